@@ -1,0 +1,194 @@
+"""The benchmark behind every speed claim: ratios inside one run, CPU time over all threads, medians over frames.
+
+Reference scene: a zoo car subdivided to at least 75,000 triangles on a ground plane, sun shadow, sky, 640x480,
+4x edge anti-aliasing; files: RGB PNG, instance PNG, float32 depth and normals TIFF, annotations.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import platform
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from viewsphere import Recipe, generate, plan, plugins
+from viewsphere.annotate import annotate
+from viewsphere.assets.mesh import Mesh
+from viewsphere.geometry.box import box_vertices
+from viewsphere.model.sample import Sample
+from viewsphere.run.stages import Stages
+from viewsphere.sampling.viewpoints import camera_for
+from viewsphere.store import Store
+from viewsphere.truth.channels import observe
+from viewsphere.truth.visibility import rasterize
+
+ROOT = Path(__file__).parent.parent
+TRIANGLES = 75_000
+
+
+def reference_recipe(frames: int, antialias: int) -> Recipe:
+    return Recipe(
+        name="bench",
+        models=[{"source": "zoo:car", "category": "car", "count": 1, "scale": {"length": 4.3}}],
+        viewpoints={
+            "azimuth": [360 * i / frames for i in range(frames)],
+            "elevation": [20],
+            "distance": 9.0,
+        },
+        camera={"size": [640, 480], "fov_deg": 40},
+        scene={"ground": True},
+        engine={"name": "raster", "antialias": antialias},
+        channels=["rgb", "depth", "instances", "normals"],
+        formats=[],
+    )
+
+
+def subdivide(mesh: Mesh) -> Mesh:
+    """Split every triangle into four until there are enough; new corners are midpoints."""
+    from dataclasses import replace
+
+    while len(mesh.triangles) < TRIANGLES:
+        t = mesh.triangles.astype(np.int64)
+        edges = np.sort(t[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+        pairs, where = np.unique(edges, axis=0, return_inverse=True)
+        m = len(mesh.vertices) + where.reshape(-1, 3)
+        a, b, c = t.T
+        split = np.stack([[a, m[:, 0], m[:, 2]], [m[:, 0], b, m[:, 1]], [m[:, 2], m[:, 1], c], m.T], axis=0)
+        triangles = split.transpose(2, 0, 1).reshape(-1, 3).astype(np.int32)
+
+        def add(array: Any, unit: bool = False, pairs: Any = pairs) -> Any:
+            if array is None:
+                return None
+            middle = array[pairs].mean(axis=1, dtype=np.float64)
+            if unit:
+                middle /= np.maximum(np.linalg.norm(middle, axis=1, keepdims=True), 1e-12)
+            return np.concatenate([array, middle.astype(np.float32)])
+
+        mesh = replace(
+            mesh,
+            vertices=add(mesh.vertices),
+            normals=add(mesh.normals, unit=True),
+            uv0=add(mesh.uv0),
+            uv1=add(mesh.uv1),
+            colors=add(mesh.colors),
+            triangles=triangles,
+            triangle_material=np.repeat(mesh.triangle_material, 4),
+            triangle_part=np.repeat(mesh.triangle_part, 4),
+        )
+    return mesh
+
+
+class Clock:
+    """CPU milliseconds of this process, all threads, by stage."""
+
+    def __init__(self) -> None:
+        self.times: dict[str, list[float]] = {}
+
+    def __call__(self, name: str, work: Callable[[], Any]) -> Any:
+        begun = time.process_time()
+        result = work()
+        self.times.setdefault(name, []).append(1e3 * (time.process_time() - begun))
+        return result
+
+    def median(self, name: str) -> float:
+        return float(np.median(self.times[name]))
+
+
+def embree_scene(geometry: Any) -> Any:
+    from embreex.mesh_construction import TriangleMesh
+    from embreex.rtcore_scene import EmbreeScene
+
+    scene = EmbreeScene(robust=True)
+    TriangleMesh(scene, geometry.vertices[geometry.triangles].astype(np.float32))
+    return scene
+
+
+def embree_frame(scene: Any, camera: Any) -> Any:
+    """One ray a pixel with camera-space z = 1, so that hit distance is z-depth; building the rays is part of the price."""
+    u, v = np.meshgrid(np.arange(camera.width) + 0.5, np.arange(camera.height) + 0.5)
+    local = np.stack([(u - camera.K[0, 2]) / camera.K[0, 0], (v - camera.K[1, 2]) / camera.K[1, 1], np.ones_like(u)], -1)
+    directions = (local.reshape(-1, 3) @ camera.R).astype(np.float32)
+    origins = np.broadcast_to(camera.center.astype(np.float32), directions.shape).copy()
+    return scene.run(origins, directions, output=True)
+
+
+def measure(frames: int, antialias: int, folder: Path) -> Clock:
+    clock = Clock()
+    planned = clock("plan (273,600 frames)", lambda: plan(Recipe.load(ROOT / "recipes" / "car_poses.yaml")))
+    clock("plan, every pose", lambda: len(planned.pose_list))
+    shot = next(iter(plan(reference_recipe(frames, antialias), shot_frames=frames).shots()))
+    mesh = subdivide(Stages().model(shot.placements[0].model))
+    engine: plugins.Engine = plugins.load("engines", "raster")
+    stage = clock("stage (once a shot)", lambda: engine.stage(shot, lambda spec: mesh))
+    boxes = [box_vertices(*mesh.bounds)]
+    try:
+        scene = embree_scene(stage.geometry)
+    except ImportError:
+        scene = None
+    store = Store(folder)
+    (folder / "store" / "writing").mkdir(parents=True)
+    names = ["depth", "instances", "normals"]
+    for turn in range(2):  # the first turn compiles and warms up
+        if turn == 1:
+            clock.times = {k: v for k, v in clock.times.items() if "plan" in k}
+            stage = clock("stage (once a shot)", lambda: engine.stage(shot, lambda spec: mesh))
+        for frame in shot.frames if turn else shot.frames[:2]:
+            camera = camera_for(shot.intrinsics, frame.pose, boxes[0].mean(axis=0))
+            begun = time.process_time()
+            visibility = clock("truth: raster", lambda: rasterize(stage.geometry, camera))
+            observed = clock("truth: channels", lambda: observe(stage.geometry, camera, visibility, names))
+            observed["rgb"] = clock("colour", lambda: stage.color(camera, frame, visibility))
+            objects = clock(
+                "annotations",
+                lambda: annotate(shot, frame, camera, stage.geometry, visibility, boxes, ["model.obj"]),
+            )
+            sample = Sample(frame.index, "train", camera, frame.pose, objects, observed, {})
+            clock("files", lambda: store.write_shot(f"{turn}-{frame.index}", [sample]))
+            clock.times.setdefault("whole frame", []).append(1e3 * (time.process_time() - begun))
+            if scene is not None:
+                clock("Embree, one ray a pixel", lambda: embree_frame(scene, camera))
+    print(f"scene: {len(mesh.triangles):,} triangles + ground, 640x480, antialias {antialias}")
+    return clock
+
+
+def throughput(folder: Path, frames: int, workers: int) -> float:
+    """Frames a second on the wall clock of a whole run with files, start of the workers included."""
+    begun = time.monotonic()
+    generate(reference_recipe(frames, 4), folder, workers=workers)
+    return frames / (time.monotonic() - begun)
+
+
+def main() -> None:
+    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    options.add_argument("--frames", type=int, default=36)
+    options.add_argument("--antialias", type=int, default=4, choices=(1, 4))
+    options.add_argument("--json", type=Path, help="write the figures here too")
+    args = options.parse_args()
+    print(f"{platform.processor() or platform.machine()}, {os.cpu_count()} cores, Python {platform.python_version()}")
+    with tempfile.TemporaryDirectory() as folder:
+        clock = measure(args.frames, args.antialias, Path(folder))
+        rates = {n: throughput(Path(folder) / f"run{n}", 8 * args.frames, n) for n in (1, 2)}
+    rows = {name: clock.median(name) for name in clock.times}
+    for name, value in rows.items():
+        print(f"{name:28}{value:10.2f} CPU ms")
+    if "Embree, one ray a pixel" in rows:
+        embree = rows["Embree, one ray a pixel"]
+        rows["truth / Embree"] = (rows["truth: raster"] + rows["truth: channels"]) / embree
+        rows["whole frame / Embree"] = rows["whole frame"] / embree
+        print(f"{'truth / Embree':28}{rows['truth / Embree']:10.2f} x")
+        print(f"{'whole frame / Embree':28}{rows['whole frame / Embree']:10.2f} x")
+    for n, rate in rates.items():
+        print(f"{f'{n} worker(s), whole run':28}{rate:10.1f} frames/s")
+    if args.json:
+        args.json.write_text(json.dumps({**rows, **{f"frames/s, {n} workers": r for n, r in rates.items()}}, indent=1))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,50 @@
+"""viewsphere: 3D models in, exactly labelled image data sets out.
+
+    import viewsphere as vs
+
+    recipe = vs.Recipe.load("recipe.yaml")
+    vs.plan(recipe).frames                     # known before anything is rendered
+    for sample in vs.render(recipe):           # in memory, no disk
+        sample.rgb, sample.depth, sample.objects[0].box3d
+    vs.generate(recipe, "out", workers=4)      # on disk, resumable
+    dataset = vs.open("out")                   # the same samples from disk
+
+Names are imported when first used, so that importing the package is quick.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from viewsphere.model.recipe import Recipe
+    from viewsphere.run.generate import export, generate
+    from viewsphere.run.memory import render
+    from viewsphere.sampling.plan import plan
+    from viewsphere.store import Dataset
+    from viewsphere.store import Dataset as open
+
+__all__ = ["Dataset", "Recipe", "export", "generate", "open", "plan", "render"]
+
+_HOMES = {
+    "Dataset": "store.Dataset",
+    "Recipe": "model.recipe.Recipe",
+    "export": "run.generate.export",
+    "generate": "run.generate.generate",
+    "open": "store.Dataset",
+    "plan": "sampling.plan.plan",
+    "render": "run.memory.render",
+}
+
+
+def __getattr__(name: str) -> Any:
+    """Import a public name from its home."""
+    from viewsphere.plugins import attribute
+
+    if name not in _HOMES:
+        raise AttributeError(f"module 'viewsphere' has no attribute {name!r}")
+    return attribute(_HOMES[name])
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -1,0 +1,114 @@
+"""All annotations of a frame's objects."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.annotate.fractions import visible_and_cut
+from viewsphere.annotate.view import view_of
+from viewsphere.geometry.box import Bounds, box_size, clip_to_image, projected_bounds
+from viewsphere.geometry.camera import project
+from viewsphere.geometry.mask import rle_of_id
+from viewsphere.geometry.pose_category import pose_category
+from viewsphere.geometry.rotation import compose, quaternion_from_matrix, rigid, transform
+from viewsphere.model.camera import Camera
+from viewsphere.model.sample import Box, ObjectAnnotation, Rle
+from viewsphere.model.shot import Frame, Placement, Shot
+from viewsphere.truth.geometry import Geometry
+from viewsphere.truth.visibility import Visibility
+
+Float = NDArray[np.float64]
+
+
+def annotate(
+    shot: Shot,
+    frame: Frame,
+    camera: Camera,
+    geometry: Geometry,
+    visibility: Visibility,
+    boxes: Sequence[Float],
+    models: Sequence[str],
+) -> tuple[ObjectAnnotation, ...]:
+    """Annotations of all placed objects, seen or not, in the order of their ids.
+
+    `boxes[i]` is the 3D box (8, 3) of placement i's model in the object's axes and `models[i]` the path of
+    that model in the data set; `geometry` is the shot's stage and `visibility` what this camera sees of it.
+    An object that covers no pixel has an empty mask, no `box2d` and visibility 0.
+    """
+    from viewsphere.geometry.kernels_box import instance_map
+
+    count = geometry.object_count
+    if not len(shot.placements) == len(boxes) == len(models) == count:
+        raise ValueError(
+            f"annotate: frame {frame.index}: expected {count} placements, boxes and models, "
+            f"got {len(shot.placements)}, {len(boxes)}, {len(models)}"
+        )
+    ids, areas, tight = instance_map(visibility.triangle, geometry.triangle_object, count)
+    parts = zip(geometry.triangle_start, geometry.triangle_start[1:], strict=False)
+    points = zip(geometry.vertex_start, geometry.vertex_start[1:], strict=False)
+    projections = [
+        projected_bounds(camera, geometry.vertices, geometry.triangles, part, corners)
+        for part, corners in zip(parts, points, strict=True)
+    ]
+    bounds, whole = [b for b, _ in projections], [w for _, w in projections]
+    annotations: list[ObjectAnnotation] = []
+    for i, placement in enumerate(shot.placements):
+        area = int(areas[i + 1])
+        x0, y0, x1, y1 = tight[i + 1].tolist() if area else (0, 0, 0, 0)
+        visible, truncated = visible_and_cut(geometry, camera, i + 1, area, bounds, whole)
+        annotations.append(
+            ObjectAnnotation(
+                id=placement.id,
+                category=placement.model.category,
+                supercategory=placement.model.supercategory,
+                category_id=placement.model.category_id,
+                key=placement.model.key,
+                model=models[i],
+                real_size=placement.model.real_size,
+                rle=Rle(camera.height, camera.width, rle_of_id(ids, i + 1, (x0, y0, x1, y1))),
+                area=area,
+                visibility=visible,
+                truncation=truncated,
+                **_flat_boxes(camera, (float(x0), float(y0), float(x1), float(y1)), bounds[i], whole[i]),
+                **_placed(camera, placement, boxes[i], shot.category_deg),
+            )
+        )
+    return tuple(annotations)
+
+
+def _flat_boxes(camera: Camera, tight: Box, bounds: Bounds | None, whole: bool) -> dict[str, Any]:
+    """The three 2D boxes; where the lens shows only a part of the model, its visible pixels count too."""
+    box2d = tight if tight[2] > tight[0] else None
+    projected = bounds and clip_to_image(bounds, camera.width, camera.height)
+    if box2d and not whole:
+        a, b = projected or box2d, box2d
+        projected = min(a[0], b[0]), min(a[1], b[1]), max(a[2], b[2]), max(a[3], b[3])
+    return {"box2d": box2d, "box2d_projected": projected, "box2d_unclipped": bounds if whole else None}
+
+
+def _placed(camera: Camera, placement: Placement, box: Float, category_deg: float) -> dict[str, Any]:
+    """The 3D box in every frame of reference, the pose, and the view of one object."""
+    world_from_object = np.array(placement.world_from_object, np.float64)
+    camera_from_world = rigid(camera.R, camera.t)
+    camera_from_object = compose(camera_from_world, world_from_object)
+    in_world = transform(world_from_object, box)
+    in_camera = transform(camera_from_world, in_world)
+    pixels, in_front = project(camera.intrinsics, in_camera)
+    view = view_of(camera_from_object, (box[2] + box[4]) / 2)
+    return {
+        "box3d_object": np.array(box, np.float64),
+        "box3d": in_world,
+        "box3d_camera": in_camera,
+        "box3d_pixels": pixels,
+        "box3d_in_front": in_front,
+        "world_from_object": world_from_object,
+        "camera_from_object": camera_from_object,
+        "quaternion": quaternion_from_matrix(camera_from_object[:3, :3]),
+        "view": view,
+        "pose_category": pose_category(view.azimuth_deg, view.elevation_deg, category_deg),
+        "size": box_size(box),
+    }

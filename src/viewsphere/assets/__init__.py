@@ -1,0 +1,1 @@
+"""Model files to normalised meshes, and back to OBJ and GLB."""

@@ -1,0 +1,148 @@
+"""Normalised meshes as OBJ and GLB files, triangles in the mesh's own order."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.assets.glb import glb_bytes
+from viewsphere.assets.mesh import Material, Mesh, Texture
+from viewsphere.assets.png import png_bytes
+from viewsphere.assets.runs import runs
+from viewsphere.assets.srgb import encoded
+
+
+def export_glb(mesh: Mesh, path: Path) -> Path:
+    """Write the mesh as GLB with all its material fields; returns the path.
+
+    In glTF's axes, an exact permutation of the object's: (x, y, z) becomes (x, z, -y). The triangles of all
+    primitives one after another are `mesh.triangles`. One node a part. Equal meshes give equal bytes.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(glb_bytes(mesh))
+    return path
+
+
+def export_obj(mesh: Mesh, folder: Path, name: str) -> Path:
+    """Write `<name>.obj`, `<name>.mtl` and its textures to the folder; returns the OBJ's path.
+
+    In object axes (Z up, front -Y, metres), with digits that read back as the same float32. The faces are
+    `mesh.triangles` in order, a group (`g`) a part. MTL keeps base colour, opacity, metallic, roughness,
+    normal, emission and clearcoat; the base colour's texture transform is applied to the coordinates. Equal
+    meshes give equal bytes.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    names = _plain_names(material.name or "material" for material in mesh.materials)
+    (folder / f"{name}.mtl").write_text(_mtl(mesh, folder, name, names), encoding="utf-8", newline="\n")
+    path = folder / f"{name}.obj"
+    with path.open("w", encoding="utf-8", newline="\n") as file:
+        file.write(f"# Z up, front -Y, metres\nmtllib {name}.mtl\n")
+        file.writelines(_obj_runs(mesh, names))
+    return path
+
+
+def _obj_runs(mesh: Mesh, names: list[str]) -> Iterable[str]:
+    parts = _plain_names(mesh.parts)
+    colors = (
+        None if mesh.colors is None else encoded(mesh.colors[:, :3].astype(np.float64)).astype(np.float32)
+    )
+    positions = mesh.vertices if colors is None else np.column_stack([mesh.vertices, colors])
+    vertex, part = 1, -1
+    for run in runs(mesh):
+        if run.part != part:
+            part = run.part
+            yield f"g {parts[part]}\n"
+        yield f"usemtl {names[run.material]}\n"
+        yield _lines("v", positions[run.vertices])
+        uv = _coordinates(mesh, mesh.materials[run.material])
+        yield _lines("vt", np.zeros((len(run.vertices), 2), np.float32) if uv is None else uv[run.vertices])
+        yield _lines("vn", mesh.normals[run.vertices])
+        corners = np.char.mod("%d", run.triangles + vertex)
+        yield "".join(f"f {a}/{a}/{a} {b}/{b}/{b} {c}/{c}/{c}\n" for a, b, c in corners.tolist())
+        vertex += len(run.vertices)
+
+
+def _lines(keyword: str, rows: NDArray[np.float32]) -> str:
+    """One line a row; the digits are the shortest that give the same float32."""
+    return "".join(f"{keyword} {' '.join(row)}\n" for row in rows.astype("U24").tolist())
+
+
+def _coordinates(mesh: Mesh, material: Material) -> NDArray[np.float32] | None:
+    """OBJ's texture coordinates (v upwards) for a material's base colour; None when the mesh has none."""
+    texture = material.base_color_texture or Texture(0)
+    uv = mesh.uv1 if texture.texcoord == 1 else mesh.uv0
+    if uv is None:
+        return None
+    u, v = (uv.astype(np.float64) * texture.scale).T
+    sine, cosine = np.sin(texture.rotation), np.cos(texture.rotation)
+    x = cosine * u + sine * v + texture.offset[0]
+    y = cosine * v - sine * u + texture.offset[1]
+    return np.column_stack([x, 1.0 - y]).astype(np.float32)
+
+
+def _plain_names(names: Iterable[str]) -> list[str]:
+    """Names without blanks and control characters, all different."""
+    taken: dict[str, int] = {}
+    plain: list[str] = []
+    for name in names:
+        base = re.sub(r"[\s\x00-\x1f\\#]+", "_", name).strip("_") or "part"
+        unique = base
+        while unique in taken:
+            taken[base] += 1
+            unique = f"{base}_{taken[base]}"
+        taken[unique] = 1
+        plain.append(unique)
+    return plain
+
+
+def _mtl(mesh: Mesh, folder: Path, name: str, names: list[str]) -> str:
+    blocks: list[str] = []
+    written: set[str] = set()
+    for material, plain in zip(mesh.materials, names, strict=True):
+        lines = [
+            f"newmtl {plain}",
+            f"Kd {_numbers(material.base_color[:3])}",
+            f"d {_numbers(material.base_color[3:] if material.alpha_mode == 'BLEND' else (1.0,))}",
+            f"Pr {_numbers((material.roughness,))}",
+            f"Pm {_numbers((material.metallic,))}",
+            f"Ke {_numbers(material.emissive)}",
+            f"Pc {_numbers((material.clearcoat,))}",
+            f"Pcr {_numbers((material.clearcoat_roughness,))}",
+        ]
+        lines += _maps(mesh, material, folder, name, written)
+        blocks.append("\n".join(lines) + "\n")
+    return "\n".join(blocks)
+
+
+def _maps(mesh: Mesh, material: Material, folder: Path, name: str, written: set[str]) -> list[str]:
+    """The material's map_ statements; their images are written beside the file."""
+    rgba, rgb = ([0, 1, 2, 3], "rgba"), ([0, 1, 2], "rgb")
+    color = rgb if material.alpha_mode == "OPAQUE" else rgba
+    wanted = (
+        ("map_Kd", material.base_color_texture, *color),
+        ("map_Pr", material.metallic_roughness_texture, [1], "roughness"),
+        ("map_Pm", material.metallic_roughness_texture, [2], "metallic"),
+        ("map_Ke", material.emissive_texture, *rgb),
+        ("norm", material.normal_texture, *rgb),
+    )
+    lines: list[str] = []
+    for keyword, texture, channels, kind in wanted:
+        if texture is None:
+            continue
+        file = f"{name}_{texture.image}_{kind}.png"
+        image = mesh.images[texture.image]
+        if file not in written:
+            (folder / file).write_bytes(png_bytes(image.pixels[..., channels]))
+            written.add(file)
+        clamp = "-clamp on " if texture.wrap_s == "clamp" else ""
+        strength = f"-bm {_numbers((material.normal_scale,))} " if keyword == "norm" else ""
+        lines.append(f"{keyword} {clamp}{strength}{file}")
+    return lines
+
+
+def _numbers(values: Iterable[float]) -> str:
+    return " ".join(repr(float(value)) for value in values)

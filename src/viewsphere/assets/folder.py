@@ -1,0 +1,210 @@
+"""The one way a reader opens files: none leaves the model's folder unasked, and each is remembered."""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import io
+import re
+import warnings
+from dataclasses import dataclass, field
+from pathlib import Path, PurePosixPath
+from typing import Any
+from urllib.parse import unquote, unquote_to_bytes
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.assets import limits
+from viewsphere.assets.mesh import Image
+from viewsphere.errors import ModelError
+
+IMAGE_FORMATS = ("PNG", "JPEG", "WEBP", "BMP", "GIF", "TIFF", "TGA", "DDS", "PPM")
+
+
+class UnreadableError(Exception):
+    """A file that the model names and that cannot be used; the message says why."""
+
+
+@dataclass(eq=False)
+class ModelFolder:
+    """The folder of one model file while it is read.
+
+    `files` are all files read or looked for, the model itself first; `warnings` what had to be left out, each
+    naming the model's file; `images` the textures decoded so far, in order of first use.
+    """
+
+    model: Path
+    confined: bool = True
+    files: list[Path] = field(default_factory=list[Path])
+    warnings: list[str] = field(default_factory=list[str])
+    images: list[Image] = field(default_factory=list[Image])
+    _indices: dict[str, int | None] = field(default_factory=dict[str, "int | None"])
+
+    def warn(self, message: str) -> None:
+        """Add a warning, once, with the model's name before it."""
+        line = f"{self.model.name}: {message}"
+        if line not in self.warnings:
+            self.warnings.append(line)
+
+    def error(self, message: str) -> ModelError:
+        """The error that says this of the model's file."""
+        return ModelError(f"{self.model}: {message}")
+
+    def read_model(self) -> bytes:
+        """The model file's own bytes; ModelError when it is missing, empty, unreadable or too large."""
+        self.files.append(self.model)
+        try:
+            size = self.model.stat().st_size
+            if not self.model.is_file():
+                raise self.error("expected a file, found a folder or a device")
+            if size > limits.MAX_FILE_BYTES:
+                raise self.error(
+                    f"expected at most {limits.MAX_FILE_BYTES >> 30} GiB, found {size / 2**30:.1f} GiB"
+                )
+            data = self.model.read_bytes()
+        except FileNotFoundError:
+            raise self.error("no such file; check the path") from None
+        except OSError as error:
+            raise self.error(f"cannot be read: {error.strerror or error}") from None
+        if not data:
+            raise self.error("the file is empty; export the model again")
+        return data
+
+    def read(self, reference: str, what: str = "file") -> bytes:
+        """Bytes of a file that the model names, or of a data: URI.
+
+        Raises UnreadableError when there is none, or when it lies outside the model's folder and the folder
+        is confined. A path that leads nowhere (or outside) but whose last part lies beside the model is read
+        from there, with a warning.
+        """
+        if reference.startswith("data:"):
+            return _data_uri(reference)
+        path = self._find(reference, what)
+        if path.stat().st_size > limits.MAX_FILE_BYTES:
+            raise UnreadableError(f"{what} {reference!r} is larger than {limits.MAX_FILE_BYTES >> 30} GiB")
+        try:
+            return path.read_bytes()
+        except OSError as error:
+            raise UnreadableError(f"{what} {reference!r} cannot be read: {error.strerror or error}") from None
+
+    def _find(self, reference: str, what: str) -> Path:
+        if re.match(r"(?i)[a-z][a-z0-9+.-]+://", reference) or "\0" in reference:
+            raise UnreadableError(
+                f"{what} {_short(reference)} is not a path below the model's folder; it is not fetched"
+            )
+        root = self.model.parent.resolve()
+        name = reference.replace("\\", "/").strip()
+        target = (root / name).resolve()
+        inside = target.is_relative_to(root)
+        drive = re.match(r"[A-Za-z]:", name) is not None
+        if not drive and (inside or not self.confined):
+            found = self._existing(target)
+            if found is not None:
+                return found
+        beside = self._existing(root / PurePosixPath(name).name) if PurePosixPath(name).name else None
+        if beside is not None and beside.resolve().is_relative_to(root):
+            self.warn(f"{what} {reference!r} was read from beside the model instead")
+            return beside
+        if inside or drive or not self.confined:
+            raise UnreadableError(f"{what} {_short(reference)} does not exist")
+        raise UnreadableError(
+            f"{what} {_short(reference)} is outside the model's folder, not read; "
+            "set confined: false to allow"
+        )
+
+    def _existing(self, path: Path) -> Path | None:
+        """This file, or the one beside it whose name differs in case only; both are remembered."""
+        try:
+            self._remember(path)
+            if path.is_file():
+                return path
+            if not path.parent.is_dir():
+                return None
+            wanted = path.name.casefold()
+            for other in sorted(path.parent.iterdir()):
+                if other.name.casefold() == wanted and other.is_file():
+                    self._remember(other)
+                    return other
+        except (OSError, ValueError):
+            return None
+        return None
+
+    def _remember(self, path: Path) -> None:
+        if path not in self.files:
+            self.files.append(path)
+
+    def image(self, key: str, name: str, data: bytes | None = None) -> int | None:
+        """Index in `images` of the texture `key` (a path or data: URI, or any name when `data` holds its
+        bytes).
+
+        None, with a warning, when it cannot be used: the material's factors stand alone then.
+        """
+        if key not in self._indices:
+            index = None
+            try:
+                data = self.read(key, "texture") if data is None else data
+                index = self.add_image(Image(name, decode_image(data, f"texture {_short(name)}")))
+            except UnreadableError as error:
+                self.warn(f"{error}; the material's plain factor is used")
+            self._indices[key] = index
+        return self._indices[key]
+
+    def add_image(self, image: Image) -> int:
+        """Keep an image; its index."""
+        if len(self.images) >= limits.MAX_TEXTURES:
+            raise self.error(f"expected at most {limits.MAX_TEXTURES} textures; merge some into an atlas")
+        self.images.append(image)
+        return len(self.images) - 1
+
+
+def decode_image(data: bytes, where: str) -> NDArray[np.uint8]:
+    """Decode a texture to (H, W, 4) uint8; 16-bit channels keep their upper byte.
+
+    Raises UnreadableError, beginning with `where`: no image, a damaged one, or one beyond `limits`.
+    """
+    from PIL import Image as Pillow
+    from PIL import UnidentifiedImageError
+
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            picture = Pillow.open(io.BytesIO(data), formats=IMAGE_FORMATS)
+            width, height = picture.size
+            if max(width, height) <= limits.MAX_TEXTURE_SIDE and width * height <= limits.MAX_TEXTURE_PIXELS:
+                return image_pixels(picture)
+            found = f"{width}x{height}"
+    except UnidentifiedImageError:
+        raise UnreadableError(f"{where} is not an image in one of {', '.join(IMAGE_FORMATS)}") from None
+    except Pillow.DecompressionBombError:
+        found = "many more"
+    except Exception as error:  # Pillow's decoders raise whatever their format's parser does
+        raise UnreadableError(f"{where} cannot be decoded ({str(error)[:80]})") from None
+    most = f"{limits.MAX_TEXTURE_SIDE} px a side and {limits.MAX_TEXTURE_PIXELS:,} in all"
+    raise UnreadableError(f"{where}: expected at most {most}, found {found}")
+
+
+def image_pixels(picture: Any) -> NDArray[np.uint8]:
+    """Pixels (H, W, 4) uint8 RGBA of a Pillow image; 16-bit channels keep their upper byte."""
+    from PIL import Image as Pillow
+
+    if picture.mode.startswith("I"):
+        grey = (np.asarray(picture).astype(np.int64) >> 8).clip(0, 255).astype(np.uint8)
+        picture = Pillow.fromarray(grey)
+    return np.array(picture.convert("RGBA"), dtype=np.uint8)
+
+
+def _data_uri(uri: str) -> bytes:
+    head, comma, body = uri.partition(",")
+    if not comma:
+        raise UnreadableError("the data URI has no comma before its data")
+    if not head.endswith(";base64"):
+        return unquote_to_bytes(body)
+    try:
+        return base64.b64decode(unquote(body), validate=True)
+    except (binascii.Error, ValueError):
+        raise UnreadableError("the data URI is not valid base64") from None
+
+
+def _short(text: str) -> str:
+    return repr(text if len(text) <= 120 else text[:117] + "...")

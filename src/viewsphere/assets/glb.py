@@ -1,0 +1,241 @@
+"""A mesh as the bytes of a GLB file (glTF 2.0) with every material field that Mesh keeps."""
+
+from __future__ import annotations
+
+import io
+import json
+import struct
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.assets.mesh import Material, Mesh, Texture
+from viewsphere.assets.png import png_bytes
+from viewsphere.assets.runs import Run, runs
+
+WRAP_CODES = {"clamp": 33071, "mirror": 33648, "repeat": 10497}
+NEAREST, LINEAR, LINEAR_MIPMAP_LINEAR = 9728, 9729, 9987
+FLOAT, UINT32 = 5126, 5125
+ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER = 34962, 34963
+
+Object = dict[str, Any]
+
+
+def glb_bytes(mesh: Mesh) -> bytes:
+    """GLB of a mesh in object axes: one node and mesh a part, one primitive a run, in order."""
+    writer = _Writer(mesh)
+    for run in runs(mesh):
+        writer.add_run(run)
+    writer.add_materials()
+    return writer.packed()
+
+
+@dataclass(eq=False)
+class _Writer:
+    mesh: Mesh
+    binary: io.BytesIO = field(default_factory=io.BytesIO)
+    views: list[Object] = field(default_factory=list[Object])
+    accessors: list[Object] = field(default_factory=list[Object])
+    meshes: list[Object] = field(default_factory=list[Object])
+    materials: list[Object] = field(default_factory=list[Object])
+    samplers: list[Object] = field(default_factory=list[Object])
+    textures: list[Object] = field(default_factory=list[Object])
+    extensions: set[str] = field(default_factory=set[str])
+    last_part: int = -1
+
+    def add_run(self, run: Run) -> None:
+        mesh, at = self.mesh, run.vertices
+        turned = np.array([0, 2, 1])
+        signs = np.array([1, 1, -1], np.float32)
+        attributes = {
+            "POSITION": self.accessor(mesh.vertices[at][:, turned] * signs, "VEC3", bounded=True),
+            "NORMAL": self.accessor(mesh.normals[at][:, turned] * signs, "VEC3"),
+        }
+        for name, array, kind in (
+            ("TEXCOORD_0", mesh.uv0, "VEC2"),
+            ("TEXCOORD_1", mesh.uv1, "VEC2"),
+            ("COLOR_0", mesh.colors, "VEC4"),
+        ):
+            if array is not None:
+                attributes[name] = self.accessor(array[at], kind)
+        indices = self.accessor(run.triangles.astype(np.uint32).reshape(-1, 1), "SCALAR")
+        if run.part != self.last_part:
+            self.meshes.append({"name": mesh.parts[run.part], "primitives": []})
+            self.last_part = run.part
+        self.meshes[-1]["primitives"].append(
+            {"attributes": attributes, "indices": indices, "material": run.material, "mode": 4}
+        )
+
+    def view(self, data: bytes, target: int | None = None) -> int:
+        self.binary.write(b"\0" * (-self.binary.tell() % 4))
+        entry: Object = {"buffer": 0, "byteOffset": self.binary.tell(), "byteLength": len(data)}
+        if target is not None:
+            entry["target"] = target
+        self.binary.write(data)
+        self.views.append(entry)
+        return len(self.views) - 1
+
+    def accessor(self, rows: NDArray[Any], kind: str, bounded: bool = False) -> int:
+        is_float = rows.dtype == np.float32
+        data = np.ascontiguousarray(rows, "<f4" if is_float else "<u4")
+        entry: Object = {
+            "bufferView": self.view(data.tobytes(), ARRAY_BUFFER if is_float else ELEMENT_ARRAY_BUFFER),
+            "componentType": FLOAT if is_float else UINT32,
+            "count": len(rows),
+            "type": kind,
+        }
+        if bounded:
+            entry["min"], entry["max"] = data.min(axis=0).tolist(), data.max(axis=0).tolist()
+        self.accessors.append(entry)
+        return len(self.accessors) - 1
+
+    def texture(self, texture: Texture, **more: float) -> Object:
+        """A textureInfo; samplers and textures are shared."""
+        sampler: Object = {
+            "magFilter": NEAREST if texture.nearest else LINEAR,
+            "minFilter": NEAREST if texture.nearest else LINEAR_MIPMAP_LINEAR,
+            "wrapS": WRAP_CODES[texture.wrap_s],
+            "wrapT": WRAP_CODES[texture.wrap_t],
+        }
+        entry: Object = {"sampler": _index(self.samplers, sampler), "source": texture.image}
+        info: Object = {"index": _index(self.textures, entry), "texCoord": texture.texcoord, **more}
+        transform: Object = {
+            "offset": list(texture.offset),
+            "rotation": texture.rotation,
+            "scale": list(texture.scale),
+        }
+        if transform != {"offset": [0.0, 0.0], "rotation": 0.0, "scale": [1.0, 1.0]}:
+            info["extensions"] = {"KHR_texture_transform": transform}
+            self.extensions.add("KHR_texture_transform")
+        return info
+
+    def add_materials(self) -> None:
+        self.materials = [self.material(material) for material in self.mesh.materials]
+
+    def material(self, m: Material) -> Object:
+        pbr: Object = {
+            "baseColorFactor": list(m.base_color),
+            "metallicFactor": m.metallic,
+            "roughnessFactor": m.roughness,
+        }
+        # glTF bounds emissiveFactor by 1; what is brighter goes to the extension.
+        strength = max(1.0, *m.emissive)
+        entry: Object = {
+            "name": m.name,
+            "pbrMetallicRoughness": pbr,
+            "emissiveFactor": [value / strength for value in m.emissive],
+            "alphaMode": m.alpha_mode,
+            "doubleSided": m.double_sided,
+        }
+        if m.alpha_mode == "MASK":
+            entry["alphaCutoff"] = m.alpha_cutoff
+        if m.base_color_texture is not None:
+            pbr["baseColorTexture"] = self.texture(m.base_color_texture)
+        if m.metallic_roughness_texture is not None:
+            pbr["metallicRoughnessTexture"] = self.texture(m.metallic_roughness_texture)
+        if m.normal_texture is not None:
+            entry["normalTexture"] = self.texture(m.normal_texture, scale=m.normal_scale)
+        if m.occlusion_texture is not None:
+            entry["occlusionTexture"] = self.texture(m.occlusion_texture, strength=m.occlusion_strength)
+        if m.emissive_texture is not None:
+            entry["emissiveTexture"] = self.texture(m.emissive_texture)
+        extensions = self.material_extensions(m, strength)
+        if extensions:
+            entry["extensions"] = extensions
+            self.extensions.update(extensions)
+        return entry
+
+    def material_extensions(self, m: Material, strength: float) -> Object:
+        """Extensions whose fields are not the default."""
+        plain = Material()
+        coat = self.group(
+            m,
+            {"clearcoatFactor": "clearcoat", "clearcoatRoughnessFactor": "clearcoat_roughness"},
+            {
+                "clearcoatTexture": "clearcoat_texture",
+                "clearcoatRoughnessTexture": "clearcoat_roughness_texture",
+                "clearcoatNormalTexture": "clearcoat_normal_texture",
+            },
+        )
+        glass = self.group(
+            m, {"transmissionFactor": "transmission"}, {"transmissionTexture": "transmission_texture"}
+        )
+        specular = self.group(
+            m,
+            {"specularFactor": "specular", "specularColorFactor": "specular_color"},
+            {"specularTexture": "specular_texture", "specularColorTexture": "specular_color_texture"},
+        )
+        found: Object = {
+            "KHR_materials_clearcoat": coat,
+            "KHR_materials_transmission": glass,
+            "KHR_materials_specular": specular,
+            "KHR_materials_ior": {"ior": m.ior} if m.ior != plain.ior else {},
+            "KHR_materials_emissive_strength": {"emissiveStrength": strength} if strength > 1.0 else {},
+        }
+        kept: Object = {name: value for name, value in found.items() if value}
+        if m.unlit:
+            kept["KHR_materials_unlit"] = {}
+        return kept
+
+    def group(self, m: Material, factors: dict[str, str], textures: dict[str, str]) -> Object:
+        """One extension's factors and textures; empty when all are the default."""
+        plain = Material()
+        if all(getattr(m, name) == getattr(plain, name) for name in (*factors.values(), *textures.values())):
+            return {}
+        found: Object = {key: getattr(m, name) for key, name in factors.items()}
+        for key, name in textures.items():
+            texture: Texture | None = getattr(m, name)
+            if texture is not None:
+                found[key] = self.texture(texture)
+        return found
+
+    def packed(self) -> bytes:
+        """The whole file."""
+        images: list[Object] = []
+        for image in self.mesh.images:
+            images.append(
+                {
+                    "name": image.name,
+                    "mimeType": "image/png",
+                    "bufferView": self.view(png_bytes(image.pixels)),
+                }
+            )
+        count = len(self.meshes)
+        root: Object = {
+            "asset": {"version": "2.0", "generator": "viewsphere"},
+            "scene": 0,
+            "scenes": [{"nodes": list(range(count))}],
+            "nodes": [{"name": mesh["name"], "mesh": i} for i, mesh in enumerate(self.meshes)],
+            "meshes": self.meshes,
+            "materials": self.materials,
+            "accessors": self.accessors,
+            "bufferViews": self.views,
+            "buffers": [{"byteLength": self.binary.tell()}],
+        }
+        optional = {"images": images, "samplers": self.samplers, "textures": self.textures}
+        root |= {name: value for name, value in optional.items() if value}
+        if self.extensions:
+            root["extensionsUsed"] = sorted(self.extensions)
+        text = json.dumps(root, separators=(",", ":"), ensure_ascii=False).encode()
+        text += b" " * (-len(text) % 4)
+        data = self.binary.getvalue()
+        data += b"\0" * (-len(data) % 4)
+        head = struct.pack("<4sII", b"glTF", 2, 12 + 8 + len(text) + 8 + len(data))
+        return b"".join(
+            [
+                head,
+                struct.pack("<I4s", len(text), b"JSON"),
+                text,
+                struct.pack("<I4s", len(data), b"BIN\0"),
+                data,
+            ]
+        )
+
+
+def _index(entries: list[Object], entry: Object) -> int:
+    """Index of an equal entry, added if there is none."""
+    if entry not in entries:
+        entries.append(entry)
+    return entries.index(entry)

@@ -1,0 +1,27 @@
+"""glTF 2.0 and GLB: our own reader, because none in Python keeps all of a material.
+
+https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html
+"""
+
+from __future__ import annotations
+
+from viewsphere.assets.folder import ModelFolder
+from viewsphere.assets.gltf.document import Document
+from viewsphere.assets.gltf.material import read_materials
+from viewsphere.assets.gltf.scene import read_pieces
+from viewsphere.assets.mesh import Mesh
+from viewsphere.assets.piece import FileFacts, assemble
+
+
+def read_gltf(folder: ModelFolder) -> tuple[Mesh, FileFacts]:
+    """The file's default scene as one mesh in glTF's axes (up +Y, front +Z, metres), at rest.
+
+    Skins stand in their bind pose with the scene's joints, morph targets at their default weights, instances
+    are repeated. One part a node, named by the node or its mesh. Raises ModelError for a file that breaks the
+    specification where it matters, or that requires an extension not read here.
+    """
+    document = Document.read(folder)
+    pieces = read_pieces(document)
+    materials = read_materials(document)
+    facts = FileFacts(folder.model, folder.model.suffix[1:].lower(), "+y", "+z", 1.0)
+    return assemble(folder, pieces, materials, facts)

@@ -1,0 +1,183 @@
+"""Materials of a glTF file, with the extensions that Material keeps."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+from urllib.parse import unquote
+
+import numpy as np
+
+from viewsphere.assets.gltf.document import Document
+from viewsphere.assets.gltf.field import Field
+from viewsphere.assets.mesh import Material, Texture, Wrap
+
+WRAPS: dict[int, Wrap] = {33071: "clamp", 33648: "mirror", 10497: "repeat"}
+NEAREST = 9728
+DIELECTRIC = 0.04  # reflectance at normal incidence of ior 1.5
+
+
+def read_materials(document: Document) -> list[Material]:
+    """All materials in file order, then one for primitives that name none.
+
+    Primitives without material are plain white plastic rather than the specification's mirror-like metal.
+    """
+    reader = _Reader(document)
+    return [*(reader.material(entry) for entry in document.root.items("materials")), Material(name="default")]
+
+
+@dataclass(frozen=True)
+class _Reader:
+    document: Document
+
+    def material(self, entry: Field) -> Material:
+        pbr = entry.get("pbrMetallicRoughness")
+        modes: dict[str, Literal["OPAQUE", "MASK", "BLEND"]] = {
+            "OPAQUE": "OPAQUE",
+            "MASK": "MASK",
+            "BLEND": "BLEND",
+        }
+        mode = entry.text("alphaMode", "OPAQUE")
+        if mode not in modes:
+            raise entry.fail("alphaMode OPAQUE, MASK or BLEND")
+        color = pbr.numbers("baseColorFactor", 4, (1.0, 1.0, 1.0, 1.0))
+        emissive = entry.numbers("emissiveFactor", 3, (0.0, 0.0, 0.0))
+        strength = entry.extension("KHR_materials_emissive_strength")
+        glow = 1.0 if strength is None else strength.number("emissiveStrength", 1.0)
+        normal, occlusion = entry.get("normalTexture"), entry.get("occlusionTexture")
+        material = Material(
+            name=entry.text("name"),
+            base_color=(color[0], color[1], color[2], color[3]),
+            base_color_texture=self.texture(pbr, "baseColorTexture"),
+            metallic=pbr.number("metallicFactor", 1.0),
+            roughness=pbr.number("roughnessFactor", 1.0),
+            metallic_roughness_texture=self.texture(pbr, "metallicRoughnessTexture"),
+            normal_texture=self.texture(entry, "normalTexture"),
+            normal_scale=normal.number("scale", 1.0),
+            occlusion_texture=self.texture(entry, "occlusionTexture"),
+            occlusion_strength=occlusion.number("strength", 1.0),
+            emissive=(emissive[0] * glow, emissive[1] * glow, emissive[2] * glow),
+            emissive_texture=self.texture(entry, "emissiveTexture"),
+            alpha_mode=modes[mode],
+            alpha_cutoff=entry.number("alphaCutoff", 0.5),
+            double_sided=entry.boolean("doubleSided"),
+            unlit=entry.extension("KHR_materials_unlit") is not None,
+        )
+        return self._specular_glossiness(entry, replace(material, **self._extensions(entry)))
+
+    def _extensions(self, entry: Field) -> dict[str, Any]:
+        found: dict[str, Any] = {}
+        coat = entry.extension("KHR_materials_clearcoat")
+        if coat is not None:
+            found["clearcoat"] = coat.number("clearcoatFactor", 0.0)
+            found["clearcoat_texture"] = self.texture(coat, "clearcoatTexture")
+            found["clearcoat_roughness"] = coat.number("clearcoatRoughnessFactor", 0.0)
+            found["clearcoat_roughness_texture"] = self.texture(coat, "clearcoatRoughnessTexture")
+            found["clearcoat_normal_texture"] = self.texture(coat, "clearcoatNormalTexture")
+        glass = entry.extension("KHR_materials_transmission")
+        if glass is not None:
+            found["transmission"] = glass.number("transmissionFactor", 0.0)
+            found["transmission_texture"] = self.texture(glass, "transmissionTexture")
+        refraction = entry.extension("KHR_materials_ior")
+        if refraction is not None:
+            found["ior"] = refraction.number("ior", 1.5)
+        specular = entry.extension("KHR_materials_specular")
+        if specular is not None:
+            found["specular"] = specular.number("specularFactor", 1.0)
+            found["specular_texture"] = self.texture(specular, "specularTexture")
+            found["specular_color"] = specular.numbers("specularColorFactor", 3, (1.0, 1.0, 1.0))
+            found["specular_color_texture"] = self.texture(specular, "specularColorTexture")
+        return found
+
+    def _specular_glossiness(self, entry: Field, material: Material) -> Material:
+        """KHR_materials_pbrSpecularGlossiness as metallic-roughness; its second texture is not kept."""
+        old = entry.extension("KHR_materials_pbrSpecularGlossiness")
+        if old is None:
+            return material
+        diffuse = old.numbers("diffuseFactor", 4, (1.0, 1.0, 1.0, 1.0))
+        specular = old.numbers("specularFactor", 3, (1.0, 1.0, 1.0))
+        diffuse_texture = self.texture(old, "diffuseTexture")
+        if "specularGlossinessTexture" in old:
+            self.document.folder.warn(f"material {material.name!r}: specularGlossinessTexture is not read")
+            metallic, color = 0.0, diffuse[:3]
+        else:
+            metallic, color = _metallic(diffuse[:3], specular)
+        return replace(
+            material,
+            base_color=(color[0], color[1], color[2], diffuse[3]),
+            base_color_texture=diffuse_texture,
+            metallic=metallic,
+            roughness=1.0 - old.number("glossinessFactor", 1.0),
+            metallic_roughness_texture=None,
+        )
+
+    def texture(self, parent: Field, key: str) -> Texture | None:
+        """The textureInfo under `key`, None when there is none or its image cannot be used."""
+        if key not in parent:
+            return None
+        info = parent.get(key)
+        entry = self.document.root.at("textures", info.integer("index"))
+        image = self._image(entry)
+        transform = info.extension("KHR_texture_transform") or Field({}, info.where)
+        texcoord = transform.integer("texCoord", info.integer("texCoord", 0))
+        if image is None or texcoord > 1:
+            if image is not None:
+                self.document.folder.warn(
+                    f"{key} uses TEXCOORD_{texcoord}, only 0 and 1 are read; its factor is used"
+                )
+            return None
+        sampler = (
+            self.document.root.at("samplers", entry.integer("sampler"))
+            if "sampler" in entry
+            else Field({}, "")
+        )
+        offset = transform.numbers("offset", 2, (0.0, 0.0))
+        scale = transform.numbers("scale", 2, (1.0, 1.0))
+        return Texture(
+            image=image,
+            texcoord=texcoord,
+            wrap_s=WRAPS.get(sampler.integer("wrapS", 10497), "repeat"),
+            wrap_t=WRAPS.get(sampler.integer("wrapT", 10497), "repeat"),
+            nearest=sampler.integer("magFilter", 0) == NEAREST,
+            offset=(offset[0], offset[1]),
+            rotation=transform.number("rotation", 0.0),
+            scale=(scale[0], scale[1]),
+        )
+
+    def _image(self, texture: Field) -> int | None:
+        folder = self.document.folder
+        webp = texture.extension("EXT_texture_webp")
+        if "source" not in texture and webp is None:
+            other = ", ".join(texture.get("extensions").mapping()) or "no source"
+            folder.warn(f"a texture with {other} is not read; the material's plain factor is used")
+            return None
+        index = texture.integer("source") if webp is None else webp.integer("source")
+        entry = self.document.root.at("images", index)
+        name = entry.text("name") or f"image{index}"
+        if "bufferView" in entry:
+            data, _ = self.document.view(entry.integer("bufferView"))
+            return folder.image(f"#{index}", name, bytes(data))
+        uri = entry.text("uri", "data:")
+        if uri.startswith("data:"):
+            return folder.image(uri, name)
+        return folder.image(unquote(uri), entry.text("name") or unquote(uri))
+
+
+def _metallic(diffuse: tuple[float, ...], specular: tuple[float, ...]) -> tuple[float, tuple[float, ...]]:
+    """Metallic factor and base colour with the same diffuse and specular brightness."""
+    weights = np.array([0.299, 0.587, 0.114])
+    d, s = (float(np.sqrt(weights @ np.square(c))) for c in (diffuse, specular))
+    strength = 1.0 - max(specular)
+    if s < DIELECTRIC:
+        metallic = 0.0
+    else:
+        b = d * strength / (1 - DIELECTRIC) + s - 2 * DIELECTRIC
+        c = DIELECTRIC - s
+        metallic = float(
+            np.clip((-b + np.sqrt(max(b * b - 4 * DIELECTRIC * c, 0.0))) / (2 * DIELECTRIC), 0.0, 1.0)
+        )
+    tiny = 1e-6
+    from_diffuse = np.array(diffuse) * strength / (1 - DIELECTRIC) / max(1 - metallic, tiny)
+    from_specular = (np.array(specular) - DIELECTRIC * (1 - metallic)) / max(metallic, tiny)
+    mixed = from_diffuse + (from_specular - from_diffuse) * metallic**2
+    return metallic, tuple(float(x) for x in np.clip(mixed, 0.0, 1.0))

@@ -1,0 +1,282 @@
+"""Nodes, meshes, skins and instances of a glTF file, as pieces in world coordinates."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from viewsphere.assets import limits
+from viewsphere.assets.gltf.document import Document
+from viewsphere.assets.gltf.field import Field
+from viewsphere.assets.piece import Float, Int, Piece
+from viewsphere.assets.smoothing import flat
+from viewsphere.assets.transform import moved, unit
+
+TRIANGLES, STRIP, FAN = 4, 5, 6
+
+
+def read_pieces(document: Document) -> list[Piece]:
+    """The triangles of the default scene, node by node, transforms applied."""
+    worlds = _world_matrices(document)
+    pieces: list[Piece] = []
+    parts: set[str] = set()
+    meshes: dict[int, list[Piece]] = {}  # unmorphed and unskinned, for instances
+    total = 0
+    for index, world in worlds.items():
+        node = document.root.at("nodes", index)
+        if "mesh" not in node:
+            continue
+        mesh = node.integer("mesh")
+        entry = document.root.at("meshes", mesh)
+        part = _unused(node.text("name") or entry.text("name") or f"node{index}", parts)
+        weights = tuple(_weights(node) or _weights(entry))
+        if "skin" in node or any(weights):
+            local = _primitives(document, entry, weights, _joints(document, node, worlds))
+        else:
+            local = meshes.setdefault(mesh, []) or _primitives(document, entry, (), None)
+            meshes[mesh] = local
+        matrices = [np.eye(4)] if "skin" in node else _instances(document, node, world)
+        total += len(matrices) * sum(len(piece.triangles) for piece in local)
+        _check_total(document, total)
+        placed = (replace(moved(piece, matrix), part=part) for matrix in matrices for piece in local)
+        pieces.extend(piece if piece.normals is not None else flat(piece) for piece in placed)
+    return pieces
+
+
+def _check_total(document: Document, total: int) -> None:
+    if total > limits.MAX_TRIANGLES:
+        raise document.folder.error(
+            f"expected at most {limits.MAX_TRIANGLES:,} triangles, found {total:,} "
+            "with all instances; simplify the model"
+        )
+
+
+def _unused(name: str, taken: set[str]) -> str:
+    unique, number = name, 2
+    while unique in taken:
+        unique, number = f"{name}_{number}", number + 1
+    taken.add(unique)
+    return unique
+
+
+def _world_matrices(document: Document) -> dict[int, Float]:
+    """Node-to-world matrices (4, 4) of the default scene, parents first, in file order."""
+    root = document.root
+    nodes = root.items("nodes")
+    if "scenes" in root and root.items("scenes"):
+        starts = _indices(root.at("scenes", root.integer("scene", 0)), "nodes")
+    else:
+        children = {child for node in nodes for child in _indices(node, "children")}
+        starts = [i for i in range(len(nodes)) if i not in children]
+    worlds: dict[int, Float] = {}
+    stack = [(index, np.eye(4)) for index in reversed(starts)]
+    while stack:
+        index, parent = stack.pop()
+        if index in worlds:
+            raise document.folder.error(
+                f"nodes[{index}] is reached twice: expected a tree, found a cycle or a shared child"
+            )
+        node = root.at("nodes", index)
+        worlds[index] = parent @ _local_matrix(node)
+        stack.extend((child, worlds[index]) for child in reversed(_indices(node, "children")))
+    return worlds
+
+
+def _indices(entry: Field, key: str) -> list[int]:
+    values = [item.value for item in entry.items(key)]
+    if not all(isinstance(v, int) and not isinstance(v, bool) and v >= 0 for v in values):
+        raise Field(values, f"{entry.where}.{key}").fail("whole numbers")
+    return values
+
+
+def _weights(entry: Field) -> list[float]:
+    count = len(entry.items("weights"))
+    return list(entry.numbers("weights", count, ()))
+
+
+def _local_matrix(node: Field) -> Float:
+    if "matrix" in node:
+        return np.array(node.numbers("matrix", 16, ())).reshape(4, 4).T
+    return _compose(
+        np.array([node.numbers("translation", 3, (0.0, 0.0, 0.0))]),
+        np.array([node.numbers("rotation", 4, (0.0, 0.0, 0.0, 1.0))]),
+        np.array([node.numbers("scale", 3, (1.0, 1.0, 1.0))]),
+    )[0]
+
+
+def _compose(translation: Float, rotation: Float, scale: Float) -> Float:
+    """Matrices (N, 4, 4) from translations, quaternions (x, y, z, w) and scales."""
+    length = np.linalg.norm(rotation, axis=1, keepdims=True)
+    x, y, z, w = np.where(length > 0, rotation / np.where(length > 0, length, 1.0), (0.0, 0.0, 0.0, 1.0)).T
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ]
+    matrices = np.tile(np.eye(4), (len(translation), 1, 1))
+    matrices[:, :3, :3] = np.moveaxis(np.array(rows), -1, 0) * scale[:, None, :]
+    matrices[:, :3, 3] = translation
+    return matrices
+
+
+def _instances(document: Document, node: Field, world: Float) -> list[Float]:
+    """World matrices of a node's mesh: one, or those of EXT_mesh_gpu_instancing."""
+    instancing = node.extension("EXT_mesh_gpu_instancing")
+    if instancing is None:
+        return [world]
+    attributes = instancing.get("attributes")
+    widths = {"TRANSLATION": (3, 0.0), "ROTATION": (4, 0.0), "SCALE": (3, 1.0)}
+    read = {
+        key: document.accessor(attributes.integer(key), (width,)).astype(np.float64)
+        for key, (width, _) in widths.items()
+        if key in attributes
+    }
+    counts = {len(values) for values in read.values()}
+    if len(counts) != 1:
+        raise attributes.fail("attributes of one length")
+    count = counts.pop()
+    t, r, s = (read.get(key, np.full((count, width), empty)) for key, (width, empty) in widths.items())
+    return list(world @ _compose(t, r, s))
+
+
+def _primitives(
+    document: Document, mesh: Field, weights: tuple[float, ...], joints: Float | None
+) -> list[Piece]:
+    """A mesh's triangles in its own axes, or in the world's when `joints` (J, 4, 4) bend it."""
+    pieces: list[Piece] = []
+    for entry in mesh.items("primitives"):
+        piece = _primitive(document, entry)
+        if piece is not None:
+            piece = _morphed(document, entry, piece, weights)
+            pieces.append(piece if joints is None else _skinned(document, entry, piece, joints))
+    return pieces
+
+
+def _joints(document: Document, node: Field, worlds: dict[int, Float]) -> Float | None:
+    """Matrices (J, 4, 4) from the bind pose to the world of a node's skin, None if it has none."""
+    if "skin" not in node:
+        return None
+    skin = document.root.at("skins", node.integer("skin"))
+    joints = _indices(skin, "joints")
+    outside = [joint for joint in joints if joint not in worlds]
+    if outside or not joints:
+        raise skin.fail(f"joints that are nodes of the scene, not {outside[:3] or 'none at all'}")
+    matrices = np.array([worlds[joint] for joint in joints])
+    if "inverseBindMatrices" not in skin:
+        return matrices
+    inverse = document.accessor(skin.integer("inverseBindMatrices"), (16,)).astype(np.float64)
+    if len(inverse) < len(joints):
+        raise skin.fail(f"{len(joints)} inverse bind matrices, not {len(inverse)}")
+    return matrices @ inverse[: len(joints)].reshape(-1, 4, 4).transpose(0, 2, 1)
+
+
+def _skinned(document: Document, entry: Field, piece: Piece, joints: Float) -> Piece:
+    """The piece bent by its skin's joints (linear blend skinning)."""
+    attributes, count = entry.get("attributes"), len(piece.positions)
+    blend = np.zeros((count, 4, 4))
+    for group in range(2):
+        joint = _attribute(document, attributes, f"JOINTS_{group}", (4,), count)
+        weight = _attribute(document, attributes, f"WEIGHTS_{group}", (4,), count)
+        if joint is None or weight is None:
+            break
+        if joint.size and (joint.min() < 0 or joint.max() >= len(joints)):
+            raise attributes.fail(f"JOINTS_{group} below {len(joints)}, not {joint.max():.0f}")
+        for column in range(4):
+            blend += weight[:, column, None, None] * joints[joint[:, column].astype(np.int64)]
+    total = blend[:, 3, 3]
+    if not (total > 0).all():
+        document.folder.warn("a skinned mesh has vertices without joints: they stay where the file puts them")
+        blend[total <= 0] = np.eye(4)
+    blend /= blend[:, 3, 3, None, None]
+    positions = np.einsum("nij,nj->ni", blend[:, :3, :3], piece.positions) + blend[:, :3, 3]
+    if piece.normals is None:
+        return replace(piece, positions=positions)
+    linear = blend[:, :3, :3]
+    cofactor = np.cross(linear[:, [1, 2, 0]], linear[:, [2, 0, 1]])
+    return replace(piece, positions=positions, normals=unit(np.einsum("nij,nj->ni", cofactor, piece.normals)))
+
+
+def _primitive(document: Document, entry: Field) -> Piece | None:
+    attributes = entry.get("attributes")
+    mode = entry.integer("mode", TRIANGLES)
+    if mode not in {TRIANGLES, STRIP, FAN}:
+        document.folder.warn("points and lines are left out")
+        return None
+    if "POSITION" not in attributes:
+        if entry.extension("KHR_draco_mesh_compression") is not None:
+            raise document.folder.error(
+                "uses KHR_draco_mesh_compression, not read here; export without compression"
+            )
+        document.folder.warn("a primitive without positions is left out")
+        return None
+    positions = _attribute(document, attributes, "POSITION", (3,), None)
+    assert positions is not None
+    count = len(positions)
+    material = entry.integer("material") if "material" in entry else len(document.root.items("materials"))
+    if "material" in entry:
+        document.root.at("materials", material)
+    return Piece(
+        part="",
+        material=material,
+        positions=positions,
+        triangles=_triangles(document, entry, mode, count),
+        normals=_attribute(document, attributes, "NORMAL", (3,), count),
+        uv0=_attribute(document, attributes, "TEXCOORD_0", (2,), count),
+        uv1=_attribute(document, attributes, "TEXCOORD_1", (2,), count),
+        colors=_colors(document, attributes, count),
+    )
+
+
+def _attribute(
+    document: Document, attributes: Field, key: str, widths: tuple[int, ...], count: int | None
+) -> Float | None:
+    if key not in attributes:
+        return None
+    values = document.accessor(attributes.integer(key), widths).astype(np.float64)
+    if count is not None and len(values) != count:
+        raise attributes.fail(f"{key} with {count} elements as POSITION has, not {len(values)}")
+    return values
+
+
+def _colors(document: Document, attributes: Field, count: int) -> Float | None:
+    values = _attribute(document, attributes, "COLOR_0", (3, 4), count)
+    if values is None or values.shape[1] == 4:
+        return values
+    return np.column_stack([values, np.ones(count)])
+
+
+def _triangles(document: Document, entry: Field, mode: int, count: int) -> Int:
+    if "indices" in entry:
+        indices = document.accessor(entry.integer("indices"), (1,))[:, 0]
+        if indices.dtype.kind not in "u":
+            raise entry.fail("indices of an unsigned type")
+        indices = indices.astype(np.int64)
+    else:
+        indices = np.arange(count)
+    if len(indices) and int(indices.max()) >= count:
+        raise document.folder.error(
+            f"{entry.where}.indices: expected indices below {count}, found {indices.max()}"
+        )
+    if mode == TRIANGLES:
+        return indices[: len(indices) // 3 * 3].reshape(-1, 3)
+    if len(indices) < 3:
+        return np.zeros((0, 3), np.int64)
+    i = np.arange(len(indices) - 2)
+    if mode == FAN:
+        return np.column_stack([np.full(len(i), indices[0]), indices[i + 1], indices[i + 2]])
+    return np.column_stack([indices[i], indices[i + 1 + i % 2], indices[i + 2 - i % 2]])
+
+
+def _morphed(document: Document, entry: Field, piece: Piece, weights: tuple[float, ...]) -> Piece:
+    """The piece with its morph targets at these weights."""
+    for target, weight in zip(entry.items("targets"), weights, strict=False):
+        if weight == 0:
+            continue
+        shift = _attribute(document, target, "POSITION", (3,), len(piece.positions))
+        turn = _attribute(document, target, "NORMAL", (3,), len(piece.positions))
+        if shift is not None:
+            piece = replace(piece, positions=piece.positions + weight * shift)
+        if turn is not None and piece.normals is not None:
+            piece = replace(piece, normals=piece.normals + weight * turn)
+    return piece

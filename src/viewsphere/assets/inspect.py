@@ -1,0 +1,125 @@
+"""What is in a model file, and what it becomes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from viewsphere.assets.cache import ZOO
+from viewsphere.assets.load import load_model
+from viewsphere.assets.mesh import Material, Mesh
+from viewsphere.assets.normalise import normalise
+from viewsphere.assets.piece import FileFacts
+from viewsphere.errors import ModelError
+from viewsphere.model.shot import Axis, ModelSpec, Size
+
+
+@dataclass(frozen=True)
+class ModelReport:
+    """A model after normalisation, and how it was read.
+
+    `size` (width, height, length) and `bounds` (lowest and highest corner) are metres in object axes;
+    `raw_size` is the file's own, along its own x, y and z. `parts` are names and triangle counts; `materials`
+    names and the fields that are not the default; `textures` names and (width, height) in pixels.
+    """
+
+    source: str
+    format: str
+    up: Axis
+    forward: Axis
+    unit: float
+    size: Size
+    bounds: tuple[tuple[float, float, float], tuple[float, float, float]]
+    raw_size: tuple[float, float, float]
+    triangles: int
+    vertices: int
+    parts: tuple[tuple[str, int], ...]
+    materials: tuple[tuple[str, dict[str, Any]], ...]
+    textures: tuple[tuple[str, tuple[int, int]], ...]
+    has_uv: bool
+    has_colors: bool
+    warnings: tuple[str, ...]
+    suggestions: tuple[str, ...]
+
+
+def describe(source: Path | ModelSpec, build: Callable[[ModelSpec], Mesh] | None = None) -> ModelReport:
+    """Read a model and report what is in it; a path is read with default settings.
+
+    `build` makes the mesh of a `zoo:` source. Raises ModelError as reading and normalising do.
+    """
+    spec = source if isinstance(source, ModelSpec) else _default_spec(source)
+    if spec.source.startswith(ZOO):
+        if build is None:
+            raise ModelError(f"{spec.source}: no builder for procedural models was given")
+        raw, facts = build(spec), FileFacts(Path(spec.source), "zoo", "+z", "-y", 1.0)
+    else:
+        raw, facts = load_model(Path(spec.source), confined=spec.confined)
+    mesh = normalise(raw, facts, spec)
+    low, high = mesh.bounds
+    width, length, height = (float(x) for x in high - low)
+    raw_size = raw.bounds[1] - raw.bounds[0]
+    counts = np.bincount(mesh.triangle_part, minlength=len(mesh.parts))
+    return ModelReport(
+        source=spec.source,
+        format=facts.format,
+        up=spec.up or facts.up,
+        forward=spec.forward or facts.forward,
+        unit=facts.unit if spec.unit is None else spec.unit,
+        size=(width, height, length),
+        bounds=(
+            (float(low[0]), float(low[1]), float(low[2])),
+            (float(high[0]), float(high[1]), float(high[2])),
+        ),
+        raw_size=(float(raw_size[0]), float(raw_size[1]), float(raw_size[2])),
+        triangles=len(mesh.triangles),
+        vertices=len(mesh.vertices),
+        parts=tuple((name, int(count)) for name, count in zip(mesh.parts, counts, strict=True)),
+        materials=tuple((material.name, _unusual(material)) for material in mesh.materials),
+        textures=tuple((image.name, (image.pixels.shape[1], image.pixels.shape[0])) for image in mesh.images),
+        has_uv=mesh.uv0 is not None,
+        has_colors=mesh.colors is not None,
+        warnings=mesh.warnings,
+        suggestions=_suggestions(spec, facts, (width, height, length)),
+    )
+
+
+def _default_spec(path: Path) -> ModelSpec:
+    return ModelSpec(key=path.stem, source=str(path.absolute()), category="model", category_id=1)
+
+
+def _unusual(material: Material) -> dict[str, Any]:
+    """Fields of a material that are not the default, its name left out."""
+    plain = replace(Material(), name=material.name)
+    names = (f.name for f in fields(Material))
+    return {
+        name: getattr(material, name) for name in names if getattr(material, name) != getattr(plain, name)
+    }
+
+
+def _suggestions(spec: ModelSpec, facts: FileFacts, size: Size) -> tuple[str, ...]:
+    width, height, length = size
+    said: list[str] = []
+    if spec.scale == "as_is" and spec.unit is None:
+        longest = max(size)
+        if longest > 100:
+            said.append(
+                f"{longest:.4g} m across: set unit: 0.001 if the file is in millimetres, "
+                "0.01 if in centimetres"
+            )
+        elif longest < 0.01:
+            said.append(f"{longest:.4g} m across: set unit (metres in one unit of the file) or scale")
+    if spec.forward is None and width > 1.5 * length:
+        sideways = "+x" if facts.forward[1] != "x" and (spec.up or facts.up)[1] != "x" else "+y"
+        said.append(
+            f"wider than long: if the picture shows its side at the front, "
+            f"set forward: {sideways} or its opposite"
+        )
+    if spec.up is None and facts.format in {"obj", "ply", "stl", "off"} and height > 2 * max(width, length):
+        said.append(
+            f"the format does not say which way is up, {facts.up} was assumed: set up if it lies on its back"
+        )
+    return tuple(said)

@@ -1,0 +1,13 @@
+"""How much a model file may ask for: a file cannot make the reader run out of memory or time."""
+
+MAX_FILE_BYTES = 4 << 30
+MAX_TRIANGLES = 20_000_000
+MAX_TEXTURE_SIDE = 16_384
+MAX_TEXTURE_PIXELS = 1 << 27  # 512 MiB once it is RGBA
+MAX_TEXTURES = 1_024
+MAX_ARCHIVE_BYTES = 1 << 30  # a 3MF archive once it is unpacked
+
+MIN_SIZE = 1e-4
+"""Smallest longest side of a normalised model, metres."""
+MAX_SIZE = 1e5
+"""Greatest longest side of a normalised model, metres."""

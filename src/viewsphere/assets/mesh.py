@@ -1,0 +1,132 @@
+"""Mesh: triangles with every glTF 2.0 material field, whatever file they came from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+Wrap = Literal["repeat", "clamp", "mirror"]
+
+
+@dataclass(frozen=True, eq=False)
+class Image:
+    """Pixels (H, W, 4) uint8 RGBA, row 0 on top, as the file has them (sRGB for colours, linear for data)."""
+
+    name: str
+    pixels: NDArray[np.uint8]
+
+
+@dataclass(frozen=True)
+class Texture:
+    """One use of an image: glTF's uv (v = 0 is the image's top row), KHR_texture_transform included."""
+
+    image: int
+    texcoord: int = 0
+    wrap_s: Wrap = "repeat"
+    wrap_t: Wrap = "repeat"
+    nearest: bool = False
+    offset: tuple[float, float] = (0.0, 0.0)
+    rotation: float = 0.0
+    scale: tuple[float, float] = (1.0, 1.0)
+
+
+@dataclass(frozen=True)
+class Material:
+    """glTF 2.0 metallic-roughness and its common extensions; colours linear.
+
+    https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html#materials; `emissive` includes
+    KHR_materials_emissive_strength.
+    """
+
+    name: str = ""
+    base_color: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)
+    base_color_texture: Texture | None = None
+    metallic: float = 0.0
+    roughness: float = 0.8
+    metallic_roughness_texture: Texture | None = None  # G roughness, B metallic
+    normal_texture: Texture | None = None
+    normal_scale: float = 1.0
+    occlusion_texture: Texture | None = None  # R
+    occlusion_strength: float = 1.0
+    emissive: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    emissive_texture: Texture | None = None
+    alpha_mode: Literal["OPAQUE", "MASK", "BLEND"] = "OPAQUE"
+    alpha_cutoff: float = 0.5
+    double_sided: bool = True
+    unlit: bool = False
+    clearcoat: float = 0.0
+    clearcoat_texture: Texture | None = None
+    clearcoat_roughness: float = 0.0
+    clearcoat_roughness_texture: Texture | None = None
+    clearcoat_normal_texture: Texture | None = None
+    transmission: float = 0.0
+    transmission_texture: Texture | None = None
+    ior: float = 1.5
+    specular: float = 1.0
+    specular_texture: Texture | None = None
+    specular_color: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    specular_color_texture: Texture | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """A whole model as one triangle list; object axes: metres, +Z up, front -Y (once normalised).
+
+    vertices (V, 3) float32; triangles (T, 3) int32, counter-clockwise seen from outside; normals (V, 3)
+    float32, unit length, for shading; uv0, uv1 (V, 2) float32 or None; colors (V, 4) float32 linear or None,
+    multiplied with the base colour; triangle_material, triangle_part (T,) int32 index `materials` and `parts`
+    (never empty). `warnings` say what the file's reader had to mend or leave out.
+    """
+
+    vertices: NDArray[np.float32]
+    triangles: NDArray[np.int32]
+    normals: NDArray[np.float32]
+    triangle_material: NDArray[np.int32]
+    triangle_part: NDArray[np.int32]
+    materials: tuple[Material, ...] = (Material(),)
+    parts: tuple[str, ...] = ("object",)
+    uv0: NDArray[np.float32] | None = None
+    uv1: NDArray[np.float32] | None = None
+    colors: NDArray[np.float32] | None = None
+    images: tuple[Image, ...] = ()
+    warnings: tuple[str, ...] = field(default=())
+
+    def __post_init__(self) -> None:
+        """Refuse arrays of the wrong shape or dtype, and indices out of range."""
+        v, t = len(self.vertices), len(self.triangles)
+        expected = {
+            "vertices": ((v, 3), np.float32),
+            "triangles": ((t, 3), np.int32),
+            "normals": ((v, 3), np.float32),
+            "triangle_material": ((t,), np.int32),
+            "triangle_part": ((t,), np.int32),
+            "uv0": ((v, 2), np.float32),
+            "uv1": ((v, 2), np.float32),
+            "colors": ((v, 4), np.float32),
+        }
+        for name, (shape, dtype) in expected.items():
+            array = getattr(self, name)
+            if array is not None and (array.shape != shape or array.dtype != dtype):
+                raise ValueError(
+                    f"Mesh.{name}: expected {shape} {np.dtype(dtype)}, got {array.shape} {array.dtype}"
+                )
+        limits = (
+            ("triangles", v),
+            ("triangle_material", len(self.materials)),
+            ("triangle_part", len(self.parts)),
+        )
+        for name, limit in limits:
+            array = getattr(self, name)
+            if array.size and (array.min() < 0 or array.max() >= limit):
+                raise ValueError(
+                    f"Mesh.{name}: expected indices in [0, {limit}), got {array.min()}..{array.max()}"
+                )
+
+    @property
+    def bounds(self) -> NDArray[np.float64]:
+        """Lowest and highest corner of the vertices that triangles use, (2, 3) float64."""
+        used = self.vertices[np.unique(self.triangles)].astype(np.float64)
+        return np.array([used.min(axis=0), used.max(axis=0)])

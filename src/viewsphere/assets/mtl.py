@@ -1,0 +1,254 @@
+"""MTL material libraries as glTF's metallic-roughness materials.
+
+http://paulbourke.net/dataformats/mtl/ and the PBR extension of
+https://benhouston3d.com/blog/extended-wavefront-obj-mtl-for-pbr
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.assets.folder import ModelFolder
+from viewsphere.assets.mesh import Image, Material, Texture
+from viewsphere.assets.text import statements
+
+SCALAR_OPTIONS = ("-blendu", "-blendv", "-bm", "-boost", "-cc", "-clamp", "-imfchan", "-texres", "-type")
+OPTION_ARGUMENTS = {"-mm": 2, **dict.fromkeys(SCALAR_OPTIONS, 1)}
+VECTOR_OPTIONS = ("-o", "-s", "-t")
+BINARY_SHARE = 0.02
+"""A texture with at most this share of its texels neither clear nor solid is a cut-out (MASK)."""
+
+Pixels = NDArray[np.uint8]
+
+
+@dataclass(frozen=True)
+class _Map:
+    """A map_ statement: its file and its options, in OBJ's texture axes (v upwards)."""
+
+    file: str
+    offset: tuple[float, float] = (0.0, 0.0)
+    scale: tuple[float, float] = (1.0, 1.0)
+    clamp: bool = False
+    strength: float = 1.0
+
+    def texture(self, image: int) -> Texture:
+        """This map in glTF's texture axes (v downwards)."""
+        wrap = "clamp" if self.clamp else "repeat"
+        offset = (self.offset[0], 1.0 - self.scale[1] - self.offset[1])
+        return Texture(image, wrap_s=wrap, wrap_t=wrap, offset=offset, scale=self.scale)
+
+
+def read_materials(folder: ModelFolder, texts: Sequence[str], wanted: set[str]) -> dict[str, Material]:
+    """The wanted materials of these libraries by name; the first definition of a name counts.
+
+    `Kd` multiplies `map_Kd`, except a black one, which many exporters write beside a texture. `Ns` becomes a
+    roughness of sqrt(2 / (Ns + 2)) unless `Pr` gives one. A `map_bump` is read if it is a normal map, not if
+    it holds heights. `d < 1` blends; a texture's alpha or `map_d` cuts out or blends by what it holds. All
+    are double-sided, as OBJ has no other.
+    """
+    blocks: dict[str, dict[str, str]] = {}
+    block: dict[str, str] = {}
+    for text in texts:
+        for line in statements(text):
+            keyword, _, rest = line.partition(" ")
+            if keyword.lower() == "newmtl":
+                block = {}
+                blocks.setdefault(rest.strip(), block)
+            elif keyword and not keyword.startswith("#"):
+                block[keyword.lower()] = rest.strip()
+    return {
+        name: _Builder(folder, name, block).material() for name, block in blocks.items() if name in wanted
+    }
+
+
+@dataclass(frozen=True)
+class _Builder:
+    folder: ModelFolder
+    name: str
+    block: dict[str, str]
+
+    def material(self) -> Material:
+        color_map = self.map("map_kd")
+        color = self.color("kd", (0.8, 0.8, 0.8) if color_map is None else (1.0, 1.0, 1.0))
+        if color_map is not None and max(color) == 0:
+            color = (1.0, 1.0, 1.0)
+        opacity = min(max(self.number("d", 1.0 - self.number("tr", 0.0)), 0.0), 1.0)
+        color_texture, mode = self.base(color_map)
+        rough_map, metal_map = self.map("map_pr"), self.map("map_pm")
+        emissive_map, normal_map = self.map("map_ke"), self.map("norm")
+        emissive = self.color("ke", (0.0, 0.0, 0.0))
+        emissive_texture = self.plain(emissive_map)
+        if emissive_texture is not None and max(emissive) == 0:
+            emissive = (1.0, 1.0, 1.0)
+        bump = self.map("map_bump") or self.map("bump")
+        return Material(
+            name=self.name,
+            base_color=(*color, opacity),
+            base_color_texture=color_texture,
+            metallic=self.number("pm", 1.0 if metal_map is not None else 0.0),
+            roughness=self.roughness(rough_map),
+            metallic_roughness_texture=self.metallic_roughness(rough_map, metal_map),
+            normal_texture=self.plain(normal_map) if normal_map is not None else self.bump(bump),
+            normal_scale=normal_map.strength
+            if normal_map is not None
+            else bump.strength
+            if bump is not None
+            else 1.0,
+            emissive=emissive,
+            emissive_texture=emissive_texture,
+            alpha_mode="BLEND" if opacity < 1.0 else mode,
+            clearcoat=min(max(self.number("pc", 0.0), 0.0), 1.0),
+            clearcoat_roughness=min(max(self.number("pcr", 0.0), 0.0), 1.0),
+            specular=self.specular(),
+        )
+
+    def number(self, key: str, default: float) -> float:
+        words = self.block.get(key, "").replace("-halo", "").split()
+        try:
+            value = float(words[0]) if words else default
+        except ValueError:
+            return default
+        return value if np.isfinite(value) else default
+
+    def color(self, key: str, default: tuple[float, float, float]) -> tuple[float, float, float]:
+        try:
+            values = [float(word) for word in self.block.get(key, "").split()[:3]]
+        except ValueError:
+            return default
+        if not values or not np.isfinite(values).all() or min(values) < 0:
+            return default
+        red, green, blue = values if len(values) == 3 else values[:1] * 3
+        return (red, green, blue)
+
+    def roughness(self, rough_map: _Map | None) -> float:
+        if "pr" in self.block or rough_map is not None:
+            return min(max(self.number("pr", 1.0), 0.0), 1.0)
+        if "ns" not in self.block:
+            return Material().roughness
+        return float(np.sqrt(2.0 / (max(self.number("ns", 0.0), 0.0) + 2.0)))
+
+    def specular(self) -> float:
+        """Ks of 0.5 is taken as a dielectric's 4 %: it is what exporters of PBR materials write."""
+        if "ks" not in self.block or "pr" in self.block or "pm" in self.block:
+            return 1.0
+        return min(1.0, 2.0 * max(self.color("ks", (0.5, 0.5, 0.5))))
+
+    def map(self, key: str) -> _Map | None:
+        """The statement `key`, options before its file name, which may hold blanks."""
+        words = self.block.get(key, "").split(" ")
+        values: dict[str, list[str]] = {}
+        while words and (words[0] in OPTION_ARGUMENTS or words[0] in VECTOR_OPTIONS or not words[0]):
+            option = words.pop(0)
+            limit = OPTION_ARGUMENTS.get(option, 3 if option else 0)
+            taken: list[str] = []
+            while (
+                len(words) > 1
+                and len(taken) < limit
+                and (option not in VECTOR_OPTIONS or _is_number(words[0]))
+            ):
+                taken.append(words.pop(0))
+            values[option] = taken
+        file = " ".join(words).strip().strip('"')
+        if not file:
+            return None
+        return _Map(
+            file,
+            offset=_pair(values.get("-o", []), 0.0),
+            scale=_pair(values.get("-s", []), 1.0),
+            clamp=values.get("-clamp") == ["on"],
+            strength=_pair(values.get("-bm", []), 1.0)[0],
+        )
+
+    def image(self, source: _Map | None) -> int | None:
+        return None if source is None else self.folder.image(source.file, source.file)
+
+    def plain(self, source: _Map | None) -> Texture | None:
+        """The map's image as it is."""
+        image = self.image(source)
+        return None if source is None or image is None else source.texture(image)
+
+    def base(self, color_map: _Map | None) -> tuple[Texture | None, Literal["OPAQUE", "MASK", "BLEND"]]:
+        """Base colour texture with `map_d` as its alpha, and the alpha mode that its texels ask for."""
+        opacity_map = self.map("map_d") or self.map("map_opacity")
+        color, opacity = self.image(color_map), self.image(opacity_map)
+        images = self.folder.images
+        if opacity is not None and opacity != color:
+            alpha = _grey(images[opacity].pixels)
+            pixels = (
+                np.full((*alpha.shape, 4), 255, np.uint8) if color is None else images[color].pixels.copy()
+            )
+            pixels[..., 3] = _resized(alpha, pixels.shape[:2])
+            color = self.folder.add_image(Image(f"{self.name} colour and opacity", pixels))
+        source = color_map or opacity_map
+        if color is None or source is None:
+            return None, "OPAQUE"
+        return source.texture(color), alpha_mode(images[color].pixels[..., 3])
+
+    def metallic_roughness(self, rough_map: _Map | None, metal_map: _Map | None) -> Texture | None:
+        """Roughness in green and metallic in blue of one new image."""
+        rough, metal = self.image(rough_map), self.image(metal_map)
+        source = rough_map if rough is not None else metal_map
+        if source is None or (rough is None and metal is None):
+            return None
+        images = self.folder.images
+        shape = images[metal if rough is None else rough].pixels.shape[:2]  # pyright: ignore[reportCallIssue, reportArgumentType]
+        pixels = np.full((*shape, 4), 255, np.uint8)
+        for index, channel in ((rough, 1), (metal, 2)):
+            if index is not None:
+                pixels[..., channel] = _resized(_grey(images[index].pixels), shape)
+        return source.texture(self.folder.add_image(Image(f"{self.name} roughness and metallic", pixels)))
+
+    def bump(self, source: _Map | None) -> Texture | None:
+        """A bump map if it is a normal map."""
+        image = self.image(source)
+        if source is None or image is None:
+            return None
+        pixels = self.folder.images[image].pixels
+        mean = pixels[..., :3].reshape(-1, 3).mean(axis=0)
+        if mean[2] < 1.3 * max(mean[0], mean[1]):
+            self.folder.warn(
+                f"height map {source.file!r} is not read; bake it to a normal map (norm) to use it"
+            )
+            return None
+        return source.texture(image)
+
+
+def _is_number(word: str) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True
+
+
+def _pair(words: Sequence[str], default: float) -> tuple[float, float]:
+    values = [float(word) if _is_number(word) else default for word in words]
+    padded = [*values, default, default]
+    return padded[0], padded[1]
+
+
+def _grey(pixels: Pixels) -> Pixels:
+    """One channel: the alpha of an image that is transparent anywhere, else its mean colour."""
+    alpha = pixels[..., 3]
+    return alpha if (alpha < 255).any() else np.rint(pixels[..., :3].mean(axis=2)).astype(np.uint8)
+
+
+def _resized(channel: Pixels, shape: tuple[int, ...]) -> Pixels:
+    from PIL import Image as Pillow
+
+    if channel.shape == shape:
+        return channel
+    return np.asarray(Pillow.fromarray(channel).resize((shape[1], shape[0]), Pillow.Resampling.BILINEAR))
+
+
+def alpha_mode(alpha: Pixels) -> Literal["OPAQUE", "MASK", "BLEND"]:
+    """What a texture's alpha is for; one that is clear all over is an exporter's slip."""
+    if alpha.min() >= 250 or alpha.max() == 0:
+        return "OPAQUE"
+    between = np.count_nonzero((alpha > 8) & (alpha < 247)) / alpha.size
+    return "MASK" if between <= BINARY_SHARE else "BLEND"

@@ -1,0 +1,130 @@
+"""A raw mesh to an object: +Z up, front -Y, metres, centred."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from viewsphere.assets import limits
+from viewsphere.assets.mesh import Mesh
+from viewsphere.assets.piece import FileFacts, Float, face_normals, unit_normals
+from viewsphere.errors import ModelError
+from viewsphere.model.shot import Axis, ModelSpec, Size
+
+PROPORTION_TOLERANCE = 0.1
+
+
+def normalise(mesh: Mesh, facts: FileFacts, spec: ModelSpec) -> Mesh:
+    """The mesh in object axes and metres: turned, scaled and centred as the model's settings say.
+
+    Axes: `spec.up` becomes +Z and `spec.forward` -Y, by an exact permutation and change of signs; unset ones
+    are the file's. Scale: `as_is` keeps the file's unit (or `spec.unit` metres); `real_size` scales uniformly
+    until the length (along Y) is the real one's: the model keeps its proportions, and a warning says when
+    they differ from the real ones by more than 10 %; a number is the length in metres. Centring: `box` puts
+    the box's centre at the origin, `area` the area-weighted centroid of the surface, `floor` the box's centre
+    in x and y and its lowest point at z = 0.
+
+    Computed in float64, stored as float32; triangles come sorted by part and material, otherwise in the
+    file's order. Raises ModelError for parallel axes and for a result smaller or larger than `limits` allows.
+    """
+    turn = rotation(spec.up or facts.up, spec.forward or facts.forward, str(facts.path))
+    vertices = mesh.vertices.astype(np.float64) @ turn.T
+    low, high = _bounds(vertices, mesh)
+    factor, warnings = _factor(high - low, facts, spec)
+    vertices *= factor
+    low, high = low * factor, high * factor
+    _check_size(float((high - low).max()), facts)
+    if spec.centring == "area":
+        center = _area_centroid(vertices, mesh)
+    else:
+        center = (low + high) / 2
+        if spec.centring == "floor":
+            center[2] = low[2]
+    stored = (vertices - center).astype(np.float32)
+    order = np.lexsort((mesh.triangle_material, mesh.triangle_part))
+    triangles = mesh.triangles[order]
+    return replace(
+        mesh,
+        vertices=stored,
+        triangles=triangles,
+        normals=unit_normals(
+            stored, triangles, (mesh.normals.astype(np.float64) @ turn.T).astype(np.float32)
+        ),
+        triangle_material=mesh.triangle_material[order],
+        triangle_part=mesh.triangle_part[order],
+        warnings=mesh.warnings + warnings,
+    )
+
+
+def rotation(up: Axis, forward: Axis, where: str) -> Float:
+    """The rotation (3, 3) that takes `up` to +Z and `forward` to -Y: entries 0, 1 and -1 only.
+
+    Raises ModelError, beginning with `where`, when the two are parallel.
+    """
+    z, front = _direction(up), _direction(forward)
+    if abs(float(z @ front)) > 0.5:
+        raise ModelError(
+            f"{where}: expected up and forward axes at right angles, found up {up} and forward {forward}"
+        )
+    return np.array([np.cross(-front, z), -front, z])
+
+
+def _direction(axis: Axis) -> Float:
+    vector = np.zeros(3)
+    vector["xyz".index(axis[1])] = 1.0 if axis[0] == "+" else -1.0
+    return vector
+
+
+def _bounds(vertices: Float, mesh: Mesh) -> tuple[Float, Float]:
+    used = vertices[np.unique(mesh.triangles)]
+    return used.min(axis=0), used.max(axis=0)
+
+
+def _factor(size: Float, facts: FileFacts, spec: ModelSpec) -> tuple[float, tuple[str, ...]]:
+    """Metres in one unit of the file, and warnings."""
+    real, scale = spec.real_size, spec.scale
+    unit = facts.unit if spec.unit is None else spec.unit
+    if scale == "real_size" and real is None:
+        raise ModelError(
+            f"{facts.path}: scale real_size needs the model's real_size (width, height, length in metres)"
+        )
+    if scale == "as_is" or (scale == "real_size" and isinstance(real, str)):
+        return unit, ()
+    wanted = real[2] if isinstance(scale, str) and isinstance(real, tuple) else float(scale)
+    if not (size[1] > 0 and wanted > 0):
+        raise ModelError(
+            f"{facts.path}: cannot scale a length of {size[1]:g} to {wanted:g} m; check forward or use as_is"
+        )
+    factor = float(wanted / size[1])
+    if scale == "real_size" and isinstance(real, tuple):
+        return factor, _proportion_warnings(size * factor, facts, real)
+    return factor, ()
+
+
+def _proportion_warnings(size: Float, facts: FileFacts, real_size: Size) -> tuple[str, ...]:
+    width, height, _ = real_size
+    off = [
+        f"{name} {found:.3g} m instead of {real:.3g} m"
+        for name, found, real in (("width", size[0], width), ("height", size[2], height))
+        if abs(found - real) > PROPORTION_TOLERANCE * real
+    ]
+    if not off:
+        return ()
+    return (
+        f"{facts.path.name}: scaled to its real length it has {' and '.join(off)}: check axes and real_size",
+    )
+
+
+def _check_size(size: float, facts: FileFacts) -> None:
+    if not limits.MIN_SIZE <= size <= limits.MAX_SIZE:
+        raise ModelError(
+            f"{facts.path}: expected a model between {limits.MIN_SIZE:g} and {limits.MAX_SIZE:g} m across, "
+            f"found {size:.3g} m; "
+            "set unit (metres in one unit of the file) or scale"
+        )
+
+
+def _area_centroid(vertices: Float, mesh: Mesh) -> Float:
+    areas = np.linalg.norm(face_normals(vertices, mesh.triangles), axis=1)
+    return areas @ vertices[mesh.triangles].mean(axis=1) / areas.sum()

@@ -1,0 +1,295 @@
+"""Wavefront OBJ: our own reader, because parts, several materials and smoothing groups matter here.
+
+http://www.martinreddy.net/gfx/3d/OBJ.spec; vertex colours as `v x y z r g b` (sRGB) by common use.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.assets.folder import ModelFolder, UnreadableError
+from viewsphere.assets.mesh import Material, Mesh
+from viewsphere.assets.mtl import read_materials
+from viewsphere.assets.piece import FileFacts, Float, Int, Piece, assemble
+from viewsphere.assets.polygon import triangulate
+from viewsphere.assets.smoothing import creased
+from viewsphere.assets.srgb import linear
+from viewsphere.assets.text import decode, statements
+
+NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
+
+
+def read_obj(folder: ModelFolder) -> tuple[Mesh, FileFacts]:
+    """The file as one mesh: up +Y, front +Z, unit 1 (OBJ has no rule for either).
+
+    Parts are the objects (`o`) if there are several, else the groups (`g`). Without normals, smoothing groups
+    decide if the file has any, else creases. Curves, surfaces, lines and points are left out. Raises
+    ModelError.
+    """
+    source = _Source()
+    source.read(statements(decode(folder.read_model())))
+    if not source.counts:
+        raise folder.error(
+            "no triangles found: an OBJ needs 'v' and 'f' lines; export the model as a mesh of faces"
+        )
+    if source.skipped:
+        folder.warn(f"{source.skipped} lines, curves or faces of fewer than three corners left out")
+    whole, owner = _whole(folder, source)
+    materials, material_of = _materials(folder, source)
+    parts = np.array(source.parts())[owner]
+    material = np.array([material_of[name] for name in source.materials])[
+        np.array(source.face_material)[owner]
+    ]
+    facts = FileFacts(folder.model, "obj", "+y", "+z", 1.0)
+    return assemble(folder, _pieces(whole, parts, source.part_names(), material), materials, facts)
+
+
+@dataclass(eq=False)
+class _Source:
+    """The file's statements, sorted by kind; faces hold indices into `materials`, `objects` and `groups`."""
+
+    v: list[str] = field(default_factory=list[str])
+    vt: list[str] = field(default_factory=list[str])
+    vn: list[str] = field(default_factory=list[str])
+    corners: list[str] = field(default_factory=list[str])
+    counts: list[int] = field(default_factory=list[int])
+    libraries: list[str] = field(default_factory=list[str])
+    materials: dict[str, int] = field(default_factory=lambda: {"": 0})
+    objects: dict[str, int] = field(default_factory=lambda: {"": 0})
+    groups: dict[str, int] = field(default_factory=lambda: {"": 0})
+    face_material: list[int] = field(default_factory=list[int])
+    face_object: list[int] = field(default_factory=list[int])
+    face_group: list[int] = field(default_factory=list[int])
+    face_smoothing: list[int] = field(default_factory=list[int])
+    smoothing_stated: bool = False
+    skipped: int = 0
+
+    def read(self, lines: list[str]) -> None:
+        """Sort all statements."""
+        state = {"usemtl": 0, "o": 0, "g": 0, "s": 0}
+        names = {"usemtl": self.materials, "o": self.objects, "g": self.groups}
+        plain = {"v": self.v, "vt": self.vt, "vn": self.vn, "mtllib": self.libraries}
+        for line in lines:
+            keyword, _, rest = line.partition(" ")
+            if keyword in plain:
+                plain[keyword].append(rest)
+            elif keyword in {"f", "fo"}:
+                self._face(rest, state)
+            elif keyword in names:
+                table = names[keyword]
+                state[keyword] = table.setdefault(rest.strip(), len(table))
+            elif keyword == "s":
+                self.smoothing_stated = True
+                state["s"] = int(rest) if rest.strip().isdecimal() and len(rest) < 10 else 0
+            elif keyword in {"l", "p", "curv", "curv2", "surf"}:
+                self.skipped += 1
+
+    def _face(self, rest: str, state: dict[str, int]) -> None:
+        tokens = rest.partition("#")[0].split()
+        if "-" in rest:
+            tokens = [self._absolute(token) for token in tokens]
+        if len(tokens) < 3:
+            self.skipped += 1
+            return
+        self.corners.extend(tokens)
+        self.counts.append(len(tokens))
+        self.face_material.append(state["usemtl"])
+        self.face_object.append(state["o"])
+        self.face_group.append(state["g"])
+        self.face_smoothing.append(state["s"])
+
+    def _absolute(self, token: str) -> str:
+        """A corner with relative indices (-1 is the last element so far) in absolute ones."""
+        totals = (len(self.v), len(self.vt), len(self.vn))
+        return "/".join(
+            str(total + 1 + int(index)) if index.startswith("-") and index[1:].isdecimal() else index
+            for index, total in zip(token.split("/"), totals, strict=False)
+        )
+
+    def parts(self) -> list[int]:
+        """The part of each face: its object if the file has several, else its group."""
+        return self.face_object if len(set(self.face_object)) > 1 else self.face_group
+
+    def part_names(self) -> list[str]:
+        """Names of the parts that `parts` counts."""
+        if len(set(self.face_object)) > 1:
+            return [name or "object" for name in self.objects]
+        whole = (
+            next((name for name, index in self.objects.items() if index == self.face_object[0]), "")
+            or "object"
+        )
+        if len(set(self.face_group)) > 1:
+            return [name or whole for name in self.groups]
+        return [whole if whole != "object" else name or whole for name in self.groups]
+
+
+def _whole(folder: ModelFolder, source: _Source) -> tuple[Piece, Int]:
+    """All triangles as one piece, and the face of each."""
+    positions, colors = _vertices(folder, source.v)
+    uv = _rows(folder, source.vt, 1, 2)
+    vectors = _rows(folder, source.vn, 3, 3)
+    table: dict[str, int] = {}
+    corners = np.array([table.setdefault(token, len(table)) for token in source.corners])
+    indices = _corner_indices(folder, list(table), (len(positions), len(uv), len(vectors)))
+    at, uv_at, normal_at = indices.T
+    cut, owner = triangulate(positions[at], corners, np.array(source.counts))
+    whole = Piece(
+        part="",
+        material=0,
+        positions=positions[at],
+        triangles=corners[cut],
+        normals=_taken(vectors, normal_at),
+        uv0=_flipped(_taken(uv, uv_at)),
+        colors=None if colors is None else colors[at],
+    )
+    if whole.normals is None:
+        groups = np.array(source.face_smoothing)[owner] if source.smoothing_stated else None
+        whole = creased(whole, groups)
+    return whole, owner
+
+
+def _taken(values: Float, at: Int) -> Float | None:
+    """Rows at these indices, zero where the index is -1, None when all are."""
+    if not len(values) or (at < 0).all():
+        return None
+    return np.where(at[:, None] < 0, 0.0, values[at])
+
+
+def _flipped(uv: Float | None) -> Float | None:
+    """OBJ's v runs upwards, glTF's downwards."""
+    return None if uv is None else np.column_stack([uv[:, 0], 1.0 - uv[:, 1]])
+
+
+def _corner_indices(folder: ModelFolder, tokens: list[str], totals: tuple[int, int, int]) -> Int:
+    """Position, uv and normal index of each distinct corner, (N, 3), from 0; -1 where it has none."""
+    indices = np.full((len(tokens), 3), -1, np.int64)
+    for row, token in enumerate(tokens):
+        for column, text in enumerate(token.split("/")[:3]):
+            if text:
+                if not text.isdecimal() or len(text) > 12 or not text.isascii():
+                    raise folder.error(f"expected a face corner like 1/2/3, found {token[:40]!r}")
+                indices[row, column] = int(text) - 1
+    for column, (name, total) in enumerate(
+        zip(("vertex", "texture coordinate", "normal"), totals, strict=True)
+    ):
+        # A missing position, index 0 and one beyond the last are all outside.
+        used = indices[:, column] if column == 0 else indices[indices[:, column] >= 0, column]
+        wrong = used[(used < 0) | (used >= total)]
+        if wrong.size:
+            raise folder.error(
+                f"a face names {name} {wrong[0] + 1}, expected 1 to {total}; the file may be truncated"
+            )
+    return indices
+
+
+def _vertices(folder: ModelFolder, lines: list[str]) -> tuple[Float, Float | None]:
+    """Positions (V, 3) and linear colours (V, 4) or None."""
+    values = _rows(folder, lines, 3, 7)
+    given = np.isfinite(values[:, 3:6])
+    if given.shape[1] < 3 or not given.any():
+        return values[:, :3], None
+    srgb = np.where(given, values[:, 3:6], 1.0)
+    srgb = np.clip(srgb / (255.0 if srgb.max() > 1.0 else 1.0), 0.0, 1.0)
+    return values[:, :3], np.column_stack([linear(srgb), np.ones(len(values))])
+
+
+def _rows(folder: ModelFolder, lines: list[str], least: int, most: int) -> NDArray[np.float64]:
+    """Numbers of each line, (N, `least` to `most` columns), NaN for what a line leaves out."""
+    rows = [line.split() for line in lines]
+    widths = {len(row) for row in rows}
+    if len(widths) == 1:
+        width = widths.pop()
+        try:
+            flat = np.fromiter((float(token) for row in rows for token in row), np.float64, len(rows) * width)
+            if width >= least:
+                return _at_least(flat.reshape(-1, width)[:, :most], most if most < 3 else least)
+        except ValueError:
+            pass
+    values = np.full((len(rows), most), np.nan)
+    for row, tokens in enumerate(rows):
+        for column, token in enumerate(tokens[:most]):
+            if token.startswith("#"):
+                break
+            values[row, column] = _number(token)
+        if not len(tokens) >= least:
+            folder.warn("some vertices have fewer numbers than they need")
+    if most == 2:
+        values[np.isnan(values[:, 1]), 1] = 0.0
+    return values
+
+
+def _at_least(values: Float, width: int) -> Float:
+    missing = width - values.shape[1]
+    return values if missing <= 0 else np.column_stack([values, np.zeros((len(values), missing))])
+
+
+def _number(token: str) -> float:
+    """A number as C's strtod reads it: the longest prefix that is one, NaN if there is none."""
+    try:
+        return float(token)
+    except ValueError:
+        found = NUMBER.match(token)
+        return float(found[0]) if found else float("nan")
+
+
+def _materials(folder: ModelFolder, source: _Source) -> tuple[list[Material], dict[str, int]]:
+    """Materials, and the index of each that a face names; the first stands in for unknown ones."""
+    materials = [Material(name="default")]
+    texts = [text for line in source.libraries for text in _libraries(folder, line)]
+    known = read_materials(folder, texts, set(source.materials)) if texts else {}
+    index: dict[str, int] = {}
+    for name in source.materials:
+        if name in known:
+            index[name] = len(materials)
+            materials.append(known[name])
+        else:
+            index[name] = 0
+            if name and texts:
+                folder.warn(f"material {name!r} is in no material library; it is plain white")
+    return materials, index
+
+
+def _libraries(folder: ModelFolder, line: str) -> list[str]:
+    """Texts of the libraries of an mtllib line: one file whose name may hold blanks, or several without."""
+    texts: list[str] = []
+    missing: list[str] = []
+    for name in dict.fromkeys([line, *line.split()]):
+        try:
+            texts.append(decode(folder.read(name, "material library")))
+        except UnreadableError as error:
+            missing.append(str(error))
+            continue
+        if name == line:
+            return texts
+    for reason in missing[1:] if len(missing) > 1 else missing:
+        folder.warn(f"{reason}; its materials are plain white")
+    return texts
+
+
+def _pieces(whole: Piece, part: Int, names: list[str], material: Int) -> list[Piece]:
+    """The whole cut by part and material, in order of the file's first face of each."""
+    key = part * (int(material.max()) + 1) + material
+    _, first, run = np.unique(key, return_index=True, return_inverse=True)
+    rank = np.empty(len(first), np.int64)
+    rank[np.argsort(first)] = np.arange(len(first))
+    run = rank[run.reshape(-1)]
+    order = np.argsort(run, kind="stable")
+    pieces: list[Piece] = []
+    for members in np.split(order, np.flatnonzero(np.diff(run[order])) + 1):
+        used, corners = np.unique(whole.triangles[members], return_inverse=True)
+        pieces.append(
+            Piece(
+                part=names[int(part[members[0]])],
+                material=int(material[members[0]]),
+                positions=whole.positions[used],
+                triangles=corners.reshape(-1, 3),
+                normals=None if whole.normals is None else whole.normals[used],
+                uv0=None if whole.uv0 is None else whole.uv0[used],
+                colors=None if whole.colors is None else whole.colors[used],
+            )
+        )
+    return pieces

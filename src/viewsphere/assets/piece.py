@@ -1,0 +1,217 @@
+"""Pieces: what a reader finds in a file, and how they become one checked Mesh."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.assets import limits
+from viewsphere.assets.folder import ModelFolder
+from viewsphere.assets.mesh import Image, Material, Mesh, Texture
+from viewsphere.model.shot import Axis
+
+Float = NDArray[np.float64]
+Int = NDArray[np.int64]
+
+TEXTURE_FIELDS = tuple(name for name in Material.__dataclass_fields__ if name.endswith("_texture"))
+"""Names of Material's texture fields, in order."""
+
+GREATEST = 1e30
+"""Coordinates beyond are taken as infinite: their squares would be in float32."""
+
+FAR = 1e3
+"""A model this many times its own size away from the file's origin is stored around its own centre."""
+
+
+@dataclass(frozen=True)
+class FileFacts:
+    """What a file, or its format's specification, says about its axes and its unit.
+
+    `unit` is metres in one unit of the file. The raw mesh's vertices plus `origin` are the file's
+    coordinates: it is zero unless the model lies so far away that float32 would lose its shape. `files` are
+    all files read or looked for.
+    """
+
+    path: Path
+    format: str
+    up: Axis
+    forward: Axis
+    unit: float
+    origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    files: tuple[Path, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """Some triangles of one part and material; arrays as in Mesh but float64, normals None if unknown."""
+
+    part: str
+    material: int
+    positions: Float
+    triangles: Int
+    normals: Float | None = None
+    uv0: Float | None = None
+    uv1: Float | None = None
+    colors: Float | None = None
+
+
+def assemble(
+    folder: ModelFolder, pieces: Sequence[Piece], materials: Sequence[Material], facts: FileFacts
+) -> tuple[Mesh, FileFacts]:
+    """Join pieces into one mesh, parts in order of first appearance, unused parts, materials and images left
+    out.
+
+    Triangles with NaN or infinite corners and those without area are dropped with a warning; a normal that is
+    unknown or not a direction becomes its face's. Raises ModelError when no triangle is left or there are too
+    many.
+    """
+    count = sum(len(piece.triangles) for piece in pieces)
+    if count == 0:
+        raise folder.error("no triangles found; export the model as a mesh of faces")
+    if count > limits.MAX_TRIANGLES:
+        raise folder.error(
+            f"expected at most {limits.MAX_TRIANGLES:,} triangles, found {count:,}; simplify the model"
+        )
+    names = list(dict.fromkeys(piece.part for piece in pieces))
+    part_of = {name: i for i, name in enumerate(names)}
+    starts = np.cumsum([0, *(len(piece.positions) for piece in pieces)])
+    positions = np.concatenate([piece.positions for piece in pieces])
+    triangles = np.concatenate(
+        [piece.triangles + start for piece, start in zip(pieces, starts, strict=False)]
+    )
+    sizes = [len(piece.triangles) for piece in pieces]
+    part = np.repeat([part_of[piece.part] for piece in pieces], sizes)
+    material = np.repeat([piece.material for piece in pieces], sizes)
+
+    finite = _finite_triangles(folder, positions, triangles)
+    triangles, part, material = triangles[finite], part[finite], material[finite]
+    positions, origin = _around_origin(positions, triangles)
+    solid = _solid_triangles(folder, positions, triangles)
+    triangles, part, material = triangles[solid], part[solid], material[solid]
+    order = np.lexsort((material, part))
+    triangles, part, material = triangles[order], part[order], material[order]
+
+    used, corners = np.unique(triangles, return_inverse=True)
+    triangles = corners.reshape(-1, 3).astype(np.int32)
+    vertices = positions[used].astype(np.float32)
+    part_used, part = np.unique(part, return_inverse=True)
+    material_used, material = np.unique(material, return_inverse=True)
+    kept, images = _used_images([materials[i] for i in material_used], folder.images)
+    mesh = Mesh(
+        vertices=vertices,
+        triangles=triangles,
+        normals=_normals(pieces, vertices, triangles, used),
+        triangle_material=material.astype(np.int32),
+        triangle_part=part.astype(np.int32),
+        materials=kept,
+        parts=tuple(names[i] for i in part_used),
+        uv0=_join(pieces, "uv0", 2, 0.0, used),
+        uv1=_join(pieces, "uv1", 2, 0.0, used),
+        colors=_join(pieces, "colors", 4, 1.0, used),
+        images=images,
+        warnings=tuple(folder.warnings),
+    )
+    return mesh, replace(facts, origin=(origin[0], origin[1], origin[2]), files=tuple(folder.files))
+
+
+def _finite_triangles(folder: ModelFolder, positions: Float, triangles: Int) -> NDArray[np.bool_]:
+    usable = np.all(np.abs(positions) < GREATEST, axis=1, keepdims=True)
+    finite = np.all(usable[triangles], axis=(1, 2))
+    if not np.any(finite):
+        raise folder.error("every triangle has a NaN or infinite corner; export the model again")
+    if not np.all(finite):
+        folder.warn(f"{np.count_nonzero(~finite)} triangles with NaN or infinite corners dropped")
+    return finite
+
+
+def _around_origin(positions: Float, triangles: Int) -> tuple[Float, list[float]]:
+    used = positions[triangles.reshape(-1)]
+    low, high = used.min(axis=0), used.max(axis=0)
+    size = float((high - low).max())
+    center = (low + high) / 2
+    if size > 0 and float(np.abs(center).max()) > FAR * size:
+        return positions - center, [float(x) for x in center]
+    return positions, [0.0, 0.0, 0.0]
+
+
+def _solid_triangles(folder: ModelFolder, positions: Float, triangles: Int) -> NDArray[np.bool_]:
+    stored = positions.astype(np.float32).astype(np.float64)
+    solid = np.any(face_normals(stored, triangles) != 0, axis=1)
+    if not np.any(solid):
+        raise folder.error("every triangle has zero area; export the model again")
+    if not np.all(solid):
+        folder.warn(f"{np.count_nonzero(~solid)} triangles without area dropped")
+    return solid
+
+
+def _join(
+    pieces: Sequence[Piece], name: str, width: int, empty: float, used: Int
+) -> NDArray[np.float32] | None:
+    arrays: list[Float | None] = [getattr(piece, name) for piece in pieces]
+    if all(array is None for array in arrays):
+        return None
+    filled = [
+        np.full((len(p.positions), width), empty) if a is None else a
+        for p, a in zip(pieces, arrays, strict=True)
+    ]
+    joined = np.concatenate(filled)[used]
+    joined[~np.isfinite(joined)] = empty
+    return joined.astype(np.float32)
+
+
+def _normals(
+    pieces: Sequence[Piece], vertices: NDArray[np.float32], triangles: NDArray[np.int32], used: Int
+) -> NDArray[np.float32]:
+    given = _join(pieces, "normals", 3, 0.0, used)
+    return unit_normals(vertices, triangles, given)
+
+
+def unit_normals(
+    vertices: NDArray[np.float32], triangles: NDArray[np.int32], given: NDArray[np.float32] | None
+) -> NDArray[np.float32]:
+    """Unit normals (V, 3): the given ones, and the area-weighted mean of the faces where they are zero."""
+    normals = np.zeros((len(vertices), 3)) if given is None else given.astype(np.float64)
+    lengths = np.linalg.norm(normals, axis=1)
+    missing = ~(lengths > 1e-12)
+    if missing.any():
+        faces = face_normals(vertices.astype(np.float64), triangles)
+        mean = np.zeros_like(normals)
+        for axis in range(3):
+            weights = np.repeat(faces[:, axis], 3)
+            mean[:, axis] = np.bincount(triangles.reshape(-1), weights=weights, minlength=len(vertices))
+        normals[missing] = mean[missing]
+        lengths = np.linalg.norm(normals, axis=1)
+    still = ~(lengths > 0)
+    normals[still] = (0.0, 0.0, 1.0)
+    lengths[still] = 1.0
+    return (normals / lengths[:, None]).astype(np.float32)
+
+
+def face_normals(positions: Float, triangles: NDArray[np.integer]) -> Float:
+    """Normals (T, 3) whose length is twice the triangle's area, counter-clockwise side."""
+    a, b, c = (positions[triangles[:, i]] for i in range(3))
+    with np.errstate(invalid="ignore", over="ignore"):
+        return np.cross(b - a, c - a)
+
+
+def _used_images(
+    materials: Sequence[Material], images: Sequence[Image]
+) -> tuple[tuple[Material, ...], tuple[Image, ...]]:
+    """These materials and only the images they use, renumbered."""
+    textures = [getattr(material, name) for material in materials for name in TEXTURE_FIELDS]
+    used = sorted({texture.image for texture in textures if texture is not None})
+    position = {old: new for new, old in enumerate(used)}
+
+    def renumbered(material: Material) -> Material:
+        changes: dict[str, Texture] = {}
+        for name in TEXTURE_FIELDS:
+            texture: Texture | None = getattr(material, name)
+            if texture is not None:
+                changes[name] = replace(texture, image=position[texture.image])
+        return replace(material, **changes)  # pyright: ignore[reportArgumentType]
+
+    return tuple(renumbered(material) for material in materials), tuple(images[i] for i in used)

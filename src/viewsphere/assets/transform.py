@@ -1,0 +1,28 @@
+"""Pieces under affine transforms."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from viewsphere.assets.piece import Float, Piece
+
+
+def moved(piece: Piece, matrix: Float) -> Piece:
+    """The piece under an affine matrix (4, 4); a mirrored one is wound the other way round."""
+    linear = matrix[:3, :3]
+    mirrored = bool(np.linalg.det(linear) < 0)
+    # The cofactor matrix is det times the inverse transpose and exists for flattening matrices too.
+    cofactor = np.cross(linear[[1, 2, 0]], linear[[2, 0, 1]]) * (-1.0 if mirrored else 1.0)
+    with np.errstate(over="ignore", invalid="ignore"):
+        positions = piece.positions @ linear.T + matrix[:3, 3]
+        normals = None if piece.normals is None else unit(piece.normals @ cofactor.T)
+    triangles = piece.triangles[:, ::-1] if mirrored else piece.triangles
+    return replace(piece, positions=positions, normals=normals, triangles=triangles)
+
+
+def unit(vectors: Float) -> Float:
+    """Vectors (N, 3) of length one; those without direction are zero."""
+    lengths = np.linalg.norm(vectors, axis=1, keepdims=True)
+    return np.where(lengths > 0, vectors / np.where(lengths > 0, lengths, 1.0), 0.0)

@@ -1,0 +1,287 @@
+"""PLY, STL, OFF, DAE and 3MF: trimesh parses them (https://trimesh.org), this module keeps what it found.
+
+trimesh's parsers are called directly: its Trimesh class would merge and reorder vertices.
+"""
+
+from __future__ import annotations
+
+import io
+import re
+import warnings
+import zipfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.assets import limits
+from viewsphere.assets.folder import ModelFolder, image_pixels
+from viewsphere.assets.mesh import Image, Material, Mesh, Texture
+from viewsphere.assets.mtl import alpha_mode
+from viewsphere.assets.piece import FileFacts, Float, Int, Piece, assemble
+from viewsphere.assets.smoothing import creased
+from viewsphere.assets.srgb import linear
+from viewsphere.assets.transform import moved
+from viewsphere.model.shot import Axis
+
+UNITS = {
+    "micron": 1e-6, "millimeter": 1e-3, "centimeter": 1e-2, "inch": 0.0254, "foot": 0.3048, "meter": 1.0,
+}  # fmt: skip
+"""Units of 3MF, metres."""
+
+COLLADA_AXES: dict[str, tuple[Axis, Axis]] = {
+    "X_UP": ("+x", "+z"),
+    "Y_UP": ("+y", "+z"),
+    "Z_UP": ("+z", "-y"),
+}
+STL_HEADER, STL_TRIANGLE = 84, 50
+Rgba = tuple[float, float, float, float]
+
+
+def read_via_trimesh(folder: ModelFolder) -> tuple[Mesh, FileFacts]:
+    """The file as one mesh with its scene's transforms applied; parts are its geometries.
+
+    Vertex and face colours are taken as sRGB. Without normals, edges are smooth up to a crease.
+    """
+    kind = folder.model.suffix[1:].lower()
+    data = folder.read_model()
+    _check_promises(folder, kind, data)
+    loaded = _parse(folder, kind, data)
+    builder = _Builder(folder, [])
+    pieces = builder.scene(loaded) if "geometry" in loaded else builder.placed(loaded, "object", np.eye(4))
+    facts = _facts(folder, kind, data, loaded)
+    return assemble(folder, pieces, builder.materials, facts)
+
+
+class _Resolver:
+    """What trimesh asks for files that a model names."""
+
+    def __init__(self, folder: ModelFolder) -> None:
+        self.folder = folder
+
+    def get(self, key: str) -> bytes:
+        if self.folder.image(key, key) is None:
+            raise FileNotFoundError(key)
+        return self.folder.read(key, "texture")
+
+    def __getitem__(self, key: str) -> bytes:
+        return self.get(key)
+
+
+def _check_promises(folder: ModelFolder, kind: str, data: bytes) -> None:
+    """Refuse files that promise more elements than they have bytes for, before anything is allocated."""
+    if kind == "ply":
+        if not data.startswith(b"ply"):
+            raise folder.error("expected a PLY file, which begins with 'ply'")
+        counts = [
+            int(n) for n in re.findall(rb"element\s+\w+\s+(\d+)", data[: 1 << 16].partition(b"end_header")[0])
+        ]
+    elif kind == "off":
+        words = re.sub(rb"#.*", b"", data[: 1 << 16]).split()
+        counts = [int(word) for word in words[1:4] if word.isdigit()]
+    else:
+        counts = []
+    if any(count > len(data) for count in counts):
+        raise folder.error(f"promises {max(counts):,} elements in {len(data):,} bytes: truncated or damaged")
+    if kind == "3mf":
+        _check_archive(folder, data)
+
+
+def _check_archive(folder: ModelFolder, data: bytes) -> None:
+    try:
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            size = sum(entry.file_size for entry in archive.infolist())
+    except zipfile.BadZipFile:
+        raise folder.error("expected a 3MF archive (zip), found something else or a truncated one") from None
+    if size > limits.MAX_ARCHIVE_BYTES:
+        raise folder.error(
+            f"expected an archive of at most {limits.MAX_ARCHIVE_BYTES >> 20} MiB unpacked, "
+            f"found {size >> 20} MiB"
+        )
+
+
+def _parse(folder: ModelFolder, kind: str, data: bytes) -> dict[str, Any]:
+    """What trimesh's parser returns: the arguments of one mesh, or of a scene of several."""
+    from trimesh.exchange.load import mesh_loaders
+
+    if kind == "stl" and len(data) >= STL_HEADER:
+        # Many writers pad binary files; trimesh wants the exact length.
+        length = STL_HEADER + STL_TRIANGLE * int.from_bytes(data[80:84], "little")
+        if STL_HEADER < length < len(data) and not data.lstrip().startswith(b"solid"):
+            data = data[:length]
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            loaded = mesh_loaders[kind](io.BytesIO(data), file_type=kind, resolver=_Resolver(folder))
+    except Exception as error:  # each parser raises whatever its code stumbles over
+        reason = str(error).split("\n")[0][:120]
+        raise folder.error(
+            f"cannot be read as {kind.upper()} ({type(error).__name__}: {reason}): damaged?"
+        ) from None
+    return cast("dict[str, Any]", loaded)
+
+
+@dataclass(frozen=True, eq=False)
+class _Builder:
+    folder: ModelFolder
+    materials: list[Material]
+
+    def scene(self, loaded: Mapping[str, Any]) -> list[Piece]:
+        """All geometries where the scene's graph puts them; each once at the origin without a graph."""
+        geometry: dict[str, Any] = loaded["geometry"]
+        graph: list[dict[str, Any]] = loaded.get("graph") or [
+            {"frame_to": name, "geometry": name, "matrix": np.eye(4)} for name in geometry
+        ]
+        edges = [edge for edge in graph if edge.get("geometry") in geometry]
+        total = sum(len(geometry[edge["geometry"]]["faces"]) for edge in edges)
+        if total > limits.MAX_TRIANGLES:
+            raise self.folder.error(
+                f"expected at most {limits.MAX_TRIANGLES:,} triangles, found {total:,}; simplify it"
+            )
+        return [
+            piece
+            for edge in edges
+            for piece in self.placed(
+                geometry[edge["geometry"]], str(edge["frame_to"]), np.asarray(edge["matrix"])
+            )
+        ]
+
+    def placed(self, geometry: Mapping[str, Any], part: str, matrix: Float) -> list[Piece]:
+        """One geometry's triangles under an affine matrix."""
+        vertices, faces = geometry.get("vertices"), geometry.get("faces")
+        if vertices is None or faces is None or not len(faces):
+            return []
+        positions = np.asarray(vertices, np.float64).reshape(-1, 3)
+        triangles = np.asarray(faces).astype(np.int64)
+        if triangles.ndim != 2 or triangles.shape[1] not in (3, 4):
+            raise self.folder.error("expected triangles or quadrilaterals, found other faces")
+        repeats = np.ones(len(triangles), np.int64)
+        if triangles.shape[1] == 4:
+            repeats *= 2
+            triangles = triangles[:, [0, 1, 2, 2, 3, 0]].reshape(-1, 3)
+        if triangles.min() < 0 or triangles.max() >= len(positions):
+            raise self.folder.error(
+                f"a face names vertex {triangles.max()}, expected 0 to {len(positions) - 1}"
+            )
+        visual = geometry.get("visual")
+        piece = Piece(
+            part=part,
+            material=self._material(getattr(visual, "material", None)),
+            positions=positions,
+            triangles=triangles,
+            normals=_rows(geometry.get("vertex_normals"), len(positions), 3),
+            uv0=_uv(visual, len(positions)),
+            colors=_vertex_colors(geometry.get("vertex_colors"), len(positions)),
+        )
+        face_colors = geometry.get("face_colors")
+        if face_colors is not None and piece.colors is None and len(face_colors) == len(repeats):
+            piece = _with_face_colors(piece, np.repeat(np.asarray(face_colors), repeats, axis=0))
+        return [moved(piece if piece.normals is not None else creased(piece), matrix)]
+
+    def _material(self, source: Any) -> int:
+        """Index of the material that keeps what trimesh's has."""
+        image = getattr(source, "baseColorTexture", None) or getattr(source, "image", None)
+        texture = self._texture(image)
+        color = _unit_color(getattr(source, "baseColorFactor", None), (1.0, 1.0, 1.0, 1.0))
+        mode = "OPAQUE" if texture is None else alpha_mode(self.folder.images[texture.image].pixels[..., 3])
+        emissive = _unit_color(getattr(source, "emissiveFactor", None), (0.0, 0.0, 0.0, 1.0))
+        rough, metal = getattr(source, "roughnessFactor", None), getattr(source, "metallicFactor", None)
+        material = Material(
+            name=str(getattr(source, "name", None) or "default"),
+            base_color=color,
+            base_color_texture=texture,
+            metallic=0.0 if metal is None else float(metal),
+            roughness=Material().roughness if rough is None else float(rough),
+            normal_texture=self._texture(getattr(source, "normalTexture", None)),
+            emissive=emissive[:3],
+            alpha_mode="BLEND" if color[3] < 1.0 else mode,
+        )
+        if material not in self.materials:
+            self.materials.append(material)
+        return self.materials.index(material)
+
+    def _texture(self, picture: Any) -> Texture | None:
+        """The texture of a Pillow image; the folder has decoded the same file when trimesh asked for it."""
+        if picture is None:
+            return None
+        pixels = image_pixels(picture)
+        for index, known in enumerate(self.folder.images):
+            if np.array_equal(known.pixels, pixels):
+                return Texture(index)
+        return Texture(self.folder.add_image(Image("texture", pixels)))
+
+
+def _unit_color(color: Any, default: Rgba) -> Rgba:
+    """A colour in [0, 1] from trimesh's, which are floats or bytes."""
+    if color is None:
+        return default
+    values = np.asarray(color)
+    scaled = values.astype(np.float64) / (255.0 if values.dtype.kind in "iu" else 1.0)
+    padded = np.ones(4)
+    padded[: min(4, scaled.size)] = scaled.reshape(-1)[:4]
+    r, g, b, a = (float(x) for x in np.clip(np.nan_to_num(padded), 0.0, 1.0))
+    return (r, g, b, a)
+
+
+def _rows(values: Any, count: int, width: int) -> Float | None:
+    if values is None:
+        return None
+    array = np.asarray(values, np.float64)
+    return array if array.shape == (count, width) else None
+
+
+def _uv(visual: Any, count: int) -> Float | None:
+    """Texture coordinates with v downwards, as glTF has them."""
+    uv = _rows(getattr(visual, "uv", None), count, 2)
+    return None if uv is None else np.column_stack([uv[:, 0], 1.0 - uv[:, 1]])
+
+
+def _vertex_colors(values: Any, count: int) -> Float | None:
+    """Linear colours (V, 4) from sRGB bytes or floats, with or without alpha."""
+    if values is None:
+        return None
+    array = np.asarray(values)
+    if array.ndim != 2 or len(array) != count or array.shape[1] not in (3, 4):
+        return None
+    unit = np.clip(array.astype(np.float64) / (255.0 if array.dtype.kind in "iu" else 1.0), 0.0, 1.0)
+    alpha = unit[:, 3] if array.shape[1] == 4 else np.ones(count)
+    return np.column_stack([linear(unit[:, :3]), alpha])
+
+
+def _with_face_colors(piece: Piece, colors: NDArray[Any]) -> Piece:
+    """The piece with every triangle on its own, coloured by its face."""
+    corners: Int = piece.triangles.reshape(-1)
+    return Piece(
+        part=piece.part,
+        material=piece.material,
+        positions=piece.positions[corners],
+        triangles=np.arange(len(corners)).reshape(-1, 3),
+        normals=None if piece.normals is None else piece.normals[corners],
+        uv0=None if piece.uv0 is None else piece.uv0[corners],
+        colors=_vertex_colors(np.repeat(colors, 3, axis=0), len(corners)),
+    )
+
+
+def _facts(folder: ModelFolder, kind: str, data: bytes, loaded: Mapping[str, Any]) -> FileFacts:
+    up: Axis = "+z"
+    forward: Axis = "-y"
+    unit = 1.0
+    if kind == "dae":
+        axis = re.search(rb"<up_axis>\s*([XYZ]_UP)\s*</up_axis>", data)
+        up, forward = COLLADA_AXES[axis[1].decode() if axis else "Y_UP"]
+        metre = re.search(rb"<unit\b[^>]*\bmeter\s*=\s*[\"']([0-9.eE+-]+)[\"']", data)
+        unit = _positive(metre[1].decode()) if metre else 1.0
+    elif kind == "3mf":
+        name = str(loaded.get("metadata", {}).get("units", "millimeter")).rstrip("s")
+        unit = UNITS.get(name, UNITS["millimeter"])
+    return FileFacts(folder.model, kind, up, forward, unit)
+
+
+def _positive(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        return 1.0
+    return value if np.isfinite(value) and value > 0 else 1.0

@@ -1,0 +1,1 @@
+"""Engines: each paints pictures of a stage; labels never come from them."""

@@ -1,0 +1,45 @@
+"""The raster engine's options, as the recipe gives them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from difflib import get_close_matches
+
+from pydantic import JsonValue
+
+from viewsphere.errors import UserError
+
+
+@dataclass(frozen=True)
+class Options:
+    """antialias: samples in an edge pixel, 1 or 4; exposure: stops; shadow_resolution: width of the shadow map in cells."""
+
+    antialias: int = 4
+    exposure: float = 0.0
+    shadow_resolution: int = 2048
+
+
+def parse_options(given: Mapping[str, JsonValue]) -> Options:
+    """Checked options. Raises UserError for an unknown name (with the nearest) or a value out of range."""
+    known = [f.name for f in fields(Options)]
+    for name in given:
+        if name not in known:
+            near = get_close_matches(name, known, 1)
+            hint = f"; did you mean {near[0]!r}?" if near else ""
+            raise UserError(
+                f"raster engine: unknown option {name!r}: expected one of {', '.join(known)}{hint}"
+            )
+    default = Options()
+    antialias = given.get("antialias", default.antialias)
+    if isinstance(antialias, bool) or antialias not in (1, 4):
+        raise UserError(f"raster engine: antialias: expected 1 or 4, found {antialias!r}")
+    exposure = given.get("exposure", default.exposure)
+    if isinstance(exposure, bool) or not isinstance(exposure, int | float) or not -16 <= exposure <= 16:
+        raise UserError(f"raster engine: exposure: expected stops from -16 to 16, found {exposure!r}")
+    resolution = given.get("shadow_resolution", default.shadow_resolution)
+    if isinstance(resolution, bool) or not isinstance(resolution, int) or not 64 <= resolution <= 8192:
+        raise UserError(
+            f"raster engine: shadow_resolution: expected an integer in 64..8192, found {resolution!r}"
+        )
+    return Options(4 if antialias == 4 else 1, float(exposure), resolution - resolution % 8)

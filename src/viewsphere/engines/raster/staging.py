@@ -1,0 +1,160 @@
+"""The raster engine's stage: everything baked, ready to be seen from any camera."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.assets.mesh import Mesh
+from viewsphere.engines.raster import kernels_edge, kernels_shade
+from viewsphere.engines.raster.background import plain_background
+from viewsphere.engines.raster.light import Extent, bake_light
+from viewsphere.engines.raster.options import Options, parse_options
+from viewsphere.engines.raster.records import Float32, Int32, Light, Surfaces, Textures, View
+from viewsphere.engines.raster.surface import BLENDED, TRANSMISSION, pack_surfaces
+from viewsphere.engines.raster.tone import EXPOSURE, KNEE, srgb_bytes
+from viewsphere.geometry.camera import inverse_camera_matrix, pixel_rays
+from viewsphere.model.camera import Camera, Intrinsics
+from viewsphere.model.shot import Background, Frame, ModelSpec, Scene, Shot
+from viewsphere.truth.geometry import Geometry, build_geometry
+from viewsphere.truth.visibility import Visibility, rasterize
+
+_KNEE = np.float32(KNEE)
+_NO_INDEX = np.zeros(0, np.int32)
+
+
+@dataclass(frozen=True, eq=False)
+class RasterStage:
+    """A scene baked for shading; `color` paints it."""
+
+    geometry: Geometry
+    scene: Scene
+    options: Options
+    origin: NDArray[np.float64]
+    surfaces: Surfaces
+    textures: Textures
+    light: Light
+    owner: Int32
+    seen: NDArray[np.bool_]
+    see_through: NDArray[np.bool_]
+    _backgrounds: dict[tuple[Background, int, int], Float32 | None] = field(default_factory=dict)
+
+    def color(self, camera: Camera, frame: Frame, visibility: Visibility) -> NDArray[np.uint8]:
+        """The picture, (H, W, 3) uint8 sRGB; `visibility` is truth's buffer for this camera.
+
+        Edge pixels are the mean of their four quarters in linear light. Raises UserError for an unreadable background image.
+        """
+        background = self._background(camera, frame.background or self.scene.background)
+        color = background.copy()
+        triangle, depth = visibility.triangle.reshape(-1), visibility.inverse_depth.reshape(-1)
+        self._paint(camera, 1, _NO_INDEX, triangle, depth, color)
+        if self.options.antialias == 4:
+            self._smooth_edges(camera, visibility, background, color)
+        shape = camera.height, camera.width, 3
+        return kernels_edge.encode(color, srgb_bytes()).reshape(shape)
+
+    def _background(self, camera: Camera, background: Background) -> Float32:
+        """Display-linear colours behind everything, (H * W, 3)."""
+        key = (background, camera.width, camera.height)
+        if key not in self._backgrounds:
+            self._backgrounds.clear()
+            self._backgrounds[key] = plain_background(*key)
+        plain = self._backgrounds[key]
+        if plain is not None:
+            return plain
+        view = _view(camera, self.origin, 1)
+        return kernels_edge.sky_picture(view, self.light, _KNEE, camera.width * camera.height)
+
+    def _smooth_edges(
+        self, camera: Camera, visibility: Visibility, background: Float32, color: Float32
+    ) -> None:
+        fine = rasterize(self.geometry, camera, subdivision=2)
+        pixels = kernels_edge.edge_pixels(
+            visibility.triangle, visibility.inverse_depth, fine.triangle, fine.inverse_depth,
+            self.owner, self.geometry.triangle_normals,
+        )  # fmt: skip
+        where, triangle, depth, samples = kernels_edge.quarters(
+            pixels, camera.width, fine.triangle, fine.inverse_depth, background
+        )
+        self._paint(camera, 2, where, triangle, depth, samples)
+        kernels_edge.average_quarters(pixels, samples, color)
+
+    def _paint(
+        self, camera: Camera, subdivision: int, where: Int32, triangle: Int32, depth: Float32, color: Float32
+    ) -> None:
+        """Shade samples over `color`; see-through surfaces over the nearest solid one behind them."""
+        view = _view(camera, self.origin, subdivision)
+        front = kernels_edge.seen_samples(triangle, self.see_through)
+        if len(front):
+            solid = rasterize(self._solid(), camera, subdivision)
+            indices = where[front] if len(where) else front
+            behind, behind_depth = np.full_like(triangle, -1), np.zeros_like(depth)
+            behind[front] = solid.triangle.reshape(-1)[indices]
+            behind_depth[front] = solid.inverse_depth.reshape(-1)[indices]
+            self._shade(view, where, behind, behind_depth, color)
+        self._shade(view, where, triangle, depth, color)
+
+    def _shade(self, view: View, where: Int32, triangle: Int32, depth: Float32, color: Float32) -> None:
+        slots = kernels_edge.seen_samples(triangle, self.seen)
+        kernels_shade.shade(
+            view, self.surfaces, self.textures, self.light, _KNEE, slots, where, triangle, depth, color
+        )
+
+    def _solid(self) -> Geometry:
+        """The geometry without its see-through surfaces."""
+        hidden = np.where(self.see_through[:-1], np.int32(-2), self.geometry.triangle_cutout)
+        return replace(self.geometry, triangle_cutout=hidden.astype(np.int32))
+
+
+def build_stage(shot: Shot, load: Callable[[ModelSpec], Mesh]) -> RasterStage:
+    """Build everything that the shot's frames share."""
+    options = parse_options(shot.engine_options)
+    loaded: dict[ModelSpec, Mesh] = {}
+    meshes: list[Mesh] = []
+    for placement in shot.placements:
+        if placement.model not in loaded:
+            loaded[placement.model] = load(placement.model)
+        meshes.append(loaded[placement.model])
+    scene = shot.scene
+    geometry = build_geometry(shot.placements, meshes, scene.ground is not None, shot.label_alpha)
+    return _baked(geometry, meshes, scene, options)
+
+
+def _baked(geometry: Geometry, meshes: Sequence[Mesh], scene: Scene, options: Options) -> RasterStage:
+    used = geometry.vertices[np.unique(geometry.triangles[: geometry.triangle_start[-1]])]
+    low, high = (used.min(axis=0), used.max(axis=0)) if len(used) else (np.zeros(3), np.zeros(3))
+    origin = (low + high) / 2
+    exposure = EXPOSURE * 2.0**options.exposure
+    surfaces, textures = pack_surfaces(geometry, meshes, scene.ground, origin, exposure)
+    ground_z = None if geometry.ground_z is None else geometry.ground_z - float(origin[2])
+    extent = Extent(low - origin, high - origin, ground_z)
+    light = bake_light(scene, extent, surfaces, textures, exposure, options.shadow_resolution)
+    own = surfaces.materials[surfaces.material]
+    see_through = np.append((own[:, BLENDED] > 0) | (own[:, TRANSMISSION] > 0), False)
+    seen = np.append(np.ones(len(own), np.bool_), False)
+    owner = (geometry.triangle_object * len(surfaces.materials) + surfaces.material).astype(np.int32)
+    return RasterStage(geometry, scene, options, origin, surfaces, textures, light, owner, seen, see_through)
+
+
+def _view(camera: Camera, origin: NDArray[np.float64], subdivision: int) -> View:
+    lens = inverse_camera_matrix(camera.intrinsics)[:2] @ np.diag([1 / subdivision, 1 / subdivision, 1.0])
+    rays = np.zeros((0, 3), np.float32)
+    if camera.distortion is not None:
+        rays = _distorted_rays(camera.intrinsics, subdivision)
+    return View(
+        (camera.center - origin).astype(np.float32),
+        camera.R.astype(np.float32),
+        lens.astype(np.float32),
+        rays,
+        np.uint32(camera.width * subdivision),
+        np.float32(1 / np.sqrt(camera.intrinsics.fx * camera.intrinsics.fy)),
+    )
+
+
+@lru_cache(maxsize=2)
+def _distorted_rays(intrinsics: Intrinsics, subdivision: int) -> Float32:
+    return pixel_rays(intrinsics, subdivision).astype(np.float32).reshape(-1, 3)

@@ -1,0 +1,236 @@
+"""COCO instances (https://cocodataset.org/#format-data) with the extra keys of Ruiz et al. 2019.
+
+    annotations/instances_<split>.json
+    <split>/<image id>.png, <split>/MASK/<image id>.png     (_<object id> if frames hold several objects)
+    MODELS/<key>/<key>.obj, .glb, ...
+
+Large data sets have numbered sub-folders. Image and annotation ids count from 1 and come from the plan:
+they do not depend on what is finished. Segmentations are polygons that pycocotools rasterises to the
+identical mask.
+"""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Mapping
+from contextlib import ExitStack
+from itertools import chain
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from viewsphere.errors import UserError
+from viewsphere.geometry.image_files import encode_png
+from viewsphere.model.paper_json import faces, json_bytes, transformation_matrix, vehicle
+from viewsphere.model.sample import Box, ObjectAnnotation, Sample
+
+if TYPE_CHECKING:
+    from viewsphere.store import Category, Dataset
+
+_NAMES = {
+    1: "person bicycle car motorcycle airplane bus train truck boat",
+    10: "traffic_light fire_hydrant",
+    13: "stop_sign parking_meter bench bird cat dog horse sheep cow elephant bear zebra giraffe",
+    27: "backpack umbrella",
+    31: "handbag tie suitcase frisbee skis snowboard sports_ball kite baseball_bat baseball_glove skateboard surfboard "
+    "tennis_racket bottle",
+    46: "wine_glass cup fork knife spoon bowl banana apple sandwich orange broccoli carrot hot_dog pizza donut cake chair "
+    "couch potted_plant bed",
+    67: "dining_table",
+    70: "toilet",
+    72: "tv laptop mouse remote keyboard cell_phone microwave oven toaster sink refrigerator",
+    84: "book clock vase scissors teddy_bear hair_drier toothbrush",
+}
+CATEGORY_IDS: dict[str, int] = dict(
+    chain.from_iterable(
+        ((name.replace("_", " "), first + i) for i, name in enumerate(names.split())) for first, names in _NAMES.items()
+    )
+)
+"""COCO's 80 categories and their ids, which have gaps (https://github.com/cocodataset/cocoapi)."""
+
+_OTHER_SPELLINGS = {
+    **{"hairdryer": "hair drier", "bike": "bicycle", "motorbike": "motorcycle", "aeroplane": "airplane"},
+    **{"sofa": "couch", "tvmonitor": "tv"},
+}
+_FIRST_FREE_ID = 91
+_FOLDER_SIZE = 10_000
+
+
+def category_ids(categories: tuple[Category, ...]) -> dict[int, int]:
+    """COCO id of each category of the data set: COCO's own for its 80 names, however spelled, else a free
+    one above 90.
+
+    Of two categories with one name of COCO's, the first has it. Free ids follow the recipe's order.
+    """
+    known = {_plain(name): number for name, number in CATEGORY_IDS.items()}
+    known |= {other: CATEGORY_IDS[name] for other, name in _OTHER_SPELLINGS.items()}
+    ids: dict[int, int] = {}
+    for category in categories:
+        own = known.get(_plain(category.name))
+        ids[category.id] = own if own and own not in ids.values() else _FIRST_FREE_ID - 1 + category.id
+    return ids
+
+
+def _plain(name: str) -> str:
+    return "".join(c for c in name.lower() if c.isalnum())
+
+
+def export(dataset: Dataset, folder: Path) -> None:
+    """Write the finished frames: instances JSON of each split, images, masks and models.
+
+    Raises UserError if the data set has no `rgb` channel.
+    """
+    if "rgb" not in dataset.plan.channels:
+        raise UserError(
+            f"{dataset.root}: format coco: expected channel rgb, found none: add it to the recipe's channels"
+        )
+    write_annotations(dataset, folder)
+    for sample in dataset:
+        dataset.link(sample.files["rgb"], folder / sample.split / image_file(dataset, sample))
+        for annotation in sample.objects:
+            if annotation.area:
+                mask = folder / sample.split / mask_file(dataset, sample, annotation)
+                mask.parent.mkdir(parents=True, exist_ok=True)
+                mask.writejson_bytes(encode_png(annotation.mask))
+    for info in dataset.models:
+        for file in sorted(dataset.path(info.obj).parent.iterdir()):
+            if file.name != "model.json":
+                relative = file.relative_to(dataset.root).as_posix()
+                dataset.link(relative, folder / "MODELS" / info.key / file.name)
+
+
+def image_file(dataset: Dataset, sample: Sample) -> str:
+    """Name of a frame's image in its split's folder."""
+    return f"{_stem(dataset, sample)}.png"
+
+
+def mask_file(dataset: Dataset, sample: Sample, annotation: ObjectAnnotation) -> str:
+    """Name of an object's mask in its split's folder."""
+    several = f"_{annotation.id:03d}" if dataset.max_objects > 1 else ""
+    return f"MASK/{_stem(dataset, sample)}{several}.png"
+
+
+def _stem(dataset: Dataset, sample: Sample) -> str:
+    per_folder = max(1, _FOLDER_SIZE // dataset.max_objects)
+    inside = f"{sample.index // per_folder:04d}/" if dataset.plan.frames > per_folder else ""
+    return f"{inside}{sample.index + 1:012d}"
+
+
+def write_annotations(dataset: Dataset, folder: Path) -> None:
+    """Write `annotations/instances_<split>.json` of every split, frame by frame, whatever their number."""
+    (folder / "annotations").mkdir(parents=True, exist_ok=True)
+    ids = category_ids(dataset.categories)
+    head = _head(dataset, ids)
+    with ExitStack() as stack:
+        files = {
+            s: stack.enter_context(_Instances(folder / "annotations" / f"instances_{s}.json", head))
+            for s in dataset.splits
+        }
+        for sample in dataset:
+            files[sample.split].add(
+                _image(dataset, sample),
+                [_annotation(dataset, sample, o, ids) for o in sample.objects if o.area],
+            )
+
+
+class _Instances:
+    """An instances file that is written frame by frame: annotations wait in a file of their own until
+    images are complete.
+    """
+
+    def __init__(self, file: Path, head: dict[str, Any]) -> None:
+        self._images = file.open("w+b")
+        self._annotations = file.with_suffix(".part").open("w+b")
+        self._part = file.with_suffix(".part")
+        self._images.write(json_bytes(head)[:-1] + b',"images":[')
+        self._separators = [b"\n", b"\n"]
+
+    def __enter__(self) -> _Instances:
+        return self
+
+    def add(self, image: dict[str, Any], annotations: list[dict[str, Any]]) -> None:
+        """Append a frame."""
+        for i, (file, values) in enumerate(((self._images, [image]), (self._annotations, annotations))):
+            for value in values:
+                file.write(self._separators[i] + json_bytes(value))
+                self._separators[i] = b",\n"
+
+    def __exit__(self, *failure: object) -> None:
+        if failure[0] is None:
+            self._images.write(b'\n],"annotations":[')
+            self._annotations.seek(0)
+            shutil.copyfileobj(self._annotations, self._images)
+            self._images.write(b"\n]}\n")
+        self._images.close()
+        self._annotations.close()
+        self._part.unlink()
+
+
+def _head(dataset: Dataset, ids: Mapping[int, int]) -> dict[str, Any]:
+    return {
+        "info": {"description": dataset.name, "version": "1.0", "contributor": f"viewsphere {dataset.plan.version}"},
+        "licenses": [],
+        "categories": [{"id": ids[c.id], "name": c.name, "supercategory": c.supercategory} for c in dataset.categories],
+        "models": {
+            i.key: vehicle(
+                i.category, i.supercategory, f"./MODELS/{i.key}/{Path(i.obj).name}", i.box3d_object, i.real_size
+            )
+            for i in dataset.models
+        },
+    }
+
+
+def _image(dataset: Dataset, sample: Sample) -> dict[str, Any]:
+    camera, pose = sample.camera, sample.pose
+    keys = [o.key for o in sample.objects]
+    lens = camera.distortion
+    return {
+        "id": sample.index + 1,
+        "file_name": image_file(dataset, sample),
+        "width": camera.width,
+        "height": camera.height,
+        "id_model": keys[0] if len(keys) == 1 else keys,
+        "id_pose": pose.index,
+        "pose_category": pose.category,
+        "render_resolution": [camera.width, camera.height],
+        "render_scale": 1.0,
+        "distance": pose.distance,
+        "elevation": pose.elevation_deg,
+        "azimuth": pose.azimuth_deg,
+        "tilt": pose.tilt_deg,
+        "transformation_matrix": {**transformation_matrix(camera), "P": camera.P.tolist()},
+        "distortion": None if lens is None else lens.model_dump(mode="json"),
+    }
+
+
+def _annotation(dataset: Dataset, sample: Sample, o: ObjectAnnotation, ids: Mapping[int, int]) -> dict[str, Any]:
+    return {
+        "id": sample.index * dataset.max_objects + o.id,
+        "image_id": sample.index + 1,
+        "category_id": ids[o.category_id],
+        "iscrowd": 0,
+        "area": o.area,
+        "bbox": _corner_and_size(o.box2d),
+        "segmentation": [[int(c) for c in polygon] for polygon in o.polygons],
+        "width": sample.camera.width,
+        "height": sample.camera.height,
+        "path_mask": mask_file(dataset, sample, o),
+        "bbox_3D_pxs": faces(o.box3d_pixels),
+        "bbox_projected": _corner_and_size(o.box2d_projected),
+        "bbox_unclipped": _corner_and_size(o.box2d_unclipped),
+        "visibility": o.visibility,
+        "truncation": o.truncation,
+        "id_object": o.id,
+        "id_model": o.key,
+        "world_from_object": o.world_from_object.tolist(),
+        "camera_from_object": o.camera_from_object.tolist(),
+        "quaternion": o.quaternion,
+        "view": o.view.__dict__,
+        "pose_category": o.pose_category,
+        "size": o.size,
+        "real_size": o.real_size,
+    }
+
+
+def _corner_and_size(box: Box | None) -> list[float] | None:
+    """COCO's [x, y, width, height] of (x0, y0, x1, y1)."""
+    return None if box is None else [box[0], box[1], box[2] - box[0], box[3] - box[1]]

@@ -1,0 +1,160 @@
+"""Where a camera stands and what it sees: orbit poses, pinhole projection, lens distortion.
+
+World: right-handed, Z up, metres. Camera axes: x right, y down, z forward (OpenCV). The image spans [0, W] x [0, H];
+pixel (i, j) has its centre at (i + .5, j + .5).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+if TYPE_CHECKING:
+    from viewsphere.model.camera import Distortion, Intrinsics
+
+Float = NDArray[np.float64]
+Window = tuple[int, int, int, int]
+"""Pixels [x0, x1) x [y0, y1) as (x0, y0, x1, y1); may reach outside the image."""
+
+
+def orbit_center(azimuth: float, elevation: float, distance: float) -> Float:
+    """Camera centre relative to the target, (3,) metres; angles in radians.
+
+    At azimuth 0 the camera stands on -Y and looks along +Y, the rig of Ruiz et al. 2019 and of PASCAL3D+.
+    """
+    ca, sa, ce, se = math.cos(azimuth), math.sin(azimuth), math.cos(elevation), math.sin(elevation)
+    return distance * np.array([ce * sa, -ce * ca, se])
+
+
+def orbit_rotation(azimuth: float, elevation: float, tilt: float = 0.0) -> Float:
+    """World-to-camera rotation (3, 3); angles in radians.
+
+    No look-at: elevation 90 degrees is well defined. A positive tilt rolls the camera clockwise seen from behind it.
+    """
+    ca, sa, ce, se = math.cos(azimuth), math.sin(azimuth), math.cos(elevation), math.sin(elevation)
+    level = np.array([[ca, sa, 0.0], [se * sa, -se * ca, -ce], [-ce * sa, ce * ca, -se]])
+    c, s = math.cos(tilt), math.sin(tilt)
+    return np.array([c * level[0] + s * level[1], c * level[1] - s * level[0], level[2]])  # not @: BLAS rounds by processor
+
+
+def orbit_angles(direction: ArrayLike) -> tuple[float, float]:
+    """Azimuth and elevation (radians) of a camera that stands in this direction from its target.
+
+    The inverse of `orbit_center`; azimuth in [0, 2 pi), and 0 at the poles.
+    """
+    x, y, z = np.asarray(direction, np.float64)
+    elevation = float(np.arctan2(z, np.hypot(x, y)))
+    azimuth = float(np.arctan2(x, -y)) % (2 * np.pi) if np.hypot(x, y) > 1e-12 * abs(z) else 0.0
+    return azimuth, elevation
+
+
+def focal_from_fov(fov: float, extent: float, fisheye: bool = False) -> float:
+    """Focal length in pixels that makes `extent` pixels span the full angle `fov` (radians).
+
+    A pinhole's is extent / (2 tan(fov / 2)); a fisheye's is extent / fov (equidistant).
+    """
+    return extent / fov if fisheye else extent / (2 * math.tan(fov / 2))
+
+
+def fov_from_focal(focal: float, extent: float, fisheye: bool = False) -> float:
+    """The full angle in radians that `extent` pixels span; the inverse of `focal_from_fov`."""
+    return extent / focal if fisheye else 2 * math.atan(extent / (2 * focal))
+
+
+def focal_from_sensor(focal: float, sensor: float, extent: float) -> float:
+    """Focal length in pixels from the lens' focal length and the sensor's size along `extent` pixels (any one unit)."""
+    return focal / sensor * extent
+
+
+def inverse_camera_matrix(intrinsics: Intrinsics) -> Float:
+    """K^-1, (3, 3): pixels to (x/z, y/z, 1)."""
+    i = intrinsics
+    return np.array(
+        [
+            [1 / i.fx, -i.skew / (i.fx * i.fy), (i.skew * i.cy / i.fy - i.cx) / i.fx],
+            [0.0, 1 / i.fy, -i.cy / i.fy],
+            [0.0, 0.0, 1.0],
+        ]
+    )
+
+
+def pixel_rays(intrinsics: Intrinsics, subdivision: int = 1, window: Window | None = None) -> Float:
+    """Rays through sample centres in camera axes, (H, W, 3): `subdivision` x `subdivision` samples a pixel.
+
+    z is 1 for a pinhole and for Brown-Conrady; a fisheye's rays are unit vectors and may look sideways or back. NaN where the
+    lens model has no ray for a pixel. `window` (x0, y0, x1, y1) replaces the image by other pixels, also outside it.
+    """
+    x0, y0, x1, y1 = (subdivision * e for e in window or (0, 0, intrinsics.width, intrinsics.height))
+    rays = np.empty((y1 - y0, x1 - x0, 3))
+    lens, i = intrinsics.distortion, intrinsics
+    if lens is None:
+        y = ((np.arange(y0, y1) + 0.5) / subdivision - i.cy) / i.fy
+        x = (np.arange(x0, x1) + 0.5) / subdivision - i.cx
+        rays[..., 0] = (x - i.skew * y[:, None]) / i.fx
+        rays[..., 1] = y[:, None]
+        rays[..., 2] = 1.0
+        return rays
+    from viewsphere.geometry import kernels_lens as kernels
+
+    k, limit = _coefficients(lens), lens_limit(lens)
+    cast = kernels.rays_fisheye if lens.model == "fisheye" else kernels.rays_brown
+    cast(k, limit, i.K, x0, y0, subdivision, rays)
+    return rays
+
+
+def project(intrinsics: Intrinsics, points: ArrayLike) -> tuple[Float, NDArray[np.bool_]]:
+    """Where camera-axes points (..., 3) fall in the image.
+
+    Returns pixels (..., 2) float64, NaN where the lens does not show the point (behind a pinhole, folded back by Brown-Conrady,
+    beyond a fisheye's largest angle), and in_front (...) bool, z > 0. A fisheye may show points that are not in front.
+    """
+    points = np.asarray(points, np.float64)
+    in_front = points[..., 2] > 0
+    lens, i = intrinsics.distortion, intrinsics
+    flat = np.ascontiguousarray(points.reshape(-1, 3))
+    if lens is None:
+        z = np.where(in_front.reshape(-1), flat[:, 2], np.nan)
+        x, y = flat[:, 0] / z, flat[:, 1] / z
+    else:
+        from viewsphere.geometry import kernels_lens as kernels
+
+        out = np.empty((len(flat), 2))
+        distort = kernels.distort_fisheye if lens.model == "fisheye" else kernels.distort_brown
+        distort(_coefficients(lens), lens_limit(lens), flat, out)
+        x, y = out.T
+    pixels = np.stack([i.fx * x + i.skew * y + i.cx, i.fy * y + i.cy], axis=-1)
+    return pixels.reshape(*points.shape[:-1], 2), in_front
+
+
+def lens_limit(lens: Distortion) -> float:
+    """How far from the axis the lens map is one-to-one: a radius r/z for Brown-Conrady (may be infinite), an angle for fisheye.
+
+    Up to there the radial map rises; beyond it a distorted picture folds back on itself, which no lens does.
+    """
+    k = _coefficients(lens)
+    if lens.model == "fisheye":
+        slope = np.array([9 * k[3], 7 * k[2], 5 * k[1], 3 * k[0], 1.0])
+        return min(math.pi, math.sqrt(_first_positive_root(slope)))
+    numerator, denominator = np.array([k[4], k[1], k[0], 1.0]), np.array([k[7], k[6], k[5], 1.0])
+    twice_s = np.array([2.0, 0.0])
+    slope = np.polyadd(
+        np.polymul(np.polyadd(numerator, np.polymul(twice_s, np.polyder(numerator))), denominator),
+        -np.polymul(twice_s, np.polymul(numerator, np.polyder(denominator))),
+    )
+    return math.sqrt(min(_first_positive_root(slope), _first_positive_root(denominator)))
+
+
+def _first_positive_root(polynomial: Float) -> float:
+    roots = np.roots(polynomial)
+    real = roots.real[(np.abs(roots.imag) <= 1e-9 * np.abs(roots)) & (roots.real > 0)]
+    return float(real.min()) if len(real) else math.inf
+
+
+def _coefficients(lens: Distortion) -> Float:
+    """Padded to the model's full length with zeros."""
+    k = np.zeros(4 if lens.model == "fisheye" else 8)
+    k[: len(lens.coefficients)] = lens.coefficients
+    return k

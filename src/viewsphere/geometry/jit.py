@@ -1,0 +1,62 @@
+"""Compile kernels once, whatever the number of processes: numba with a cache that is never stale.
+
+numba's own cache misses changes in functions that a kernel calls from another file, so each kernel is cached in a
+folder keyed by a digest of its source file, of the files of all kernels it can call, of numba's version and of the
+processor's name.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import tempfile
+from collections.abc import Callable
+from functools import cache, partial
+from pathlib import Path
+from typing import Any
+
+import llvmlite.binding
+import numba
+import platformdirs
+from numba.core import config
+from numba.core.dispatcher import Dispatcher
+
+_BUILD = (numba.__version__, llvmlite.binding.get_host_cpu_name(), os.environ.get("NUMBA_BOUNDSCHECK"))
+
+
+def njit(function: Callable[..., Any] | None = None, **options: Any) -> Any:
+    """`numba.njit` as every kernel uses it: no GIL, cached, numpy's division, exact unless `fastmath` is given."""
+    if function is None:
+        return partial(njit, **options)
+    if not os.environ.get("NUMBA_CACHE_DIR"):
+        setattr(config, "CACHE_DIR", _cache_folder(frozenset(_sources(function, set()))))  # noqa: B010, not in its stubs
+    return numba.njit(nogil=True, cache=True, error_model="numpy", **options)(function)
+
+
+def _sources(function: Callable[..., Any], seen: set[str]) -> set[str]:
+    """Files of a function and of all kernels within its reach."""
+    file = function.__code__.co_filename
+    if file not in seen:
+        seen.add(file)
+        for value in list(function.__globals__.values()):
+            if isinstance(value, Dispatcher):
+                _sources(value.py_func, seen)
+    return seen
+
+
+@cache
+def _cache_folder(sources: frozenset[str]) -> str:
+    """A writable folder for these sources: in the user's cache, else in the temporary folder."""
+    digest = hashlib.sha256(repr(_BUILD).encode())
+    for source in sorted(sources):
+        digest.update(Path(source).read_bytes())
+    wanted = Path(os.environ.get("VIEWSPHERE_CACHE") or platformdirs.user_cache_dir("viewsphere"))
+    for root in (wanted, Path(tempfile.gettempdir()) / f"viewsphere-{Path.home().name}"):
+        folder = root / "kernels" / digest.hexdigest()[:16]
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError:
+            continue
+        if os.access(folder, os.W_OK):
+            return str(folder)
+    return tempfile.mkdtemp(prefix="viewsphere-kernels-")

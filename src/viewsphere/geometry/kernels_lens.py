@@ -1,0 +1,156 @@
+"""Lens models: the forward maps and their inverses by Newton's method."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from viewsphere.geometry.jit import njit
+
+TOLERANCE = 1e-14
+
+
+@njit
+def brown_conrady(k, x, y):
+    """Distorted (x, y) and the map's Jacobian; k is k1 k2 p1 p2 k3 k4 k5 k6 and (x, y) the undistorted x/z, y/z."""
+    s = x * x + y * y
+    n = 1.0 + s * (k[0] + s * (k[1] + s * k[4]))
+    d = 1.0 + s * (k[5] + s * (k[6] + s * k[7]))
+    dn = k[0] + s * (2.0 * k[1] + s * 3.0 * k[4])
+    dd = k[5] + s * (2.0 * k[6] + s * 3.0 * k[7])
+    g, dg = n / d, 2.0 * (dn * d - n * dd) / (d * d)
+    u = x * g + 2.0 * k[2] * x * y + k[3] * (s + 2.0 * x * x)
+    v = y * g + k[2] * (s + 2.0 * y * y) + 2.0 * k[3] * x * y
+    uy = x * y * dg + 2.0 * k[2] * x + 2.0 * k[3] * y
+    ux = g + x * x * dg + 2.0 * k[2] * y + 6.0 * k[3] * x
+    vy = g + y * y * dg + 6.0 * k[2] * y + 2.0 * k[3] * x
+    return u, v, ux, uy, vy
+
+
+@njit
+def radial_brown(k, r):
+    """r times the radial factor, and its derivative."""
+    s = r * r
+    n = 1.0 + s * (k[0] + s * (k[1] + s * k[4]))
+    d = 1.0 + s * (k[5] + s * (k[6] + s * k[7]))
+    dn = k[0] + s * (2.0 * k[1] + s * 3.0 * k[4])
+    dd = k[5] + s * (2.0 * k[6] + s * 3.0 * k[7])
+    return r * n / d, n / d + 2.0 * s * (dn * d - n * dd) / (d * d)
+
+
+@njit
+def radial_fisheye(k, theta):
+    """Kannala and Brandt's theta_d, and its derivative."""
+    s = theta * theta
+    f = 1.0 + s * (k[0] + s * (k[1] + s * (k[2] + s * k[3])))
+    return theta * f, 1.0 + s * (3.0 * k[0] + s * (5.0 * k[1] + s * (7.0 * k[2] + s * 9.0 * k[3])))
+
+
+@njit
+def invert_radial(k, fisheye, target, limit):
+    """r in [0, limit] with radial(r) = target, NaN if there is none; the function rises up to `limit` (may be infinite)."""
+    low, high = 0.0, limit
+    if limit == np.inf:
+        high = max(1.0, target)
+        while radial_brown(k, high)[0] < target and high < 1e300:
+            high *= 2.0
+    r = min(target, high)
+    if (radial_fisheye(k, high) if fisheye else radial_brown(k, high))[0] < target:
+        return np.nan
+    for _ in range(200):
+        value, slope = radial_fisheye(k, r) if fisheye else radial_brown(k, r)
+        if value < target:
+            low = r
+        else:
+            high = r
+        step = (target - value) / slope if slope > 0.0 else np.inf
+        following = r + step
+        if not low <= following <= high:
+            following = 0.5 * (low + high)
+        if abs(following - r) <= TOLERANCE * r:
+            return following
+        r = following
+    return r
+
+
+@njit
+def rays_brown(k, limit, matrix, x0, y0, samples, out):
+    """Undistorted rays (x, y, 1) of the sample centres; NaN beyond the range in which the lens map is one-to-one."""
+    for j in range(out.shape[0]):
+        for i in range(out.shape[1]):
+            v = ((j + y0 + 0.5) / samples - matrix[1, 2]) / matrix[1, 1]
+            u = ((i + x0 + 0.5) / samples - matrix[0, 2] - matrix[0, 1] * v) / matrix[0, 0]
+            x, y = undistort_brown(k, limit, u, v)
+            out[j, i, 0], out[j, i, 1], out[j, i, 2] = x, y, 1.0
+
+
+@njit
+def undistort_brown(k, limit, u, v):
+    """(x/z, y/z) that the lens maps to (u, v); NaN if none within radius `limit` and the map's unfolded part."""
+    target = math.sqrt(u * u + v * v)
+    if target == 0.0:
+        x, y = 0.0, 0.0
+    else:
+        r = invert_radial(k, False, target, limit)
+        if np.isnan(r):
+            r = 0.99 * limit  # the tangential terms may still bring it into range
+        x, y = u * r / target, v * r / target
+    for _ in range(50):
+        fu, fv, ux, uy, vy = brown_conrady(k, x, y)
+        determinant = ux * vy - uy * uy
+        if not determinant > 0.0:
+            break
+        du, dv = u - fu, v - fv
+        sx, sy = (vy * du - uy * dv) / determinant, (ux * dv - uy * du) / determinant
+        x, y = x + sx, y + sy
+        if abs(sx) + abs(sy) <= TOLERANCE * (1.0 + abs(x) + abs(y)):
+            _, _, ux, uy, vy = brown_conrady(k, x, y)
+            if math.sqrt(x * x + y * y) < limit and ux > 0.0 and ux * vy - uy * uy > 0.0:
+                return x, y
+            break
+    return np.nan, np.nan
+
+
+@njit
+def rays_fisheye(k, limit, matrix, x0, y0, samples, out):
+    """Unit rays of the sample centres; NaN beyond the largest angle `limit`."""
+    for j in range(out.shape[0]):
+        for i in range(out.shape[1]):
+            v = ((j + y0 + 0.5) / samples - matrix[1, 2]) / matrix[1, 1]
+            u = ((i + x0 + 0.5) / samples - matrix[0, 2] - matrix[0, 1] * v) / matrix[0, 0]
+            radius = math.sqrt(u * u + v * v)
+            if radius == 0.0:
+                out[j, i, 0], out[j, i, 1], out[j, i, 2] = 0.0, 0.0, 1.0
+                continue
+            theta = invert_radial(k, True, radius, limit)
+            sine = math.sin(theta) / radius
+            out[j, i, 0], out[j, i, 1] = u * sine, v * sine
+            out[j, i, 2] = math.cos(theta) if theta == theta else np.nan
+
+
+@njit
+def distort_brown(k, limit, points, out):
+    """Distorted (x, y) of camera points (N, 3); NaN where z <= 0 or beyond the unfolded range."""
+    for i in range(points.shape[0]):
+        out[i, 0] = out[i, 1] = np.nan
+        if points[i, 2] > 0.0:
+            x, y = points[i, 0] / points[i, 2], points[i, 1] / points[i, 2]
+            u, v, ux, uy, vy = brown_conrady(k, x, y)
+            if math.sqrt(x * x + y * y) < limit and ux > 0.0 and ux * vy - uy * uy > 0.0:
+                out[i, 0], out[i, 1] = u, v
+
+
+@njit
+def distort_fisheye(k, limit, points, out):
+    """Distorted (x, y) of camera points (N, 3); NaN at the camera's centre, straight behind, and beyond angle `limit`."""
+    for i in range(points.shape[0]):
+        x, y, z = points[i, 0], points[i, 1], points[i, 2]
+        r = math.sqrt(x * x + y * y)
+        theta = math.atan2(r, z)
+        out[i, 0] = out[i, 1] = np.nan
+        if r == 0.0 and z > 0.0:
+            out[i, 0] = out[i, 1] = 0.0
+        elif r > 0.0 and theta <= limit:
+            scale = radial_fisheye(k, theta)[0] / r
+            out[i, 0], out[i, 1] = x * scale, y * scale

@@ -1,0 +1,163 @@
+"""Compiled loops over masks: boundaries along pixel corners, run lengths."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from viewsphere.geometry.jit import njit
+
+# Headings: 0 right, 1 down, 2 left, 3 up. The foreground lies on the right hand of the walk.
+STEP_X = (1, 0, -1, 0)
+STEP_Y = (0, 1, 0, -1)
+# The pixels ahead of corner (x, y), as offsets of (row, column): on the left and on the right hand.
+LEFT_ROW, LEFT_COLUMN = (-1, 0, 0, -1), (0, 0, -1, -1)
+RIGHT_ROW, RIGHT_COLUMN = (0, 0, -1, -1), (0, -1, -1, 0)
+
+
+@njit
+def _turn(mask, x, y, heading):
+    """The heading after corner (x, y) of the padded mask; at a diagonal touch the walk stays with its own
+    pixel.
+    """
+    if not mask[y + RIGHT_ROW[heading], x + RIGHT_COLUMN[heading]]:
+        return (heading + 1) % 4
+    if mask[y + LEFT_ROW[heading], x + LEFT_COLUMN[heading]]:
+        return (heading + 3) % 4
+    return heading
+
+
+@njit
+def _push(ring, start, count, x, y):
+    """Append a corner to the ring that began at `start`; a corner on the way straight on is replaced."""
+    if count - start >= 2:
+        ax, ay = ring[count - 2]
+        bx, by = ring[count - 1]
+        if (ax == bx == x and (by - ay) * (y - by) > 0) or (ay == by == y and (bx - ax) * (x - bx) > 0):
+            count -= 1
+    ring[count, 0] = x
+    ring[count, 1] = y
+    return count + 1
+
+
+@njit
+def _mark_loops(mask, seen, hole_below):
+    """Walk every loop once: marks its horizontal edges, notes each hole at the corner above it, counts
+    edges and rings.
+
+    A loop's first edge in raster order has foreground below for an outer ring and above for a hole. From a
+    hole's first corner the line straight up stays inside the foreground until it meets the boundary of the
+    same component: there the hole is joined. `seen` is 2 where an outer ring starts.
+    """
+    edges, rings = 0, 0
+    height, width = mask.shape
+    for y in range(1, height):
+        for x in range(1, width - 1):
+            below, above = mask[y, x], mask[y - 1, x]
+            if below == above or seen[y, x]:
+                continue
+            heading = 0 if below else 2
+            cx, cy = (x, y) if below else (x + 1, y)
+            sx, sy, first = cx, cy, heading
+            while True:
+                if heading == 0:
+                    seen[cy, cx] = 1
+                elif heading == 2:
+                    seen[cy, cx - 1] = 1
+                cx += STEP_X[heading]
+                cy += STEP_Y[heading]
+                edges += 1
+                heading = _turn(mask, cx, cy, heading)
+                if cx == sx and cy == sy and heading == first:
+                    break
+            if below:
+                seen[y, x] = 2
+                rings += 1
+                continue
+            top = y - 1
+            while mask[top - 1, x - 1] and mask[top - 1, x]:
+                top -= 1
+            hole_below[top, x] = y
+    return edges, rings
+
+
+@njit
+def _walk(mask, hole_below, ring, count, sx, sy, stack):
+    """Append the outer ring that starts at (sx, sy) heading right, its holes joined by vertical bridges."""
+    start, depth = count, 0
+    x, y, heading = sx, sy, 0
+    count = _push(ring, start, count, x, y)
+    while True:
+        x += STEP_X[heading]
+        y += STEP_Y[heading]
+        turned = _turn(mask, x, y, heading)
+        if depth and x == stack[depth - 1, 0] and y == stack[depth - 1, 2] and heading == 2:
+            # Back at the hole's first corner: return over the bridge, go on where the walk left off.
+            depth -= 1
+            count = _push(ring, start, count, x, y)
+            y, heading = stack[depth, 1], stack[depth, 3]
+            count = _push(ring, start, count, x, y)
+            heading = _turn(mask, x, y, heading)
+            continue
+        elif hole_below[y, x]:
+            count = _push(ring, start, count, x, y)
+            stack[depth, 0], stack[depth, 1], stack[depth, 2], stack[depth, 3] = (
+                x,
+                y,
+                hole_below[y, x],
+                heading,
+            )
+            depth += 1
+            y, heading = hole_below[y, x], 1
+            count = _push(ring, start, count, x, y)
+            continue
+        if depth == 0 and x == sx and y == sy and turned == 0:
+            return _push(ring, start, count, x, y) - 1
+        if turned != heading:
+            count = _push(ring, start, count, x, y)
+        heading = turned
+
+
+@njit
+def trace_rings(mask):
+    """Corners (n, 2) int32 of one ring per 4-connected component, and the rings' ends (rings,).
+
+    `mask` (h, w) bool is padded by one pixel of background; so are the corners' coordinates.
+    """
+    height, width = mask.shape
+    seen = np.zeros((height, width), np.uint8)
+    hole_below = np.zeros((height, width), np.int32)
+    edges, rings = _mark_loops(mask, seen, hole_below)
+    ring = np.empty((3 * edges + 8, 2), np.int32)
+    ends = np.empty(rings, np.int64)
+    stack = np.empty((edges // 4 + 1, 4), np.int64)
+    count, found = 0, 0
+    for y in range(1, height):
+        for x in range(1, width - 1):
+            if seen[y, x] == 2:
+                count = _walk(mask, hole_below, ring, count, x, y, stack)
+                ends[found] = count
+                found += 1
+    return ring[:count], ends
+
+
+@njit
+def run_lengths(ids, wanted, x0, y0, x1, y1):
+    """COCO's uncompressed run lengths of `ids == wanted`, all of it in columns [x0, x1) and rows [y0, y1)."""
+    height, width = ids.shape
+    runs = np.empty((x1 - x0) * (y1 - y0 + 1) + 2, np.int64)
+    count, last, inside = 0, 0, False
+    for x in range(x0, x1):
+        for y in range(y0, y1):
+            if (ids[y, x] == wanted) != inside:
+                position = x * height + y
+                runs[count] = position - last
+                count, last, inside = count + 1, position, not inside
+        whole_columns = y0 == 0 and y1 == height
+        if inside and not (whole_columns and x + 1 < x1):
+            position = x * height + y1
+            if position == width * height:
+                break
+            runs[count] = position - last
+            count, last, inside = count + 1, position, False
+    runs[count] = width * height - last
+    return runs[: count + 1]

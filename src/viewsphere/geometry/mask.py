@@ -1,0 +1,78 @@
+"""Masks as COCO keeps them: run-length codes and polygons, both exact.
+
+COCO's own rasteriser is the judge of both:
+https://github.com/cocodataset/cocoapi/blob/master/common/maskApi.c.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Mask = NDArray[np.bool_]
+
+
+def encode_rle(mask: Mask) -> str:
+    """COCO's compressed run-length code (column-major) of a (H, W) bool mask."""
+    from pycocotools import mask as coco
+
+    code: Any = coco.encode(np.asfortranarray(mask, np.uint8))
+    return code["counts"].decode("ascii")
+
+
+def decode_rle(height: int, width: int, counts: str) -> Mask:
+    """The (height, width) bool mask of a compressed run-length code; raises ValueError when it does not
+    fill the image.
+    """
+    from pycocotools import mask as coco
+
+    size = [height, width]
+    mask = coco.decode({"size": size, "counts": counts.encode("ascii")})
+    if mask.shape != (height, width):
+        raise ValueError(f"RLE: expected a mask of {size}, found {mask.shape}")
+    return np.ascontiguousarray(mask).view(np.bool_)
+
+
+def rle_of_id(ids: NDArray[np.int32], wanted: int, box: tuple[int, int, int, int]) -> str:
+    """`encode_rle(ids == wanted)`, where all such pixels lie in the half-open box (x0, y0, x1, y1); reads
+    only the box.
+    """
+    from pycocotools import mask as coco
+
+    from viewsphere.geometry.kernels_mask import run_lengths
+
+    height, width = ids.shape
+    runs = run_lengths(ids, wanted, *box)
+    code: Any = coco.frPyObjects({"size": [height, width], "counts": runs.tolist()}, height, width)
+    return code["counts"].decode("ascii")
+
+
+def mask_box(mask: Mask) -> tuple[int, int, int, int] | None:
+    """Tight half-open box (x0, y0, x1, y1) of a mask; None if it is empty."""
+    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+    if not rows.size:
+        return None
+    return int(columns[0]), int(rows[0]), int(columns[-1]) + 1, int(rows[-1]) + 1
+
+
+def mask_polygons(mask: Mask) -> list[list[float]]:
+    """COCO polygons [x0, y0, x1, y1, ...] of a (H, W) bool mask, one for each 4-connected component.
+
+    They run along pixel corners, clockwise as seen, without collinear corners; each hole is joined to the
+    boundary above it by a vertical bridge of no width. So pycocotools' `frPyObjects` and `merge` give back
+    the identical mask, and the shoelace areas sum to the number of pixels. Islands in holes are components
+    of their own. Empty for an empty mask.
+    """
+    from viewsphere.geometry.kernels_mask import trace_rings
+
+    box = mask_box(mask)
+    if box is None:
+        return []
+    x0, y0, x1, y1 = box
+    padded = np.zeros((y1 - y0 + 2, x1 - x0 + 2), np.bool_)
+    padded[1:-1, 1:-1] = mask[y0:y1, x0:x1]
+    corners, ends = trace_rings(padded)
+    moved = corners + np.array([x0 - 1.0, y0 - 1.0])
+    return [ring.ravel().tolist() for ring in np.split(moved, ends[:-1])]

@@ -1,0 +1,74 @@
+"""Rotations as matrices and as unit quaternions (w, x, y, z), Hamilton's convention, active."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Float = NDArray[np.float64]
+
+
+def matrix_from_quaternion(quaternion: ArrayLike) -> Float:
+    """Rotation matrix (3, 3) of the quaternion (w, x, y, z), of any length but zero."""
+    q = np.asarray(quaternion, np.float64)
+    norm = np.linalg.norm(q)
+    if q.shape != (4,) or not np.isfinite(norm) or norm == 0:
+        raise ValueError(f"matrix_from_quaternion: expected 4 finite numbers, not all zero, got {quaternion}")
+    w, x, y, z = q / norm
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def quaternion_from_matrix(matrix: ArrayLike) -> tuple[float, float, float, float]:
+    """Unit quaternion (w, x, y, z) with w >= 0 of a rotation matrix (3, 3).
+
+    At a half turn (w = 0) the first of x, y, z that is not zero is positive, so equal rotations give equal
+    numbers. The largest of the four is computed first and divides the others: no rotation is
+    ill-conditioned (Shepperd 1978).
+    """
+    m = np.asarray(matrix, np.float64)
+    if m.shape != (3, 3) or not np.allclose(m @ m.T, np.eye(3), atol=1e-6) or np.linalg.det(m) < 0:
+        raise ValueError(f"quaternion_from_matrix: expected a (3, 3) rotation, got {m.tolist()}")
+    # Row i holds 4 q_i (w, x, y, z): the row of the largest q_i has the most digits.
+    products = np.array(
+        [
+            [1 + m[0, 0] + m[1, 1] + m[2, 2], m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1]],
+            [m[2, 1] - m[1, 2], 1 + m[0, 0] - m[1, 1] - m[2, 2], m[0, 1] + m[1, 0], m[0, 2] + m[2, 0]],
+            [m[0, 2] - m[2, 0], m[0, 1] + m[1, 0], 1 - m[0, 0] + m[1, 1] - m[2, 2], m[1, 2] + m[2, 1]],
+            [m[1, 0] - m[0, 1], m[0, 2] + m[2, 0], m[1, 2] + m[2, 1], 1 - m[0, 0] - m[1, 1] + m[2, 2]],
+        ]
+    )
+    q = products[np.argmax(np.diag(products))]
+    q = q / np.sqrt((q * q).sum())
+    q[np.abs(q) < 1e-15] = 0.0
+    w, x, y, z = (q * np.sign(q[np.flatnonzero(q)[0]]) + 0.0).tolist()
+    return w, x, y, z
+
+
+def transform(matrix: ArrayLike, points: ArrayLike) -> Float:
+    """Points (..., 3) moved by the first three rows of a (3 or 4, 4) matrix, or turned by a (3, 3) one.
+
+    Written out, because BLAS rounds differently from processor to processor.
+    """
+    m, p = np.asarray(matrix, np.float64), np.asarray(points, np.float64)
+    x, y, z = p[..., 0], p[..., 1], p[..., 2]
+    rows = [m[r, 0] * x + m[r, 1] * y + m[r, 2] * z for r in range(3)]
+    return np.stack([row + m[r, 3] if m.shape[1] == 4 else row for r, row in enumerate(rows)], axis=-1)
+
+
+def rigid(rotation: ArrayLike, translation: ArrayLike) -> Float:
+    """The (4, 4) matrix of x -> rotation x + translation."""
+    matrix = np.eye(4)
+    matrix[:3, :3], matrix[:3, 3] = rotation, translation
+    return matrix
+
+
+def compose(a: ArrayLike, b: ArrayLike) -> Float:
+    """The rigid motion `b` followed by `a`, (4, 4) each."""
+    a, b = np.asarray(a, np.float64), np.asarray(b, np.float64)
+    return rigid(transform(a[:3, :3], b[:3, :3].T).T, transform(a, b[:3, 3]))

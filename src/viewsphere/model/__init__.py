@@ -1,0 +1,1 @@
+"""The nouns: recipe, shot, camera, channel, sample. Plain data, no behaviour that touches the outside world."""

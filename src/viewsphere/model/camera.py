@@ -1,0 +1,80 @@
+"""The camera: its lens (intrinsics) and, for one frame, where it stands (extrinsics)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from viewsphere.model.frozen import Frozen
+
+
+class Distortion(Frozen):
+    """Lens distortion with OpenCV's coefficients.
+
+    `brown_conrady`: k1 k2 p1 p2 [k3 [k4 k5 k6]] (https://docs.opencv.org/4.x/d9/d0c/group__calib3d.html);
+    `fisheye`: k1 k2 k3 k4 of theta_d = theta (1 + k1 theta^2 + ...) (Kannala and Brandt 2006; OpenCV's fisheye module).
+    """
+
+    model: Literal["brown_conrady", "fisheye"]
+    coefficients: tuple[float, ...]
+
+
+class Intrinsics(Frozen):
+    """Image size in pixels and the pinhole matrix K; pixel coordinates have their origin at the image's corner."""
+
+    width: int = Field(gt=0)
+    height: int = Field(gt=0)
+    fx: float = Field(gt=0)
+    fy: float = Field(gt=0)
+    cx: float
+    cy: float
+    skew: float = 0.0
+    distortion: Distortion | None = None
+
+    @property
+    def K(self) -> NDArray[np.float64]:
+        """Camera matrix, (3, 3) float64, pixels."""
+        return np.array([[self.fx, self.skew, self.cx], [0.0, self.fy, self.cy], [0.0, 0.0, 1.0]])
+
+
+@dataclass(frozen=True, eq=False)
+class Camera:
+    """One frame's camera: intrinsics and the world-to-camera motion x_camera = R x_world + t (OpenCV axes, metres)."""
+
+    intrinsics: Intrinsics
+    R: NDArray[np.float64]
+    t: NDArray[np.float64]
+
+    @property
+    def K(self) -> NDArray[np.float64]:
+        """Camera matrix, (3, 3) float64, pixels."""
+        return self.intrinsics.K
+
+    @property
+    def P(self) -> NDArray[np.float64]:
+        """Projection matrix K [R|t], (3, 4) float64; exact for an undistorted lens."""
+        return self.K @ np.column_stack([self.R, self.t])
+
+    @property
+    def center(self) -> NDArray[np.float64]:
+        """Camera centre in the world, (3,) metres."""
+        return -self.R.T @ self.t
+
+    @property
+    def width(self) -> int:
+        """Image width in pixels."""
+        return self.intrinsics.width
+
+    @property
+    def height(self) -> int:
+        """Image height in pixels."""
+        return self.intrinsics.height
+
+    @property
+    def distortion(self) -> Distortion | None:
+        """Lens distortion, None for a pinhole."""
+        return self.intrinsics.distortion

@@ -1,0 +1,148 @@
+"""Validation errors in the user's words: where, what was expected, what was found, the nearest valid name."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from difflib import get_close_matches
+from typing import Any, cast
+
+from pydantic import ValidationError
+from pydantic_core import ErrorDetails, InitErrorDetails, PydanticCustomError
+
+Path = tuple[str | int, ...]
+EXPLAINED = "explained"
+
+
+@dataclass(frozen=True)
+class Marks:
+    """Where the values of a file stand: path of keys and indices -> line, counted from 1."""
+
+    file: str
+    lines: Mapping[Path, int]
+
+    def line(self, path: Path) -> int:
+        """Line of the value, else of the innermost value around it that stands in the file."""
+        while path and path not in self.lines:
+            path = path[:-1]
+        return self.lines.get(path, 1)
+
+
+def nearest(name: object, known: Iterable[str]) -> str:
+    """`; did you mean 'x'?` with the known name most like this one; empty if none is like it."""
+    by_lower = {k.lower(): k for k in known}
+    close = get_close_matches(str(name).lower(), by_lower, 1, 0.6)
+    return f"; did you mean {by_lower[close[0]]!r}?" if close else ""
+
+
+def one_of(name: object, known: Sequence[str]) -> str:
+    """`expected one of a, b, c; found 'd'; did you mean ...?`."""
+    return f"expected one of {', '.join(known)}; found {shown(name)}{nearest(name, known)}"
+
+
+def shown(value: object) -> str:
+    """A value as the user would write it, in at most about 60 characters."""
+    if value is None or isinstance(value, bool):
+        return {None: "null", True: "true", False: "false"}[value]
+    if isinstance(value, Mapping):
+        return "a mapping"
+    text = repr(list(value)) if isinstance(value, tuple) else repr(value)
+    return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+def explained(error: ValidationError, fields: Sequence[str]) -> ValidationError:
+    """The same mistakes in their final words; `fields` are those of the model that found them."""
+    errors = error.errors(include_url=False)
+    details = [
+        InitErrorDetails(
+            type=PydanticCustomError(EXPLAINED, "{text}", {"text": _words(e, fields), "below": _below(e)}),
+            loc=e["loc"],
+            input=e["input"],
+        )
+        for e in errors
+        if not _follows(e, errors)
+    ]
+    return ValidationError.from_exception_data(error.title, details)
+
+
+def _follows(error: ErrorDetails, errors: Sequence[ErrorDetails]) -> bool:
+    """Whether a list is only found too short because its items, mistakes themselves, were not counted."""
+    depth = len(error["loc"])
+    inside = (e for e in errors if len(e["loc"]) > depth and e["loc"][:depth] == error["loc"])
+    return error["type"] == "too_short" and any(inside)
+
+
+def report(error: ValidationError, data: object, marks: Marks | None = None) -> str:
+    """All mistakes, a line each in the file's order: `recipe.yaml:12: models[0].categry: expected ...`."""
+    found: list[tuple[int, str]] = []
+    for e in error.errors(include_url=False):
+        path = _path_in(data, e["loc"]) + _below(e)
+        line = marks.line(path) if marks else 0
+        where = f"{marks.file}:{line}: " if marks else ""
+        found.append((line, f"{where}{dotted(path)}: {_words(e, ())}"))
+    return "\n".join(dict.fromkeys(text for _, text in sorted(found, key=lambda f: f[0])))
+
+
+def dotted(path: Path) -> str:
+    """`models[0].category`; `recipe` for the whole."""
+    text = "".join(f"[{p}]" if isinstance(p, int) else f".{p}" for p in path)
+    return text.removeprefix(".") or "recipe"
+
+
+def _below(error: ErrorDetails) -> Path:
+    """The rest of the path to what is wrong, where the location ends above it: a missing field, a union's `kind`."""
+    match error["type"]:
+        case "explained":
+            return error.get("ctx", {})["below"]
+        case "missing":
+            return (error["loc"][-1],)
+        case "union_tag_invalid":
+            return ("kind",)
+        case _:
+            return ()
+
+
+def _path_in(data: Any, location: Path) -> Path:
+    """The part of a location that stands in the data: without the names of union members and absent fields."""
+    path: list[str | int] = []
+    for part in location:
+        if isinstance(part, int):
+            inside = isinstance(data, (list, tuple)) and part < len(cast(Sequence[Any], data))
+        else:
+            inside = isinstance(data, dict) and part in data
+        if inside:
+            path.append(part)
+            data = data[part]
+    return tuple(path)
+
+
+def _words(error: ErrorDetails, fields: Sequence[str]) -> str:
+    kind, found, context = error["type"], error["input"], error.get("ctx", {})
+    match kind:
+        case "explained":
+            return str(context["text"])
+        case "value_error":
+            return str(context["error"])
+        case "extra_forbidden":
+            return one_of(error["loc"][-1], fields)
+        case "missing":
+            return "expected a value; found nothing"
+        case "literal_error":
+            return one_of(found, _quoted(context["expected"]))
+        case "union_tag_invalid":
+            return one_of(context["tag"], _quoted(context["expected_tags"]))
+        case "too_short" | "too_long":
+            limit = f"at least {context['min_length']}" if kind == "too_short" else f"at most {context['max_length']}"
+            return f"expected {limit} of them; found {context['actual_length']}"
+        case "model_type" | "dict_type" | "model_attributes_type":
+            return f"expected a mapping; found {shown(found)}"
+        case "tuple_type" | "list_type":
+            return f"expected a list; found {shown(found)}"
+        case _:
+            message = error["msg"].removeprefix("Input should be ").removeprefix("expected ").replace("a valid ", "a ")
+            return f"expected {message}; found {shown(found)}"
+
+
+def _quoted(text: str) -> list[str]:
+    return re.findall(r"'([^']*)'", text)

@@ -1,0 +1,198 @@
+"""The recipe: what the user wrote, validated and frozen. It holds ranges and distributions, not draws."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+from collections.abc import Mapping
+from os import PathLike
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    ConfigDict,
+    Discriminator,
+    Field,
+    ModelWrapValidatorHandler,
+    PrivateAttr,
+    Tag,
+    ValidationError,
+    ValidationInfo,
+    field_validator,
+    model_validator,
+)
+
+from viewsphere.errors import RecipeError
+from viewsphere.model.channel import CHANNELS, DEFAULT_CHANNELS
+from viewsphere.model.frozen import Frozen
+from viewsphere.model.mistakes import Marks, one_of, report, shown
+from viewsphere.model.recipe_models import ModelEntry
+from viewsphere.model.recipe_scene import CameraEntry, EngineEntry, SceneEntry, engine_entry
+from viewsphere.model.recipe_values import Count, Natural, Number, OrShort, shape_of
+from viewsphere.model.recipe_viewpoints import Viewpoints
+
+BEFORE_RENDERING = {"name", "formats", "max_frames", "shot_frames"}
+"""Fields that change neither a picture nor a label."""
+
+Share = Annotated[
+    Annotated[Number, Field(ge=0, le=1), Tag("number")] | Annotated[tuple[str, ...], Tag("list")],
+    Discriminator(
+        shape_of,
+        custom_error_type="share",
+        custom_error_message="expected a share of 0 to 1 or a list of model keys",
+    ),
+]
+
+
+class Splits(Frozen):
+    """How the frames are divided: `by`, and every split's share, or the keys of its models."""
+
+    model_config = ConfigDict(extra="allow")
+    __pydantic_extra__: dict[str, Share] = Field(init=False)  # pyright: ignore[reportIncompatibleVariableOverride]
+
+    by: Literal["model", "pose", "frame"] = Field(default="model", description="what is kept together in one split")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _default_shares(cls, data: Any) -> Any:
+        if isinstance(data, dict) and not data.keys() - {"by"}:
+            return {**data, "train": 0.7, "val": 0.3}
+        return data
+
+    @model_validator(mode="after")
+    def _check(self) -> Splits:
+        for name in self.shares:
+            if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_-]{0,99}", name):
+                raise ValueError(f"expected names of letters, digits, '-' and '_'; found split {name!r}")
+        numbers = {name: share for name, share in self.shares.items() if not isinstance(share, tuple)}
+        if numbers and abs(sum(numbers.values()) - 1) > 1e-6:
+            added = " + ".join(f"{name} {share:g}" for name, share in numbers.items())
+            raise ValueError(f"expected shares that add up to 1; found {added} = {sum(numbers.values()):g}")
+        if len(numbers) < len(self.shares) and self.by != "model":
+            raise ValueError(f"expected by: model, for a split of listed models; found by: {self.by}")
+        return self
+
+    @property
+    def shares(self) -> dict[str, float | tuple[str, ...]]:
+        """Split -> its share, or the keys of its models; in the recipe's order."""
+        return dict(self.__pydantic_extra__)
+
+
+def _channel(name: str) -> str:
+    if name not in CHANNELS:
+        raise ValueError(one_of(name, tuple(CHANNELS)))
+    return name
+
+
+def _distinct(names: tuple[str, ...]) -> tuple[str, ...]:
+    for i, name in enumerate(names):
+        if name in names[:i]:
+            raise ValueError(f"expected distinct names; found {shown(name)} twice")
+    return names
+
+
+ChannelName = Annotated[str, AfterValidator(_channel), Field(json_schema_extra={"enum": list[Any](CHANNELS)})]
+
+
+class Recipe(Frozen):
+    """A data set to be made. From a file by `Recipe.load`, or from keyword arguments that are what the file would say.
+
+    Any mistake raises RecipeError. Relative paths mean files relative to the recipe's file, or to the working folder that
+    a recipe was made in.
+    """
+
+    name: str = Field(default="dataset", min_length=1, max_length=200, description="name of the data set")
+    seed: Natural = Field(default=0, description="every random choice follows from it")
+    models: tuple[ModelEntry, ...] = Field(min_length=1, description="the models to place, each entry of one category")
+    viewpoints: Viewpoints = Field(
+        description="where the camera stands; kind: grid (default), sphere, normal or jitter"
+    )
+    camera: CameraEntry = Field(default=CameraEntry(fov_deg=40.0), description="image size and lens")
+    scene: SceneEntry = Field(default=SceneEntry(), description="background, ground, sun and sky")
+    engine: Annotated[EngineEntry, BeforeValidator(engine_entry), OrShort({"type": "string"})] = Field(
+        default=EngineEntry(),
+        description="what paints the pictures: a name, or a mapping of name and the engine's options",
+    )
+    channels: Annotated[tuple[ChannelName, ...], AfterValidator(_distinct)] = Field(
+        default=DEFAULT_CHANNELS, min_length=1, description="what to keep of every frame"
+    )
+    formats: Annotated[tuple[str, ...], AfterValidator(_distinct)] = Field(
+        default=("native", "coco"), description="formats to write when all is rendered"
+    )
+    splits: Splits = Field(
+        default=Splits(),
+        description="shares of train, val, ... by model, pose or frame; 70/30 train/val by model by default",
+    )
+    shot_frames: Count | None = Field(default=None, description="most frames that are rendered and resumed as one unit")
+    label_alpha: Annotated[Number, Field(gt=0, le=1)] = Field(
+        default=0.01, description="a blended texel is surface, and labelled, where its alpha is at least this"
+    )
+    max_frames: Count = Field(
+        default=1_000_000, description="planning more frames than this is taken for a typing mistake"
+    )
+
+    _folder: Path = PrivateAttr()
+
+    @model_validator(mode="before")
+    @classmethod
+    def _plain(cls, data: Any) -> Any:
+        return _plain(data)
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _report(cls, data: Any, handler: ModelWrapValidatorHandler[Self], info: ValidationInfo) -> Self:
+        marks: Marks | None = (info.context or {}).get("marks")
+        try:
+            return handler(data)
+        except ValidationError as error:
+            raise RecipeError(report(error, data, marks)) from None
+
+    @field_validator("name")
+    @classmethod
+    def _one_line(cls, value: str) -> str:
+        if not value.isprintable() or not value.strip():
+            raise ValueError(f"expected one line of printable text; found {shown(value)}")
+        return value
+
+    def model_post_init(self, context: Any, /) -> None:
+        """Remember the folder that relative paths start from."""
+        self._folder = Path((context or {}).get("folder", Path.cwd())).absolute()
+
+    @property
+    def folder(self) -> Path:
+        """Absolute folder that relative paths start from."""
+        return self._folder
+
+    @classmethod
+    def load(cls, path: str | PathLike[str]) -> Self:
+        """Read a recipe file; raises RecipeError with file, line and field of every mistake."""
+        from viewsphere.model.recipe_file import read
+
+        data, marks = read(Path(path))
+        return cls.model_validate(data, context={"marks": marks, "folder": Path(path).parent})
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 (hexadecimal) of all that changes a picture or a label; formats, for one, do not."""
+        text = json.dumps(self.model_dump(mode="json", exclude=BEFORE_RENDERING), separators=(",", ":"))
+        return hashlib.sha256(text.encode()).hexdigest()
+
+    def to_yaml(self) -> str:
+        """The recipe as the text of a file, without what equals the defaults; paths stay as they were written."""
+        from viewsphere.model.recipe_file import dump
+
+        return dump(self.model_dump(mode="json", exclude_defaults=True))
+
+
+def _plain(value: Any) -> Any:
+    """NumPy's numbers and arrays and paths as plain data; everything else as it is."""
+    if isinstance(value, Mapping):
+        return {k: _plain(v) for k, v in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(v) for v in value]
+    if isinstance(value, PathLike):
+        return str(value)
+    return value.tolist() if type(value).__module__ == "numpy" else value

@@ -1,0 +1,198 @@
+"""Recipe files: YAML 1.2 in UTF-8, read with the line of every value; their JSON schema; a recipe to start from."""
+
+from __future__ import annotations
+
+import math
+import re
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import yaml
+from yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
+
+from viewsphere.errors import RecipeError
+from viewsphere.model.mistakes import Marks, dotted, shown
+from viewsphere.model.mistakes import Path as Place
+
+LARGEST_FILE = 10_000_000
+MOST_VALUES = 200_000
+"""Aliases can make a file of a few lines mean billions of values."""
+
+_INT = re.compile(r"[-+]?[0-9]+\Z")
+_FLOAT = re.compile(
+    r"(?:[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?|[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN))\Z"
+)
+_TAG = "tag:yaml.org,2002:"
+
+
+def _use_yaml_12(rules: type[yaml.SafeLoader] | type[yaml.SafeDumper]) -> None:
+    """YAML 1.2's core rules: `no` and `12:30` are text, `1e3` is a number, there are no dates and no merge keys."""
+    rules.yaml_implicit_resolvers = {}
+    rules.add_implicit_resolver(f"{_TAG}null", re.compile(r"(?:~|null|Null|NULL|)\Z"), ["~", "n", "N", ""])
+    rules.add_implicit_resolver(f"{_TAG}bool", re.compile(r"(?:true|True|TRUE|false|False|FALSE)\Z"), list("tTfF"))
+    rules.add_implicit_resolver(f"{_TAG}int", _INT, list("-+0123456789"))
+    rules.add_implicit_resolver(f"{_TAG}float", _FLOAT, list("-+.0123456789"))
+
+
+class _Loader(yaml.SafeLoader):
+    """Reads by the rules of YAML 1.2."""
+
+
+class _Dumper(yaml.SafeDumper):
+    """Writes so that `_Loader` reads the same."""
+
+    def ignore_aliases(self, data: Any) -> bool:
+        return True
+
+
+_use_yaml_12(_Loader)
+_use_yaml_12(_Dumper)
+
+
+def read(path: Path) -> tuple[Any, Marks]:
+    """Plain data of a recipe file, and the line of every value in it; raises RecipeError naming file and line."""
+    text = _text(path)
+    loader = _Loader(text)
+    try:
+        root = loader.get_single_node()
+        reader = _Reader(str(path))
+        data = reader.value(root, ()) if root is not None else None
+    except yaml.MarkedYAMLError as error:
+        raise RecipeError(_syntax(path, text, error)) from None
+    except RecursionError:
+        raise RecipeError(f"{path}: expected a recipe, found lists or mappings nested too deeply") from None
+    if not isinstance(data, dict):
+        found = "an empty file" if data is None else shown(data)
+        raise RecipeError(f"{path}:1: expected a mapping of name, models, viewpoints, ...; found {found}")
+    return data, Marks(str(path), reader.lines)
+
+
+def _text(path: Path) -> str:
+    try:
+        if path.is_dir():
+            raise RecipeError(f"{path}: expected a recipe file, found a folder: name the .yaml file in it")
+        if path.stat().st_size > LARGEST_FILE:
+            raise RecipeError(
+                f"{path}: expected a recipe of at most {LARGEST_FILE:,} bytes, found {path.stat().st_size:,}"
+            )
+        raw = path.read_bytes()
+    except OSError as error:
+        raise RecipeError(f"{path}: expected a readable recipe file, found: {error.strerror or error}") from None
+    try:
+        text = raw.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = raw.count(b"\n", 0, error.start) + 1
+        raise RecipeError(
+            f"{path}:{line}: expected text in UTF-8; found byte 0x{raw[error.start]:02x}: save it as UTF-8"
+        ) from None
+    control = yaml.reader.Reader.NON_PRINTABLE.search(text)
+    if control:
+        line = text.count("\n", 0, control.start()) + 1
+        raise RecipeError(f"{path}:{line}: expected text; found the control character {control.group()!r}")
+    return text
+
+
+def _syntax(path: Path, text: str, error: yaml.MarkedYAMLError) -> str:
+    mark = error.problem_mark or error.context_mark
+    line = mark.line + 1 if mark else 1
+    around = text.splitlines()[mark.line] if mark and mark.line < text.count("\n") + 1 and text else ""
+    if "\t" in around[: len(around) - len(around.lstrip())] or "'\\t'" in (error.problem or ""):
+        return f"{path}:{line}: expected spaces; found a tab: YAML is indented with spaces"
+    context = f" {error.context}" if error.context else ""
+    return f"{path}:{line}: expected YAML; found a mistake{context}: {error.problem}"
+
+
+class _Reader:
+    """Turns YAML nodes into plain data and keeps their lines."""
+
+    def __init__(self, file: str) -> None:
+        self.file = file
+        self.lines: dict[Place, int] = {}
+        self._count = 0
+        self._open: set[int] = set()
+
+    def value(self, node: Node, place: Place) -> Any:
+        """The node's plain data; raises RecipeError for duplicate keys, tags and endless or exploding aliases."""
+        line = node.start_mark.line + 1
+        self.lines.setdefault(place, line)
+        self._count += 1
+        if self._count > MOST_VALUES:
+            raise self._error(line, place, f"expected at most {MOST_VALUES:,} values; found more: write fewer aliases")
+        if id(node) in self._open:
+            raise self._error(line, place, "expected a value; found an alias for the value it stands in")
+        self._open.add(id(node))
+        try:
+            if isinstance(node, MappingNode) and node.tag == f"{_TAG}map":
+                return self._mapping(node, place)
+            if isinstance(node, SequenceNode) and node.tag == f"{_TAG}seq":
+                return [self.value(item, (*place, i)) for i, item in enumerate(node.value)]
+            if isinstance(node, ScalarNode):
+                return self._scalar(node, place)
+        finally:
+            self._open.discard(id(node))
+        raise self._error(line, place, f"expected plain YAML; found the tag {node.tag!r}")
+
+    def _mapping(self, node: MappingNode, place: Place) -> dict[str, Any]:
+        result: dict[str, Any] = {}
+        for key_node, value_node in node.value:
+            line = key_node.start_mark.line + 1
+            key = key_node.value if isinstance(key_node, ScalarNode) else None
+            if not isinstance(key, str):
+                raise self._error(line, place, "expected a name before the colon; found a list or mapping")
+            if key in result:
+                first = self.lines[(*place, key)]
+                raise self._error(
+                    line, (*place, key), f"expected every field once; found {key!r} again, after line {first}"
+                )
+            self.lines[(*place, key)] = line
+            result[key] = self.value(value_node, (*place, key))
+        return result
+
+    def _scalar(self, node: ScalarNode, place: Place) -> Any:
+        text: str = node.value
+        match node.tag.removeprefix(_TAG):
+            case "null":
+                return None
+            case "bool":
+                return text.lower() == "true"
+            case "int" if _INT.match(text) and len(text) <= 300:
+                return int(text)
+            case "float" if _FLOAT.match(text):
+                return _float(text)
+            case "str":
+                return text
+            case _:
+                line = node.start_mark.line + 1
+                raise self._error(line, place, f"expected plain YAML; found {shown(text)} with the tag {node.tag!r}")
+
+    def _error(self, line: int, place: Place, problem: str) -> RecipeError:
+        return RecipeError(f"{self.file}:{line}: {dotted(place)}: {problem}")
+
+
+def _float(text: str) -> float:
+    lower = text.lower()
+    if lower.endswith("inf"):
+        return -math.inf if lower.startswith("-") else math.inf
+    return math.nan if lower == ".nan" else float(text)
+
+
+def dump(data: dict[str, Any]) -> str:
+    """Plain data as the text of a recipe file that `read` gives back."""
+    return yaml.dump(data, Dumper=_Dumper, sort_keys=False, default_flow_style=None, allow_unicode=True, width=110)
+
+
+def schema() -> dict[str, Any]:
+    """JSON schema (draft 2020-12) of recipe files, with a description of every field."""
+    from viewsphere.model.recipe import Recipe
+
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        **Recipe.model_json_schema(),
+        "title": "viewsphere recipe",
+    }
+
+
+def template() -> str:
+    """The commented recipe that `viewsphere new` writes; it renders as it is."""
+    return files("viewsphere.model").joinpath("template.yaml").read_text("utf-8")

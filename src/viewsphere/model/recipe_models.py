@@ -1,0 +1,151 @@
+"""The models of a recipe: which files or zoo families, and how each is turned, sized and named."""
+
+from __future__ import annotations
+
+import re
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
+
+from viewsphere.model.frozen import Frozen
+from viewsphere.model.mistakes import nearest, shown
+from viewsphere.model.recipe_values import Count, OrShort, Positive, shape_of
+from viewsphere.model.shot import Axis
+
+UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
+ZOO = "zoo:"
+
+UnitName = Literal["m", "cm", "mm", "in", "ft"]
+
+
+def _one_or_more(value: Any) -> Any:
+    return (value,) if isinstance(value, str) else value
+
+
+def _unit(value: Any) -> Any:
+    number = isinstance(value, (int, float)) and not isinstance(value, bool)
+    if (number and value > 0) or value in UNITS:
+        return value
+    raise ValueError(
+        f"expected one of {', '.join(UNITS)} or the metres in one unit; found {shown(value)}{nearest(value, UNITS)}"
+    )
+
+
+Unit = Annotated[
+    UnitName | float,
+    BeforeValidator(_unit),
+]
+
+
+class Dimensions(Frozen):
+    """A model's true size in metres."""
+
+    width: Positive = Field(description="along X, metres")
+    height: Positive = Field(description="along Z, metres")
+    length: Positive = Field(description="along Y, from front to back, metres")
+
+
+class SizeTable(Frozen):
+    """A CSV file of true sizes with the columns name, width, height and length; `name` is a file's name without ending."""
+
+    csv: str = Field(min_length=1, description="path of the file")
+    unit: Unit = Field(default="m", description="unit of its numbers: m, cm, mm, in, ft or a number of metres")
+
+
+class Length(Frozen):
+    """A length to scale a model to."""
+
+    length: Positive = Field(description="metres from front to back")
+
+
+RealSize = Annotated[
+    Annotated[Dimensions, Tag("mapping")]
+    | Annotated[SizeTable, Tag("table")]
+    | Annotated[str, Field(min_length=1), Tag("text")],
+    Discriminator(
+        lambda v: "table" if (isinstance(v, dict) and "csv" in v) or isinstance(v, SizeTable) else shape_of(v),
+        custom_error_type="real_size",
+        custom_error_message="expected 'file', the path of a CSV file or a mapping of width, height and length",
+    ),
+]
+
+Scale = Annotated[
+    Annotated[Length, Tag("mapping")] | Annotated[Literal["as_is", "real_size"], Tag("text")],
+    Discriminator(
+        shape_of,
+        custom_error_type="scale",
+        custom_error_message="expected as_is, real_size or a mapping of length",
+    ),
+]
+
+
+class ModelEntry(Frozen):
+    """Some models of one category, treated alike."""
+
+    source: Annotated[
+        tuple[Annotated[str, Field(min_length=1)], ...],
+        BeforeValidator(_one_or_more),
+        OrShort({"type": "string"}),
+    ] = Field(
+        min_length=1,
+        description="a file, a pattern such as cars/*.obj, a folder, or zoo:<family>; or a list of them. "
+        "Paths are relative to the recipe",
+    )
+    category: str = Field(
+        default="",
+        max_length=200,
+        validate_default=False,
+        description="what the models are; needed for files, for the zoo by default its family",
+    )
+    supercategory: str = Field(default="", max_length=200, description="a wider name, such as vehicle")
+    count: Count | None = Field(
+        default=None, description="zoo: how many models to draw (default 1); files: how many there have to be"
+    )
+    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$", max_length=100)] | None = Field(
+        default=None,
+        description="begins the models' keys: <name>_<file name>, or <name>_000, <name>_001, ... for the zoo",
+    )
+    up: Axis | None = Field(default=None, description="the file's axis that points up; by default what its format says")
+    forward: Axis | None = Field(default=None, description="the file's axis that the model's front faces")
+    unit: Unit | None = Field(default=None, description="the file's unit: m, cm, mm, in, ft or the metres in one unit")
+    centring: Literal["box", "area", "floor"] = Field(
+        default="box",
+        description="what lands on the origin: the box's centre, the surface's centroid, or the centre of the box's bottom",
+    )
+    real_size: RealSize | None = Field(
+        default=None,
+        description="the true size: {width, height, length} in metres, a CSV file of name, width, height and length "
+        "(its path, or {csv, unit}), or file: the size the file has. The default for the zoo is file",
+    )
+    scale: Scale = Field(
+        default="as_is", description="as_is, real_size, or {length: 1.8}: metres to scale the model to"
+    )
+    confined: bool = Field(
+        default=True, strict=True, description="whether paths inside model files have to stay in the model's folder"
+    )
+
+    @property
+    def families(self) -> tuple[str, ...]:
+        """The zoo families of this entry; empty if it is one of files."""
+        return tuple(s.removeprefix(ZOO) for s in self.source if s.startswith(ZOO))
+
+    @model_validator(mode="after")
+    def _check(self) -> ModelEntry:
+        families = self.families
+        if families and len(families) < len(self.source):
+            raise ValueError("expected either files or zoo families; found both: give each an entry of its own")
+        for family in families:
+            if not re.fullmatch(r"[a-z][a-z0-9_]*", family):
+                raise ValueError(f"expected zoo:<family>, such as zoo:car; found {ZOO + family!r}")
+        if not families and not self.category:
+            raise ValueError("expected a category, such as car; found none (only zoo families have one of their own)")
+        if self.up and self.forward and self.up[1] == self.forward[1]:
+            raise ValueError(f"expected up and forward along different axes; found {self.up} and {self.forward}")
+        if self.scale == "real_size" and self.real_size is None and not families:
+            raise ValueError("expected real_size to be set, for scale: real_size; found none")
+        return self
+
+
+def unit_metres(unit: str | float) -> float:
+    """Metres in one unit."""
+    return UNITS[unit] if isinstance(unit, str) else unit

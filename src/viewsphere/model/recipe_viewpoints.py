@@ -1,0 +1,200 @@
+"""The viewpoints of a recipe: the paper's grid, and random ones. Angles in degrees, distances in metres."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import Discriminator, Field, Tag, field_validator, model_validator
+
+from viewsphere.geometry.pose_category import pose_category
+from viewsphere.model.frozen import Frozen
+from viewsphere.model.recipe_values import Count, Interval, Number, Point, Positive, Range, Values
+
+AZIMUTH = "0: the camera faces the model's front; 90: it stands on the model's left, +X"
+ELEVATION = "above the horizon, -90 to 90"
+DISTANCE = "from the target to the camera, metres"
+TILT = "roll of the camera about its axis, clockwise seen from behind"
+
+
+def axis_count(values: float | tuple[float, ...] | Range, *, turn: bool = False) -> int:
+    """How many values an axis has; with `turn`, a range's last value is dropped when it is its first after 360 degrees."""
+    if isinstance(values, Range):
+        repeats = turn and values.count > 1 and abs(values.value(values.count - 1) - values.start - 360) < 1e-6
+        return values.count - repeats
+    return len(values) if isinstance(values, tuple) else 1
+
+
+def axis_value(values: float | tuple[float, ...] | Range, index: int) -> float:
+    """One value of an axis."""
+    if isinstance(values, Range):
+        return values.value(index)
+    return values[index] if isinstance(values, tuple) else values
+
+
+def _ends(values: float | tuple[float, ...] | Range) -> tuple[float, float]:
+    if isinstance(values, Range):
+        return values.start, values.value(values.count - 1)
+    return (min(values), max(values)) if isinstance(values, tuple) else (values, values)
+
+
+def _in_elevation(low: float, high: float) -> None:
+    if low < -90 or high > 90:
+        raise ValueError(f"expected elevations of -90 to 90 degrees; found {low if low < -90 else high:g}")
+
+
+def _above_zero(low: float) -> None:
+    if low <= 0:
+        raise ValueError(f"expected distances above 0 m; found {low:g}")
+
+
+class _Aimed(Frozen):
+    """What all kinds of viewpoints have."""
+
+    target: Literal["center"] | Point = Field(
+        default="center",
+        description="what the camera looks at: the centre of the model's box, or a point [x, y, z] in metres",
+    )
+    bins: Positive = Field(
+        default=45.0,
+        description="width in degrees of the named pose categories (front, front-left, ...); has to divide 360",
+    )
+
+    @field_validator("target", mode="before")
+    @classmethod
+    def _target(cls, value: Any) -> Any:
+        if value != "center" and not (isinstance(value, (list, tuple)) and len(value) == 3):
+            raise ValueError(f"expected center or [x, y, z]; found {value!r}")
+        return value
+
+    @field_validator("bins")
+    @classmethod
+    def _bins(cls, value: float) -> float:
+        try:
+            pose_category(0.0, 0.0, value)
+        except ValueError:
+            raise ValueError(f"expected a number of degrees that divides 360; found {value:g}") from None
+        return value
+
+
+class _Axes(_Aimed):
+    """Angles and distances to combine."""
+
+    azimuth: Values = Field(
+        default=Range(start=0, stop=360, step=45), description=f"degrees; {AZIMUTH}; a full turn drops 360"
+    )
+    elevation: Values = Field(default=20.0, description=f"degrees {ELEVATION}")
+    distance: Values = Field(description=DISTANCE)
+    tilt: Values = Field(default=0.0, description=f"degrees; {TILT}")
+
+    @field_validator("azimuth", "elevation", "distance", "tilt")
+    @classmethod
+    def _distinct(cls, values: float | tuple[float, ...] | Range) -> float | tuple[float, ...] | Range:
+        if isinstance(values, tuple) and len(set(values)) < len(values):
+            twice = next(v for i, v in enumerate(values) if v in values[:i])
+            raise ValueError(f"expected distinct values; found {twice:g} twice")
+        return values
+
+    @field_validator("azimuth", "tilt")
+    @classmethod
+    def _one_turn(cls, values: float | tuple[float, ...] | Range) -> float | tuple[float, ...] | Range:
+        if isinstance(values, Range) and values.stop - values.start > 360 + 1e-6:
+            raise ValueError(f"expected at most a full turn; found {values.start:g} to {values.stop:g}")
+        return values
+
+    @field_validator("elevation")
+    @classmethod
+    def _elevation(cls, values: float | tuple[float, ...] | Range) -> float | tuple[float, ...] | Range:
+        _in_elevation(*_ends(values))
+        return values
+
+    @field_validator("distance")
+    @classmethod
+    def _distance(cls, values: float | tuple[float, ...] | Range) -> float | tuple[float, ...] | Range:
+        _above_zero(_ends(values)[0])
+        return values
+
+    @property
+    def axis_counts(self) -> dict[str, int]:
+        """Number of values of each axis, outermost loop first."""
+        return {
+            "tilts": axis_count(self.tilt, turn=True),
+            "distances": axis_count(self.distance),
+            "elevations": axis_count(self.elevation),
+            "azimuths": axis_count(self.azimuth, turn=True),
+        }
+
+
+class Grid(_Axes):
+    """Every combination of the given angles and distances, as in the paper."""
+
+    kind: Literal["grid"] = Field(default="grid", description="every combination of the given angles and distances")
+
+
+class Spread(Frozen):
+    """A width for each coordinate of a viewpoint; 0 leaves it as it is."""
+
+    azimuth: Annotated[Number, Field(ge=0)] = Field(default=0.0, description="degrees")
+    elevation: Annotated[Number, Field(ge=0)] = Field(default=0.0, description="degrees")
+    distance: Annotated[Number, Field(ge=0)] = Field(default=0.0, description="metres")
+    tilt: Annotated[Number, Field(ge=0)] = Field(default=0.0, description="degrees")
+
+
+class Jitter(_Axes):
+    """A grid whose every viewpoint is moved at random, uniformly within plus or minus a width; it stays below the poles."""
+
+    kind: Literal["jitter"] = Field(description="a grid with random offsets")
+    plus_minus: Spread = Field(description="the widest offset of each coordinate")
+    count: Count = Field(default=1, description="viewpoints for each one of the grid")
+
+    @model_validator(mode="after")
+    def _in_front(self) -> Jitter:
+        _above_zero(_ends(self.distance)[0] - self.plus_minus.distance)
+        return self
+
+
+class Sphere(_Aimed):
+    """Random viewpoints, uniform by area on the sphere or on a part of it."""
+
+    kind: Literal["sphere"] = Field(description="uniform on the sphere")
+    count: Count = Field(description="how many viewpoints")
+    azimuth: Interval = Field(default=(0.0, 360.0), description=f"[low, high] in degrees; {AZIMUTH}")
+    elevation: Interval = Field(default=(-90.0, 90.0), description=f"[low, high] in degrees {ELEVATION}")
+    distance: Interval = Field(description=f"a number or [low, high] (uniform): {DISTANCE}")
+    tilt: Interval = Field(default=(0.0, 0.0), description=f"a number or [low, high] (uniform), degrees; {TILT}")
+
+    @field_validator("elevation")
+    @classmethod
+    def _elevation(cls, value: tuple[float, float]) -> tuple[float, float]:
+        _in_elevation(*value)
+        return value
+
+    @field_validator("distance")
+    @classmethod
+    def _distance(cls, value: tuple[float, float]) -> tuple[float, float]:
+        _above_zero(value[0])
+        return value
+
+
+class Normal(_Aimed):
+    """Random viewpoints, normal around one; draws beyond the poles or at no distance are drawn again."""
+
+    kind: Literal["normal"] = Field(description="normal around a viewpoint")
+    count: Count = Field(description="how many viewpoints")
+    azimuth: Number = Field(default=0.0, description=f"mean, degrees; {AZIMUTH}")
+    elevation: Annotated[Number, Field(ge=-90, le=90)] = Field(default=20.0, description=f"mean, degrees {ELEVATION}")
+    distance: Positive = Field(description=f"mean; {DISTANCE}")
+    tilt: Number = Field(default=0.0, description=f"mean, degrees; {TILT}")
+    sd: Spread = Field(description="standard deviations")
+
+
+def _kind(value: Any) -> Any:
+    return value.get("kind", "grid") if isinstance(value, dict) else getattr(value, "kind", None)
+
+
+Viewpoints = Annotated[
+    Annotated[Grid, Tag("grid")]
+    | Annotated[Sphere, Tag("sphere")]
+    | Annotated[Normal, Tag("normal")]
+    | Annotated[Jitter, Tag("jitter")],
+    Discriminator(_kind),
+]

@@ -1,0 +1,92 @@
+"""A sample as plain JSON and back, exactly: what the store keeps of a frame besides its channels."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.model.camera import Camera, Intrinsics
+from viewsphere.model.sample import ObjectAnnotation, Rle, Sample, View
+from viewsphere.model.shot import Pose
+
+_ARRAYS = (
+    "box3d_object",
+    "box3d",
+    "box3d_camera",
+    "box3d_pixels",
+    "box3d_in_front",
+    "world_from_object",
+    "camera_from_object",
+)
+_TUPLES = ("box2d", "box2d_projected", "box2d_unclipped", "quaternion", "size", "real_size")
+
+
+def sample_to_record(sample: Sample) -> dict[str, Any]:
+    """The sample without its arrays of pixels, as `json.dumps(..., allow_nan=False)` takes it; NaN becomes
+    null.
+    """
+    camera = sample.camera
+    return {
+        "index": sample.index,
+        "split": sample.split,
+        "pose": sample.pose.model_dump(mode="json"),
+        "camera": {
+            "intrinsics": camera.intrinsics.model_dump(mode="json"),
+            "R": camera.R.tolist(),
+            "t": camera.t.tolist(),
+        },
+        "objects": [_object_to_record(o) for o in sample.objects],
+        "files": dict(sample.files),
+    }
+
+
+def sample_from_record(
+    record: Mapping[str, Any], channels: Mapping[str, NDArray[Any]], files: Mapping[str, str]
+) -> Sample:
+    """The sample a record was made of, with these channels and files; every number is equal to the last bit."""
+    camera = record["camera"]
+    return Sample(
+        index=record["index"],
+        split=record["split"],
+        camera=Camera(
+            Intrinsics.model_validate(camera["intrinsics"]),
+            np.array(camera["R"], np.float64),
+            np.array(camera["t"], np.float64),
+        ),
+        pose=Pose.model_validate(record["pose"]),
+        objects=tuple(_object_from_record(o) for o in record["objects"]),
+        channels=channels,
+        files=files,
+    )
+
+
+def _object_to_record(annotation: ObjectAnnotation) -> dict[str, Any]:
+    record = dict(annotation.__dict__)
+    record["rle"] = dict(annotation.rle.__dict__)
+    record["view"] = dict(annotation.view.__dict__)
+    for name in _ARRAYS:
+        record[name] = _without_nan(record[name].tolist())
+    for name in _TUPLES:
+        record[name] = None if record[name] is None else list(record[name])
+    return record
+
+
+def _object_from_record(record: Mapping[str, Any]) -> ObjectAnnotation:
+    values = dict(record)
+    values["rle"] = Rle(**record["rle"])
+    values["view"] = View(**record["view"])
+    for name in _ARRAYS:
+        values[name] = np.array(record[name], np.bool_ if name == "box3d_in_front" else np.float64)
+    for name in _TUPLES:
+        values[name] = None if record[name] is None else tuple(record[name])
+    return ObjectAnnotation(**values)
+
+
+def _without_nan(value: Any) -> Any:
+    if isinstance(value, list):
+        return [_without_nan(v) for v in value]
+    return None if isinstance(value, float) and math.isnan(value) else value

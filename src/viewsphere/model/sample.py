@@ -1,0 +1,124 @@
+"""A sample: one frame's pictures and everything that is known of its objects."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.model.camera import Camera
+from viewsphere.model.channel import CHANNELS
+from viewsphere.model.shot import Pose, Size
+
+Float = NDArray[np.float64]
+Box = tuple[float, float, float, float]
+
+
+@dataclass(frozen=True)
+class View:
+    """The camera as one object sees it: its orbit around the object's box centre, in the object's own axes.
+
+    A camera that does not look at that point counts, for the tilt, as turned to it by the shortest way.
+    """
+
+    azimuth_deg: float
+    elevation_deg: float
+    distance: float
+    tilt_deg: float
+
+
+@dataclass(frozen=True)
+class Rle:
+    """COCO's compressed run-length code of a mask."""
+
+    height: int
+    width: int
+    counts: str
+
+
+@dataclass(frozen=True, eq=False)
+class ObjectAnnotation:
+    """One placed object in one frame, seen or not.
+
+    Boxes are half-open pixel corners (x0, y0, x1, y1). `box2d` is tight around the visible pixels, None if
+    there are none; `box2d_projected` is the box of the projected model clipped to the image, None where
+    they do not meet; `box2d_unclipped` the same unclipped, None where the model reaches behind the camera
+    (or out of a distorted lens' field). The 3D box is tight and object-aligned: (8, 3) in the object's, the
+    world's and the camera's axes (metres) and (8, 2) in pixels, NaN where the lens does not show the
+    vertex, as behind the camera; vertex order and faces as in `viewsphere.geometry.box`. `visibility` is
+    visible pixels over all the pixels the object alone would cover, those outside the image included (BOP's
+    visib_fract, on a canvas of three times the image's width and height); `truncation` is the share of the
+    latter outside the image.
+    """
+
+    id: int
+    category: str
+    supercategory: str
+    category_id: int
+    key: str  # the model's key in the data set
+    model: str  # path of the normalised model, relative to the data set's root
+    rle: Rle
+    area: int
+    box2d: Box | None
+    box2d_projected: Box | None
+    box2d_unclipped: Box | None
+    box3d_object: Float
+    box3d: Float
+    box3d_camera: Float
+    box3d_pixels: Float
+    box3d_in_front: NDArray[np.bool_]
+    world_from_object: Float
+    camera_from_object: Float
+    quaternion: tuple[float, float, float, float]  # camera_from_object's rotation, (w, x, y, z), w >= 0
+    view: View
+    pose_category: str
+    size: Size
+    real_size: Size | None
+    visibility: float
+    truncation: float
+
+    @property
+    def mask(self) -> NDArray[np.bool_]:
+        """Visible pixels, (H, W) bool."""
+        from viewsphere.geometry.mask import decode_rle
+
+        return decode_rle(self.rle.height, self.rle.width, self.rle.counts)
+
+    @property
+    def polygons(self) -> list[list[float]]:
+        """COCO polygons of the mask, traced along pixel corners: pycocotools rasterises them to the
+        identical mask.
+        """
+        from viewsphere.geometry.mask import mask_polygons
+
+        return mask_polygons(self.mask)
+
+
+@dataclass(frozen=True, eq=False)
+class Sample:
+    """One frame: camera, pose, objects and channels. `channels` maps names of `CHANNELS` to arrays (loaded
+    when asked).
+    """
+
+    index: int
+    split: str
+    camera: Camera
+    pose: Pose
+    objects: tuple[ObjectAnnotation, ...]
+    channels: Mapping[str, NDArray[Any]]
+    files: Mapping[str, str]  # channel -> path relative to the data set's root; empty in memory
+
+    def __getattr__(self, name: str) -> NDArray[Any]:
+        """Any channel by name: `sample.rgb`, `sample.depth`, `sample.instances`, ..."""
+        if name in CHANNELS:
+            try:
+                return self.channels[name]
+            except KeyError:
+                raise AttributeError(
+                    f"this sample has no channel {name!r}; it has {', '.join(self.channels)}: "
+                    "add it to the recipe's channels"
+                ) from None
+        raise AttributeError(f"Sample has no attribute {name!r}")

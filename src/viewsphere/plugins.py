@@ -1,0 +1,103 @@
+"""The seams: what an engine and a format must offer, and how a name finds its module.
+
+A plug-in is one module; its name is its file's name, listed without importing it. Third parties use the entry-point
+groups `viewsphere.engines` and `viewsphere.formats`. The only user of importlib.
+"""
+
+from __future__ import annotations
+
+import importlib
+import pkgutil
+from collections.abc import Callable
+from difflib import get_close_matches
+from importlib.metadata import entry_points
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.errors import UserError
+
+if TYPE_CHECKING:
+    from viewsphere.assets.mesh import Mesh
+    from viewsphere.model.camera import Camera
+    from viewsphere.model.shot import Frame, ModelSpec, Shot
+    from viewsphere.store import Dataset
+    from viewsphere.truth.geometry import Geometry
+    from viewsphere.truth.visibility import Visibility
+
+Kind = Literal["engines", "formats"]
+
+
+class Stage(Protocol):
+    """What an engine built for a shot and keeps warm while the camera moves."""
+
+    geometry: Geometry
+
+    def color(self, camera: Camera, frame: Frame, visibility: Visibility) -> NDArray[np.uint8]:
+        """The picture, (H, W, 3) uint8 sRGB; `visibility` is truth's buffer for this camera."""
+        ...
+
+
+class Engine(Protocol):
+    """A module that paints pictures: `stage` and the frames a shot holds by default."""
+
+    SHOT_FRAMES: int
+
+    def stage(self, shot: Shot, load: Callable[[ModelSpec], Mesh]) -> Stage:
+        """Build what all frames of the shot share; `load` gives a model's normalised mesh."""
+        ...
+
+
+class Format(Protocol):
+    """A module that writes a data set in one format: `export`."""
+
+    def export(self, dataset: Dataset, folder: Path) -> None:
+        """Write the finished frames of the data set into this empty folder; images by `dataset.link`."""
+        ...
+
+
+def names(kind: Kind) -> tuple[str, ...]:
+    """Names of all plug-ins of this kind, sorted; none is imported."""
+    package = importlib.import_module(f"viewsphere.{kind}")
+    own = {m.name for m in pkgutil.iter_modules(package.__path__) if not m.name.startswith("_")}
+    return tuple(sorted(own | {e.name for e in entry_points(group=f"viewsphere.{kind}")}))
+
+
+def load(kind: Kind, name: str) -> Any:
+    """The plug-in's module (or the object its entry point names).
+
+    Raises UserError for an unknown name, with the nearest known one.
+    """
+    for entry in entry_points(group=f"viewsphere.{kind}"):
+        if entry.name == name:
+            return entry.load()
+    known = names(kind)
+    if name not in known:
+        near = get_close_matches(name, known, 1)
+        hint = f"; did you mean {near[0]!r}?" if near else ""
+        raise UserError(f"{kind[:-1]} {name!r}: expected one of {', '.join(known)}{hint}")
+    return importlib.import_module(f"viewsphere.{kind}.{name}")
+
+
+def attribute(path: str) -> Any:
+    """A public object by its dotted path inside viewsphere: `model.recipe.Recipe`."""
+    module, _, name = path.rpartition(".")
+    return getattr(importlib.import_module(f"viewsphere.{module}"), name)
+
+
+def families() -> tuple[str, ...]:
+    """Names of the zoo's families (its modules, not its packages), sorted; none is imported."""
+    package = importlib.import_module("viewsphere.zoo")
+    return tuple(sorted(m.name for m in pkgutil.iter_modules(package.__path__) if not m.ispkg))
+
+
+def family(name: str) -> Any:
+    """The module of a zoo family; raises UserError for an unknown name, with the nearest known one."""
+    known = families()
+    if name not in known:
+        near = get_close_matches(name, known, 1)
+        hint = f"; did you mean {near[0]!r}?" if near else ""
+        raise UserError(f"zoo family {name!r}: expected one of {', '.join(known)}{hint}")
+    return importlib.import_module(f"viewsphere.zoo.{name}")

@@ -1,0 +1,190 @@
+"""Pictures for people: a contact sheet of a recipe or a data set, a model from four sides."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw, ImageFont
+
+from viewsphere.geometry.box import FACES
+from viewsphere.model.camera import Intrinsics
+from viewsphere.model.recipe import Recipe
+from viewsphere.model.sample import ObjectAnnotation, Sample
+from viewsphere.model.shot import Frame, Ground, ModelSpec, Placement, Pose, Scene, Shot
+from viewsphere.run.stages import Stages
+from viewsphere.sampling.plan import Plan, plan
+from viewsphere.store import Dataset
+
+Drawing = Literal["boxes", "boxes3d", "masks", "depth"]
+Picture = NDArray[np.uint8]
+
+PALETTE = ((230, 75, 60), (50, 130, 220), (45, 165, 95), (240, 170, 40), (150, 90, 200), (20, 170, 180))
+INK = (30, 32, 36)
+PAPER = (250, 250, 248)
+MARGIN = 8
+CAPTION = 18
+SIDES = (("front", 0.0), ("left side", 90.0), ("back", 180.0), ("right side", 270.0))
+
+
+def preview_samples(recipe: Recipe, count: int = 12, width: int = 320) -> Iterator[Sample]:
+    """Render `count` frames spread over all models and poses, `width` pixels wide, in memory."""
+    planned = plan(recipe)
+    stages = Stages()
+    for model, poses in _spread(planned, count):
+        shot = planned.shot_of(model, poses)
+        channels = tuple(dict.fromkeys((*shot.channels, "rgb", "depth", "instances")))
+        small = shot.model_copy(update={"intrinsics": _scaled(shot.intrinsics, width), "channels": channels})
+        yield from stages.render(small)
+
+
+def dataset_samples(dataset: Dataset, count: int = 12) -> list[Sample]:
+    """`count` frames spread evenly over a data set."""
+    picks = np.unique(np.linspace(0, len(dataset) - 1, min(count, len(dataset))).round().astype(int))
+    return [dataset[int(i)] for i in picks]
+
+
+def _spread(planned: Plan, count: int) -> list[tuple[int, list[int]]]:
+    """Model and pose indices such that models follow in order and poses step through the grid."""
+    count = min(count, planned.frames)
+    models = np.linspace(0, planned.models - 1, count).round().astype(int)
+    poses = (np.arange(count) * planned.poses / count * (1 + 1 / max(count, 1))).astype(int) % planned.poses
+    chosen: dict[int, list[int]] = {}
+    for model, pose in zip(models.tolist(), poses.tolist(), strict=True):
+        chosen.setdefault(model, []).append(pose)
+    return list(chosen.items())
+
+
+def _scaled(lens: Intrinsics, width: int) -> Intrinsics:
+    """The same view at another width; wider is never needed for a preview."""
+    k = min(1.0, width / lens.width)
+    sizes = {"width": max(1, round(lens.width * k)), "height": max(1, round(lens.height * k))}
+    x, y = sizes["width"] / lens.width, sizes["height"] / lens.height
+    return lens.model_copy(
+        update={
+            **sizes,
+            "fx": lens.fx * x,
+            "cx": lens.cx * x,
+            "skew": lens.skew * x,
+            "fy": lens.fy * y,
+            "cy": lens.cy * y,
+        }
+    )
+
+
+def four_sides(spec: ModelSpec, size: int = 320) -> Picture:
+    """A model from azimuth 0, 90, 180 and 270 at elevation 15, each view with its name; (H, W, 3) uint8 sRGB.
+
+    The first view shows the front if the model faces -Y, as everything else assumes.
+    """
+    stages = Stages()
+    low, high = stages.model(spec).bounds
+    radius = float(np.linalg.norm(high - low)) / 2
+    focal = 1.6 * size
+    distance = radius / math.sin(math.atan(0.5 * size / focal)) * 1.02
+    frames = tuple(
+        Frame(
+            index=i,
+            split="",
+            pose=Pose(index=i, azimuth_deg=a, elevation_deg=15, distance=distance, category=name),
+        )
+        for i, (name, a) in enumerate(SIDES)
+    )
+    shot = Shot(
+        key=spec.key,
+        placements=(Placement(id=1, model=spec),),
+        intrinsics=Intrinsics(width=size, height=size, fx=focal, fy=focal, cx=size / 2, cy=size / 2),
+        scene=Scene(ground=Ground()),
+        frames=frames,
+        channels=("rgb", "instances"),
+    )
+    tiles = [(s.rgb, f"{s.pose.category} (azimuth {s.pose.azimuth_deg:g})") for s in stages.render(shot)]
+    return _sheet(tiles, columns=4)
+
+
+def contact_sheet(samples: Sequence[Sample], draw: Sequence[Drawing] = (), columns: int = 4, width: int = 320) -> Picture:
+    """All samples side by side with what was asked for drawn over them, (H, W, 3) uint8 sRGB."""
+    tiles = [
+        (
+            draw_sample(s, draw, width),
+            f"{s.objects[0].key}  az {s.pose.azimuth_deg:g}  el {s.pose.elevation_deg:g}  d {s.pose.distance:g}",
+        )
+        for s in samples
+    ]
+    return _sheet(tiles, columns)
+
+
+def draw_sample(sample: Sample, draw: Sequence[Drawing] = (), width: int | None = None) -> Picture:
+    """One frame with 2D boxes, 3D boxes (front face filled), masks or depth (beside the picture) drawn."""
+    rgb = np.asarray(sample.rgb)
+    if "masks" in draw:
+        rgb = _tint(rgb, sample.objects)
+    scale = 1.0 if width is None else min(1.0, width / rgb.shape[1])
+    size = (round(rgb.shape[1] * scale), round(rgb.shape[0] * scale))
+    picture = Image.fromarray(rgb).resize(size, Image.Resampling.LANCZOS) if scale < 1 else Image.fromarray(rgb)
+    pen = ImageDraw.Draw(picture, "RGBA")
+    for o in sample.objects:
+        color = PALETTE[(o.id - 1) % len(PALETTE)]
+        if "boxes3d" in draw:
+            _draw_box3d(pen, o, scale, color)
+        if "boxes" in draw and o.box2d is not None:
+            x0, y0, x1, y1 = (v * scale for v in o.box2d)
+            pen.rectangle((x0, y0, x1 - 1, y1 - 1), outline=color, width=2)
+    pictures = [np.asarray(picture)]
+    if "depth" in draw:
+        pictures.append(np.asarray(Image.fromarray(depth_picture(sample.depth)).resize(size, Image.Resampling.BILINEAR)))
+    return np.hstack(pictures)
+
+
+def depth_picture(depth: NDArray[np.float32]) -> Picture:
+    """Near is light, far is dark, nothing is black; (H, W, 3) uint8."""
+    seen = np.isfinite(depth)
+    grey = np.zeros(depth.shape, np.float64)
+    if seen.any():
+        near, far = np.percentile(depth[seen], (0, 98))
+        grey[seen] = 1.0 - 0.85 * np.clip((depth[seen] - near) / max(far - near, 1e-9), 0, 1)
+    return np.repeat((grey * 255).astype(np.uint8)[..., None], 3, axis=2)
+
+
+def _tint(rgb: Picture, objects: Sequence[ObjectAnnotation]) -> Picture:
+    tinted = rgb.astype(np.float64)
+    for o in objects:
+        mask = o.mask
+        tinted[mask] = 0.5 * tinted[mask] + 0.5 * np.array(PALETTE[(o.id - 1) % len(PALETTE)])
+    return tinted.round().astype(np.uint8)
+
+
+def _draw_box3d(pen: ImageDraw.ImageDraw, o: ObjectAnnotation, scale: float, color: tuple[int, int, int]) -> None:
+    corners = o.box3d_pixels * scale
+    for name, face in FACES.items():
+        ring = [tuple(corners[i]) for i in face]
+        if not np.isfinite(corners[list(face)]).all():
+            continue
+        if name == "front":
+            pen.polygon(ring, fill=(*color, 70))
+        pen.line([*ring, ring[0]], fill=(*color, 255), width=2)
+
+
+def _sheet(tiles: Sequence[tuple[Picture, str]], columns: int) -> Picture:
+    """Tiles in rows with captions below, on paper."""
+    height, width = (max(t.shape[i] for t, _ in tiles) for i in (0, 1))
+    columns = min(columns, len(tiles))
+    rows = -(-len(tiles) // columns)
+    cell = (width + MARGIN, height + CAPTION + MARGIN)
+    sheet = Image.new("RGB", (columns * cell[0] + MARGIN, rows * cell[1] + MARGIN), PAPER)
+    pen = ImageDraw.Draw(sheet)
+    font = ImageFont.load_default(size=12)
+    for i, (tile, caption) in enumerate(tiles):
+        x, y = MARGIN + i % columns * cell[0], MARGIN + i // columns * cell[1]
+        sheet.paste(Image.fromarray(tile), (x, y))
+        pen.text((x + 2, y + height + 2), _fitting(caption, font, width), fill=INK, font=font)
+    return np.asarray(sheet)
+
+
+def _fitting(text: str, font: ImageFont.ImageFont | ImageFont.FreeTypeFont, width: int) -> str:
+    while len(text) > 2 and font.getlength(text) > width:
+        text = text[:-2] + "…"
+    return text

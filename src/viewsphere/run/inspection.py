@@ -1,0 +1,87 @@
+"""What `viewsphere inspect` says of one model."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import cast, get_args
+
+from viewsphere.assets.inspect import ModelReport, describe
+from viewsphere.errors import UserError
+from viewsphere.model.shot import Axis, ModelSpec
+from viewsphere.run.stages import build_zoo_model
+
+
+def model_spec(
+    source: str,
+    *,
+    up: str | None = None,
+    forward: str | None = None,
+    unit: float | None = None,
+    seed: int = 0,
+) -> ModelSpec:
+    """A model file or `zoo:<family>` with the settings given, the others by default.
+
+    Raises UserError for something that is no axis or no unit.
+    """
+    for name, axis in (("up", up), ("forward", forward)):
+        if axis is not None and axis not in get_args(Axis):
+            raise UserError(f"--{name}: expected one of {', '.join(get_args(Axis))}, found {axis!r}")
+    if unit is not None and not unit > 0:
+        raise UserError(f"--unit: expected metres in one unit, more than 0, found {unit:g}")
+    zoo = source.startswith("zoo:")
+    return ModelSpec(
+        key=Path(source.replace(":", "-")).stem or "model",
+        source=source if zoo else str(Path(source).absolute()),
+        seed=seed if zoo else None,
+        category="model",
+        category_id=1,
+        up=cast("Axis | None", up),
+        forward=cast("Axis | None", forward),
+        unit=unit,
+    )
+
+
+def inspect_model(spec: ModelSpec) -> ModelReport:
+    """What is in the model and what it becomes; raises ModelError for a file that cannot be used."""
+    return describe(spec, build_zoo_model)
+
+
+def report_lines(report: ModelReport) -> Iterator[str]:
+    """The report as lines of text."""
+    width, height, length = report.size
+    raw = " x ".join(f"{x:.4g}" for x in report.raw_size)
+    yield f"{report.source} ({report.format})"
+    yield f"  size       width {width:.4g} m, height {height:.4g} m, length {length:.4g} m (in the file: {raw})"
+    yield f"  axes       up {report.up}, forward {report.forward}; 1 unit = {report.unit:g} m"
+    yield f"  triangles  {report.triangles:,} ({report.vertices:,} vertices)"
+    attributes = [name for name, has in (("uv", report.has_uv), ("vertex colours", report.has_colors)) if has]
+    if attributes:
+        yield f"  carries    {', '.join(attributes)}"
+    yield f"  parts      {len(report.parts)}"
+    for name, count in report.parts[:20]:
+        yield f"    {name}: {count:,} triangles"
+    if len(report.parts) > 20:
+        yield f"    and {len(report.parts) - 20} more"
+    yield f"  materials  {len(report.materials)}"
+    for name, values in report.materials[:20]:
+        yield f"    {name or '(unnamed)'}: {_values(values) or 'plain'}"
+    for name, (w, h) in report.textures:
+        yield f"  texture    {name}: {w} x {h}"
+    for warning in report.warnings:
+        yield f"  warning    {warning}"
+    for suggestion in report.suggestions:
+        yield f"  hint       {suggestion}"
+
+
+def _values(values: dict[str, object]) -> str:
+    def text(value: object) -> str:
+        if isinstance(value, tuple):
+            return (
+                "(" + ", ".join(f"{x:.3g}" if isinstance(x, float) else str(x) for x in cast("tuple[object, ...]", value)) + ")"
+            )
+        if isinstance(value, float):
+            return f"{value:.3g}"
+        return f"image {image}" if (image := getattr(value, "image", None)) is not None else str(value)
+
+    return ", ".join(f"{name} {text(value)}" for name, value in values.items())

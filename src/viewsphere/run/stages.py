@@ -1,0 +1,85 @@
+"""From a shot to its samples: load the models, keep the stage warm, render frame by frame."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from viewsphere import plugins
+from viewsphere.annotate import annotate
+from viewsphere.assets.cache import load_normalised
+from viewsphere.assets.mesh import Mesh
+from viewsphere.geometry.box import box_vertices
+from viewsphere.model.sample import Float, Sample
+from viewsphere.model.shot import Frame, ModelSpec, Shot
+from viewsphere.sampling.viewpoints import camera_for
+from viewsphere.truth.channels import observe
+from viewsphere.truth.visibility import rasterize
+from viewsphere.zoo import build
+
+WARM_MODELS = 8
+
+
+def build_zoo_model(spec: ModelSpec) -> Mesh:
+    """The procedural model a `zoo:family` source names, drawn from its seed."""
+    return build(spec.source.removeprefix("zoo:"), np.random.default_rng(spec.seed))
+
+
+def model_files(key: str) -> tuple[str, str]:
+    """Paths of a model's OBJ and GLB in a data set, relative to its root."""
+    return f"store/models/{key}/{key}.obj", f"store/models/{key}/{key}.glb"
+
+
+@dataclass(eq=False)
+class Stages:
+    """Renders shots; keeps the last shot's stage and the last few models warm."""
+
+    _stage: plugins.Stage | None = None
+    _stage_key: str = ""
+    _models: dict[str, Mesh] = field(default_factory=dict[str, Mesh])
+
+    def model(self, spec: ModelSpec) -> Mesh:
+        """The normalised model; raises ModelError if its file cannot be used."""
+        name = spec.model_dump_json()
+        if name not in self._models:
+            self._models[name] = load_normalised(spec, build_zoo_model)
+            while len(self._models) > WARM_MODELS:
+                del self._models[next(iter(self._models))]
+        return self._models[name]
+
+    def stage(self, shot: Shot) -> plugins.Stage:
+        """The engine's stage for this shot, built anew only when the scene is another one."""
+        if self._stage is None or self._stage_key != shot.stage_key:
+            engine: plugins.Engine = plugins.load("engines", shot.engine)
+            self._stage = engine.stage(shot, self.model)
+            self._stage_key = shot.stage_key
+        return self._stage
+
+    def render(self, shot: Shot) -> Iterator[Sample]:
+        """The shot's samples in order, channels in memory."""
+        stage = self.stage(shot)
+        boxes = [box_vertices(*self.model(p.model).bounds) for p in shot.placements]
+        for frame in shot.frames:
+            yield render_frame(shot, frame, stage, boxes)
+
+
+def render_frame(shot: Shot, frame: Frame, stage: plugins.Stage, boxes: Sequence[Float]) -> Sample:
+    """One frame: colour from the engine, every label from truth. `boxes`: each object's 3D box in its own axes."""
+    camera = camera_for(shot.intrinsics, frame.pose, _target(shot, boxes))
+    visibility = rasterize(stage.geometry, camera)
+    names = [name for name in shot.channels if name != "rgb"]
+    observed = observe(stage.geometry, camera, visibility, names)
+    if "rgb" in shot.channels:
+        observed["rgb"] = stage.color(camera, frame, visibility)
+    files = [model_files(p.model.key)[0] for p in shot.placements]
+    objects = annotate(shot, frame, camera, stage.geometry, visibility, boxes, files)
+    channels = {name: observed[name] for name in shot.channels}
+    return Sample(frame.index, frame.split, camera, frame.pose, objects, channels, {})
+
+
+def _target(shot: Shot, boxes: Sequence[Float]) -> Float:
+    """Box centre of object 1 in the world: what a pose without a target of its own looks at."""
+    world = np.array(shot.placements[0].world_from_object)
+    return world[:3, :3] @ boxes[0].mean(axis=0) + world[:3, 3]

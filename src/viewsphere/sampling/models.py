@@ -1,0 +1,243 @@
+"""From a recipe's model entries to one specification a model: files found, keys made, sizes looked up."""
+
+from __future__ import annotations
+
+import csv
+import math
+import os
+import re
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import cache
+from glob import glob, has_magic
+from pathlib import Path
+from typing import Literal
+
+from viewsphere.errors import RecipeError
+from viewsphere.model.mistakes import nearest
+from viewsphere.model.recipe import Recipe
+from viewsphere.model.recipe_models import ZOO, Dimensions, Length, ModelEntry, SizeTable, unit_metres
+from viewsphere.model.shot import ModelSpec, Size
+from viewsphere.sampling.seeds import generator
+from viewsphere.store import Category
+
+MODEL_SUFFIXES = frozenset({".obj", ".glb", ".gltf", ".ply", ".stl", ".off", ".dae", ".3mf"})
+"""Endings that folders and patterns are searched for."""
+
+COLUMNS = ("name", "width", "height", "length")
+Sizes = Mapping[str, tuple[float, float, float]]
+
+
+@dataclass(frozen=True)
+class _Found:
+    """A model that an entry means: the entry's index, the key it would like, a file's path or `zoo:<family>`."""
+
+    entry: int
+    key: str
+    source: str
+
+    @property
+    def in_zoo(self) -> bool:
+        return self.source.startswith(ZOO)
+
+
+def count_models(recipe: Recipe) -> int:
+    """How many models there are, without making their specifications; raises RecipeError for files not found."""
+    return sum(
+        len(entry.families) * (entry.count or 1) if entry.families else len(_files(recipe, i))
+        for i, entry in enumerate(recipe.models)
+    )
+
+
+def model_specs(recipe: Recipe) -> tuple[ModelSpec, ...]:
+    """One specification a model: entries in the recipe's order, files sorted; keys follow from names only.
+
+    Raises RecipeError for files not found, two models of one key, a model that a table of sizes lacks, and a category
+    with two supercategories.
+    """
+    ids = {c.name: c.id for c in categories(recipe)}
+    table = cache(_read_sizes)
+    specs: list[ModelSpec] = []
+    for found in _with_unique_keys([f for i in range(len(recipe.models)) for f in _found(recipe, i)]):
+        entry = recipe.models[found.entry]
+        category = _category(entry, found.source)
+        spec = ModelSpec(
+            key=found.key,
+            source=found.source,
+            seed=int(generator(recipe.seed, found.source, found.key).integers(2**63)) if found.in_zoo else None,
+            category=category,
+            supercategory=entry.supercategory,
+            category_id=ids[category],
+            up=entry.up,
+            forward=entry.forward,
+            unit=None if entry.unit is None else unit_metres(entry.unit),
+            centring=entry.centring,
+            scale=entry.scale.length if isinstance(entry.scale, Length) else entry.scale,
+            real_size=_real_size(recipe, found, table),
+            confined=entry.confined,
+        )
+        specs.append(spec)
+    return tuple(specs)
+
+
+def categories(recipe: Recipe) -> tuple[Category, ...]:
+    """The categories in order of appearance, ids from 1; raises RecipeError for one with two supercategories."""
+    result: dict[str, Category] = {}
+    for i, entry in enumerate(recipe.models):
+        for source in entry.source:
+            name = _category(entry, source)
+            category = result.setdefault(name, Category(len(result) + 1, name, entry.supercategory))
+            if category.supercategory != entry.supercategory:
+                raise RecipeError(
+                    f"models[{i}].supercategory: expected {category.supercategory!r}, as category {name!r} has before; "
+                    f"found {entry.supercategory!r}"
+                )
+    return tuple(result.values())
+
+
+def _category(entry: ModelEntry, source: str) -> str:
+    return entry.category or source.removeprefix(ZOO).replace("_", " ")
+
+
+def _found(recipe: Recipe, index: int) -> Iterator[_Found]:
+    entry = recipe.models[index]
+    for family in entry.families:
+        for number in range(entry.count or 1):
+            yield _Found(index, f"{entry.name or family}_{number:03d}", ZOO + family)
+    if not entry.families:
+        prefix = f"{entry.name}_" if entry.name else ""
+        for file in _files(recipe, index):
+            yield _Found(index, prefix + _as_key(file.stem), str(file))
+
+
+def _as_key(text: str) -> str:
+    """The text as a part of a folder's name: letters, digits, `_`, `-` and inner dots."""
+    return re.sub(r"[^\w.-]", "_", text).strip(".") or "model"
+
+
+def _files(recipe: Recipe, index: int) -> tuple[Path, ...]:
+    """All files of an entry, sorted, each once; raises RecipeError for a source without any, or not `count` of them."""
+    entry, where = recipe.models[index], f"models[{index}]"
+    files = {file for source in entry.source for file in _matching(recipe.folder, source, where)}
+    if entry.count is not None and entry.count != len(files):
+        raise RecipeError(f"{where}.count: expected {entry.count} model files; found {len(files)}")
+    return tuple(sorted(files, key=lambda f: f.as_posix()))
+
+
+def _matching(folder: Path, source: str, where: str) -> list[Path]:
+    path = folder / Path(source).expanduser()
+    if path.is_file():
+        matches = [path]
+    elif path.is_dir():
+        matches = [
+            f for f in path.rglob("*") if not any(p.startswith((".", "__MACOSX")) for p in f.relative_to(path).parts)
+        ]
+    elif has_magic(source):
+        matches = [folder / f for f in glob(source, root_dir=folder, recursive=True)]
+    else:
+        raise RecipeError(
+            f"{where}.source: expected a file, folder, pattern or zoo:<family>; found no {source!r} in {folder}"
+        )
+    if matches != [path]:
+        matches = [f for f in matches if f.suffix.lower() in MODEL_SUFFIXES and f.is_file()]
+    if not matches:
+        endings = ", ".join(sorted(MODEL_SUFFIXES))
+        raise RecipeError(f"{where}.source: expected model files ({endings}); {source!r} gives none in {folder}")
+    return [Path(os.path.abspath(f)) for f in matches]
+
+
+def _is_hidden(name: str) -> bool:
+    return name.startswith((".", "__MACOSX"))
+
+
+def _with_unique_keys(found: list[_Found]) -> list[_Found]:
+    """Files of one name get their ending or their folders' names behind it; raises RecipeError if that does not help."""
+    groups: defaultdict[str, list[_Found]] = defaultdict(list)
+    for item in found:
+        groups[item.key.casefold()].append(item)
+    renamed = [replace(item, key=_longer_key(item, groups[item.key.casefold()])) for item in found]
+    first: dict[str, _Found] = {}
+    for item in renamed:
+        other = first.setdefault(item.key.casefold(), item)
+        if other is not item:
+            raise RecipeError(
+                f"models[{item.entry}]: expected every model once; found key {item.key!r} again ({item.source}), after "
+                f"models[{other.entry}] ({other.source}): give one of the entries another name"
+            )
+    return renamed
+
+
+def _longer_key(item: _Found, group: list[_Found]) -> str:
+    if len(group) == 1 or any(other.in_zoo for other in group):
+        return item.key
+    for folders in range(max(len(Path(other.source).parts) for other in group)):
+        for ending in (False, True):
+            variants = [_variant(other, folders, ending=ending) for other in group]
+            if len({v.casefold() for v in variants}) == len(group):
+                return _variant(item, folders, ending=ending)
+    return item.key
+
+
+def _variant(item: _Found, folders: int, *, ending: bool) -> str:
+    path = Path(item.source)
+    names = path.parent.parts[len(path.parent.parts) - folders :] if folders else ()
+    return "-".join([item.key, *map(_as_key, names), *([path.suffix[1:]] if ending else [])])
+
+
+def _real_size(recipe: Recipe, found: _Found, table: Callable[[Path], Sizes]) -> Size | Literal["file"] | None:
+    size = recipe.models[found.entry].real_size
+    if isinstance(size, Dimensions):
+        return size.width, size.height, size.length
+    if size == "file" or (size is None and found.in_zoo):
+        return "file"
+    if size is None:
+        return None
+    path, unit = (size.csv, unit_metres(size.unit)) if isinstance(size, SizeTable) else (size, 1.0)
+    sizes = table(recipe.folder / path)
+    name = found.key if found.in_zoo else Path(found.source).stem
+    row = sizes.get(name) or sizes.get(found.key)
+    if row is None:
+        raise RecipeError(
+            f"models[{found.entry}].real_size: expected a row for {name!r} in {recipe.folder / path}; found none"
+            f"{nearest(name, sizes)}"
+        )
+    width, height, length = (value * unit for value in row)
+    return width, height, length
+
+
+def _read_sizes(path: Path) -> Sizes:
+    """Rows of a table of sizes by name; raises RecipeError naming file and line."""
+    try:
+        with path.open(encoding="utf-8-sig", newline="") as file:
+            rows = csv.DictReader(file, skipinitialspace=True)
+            columns = [c.strip().lower() for c in rows.fieldnames or ()]
+            rows.fieldnames = columns
+            if not set(COLUMNS) <= set(columns):
+                raise RecipeError(
+                    f"{path}:1: expected columns {', '.join(COLUMNS)}; found no {' and no '.join(missing)}"
+                )
+            sizes: dict[str, tuple[float, float, float]] = {}
+            for row in rows:
+                name = (row["name"] or "").strip()
+                if not name or name in sizes:
+                    raise RecipeError(f"{path}:{rows.line_num}: expected every name once; found {name!r}")
+                sizes[name] = _row_size(row, f"{path}:{rows.line_num}")
+            return sizes
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        problem = error.strerror if isinstance(error, OSError) else error
+        raise RecipeError(f"{path}: expected a readable CSV file of {', '.join(COLUMNS)}; found: {problem}") from None
+
+
+def _row_size(row: Mapping[str, str | None], where: str) -> tuple[float, float, float]:
+    values: list[float] = []
+    for column in COLUMNS[1:]:
+        try:
+            value = float(row[column] or "")
+        except ValueError:
+            value = math.nan
+        if not (0 < value < math.inf):
+            raise RecipeError(f"{where}: {column}: expected a number above 0; found {row[column]!r}")
+        values.append(value)
+    width, height, length = values
+    return width, height, length

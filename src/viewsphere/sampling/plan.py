@@ -1,0 +1,280 @@
+"""The plan: which frames a recipe means, in which order, split and unit of work. Meshes are not touched."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from bisect import bisect_right
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import accumulate
+from pathlib import Path
+
+from viewsphere import plugins
+from viewsphere.errors import RecipeError
+from viewsphere.model.mistakes import nearest, one_of
+from viewsphere.model.recipe import Recipe
+from viewsphere.model.shot import Background, Frame, ModelSpec, Placement, Scene, Shot
+from viewsphere.sampling.models import categories, count_models, model_specs
+from viewsphere.sampling.seeds import generator, share
+from viewsphere.sampling.viewpoints import Poses, poses
+from viewsphere.store import Category
+
+SHOT_FRAMES = 16
+"""Most frames of a shot, unless the recipe or the caller says otherwise."""
+
+IMAGE_SUFFIXES = frozenset({".jpg", ".jpeg", ".png", ".webp", ".bmp", ".tif", ".tiff"})
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """What will be rendered. Frame index = model index * poses + pose index; nothing here grows with the frames."""
+
+    recipe: Recipe
+    model_specs: tuple[ModelSpec, ...]
+    pose_list: Poses
+    categories: tuple[Category, ...]
+    images: tuple[str, ...]  # absolute paths of the background's images, sorted
+    shot_frames: int
+
+    @property
+    def models(self) -> int:
+        """Number of models."""
+        return len(self.model_specs)
+
+    @property
+    def poses(self) -> int:
+        """Number of poses of each model."""
+        return len(self.pose_list)
+
+    @property
+    def frames(self) -> int:
+        """Number of frames: models x poses."""
+        return self.models * self.poses
+
+    @property
+    def max_objects(self) -> int:
+        """Most objects in one frame."""
+        return 1
+
+    @property
+    def splits(self) -> tuple[str, ...]:
+        """Names of the splits, in the recipe's order."""
+        return tuple(self.recipe.splits.shares)
+
+    @cached_property
+    def split_counts(self) -> dict[str, int]:
+        """Split -> number of its frames."""
+        by = self.recipe.splits.by
+        if by == "model":
+            found = Counter({s: 0 for s in self.splits})
+            for spec in self.model_specs:
+                found[self.split(spec, 0)] += self.poses
+        elif by == "pose":
+            found = Counter(self.split(self.model_specs[0], i) for i in range(self.poses))
+            found = Counter({name: count * self.models for name, count in found.items()})
+        else:
+            found = Counter(self.split(m, i) for m in self.model_specs for i in range(self.poses))
+        return {name: found[name] for name in self.splits}
+
+    @cached_property
+    def warnings(self) -> tuple[str, ...]:
+        """What may be meant otherwise."""
+        by = self.recipe.splits.by
+        return tuple(
+            f"split {name!r} is empty: too few {by}s for its share; list models for it, or split by something else"
+            for name, count in self.split_counts.items()
+            if count == 0
+        )
+
+    def split(self, spec: ModelSpec, pose: int) -> str:
+        """The split of a frame; it follows from the seed and the names of what is kept together, and nothing else."""
+        if spec.key in self._listed:
+            return self._listed[spec.key]
+        names = {
+            "model": (spec.key,),
+            "pose": (self.pose_list.name(pose),),
+            "frame": (spec.key, self.pose_list.name(pose)),
+        }
+        by = self.recipe.splits.by
+        edges, shared = self._edges
+        return shared[min(bisect_right(edges, share(self.recipe.seed, "split", *names[by])), len(shared) - 1)]
+
+    @cached_property
+    def _listed(self) -> dict[str, str]:
+        shares = self.recipe.splits.shares.items()
+        return {key: name for name, keys in shares if isinstance(keys, tuple) for key in keys}
+
+    @cached_property
+    def _edges(self) -> tuple[tuple[float, ...], tuple[str, ...]]:
+        """Upper ends of the intervals of [0, 1) that the splits with a share take, and their names."""
+        shares = {
+            name: part for name, part in self.recipe.splits.shares.items() if not isinstance(part, tuple) and part
+        }
+        return tuple(accumulate(shares.values())), tuple(shares)
+
+    @cached_property
+    def _chunks(self) -> tuple[int, ...]:
+        """First pose of each shot of a model, and the number of poses: chunks of sizes that differ by one at most."""
+        parts = math.ceil(self.poses / self.shot_frames)
+        return tuple(i * self.poses // parts for i in range(parts + 1))
+
+    @property
+    def shot_count(self) -> int:
+        """Number of shots."""
+        return self.models * (len(self._chunks) - 1)
+
+    def shot_key(self, index: int) -> str:
+        """`<model key>-<first pose>`: stable, unique, fit for a folder's name."""
+        model, chunk = divmod(index, len(self._chunks) - 1)
+        return f"{self.model_specs[model].key}-{self._chunks[chunk]:06d}"
+
+    def shot_model(self, key: str) -> str:
+        """Key of the model in the shot of this key."""
+        return key.rpartition("-")[0]
+
+    def shot_table(self) -> Iterator[tuple[str, int, int]]:
+        """Key, first frame and number of frames of every shot, in order."""
+        parts = len(self._chunks) - 1
+        for index in range(self.shot_count):
+            model, chunk = divmod(index, parts)
+            first, last = self._chunks[chunk], self._chunks[chunk + 1]
+            yield self.shot_key(index), model * self.poses + first, last - first
+
+    def shot(self, index: int) -> Shot:
+        """One shot; raises IndexError past the end."""
+        if not 0 <= index < self.shot_count:
+            raise IndexError(f"expected a shot of 0..{self.shot_count - 1}, got {index}")
+        model, chunk = divmod(index, len(self._chunks) - 1)
+        spec = self.model_specs[model]
+        frames = tuple(self._frame(model, i) for i in range(self._chunks[chunk], self._chunks[chunk + 1]))
+        return Shot(
+            key=self.shot_key(index),
+            placements=(Placement(id=1, model=spec),),
+            intrinsics=self.recipe.camera.intrinsics,
+            scene=self._scene,
+            frames=frames,
+            engine=self.recipe.engine.name,
+            engine_options=self.recipe.engine.options,
+            channels=self.recipe.channels,
+            label_alpha=self.recipe.label_alpha,
+            category_deg=self.recipe.viewpoints.bins,
+        )
+
+    def shots(self) -> Iterator[Shot]:
+        """All shots in order, made one by one."""
+        return (self.shot(i) for i in range(self.shot_count))
+
+    def _frame(self, model: int, pose: int) -> Frame:
+        spec = self.model_specs[model]
+        background = None
+        if self.recipe.scene.background.images is not None and self.recipe.scene.background.draw == "per_frame":
+            background = self._drawn(spec.key, self.pose_list.name(pose))
+        return Frame(
+            index=model * self.poses + pose,
+            pose=self.pose_list[pose],
+            split=self.split(spec, pose),
+            background=background,
+        )
+
+    def _drawn(self, *names: str) -> Background:
+        rng = generator(self.recipe.seed, "background", *names)
+        return Background(image=self.images[int(rng.integers(len(self.images)))])
+
+    @cached_property
+    def _scene(self) -> Scene:
+        entry = self.recipe.scene
+        background = Background(color=entry.background.color)
+        if entry.background.image is not None:
+            background = Background(image=self.images[0])
+        elif entry.background.images is not None and entry.background.draw == "fixed":
+            background = self._drawn()
+        return Scene(sun=entry.light, sky=entry.sky, ground=entry.floor, background=background)
+
+    @cached_property
+    def digest(self) -> str:
+        """SHA-256 of all that a store of this plan holds: the recipe, the models, the backgrounds and the chunks.
+
+        Files count by their names, so that folders can move; what is in a model's file, the store itself watches.
+        """
+        models = [m.model_dump(mode="json") | {"source": Path(m.source).name} for m in self.model_specs]
+        images = [Path(i).name for i in self.images]
+        value = [self.recipe.digest, models, images, self._chunks]
+        return hashlib.sha256(json.dumps(value, separators=(",", ":")).encode()).hexdigest()
+
+
+def plan(recipe: Recipe, shot_frames: int | None = None) -> Plan:
+    """What a recipe means, frame by frame, without touching a mesh.
+
+    `shot_frames`: most frames of a shot, where the recipe does not say.
+    Raises RecipeError for files that are not there, unknown engines and formats, more frames than `max_frames`.
+    """
+    _check_names(recipe)
+    views = poses(recipe.viewpoints, recipe.seed)
+    _check_frames(recipe, views)
+    specs = model_specs(recipe)
+    _check_listed(recipe, specs)
+    return Plan(
+        recipe,
+        specs,
+        views,
+        categories(recipe),
+        _images(recipe),
+        recipe.shot_frames or shot_frames or SHOT_FRAMES,
+    )
+
+
+def _check_names(recipe: Recipe) -> None:
+    engines = plugins.names("engines")
+    if recipe.engine.name not in engines:
+        raise RecipeError(f"engine: {one_of(recipe.engine.name, engines)}")
+    formats = plugins.names("formats")
+    for i, name in enumerate(recipe.formats):
+        if name not in formats:
+            raise RecipeError(f"formats[{i}]: {one_of(name, formats)}")
+
+
+def _check_frames(recipe: Recipe, views: Poses) -> None:
+    models, count = count_models(recipe), math.prod(views.counts.values())
+    if models * count > recipe.max_frames:
+        factors = " x ".join(f"{n:,} {what}" for what, n in {"models": models, **views.counts}.items())
+        raise RecipeError(
+            f"viewpoints: expected at most {recipe.max_frames:,} frames; found {models * count:,} ({factors}): "
+            f"set max_frames: {models * count} in the recipe if that is meant"
+        )
+
+
+def _check_listed(recipe: Recipe, specs: tuple[ModelSpec, ...]) -> None:
+    """The models that the splits list have to be there, once; if no split has a share, all have to be listed."""
+    keys, seen = {spec.key for spec in specs}, dict[str, str]()
+    for name, listed in recipe.splits.shares.items():
+        for key in listed if isinstance(listed, tuple) else ():
+            if key not in keys:
+                raise RecipeError(f"splits.{name}: expected keys of models; found {key!r}{nearest(key, keys)}")
+            if key in seen:
+                raise RecipeError(
+                    f"splits.{name}: expected every model in one split; found {key!r}, listed in {seen[key]!r} too"
+                )
+            seen[key] = name
+    if all(isinstance(s, tuple) for s in recipe.splits.shares.values()) and keys - seen.keys():
+        raise RecipeError(f"splits: expected every model to be listed; found no split for {min(keys - seen.keys())!r}")
+
+
+def _images(recipe: Recipe) -> tuple[str, ...]:
+    background = recipe.scene.background
+    if background.image is not None:
+        path = recipe.folder / background.image
+        if not path.is_file():
+            raise RecipeError(f"scene.background.image: expected an image file; found none at {path}")
+        return (str(path),)
+    if background.images is None:
+        return ()
+    folder = recipe.folder / background.images
+    found = sorted(str(f) for f in folder.rglob("*") if f.suffix.lower() in IMAGE_SUFFIXES and f.is_file())
+    if not found:
+        endings = ", ".join(sorted(IMAGE_SUFFIXES))
+        raise RecipeError(f"scene.background.images: expected a folder with images ({endings}); found none in {folder}")
+    return tuple(found)

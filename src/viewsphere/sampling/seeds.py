@@ -1,0 +1,29 @@
+"""Where randomness comes from: a generator, or a number, for a seed and the stable names of what is drawn."""
+
+from __future__ import annotations
+
+import hashlib
+
+import numpy as np
+
+
+def _digest(names: tuple[str, ...], size: int) -> bytes:
+    hasher = hashlib.blake2b(digest_size=size)
+    for name in names:
+        text = name.encode()
+        hasher.update(len(text).to_bytes(8, "little") + text)
+    return hasher.digest()
+
+
+def generator(seed: int, *names: str) -> np.random.Generator:
+    """A generator for what these names mean (a purpose, a model's key, a pose's values), never a position in a list.
+
+    Its stream is `SeedSequence(seed, spawn_key=<128-bit digest of the names>)`: the same whatever else is drawn.
+    """
+    words = np.frombuffer(_digest(names, 16), "<u4")
+    return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=tuple(int(w) for w in words)))
+
+
+def share(seed: int, *names: str) -> float:
+    """A number of [0, 1) for a seed and names, uniform over names; for choices that are too many for a generator each."""
+    return int.from_bytes(_digest((str(seed), *names), 8), "little") / 2**64

@@ -1,0 +1,252 @@
+"""From a recipe's viewpoints to poses, and from a pose to a camera."""
+
+from __future__ import annotations
+
+import math
+from abc import abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple, overload
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from viewsphere.geometry.camera import orbit_center, orbit_rotation
+from viewsphere.geometry.pose_category import pose_category
+from viewsphere.model.camera import Camera, Intrinsics
+from viewsphere.model.recipe_viewpoints import Grid, Jitter, Normal, Sphere, axis_value
+from viewsphere.model.shot import Pose
+from viewsphere.sampling.seeds import generator
+
+Float = NDArray[np.float64]
+
+
+class View(NamedTuple):
+    """Where the camera stands: degrees and metres."""
+
+    azimuth: float
+    elevation: float
+    distance: float
+    tilt: float
+
+
+@dataclass(frozen=True)
+class Poses(Sequence[Pose]):
+    """The poses of a recipe, in index order, made one by one when asked for: a million of them take no memory.
+
+    `counts` are the factors of their number, outermost loop first.
+    """
+
+    viewpoints: Grid | Sphere | Normal | Jitter
+    seed: int
+
+    @property
+    @abstractmethod
+    def counts(self) -> dict[str, int]:
+        """What there is how many of; the product is the number of poses."""
+
+    @abstractmethod
+    def name(self, index: int) -> str:
+        """The pose's stable name: equal for the same pose wherever it stands in the list."""
+
+    @abstractmethod
+    def view(self, index: int) -> View:
+        """Where the camera stands."""
+
+    @cached_property
+    def _length(self) -> int:
+        return math.prod(self.counts.values())
+
+    def __len__(self) -> int:
+        return self._length
+
+    @overload
+    def __getitem__(self, index: int) -> Pose: ...
+    @overload
+    def __getitem__(self, index: slice) -> Sequence[Pose]: ...
+    def __getitem__(self, index: int | slice) -> Pose | Sequence[Pose]:
+        if isinstance(index, slice):
+            return tuple(self._pose(i) for i in range(*index.indices(len(self))))
+        i = index + len(self) if index < 0 else index
+        if not 0 <= i < len(self):
+            raise IndexError(f"expected a pose of 0..{len(self) - 1}, got {index}")
+        return self._pose(i)
+
+    def _pose(self, index: int) -> Pose:
+        view = self.view(index)
+        target = self.viewpoints.target
+        return Pose(
+            index=index,
+            azimuth_deg=view.azimuth,
+            elevation_deg=view.elevation,
+            distance=view.distance,
+            tilt_deg=view.tilt,
+            target=None if target == "center" else target,
+            category=pose_category(view.azimuth, view.elevation, self.viewpoints.bins),
+        )
+
+
+@dataclass(frozen=True)
+class GridPoses(Poses):
+    """All combinations of a grid: tilt outermost, then distance, elevation, azimuth innermost."""
+
+    viewpoints: Grid | Jitter
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Number of tilts, distances, elevations and azimuths."""
+        return self.viewpoints.axis_counts
+
+    def name(self, index: int) -> str:
+        """The pose's values."""
+        return "pose " + " ".join(repr(v + 0.0) for v in self.view(index))
+
+    def view(self, index: int) -> View:
+        """The values that this index stands for."""
+        _, distances, elevations, azimuths = self._axis_lengths
+        index, azimuth = divmod(index, azimuths)
+        index, elevation = divmod(index, elevations)
+        tilt, distance = divmod(index, distances)
+        grid = self.viewpoints
+        return View(
+            axis_value(grid.azimuth, azimuth),
+            axis_value(grid.elevation, elevation),
+            axis_value(grid.distance, distance),
+            axis_value(grid.tilt, tilt),
+        )
+
+    @cached_property
+    def _axis_lengths(self) -> tuple[int, ...]:
+        return tuple(self.viewpoints.axis_counts.values())
+
+
+@dataclass(frozen=True)
+class JitteredPoses(Poses):
+    """Random offsets on a grid; the draws for one pose of the grid follow one another."""
+
+    viewpoints: Jitter
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Those of the grid, and the draws for each of its poses."""
+        return {**self.viewpoints.axis_counts, "draws": self.viewpoints.count}
+
+    def name(self, index: int) -> str:
+        """The values of the grid's pose, and the number of the draw."""
+        place, draw = divmod(index, self.viewpoints.count)
+        return f"{self._grid.name(place)} draw {draw}"
+
+    def view(self, index: int) -> View:
+        """The grid's pose, moved."""
+        around, by = self._grid.view(index // self.viewpoints.count), self.viewpoints.plus_minus
+        azimuth, elevation, distance, tilt = generator(self.seed, "jitter", self.name(index)).random(4)
+        low, high = max(around.elevation - by.elevation, -90.0), min(around.elevation + by.elevation, 90.0)
+        return View(
+            around.azimuth + (2 * azimuth - 1) * by.azimuth,
+            low + elevation * (high - low),
+            around.distance + (2 * distance - 1) * by.distance,
+            around.tilt + (2 * tilt - 1) * by.tilt,
+        )
+
+    @cached_property
+    def _grid(self) -> GridPoses:
+        return GridPoses(self.viewpoints, self.seed)
+
+
+@dataclass(frozen=True)
+class SpherePoses(Poses):
+    """Uniform by area on the sphere, or on the part of it between two azimuths and two elevations."""
+
+    viewpoints: Sphere
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """The number of draws."""
+        return {"draws": self.viewpoints.count}
+
+    def name(self, index: int) -> str:
+        """The number of the draw."""
+        return f"draw {index}"
+
+    def view(self, index: int) -> View:
+        """Azimuth, the sine of the elevation, distance and tilt, each uniform."""
+        part = self.viewpoints
+        u = generator(self.seed, "sphere", self.name(index)).random(4)
+        low, high = (math.sin(math.radians(e)) for e in part.elevation)
+        sine = min(max(low + u[1] * (high - low), -1.0), 1.0)
+        elevation = min(max(math.degrees(math.asin(sine)), part.elevation[0]), part.elevation[1])
+        azimuth, distance, tilt = (
+            lo + x * (hi - lo) for x, (lo, hi) in ((u[0], part.azimuth), (u[2], part.distance), (u[3], part.tilt))
+        )
+        return View(azimuth, elevation, distance, tilt)
+
+
+@dataclass(frozen=True)
+class NormalPoses(Poses):
+    """Normal around one pose."""
+
+    viewpoints: Normal
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """The number of draws."""
+        return {"draws": self.viewpoints.count}
+
+    def name(self, index: int) -> str:
+        """The number of the draw."""
+        return f"draw {index}"
+
+    def view(self, index: int) -> View:
+        """A draw; those beyond a pole, or at no distance, are drawn again."""
+        mean, sd = self.viewpoints, self.viewpoints.sd
+        rng = generator(self.seed, "normal", self.name(index))
+        while True:
+            view = View(
+                rng.normal(mean.azimuth, sd.azimuth),
+                rng.normal(mean.elevation, sd.elevation),
+                rng.normal(mean.distance, sd.distance),
+                rng.normal(mean.tilt, sd.tilt),
+            )
+            if abs(view.elevation) <= 90 and view.distance > 0:
+                return view
+
+
+def poses(viewpoints: Grid | Sphere | Normal | Jitter, seed: int) -> Poses:
+    """The poses of a recipe's viewpoints; `seed` is the recipe's."""
+    match viewpoints:
+        case Jitter():
+            return JitteredPoses(viewpoints, seed)
+        case Sphere():
+            return SpherePoses(viewpoints, seed)
+        case Normal():
+            return NormalPoses(viewpoints, seed)
+        case Grid():
+            return GridPoses(viewpoints, seed)
+
+
+def camera_for(intrinsics: Intrinsics, pose: Pose, target: ArrayLike) -> Camera:
+    """The camera of a pose; `target` (3,) world metres is looked at unless the pose has a target of its own."""
+    azimuth, elevation, tilt = np.radians([pose.azimuth_deg, pose.elevation_deg, pose.tilt_deg])
+    at = np.asarray(target if pose.target is None else pose.target, np.float64)
+    rotation = orbit_rotation(azimuth, elevation, tilt)
+    center = at + orbit_center(azimuth, elevation, pose.distance)
+    return Camera(intrinsics, rotation, -rotation @ center)
+
+
+def distance_problem(pose: Pose, box: Float) -> str | None:
+    """Why the camera of this pose cannot stand where it does, inside the model's box (8, 3) in world metres; or None."""
+    center, corner = box.mean(axis=0), box[2]
+    target = center if pose.target is None else np.array(pose.target)
+    azimuth, elevation = np.radians([pose.azimuth_deg, pose.elevation_deg])
+    camera = target + orbit_center(azimuth, elevation, pose.distance)
+    edges = box[[1, 3, 6]] - corner
+    lengths = np.einsum("ij,ij->i", edges, edges)
+    along = edges @ (camera - corner)
+    if not np.all((lengths > 0) & (along > 0) & (along < lengths)):
+        return None
+    reach = float(np.linalg.norm(box - target, axis=1).max())
+    return (
+        f"expected the camera outside the model; found distance {pose.distance:g} m (pose {pose.index}) inside its "
+        f"box, which reaches {reach:.3g} m"
+    )

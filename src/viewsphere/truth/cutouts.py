@@ -1,0 +1,111 @@
+"""Cut-outs: where a triangle with a see-through material is surface."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.assets.mesh import Material, Mesh, Texture
+
+WRAPS = ("repeat", "clamp", "mirror")
+SURFACE, NEVER = -1, -2
+
+
+@dataclass(frozen=True, eq=False)
+class Cutouts:
+    """The cut-out materials of a stage and the triangles that use them, packed for the kernels.
+
+    A point is surface where `texel / 255 * factor * a >= threshold`: the nearest texel at its (u, v) and the interpolated
+    vertex alpha a. texels (N,) uint8: the alpha of all textures, row by row; layout (M, 5) int64 per material: offset into
+    `texels`, width, height, wrap of u, wrap of v (indices of WRAPS); levels (M, 2) float64: factor, threshold; material
+    (C,) int32 per cut-out triangle: a row of `layout`; corners (C, 3, 3) float64: (u, v, a) of its corners, texture
+    transform applied.
+    """
+
+    texels: NDArray[np.uint8]
+    layout: NDArray[np.int64]
+    levels: NDArray[np.float64]
+    material: NDArray[np.int32]
+    corners: NDArray[np.float64]
+
+
+NO_CUTOUTS = Cutouts(
+    np.zeros(0, np.uint8),
+    np.zeros((0, 5), np.int64),
+    np.zeros((0, 2), np.float64),
+    np.zeros(0, np.int32),
+    np.zeros((0, 3, 3), np.float64),
+)
+
+
+def mesh_cutouts(mesh: Mesh, label_alpha: float) -> tuple[Cutouts, NDArray[np.int32]]:
+    """The mesh's cut-outs and, per triangle, SURFACE, NEVER or its row of `corners`."""
+    rows = np.full(len(mesh.triangles), SURFACE, np.int32)
+    cutouts = NO_CUTOUTS
+    for index, material in enumerate(mesh.materials):
+        chosen = np.flatnonzero(mesh.triangle_material == index)
+        if len(chosen) == 0 or material.alpha_mode == "OPAQUE" or material.transmission > 0:
+            continue
+        threshold = material.alpha_cutoff if material.alpha_mode == "MASK" else label_alpha
+        own = _material_cutouts(mesh, material, chosen, threshold)
+        alpha = own.corners[:, :, 2]
+        lowest, highest = own.texels.min() / 255 * own.levels[0, 0], own.texels.max() / 255 * own.levels[0, 0]
+        mixed = (lowest * alpha.min(axis=1) < threshold) & (highest * alpha.max(axis=1) >= threshold)
+        rows[chosen[highest * alpha.max(axis=1) < threshold]] = NEVER
+        if mixed.any():
+            rows[chosen[mixed]] = len(cutouts.corners) + np.arange(mixed.sum())
+            kept = Cutouts(own.texels, own.layout, own.levels, own.material[mixed], own.corners[mixed])
+            cutouts = _appended(cutouts, kept)
+    return cutouts, rows
+
+
+def stack_cutouts(parts: Sequence[tuple[Cutouts, NDArray[np.int32]]]) -> tuple[Cutouts, NDArray[np.int32]]:
+    """All meshes' cut-outs as one, and the triangles' rows in it."""
+    cutouts, rows = NO_CUTOUTS, [np.zeros(0, np.int32)]
+    for own, own_rows in parts:
+        rows.append(np.where(own_rows >= 0, own_rows + len(cutouts.corners), own_rows).astype(np.int32))
+        cutouts = _appended(cutouts, own)
+    return cutouts, np.concatenate(rows)
+
+
+def _appended(a: Cutouts, b: Cutouts) -> Cutouts:
+    layout = b.layout.copy()
+    layout[:, 0] += len(a.texels)
+    return Cutouts(
+        np.concatenate([a.texels, b.texels]),
+        np.concatenate([a.layout, layout]),
+        np.concatenate([a.levels, b.levels]),
+        np.concatenate([a.material, b.material + np.int32(len(a.layout))]),
+        np.concatenate([a.corners, b.corners]),
+    )
+
+
+def _material_cutouts(mesh: Mesh, material: Material, chosen: NDArray[np.intp], threshold: float) -> Cutouts:
+    texture = material.base_color_texture
+    uv = None if texture is None else (mesh.uv0, mesh.uv1)[texture.texcoord]
+    corners = np.zeros((len(chosen), 3, 3))
+    used = mesh.triangles[chosen]
+    corners[:, :, 2] = 1.0 if mesh.colors is None else mesh.colors[used][:, :, 3]
+    texels, wraps = np.full((1, 1), 255, np.uint8), (0, 0)
+    if texture is not None and uv is not None:
+        corners[:, :, :2] = _transformed(texture, uv[used].astype(np.float64))
+        texels = mesh.images[texture.image].pixels[:, :, 3]
+        wraps = (WRAPS.index(texture.wrap_s), WRAPS.index(texture.wrap_t))
+    return Cutouts(
+        np.ascontiguousarray(texels).reshape(-1),
+        np.array([[0, texels.shape[1], texels.shape[0], *wraps]], np.int64),
+        np.array([[material.base_color[3], threshold]]),
+        np.zeros(len(chosen), np.int32),
+        corners,
+    )
+
+
+def _transformed(texture: Texture, uv: NDArray[np.float64]) -> NDArray[np.float64]:
+    """KHR_texture_transform: scale, then rotate, then offset."""
+    c, s = math.cos(texture.rotation), math.sin(texture.rotation)
+    u, v = uv[..., 0] * texture.scale[0], uv[..., 1] * texture.scale[1]
+    return np.stack([c * u + s * v + texture.offset[0], -s * u + c * v + texture.offset[1]], axis=-1)

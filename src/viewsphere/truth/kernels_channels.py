@@ -1,0 +1,197 @@
+"""Channels from the visibility buffer, one kernel each.
+
+A sample's ray is p = (x + .5, y + .5, 1) against vertices in homogeneous pixels for a pinhole, or its row of a ray table
+against vertices in camera axes for a distorted lens; `rays` is (0, 0, 3) for a pinhole. Exact (no fastmath).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from viewsphere.geometry.jit import njit
+
+ONE = np.float32(1)
+
+
+@njit
+def depths(inverse, rays, out):
+    """Depth along z: s times the ray's z; infinite where nothing is seen."""
+    height, width = inverse.shape
+    table = rays.shape[0] > 0
+    for y in range(height):
+        for x in range(width):
+            out[y, x] = ONE / inverse[y, x]
+            if table and inverse[y, x] > 0:
+                out[y, x] = out[y, x] * rays[y, x, 2]
+
+
+@njit
+def labels(seen, table, empty, out):
+    """table[triangle], or `empty` where none."""
+    height, width = seen.shape
+    for y in range(height):
+        for x in range(width):
+            t = seen[y, x]
+            out[y, x] = table[np.uintp(t)] if t >= 0 else empty
+
+
+@njit(inline="always")
+def _edges(q, i0, i1, i2, px, py, pz):
+    """det[p, q_j, q_k] of the three edges. Taking p's share from each corner first keeps them exact for tiny triangles."""
+    a, b, c = np.uintp(0), np.uintp(1), np.uintp(2)
+    if pz == 1.0:
+        w0, w1, w2 = q[i0, c], q[i1, c], q[i2, c]
+        x0, x1, x2 = q[i0, a] - px * w0, q[i1, a] - px * w1, q[i2, a] - px * w2
+        y0, y1, y2 = q[i0, b] - py * w0, q[i1, b] - py * w1, q[i2, b] - py * w2
+        return x1 * y2 - y1 * x2, x2 * y0 - y2 * x0, x0 * y1 - y0 * x1
+    s = px * px + py * py + pz * pz
+    s0 = (q[i0, a] * px + q[i0, b] * py + q[i0, c] * pz) / s
+    s1 = (q[i1, a] * px + q[i1, b] * py + q[i1, c] * pz) / s
+    s2 = (q[i2, a] * px + q[i2, b] * py + q[i2, c] * pz) / s
+    x0, y0, z0 = q[i0, a] - s0 * px, q[i0, b] - s0 * py, q[i0, c] - s0 * pz
+    x1, y1, z1 = q[i1, a] - s1 * px, q[i1, b] - s1 * py, q[i1, c] - s1 * pz
+    x2, y2, z2 = q[i2, a] - s2 * px, q[i2, b] - s2 * py, q[i2, c] - s2 * pz
+    e0 = px * (y1 * z2 - z1 * y2) + py * (z1 * x2 - x1 * z2) + pz * (x1 * y2 - y1 * x2)
+    e1 = px * (y2 * z0 - z2 * y0) + py * (z2 * x0 - x2 * z0) + pz * (x2 * y0 - y2 * x0)
+    e2 = px * (y0 * z1 - z0 * y1) + py * (z0 * x1 - x0 * z1) + pz * (x0 * y1 - y0 * x1)
+    return e0, e1, e2
+
+
+@njit(inline="always")
+def _weights(q, i0, i1, i2, px, py, pz):
+    """Barycentrics of the ray in the triangle."""
+    e0, e1, e2 = _edges(q, i0, i1, i2, px, py, pz)
+    total = e0 + e1 + e2
+    if total == 0.0:
+        return 1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0
+    inverse = 1.0 / total
+    return e0 * inverse, e1 * inverse, e2 * inverse
+
+
+@njit
+def barycentrics(seen, triangles, q, rays, out):
+    """The weights of the seen triangle's corners; 0 where nothing is seen."""
+    height, width = seen.shape
+    table = rays.shape[0] > 0
+    for y in range(height):
+        for x in range(width):
+            t = seen[y, x]
+            if t < 0:
+                out[y, x] = 0
+                continue
+            px, py, pz = (rays[y, x, 0], rays[y, x, 1], rays[y, x, 2]) if table else (x + 0.5, y + 0.5, 1.0)
+            i0, i1, i2 = np.uintp(triangles[t, 0]), np.uintp(triangles[t, 1]), np.uintp(triangles[t, 2])
+            out[y, x, 0], out[y, x, 1], out[y, x, 2] = _weights(q, i0, i1, i2, px, py, pz)
+
+
+@njit
+def coordinates(seen, triangles, objects, q, rays, values, out):
+    """Vertex values (V, 3) interpolated where an object is seen; NaN elsewhere."""
+    height, width = seen.shape
+    table = rays.shape[0] > 0
+    for y in range(height):
+        for x in range(width):
+            t = seen[y, x]
+            if t < 0 or objects[t] == 0:
+                out[y, x] = np.nan
+                continue
+            px, py, pz = (rays[y, x, 0], rays[y, x, 1], rays[y, x, 2]) if table else (x + 0.5, y + 0.5, 1.0)
+            i0, i1, i2 = np.uintp(triangles[t, 0]), np.uintp(triangles[t, 1]), np.uintp(triangles[t, 2])
+            b0, b1, b2 = _weights(q, i0, i1, i2, px, py, pz)
+            for k in range(3):
+                out[y, x, k] = b0 * values[i0, k] + b1 * values[i1, k] + b2 * values[i2, k]
+
+
+@njit
+def normals_geometric(seen, triangle_normals, rays, camera_from_p, rotation, out):
+    """The triangle's normal in camera axes, towards the camera; 0 where nothing is seen or the triangle is degenerate."""
+    height, width = seen.shape
+    table = rays.shape[0] > 0
+    m = camera_from_p
+    last, nx, ny, nz = -1, 0.0, 0.0, 0.0
+    for y in range(height):
+        for x in range(width):
+            t = seen[y, x]
+            if t != last:  # the camera is on one side of the triangle's plane: the sign holds for all its pixels
+                last, nx, ny, nz = t, 0.0, 0.0, 0.0
+                if t >= 0:
+                    px, py, pz = (rays[y, x, 0], rays[y, x, 1], rays[y, x, 2]) if table else (x + 0.5, y + 0.5, 1.0)
+                    dx = m[0, 0] * px + m[0, 1] * py + m[0, 2] * pz
+                    dy = m[1, 0] * px + m[1, 1] * py + m[1, 2] * pz
+                    dz = m[2, 0] * px + m[2, 1] * py + m[2, 2] * pz
+                    nx, ny, nz = _towards(triangle_normals[t], rotation, dx, dy, dz)
+            out[y, x, 0], out[y, x, 1], out[y, x, 2] = nx, ny, nz
+
+
+@njit
+def rotated(vectors, rotation):
+    """R v of each row, (n, 3) float64."""
+    out = np.empty((vectors.shape[0], 3))
+    r = rotation
+    for i in range(vectors.shape[0]):
+        x, y, z = np.float64(vectors[i, 0]), np.float64(vectors[i, 1]), np.float64(vectors[i, 2])
+        out[i, 0] = r[0, 0] * x + r[0, 1] * y + r[0, 2] * z
+        out[i, 1] = r[1, 0] * x + r[1, 1] * y + r[1, 2] * z
+        out[i, 2] = r[2, 0] * x + r[2, 1] * y + r[2, 2] * z
+    return out
+
+
+@njit
+def normals_shading(seen, triangles, q, rays, values, side, triangle_normals, camera_from_p, rotation, out):
+    """Interpolated vertex normals (`values`, camera axes) on the triangle's visible side, never turned away from the ray.
+
+    `side` is 1 where a triangle's vertex normals agree with its winding, -1 where they oppose it, 2 or -2 likewise where all
+    three equal the triangle's own normal.
+    """
+    height, width = seen.shape
+    table = rays.shape[0] > 0
+    m = camera_from_p
+    a, b, c = np.uintp(0), np.uintp(1), np.uintp(2)
+    last, nx, ny, nz = -1, 0.0, 0.0, 0.0
+    for y in range(height):
+        uy = np.uintp(y)
+        for x in range(width):
+            ux = np.uintp(x)
+            t = seen[uy, ux]
+            if t == last:
+                out[uy, ux, a], out[uy, ux, b], out[uy, ux, c] = nx, ny, nz
+                continue
+            if t < 0:
+                last, nx, ny, nz = -1, 0.0, 0.0, 0.0
+                out[uy, ux, a], out[uy, ux, b], out[uy, ux, c] = nx, ny, nz
+                continue
+            ut = np.uintp(t)
+            px, py, pz = (rays[uy, ux, a], rays[uy, ux, b], rays[uy, ux, c]) if table else (x + 0.5, y + 0.5, 1.0)
+            i0, i1, i2 = np.uintp(triangles[ut, a]), np.uintp(triangles[ut, b]), np.uintp(triangles[ut, c])
+            e0, e1, e2 = _edges(q, i0, i1, i2, px, py, pz)
+            # the e_i have the sign of g . ray, g the normal by winding: this sum lies on g's side if seen from the front, else not
+            sign = -np.float64(side[ut])
+            nx = sign * (e0 * values[i0, a] + e1 * values[i1, a] + e2 * values[i2, a])
+            ny = sign * (e0 * values[i0, b] + e1 * values[i1, b] + e2 * values[i2, b])
+            nz = sign * (e0 * values[i0, c] + e1 * values[i1, c] + e2 * values[i2, c])
+            dx = m[0, 0] * px + m[0, 1] * py + m[0, 2] * pz
+            dy = m[1, 0] * px + m[1, 1] * py + m[1, 2] * pz
+            dz = m[2, 0] * px + m[2, 1] * py + m[2, 2] * pz
+            away = nx * dx + ny * dy + nz * dz
+            if away > 0.0:
+                away /= dx * dx + dy * dy + dz * dz
+                nx, ny, nz = nx - away * dx, ny - away * dy, nz - away * dz
+            square, total = nx * nx + ny * ny + nz * nz, e0 + e1 + e2
+            if not square > 1e-12 * total * total:
+                nx, ny, nz = _towards(triangle_normals[ut], rotation, dx, dy, dz)
+                square = nx * nx + ny * ny + nz * nz
+            s = 1.0 / math.sqrt(square) if square > 0.0 else 0.0
+            nx, ny, nz = nx * s, ny * s, nz * s
+            out[uy, ux, a], out[uy, ux, b], out[uy, ux, c] = nx, ny, nz
+            last = t if side[ut] == 2 or side[ut] == -2 else -1
+
+
+@njit
+def _towards(normal, r, dx, dy, dz):
+    """The world normal in camera axes, turned towards the camera along ray d."""
+    x = r[0, 0] * normal[0] + r[0, 1] * normal[1] + r[0, 2] * normal[2]
+    y = r[1, 0] * normal[0] + r[1, 1] * normal[1] + r[1, 2] * normal[2]
+    z = r[2, 0] * normal[0] + r[2, 1] * normal[1] + r[2, 2] * normal[2]
+    return (-x, -y, -z) if x * dx + y * dy + z * dz > 0.0 else (x, y, z)

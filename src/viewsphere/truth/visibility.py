@@ -1,0 +1,122 @@
+"""The exact rasteriser's result: which triangle each pixel's ray meets first, and where."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.geometry.camera import Window, pixel_rays
+from viewsphere.model.camera import Camera, Intrinsics
+from viewsphere.truth.geometry import Geometry
+
+
+@dataclass(frozen=True, eq=False)
+class Visibility:
+    """triangle (H, W) int32, -1 where no triangle; inverse_depth (H, W) float32, 1/s, 0 where none.
+
+    The seen point is `center + R.T @ (s * ray)`, ray from `geometry.camera.pixel_rays`: its z is 1 (so s is z-depth) for a
+    pinhole and for Brown-Conrady, and its length is 1 for a fisheye, whose rays may look sideways or back.
+    """
+
+    triangle: NDArray[np.int32]
+    inverse_depth: NDArray[np.float32]
+
+
+def rasterize(
+    geometry: Geometry,
+    camera: Camera,
+    subdivision: int = 1,
+    object_id: int | None = None,
+    window: Window | None = None,
+) -> Visibility:
+    """Cast one ray through the centre of each pixel, exactly; of two surfaces in one place the first triangle is seen.
+
+    `subdivision` 2 gives the (2H, 2W) buffer of the centres of a pixel's 2 x 2 quarters (edge anti-aliasing). With an
+    `object_id` that object stands alone, without the ground. `window` replaces the image by another rectangle of pixels, which
+    may lie outside it.
+    """
+    everything = (0, len(geometry.triangles), 0, len(geometry.vertices))
+    nearest, seen = _draw(geometry, camera, subdivision, _range(geometry, object_id) if object_id else everything, window)
+    return Visibility(seen, nearest.astype(np.float32))
+
+
+def silhouette(geometry: Geometry, camera: Camera, object_id: int, window: Window) -> NDArray[np.bool_]:
+    """Pixels whose ray meets this object, were it alone: (y1 - y0, x1 - x0) bool over the window.
+
+    Outside the image too; False where the lens has no ray for a pixel.
+    """
+    return _draw(geometry, camera, 1, _range(geometry, object_id), window)[1] >= 0
+
+
+def _range(geometry: Geometry, object_id: int) -> tuple[int, int, int, int]:
+    """Triangles [a, b) and vertices [c, d) of an object."""
+    if not 1 <= object_id <= geometry.object_count:
+        raise ValueError(f"object_id: expected 1..{geometry.object_count}, got {object_id}")
+    t, v = geometry.triangle_start, geometry.vertex_start
+    return t[object_id - 1], t[object_id], v[object_id - 1], v[object_id]
+
+
+def homogeneous(geometry: Geometry, camera: Camera, base: int = 0, stop: int | None = None) -> NDArray[np.float64]:
+    """Vertices [base, stop) before the perspective division, (n, 3).
+
+    K (R X + t) for a pinhole; camera axes, R X + t, for a distorted lens.
+    """
+    from viewsphere.truth import kernels
+
+    stop = len(geometry.vertices) if stop is None else stop
+    q = np.empty((stop - base, 3))
+    k = camera.K if camera.distortion is None else np.eye(3)
+    kernels.transform(geometry.vertices, base, stop, k, camera.R, camera.t, q)
+    return q
+
+
+def lens_rays(camera: Camera) -> NDArray[np.float64] | None:
+    """The image's ray table, (H, W, 3), None for a pinhole; kept for the next frame, so not to be written to."""
+    return None if camera.distortion is None else _ray_table(camera.intrinsics, 1, None).rays
+
+
+@dataclass(frozen=True, eq=False)
+class _RayTable:
+    """Rays of a lens and the quadtree over them."""
+
+    rays: NDArray[np.float64]
+    levels: NDArray[np.int64]
+    boxes: NDArray[np.float64]
+
+
+@lru_cache(maxsize=4)
+def _ray_table(intrinsics: Intrinsics, samples: int, window: Window | None) -> _RayTable:
+    from viewsphere.truth import kernels_rays as kernels
+
+    rays = pixel_rays(intrinsics, samples, window)
+    rays.setflags(write=False)
+    levels = kernels.tree_levels(rays.shape[0], rays.shape[1])
+    return _RayTable(rays, levels, kernels.build_tree(rays, levels))
+
+
+def _draw(
+    geometry: Geometry, camera: Camera, samples: int, part: tuple[int, int, int, int], window: Window | None
+) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+    """1/s (0 where none) and triangle (-1 where none) over the window, of triangles [first, last)."""
+    from viewsphere.truth import kernels, kernels_rays
+
+    x0, y0, x1, y1 = (samples * edge for edge in window or (0, 0, camera.width, camera.height))
+    nearest, seen = np.zeros((y1 - y0, x1 - x0)), np.full((y1 - y0, x1 - x0), -1, np.int32)
+    first, last, base, stop = part
+    q = homogeneous(geometry, camera, base, stop)
+    c = geometry.cutouts
+    surface = (geometry.triangle_cutout, c.texels, c.layout, c.levels, c.corners, c.material)
+    if camera.distortion is not None:
+        table = _ray_table(camera.intrinsics, samples, window)
+        unit = camera.distortion.model == "fisheye"
+        kernels_rays.draw(
+            q, geometry.triangles, first, last, base, table.rays, table.levels, table.boxes, unit, *surface, nearest, seen
+        )
+        return nearest, seen
+    cell = np.empty((stop - base, 4), np.int32)
+    kernels.cells(q, samples, x0, y0, x1 - x0, y1 - y0, cell)
+    kernels.draw(q, cell, geometry.triangles, first, last, base, samples, x0, y0, *surface, nearest, seen)
+    return nearest, seen

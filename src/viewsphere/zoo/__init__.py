@@ -1,0 +1,35 @@
+"""Procedural models that ship with the tool, in metres, front -Y, up +Z, standing on z = 0.
+
+A family is one module of this package, named as its file: `NAME(...)` builds a Mesh from parameters and `NAME_random(rng)`
+draws the parameters. Sub-packages hold what families are built from.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from viewsphere import plugins
+
+if TYPE_CHECKING:
+    from viewsphere.assets.mesh import Mesh
+
+
+def families() -> tuple[str, ...]:
+    """Names of all families, sorted; none is imported."""
+    return plugins.families()
+
+
+def build(family: str, rng: np.random.Generator) -> Mesh:
+    """A random member of the family; the same generator state gives the same bytes.
+
+    Raises UserError for an unknown family, with the nearest known one.
+    """
+    return getattr(plugins.family(family), f"{family}_random")(rng)
+
+
+def real_size(mesh: Mesh) -> tuple[float, float, float]:
+    """Width, height, length (extent along x, z, y) in metres: a zoo mesh has its real size."""
+    x, y, z = np.ptp(mesh.bounds, axis=0)
+    return float(x), float(z), float(y)

@@ -1,0 +1,1 @@
+"""What a car is built from: hull, greenhouse, wheels, lights and fittings."""

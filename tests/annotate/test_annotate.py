@@ -1,0 +1,266 @@
+import itertools
+import json
+
+import numpy as np
+import pytest
+
+from viewsphere.annotate import annotate
+from viewsphere.annotate.view import view_of
+from viewsphere.assets.mesh import Mesh
+from viewsphere.geometry.box import FACES, box_vertices
+from viewsphere.geometry.camera import orbit_center, orbit_rotation
+from viewsphere.geometry.rotation import matrix_from_quaternion, rigid
+from viewsphere.model.camera import Camera, Distortion, Intrinsics
+from viewsphere.model.record import sample_from_record, sample_to_record
+from viewsphere.model.sample import Sample
+from viewsphere.model.shot import Frame, ModelSpec, Placement, Pose, Scene, Shot
+from viewsphere.truth.geometry import build_geometry
+from viewsphere.truth.visibility import rasterize, silhouette
+
+HALVES = ((0, 1, 2), (0, 2, 3))
+TRIANGLES = np.array([[face[i] for i in half] for face in FACES.values() for half in HALVES], np.int32)
+LENS = Intrinsics(width=160, height=120, fx=125, fy=125, cx=80, cy=60)
+
+
+def block(low, high):
+    vertices = box_vertices(low, high).astype(np.float32)
+    normals = vertices / np.linalg.norm(vertices, axis=1, keepdims=True)
+    zeros = np.zeros(len(TRIANGLES), np.int32)
+    return Mesh(vertices, TRIANGLES, normals.astype(np.float32), zeros, zeros)
+
+
+UNIT = block((-0.5,) * 3, (0.5,) * 3)
+
+
+def at(x=0.0, y=0.0, z=0.0, turn=0.0):
+    c, s = np.cos(turn), np.sin(turn)
+    return ((c, -s, 0, x), (s, c, 0, y), (0, 0, 1, z), (0, 0, 0, 1))
+
+
+def scene(meshes, motions, pose=None, intrinsics=LENS, ground=False, category_deg=45.0):
+    """Annotations of a frame, and all that they came from; the camera looks at the world's origin."""
+    pose = pose or Pose(index=0, azimuth_deg=0, elevation_deg=0, distance=4)
+    angles = np.radians([pose.azimuth_deg, pose.elevation_deg, pose.tilt_deg])
+    rotation = orbit_rotation(*angles)
+    camera = Camera(intrinsics, rotation, -rotation @ orbit_center(*angles[:2], pose.distance))
+    specs = [
+        ModelSpec(key=f"m{i}", source="x.obj", category="cube", category_id=1, real_size=(1, 2, 3))
+        for i in range(len(meshes))
+    ]
+    placements = tuple(
+        Placement(id=i + 1, model=s, world_from_object=m)
+        for i, (s, m) in enumerate(zip(specs, motions, strict=True))
+    )
+    frame = Frame(index=5, pose=pose, split="train")
+    shot = Shot(
+        key="shot", placements=placements, intrinsics=intrinsics, scene=Scene(), frames=(frame,),
+        channels=("instances",), category_deg=category_deg,
+    )  # fmt: skip
+    geometry = build_geometry(placements, meshes, ground, 0.01)
+    visibility = rasterize(geometry, camera)
+    boxes = [box_vertices(*m.bounds) for m in meshes]
+    objects = annotate(
+        shot, frame, camera, geometry, visibility, boxes, [f"MODELS/{s.key}.glb" for s in specs]
+    )
+    return objects, camera, geometry, visibility, pose
+
+
+def test_a_cube_seen_head_on():
+    (cube,), *_ = scene([UNIT], [at()])
+    half = 0.5 / 3.5 * 125  # 17.857 px about (80, 60)
+    assert cube.box2d_projected == pytest.approx((80 - half, 60 - half, 80 + half, 60 + half))
+    assert cube.box2d_unclipped == cube.box2d_projected
+    assert cube.box2d == (62, 42, 98, 78)  # pixel centres within
+    expected = np.zeros((120, 160), bool)
+    expected[42:78, 62:98] = True
+    np.testing.assert_array_equal(cube.mask, expected)
+    assert cube.area == 36 * 36
+    assert cube.polygons == [[62, 42, 98, 42, 98, 78, 62, 78]]
+    assert (cube.visibility, cube.truncation) == (1.0, 0.0)
+    assert (cube.size, cube.real_size, cube.pose_category) == ((1, 1, 1), (1, 2, 3), "front")
+    assert (cube.id, cube.category, cube.key, cube.model) == (1, "cube", "m0", "MODELS/m0.glb")
+    np.testing.assert_allclose(cube.box3d_camera.mean(axis=0), (0, 0, 4), atol=1e-15)
+    np.testing.assert_array_equal(cube.box3d, cube.box3d_object)
+    np.testing.assert_allclose(
+        cube.box3d_pixels[1], (80 + half, 60 + half)
+    )  # front, left of the object, bottom
+    assert cube.box3d_in_front.all()
+    assert cube.quaternion == pytest.approx((np.sqrt(0.5), np.sqrt(0.5), 0, 0))  # z up to y down
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_p_times_the_box_is_the_box_in_pixels(seed):
+    rng = np.random.default_rng(seed)
+    azimuth, elevation, tilt, distance = rng.uniform((0, -90, -180, 1.2), (360, 90, 180, 9))
+    pose = Pose(index=0, azimuth_deg=azimuth, elevation_deg=elevation, distance=distance, tilt_deg=tilt)
+    turns = [matrix_from_quaternion(rng.normal(size=4)) for _ in range(3)]
+    motions = [rigid(turn, rng.uniform(-2, 2, 3)).tolist() for turn in turns]
+    meshes = [block(-rng.uniform(0.1, 1, 3), rng.uniform(0.1, 1, 3)) for _ in range(3)]
+    intrinsics = LENS.model_copy(update={"skew": 3.0, "fy": 140.0, "cx": 70.5})
+    objects, camera, geometry, visibility, _ = scene(meshes, motions, pose, intrinsics)
+    for o in objects:
+        homogeneous = np.column_stack([o.box3d, np.ones(8)]) @ camera.P.T
+        np.testing.assert_array_equal(o.box3d_in_front, homogeneous[:, 2] > 0)
+        front = o.box3d_in_front
+        pixels = homogeneous[front, :2] / homogeneous[front, 2:]
+        np.testing.assert_allclose(o.box3d_pixels[front], pixels, rtol=1e-9, atol=1e-6)
+        assert np.isnan(o.box3d_pixels[~front]).all()
+        np.testing.assert_allclose(
+            o.camera_from_object, rigid(camera.R, camera.t) @ o.world_from_object, atol=1e-12
+        )
+        np.testing.assert_allclose(
+            matrix_from_quaternion(o.quaternion), o.camera_from_object[:3, :3], atol=1e-12
+        )
+        ids = np.where(visibility.triangle < 0, 0, geometry.triangle_object[visibility.triangle])
+        np.testing.assert_array_equal(o.mask, ids == o.id)
+        assert o.area == o.mask.sum()
+        if o.area:
+            rows, columns = np.nonzero(o.mask)
+            assert o.box2d == (columns.min(), rows.min(), columns.max() + 1, rows.max() + 1)
+        else:
+            assert o.box2d is None
+        large = silhouette(geometry, camera, o.id, (-160, -120, 320, 240))
+        total, inside = large.sum(), large[120:240, 160:320].sum()
+        if total:
+            assert o.visibility == o.area / total
+            assert o.truncation == (total - inside) / total
+        else:
+            assert o.visibility == 0
+        if o.box2d_unclipped and o.box2d_projected:
+            u = o.box2d_unclipped
+            assert o.box2d_projected == (max(u[0], 0), max(u[1], 0), min(u[2], 160), min(u[3], 120))
+
+
+POSES = list(itertools.product((0, 30, 135, 359), (-90, -35, 0, 60, 90), (0, 25, -170)))
+
+
+@pytest.mark.parametrize(("azimuth", "elevation", "tilt"), POSES)
+def test_the_view_of_an_object_at_the_target_is_the_pose(azimuth, elevation, tilt):
+    pose = Pose(index=0, azimuth_deg=azimuth, elevation_deg=elevation, distance=4, tilt_deg=tilt)
+    (cube,), *_ = scene([UNIT], [at()], pose)
+    view = cube.view
+    assert view.distance == pytest.approx(4)
+    assert view.elevation_deg == pytest.approx(elevation)
+    if abs(elevation) < 90:
+        assert (view.azimuth_deg, view.tilt_deg) == pytest.approx((azimuth, tilt), abs=1e-9)
+    else:  # azimuth and tilt are one and the same turn there
+        assert view.tilt_deg == 0
+        again = orbit_rotation(*np.radians([view.azimuth_deg, elevation]))
+        np.testing.assert_allclose(again, orbit_rotation(*np.radians([azimuth, elevation, tilt])), atol=1e-12)
+
+
+def test_the_view_is_in_the_objects_own_axes():
+    # turned a quarter to the left (towards +X), an object shows a camera on -Y its right side
+    (cube,), *_ = scene([UNIT], [at(turn=np.pi / 2)])
+    assert cube.view.azimuth_deg == pytest.approx(270)
+    assert cube.pose_category == "right"
+    (fine,), *_ = scene([UNIT], [at(turn=np.pi / 2)], category_deg=30.0)
+    assert fine.pose_category == "az270"
+
+
+def test_the_view_of_an_object_off_the_axis_needs_no_tilt():
+    for x, z in ((1.5, 0.0), (0.0, 1.0), (-1.2, 0.0)):
+        (cube,), *_ = scene([UNIT], [at(x=x, z=z)])
+        assert cube.view.tilt_deg == pytest.approx(0, abs=1e-9)
+        assert cube.view.azimuth_deg == pytest.approx(np.degrees(np.arctan2(-x, 4)) % 360)
+        assert cube.view.elevation_deg == pytest.approx(np.degrees(np.arctan2(-z, np.hypot(x, 4))))
+        assert cube.view.distance == pytest.approx(np.sqrt(16 + x * x + z * z))
+
+
+def test_the_view_from_inside_and_of_what_is_behind():
+    assert view_of(rigid(np.eye(3), (0, 0, 0)), np.zeros(3)).distance == 0
+    behind = view_of(rigid(orbit_rotation(0, 0), (0, 0, -4)), np.zeros(3))
+    assert (behind.azimuth_deg, behind.distance) == pytest.approx((180, 4))
+
+
+def test_one_cube_hides_another():
+    front, back = scene([UNIT, UNIT], [at(y=-1), at(x=0.5, y=1)])[0]
+    assert (front.visibility, front.truncation) == (1, 0)
+    assert 0 < back.visibility < 0.5
+    assert back.truncation == 0
+    hidden = scene([UNIT, UNIT], [at(y=-1), at(y=1)])[0][1]
+    assert (hidden.area, hidden.box2d, hidden.visibility, hidden.truncation) == (0, None, 0, 0)
+    assert hidden.polygons == []
+    assert not hidden.mask.any()
+    assert hidden.box2d_projected is not None
+
+
+def test_a_cube_half_outside():
+    plate = block((-0.5, -0.001, -0.5), (0.5, 0.001, 0.5))
+    (cut,), *_ = scene([plate], [at(x=80 / 125 * 3.999)])  # its middle projects to the image's right edge
+    assert (cut.truncation, cut.visibility) == (0.5, 0.5)
+    assert cut.box2d_projected[2] == 160 < cut.box2d_unclipped[2]
+
+
+def test_an_object_far_outside_and_one_behind():
+    outside, behind = scene([UNIT, UNIT], [at(x=100), at(y=-9)])[0]
+    for o in (outside, behind):
+        assert (o.area, o.box2d, o.box2d_projected, o.visibility, o.truncation) == (0, None, None, 0, 1)
+    assert outside.box2d_unclipped is not None
+    assert behind.box2d_unclipped is None
+    assert not behind.box3d_in_front.any()
+
+
+def test_a_model_that_crosses_the_camera_plane():
+    (corridor,), camera, geometry, *_ = scene([block((0.5, -9, -0.5), (1, 3, 0.5))], [at()])
+    assert corridor.box2d_unclipped is None
+    assert corridor.box2d_projected == pytest.approx((80 + 0.5 / 7 * 125, 0, 160, 120))
+    assert corridor.box3d_in_front.sum() == 4
+    assert corridor.area > 1000
+    large = silhouette(geometry, camera, 1, (-160, -120, 320, 240))
+    assert corridor.visibility == corridor.area / large.sum()
+    assert corridor.truncation == 1 - large[120:240, 160:320].sum() / large.sum()
+
+
+@pytest.mark.parametrize("elevation", [30, 5, -5])
+def test_the_ground_hides_only_from_below(elevation):
+    pose = Pose(index=0, azimuth_deg=20, elevation_deg=elevation, distance=4)
+    (cube,), camera, geometry, *_ = scene([UNIT], [at()], pose, ground=True)
+    alone = silhouette(geometry, camera, 1, (0, 0, 160, 120)).sum()
+    assert cube.visibility == cube.area / alone
+    assert (cube.visibility == 1) == (camera.center[2] > -0.5)
+
+
+def test_lens_distortion_is_followed():
+    lens = Distortion(model="brown_conrady", coefficients=(-0.3, 0.1, 0.0, 0.0))
+    (cube,), *_ = scene([UNIT], [at(x=1.0)], intrinsics=LENS.model_copy(update={"distortion": lens}))
+    corners = cube.box3d_camera[[0, 1, 4, 5]]
+    r2 = ((corners[:, :2] / corners[:, 2:]) ** 2).sum(axis=1)
+    u = corners[:, 0] / corners[:, 2] * (1 - 0.3 * r2 + 0.1 * r2**2) * 125 + 80
+    np.testing.assert_allclose(cube.box3d_pixels[[0, 1, 4, 5], 0], u)
+    assert np.abs(np.array(cube.box2d) - cube.box2d_projected).max() <= 1
+    assert (cube.visibility, cube.truncation) == (1, 0)
+
+
+def test_wrong_numbers_of_models_are_refused():
+    objects, camera, geometry, visibility, pose = scene([UNIT], [at()])
+    frame = Frame(index=5, pose=pose, split="train")
+    shot = Shot(key="s", placements=(), intrinsics=LENS, scene=Scene(), frames=(frame,), channels=())
+    with pytest.raises(ValueError, match="frame 5: expected 1 placements"):
+        annotate(shot, frame, camera, geometry, visibility, [objects[0].box3d_object], ["m"])
+
+
+def test_a_record_gives_back_every_bit():
+    tilted = Pose(index=3, azimuth_deg=0.1, elevation_deg=1 / 3, distance=4, tilt_deg=7, target=(0, 0, 0.1))
+    lens = LENS.model_copy(update={"distortion": Distortion(model="fisheye", coefficients=(0.1, 0, 0, 0))})
+    motions = [at(turn=0.3), at(y=-9), at(x=3)]
+    objects, camera, _, visibility, pose = scene([UNIT] * 3, motions, tilted, lens)
+    channels = {"instances": visibility.triangle}
+    sample = Sample(5, "train", camera, pose, objects, channels, {"instances": "a/b.png"})
+    text = json.dumps(sample_to_record(sample), allow_nan=False)
+    back = sample_from_record(json.loads(text), channels=channels, files=sample.files)
+    assert (back.index, back.split, back.pose, back.files) == (5, "train", pose, sample.files)
+    assert back.camera.intrinsics == lens
+    np.testing.assert_array_equal(back.camera.P, camera.P)
+    np.testing.assert_array_equal(back.instances, visibility.triangle)
+    assert len(back.objects) == 3
+    for a, b in zip(objects, back.objects, strict=True):
+        for name, value in a.__dict__.items():
+            other = getattr(b, name)
+            assert type(other) is type(value), name
+            if isinstance(value, np.ndarray):
+                assert other.dtype == value.dtype
+                np.testing.assert_array_equal(other, value, err_msg=name)
+            else:
+                assert other == value, name
+    assert json.dumps(sample_to_record(back)) == json.dumps(json.loads(text))

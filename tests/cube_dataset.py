@@ -1,0 +1,122 @@
+"""A small data set of boxes, made without recipe and engine: labels from truth, pictures from the ids."""
+
+from pathlib import Path
+
+import numpy as np
+
+from viewsphere.annotate import annotate
+from viewsphere.assets.export import export_glb, export_obj
+from viewsphere.assets.mesh import Mesh
+from viewsphere.geometry.box import FACES, box_vertices
+from viewsphere.geometry.camera import orbit_center, orbit_rotation
+from viewsphere.geometry.pose_category import pose_category
+from viewsphere.model.camera import Camera, Intrinsics
+from viewsphere.model.channel import CHANNELS
+from viewsphere.model.sample import Sample
+from viewsphere.model.shot import Frame, Ground, ModelSpec, Placement, Pose, Scene, Shot
+from viewsphere.store import Category, Dataset, ModelInfo, PlanRecord, Store
+from viewsphere.truth.channels import observe
+from viewsphere.truth.geometry import build_geometry
+from viewsphere.truth.visibility import rasterize
+
+HALVES = ((0, 1, 2), (0, 2, 3))
+TRIANGLES = np.array([[face[i] for i in half] for face in FACES.values() for half in HALVES], np.int32)
+LENS = Intrinsics(width=96, height=72, fx=80, fy=80, cx=48, cy=36)
+CATEGORIES = (Category(1, "hair_drier", "appliance"), Category(2, "gizmo", ""), Category(3, "car", "vehicle"))
+
+
+def block(width: float, length: float, height: float) -> Mesh:
+    half = np.array([width, length, height]) / 2
+    vertices = box_vertices(-half, half).astype(np.float32)
+    normals = (vertices / np.linalg.norm(vertices, axis=1, keepdims=True)).astype(np.float32)
+    zeros = np.zeros(len(TRIANGLES), np.int32)
+    return Mesh(vertices, TRIANGLES, normals, zeros, zeros)
+
+
+MESHES = (block(0.6, 1.0, 0.5), block(1.0, 0.3, 0.9), block(0.2, 1.4, 0.2))
+POSES = tuple(
+    Pose(
+        index=i, azimuth_deg=a, elevation_deg=e, distance=2.2, tilt_deg=t, target=(0, 0, 0), category=pose_category(a, e)
+    )
+    for i, (a, e, t) in enumerate([(0, 10, 0), (70, 35, 12), (200, 60, 0), (300, -20, 0)])
+)  # fmt: skip
+
+
+def spec(index: int) -> ModelSpec:
+    category = CATEGORIES[index]
+    return ModelSpec(
+        key=f"block-{index}", source="x.obj", category=category.name, supercategory=category.supercategory,
+        category_id=category.id, real_size=(0.1, 0.2, 0.3) if index == 1 else None,
+    )  # fmt: skip
+
+
+def placed(offsets: dict[int, tuple[float, float, float]]) -> tuple[Placement, ...]:
+    return tuple(
+        Placement(id=i, model=spec(m), world_from_object=((1, 0, 0, x), (0, 1, 0, y), (0, 0, 1, z), (0, 0, 0, 1)))
+        for i, (m, (x, y, z)) in enumerate(offsets.items(), 1)
+    )
+
+
+def render(shot: Shot):
+    meshes = [MESHES[int(p.model.key[-1])] for p in shot.placements]
+    geometry = build_geometry(shot.placements, meshes, shot.scene.ground is not None, shot.label_alpha)
+    boxes = [box_vertices(*m.bounds) for m in meshes]
+    files = [f"store/models/{p.model.key}/{p.model.key}.obj" for p in shot.placements]
+    for frame in shot.frames:
+        angles = np.radians([frame.pose.azimuth_deg, frame.pose.elevation_deg, frame.pose.tilt_deg])
+        rotation = orbit_rotation(*angles)
+        camera = Camera(shot.intrinsics, rotation, -rotation @ orbit_center(*angles[:2], frame.pose.distance))
+        visibility = rasterize(geometry, camera)
+        channels = dict(observe(geometry, camera, visibility, [c for c in shot.channels if c != "rgb"]))
+        if "rgb" in shot.channels:
+            channels["rgb"] = (channels["instances"][..., None] * np.array([90, 60, 30])).astype(np.uint8)
+        objects = annotate(shot, frame, camera, geometry, visibility, boxes, files)
+        yield Sample(frame.index, frame.split, camera, frame.pose, objects, channels, {})
+
+
+def shots(several: bool, channels: tuple[str, ...], intrinsics: Intrinsics, ground: bool) -> list[Shot]:
+    """Three models by four poses, or four frames of three boxes, one of them always out of sight."""
+    scenes = [{0: (0, 0, 0), 1: (0.5, 0.8, 0), 2: (0, 50, 0)}] if several else [{m: (0, 0, 0)} for m in range(3)]
+    made = []
+    for s, offsets in enumerate(scenes):
+        frames = tuple(
+            Frame(index=s * len(POSES) + p.index, pose=p, split="val" if (p.index if several else s) == 2 else "train")
+            for p in POSES
+        )
+        made.append(
+            Shot(
+                key=f"shot-{s}", placements=placed(offsets), intrinsics=intrinsics, channels=channels, frames=frames,
+                scene=Scene(ground=Ground() if ground else None),
+            )
+        )  # fmt: skip
+    return made
+
+
+def make(root: Path, several=False, channels=tuple(CHANNELS), intrinsics=LENS, ground=False, leave_out=()) -> Dataset:
+    """Write the data set; shots whose number is in `leave_out` stay unfinished."""
+    planned = shots(several, channels, intrinsics, ground)
+    store = Store(root)
+    store.open_for(
+        PlanRecord(
+            version="1", digest="d", name="blocks", recipe={}, categories=CATEGORIES, splits=("train", "val"),
+            channels=channels, models=tuple(f"block-{i}" for i in range(3)), poses=len(POSES),
+            frames=sum(len(s.frames) for s in planned), max_objects=3 if several else 1,
+            shots=tuple((s.key, s.frames[0].index, len(s.frames)) for s in planned),
+        )
+    )  # fmt: skip
+    for i, mesh in enumerate(MESHES):
+        s, (low, high) = spec(i), mesh.bounds
+        width, length, height = (high - low).tolist()
+        with store.aside(store.model_folder(s.key)) as folder:
+            export_obj(mesh, folder, s.key)
+            export_glb(mesh, folder / f"{s.key}.glb")
+            info = ModelInfo(
+                s.key, s.category, s.supercategory, s.category_id, f"store/models/{s.key}/{s.key}.obj",
+                f"store/models/{s.key}/{s.key}.glb", box_vertices(low, high), (width, height, length), s.real_size,
+                mesh.parts, len(mesh.triangles), "d",
+            )  # fmt: skip
+            store.write_model_info(folder, info)
+    for i, shot in enumerate(planned):
+        if i not in leave_out:
+            store.write_shot(shot.key, render(shot))
+    return Dataset(root)

@@ -1,0 +1,211 @@
+"""A run can be stopped anywhere, spread over any number of workers, and gives the same bytes."""
+
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+import viewsphere as vs
+from conftest import small_recipe, tree_hash
+from viewsphere.errors import ModelError, RecipeError, StoreError, UserError
+from viewsphere.run.generate import Progress, export, generate
+from viewsphere.run.pool import Job, run_jobs
+
+
+def command(recipe_file, out, workers):
+    return [
+        sys.executable,
+        "-m",
+        "viewsphere",
+        "render",
+        str(recipe_file),
+        "-o",
+        str(out),
+        "--workers",
+        str(workers),
+    ]
+
+
+@pytest.fixture
+def recipe_file(tmp_path):
+    file = tmp_path / "recipe.yaml"
+    file.write_text(small_recipe().to_yaml())
+    return file
+
+
+@pytest.mark.parametrize("workers", [2, pytest.param(4, marks=pytest.mark.slow)])
+def test_any_number_of_workers_gives_the_same_bytes(workers, recipe_file, small_run, tmp_path):
+    subprocess.run(command(recipe_file, tmp_path / "out", workers), check=True, timeout=110, capture_output=True)
+    assert tree_hash(tmp_path / "out") == tree_hash(small_run)
+
+
+@pytest.mark.parametrize("kills", [2, pytest.param(10, marks=[pytest.mark.slow, pytest.mark.timeout(600)])])
+def test_a_killed_run_goes_on_to_the_same_bytes(kills, recipe_file, small_run, tmp_path):
+    out, rng = tmp_path / "out", random.Random(kills)
+    for _ in range(kills):
+        run = subprocess.Popen(
+            command(recipe_file, out, 2),
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            start_new_session=True,
+        )
+        time.sleep(rng.uniform(0.5, 5.0))
+        os.killpg(run.pid, signal.SIGKILL)
+        run.wait(timeout=30)
+    subprocess.run(command(recipe_file, out, 2), check=True, timeout=110, capture_output=True)
+    assert tree_hash(out) == tree_hash(small_run)
+
+
+def test_finished_shots_are_never_rendered_again(tmp_path):
+    seen: list[Progress] = []
+    first = generate(small_recipe(), tmp_path / "out", formats=[])
+    again = generate(small_recipe(), tmp_path / "out", formats=[], listener=seen.append)
+    assert (first.rendered, first.frames) == (12, 12)
+    assert (again.rendered, again.frames) == (0, 12)
+    assert [p for p in seen if p.phase == "frames"] == [Progress("frames", 12, 12, 12)]
+
+
+def test_what_is_missing_is_rendered(small_dataset, small_run):
+    victim = next((small_dataset.root / "store" / "shots").glob("*/*"))
+    for file in sorted(victim.rglob("*"), reverse=True):
+        file.rmdir() if file.is_dir() else file.unlink()
+    victim.rmdir()
+    summary = generate(small_recipe(), small_dataset.root)
+    assert summary.rendered == 2
+    assert tree_hash(small_dataset.root) == tree_hash(small_run)
+
+
+def test_memory_and_disk_hold_the_same_samples(small_run):
+    dataset = vs.open(small_run)
+    memory = list(vs.render(small_recipe()))
+    assert len(dataset) == len(memory) == vs.plan(small_recipe()).frames == 12
+    for a, b in zip(memory, dataset, strict=True):
+        assert (a.index, a.split, a.pose) == (b.index, b.split, b.pose)
+        assert set(a.channels) == set(b.channels)
+        for name in a.channels:
+            assert a.channels[name].dtype == b.channels[name].dtype
+            assert np.array_equal(a.channels[name], b.channels[name], equal_nan=a.channels[name].dtype.kind == "f"), name
+        for name in ("K", "R", "t", "P"):
+            assert np.array_equal(getattr(a.camera, name), getattr(b.camera, name))
+        for o, p in zip(a.objects, b.objects, strict=True):
+            assert (o.id, o.category, o.model, o.box2d, o.area, o.visibility, o.truncation, o.size, o.real_size) == (
+                p.id, p.category, p.model, p.box2d, p.area, p.visibility, p.truncation, p.size, p.real_size
+            )  # fmt: skip
+            assert np.array_equal(o.mask, p.mask)
+            assert np.array_equal(o.box3d_pixels, p.box3d_pixels, equal_nan=True)
+            assert np.array_equal(o.camera_from_object, p.camera_from_object)
+            assert np.array_equal(o.mask, a.instances == o.id)
+            assert (small_run / o.model).is_file()
+
+
+def test_dataset_indexing(small_run):
+    dataset = vs.open(small_run)
+    assert [s.index for s in dataset] == [dataset[i].index for i in range(len(dataset))] == list(range(12))
+    assert dataset[-1].index == 11
+    assert [s.index for s in dataset[2:5]] == [2, 3, 4]
+    with pytest.raises(IndexError):
+        dataset[12]
+
+
+def test_another_recipe_is_refused_and_nothing_changes(small_dataset):
+    before = tree_hash(small_dataset.root)
+    other = small_recipe(viewpoints={"azimuth": [0], "elevation": [15], "distance": 1.0})
+    with pytest.raises(StoreError, match="another output folder"):
+        generate(other, small_dataset.root)
+    assert tree_hash(small_dataset.root) == before
+
+
+def test_foreign_files_are_refused(tmp_path):
+    (tmp_path / "thesis.tex").write_text("x")
+    with pytest.raises(StoreError, match="other files"):
+        generate(small_recipe(), tmp_path)
+
+
+@pytest.mark.skipif(os.name == "nt" or os.geteuid() == 0, reason="root may write anywhere")
+def test_unwritable_folder(tmp_path):
+    tmp_path.chmod(0o500)
+    with pytest.raises(StoreError, match="writable"):
+        generate(small_recipe(), tmp_path / "out")
+
+
+def test_output_that_is_a_file(tmp_path):
+    (tmp_path / "out").write_text("x")
+    with pytest.raises(StoreError, match="writable output folder"):
+        generate(small_recipe(), tmp_path / "out")
+
+
+def test_unknown_format_is_refused_before_rendering(tmp_path):
+    with pytest.raises(UserError, match="did you mean 'coco'"):
+        generate(small_recipe(), tmp_path / "out", formats=["cocoo"])
+    assert not (tmp_path / "out").exists()
+
+
+def test_camera_inside_the_model_is_refused(tmp_path):
+    near = small_recipe(viewpoints={"azimuth": 0, "elevation": 0, "distance": 0.05})
+    with pytest.raises(RecipeError, match="distance"):
+        generate(near, tmp_path / "out")
+
+
+@pytest.fixture
+def one_bad(tmp_path):
+    (tmp_path / "models").mkdir()
+    (tmp_path / "models" / "bad.obj").write_text("not a model\n")
+    good = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+    (tmp_path / "models" / "good.obj").write_text(good)
+    return small_recipe(
+        models=[{"source": str(tmp_path / "models"), "category": "thing"}],
+        viewpoints={"azimuth": [0, 90], "elevation": [15], "distance": 4.0},
+    )
+
+
+def test_one_bad_model_stops_the_run(one_bad, tmp_path):
+    with pytest.raises(ModelError, match=r"bad\.obj"):
+        generate(one_bad, tmp_path / "out")
+    assert len(vs.open(tmp_path / "out")) == 0
+
+
+def test_one_bad_model_is_left_out_if_asked(one_bad, tmp_path):
+    summary = generate(one_bad, tmp_path / "out", keep_going=True)
+    assert list(summary.skipped) == ["bad"]
+    assert summary.frames == 2
+    assert {o.key for s in vs.open(tmp_path / "out") for o in s.objects} == {"good"}
+
+
+def test_a_changed_model_is_refused(one_bad, tmp_path):
+    generate(one_bad, tmp_path / "out", keep_going=True)
+    file = tmp_path / "models" / "good.obj"
+    file.write_text(file.read_text().replace("v 1 0 0", "v 2 0 0"))
+    with pytest.raises(StoreError, match="changed"):
+        generate(one_bad, tmp_path / "out", keep_going=True)
+
+
+def test_export_of_a_half_finished_store(small_dataset):
+    first = next((small_dataset.root / "store" / "shots").glob("*/*"))
+    first.rename(small_dataset.root / "gone")
+    export(small_dataset.root, ["coco"])
+    ids = [
+        image["id"]
+        for file in (small_dataset.root / "coco" / "annotations").glob("*.json")
+        for image in json.loads(file.read_text())["images"]
+    ]
+    assert len(ids) == 10
+    assert set(ids) == {s.index + 1 for s in vs.open(small_dataset.root)}
+
+
+class Deadly:
+    """A task that ends the process which unpacks it."""
+
+    def __reduce__(self):
+        return os._exit, (3,)
+
+
+def test_a_worker_that_dies_costs_a_retry_then_an_error(tmp_path):
+    outcomes = list(run_jobs([Job("x", "x", Deadly)], tmp_path, 1))
+    assert len(outcomes) == 1
+    assert "died 2 times (exit code 3)" in str(outcomes[0].error)

@@ -1,0 +1,56 @@
+"""What the pages say is true: generated pages are fresh, README's commands and code run."""
+
+import os
+import re
+import subprocess
+import sys
+
+import pytest
+
+from conftest import ROOT
+
+README = (ROOT / "README.md").read_text("utf-8")
+
+
+def test_generated_pages_are_what_the_code_says():
+    run = subprocess.run([sys.executable, ROOT / "scripts" / "docs.py", "--check"], capture_output=True, text=True)
+    assert run.returncode == 0, run.stderr
+
+
+def test_links_lead_somewhere():
+    pages = [ROOT / "README.md", *(ROOT / "docs").glob("*.md"), ROOT / "recipes" / "README.md"]
+    for page in pages:
+        for target in re.findall(r"\]\(([^)#]+)[^)]*\)", page.read_text("utf-8")):
+            if "://" not in target:
+                assert (page.parent / target).exists(), f"{page.name}: {target}"
+
+
+def test_readme_s_scripts_exist():
+    for name in re.findall(r"^(scripts/\w+)", README, re.MULTILINE):
+        assert os.access(ROOT / name, os.X_OK)
+
+
+@pytest.mark.timeout(300)
+@pytest.mark.slow
+def test_readme_s_commands_and_code_run(tmp_path):
+    commands = re.findall(r"^(viewsphere [^#\n]+)", README, re.MULTILINE)
+    assert len(commands) >= 5
+    for line in commands:
+        words = [sys.executable, "-m", *line.split()]
+        run = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, timeout=250)
+        assert run.returncode == 0, f"{line}\n{run.stdout}{run.stderr}"
+    code = re.search(r"```python\n(.*?)```", README, re.DOTALL)
+    assert code is not None
+    subprocess.run([sys.executable, "-c", code[1]], cwd=tmp_path, check=True, timeout=120)
+
+
+def test_readme_s_recipe_is_valid(tmp_path):
+    import viewsphere as vs
+
+    text = re.search(r"```yaml\n(.*?)```", README, re.DOTALL)
+    assert text is not None
+    (tmp_path / "models").mkdir()
+    for name in "ab":
+        (tmp_path / "models" / f"{name}.glb").write_bytes(b"")
+    (tmp_path / "recipe.yaml").write_text(text[1])
+    assert vs.plan(vs.Recipe.load(tmp_path / "recipe.yaml")).frames == 2 * 36 * 9 * 2

@@ -1,0 +1,118 @@
+"""The store: nothing half written is ever seen, and what is broken is said."""
+
+import json
+import os
+import socket
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from viewsphere.errors import StoreError
+from viewsphere.model.channel import CHANNELS
+from viewsphere.store import Category, Dataset, PlanRecord, Store, decode, encode
+
+
+def plan_record(**changes):
+    record = PlanRecord(
+        version="1", digest="d", name="n", recipe={"a": 1.5}, categories=(Category(1, "car", "vehicle"),), splits=("train",),
+        channels=("rgb",), models=("m",), poses=1, frames=1, max_objects=1, shots=(("m-0", 0, 1),),
+    )  # fmt: skip
+    return replace(record, **changes)
+
+
+def test_plan_record_round_trip():
+    assert PlanRecord.from_json(plan_record().to_json()) == plan_record()
+
+
+@pytest.mark.parametrize("name", [n for n in CHANNELS])
+def test_channel_files_round_trip(name, tmp_path):
+    channel, rng = CHANNELS[name], np.random.default_rng(1)
+    array = rng.integers(0, 200, channel.shape(7, 11)).astype(channel.dtype)
+    if channel.encoding == "tiff" and np.issubdtype(channel.dtype, np.floating):
+        array = (array / 7).astype(channel.dtype)
+        array.flat[::3] = channel.empty
+    (tmp_path / "x").write_bytes(encode(channel, array))
+    back = decode(channel, tmp_path / "x")
+    assert back.dtype == array.dtype
+    assert np.array_equal(back, array, equal_nan=channel.dtype is np.float32)
+
+
+def test_wrong_arrays_are_refused():
+    with pytest.raises(ValueError, match="depth"):
+        encode(CHANNELS["depth"], np.zeros((2, 2), np.float64))
+    with pytest.raises(StoreError, match="65535"):
+        encode(CHANNELS["instances"], np.full((2, 2), 70_000, np.int32))
+
+
+def test_an_interrupted_write_leaves_nothing(tmp_path):
+    store = Store(tmp_path / "out")
+    store.open_for(plan_record())
+    with pytest.raises(RuntimeError), store.aside(store.shot_folder("m-0")) as folder:
+        (folder / "half").write_text("x")
+        raise RuntimeError
+    assert not store.has_shot("m-0")
+    assert list((store.folder / "writing").iterdir()) == []
+
+
+def test_two_writers_of_one_shot(tmp_path):
+    store = Store(tmp_path / "out")
+    store.open_for(plan_record())
+    for _ in range(2):
+        with store.aside(store.shot_folder("m-0")) as folder:
+            (folder / "frames.json").write_text("[]")
+    assert store.has_shot("m-0")
+    assert list((store.folder / "writing").iterdir()) == []
+
+
+def test_leftovers_of_the_dead_are_swept_and_those_of_the_living_stay(tmp_path):
+    store = Store(tmp_path / "out")
+    store.open_for(plan_record())
+    writing, host = store.folder / "writing", socket.gethostname()
+    (writing / f"{host}~999999999~m-0").mkdir()
+    (writing / f"{host}~{os.getppid()}~m-1").mkdir()
+    (writing / "otherhost~1~m-2").mkdir()
+    store.open_for(plan_record())
+    assert {p.name for p in writing.iterdir()} == {f"{host}~{os.getppid()}~m-1", "otherhost~1~m-2"}
+
+
+@pytest.mark.parametrize("changes", [{"digest": "other"}, {"version": "2"}])
+def test_data_of_another_plan_are_refused(tmp_path, changes):
+    store = Store(tmp_path / "out")
+    store.open_for(plan_record())
+    with pytest.raises(StoreError, match="another output folder"):
+        store.open_for(plan_record(**changes))
+
+
+@pytest.mark.parametrize("text", ["", "{}", "[]", '{"store": 99}', json.dumps({"store": 1})])
+def test_a_broken_plan_is_said(tmp_path, text):
+    (tmp_path / "store").mkdir()
+    (tmp_path / "store" / "plan.json").write_text(text)
+    with pytest.raises(StoreError, match="plan"):
+        Dataset(tmp_path)
+
+
+def test_a_full_disk_is_one_line_and_loses_nothing(tmp_path):
+    store = Store(tmp_path / "out")
+    store.open_for(plan_record())
+    with pytest.raises(StoreError, match="No space left"), store.aside(store.shot_folder("m-0")):
+        raise OSError(28, "No space left on device")
+    assert not store.has_shot("m-0")
+
+
+def test_link_is_a_hard_link_where_it_can_be(small_dataset):
+    file = small_dataset[0].files["rgb"]
+    small_dataset.link(file, small_dataset.root / "x" / "a.png")
+    assert (small_dataset.root / "x" / "a.png").samefile(small_dataset.path(file))
+    assert small_dataset.link_kinds == {"hard link"}
+
+
+def test_link_copies_where_links_fail(small_dataset, monkeypatch):
+    def refuse(*_: object) -> None:
+        raise OSError
+
+    monkeypatch.setattr(os, "link", refuse)
+    file = small_dataset[0].files["rgb"]
+    small_dataset.link(file, small_dataset.root / "x" / "a.png")
+    assert (small_dataset.root / "x" / "a.png").read_bytes() == small_dataset.path(file).read_bytes()
+    assert small_dataset.link_kinds <= {"reflink", "copy"}

@@ -1,0 +1,203 @@
+"""Truth against Embree, an independent ray caster (float32, so ties and grazed edges are set aside and counted)."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from truth_scenes import LENSES, cube, lens, mesh_of, orbit_camera, placed, sphere
+
+from viewsphere.geometry.camera import pixel_rays
+from viewsphere.truth.channels import observe
+from viewsphere.truth.visibility import rasterize
+
+pytest.importorskip("embreex")
+
+MODELS = Path(__file__).parents[2].parent / "shared" / "models"
+FOLDERS = ("car", "bicycle", "chair", "boat", "hair_drier", "misc")
+
+
+def embree(geometry):
+    from embreex.mesh_construction import TriangleMesh
+    from embreex.rtcore_scene import EmbreeScene
+
+    scene = EmbreeScene(robust=True)
+    TriangleMesh(scene, geometry.vertices.astype(np.float32), geometry.triangles)
+    return scene
+
+
+def trace(scene, camera):
+    """Triangle (-1 where none) and s of Embree's first hit through each pixel's centre."""
+    rays = pixel_rays(camera.intrinsics)
+    directions = (rays.reshape(-1, 3) @ camera.R).astype(np.float32)
+    origins = np.broadcast_to(camera.center.astype(np.float32), directions.shape).copy()
+    hit = scene.run(origins, directions, output=True)
+    triangle = np.asarray(hit["primID"], np.int64).reshape(rays.shape[:2])
+    return triangle, np.asarray(hit["tfar"], np.float64).reshape(rays.shape[:2])
+
+
+def planes(geometry, camera, triangle, rays):
+    """Of each ray and the triangle named for it: s where it meets the plane, and its distance to the nearest edge in pixels."""
+    x = geometry.vertices @ camera.R.T + camera.t
+    corners = x[geometry.triangles[triangle]]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    with np.errstate(all="ignore"):
+        s = (normal * corners[:, 0]).sum(-1) / (normal * rays).sum(-1)
+        distance = np.full(len(rays), np.inf)
+        for i in range(3):
+            side = np.cross(corners[:, i], corners[:, (i + 1) % 3])
+            side /= np.linalg.norm(side, axis=1)[:, None]
+            distance = np.minimum(distance, np.abs((side * rays).sum(-1)) / np.linalg.norm(rays, axis=1))
+    distance = np.where(triangle < 0, np.inf, distance)
+    return np.where(triangle < 0, np.inf, s), distance * camera.intrinsics.fx
+
+
+def right_by_float64(geometry, camera, ray, triangle):
+    """Whether brute force in float64 finds this triangle first along the ray."""
+    x = geometry.vertices @ camera.R.T + camera.t
+    a, b, c = (x[geometry.triangles[:, k]] for k in range(3))
+    with np.errstate(all="ignore"):
+        p = np.cross(ray, c - a)
+        det = (p * (b - a)).sum(-1)
+        u, q = -(p * a).sum(-1) / det, np.cross(-a, b - a)
+        v, s = (q @ ray) / det, (q * (c - a)).sum(-1) / det
+        s = np.where((u >= 0) & (v >= 0) & (u + v <= 1) & (s > 0), s, np.inf)
+    return triangle == (int(np.argmin(s)) if np.isfinite(s).any() else -1)
+
+
+def compare(geometry, cameras):
+    """Ids and depth of all cameras; returns how many pixels were a toss-up, how many Embree got wrong, and depth errors."""
+    scene, toss_ups, overruled, errors = embree(geometry), 0, 0, []
+    for camera in cameras:
+        visibility = rasterize(geometry, camera)
+        observed = observe(geometry, camera, visibility, ("instances", "parts", "triangles", "depth"))
+        other, s = trace(scene, camera)
+        rows, columns = np.nonzero(other != visibility.triangle)
+        own, other_there = visibility.triangle[rows, columns], other[rows, columns]
+        rays = pixel_rays(camera.intrinsics)[rows, columns]
+        (s_own, d_own), (s_other, d_other) = (planes(geometry, camera, t, rays) for t in (own, other_there))
+        with np.errstate(invalid="ignore"):
+            tie = np.abs(s_own - s_other) <= 1e-6 * np.minimum(np.abs(s_own), np.abs(s_other))
+        toss_up = tie | (np.minimum(d_own, d_other) < 1e-3)
+        for i in np.flatnonzero(~toss_up):
+            assert right_by_float64(geometry, camera, rays[i], own[i]), (rows[i], columns[i], own[i], other_there[i])
+        toss_ups += int(toss_up.sum())
+        overruled += int((~toss_up).sum())
+        agreed = other == visibility.triangle
+        hit = agreed & (other >= 0) & (geometry.triangle_object[other] > 0)
+        z = s * pixel_rays(camera.intrinsics)[..., 2]
+        errors.append(np.abs(observed["depth"] - z)[hit] / np.maximum(1, z[hit] / 10))
+        objects = np.where(other >= 0, geometry.triangle_object[other], 0)
+        parts = np.where(other >= 0, geometry.triangle_part[other], 0)
+        start = np.array(geometry.triangle_start)[np.maximum(objects - 1, 0)]
+        assert np.array_equal(observed["instances"][agreed], objects[agreed])
+        assert np.array_equal(observed["parts"][agreed], parts[agreed])
+        assert np.array_equal(observed["triangles"][agreed], np.where(objects > 0, other - start, -1)[agreed])
+    return toss_ups, overruled, np.concatenate(errors)
+
+
+def random_cameras(rng, count, width, height, distortion=None, reach=(4.0, 14.0)):
+    fov = math.radians(170 if distortion is not None and distortion.model == "fisheye" else 50)
+    intrinsics = lens(width, height, fov, distortion)
+    return [
+        orbit_camera(
+            intrinsics, rng.uniform(0, 2 * np.pi), rng.uniform(-0.1, np.pi / 2), rng.uniform(*reach),
+            rng.normal(size=3) * 0.3, rng.uniform(-0.5, 0.5),
+        )  # fmt: skip
+        for _ in range(count)
+    ]  # fmt: skip
+
+
+def turned(angle, x, y, z=0.0):
+    move = np.eye(4)
+    move[:2, :2] = [[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]]
+    move[:3, 3] = x, y, z
+    return move
+
+
+def circle(count, radius):
+    return [
+        turned(1.3 * i, radius * math.cos(2 * np.pi * i / count), radius * math.sin(2 * np.pi * i / count))
+        for i in range(count)
+    ]
+
+
+def procedural(rng):
+    """A ball, a cube with parts, a torus, a bumpy ball and a needle."""
+    import trimesh
+
+    torus = trimesh.creation.torus(1.0, 0.35, 60, 30)
+    ball = sphere(4)
+    bumps = ball.vertices * (1 + 0.1 * rng.normal(size=(len(ball.vertices), 1)))
+    needle = trimesh.creation.cone(0.02, 3.0, sections=7)
+    return [
+        sphere(5),
+        cube(0.9),
+        mesh_of(torus.vertices, torus.faces),
+        mesh_of(bumps, ball.triangles, parts=np.arange(len(ball.triangles)) % 3),
+        mesh_of(needle.vertices, needle.faces),
+    ]
+
+
+@pytest.mark.parametrize("name", LENSES)
+def test_ids_and_depth_on_procedural_scenes(name):
+    rng = np.random.default_rng(7)
+    meshes = procedural(rng)
+    geometry = placed(*meshes, moves=circle(len(meshes), 2.0), ground=True)
+    cameras = random_cameras(rng, 5 if name == "pinhole" else 2, 320, 240, LENSES[name])
+    toss_ups, overruled, errors = compare(geometry, cameras)
+    pixels = len(cameras) * 320 * 240
+    assert toss_ups < 2e-4 * pixels
+    assert overruled < 2e-5 * pixels
+    assert np.quantile(errors, 0.999) <= 1e-4
+
+
+def real_models(count):
+    """Normalised to 2 m long; files that cannot be read are somebody else's test."""
+    from viewsphere.assets.load import SUFFIXES, load_model
+    from viewsphere.assets.normalise import normalise
+    from viewsphere.errors import ModelError
+    from viewsphere.model.shot import ModelSpec
+
+    found = {f: sorted(p for p in (MODELS / f).rglob("*") if p.suffix[1:].lower() in SUFFIXES) for f in FOLDERS}
+    meshes = {}
+    for i in range(max(map(len, found.values()))):
+        for folder in FOLDERS:
+            if i < len(found[folder]) and len(meshes) < count:
+                path = found[folder][i]
+                spec = ModelSpec(key="m", source=str(path), category="thing", category_id=1, scale=2.0)
+                try:
+                    meshes[path.stem] = normalise(*load_model(path), spec)
+                except ModelError:
+                    continue
+    return meshes
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not MODELS.exists(), reason="no folder of real models beside the project")
+@pytest.mark.timeout(300)
+def test_ids_and_depth_on_real_models():
+    meshes = list(real_models(12).values())
+    assert len(meshes) >= 10
+    rng = np.random.default_rng(3)
+    pixels = toss_ups = overruled = 0
+    errors = []
+    for chosen in (meshes[:6], meshes[6:]):
+        geometry = placed(*chosen, moves=circle(len(chosen), 2.0), ground=True)
+        cameras = random_cameras(rng, 20, 640, 480)
+        tossed, wrong, error = compare(opaque(geometry), cameras)
+        pixels, toss_ups, overruled = pixels + 20 * 640 * 480, toss_ups + tossed, overruled + wrong
+        errors.append(error)
+    assert overruled < 1e-5 * pixels
+    assert toss_ups < 2e-2 * pixels  # real models hold doubled faces: equal depth to the last bit
+    assert np.quantile(np.concatenate(errors), 0.999) <= 1e-4
+    print(f"{pixels} pixels, {toss_ups} toss-ups, {overruled} where Embree was wrong")
+
+
+def opaque(geometry):
+    """Without cut-outs, of which Embree knows nothing."""
+    from dataclasses import replace
+
+    return replace(geometry, triangle_cutout=np.full_like(geometry.triangle_cutout, -1))
