@@ -67,9 +67,10 @@ def render(shot: Shot):
         rotation = orbit_rotation(*angles)
         camera = Camera(shot.intrinsics, rotation, -rotation @ orbit_center(*angles[:2], frame.pose.distance))
         visibility = rasterize(geometry, camera)
-        channels = dict(observe(geometry, camera, visibility, [c for c in shot.channels if c != "rgb"]))
+        channels = dict(observe(geometry, camera, visibility, {"instances", *shot.channels} - {"rgb"}))
         if "rgb" in shot.channels:
             channels["rgb"] = (channels["instances"][..., None] * np.array([90, 60, 30])).astype(np.uint8)
+        channels = {name: channels[name] for name in shot.channels}
         objects = annotate(shot, frame, camera, geometry, visibility, boxes, files)
         yield Sample(frame.index, frame.split, camera, frame.pose, objects, channels, {})
 

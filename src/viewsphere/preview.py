@@ -35,9 +35,11 @@ def preview_samples(recipe: Recipe, count: int = 12, width: int = 320) -> Iterat
     planned = plan(recipe)
     stages = Stages()
     for model, poses in _spread(planned, count):
-        shot = planned.shot_of(model, poses)
+        shot = planned.shot(model * planned.shot_count // planned.models)
         channels = tuple(dict.fromkeys((*shot.channels, "rgb", "depth", "instances")))
-        small = shot.model_copy(update={"intrinsics": _scaled(shot.intrinsics, width), "channels": channels})
+        frames = tuple(planned.frame(model, pose) for pose in poses)
+        lens = _scaled(shot.intrinsics, width)
+        small = shot.model_copy(update={"intrinsics": lens, "channels": channels, "frames": frames})
         yield from stages.render(small)
 
 

@@ -101,13 +101,12 @@ def compare(geometry, cameras):
 def random_cameras(rng, count, width, height, distortion=None, reach=(4.0, 14.0)):
     fov = math.radians(170 if distortion is not None and distortion.model == "fisheye" else 50)
     intrinsics = lens(width, height, fov, distortion)
-    return [
-        orbit_camera(
-            intrinsics, rng.uniform(0, 2 * np.pi), rng.uniform(-0.1, np.pi / 2), rng.uniform(*reach),
-            rng.normal(size=3) * 0.3, rng.uniform(-0.5, 0.5),
-        )  # fmt: skip
-        for _ in range(count)
-    ]  # fmt: skip
+    cameras = []
+    for _ in range(count):
+        azimuth, elevation = rng.uniform(0, 2 * np.pi), rng.uniform(-0.1, np.pi / 2)
+        distance, target, tilt = rng.uniform(*reach), rng.normal(size=3) * 0.3, rng.uniform(-0.5, 0.5)
+        cameras.append(orbit_camera(intrinsics, azimuth, elevation, distance, target, tilt))
+    return cameras
 
 
 def turned(angle, x, y, z=0.0):
@@ -191,7 +190,7 @@ def test_ids_and_depth_on_real_models():
         pixels, toss_ups, overruled = pixels + 20 * 640 * 480, toss_ups + tossed, overruled + wrong
         errors.append(error)
     assert overruled < 1e-5 * pixels
-    assert toss_ups < 2e-2 * pixels  # real models hold doubled faces: equal depth to the last bit
+    assert toss_ups < 2e-3 * pixels  # real models hold doubled faces: equal depth to the last bit
     assert np.quantile(np.concatenate(errors), 0.999) <= 1e-4
     print(f"{pixels} pixels, {toss_ups} toss-ups, {overruled} where Embree was wrong")
 
@@ -201,3 +200,17 @@ def opaque(geometry):
     from dataclasses import replace
 
     return replace(geometry, triangle_cutout=np.full_like(geometry.triangle_cutout, -1))
+
+
+@pytest.mark.slow
+def test_ids_with_bounds_checked():
+    """The same kernels, compiled to check every array access."""
+    import os
+    import subprocess
+    import sys
+
+    chosen = ["test_embree.py", "test_geometry.py", "test_channels.py", "test_visibility.py"]
+    command = [sys.executable, "-m", "pytest", "-q", "-m", "not slow", *(str(Path(__file__).parent / c) for c in chosen)]
+    environment = {**os.environ, "NUMBA_BOUNDSCHECK": "1"}
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout[-3000:]

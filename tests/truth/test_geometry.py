@@ -42,9 +42,7 @@ def test_objects_lie_in_order_and_the_ground_last():
     assert len(geometry.vertices) == 52 and len(geometry.triangles) == 26
     for name in ("normals", "coordinates"):
         assert len(getattr(geometry, name)) == 52
-    np.testing.assert_allclose(
-        geometry.vertices[24:48], geometry.coordinates[24:48] @ move[:3, :3].T + move[:3, 3], atol=1e-12
-    )
+    np.testing.assert_allclose(geometry.vertices[24:48], geometry.coordinates[24:48] @ move[:3, :3].T + move[:3, 3], atol=1e-12)
     np.testing.assert_allclose(geometry.normals[24:48], cube().normals @ move[:3, :3].T, atol=1e-7)
     assert geometry.triangle_object.tolist() == [1] * 12 + [2] * 12 + [0] * 2
     assert geometry.triangle_category.tolist() == [10] * 12 + [11] * 12 + [0] * 2

@@ -17,7 +17,7 @@ from viewsphere.geometry.pose_category import pose_category
 from viewsphere.geometry.rotation import compose, quaternion_from_matrix, rigid, transform
 from viewsphere.model.camera import Camera
 from viewsphere.model.sample import Box, ObjectAnnotation, Rle
-from viewsphere.model.shot import Frame, Placement, Shot
+from viewsphere.model.shot import Frame, ModelSpec, Placement, Shot, Size
 from viewsphere.truth.geometry import Geometry
 from viewsphere.truth.visibility import Visibility
 
@@ -32,12 +32,13 @@ def annotate(
     visibility: Visibility,
     boxes: Sequence[Float],
     models: Sequence[str],
+    real_sizes: Sequence[Size | None] | None = None,
 ) -> tuple[ObjectAnnotation, ...]:
     """Annotations of all placed objects, seen or not, in the order of their ids.
 
-    `boxes[i]` is the 3D box (8, 3) of placement i's model in the object's axes and `models[i]` the path of
-    that model in the data set; `geometry` is the shot's stage and `visibility` what this camera sees of it.
-    An object that covers no pixel has an empty mask, no `box2d` and visibility 0.
+    `boxes[i]` is the 3D box (8, 3) of placement i's model in the object's axes, `models[i]` the path of that model in the data
+    set and `real_sizes[i]` its true size (by default the one its spec gives in numbers); `geometry` is the shot's stage and
+    `visibility` what this camera sees of it. An object that covers no pixel has an empty mask, no `box2d` and visibility 0.
     """
     from viewsphere.geometry.kernels_box import instance_map
 
@@ -68,7 +69,7 @@ def annotate(
                 category_id=placement.model.category_id,
                 key=placement.model.key,
                 model=models[i],
-                real_size=placement.model.real_size,
+                real_size=real_sizes[i] if real_sizes else _real_size(placement.model),
                 rle=Rle(camera.height, camera.width, rle_of_id(ids, i + 1, (x0, y0, x1, y1))),
                 area=area,
                 visibility=visible,
@@ -78,6 +79,10 @@ def annotate(
             )
         )
     return tuple(annotations)
+
+
+def _real_size(spec: ModelSpec) -> Size | None:
+    return None if isinstance(spec.real_size, str) else spec.real_size
 
 
 def _flat_boxes(camera: Camera, tight: Box, bounds: Bounds | None, whole: bool) -> dict[str, Any]:

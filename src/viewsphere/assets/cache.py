@@ -34,9 +34,7 @@ ARRAYS = ("vertices", "triangles", "normals", "triangle_material", "triangle_par
 ZOO = "zoo:"
 
 
-def load_normalised(
-    spec: ModelSpec, build: Callable[[ModelSpec], Mesh] | None = None, folder: Path | None = None
-) -> Mesh:
+def load_normalised(spec: ModelSpec, build: Callable[[ModelSpec], Mesh] | None = None, folder: Path | None = None) -> Mesh:
     """The model in object axes and metres, from the cache when it holds it.
 
     `build` makes the mesh of a source that begins with `zoo:` (in object axes, metres); such meshes are
@@ -65,10 +63,8 @@ def load_normalised(
     return mesh
 
 
-def real_size(
-    spec: ModelSpec, build: Callable[[ModelSpec], Mesh] | None = None, folder: Path | None = None
-) -> Size | None:
-    """The model's true (width, height, length) in metres: as the settings say, or the file's own if they say `file`."""
+def real_size(spec: ModelSpec, build: Callable[[ModelSpec], Mesh] | None = None, folder: Path | None = None) -> Size | None:
+    """The model's true (width, height, length) in metres: the one set, or the file's own for `file`."""
     if spec.real_size != "file":
         return spec.real_size
     low, high = load_normalised(spec.model_copy(update={"scale": "as_is"}), build, folder).bounds

@@ -47,9 +47,7 @@ def export_obj(mesh: Mesh, folder: Path, name: str) -> Path:
 
 def _obj_runs(mesh: Mesh, names: list[str]) -> Iterable[str]:
     parts = _plain_names(mesh.parts)
-    colors = (
-        None if mesh.colors is None else encoded(mesh.colors[:, :3].astype(np.float64)).astype(np.float32)
-    )
+    colors = None if mesh.colors is None else encoded(mesh.colors[:, :3].astype(np.float64)).astype(np.float32)
     positions = mesh.vertices if colors is None else np.column_stack([mesh.vertices, colors])
     vertex, part = 1, -1
     for run in runs(mesh):

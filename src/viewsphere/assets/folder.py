@@ -7,6 +7,7 @@ import binascii
 import io
 import re
 import warnings
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 from typing import Any
@@ -59,9 +60,7 @@ class ModelFolder:
             if not self.model.is_file():
                 raise self.error("expected a file, found a folder or a device")
             if size > limits.MAX_FILE_BYTES:
-                raise self.error(
-                    f"expected at most {limits.MAX_FILE_BYTES >> 30} GiB, found {size / 2**30:.1f} GiB"
-                )
+                raise self.error(f"expected at most {limits.MAX_FILE_BYTES >> 30} GiB, found {size / 2**30:.1f} GiB")
             data = self.model.read_bytes()
         except FileNotFoundError:
             raise self.error("no such file; check the path") from None
@@ -90,9 +89,7 @@ class ModelFolder:
 
     def _find(self, reference: str, what: str) -> Path:
         if re.match(r"(?i)[a-z][a-z0-9+.-]+://", reference) or "\0" in reference:
-            raise UnreadableError(
-                f"{what} {_short(reference)} is not a path below the model's folder; it is not fetched"
-            )
+            raise UnreadableError(f"{what} {_short(reference)} is not a path below the model's folder; it is not fetched")
         root = self.model.parent.resolve()
         name = reference.replace("\\", "/").strip()
         target = (root / name).resolve()
@@ -109,8 +106,7 @@ class ModelFolder:
         if inside or drive or not self.confined:
             raise UnreadableError(f"{what} {_short(reference)} does not exist")
         raise UnreadableError(
-            f"{what} {_short(reference)} is outside the model's folder, not read; "
-            "set confined: false to allow"
+            f"{what} {_short(reference)} is outside the model's folder, not read; set confined: false to allow"
         )
 
     def _existing(self, path: Path) -> Path | None:
@@ -150,10 +146,20 @@ class ModelFolder:
             self._indices[key] = index
         return self._indices[key]
 
+    def derived(self, key: str, make: Callable[[], Image]) -> int:
+        """Index in `images` of an image made from others, made once for each key."""
+        index = self._indices.get(key)
+        if index is None:
+            index = self._indices[key] = self.add_image(make())
+        return index
+
     def add_image(self, image: Image) -> int:
         """Keep an image; its index."""
         if len(self.images) >= limits.MAX_TEXTURES:
             raise self.error(f"expected at most {limits.MAX_TEXTURES} textures; merge some into an atlas")
+        pixels = image.pixels[..., 0].size + sum(known.pixels[..., 0].size for known in self.images)
+        if pixels > limits.MAX_ALL_TEXTURE_PIXELS:
+            raise self.error(f"expected textures of at most {limits.MAX_ALL_TEXTURE_PIXELS:,} px in all; make them smaller")
         self.images.append(image)
         return len(self.images) - 1
 

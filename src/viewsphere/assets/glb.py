@@ -159,9 +159,7 @@ class _Writer:
                 "clearcoatNormalTexture": "clearcoat_normal_texture",
             },
         )
-        glass = self.group(
-            m, {"transmissionFactor": "transmission"}, {"transmissionTexture": "transmission_texture"}
-        )
+        glass = self.group(m, {"transmissionFactor": "transmission"}, {"transmissionTexture": "transmission_texture"})
         specular = self.group(
             m,
             {"specularFactor": "specular", "specularColorFactor": "specular_color"},

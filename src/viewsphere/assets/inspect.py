@@ -95,9 +95,7 @@ def _unusual(material: Material) -> dict[str, Any]:
     """Fields of a material that are not the default, its name left out."""
     plain = replace(Material(), name=material.name)
     names = (f.name for f in fields(Material))
-    return {
-        name: getattr(material, name) for name in names if getattr(material, name) != getattr(plain, name)
-    }
+    return {name: getattr(material, name) for name in names if getattr(material, name) != getattr(plain, name)}
 
 
 def _suggestions(spec: ModelSpec, facts: FileFacts, size: Size) -> tuple[str, ...]:
@@ -106,20 +104,12 @@ def _suggestions(spec: ModelSpec, facts: FileFacts, size: Size) -> tuple[str, ..
     if spec.scale == "as_is" and spec.unit is None:
         longest = max(size)
         if longest > 100:
-            said.append(
-                f"{longest:.4g} m across: set unit: 0.001 if the file is in millimetres, "
-                "0.01 if in centimetres"
-            )
+            said.append(f"{longest:.4g} m across: set unit: 0.001 if the file is in millimetres, 0.01 if in centimetres")
         elif longest < 0.01:
             said.append(f"{longest:.4g} m across: set unit (metres in one unit of the file) or scale")
     if spec.forward is None and width > 1.5 * length:
         sideways = "+x" if facts.forward[1] != "x" and (spec.up or facts.up)[1] != "x" else "+y"
-        said.append(
-            f"wider than long: if the picture shows its side at the front, "
-            f"set forward: {sideways} or its opposite"
-        )
+        said.append(f"wider than long: if the picture shows its side at the front, set forward: {sideways} or its opposite")
     if spec.up is None and facts.format in {"obj", "ply", "stl", "off"} and height > 2 * max(width, length):
-        said.append(
-            f"the format does not say which way is up, {facts.up} was assumed: set up if it lies on its back"
-        )
+        said.append(f"the format does not say which way is up, {facts.up} was assumed: set up if it lies on its back")
     return tuple(said)

@@ -32,10 +32,7 @@ def load_model(path: Path, *, confined: bool = True) -> tuple[Mesh, FileFacts]:
     """
     suffix = path.suffix[1:].lower()
     if suffix not in SUFFIXES:
-        raise ModelError(
-            f"{path}: expected a model file with suffix {', '.join(SUFFIXES)}, "
-            f"found {path.suffix or 'none'!r}"
-        )
+        raise ModelError(f"{path}: expected a model file with suffix {', '.join(SUFFIXES)}, found {path.suffix or 'none'!r}")
     folder = ModelFolder(path, confined)
     if suffix in {"glb", "gltf"}:
         from viewsphere.assets.gltf import read_gltf

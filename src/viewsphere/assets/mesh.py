@@ -110,9 +110,7 @@ class Mesh:
         for name, (shape, dtype) in expected.items():
             array = getattr(self, name)
             if array is not None and (array.shape != shape or array.dtype != dtype):
-                raise ValueError(
-                    f"Mesh.{name}: expected {shape} {np.dtype(dtype)}, got {array.shape} {array.dtype}"
-                )
+                raise ValueError(f"Mesh.{name}: expected {shape} {np.dtype(dtype)}, got {array.shape} {array.dtype}")
         limits = (
             ("triangles", v),
             ("triangle_material", len(self.materials)),
@@ -121,9 +119,7 @@ class Mesh:
         for name, limit in limits:
             array = getattr(self, name)
             if array.size and (array.min() < 0 or array.max() >= limit):
-                raise ValueError(
-                    f"Mesh.{name}: expected indices in [0, {limit}), got {array.min()}..{array.max()}"
-                )
+                raise ValueError(f"Mesh.{name}: expected indices in [0, {limit}), got {array.min()}..{array.max()}")
 
     @property
     def bounds(self) -> NDArray[np.float64]:

@@ -61,9 +61,7 @@ def read_materials(folder: ModelFolder, texts: Sequence[str], wanted: set[str]) 
                 blocks.setdefault(rest.strip(), block)
             elif keyword and not keyword.startswith("#"):
                 block[keyword.lower()] = rest.strip()
-    return {
-        name: _Builder(folder, name, block).material() for name, block in blocks.items() if name in wanted
-    }
+    return {name: _Builder(folder, name, block).material() for name, block in blocks.items() if name in wanted}
 
 
 @dataclass(frozen=True)
@@ -94,11 +92,7 @@ class _Builder:
             roughness=self.roughness(rough_map),
             metallic_roughness_texture=self.metallic_roughness(rough_map, metal_map),
             normal_texture=self.plain(normal_map) if normal_map is not None else self.bump(bump),
-            normal_scale=normal_map.strength
-            if normal_map is not None
-            else bump.strength
-            if bump is not None
-            else 1.0,
+            normal_scale=normal_map.strength if normal_map is not None else bump.strength if bump is not None else 1.0,
             emissive=emissive,
             emissive_texture=emissive_texture,
             alpha_mode="BLEND" if opacity < 1.0 else mode,
@@ -146,11 +140,7 @@ class _Builder:
             option = words.pop(0)
             limit = OPTION_ARGUMENTS.get(option, 3 if option else 0)
             taken: list[str] = []
-            while (
-                len(words) > 1
-                and len(taken) < limit
-                and (option not in VECTOR_OPTIONS or _is_number(words[0]))
-            ):
+            while len(words) > 1 and len(taken) < limit and (option not in VECTOR_OPTIONS or _is_number(words[0])):
                 taken.append(words.pop(0))
             values[option] = taken
         file = " ".join(words).strip().strip('"')
@@ -176,18 +166,12 @@ class _Builder:
         """Base colour texture with `map_d` as its alpha, and the alpha mode that its texels ask for."""
         opacity_map = self.map("map_d") or self.map("map_opacity")
         color, opacity = self.image(color_map), self.image(opacity_map)
-        images = self.folder.images
         if opacity is not None and opacity != color:
-            alpha = _grey(images[opacity].pixels)
-            pixels = (
-                np.full((*alpha.shape, 4), 255, np.uint8) if color is None else images[color].pixels.copy()
-            )
-            pixels[..., 3] = _resized(alpha, pixels.shape[:2])
-            color = self.folder.add_image(Image(f"{self.name} colour and opacity", pixels))
+            color = self.folder.derived(f"#{color} with opacity {opacity}", lambda: self.with_opacity(color, opacity))
         source = color_map or opacity_map
         if color is None or source is None:
             return None, "OPAQUE"
-        return source.texture(color), alpha_mode(images[color].pixels[..., 3])
+        return source.texture(color), alpha_mode(self.folder.images[color].pixels[..., 3])
 
     def metallic_roughness(self, rough_map: _Map | None, metal_map: _Map | None) -> Texture | None:
         """Roughness in green and metallic in blue of one new image."""
@@ -195,13 +179,26 @@ class _Builder:
         source = rough_map if rough is not None else metal_map
         if source is None or (rough is None and metal is None):
             return None
+        key = f"#roughness {rough} and metallic {metal}"
+        return source.texture(self.folder.derived(key, lambda: self.merged(rough, metal)))
+
+    def with_opacity(self, color: int | None, opacity: int) -> Image:
+        """An image whose alpha is another's grey; white without a colour."""
         images = self.folder.images
-        shape = images[metal if rough is None else rough].pixels.shape[:2]  # pyright: ignore[reportCallIssue, reportArgumentType]
+        alpha = _grey(images[opacity].pixels)
+        pixels = np.full((*alpha.shape, 4), 255, np.uint8) if color is None else images[color].pixels.copy()
+        pixels[..., 3] = _resized(alpha, pixels.shape[:2])
+        return Image(f"{self.name} colour and opacity", pixels)
+
+    def merged(self, rough: int | None, metal: int | None) -> Image:
+        """An image with one's grey in green and the other's in blue."""
+        channels = [(index, channel) for index, channel in ((rough, 1), (metal, 2)) if index is not None]
+        images = self.folder.images
+        shape = images[channels[0][0]].pixels.shape[:2]
         pixels = np.full((*shape, 4), 255, np.uint8)
-        for index, channel in ((rough, 1), (metal, 2)):
-            if index is not None:
-                pixels[..., channel] = _resized(_grey(images[index].pixels), shape)
-        return source.texture(self.folder.add_image(Image(f"{self.name} roughness and metallic", pixels)))
+        for index, channel in channels:
+            pixels[..., channel] = _resized(_grey(images[index].pixels), shape)
+        return Image(f"{self.name} roughness and metallic", pixels)
 
     def bump(self, source: _Map | None) -> Texture | None:
         """A bump map if it is a normal map."""
@@ -211,9 +208,7 @@ class _Builder:
         pixels = self.folder.images[image].pixels
         mean = pixels[..., :3].reshape(-1, 3).mean(axis=0)
         if mean[2] < 1.3 * max(mean[0], mean[1]):
-            self.folder.warn(
-                f"height map {source.file!r} is not read; bake it to a normal map (norm) to use it"
-            )
+            self.folder.warn(f"height map {source.file!r} is not read; bake it to a normal map (norm) to use it")
             return None
         return source.texture(image)
 

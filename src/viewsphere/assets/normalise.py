@@ -48,9 +48,7 @@ def normalise(mesh: Mesh, facts: FileFacts, spec: ModelSpec) -> Mesh:
         mesh,
         vertices=stored,
         triangles=triangles,
-        normals=unit_normals(
-            stored, triangles, (mesh.normals.astype(np.float64) @ turn.T).astype(np.float32)
-        ),
+        normals=unit_normals(stored, triangles, (mesh.normals.astype(np.float64) @ turn.T).astype(np.float32)),
         triangle_material=mesh.triangle_material[order],
         triangle_part=mesh.triangle_part[order],
         warnings=mesh.warnings + warnings,
@@ -64,9 +62,7 @@ def rotation(up: Axis, forward: Axis, where: str) -> Float:
     """
     z, front = _direction(up), _direction(forward)
     if abs(float(z @ front)) > 0.5:
-        raise ModelError(
-            f"{where}: expected up and forward axes at right angles, found up {up} and forward {forward}"
-        )
+        raise ModelError(f"{where}: expected up and forward axes at right angles, found up {up} and forward {forward}")
     return np.array([np.cross(-front, z), -front, z])
 
 
@@ -86,16 +82,12 @@ def _factor(size: Float, facts: FileFacts, spec: ModelSpec) -> tuple[float, tupl
     real, scale = spec.real_size, spec.scale
     unit = facts.unit if spec.unit is None else spec.unit
     if scale == "real_size" and real is None:
-        raise ModelError(
-            f"{facts.path}: scale real_size needs the model's real_size (width, height, length in metres)"
-        )
+        raise ModelError(f"{facts.path}: scale real_size needs the model's real_size (width, height, length in metres)")
     if scale == "as_is" or (scale == "real_size" and isinstance(real, str)):
         return unit, ()
     wanted = real[2] if isinstance(scale, str) and isinstance(real, tuple) else float(scale)
     if not (size[1] > 0 and wanted > 0):
-        raise ModelError(
-            f"{facts.path}: cannot scale a length of {size[1]:g} to {wanted:g} m; check forward or use as_is"
-        )
+        raise ModelError(f"{facts.path}: cannot scale a length of {size[1]:g} to {wanted:g} m; check forward or use as_is")
     factor = float(wanted / size[1])
     if scale == "real_size" and isinstance(real, tuple):
         return factor, _proportion_warnings(size * factor, facts, real)
@@ -111,9 +103,7 @@ def _proportion_warnings(size: Float, facts: FileFacts, real_size: Size) -> tupl
     ]
     if not off:
         return ()
-    return (
-        f"{facts.path.name}: scaled to its real length it has {' and '.join(off)}: check axes and real_size",
-    )
+    return (f"{facts.path.name}: scaled to its real length it has {' and '.join(off)}: check axes and real_size",)
 
 
 def _check_size(size: float, facts: FileFacts) -> None:

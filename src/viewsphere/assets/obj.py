@@ -6,15 +6,14 @@ http://www.martinreddy.net/gfx/3d/OBJ.spec; vertex colours as `v x y z r g b` (s
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from viewsphere.assets.folder import ModelFolder, UnreadableError
 from viewsphere.assets.mesh import Material, Mesh
 from viewsphere.assets.mtl import read_materials
-from viewsphere.assets.piece import FileFacts, Float, Int, Piece, assemble
+from viewsphere.assets.piece import FileFacts, Float, Int, Piece, assemble, compact
 from viewsphere.assets.polygon import triangulate
 from viewsphere.assets.smoothing import creased
 from viewsphere.assets.srgb import linear
@@ -33,17 +32,13 @@ def read_obj(folder: ModelFolder) -> tuple[Mesh, FileFacts]:
     source = _Source()
     source.read(statements(decode(folder.read_model())))
     if not source.counts:
-        raise folder.error(
-            "no triangles found: an OBJ needs 'v' and 'f' lines; export the model as a mesh of faces"
-        )
+        raise folder.error("no triangles found: an OBJ needs 'v' and 'f' lines; export the model as a mesh of faces")
     if source.skipped:
         folder.warn(f"{source.skipped} lines, curves or faces of fewer than three corners left out")
     whole, owner = _whole(folder, source)
     materials, material_of = _materials(folder, source)
     parts = np.array(source.parts())[owner]
-    material = np.array([material_of[name] for name in source.materials])[
-        np.array(source.face_material)[owner]
-    ]
+    material = np.array([material_of[name] for name in source.materials])[np.array(source.face_material)[owner]]
     facts = FileFacts(folder.model, "obj", "+y", "+z", 1.0)
     return assemble(folder, _pieces(whole, parts, source.part_names(), material), materials, facts)
 
@@ -118,10 +113,7 @@ class _Source:
         """Names of the parts that `parts` counts."""
         if len(set(self.face_object)) > 1:
             return [name or "object" for name in self.objects]
-        whole = (
-            next((name for name, index in self.objects.items() if index == self.face_object[0]), "")
-            or "object"
-        )
+        whole = next((name for name, index in self.objects.items() if index == self.face_object[0]), "") or "object"
         if len(set(self.face_group)) > 1:
             return [name or whole for name in self.groups]
         return [whole if whole != "object" else name or whole for name in self.groups]
@@ -129,9 +121,9 @@ class _Source:
 
 def _whole(folder: ModelFolder, source: _Source) -> tuple[Piece, Int]:
     """All triangles as one piece, and the face of each."""
-    positions, colors = _vertices(folder, source.v)
-    uv = _rows(folder, source.vt, 1, 2)
-    vectors = _rows(folder, source.vn, 3, 3)
+    positions, colors = _vertices(source.v)
+    uv = np.nan_to_num(_padded(_rows(source.vt, 2), 2, 0.0))
+    vectors = _padded(_rows(source.vn, 3), 3, np.nan)
     table: dict[str, int] = {}
     corners = np.array([table.setdefault(token, len(table)) for token in source.corners])
     indices = _corner_indices(folder, list(table), (len(positions), len(uv), len(vectors)))
@@ -173,58 +165,48 @@ def _corner_indices(folder: ModelFolder, tokens: list[str], totals: tuple[int, i
                 if not text.isdecimal() or len(text) > 12 or not text.isascii():
                     raise folder.error(f"expected a face corner like 1/2/3, found {token[:40]!r}")
                 indices[row, column] = int(text) - 1
-    for column, (name, total) in enumerate(
-        zip(("vertex", "texture coordinate", "normal"), totals, strict=True)
-    ):
+    for column, (name, total) in enumerate(zip(("vertex", "texture coordinate", "normal"), totals, strict=True)):
         # A missing position, index 0 and one beyond the last are all outside.
         used = indices[:, column] if column == 0 else indices[indices[:, column] >= 0, column]
         wrong = used[(used < 0) | (used >= total)]
         if wrong.size:
-            raise folder.error(
-                f"a face names {name} {wrong[0] + 1}, expected 1 to {total}; the file may be truncated"
-            )
+            raise folder.error(f"a face names {name} {wrong[0] + 1}, expected 1 to {total}; the file may be truncated")
     return indices
 
 
-def _vertices(folder: ModelFolder, lines: list[str]) -> tuple[Float, Float | None]:
+def _vertices(lines: list[str]) -> tuple[Float, Float | None]:
     """Positions (V, 3) and linear colours (V, 4) or None."""
-    values = _rows(folder, lines, 3, 7)
+    values = _padded(_rows(lines, 6), 6, np.nan)
     given = np.isfinite(values[:, 3:6])
-    if given.shape[1] < 3 or not given.any():
+    if not given.any():
         return values[:, :3], None
     srgb = np.where(given, values[:, 3:6], 1.0)
     srgb = np.clip(srgb / (255.0 if srgb.max() > 1.0 else 1.0), 0.0, 1.0)
     return values[:, :3], np.column_stack([linear(srgb), np.ones(len(values))])
 
 
-def _rows(folder: ModelFolder, lines: list[str], least: int, most: int) -> NDArray[np.float64]:
-    """Numbers of each line, (N, `least` to `most` columns), NaN for what a line leaves out."""
-    rows = [line.split() for line in lines]
-    widths = {len(row) for row in rows}
-    if len(widths) == 1:
-        width = widths.pop()
+def _rows(lines: list[str], width: int) -> Float:
+    """Numbers of each line, (N, at most `width`) and NaN for what a line leaves out."""
+    rows = [line.split()[:width] for line in lines]
+    most = max(map(len, rows), default=0)
+    if all(len(row) == most for row in rows):
         try:
-            flat = np.fromiter((float(token) for row in rows for token in row), np.float64, len(rows) * width)
-            if width >= least:
-                return _at_least(flat.reshape(-1, width)[:, :most], most if most < 3 else least)
+            return np.fromiter((float(token) for row in rows for token in row), np.float64).reshape(-1, max(most, 1))
         except ValueError:
-            pass
+            pass  # comments behind numbers, or numbers that only C can read
     values = np.full((len(rows), most), np.nan)
     for row, tokens in enumerate(rows):
-        for column, token in enumerate(tokens[:most]):
+        for column, token in enumerate(tokens):
             if token.startswith("#"):
                 break
             values[row, column] = _number(token)
-        if not len(tokens) >= least:
-            folder.warn("some vertices have fewer numbers than they need")
-    if most == 2:
-        values[np.isnan(values[:, 1]), 1] = 0.0
     return values
 
 
-def _at_least(values: Float, width: int) -> Float:
-    missing = width - values.shape[1]
-    return values if missing <= 0 else np.column_stack([values, np.zeros((len(values), missing))])
+def _padded(values: Float, width: int, empty: float) -> Float:
+    """The first `width` columns, those that are missing filled."""
+    missing = max(width - values.shape[1], 0)
+    return np.pad(values[:, :width], ((0, 0), (0, missing)), constant_values=empty)
 
 
 def _number(token: str) -> float:
@@ -280,16 +262,6 @@ def _pieces(whole: Piece, part: Int, names: list[str], material: Int) -> list[Pi
     order = np.argsort(run, kind="stable")
     pieces: list[Piece] = []
     for members in np.split(order, np.flatnonzero(np.diff(run[order])) + 1):
-        used, corners = np.unique(whole.triangles[members], return_inverse=True)
-        pieces.append(
-            Piece(
-                part=names[int(part[members[0]])],
-                material=int(material[members[0]]),
-                positions=whole.positions[used],
-                triangles=corners.reshape(-1, 3),
-                normals=None if whole.normals is None else whole.normals[used],
-                uv0=None if whole.uv0 is None else whole.uv0[used],
-                colors=None if whole.colors is None else whole.colors[used],
-            )
-        )
+        run_piece = replace(whole, triangles=whole.triangles[members], material=int(material[members[0]]))
+        pieces.append(compact(replace(run_piece, part=names[int(part[members[0]])])))
     return pieces

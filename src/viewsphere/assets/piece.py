@@ -59,6 +59,30 @@ class Piece:
     colors: Float | None = None
 
 
+def compact(piece: Piece) -> Piece:
+    """The piece without vertices that no triangle uses."""
+    used, corners = np.unique(piece.triangles, return_inverse=True)
+    if len(used) == len(piece.positions):
+        return piece
+    return replace(pick(piece, used), triangles=corners.reshape(-1, 3))
+
+
+def pick(piece: Piece, vertices: NDArray[np.integer]) -> Piece:
+    """The piece with these of its vertices, in this order; its triangles are left as they are."""
+
+    def taken(array: Float | None) -> Float | None:
+        return None if array is None else array[vertices]
+
+    return replace(
+        piece,
+        positions=piece.positions[vertices],
+        normals=taken(piece.normals),
+        uv0=taken(piece.uv0),
+        uv1=taken(piece.uv1),
+        colors=taken(piece.colors),
+    )
+
+
 def assemble(
     folder: ModelFolder, pieces: Sequence[Piece], materials: Sequence[Material], facts: FileFacts
 ) -> tuple[Mesh, FileFacts]:
@@ -73,16 +97,12 @@ def assemble(
     if count == 0:
         raise folder.error("no triangles found; export the model as a mesh of faces")
     if count > limits.MAX_TRIANGLES:
-        raise folder.error(
-            f"expected at most {limits.MAX_TRIANGLES:,} triangles, found {count:,}; simplify the model"
-        )
+        raise folder.error(f"expected at most {limits.MAX_TRIANGLES:,} triangles, found {count:,}; simplify the model")
     names = list(dict.fromkeys(piece.part for piece in pieces))
     part_of = {name: i for i, name in enumerate(names)}
     starts = np.cumsum([0, *(len(piece.positions) for piece in pieces)])
     positions = np.concatenate([piece.positions for piece in pieces])
-    triangles = np.concatenate(
-        [piece.triangles + start for piece, start in zip(pieces, starts, strict=False)]
-    )
+    triangles = np.concatenate([piece.triangles + start for piece, start in zip(pieces, starts, strict=False)])
     sizes = [len(piece.triangles) for piece in pieces]
     part = np.repeat([part_of[piece.part] for piece in pieces], sizes)
     material = np.repeat([piece.material for piece in pieces], sizes)
@@ -148,16 +168,11 @@ def _solid_triangles(folder: ModelFolder, positions: Float, triangles: Int) -> N
     return solid
 
 
-def _join(
-    pieces: Sequence[Piece], name: str, width: int, empty: float, used: Int
-) -> NDArray[np.float32] | None:
+def _join(pieces: Sequence[Piece], name: str, width: int, empty: float, used: Int) -> NDArray[np.float32] | None:
     arrays: list[Float | None] = [getattr(piece, name) for piece in pieces]
     if all(array is None for array in arrays):
         return None
-    filled = [
-        np.full((len(p.positions), width), empty) if a is None else a
-        for p, a in zip(pieces, arrays, strict=True)
-    ]
+    filled = [np.full((len(p.positions), width), empty) if a is None else a for p, a in zip(pieces, arrays, strict=True)]
     joined = np.concatenate(filled)[used]
     joined[~np.isfinite(joined)] = empty
     return joined.astype(np.float32)
@@ -198,9 +213,7 @@ def face_normals(positions: Float, triangles: NDArray[np.integer]) -> Float:
         return np.cross(b - a, c - a)
 
 
-def _used_images(
-    materials: Sequence[Material], images: Sequence[Image]
-) -> tuple[tuple[Material, ...], tuple[Image, ...]]:
+def _used_images(materials: Sequence[Material], images: Sequence[Image]) -> tuple[tuple[Material, ...], tuple[Image, ...]]:
     """These materials and only the images they use, renumbered."""
     textures = [getattr(material, name) for material in materials for name in TEXTURE_FIELDS]
     used = sorted({texture.image for texture in textures if texture is not None})

@@ -10,7 +10,7 @@ import re
 import warnings
 import zipfile
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, cast
 
 import numpy as np
@@ -20,8 +20,8 @@ from viewsphere.assets import limits
 from viewsphere.assets.folder import ModelFolder, image_pixels
 from viewsphere.assets.mesh import Image, Material, Mesh, Texture
 from viewsphere.assets.mtl import alpha_mode
-from viewsphere.assets.piece import FileFacts, Float, Int, Piece, assemble
-from viewsphere.assets.smoothing import creased
+from viewsphere.assets.piece import FileFacts, Float, Piece, assemble
+from viewsphere.assets.smoothing import creased, split
 from viewsphere.assets.srgb import linear
 from viewsphere.assets.transform import moved
 from viewsphere.model.shot import Axis
@@ -75,9 +75,7 @@ def _check_promises(folder: ModelFolder, kind: str, data: bytes) -> None:
     if kind == "ply":
         if not data.startswith(b"ply"):
             raise folder.error("expected a PLY file, which begins with 'ply'")
-        counts = [
-            int(n) for n in re.findall(rb"element\s+\w+\s+(\d+)", data[: 1 << 16].partition(b"end_header")[0])
-        ]
+        counts = [int(n) for n in re.findall(rb"element\s+\w+\s+(\d+)", data[: 1 << 16].partition(b"end_header")[0])]
     elif kind == "off":
         words = re.sub(rb"#.*", b"", data[: 1 << 16]).split()
         counts = [int(word) for word in words[1:4] if word.isdigit()]
@@ -97,8 +95,7 @@ def _check_archive(folder: ModelFolder, data: bytes) -> None:
         raise folder.error("expected a 3MF archive (zip), found something else or a truncated one") from None
     if size > limits.MAX_ARCHIVE_BYTES:
         raise folder.error(
-            f"expected an archive of at most {limits.MAX_ARCHIVE_BYTES >> 20} MiB unpacked, "
-            f"found {size >> 20} MiB"
+            f"expected an archive of at most {limits.MAX_ARCHIVE_BYTES >> 20} MiB unpacked, found {size >> 20} MiB"
         )
 
 
@@ -117,9 +114,7 @@ def _parse(folder: ModelFolder, kind: str, data: bytes) -> dict[str, Any]:
             loaded = mesh_loaders[kind](io.BytesIO(data), file_type=kind, resolver=_Resolver(folder))
     except Exception as error:  # each parser raises whatever its code stumbles over
         reason = str(error).split("\n")[0][:120]
-        raise folder.error(
-            f"cannot be read as {kind.upper()} ({type(error).__name__}: {reason}): damaged?"
-        ) from None
+        raise folder.error(f"cannot be read as {kind.upper()} ({type(error).__name__}: {reason}): damaged?") from None
     return cast("dict[str, Any]", loaded)
 
 
@@ -137,15 +132,11 @@ class _Builder:
         edges = [edge for edge in graph if edge.get("geometry") in geometry]
         total = sum(len(geometry[edge["geometry"]]["faces"]) for edge in edges)
         if total > limits.MAX_TRIANGLES:
-            raise self.folder.error(
-                f"expected at most {limits.MAX_TRIANGLES:,} triangles, found {total:,}; simplify it"
-            )
+            raise self.folder.error(f"expected at most {limits.MAX_TRIANGLES:,} triangles, found {total:,}; simplify it")
         return [
             piece
             for edge in edges
-            for piece in self.placed(
-                geometry[edge["geometry"]], str(edge["frame_to"]), np.asarray(edge["matrix"])
-            )
+            for piece in self.placed(geometry[edge["geometry"]], str(edge["frame_to"]), np.asarray(edge["matrix"]))
         ]
 
     def placed(self, geometry: Mapping[str, Any], part: str, matrix: Float) -> list[Piece]:
@@ -162,9 +153,7 @@ class _Builder:
             repeats *= 2
             triangles = triangles[:, [0, 1, 2, 2, 3, 0]].reshape(-1, 3)
         if triangles.min() < 0 or triangles.max() >= len(positions):
-            raise self.folder.error(
-                f"a face names vertex {triangles.max()}, expected 0 to {len(positions) - 1}"
-            )
+            raise self.folder.error(f"a face names vertex {triangles.max()}, expected 0 to {len(positions) - 1}")
         visual = geometry.get("visual")
         piece = Piece(
             part=part,
@@ -252,16 +241,8 @@ def _vertex_colors(values: Any, count: int) -> Float | None:
 
 def _with_face_colors(piece: Piece, colors: NDArray[Any]) -> Piece:
     """The piece with every triangle on its own, coloured by its face."""
-    corners: Int = piece.triangles.reshape(-1)
-    return Piece(
-        part=piece.part,
-        material=piece.material,
-        positions=piece.positions[corners],
-        triangles=np.arange(len(corners)).reshape(-1, 3),
-        normals=None if piece.normals is None else piece.normals[corners],
-        uv0=None if piece.uv0 is None else piece.uv0[corners],
-        colors=_vertex_colors(np.repeat(colors, 3, axis=0), len(corners)),
-    )
+    alone = split(piece)
+    return replace(alone, colors=_vertex_colors(np.repeat(colors, 3, axis=0), len(alone.positions)))
 
 
 def _facts(folder: ModelFolder, kind: str, data: bytes, loaded: Mapping[str, Any]) -> FileFacts:

@@ -18,8 +18,12 @@ from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from viewsphere.errors import UserError
 from viewsphere.geometry.image_files import encode_png
+from viewsphere.geometry.mask import mask_polygons
 from viewsphere.model.paper_json import faces, json_bytes, transformation_matrix, vehicle
 from viewsphere.model.sample import Box, ObjectAnnotation, Sample
 
@@ -80,17 +84,8 @@ def export(dataset: Dataset, folder: Path) -> None:
     Raises UserError if the data set has no `rgb` channel.
     """
     if "rgb" not in dataset.plan.channels:
-        raise UserError(
-            f"{dataset.root}: format coco: expected channel rgb, found none: add it to the recipe's channels"
-        )
-    write_annotations(dataset, folder)
-    for sample in dataset:
-        dataset.link(sample.files["rgb"], folder / sample.split / image_file(dataset, sample))
-        for annotation in sample.objects:
-            if annotation.area:
-                mask = folder / sample.split / mask_file(dataset, sample, annotation)
-                mask.parent.mkdir(parents=True, exist_ok=True)
-                mask.writejson_bytes(encode_png(annotation.mask))
+        raise UserError(f"{dataset.root}: format coco: expected channel rgb, found none: add it to the recipe's channels")
+    write_annotations(dataset, folder, pictures=True)
     for info in dataset.models:
         for file in sorted(dataset.path(info.obj).parent.iterdir()):
             if file.name != "model.json":
@@ -115,21 +110,30 @@ def _stem(dataset: Dataset, sample: Sample) -> str:
     return f"{inside}{sample.index + 1:012d}"
 
 
-def write_annotations(dataset: Dataset, folder: Path) -> None:
-    """Write `annotations/instances_<split>.json` of every split, frame by frame, whatever their number."""
+def write_annotations(dataset: Dataset, folder: Path, *, pictures: bool = False) -> None:
+    """Write `annotations/instances_<split>.json` of every split, frame by frame, and if asked the images and masks."""
     (folder / "annotations").mkdir(parents=True, exist_ok=True)
     ids = category_ids(dataset.categories)
     head = _head(dataset, ids)
     with ExitStack() as stack:
         files = {
-            s: stack.enter_context(_Instances(folder / "annotations" / f"instances_{s}.json", head))
-            for s in dataset.splits
+            split: stack.enter_context(_Instances(folder / "annotations" / f"instances_{split}.json", head))
+            for split in dataset.splits
         }
         for sample in dataset:
-            files[sample.split].add(
-                _image(dataset, sample),
-                [_annotation(dataset, sample, o, ids) for o in sample.objects if o.area],
-            )
+            masks = {o.id: o.mask for o in sample.objects if o.area}
+            seen = [o for o in sample.objects if o.id in masks]
+            annotations = [_annotation(dataset, sample, o, ids, masks[o.id]) for o in seen]
+            files[sample.split].add(_image(dataset, sample), annotations)
+            if pictures:
+                dataset.link(sample.files["rgb"], folder / sample.split / image_file(dataset, sample))
+                for o in seen:
+                    _write_mask(folder / sample.split / mask_file(dataset, sample, o), masks[o.id])
+
+
+def _write_mask(file: Path, mask: NDArray[np.bool_]) -> None:
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.write_bytes(encode_png(mask))
 
 
 class _Instances:
@@ -171,9 +175,7 @@ def _head(dataset: Dataset, ids: Mapping[int, int]) -> dict[str, Any]:
         "licenses": [],
         "categories": [{"id": ids[c.id], "name": c.name, "supercategory": c.supercategory} for c in dataset.categories],
         "models": {
-            i.key: vehicle(
-                i.category, i.supercategory, f"./MODELS/{i.key}/{Path(i.obj).name}", i.box3d_object, i.real_size
-            )
+            i.key: vehicle(i.category, i.supercategory, f"./MODELS/{i.key}/{Path(i.obj).name}", i.box3d_object, i.real_size)
             for i in dataset.models
         },
     }
@@ -202,7 +204,9 @@ def _image(dataset: Dataset, sample: Sample) -> dict[str, Any]:
     }
 
 
-def _annotation(dataset: Dataset, sample: Sample, o: ObjectAnnotation, ids: Mapping[int, int]) -> dict[str, Any]:
+def _annotation(
+    dataset: Dataset, sample: Sample, o: ObjectAnnotation, ids: Mapping[int, int], mask: NDArray[np.bool_]
+) -> dict[str, Any]:
     return {
         "id": sample.index * dataset.max_objects + o.id,
         "image_id": sample.index + 1,
@@ -210,7 +214,7 @@ def _annotation(dataset: Dataset, sample: Sample, o: ObjectAnnotation, ids: Mapp
         "iscrowd": 0,
         "area": o.area,
         "bbox": _corner_and_size(o.box2d),
-        "segmentation": [[int(c) for c in polygon] for polygon in o.polygons],
+        "segmentation": [[int(c) for c in polygon] for polygon in mask_polygons(mask)],
         "width": sample.camera.width,
         "height": sample.camera.height,
         "path_mask": mask_file(dataset, sample, o),

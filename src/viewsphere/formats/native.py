@@ -67,7 +67,7 @@ def _write_frame(dataset: Dataset, sample: Sample, folder: Path, entries: IO[byt
     files: dict[str, str] = {}
     places: list[Place] = []
     for o in sample.objects:
-        name = _object_name(dataset, sample, o)
+        name = object_name(dataset, sample.index, o.id, o.key)
         stem = f"{_group(dataset, sample)}{name}-{sample.pose.index:04d}"
         for channel in () if files else sample.files:
             files[channel] = stem + Path(sample.files[channel]).suffix
@@ -92,10 +92,11 @@ def _pose_folder(dataset: Dataset, sample: Sample) -> str:
     return f"{group}Pose-{index}"
 
 
-def _object_name(dataset: Dataset, sample: Sample, o: ObjectAnnotation) -> str:
+def object_name(dataset: Dataset, frame: int, object_id: int, key: str) -> str:
+    """An object's name in its pose: its model's key, with numbers where that is not unique."""
     plan = dataset.plan
     one_a_pose = dataset.max_objects == 1 and plan.frames <= len(plan.models) * plan.poses
-    return o.key if one_a_pose else f"{o.key}_{sample.index + 1}_{o.id}"
+    return key if one_a_pose else f"{key}_{frame + 1}_{object_id}"
 
 
 def _group(dataset: Dataset, sample: Sample) -> str:

@@ -7,6 +7,7 @@ pixel (i, j) has its centre at (i + .5, j + .5).
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -132,25 +133,62 @@ def project(intrinsics: Intrinsics, points: ArrayLike) -> tuple[Float, NDArray[n
 def lens_limit(lens: Distortion) -> float:
     """How far from the axis the lens map is one-to-one: a radius r/z for Brown-Conrady (may be infinite), an angle for fisheye.
 
-    Up to there the radial map rises; beyond it a distorted picture folds back on itself, which no lens does.
+    Beyond it a distortion polynomial folds the picture back on itself, which no lens does. A fisheye's radius must rise with
+    the angle. Brown-Conrady's Jacobian is symmetric (the map is the gradient of a potential); inside the limit it is positive
+    definite all around, so the potential is convex and no two rays meet in a pixel.
     """
-    k = _coefficients(lens)
-    if lens.model == "fisheye":
+    return _limit(lens.model, tuple(_coefficients(lens).tolist()))
+
+
+@lru_cache(maxsize=64)
+def _limit(model: str, k: tuple[float, ...]) -> float:
+    if model == "fisheye":
         slope = np.array([9 * k[3], 7 * k[2], 5 * k[1], 3 * k[0], 1.0])
         return min(math.pi, math.sqrt(_first_positive_root(slope)))
     numerator, denominator = np.array([k[4], k[1], k[0], 1.0]), np.array([k[7], k[6], k[5], 1.0])
     twice_s = np.array([2.0, 0.0])
-    slope = np.polyadd(
-        np.polymul(np.polyadd(numerator, np.polymul(twice_s, np.polyder(numerator))), denominator),
-        -np.polymul(twice_s, np.polymul(numerator, np.polyder(denominator))),
-    )
-    return math.sqrt(min(_first_positive_root(slope), _first_positive_root(denominator)))
+    rising = np.polymul(np.polyadd(numerator, np.polymul(twice_s, np.polyder(numerator))), denominator)
+    falling = np.polymul(twice_s, np.polymul(numerator, np.polyder(denominator)))
+    slope = np.asarray(np.polysub(rising, falling), np.float64)
+    radial = math.sqrt(min(_first_positive_root(p) for p in (slope, numerator, denominator)))
+    tangential = math.hypot(k[2], k[3])
+    return radial if tangential == 0 else _tangential_limit(numerator, denominator, slope, tangential, radial)
+
+
+def _tangential_limit(numerator: Float, denominator: Float, slope: Float, tangential: float, radial: float) -> float:
+    """The radius, at most `radial`, up to which the Jacobian stays positive definite in spite of the tangential terms.
+
+    In polar axes at angle c = cos(psi) from their direction it is [[a + 6 m c, -2 m s], [-2 m s, b + 2 m c]]: a and b the
+    radial map's derivative and factor, m = |p| r. Its determinant is quadratic in c, its least value over c in closed form.
+    """
+
+    def definite(r: Float) -> NDArray[np.bool_]:
+        s, m = r * r, tangential * r
+        d = np.polyval(denominator, s)
+        a, b = np.polyval(slope, s) / (d * d), np.polyval(numerator, s) / d
+        inner = (a + 3 * b >= 16 * m) | (a * b - 4 * m * m > (a + 3 * b) ** 2 / 16)
+        return (a > 6 * m) & (b > 2 * m) & inner
+
+    radii = np.tan(np.linspace(0.0, min(math.atan(radial), 1.57), 8192))[:-1]
+    good = definite(radii)
+    if good.all():
+        return min(radial, float(radii[-1]))
+    first = int(np.argmin(good))
+    low, high = float(radii[first - 1]), float(radii[first])
+    for _ in range(60):
+        middle = (low + high) / 2
+        low, high = (middle, high) if definite(np.array(middle)) else (low, middle)
+    return low
 
 
 def _first_positive_root(polynomial: Float) -> float:
-    roots = np.roots(polynomial)
-    real = roots.real[(np.abs(roots.imag) <= 1e-9 * np.abs(roots)) & (roots.real > 0)]
-    return float(real.min()) if len(real) else math.inf
+    """Of a polynomial whose constant term is 1, highest power first; infinite if there is none.
+
+    Solved for 1/s, which keeps its leading coefficient 1 however small the others are.
+    """
+    roots = np.roots(polynomial[::-1])
+    real = roots.real[(np.abs(roots.imag) <= 1e-9 * np.abs(roots)) & (roots.real > 1e-12)]
+    return 1.0 / float(real.max()) if len(real) else math.inf
 
 
 def _coefficients(lens: Distortion) -> Float:

@@ -52,11 +52,7 @@ def projected_bounds(vertices, triangles, first, last, base, stop, k, r, t, near
 def lies_below(vertices, triangles, first, last, z):
     """Whether any triangle of [first, last) has all its corners at or below the height z."""
     for f in range(first, last):
-        if (
-            vertices[triangles[f, 0], 2] <= z
-            and vertices[triangles[f, 1], 2] <= z
-            and vertices[triangles[f, 2], 2] <= z
-        ):
+        if vertices[triangles[f, 0], 2] <= z and vertices[triangles[f, 1], 2] <= z and vertices[triangles[f, 2], 2] <= z:
             return True
     return False
 

@@ -87,28 +87,34 @@ def rays_brown(k, limit, matrix, x0, y0, samples, out):
 
 @njit
 def undistort_brown(k, limit, u, v):
-    """(x/z, y/z) that the lens maps to (u, v); NaN if none within radius `limit` and the map's unfolded part."""
+    """(x/z, y/z) within radius `limit` that the lens maps to (u, v); NaN if there is none.
+
+    Newton's method with step halving: inside the limit the Jacobian is positive definite, so it finds the only solution.
+    """
     target = math.sqrt(u * u + v * v)
-    if target == 0.0:
-        x, y = 0.0, 0.0
-    else:
-        r = invert_radial(k, False, target, limit)
-        if np.isnan(r):
-            r = 0.99 * limit  # the tangential terms may still bring it into range
-        x, y = u * r / target, v * r / target
-    for _ in range(50):
-        fu, fv, ux, uy, vy = brown_conrady(k, x, y)
+    r = invert_radial(k, False, target, limit)
+    start = 0.99 * limit if np.isnan(r) else min(r, 0.99 * limit)
+    scale = start / target if target > 0.0 else 1.0
+    x, y = u * scale, v * scale
+    fu, fv, ux, uy, vy = brown_conrady(k, x, y)
+    for _ in range(100):
         determinant = ux * vy - uy * uy
-        if not determinant > 0.0:
-            break
         du, dv = u - fu, v - fv
         sx, sy = (vy * du - uy * dv) / determinant, (ux * dv - uy * du) / determinant
-        x, y = x + sx, y + sy
         if abs(sx) + abs(sy) <= TOLERANCE * (1.0 + abs(x) + abs(y)):
-            _, _, ux, uy, vy = brown_conrady(k, x, y)
-            if math.sqrt(x * x + y * y) < limit and ux > 0.0 and ux * vy - uy * uy > 0.0:
-                return x, y
-            break
+            return x, y
+        step = 1.0
+        while step > 1e-9:
+            nx, ny = x + step * sx, y + step * sy
+            fu, fv, ux, uy, vy = brown_conrady(k, nx, ny)
+            closer = (u - fu) ** 2 + (v - fv) ** 2 < du * du + dv * dv
+            if closer and nx * nx + ny * ny < limit * limit:
+                break
+            step *= 0.5
+        if step <= 1e-9:
+            small = du * du + dv * dv <= (1e-13 * (1.0 + target)) ** 2  # at the rounding floor no step brings it closer
+            return (x, y) if small else (np.nan, np.nan)
+        x, y = nx, ny
     return np.nan, np.nan
 
 
@@ -126,7 +132,7 @@ def rays_fisheye(k, limit, matrix, x0, y0, samples, out):
             theta = invert_radial(k, True, radius, limit)
             sine = math.sin(theta) / radius
             out[j, i, 0], out[j, i, 1] = u * sine, v * sine
-            out[j, i, 2] = math.cos(theta) if theta == theta else np.nan
+            out[j, i, 2] = math.cos(theta)
 
 
 @njit
@@ -136,9 +142,8 @@ def distort_brown(k, limit, points, out):
         out[i, 0] = out[i, 1] = np.nan
         if points[i, 2] > 0.0:
             x, y = points[i, 0] / points[i, 2], points[i, 1] / points[i, 2]
-            u, v, ux, uy, vy = brown_conrady(k, x, y)
-            if math.sqrt(x * x + y * y) < limit and ux > 0.0 and ux * vy - uy * uy > 0.0:
-                out[i, 0], out[i, 1] = u, v
+            if math.sqrt(x * x + y * y) < limit:
+                out[i, 0], out[i, 1] = brown_conrady(k, x, y)[:2]
 
 
 @njit

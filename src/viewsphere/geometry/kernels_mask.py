@@ -161,3 +161,34 @@ def run_lengths(ids, wanted, x0, y0, x1, y1):
             count, last, inside = count + 1, position, False
     runs[count] = width * height - last
     return runs[: count + 1]
+
+
+@njit
+def decode_runs(codes, height, width):
+    """The mask (height, width) bool of a compressed run-length code's characters, and whether it is whole and fills it."""
+    mask = np.zeros((height, width), np.bool_)
+    runs = np.zeros(len(codes) + 1, np.int64)
+    count, position, i = 0, 0, 0
+    while i < len(codes):
+        run, shift, more = np.int64(0), 0, True
+        while more:
+            if i == len(codes) or shift > 30 or not 48 <= codes[i] < 112:
+                return mask, False
+            bits = np.int64(codes[i]) - 48
+            run |= (bits & 31) << shift
+            shift += 5
+            more = bits & 32 != 0
+            if not more and bits & 16:
+                run |= np.int64(-1) << shift
+            i += 1
+        if count > 2:
+            run += runs[count - 2]
+        if run < 0 or position + run > height * width:
+            return mask, False
+        if count % 2:
+            for p in range(position, position + run):
+                mask[p % height, p // height] = True
+        runs[count] = run
+        count += 1
+        position += run
+    return mask, position == height * width

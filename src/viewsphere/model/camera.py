@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from viewsphere.model.frozen import Frozen
 
@@ -19,8 +19,16 @@ class Distortion(Frozen):
     `fisheye`: k1 k2 k3 k4 of theta_d = theta (1 + k1 theta^2 + ...) (Kannala and Brandt 2006; OpenCV's fisheye module).
     """
 
-    model: Literal["brown_conrady", "fisheye"]
-    coefficients: tuple[float, ...]
+    model: Literal["brown_conrady", "fisheye"] = Field(description="OpenCV's standard or its fisheye model")
+    coefficients: tuple[float, ...] = Field(description="brown_conrady: 4, 5 or 8 in OpenCV's order; fisheye: 4")
+
+    @model_validator(mode="after")
+    def _counted(self) -> Self:
+        expected = {"brown_conrady": (4, 5, 8), "fisheye": (4,)}[self.model]
+        if len(self.coefficients) not in expected:
+            counts = " or ".join(map(str, expected))
+            raise ValueError(f"{self.model}: expected {counts} coefficients, got {len(self.coefficients)}")
+        return self
 
 
 class Intrinsics(Frozen):

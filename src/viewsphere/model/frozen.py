@@ -10,7 +10,7 @@ from viewsphere.model.mistakes import explained
 
 
 class Frozen(BaseModel):
-    """An immutable value; unknown fields, NaN and infinity are errors, told in words that name the nearest valid field."""
+    """An immutable value; unknown fields, NaN and infinity are errors, and the nearest valid field is named."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 

@@ -113,7 +113,7 @@ def _path_in(data: Any, location: Path) -> Path:
             inside = isinstance(data, dict) and part in data
         if inside:
             path.append(part)
-            data = data[part]
+            data = cast(Any, data)[part]
     return tuple(path)
 
 
@@ -139,9 +139,13 @@ def _words(error: ErrorDetails, fields: Sequence[str]) -> str:
             return f"expected a mapping; found {shown(found)}"
         case "tuple_type" | "list_type":
             return f"expected a list; found {shown(found)}"
+        case "int_type":
+            return f"expected a whole number; found {shown(found)}"
+        case "greater_than" | "greater_than_equal" | "less_than" | "less_than_equal":
+            return f"expected a number {error['msg'].removeprefix('Input should be ')}; found {shown(found)}"
         case _:
             message = error["msg"].removeprefix("Input should be ").removeprefix("expected ").replace("a valid ", "a ")
-            return f"expected {message}; found {shown(found)}"
+            return f"expected {message.replace('String should', 'text that should')}; found {shown(found)}"
 
 
 def _quoted(text: str) -> list[str]:

@@ -28,9 +28,7 @@ def faces(points: NDArray[np.float64]) -> dict[str, dict[str, list[float] | None
     return {name: {str(v): values[v] for v in face} for name, face in named}
 
 
-def vehicle(
-    category: str, supercategory: str, file: str, box: NDArray[np.float64], real_size: Size | None
-) -> dict[str, Any]:
+def vehicle(category: str, supercategory: str, file: str, box: NDArray[np.float64], real_size: Size | None) -> dict[str, Any]:
     """A model: its file, its 3D box in its own axes and its true size, in metres."""
     sizes = zip(("width", "height", "length"), real_size or (None, None, None), strict=True)
     return {

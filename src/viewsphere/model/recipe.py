@@ -100,16 +100,14 @@ ChannelName = Annotated[str, AfterValidator(_channel), Field(json_schema_extra={
 class Recipe(Frozen):
     """A data set to be made. From a file by `Recipe.load`, or from keyword arguments that are what the file would say.
 
-    Any mistake raises RecipeError. Relative paths mean files relative to the recipe's file, or to the working folder that
-    a recipe was made in.
+    Any mistake raises RecipeError. Relative paths are relative to the recipe's file, or to the folder that was the
+    working folder when a recipe was made in Python.
     """
 
     name: str = Field(default="dataset", min_length=1, max_length=200, description="name of the data set")
     seed: Natural = Field(default=0, description="every random choice follows from it")
     models: tuple[ModelEntry, ...] = Field(min_length=1, description="the models to place, each entry of one category")
-    viewpoints: Viewpoints = Field(
-        description="where the camera stands; kind: grid (default), sphere, normal or jitter"
-    )
+    viewpoints: Viewpoints = Field(description="where the camera stands; kind: grid (default), sphere, normal or jitter")
     camera: CameraEntry = Field(default=CameraEntry(fov_deg=40.0), description="image size and lens")
     scene: SceneEntry = Field(default=SceneEntry(), description="background, ground, sun and sky")
     engine: Annotated[EngineEntry, BeforeValidator(engine_entry), OrShort({"type": "string"})] = Field(
@@ -130,9 +128,7 @@ class Recipe(Frozen):
     label_alpha: Annotated[Number, Field(gt=0, le=1)] = Field(
         default=0.01, description="a blended texel is surface, and labelled, where its alpha is at least this"
     )
-    max_frames: Count = Field(
-        default=1_000_000, description="planning more frames than this is taken for a typing mistake"
-    )
+    max_frames: Count = Field(default=1_000_000, description="planning more frames than this is taken for a typing mistake")
 
     _folder: Path = PrivateAttr()
 

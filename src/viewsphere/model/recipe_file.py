@@ -20,9 +20,7 @@ MOST_VALUES = 200_000
 """Aliases can make a file of a few lines mean billions of values."""
 
 _INT = re.compile(r"[-+]?[0-9]+\Z")
-_FLOAT = re.compile(
-    r"(?:[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?|[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN))\Z"
-)
+_FLOAT = re.compile(r"(?:[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?|[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN))\Z")
 _TAG = "tag:yaml.org,2002:"
 
 
@@ -73,9 +71,7 @@ def _text(path: Path) -> str:
         if path.is_dir():
             raise RecipeError(f"{path}: expected a recipe file, found a folder: name the .yaml file in it")
         if path.stat().st_size > LARGEST_FILE:
-            raise RecipeError(
-                f"{path}: expected a recipe of at most {LARGEST_FILE:,} bytes, found {path.stat().st_size:,}"
-            )
+            raise RecipeError(f"{path}: expected a recipe of at most {LARGEST_FILE:,} bytes, found {path.stat().st_size:,}")
         raw = path.read_bytes()
     except OSError as error:
         raise RecipeError(f"{path}: expected a readable recipe file, found: {error.strerror or error}") from None
@@ -142,9 +138,7 @@ class _Reader:
                 raise self._error(line, place, "expected a name before the colon; found a list or mapping")
             if key in result:
                 first = self.lines[(*place, key)]
-                raise self._error(
-                    line, (*place, key), f"expected every field once; found {key!r} again, after line {first}"
-                )
+                raise self._error(line, (*place, key), f"expected every field once; found {key!r} again, after line {first}")
             self.lines[(*place, key)] = line
             result[key] = self.value(value_node, (*place, key))
         return result

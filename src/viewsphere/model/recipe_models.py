@@ -46,7 +46,7 @@ class Dimensions(Frozen):
 
 
 class SizeTable(Frozen):
-    """A CSV file of true sizes with the columns name, width, height and length; `name` is a file's name without ending."""
+    """A CSV file of true sizes: columns name (a file's, without its ending), width, height and length."""
 
     csv: str = Field(min_length=1, description="path of the file")
     unit: Unit = Field(default="m", description="unit of its numbers: m, cm, mm, in, ft or a number of metres")
@@ -117,9 +117,7 @@ class ModelEntry(Frozen):
         description="the true size: {width, height, length} in metres, a CSV file of name, width, height and length "
         "(its path, or {csv, unit}), or file: the size the file has. The default for the zoo is file",
     )
-    scale: Scale = Field(
-        default="as_is", description="as_is, real_size, or {length: 1.8}: metres to scale the model to"
-    )
+    scale: Scale = Field(default="as_is", description="as_is, real_size, or {length: 1.8}: metres to scale the model to")
     confined: bool = Field(
         default=True, strict=True, description="whether paths inside model files have to stay in the model's folder"
     )

@@ -35,7 +35,6 @@ from viewsphere.model.shot import Ground, Sky, Sun
 
 LARGEST_IMAGE = 16384
 LENSES = ("fov_deg", "focal_px", "focal_mm", "K")
-COEFFICIENTS = {"brown_conrady": (4, 5, 8), "fisheye": (4,)}
 
 Row = tuple[Number, Number, Number]
 Pixels = Annotated[Count, Field(le=LARGEST_IMAGE)]
@@ -85,14 +84,6 @@ class CameraEntry(Frozen):
     def _pinhole(cls, value: tuple[Row, Row, Row] | None) -> tuple[Row, Row, Row] | None:
         if value and (value[0][0] <= 0 or value[1][0] != 0 or value[1][1] <= 0 or value[2] != (0, 0, 1)):
             raise ValueError("expected [[fx, skew, cx], [0, fy, cy], [0, 0, 1]] with fx and fy above 0")
-        return value
-
-    @field_validator("distortion")
-    @classmethod
-    def _coefficients(cls, value: Distortion | None) -> Distortion | None:
-        if value and len(value.coefficients) not in COEFFICIENTS[value.model]:
-            counts = " or ".join(map(str, COEFFICIENTS[value.model]))
-            raise ValueError(f"expected {counts} coefficients for {value.model}; found {len(value.coefficients)}")
         return value
 
     @model_validator(mode="after")
@@ -174,19 +165,15 @@ SWITCH: list[Any] = [True, False, "on", "off"]
 class SceneEntry(Frozen):
     """Light, ground and background."""
 
-    background: Annotated[BackgroundEntry, BeforeValidator(_background), OrShort({"const": "sky"}, *COLOR_FORMS)] = (
-        Field(
-            default=BackgroundEntry(),
-            description="sky, a colour, {image: path}, or {images: folder, draw: fixed or per_frame}",
-        )
+    background: Annotated[BackgroundEntry, BeforeValidator(_background), OrShort({"const": "sky"}, *COLOR_FORMS)] = Field(
+        default=BackgroundEntry(),
+        description="sky, a colour, {image: path}, or {images: folder, draw: fixed or per_frame}",
     )
     ground: Annotated[
         Literal["on", "off", "auto"] | tuple[float, float, float],
         BeforeValidator(_ground),
         WithJsonSchema({"anyOf": [{"enum": [*SWITCH, "auto"]}, *COLOR_FORMS]}),
-    ] = Field(
-        default="auto", description="on, off, a colour, or auto: on under the sky, off before a colour or an image"
-    )
+    ] = Field(default="auto", description="on, off, a colour, or auto: on under the sky, off before a colour or an image")
     sun: Annotated[
         Annotated[Sun, Tag("mapping")] | Annotated[Literal["off"], Tag("text")],
         Discriminator(shape_of, custom_error_type="sun", custom_error_message="expected on, off or a mapping"),

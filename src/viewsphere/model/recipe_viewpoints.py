@@ -17,7 +17,7 @@ TILT = "roll of the camera about its axis, clockwise seen from behind"
 
 
 def axis_count(values: float | tuple[float, ...] | Range, *, turn: bool = False) -> int:
-    """How many values an axis has; with `turn`, a range's last value is dropped when it is its first after 360 degrees."""
+    """How many values an axis has; with `turn`, a range's last value is dropped if it is the first after 360 degrees."""
     if isinstance(values, Range):
         repeats = turn and values.count > 1 and abs(values.value(values.count - 1) - values.start - 360) < 1e-6
         return values.count - repeats
@@ -79,9 +79,7 @@ class _Aimed(Frozen):
 class _Axes(_Aimed):
     """Angles and distances to combine."""
 
-    azimuth: Values = Field(
-        default=Range(start=0, stop=360, step=45), description=f"degrees; {AZIMUTH}; a full turn drops 360"
-    )
+    azimuth: Values = Field(default=Range(start=0, stop=360, step=45), description=f"degrees; {AZIMUTH}; a full turn drops 360")
     elevation: Values = Field(default=20.0, description=f"degrees {ELEVATION}")
     distance: Values = Field(description=DISTANCE)
     tilt: Values = Field(default=0.0, description=f"degrees; {TILT}")
@@ -140,7 +138,7 @@ class Spread(Frozen):
 
 
 class Jitter(_Axes):
-    """A grid whose every viewpoint is moved at random, uniformly within plus or minus a width; it stays below the poles."""
+    """A grid whose every viewpoint is moved at random, uniformly within plus or minus a width, not beyond the poles."""
 
     kind: Literal["jitter"] = Field(description="a grid with random offsets")
     plus_minus: Spread = Field(description="the widest offset of each coordinate")

@@ -44,9 +44,7 @@ def sample_to_record(sample: Sample) -> dict[str, Any]:
     }
 
 
-def sample_from_record(
-    record: Mapping[str, Any], channels: Mapping[str, NDArray[Any]], files: Mapping[str, str]
-) -> Sample:
+def sample_from_record(record: Mapping[str, Any], channels: Mapping[str, NDArray[Any]], files: Mapping[str, str]) -> Sample:
     """The sample a record was made of, with these channels and files; every number is equal to the last bit."""
     camera = record["camera"]
     return Sample(

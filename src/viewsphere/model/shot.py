@@ -57,9 +57,7 @@ class Sun(Frozen):
 
     azimuth_deg: float = Field(default=40.0, description="direction the sun stands in, degrees, as for cameras")
     elevation_deg: float = Field(default=50.0, gt=0, le=90, description="degrees above the horizon")
-    strength: float = Field(
-        default=3.0, ge=0, description="irradiance on a plane that faces the sun, in the sky's units"
-    )
+    strength: float = Field(default=3.0, ge=0, description="irradiance on a plane that faces the sun, in the sky's units")
     color: Color = Field(default=(1.0, 0.96, 0.9), description="linear red, green, blue")
 
 

@@ -14,6 +14,7 @@ from viewsphere.errors import ModelError, RecipeError, UserError, ViewsphereErro
 from viewsphere.model.recipe import Recipe
 from viewsphere.run.pool import Job, Outcome, run_jobs
 from viewsphere.run.tasks import Task
+from viewsphere.run.warm import compile_kernels
 from viewsphere.sampling.plan import Plan, plan
 from viewsphere.sampling.viewpoints import distance_problem
 from viewsphere.store import Category, Dataset, PlanRecord, Store
@@ -21,7 +22,10 @@ from viewsphere.store import Category, Dataset, PlanRecord, Store
 
 @dataclass(frozen=True)
 class Progress:
-    """Where a run stands: `done` of `total` models, frames or exports; `resumed` of them were there before this run."""
+    """Where a run stands: `done` of `total`; `resumed` of them were there before this run.
+
+    Phases are models, kernels (compiled once on a machine, then cached), frames and exports.
+    """
 
     phase: str
     done: int
@@ -69,10 +73,6 @@ def generate(
     store = Store(Path(out))
     store.open_for(plan_record(planned))
     skipped = _prepare_models(planned, store, workers, keep_going, tell)
-    if workers:
-        from viewsphere.run.warm import compile_kernels
-
-        compile_kernels(planned)
     rendered = _render_shots(planned, store, workers, keep_going, skipped, tell)
     _note_skipped(store, skipped)
     notes = export(store.root, wanted, listener=tell)
@@ -135,9 +135,10 @@ def _distance_problems(planned: Plan, store: Store) -> Iterator[tuple[str, Views
 
 
 def _joined(errors: Sequence[ViewsphereError]) -> ViewsphereError:
-    if len(errors) == 1:
-        return errors[0]
-    return UserError("\n".join(str(e) for e in errors))
+    """All of them, a line each; of their common type if they have one."""
+    kinds = {type(e) for e in errors}
+    kind = kinds.pop() if len(kinds) == 1 else UserError
+    return kind("\n".join(str(e) for e in errors))
 
 
 def _render_shots(planned: Plan, store: Store, workers: int, keep_going: bool, skipped: dict[str, str], tell: Listener) -> int:
@@ -148,6 +149,10 @@ def _render_shots(planned: Plan, store: Store, workers: int, keep_going: bool, s
     resumed = total - sum(count for key, _, count in table if key in missing)
     jobs = [_shot_job(planned, i, key) for i, (key, _, _) in enumerate(planned.shot_table()) if key in missing]
     rendered = 0
+    if jobs:
+        tell(Progress("kernels", 0, 1))
+        compile_kernels(planned.shot(0))
+        tell(Progress("kernels", 1, 1))
     tell(Progress("frames", resumed, total, resumed))
     for outcome in run_jobs(jobs, store.root, workers):
         _accept(outcome, keep_going, skipped)

@@ -9,11 +9,11 @@ import numpy as np
 
 from viewsphere import plugins
 from viewsphere.annotate import annotate
-from viewsphere.assets.cache import load_normalised
+from viewsphere.assets.cache import load_normalised, real_size
 from viewsphere.assets.mesh import Mesh
 from viewsphere.geometry.box import box_vertices
 from viewsphere.model.sample import Float, Sample
-from viewsphere.model.shot import Frame, ModelSpec, Shot
+from viewsphere.model.shot import Frame, ModelSpec, Shot, Size
 from viewsphere.sampling.viewpoints import camera_for
 from viewsphere.truth.channels import observe
 from viewsphere.truth.visibility import rasterize
@@ -39,6 +39,7 @@ class Stages:
     _stage: plugins.Stage | None = None
     _stage_key: str = ""
     _models: dict[str, Mesh] = field(default_factory=dict[str, Mesh])
+    _sizes: dict[str, Size | None] = field(default_factory=dict[str, Size | None])
 
     def model(self, spec: ModelSpec) -> Mesh:
         """The normalised model; raises ModelError if its file cannot be used."""
@@ -48,6 +49,13 @@ class Stages:
             while len(self._models) > WARM_MODELS:
                 del self._models[next(iter(self._models))]
         return self._models[name]
+
+    def real_size(self, spec: ModelSpec) -> Size | None:
+        """The model's true (width, height, length) in metres, None if nobody said."""
+        name = spec.model_dump_json()
+        if name not in self._sizes:
+            self._sizes[name] = real_size(spec, build_zoo_model)
+        return self._sizes[name]
 
     def stage(self, shot: Shot) -> plugins.Stage:
         """The engine's stage for this shot, built anew only when the scene is another one."""
@@ -61,12 +69,18 @@ class Stages:
         """The shot's samples in order, channels in memory."""
         stage = self.stage(shot)
         boxes = [box_vertices(*self.model(p.model).bounds) for p in shot.placements]
+        sizes = [self.real_size(p.model) for p in shot.placements]
         for frame in shot.frames:
-            yield render_frame(shot, frame, stage, boxes)
+            yield render_frame(shot, frame, stage, boxes, sizes)
 
 
-def render_frame(shot: Shot, frame: Frame, stage: plugins.Stage, boxes: Sequence[Float]) -> Sample:
-    """One frame: colour from the engine, every label from truth. `boxes`: each object's 3D box in its own axes."""
+def render_frame(
+    shot: Shot, frame: Frame, stage: plugins.Stage, boxes: Sequence[Float], sizes: Sequence[Size | None]
+) -> Sample:
+    """One frame: colour from the engine, every label from truth.
+
+    `boxes` and `sizes`: each object's 3D box in its own axes, and its real size if known.
+    """
     camera = camera_for(shot.intrinsics, frame.pose, _target(shot, boxes))
     visibility = rasterize(stage.geometry, camera)
     names = [name for name in shot.channels if name != "rgb"]
@@ -74,7 +88,7 @@ def render_frame(shot: Shot, frame: Frame, stage: plugins.Stage, boxes: Sequence
     if "rgb" in shot.channels:
         observed["rgb"] = stage.color(camera, frame, visibility)
     files = [model_files(p.model.key)[0] for p in shot.placements]
-    objects = annotate(shot, frame, camera, stage.geometry, visibility, boxes, files)
+    objects = annotate(shot, frame, camera, stage.geometry, visibility, boxes, files, sizes)
     channels = {name: observed[name] for name in shot.channels}
     return Sample(frame.index, frame.split, camera, frame.pose, objects, channels, {})
 

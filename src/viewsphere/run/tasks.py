@@ -70,7 +70,7 @@ class Worker:
             glb=glb,
             box3d_object=box_vertices(low, high),
             size=(width, height, length),
-            real_size=spec.real_size,
+            real_size=self.stages.real_size(spec),
             parts=mesh.parts,
             triangles=len(mesh.triangles),
             digest=digest,

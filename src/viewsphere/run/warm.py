@@ -1,4 +1,4 @@
-"""Compile every kernel a plan needs in this process, so that workers find them in the cache."""
+"""Compile every kernel a shot needs in this process, so that workers find them in the cache."""
 
 from __future__ import annotations
 
@@ -10,17 +10,15 @@ from viewsphere.geometry.box import box_vertices
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.shot import ModelSpec, Placement, Pose, Shot
 from viewsphere.run.stages import render_frame
-from viewsphere.sampling.plan import Plan
 
 SIZE = 16
 
 
-def compile_kernels(planned: Plan) -> None:
-    """Render one tiny frame of two cards with the plan's engine, channels, ground and lens; the picture is thrown away.
+def compile_kernels(shot: Shot) -> None:
+    """Render one tiny frame of two cards with the shot's engine, channels, scene and lens; the picture is thrown away.
 
     The first time on a machine this takes some 20 CPU-seconds, later about one.
     """
-    shot = planned.shot(0)
     lens = shot.intrinsics
     tiny = Intrinsics(width=SIZE, height=SIZE, fx=SIZE, fy=SIZE, cx=SIZE / 2, cy=SIZE / 2, distortion=lens.distortion)
     spec = ModelSpec(key="card", source="card", category="card", category_id=1)
@@ -35,7 +33,7 @@ def _render(shot: Shot) -> None:
     engine: plugins.Engine = plugins.load("engines", shot.engine)
     stage = engine.stage(shot, lambda spec: card)
     boxes = [box_vertices(*card.bounds)] * len(shot.placements)
-    render_frame(shot, shot.frames[0], stage, boxes)
+    render_frame(shot, shot.frames[0], stage, boxes, [None] * len(boxes))
 
 
 def _card() -> Mesh:

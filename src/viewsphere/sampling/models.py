@@ -130,21 +130,18 @@ def _matching(folder: Path, source: str, where: str) -> list[Path]:
     if path.is_file():
         matches = [path]
     elif path.is_dir():
-        matches = [
-            f for f in path.rglob("*") if not any(p.startswith((".", "__MACOSX")) for p in f.relative_to(path).parts)
-        ]
+        matches = [f for f in path.rglob("*") if not any(map(_is_hidden, f.relative_to(path).parts))]
     elif has_magic(source):
-        matches = [folder / f for f in glob(source, root_dir=folder, recursive=True)]
+        matches = [folder / f for f in glob(source, root_dir=folder, recursive=True)]  # noqa: PTH207 (Path.glob takes no absolute pattern)
     else:
-        raise RecipeError(
-            f"{where}.source: expected a file, folder, pattern or zoo:<family>; found no {source!r} in {folder}"
-        )
+        kinds = "a file, folder, pattern or zoo:<family>"
+        raise RecipeError(f"{where}.source: expected {kinds}; found no {source!r} in {folder}")
     if matches != [path]:
         matches = [f for f in matches if f.suffix.lower() in MODEL_SUFFIXES and f.is_file()]
     if not matches:
         endings = ", ".join(sorted(MODEL_SUFFIXES))
         raise RecipeError(f"{where}.source: expected model files ({endings}); {source!r} gives none in {folder}")
-    return [Path(os.path.abspath(f)) for f in matches]
+    return [Path(os.path.normpath(f)) for f in matches]
 
 
 def _is_hidden(name: str) -> bool:
@@ -152,7 +149,7 @@ def _is_hidden(name: str) -> bool:
 
 
 def _with_unique_keys(found: list[_Found]) -> list[_Found]:
-    """Files of one name get their ending or their folders' names behind it; raises RecipeError if that does not help."""
+    """Files of one name get their ending or their folders' names behind it; raises RecipeError where that is no help."""
     groups: defaultdict[str, list[_Found]] = defaultdict(list)
     for item in found:
         groups[item.key.casefold()].append(item)
@@ -214,9 +211,8 @@ def _read_sizes(path: Path) -> Sizes:
             columns = [c.strip().lower() for c in rows.fieldnames or ()]
             rows.fieldnames = columns
             if not set(COLUMNS) <= set(columns):
-                raise RecipeError(
-                    f"{path}:1: expected columns {', '.join(COLUMNS)}; found no {' and no '.join(missing)}"
-                )
+                found = ", ".join(columns) or "nothing"
+                raise RecipeError(f"{path}:1: expected columns {', '.join(COLUMNS)}; found {found}")
             sizes: dict[str, tuple[float, float, float]] = {}
             for row in rows:
                 name = (row["name"] or "").strip()

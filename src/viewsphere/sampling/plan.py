@@ -111,9 +111,7 @@ class Plan:
     @cached_property
     def _edges(self) -> tuple[tuple[float, ...], tuple[str, ...]]:
         """Upper ends of the intervals of [0, 1) that the splits with a share take, and their names."""
-        shares = {
-            name: part for name, part in self.recipe.splits.shares.items() if not isinstance(part, tuple) and part
-        }
+        shares = {name: part for name, part in self.recipe.splits.shares.items() if not isinstance(part, tuple) and part}
         return tuple(accumulate(shares.values())), tuple(shares)
 
     @cached_property
@@ -150,7 +148,7 @@ class Plan:
             raise IndexError(f"expected a shot of 0..{self.shot_count - 1}, got {index}")
         model, chunk = divmod(index, len(self._chunks) - 1)
         spec = self.model_specs[model]
-        frames = tuple(self._frame(model, i) for i in range(self._chunks[chunk], self._chunks[chunk + 1]))
+        frames = tuple(self.frame(model, i) for i in range(self._chunks[chunk], self._chunks[chunk + 1]))
         return Shot(
             key=self.shot_key(index),
             placements=(Placement(id=1, model=spec),),
@@ -168,7 +166,8 @@ class Plan:
         """All shots in order, made one by one."""
         return (self.shot(i) for i in range(self.shot_count))
 
-    def _frame(self, model: int, pose: int) -> Frame:
+    def frame(self, model: int, pose: int) -> Frame:
+        """The frame of a model (its index) and a pose."""
         spec = self.model_specs[model]
         background = None
         if self.recipe.scene.background.images is not None and self.recipe.scene.background.draw == "per_frame":

@@ -25,5 +25,5 @@ def generator(seed: int, *names: str) -> np.random.Generator:
 
 
 def share(seed: int, *names: str) -> float:
-    """A number of [0, 1) for a seed and names, uniform over names; for choices that are too many for a generator each."""
+    """A number of [0, 1) for a seed and names, uniform over names: for choices too many to make a generator for each."""
     return int.from_bytes(_digest((str(seed), *names), 8), "little") / 2**64

@@ -1,0 +1,1 @@
+"""The exact rasteriser and the geometric channels: every label comes from here."""

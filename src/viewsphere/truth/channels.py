@@ -19,9 +19,7 @@ from viewsphere.truth.visibility import Visibility, homogeneous, lens_rays
 Array = NDArray[Any]
 
 
-def observe(
-    geometry: Geometry, camera: Camera, visibility: Visibility, names: Iterable[str]
-) -> dict[str, Array]:
+def observe(geometry: Geometry, camera: Camera, visibility: Visibility, names: Iterable[str]) -> dict[str, Array]:
     """The named channels of this view, each (H, W) or (H, W, 3) as its row of `model.channel.CHANNELS` says.
 
     `visibility` is `rasterize(geometry, camera)`. All channels but rgb: `depth` (z; behind a fisheye it is negative),
@@ -29,7 +27,7 @@ def observe(
     the visible side of its triangle, and bent to at most perpendicular to the ray where interpolation turns it away),
     `normals_geometric`, `coordinates` (NaN on the ground), `barycentrics`. Raises ValueError for other names.
     """
-    view = _View(geometry, camera, visibility)
+    view, names = _View(geometry, camera, visibility), tuple(names)
     unknown = [name for name in names if name not in _CHANNELS]
     if unknown:
         raise ValueError(f"channel {unknown[0]!r}: expected one of {', '.join(_CHANNELS)}")
@@ -102,9 +100,7 @@ def _normals_geometric(view: _View) -> Array:
     from viewsphere.truth import kernels_channels as kernels
 
     out, g = view.empty("normals_geometric"), view.geometry
-    kernels.normals_geometric(
-        view.visibility.triangle, g.triangle_normals, view.rays, view.camera_from_p, view.camera.R, out
-    )
+    kernels.normals_geometric(view.visibility.triangle, g.triangle_normals, view.rays, view.camera_from_p, view.camera.R, out)
     return out
 
 
@@ -112,9 +108,7 @@ def _coordinates(view: _View) -> Array:
     from viewsphere.truth import kernels_channels as kernels
 
     out, g = view.empty("coordinates"), view.geometry
-    kernels.coordinates(
-        view.visibility.triangle, g.triangles, g.triangle_object, view.q, view.rays, g.coordinates, out
-    )
+    kernels.coordinates(view.visibility.triangle, g.triangles, g.triangle_object, view.q, view.rays, g.coordinates, out)
     return out
 
 

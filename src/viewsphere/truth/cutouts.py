@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +32,11 @@ class Cutouts:
     levels: NDArray[np.float64]
     material: NDArray[np.int32]
     corners: NDArray[np.float64]
+
+    @property
+    def arrays(self) -> tuple[NDArray[Any], ...]:
+        """(texels, layout, levels, material, corners), as the kernels take them."""
+        return self.texels, self.layout, self.levels, self.material, self.corners
 
 
 NO_CUTOUTS = Cutouts(

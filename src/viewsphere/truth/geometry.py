@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -23,12 +24,15 @@ class Geometry:
     """World-space triangles, objects in id order, the ground (if any) last.
 
     vertices (V, 3) float64 world metres; triangles (T, 3) int32; normals (V, 3) float32 world, unit; coordinates (V, 3)
-    float32, each vertex in its object's axes (zero for the ground); triangle_normals (T, 3) float32 world, unit, by
-    winding (zero for a degenerate triangle); triangle_side (T,) int8, 1 where the mean of the vertex normals agrees with the
-    winding, -1 where it opposes it, 2 or -2 likewise where all three equal the triangle's own; triangle_object, triangle_part, triangle_category (T,) int32 with 0 for the
-    ground; triangle_cutout (T,) int32: -1 all surface, -2 never seen, else a row of `cutouts.corners`. Object i + 1 owns
-    vertices [vertex_start[i], vertex_start[i + 1]) and triangles [triangle_start[i], triangle_start[i + 1]); both have one
-    entry more than there are objects.
+    float32, each vertex in its object's axes (zero for the ground).
+
+    triangle_normals (T, 3) float32 world, unit, by winding (zero for a degenerate triangle); triangle_side (T,) int8: 1 where
+    the mean of the vertex normals agrees with the winding, -1 where it opposes it, 2 or -2 likewise where all three equal the
+    triangle's own; triangle_object, triangle_part, triangle_category (T,) int32, 0 for the ground; triangle_cutout (T,) int32:
+    -1 all surface, -2 never seen, else a row of `cutouts.corners`.
+
+    Object i + 1 owns vertices [vertex_start[i], vertex_start[i + 1]) and triangles [triangle_start[i], triangle_start[i + 1]);
+    both have one entry more than there are objects.
     """
 
     vertices: NDArray[np.float64]
@@ -52,9 +56,7 @@ class Geometry:
         return len(self.vertex_start) - 1
 
 
-def build_geometry(
-    placements: Sequence[Placement], meshes: Sequence[Mesh], ground: bool, label_alpha: float
-) -> Geometry:
+def build_geometry(placements: Sequence[Placement], meshes: Sequence[Mesh], ground: bool, label_alpha: float) -> Geometry:
     """Place the meshes in the world and, if asked, lay the ground at their lowest point (z = 0 if there are none).
 
     `meshes[i]` is the normalised model of `placements[i]`, whose id is i + 1. The ground is two triangles that reach 1,000
@@ -78,15 +80,13 @@ def build_geometry(
         vertices = np.concatenate([vertices, corners])
         triangles = np.concatenate([triangles, np.array([[n, n + 1, n + 2], [n, n + 2, n + 3]], np.int32)])
     cutouts, rows = stack_cutouts(surfaces)
-    up = np.tile(np.float32([0, 0, 1]), (4 * ground, 1))
+    up = np.tile(np.array([0, 0, 1], np.float32), (4 * ground, 1))
     moved = [_moved(p.world_from_object, m.normals, 0.0) for p, m in zip(placements, meshes, strict=True)]
     normals = _joined([*moved, up], (0, 3), np.float32)
     triangle_normals = _triangle_normals(vertices, triangles)
     pad = np.zeros(2 * ground, np.int32)
     objects = [np.full(len(m.triangles), p.id) for p, m in zip(placements, meshes, strict=True)]
-    categories = [
-        np.full(len(m.triangles), p.model.category_id) for p, m in zip(placements, meshes, strict=True)
-    ]
+    categories = [np.full(len(m.triangles), p.model.category_id) for p, m in zip(placements, meshes, strict=True)]
     return Geometry(
         vertices=vertices,
         triangles=triangles,
@@ -105,7 +105,7 @@ def build_geometry(
     )
 
 
-def _joined(arrays: Sequence[NDArray[np.generic]], empty: tuple[int, ...], dtype: type) -> NDArray[np.generic]:
+def _joined(arrays: Sequence[NDArray[Any]], empty: tuple[int, ...], dtype: type) -> NDArray[Any]:
     return np.ascontiguousarray(np.concatenate([np.zeros(empty, dtype), *arrays]), dtype)
 
 

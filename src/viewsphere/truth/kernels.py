@@ -17,7 +17,8 @@ from viewsphere.geometry.jit import njit
 EPSILON = 1e-5  # pixels a bounding box is widened by: more than the edge functions' rounding
 BEHIND = -(1 << 30)
 SLIVER = 1e-5  # twice the area in pixels below which the sign of a triangle's area is not trusted
-SMALL = 8
+SMALL = 8  # pixels: the width up to which testing every pixel beats computing spans
+NEVER, CLAMP, MIRROR = -2, 1, 2  # as in cutouts.py
 
 
 @njit
@@ -56,8 +57,9 @@ def cells(q, samples, x0, y0, width, height, cell):
 
 
 @njit
-def is_surface(texels, layout, levels, corners, material, row, b0, b1, b2):
-    """Whether the point with these barycentrics of cut-out triangle `row` is surface; see `Cutouts`."""
+def is_surface(cutouts, row, b0, b1, b2):
+    """Whether the point with these barycentrics of cut-out triangle `row` is surface; `cutouts` is `Cutouts.arrays`."""
+    texels, layout, levels, material, corners = cutouts
     c = corners[row]
     m = layout[material[row]]
     i = _texel(b0 * c[0, 0] + b1 * c[1, 0] + b2 * c[2, 0], m[1], m[3])
@@ -68,10 +70,11 @@ def is_surface(texels, layout, levels, corners, material, row, b0, b1, b2):
 
 @njit
 def _texel(u, size, wrap):
-    if wrap == 1:
+    """Index of the nearest texel; wrap as in `cutouts.WRAPS`."""
+    if wrap == CLAMP:
         u = min(max(u, 0.0), 1.0)
     else:
-        period = 1.0 if wrap == 0 else 2.0
+        period = 2.0 if wrap == MIRROR else 1.0
         u -= period * math.floor(u / period)
         if u > 1.0:
             u = 2.0 - u
@@ -79,39 +82,14 @@ def _texel(u, size, wrap):
 
 
 @njit
-def _draw_checked(t, q0, q1, q2, box, samples, x0, y0, bounds, cutout, texels, layout, levels, corners, material, nearest, seen):
-    """Draw one triangle pixel by pixel: for cut-outs, and for slivers whose facing is uncertain."""
-    xa, ya, xb, yb = box
-    nx, ny, nz, det = _plane(q0, q1, q2)
-    for y in range(ya, yb + 1):
-        py = (y + y0 + 0.5) / samples
-        for x in range(xa, xb + 1):
-            px = (x + x0 + 0.5) / samples
-            e0 = _edge(q1, q2, px, py)
-            e1 = _edge(q2, q0, px, py)
-            e2 = _edge(q0, q1, px, py)
-            if not ((e0 >= 0.0 and e1 >= 0.0 and e2 >= 0.0) or (e0 <= 0.0 and e1 <= 0.0 and e2 <= 0.0)):
-                continue
-            inverse = min(max((nx * px + (ny * py + nz)) / det, bounds[0]), bounds[1])
-            if inverse > nearest[y, x]:
-                total = e0 + e1 + e2
-                if cutout >= 0 and (
-                    total == 0.0
-                    or not is_surface(texels, layout, levels, corners, material, cutout, e0 / total, e1 / total, e2 / total)
-                ):
-                    continue
-                nearest[y, x] = inverse
-                seen[y, x] = t
+def edge(a, b):
+    """Coefficients of det[p, a, b] in p; those of edge(b, a) are exactly the opposite."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 @njit
-def _edge(a, b, px, py):
-    return (a[1] * b[2] - a[2] * b[1]) * px + ((a[2] * b[0] - a[0] * b[2]) * py + (a[0] * b[1] - a[1] * b[0]))
-
-
-@njit
-def _plane(q0, q1, q2):
-    """Normal of the triangle in homogeneous space and its product with q0, from differences: exact to the triangle's size."""
+def plane(q0, q1, q2):
+    """Normal of the triangle and its product with q0, from differences: exact to the triangle's size."""
     ax, ay, az = q1[0] - q0[0], q1[1] - q0[1], q1[2] - q0[2]
     bx, by, bz = q2[0] - q0[0], q2[1] - q0[1], q2[2] - q0[2]
     nx, ny, nz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
@@ -119,99 +97,133 @@ def _plane(q0, q1, q2):
 
 
 @njit
-def draw(q, cell, triangles, first, last, base, samples, x0, y0, cutout, texels, layout, levels, corners, material, nearest, seen):
-    """Draw triangles [first, last) into nearest (1/z, 0 where none) and seen (triangle, -1 where none).
+def negated(e):
+    """The opposite of three coefficients."""
+    return -e[0], -e[1], -e[2]
 
-    `base` is the vertex q[0] stands for; (x0, y0) the canvas' first sample in samples of the image, `samples` a pixel.
+
+@njit
+def _inside(a, b, c, px, f0, f1, f2):
+    return a[0] * px + f0 >= 0.0 and b[0] * px + f1 >= 0.0 and c[0] * px + f2 >= 0.0
+
+
+@njit
+def draw(q, cell, triangles, span, canvas, cutout, cutouts, nearest, seen):
+    """Draw triangles into nearest (1/z, 0 where none) and seen (triangle, -1 where none).
+
+    `span` is the first triangle, the one after the last, and the vertex that q[0] stands for; `canvas` the samples of a pixel's
+    side and the canvas' first sample (x, y).
     """
     height, width = nearest.shape
-    u0, u1, u2, u3 = np.uintp(0), np.uintp(1), np.uintp(2), np.uintp(3)
-    step = 1.0 / samples
+    first, last, base = span
+    a, b, c, d = np.uintp(0), np.uintp(1), np.uintp(2), np.uintp(3)
     for t in range(first, last):
         ut = np.uintp(t)
-        i0 = np.uintp(triangles[ut, u0] - base)
-        i1 = np.uintp(triangles[ut, u1] - base)
-        i2 = np.uintp(triangles[ut, u2] - base)
-        xa = min(cell[i0, u0], cell[i1, u0], cell[i2, u0])
-        ya = min(cell[i0, u1], cell[i1, u1], cell[i2, u1])
-        xb = -min(cell[i0, u2], cell[i1, u2], cell[i2, u2])
-        yb = -min(cell[i0, u3], cell[i1, u3], cell[i2, u3])
-        if xa > xb or ya > yb or cutout[ut] == -2:
+        i0, i1, i2 = np.uintp(triangles[ut, a] - base), np.uintp(triangles[ut, b] - base), np.uintp(triangles[ut, c] - base)
+        xa, ya = min(cell[i0, a], cell[i1, a], cell[i2, a]), min(cell[i0, b], cell[i1, b], cell[i2, b])
+        xb, yb = -min(cell[i0, c], cell[i1, c], cell[i2, c]), -min(cell[i0, d], cell[i1, d], cell[i2, d])
+        if xa > xb or ya > yb or cutout[ut] == NEVER:
             continue
-        w0, w1, w2 = q[i0, u2], q[i1, u2], q[i2, u2]
+        q0, q1, q2 = (q[i0, a], q[i0, b], q[i0, c]), (q[i1, a], q[i1, b], q[i1, c]), (q[i2, a], q[i2, b], q[i2, c])
         crossing = xa == BEHIND
         if crossing:
-            if w0 <= 0.0 and w1 <= 0.0 and w2 <= 0.0:
+            if q0[2] <= 0.0 and q1[2] <= 0.0 and q2[2] <= 0.0:
                 continue
             xa, ya, xb, yb = 0, 0, width - 1, height - 1
-        x_0, x_1, x_2 = q[i0, u0], q[i1, u0], q[i2, u0]
-        y_0, y_1, y_2 = q[i0, u1], q[i1, u1], q[i2, u1]
-        nx, ny, nz, det = _plane((x_0, y_0, w0), (x_1, y_1, w1), (x_2, y_2, w2))
+        nx, ny, nz, det = plane(q0, q1, q2)
         if det == 0.0:
             continue
-        sliver = not crossing and abs(det) < SLIVER * (w0 * w1 * w2)
-        if sliver or cutout[ut] >= 0:
+        box = (xa, ya, xb, yb)
+        w0, w1, w2 = q0[2], q1[2], q2[2]
+        if cutout[ut] >= 0 or (not crossing and abs(det) < SLIVER * (w0 * w1 * w2)):
             bounds = (0.0, np.inf) if crossing else (1.0 / max(w0, w1, w2), 1.0 / min(w0, w1, w2))
-            _draw_checked(
-                t, (x_0, y_0, w0), (x_1, y_1, w1), (x_2, y_2, w2), (xa, ya, xb, yb), samples, x0, y0, bounds,
-                cutout[ut], texels, layout, levels, corners, material, nearest, seen,
-            )  # fmt: skip
+            _draw_checked(t, q0, q1, q2, box, canvas, bounds, cutout[ut], cutouts, nearest, seen)
             continue
-        a0, b0, c0 = y_1 * w2 - w1 * y_2, w1 * x_2 - x_1 * w2, x_1 * y_2 - y_1 * x_2
-        a1, b1, c1 = y_2 * w0 - w2 * y_0, w2 * x_0 - x_2 * w0, x_2 * y_0 - y_2 * x_0
-        a2, b2, c2 = y_0 * w1 - w0 * y_1, w0 * x_1 - x_0 * w1, x_0 * y_1 - y_0 * x_1
+        e0, e1, e2 = edge(q1, q2), edge(q2, q0), edge(q0, q1)
         if det < 0.0:
-            a0, b0, c0 = -a0, -b0, -c0
-            a1, b1, c1 = -a1, -b1, -c1
-            a2, b2, c2 = -a2, -b2, -c2
-        inverse_det = 1.0 / det
-        nx, ny, nz = nx * inverse_det, ny * inverse_det, nz * inverse_det
-        for y in range(ya, yb + 1):
-            py = (y + y0 + 0.5) * step
-            f0, f1, f2, s = b0 * py + c0, b1 * py + c1, b2 * py + c2, ny * py + nz
-            l, r = xa, xb
-            if xb - xa >= SMALL:
-                # each edge's crossing of this row narrows the span; a pixel is left on each side for the exact test below
-                low, high = float(xa), float(xb)
-                if a0 > 0.0:
-                    low = max(low, -f0 / a0 * samples - (x0 + 1.5))
-                elif a0 < 0.0:
-                    high = min(high, -f0 / a0 * samples - (x0 - 0.5))
-                if a1 > 0.0:
-                    low = max(low, -f1 / a1 * samples - (x0 + 1.5))
-                elif a1 < 0.0:
-                    high = min(high, -f1 / a1 * samples - (x0 - 0.5))
-                if a2 > 0.0:
-                    low = max(low, -f2 / a2 * samples - (x0 + 1.5))
-                elif a2 < 0.0:
-                    high = min(high, -f2 / a2 * samples - (x0 - 0.5))
-                if low > high:
-                    continue
-                l, r = math.ceil(low), math.floor(high)
-                while l <= r:
-                    px = (l + x0 + 0.5) * step
-                    if a0 * px + f0 >= 0.0 and a1 * px + f1 >= 0.0 and a2 * px + f2 >= 0.0:
-                        break
-                    l += 1
-                while l <= r:
-                    px = (r + x0 + 0.5) * step
-                    if a0 * px + f0 >= 0.0 and a1 * px + f1 >= 0.0 and a2 * px + f2 >= 0.0:
-                        break
-                    r -= 1
-                uy = np.uintp(y)
-                for x in range(l, r + 1):
-                    inverse = nx * ((x + x0 + 0.5) * step) + s
-                    ux = np.uintp(x)
-                    better = inverse > nearest[uy, ux]
-                    nearest[uy, ux] = inverse if better else nearest[uy, ux]
-                    seen[uy, ux] = t if better else seen[uy, ux]
-            else:
-                uy = np.uintp(y)
-                for x in range(xa, xb + 1):
-                    px = (x + x0 + 0.5) * step
-                    if a0 * px + f0 >= 0.0 and a1 * px + f1 >= 0.0 and a2 * px + f2 >= 0.0:
-                        inverse = nx * px + s
-                        ux = np.uintp(x)
-                        if inverse > nearest[uy, ux]:
-                            nearest[uy, ux] = inverse
-                            seen[uy, ux] = np.int32(t)
+            e0, e1, e2 = negated(e0), negated(e1), negated(e2)
+        inverse = 1.0 / det
+        n = (nx * inverse, ny * inverse, nz * inverse)
+        if xb - xa < SMALL:
+            _draw_small(t, e0, e1, e2, n, box, canvas, nearest, seen)
+        else:
+            _draw_rows(t, e0, e1, e2, n, box, canvas, nearest, seen)
+
+
+@njit
+def _draw_small(t, e0, e1, e2, n, box, canvas, nearest, seen):
+    """Draw a narrow triangle: every pixel of its box is tested."""
+    xa, ya, xb, yb = box
+    samples, x0, y0 = canvas
+    step = 1.0 / samples
+    for y in range(ya, yb + 1):
+        py = (y + y0 + 0.5) * step
+        f0, f1, f2 = e0[1] * py + e0[2], e1[1] * py + e1[2], e2[1] * py + e2[2]
+        uy = np.uintp(y)
+        for x in range(xa, xb + 1):
+            px = (x + x0 + 0.5) * step
+            if _inside(e0, e1, e2, px, f0, f1, f2):
+                inverse = n[0] * px + (n[1] * py + n[2])
+                ux = np.uintp(x)
+                if inverse > nearest[uy, ux]:
+                    nearest[uy, ux] = inverse
+                    seen[uy, ux] = t
+
+
+@njit
+def _draw_rows(t, e0, e1, e2, n, box, canvas, nearest, seen):
+    """Draw a wide triangle row by row: where it begins and ends is found by division, then settled by the exact test."""
+    xa, ya, xb, yb = box
+    samples, x0, y0 = canvas
+    step = 1.0 / samples
+    for y in range(ya, yb + 1):
+        py = (y + y0 + 0.5) * step
+        f0, f1, f2 = e0[1] * py + e0[2], e1[1] * py + e1[2], e2[1] * py + e2[2]
+        low, high = float(xa), float(xb)
+        for e, f in ((e0[0], f0), (e1[0], f1), (e2[0], f2)):
+            if e > 0.0:
+                low = max(low, -f / e * samples - (x0 + 1.5))  # a pixel early
+            elif e < 0.0:
+                high = min(high, -f / e * samples - (x0 - 0.5))  # a pixel late
+        if low > high:
+            continue
+        left, right = math.ceil(low), math.floor(high)
+        while left <= right and not _inside(e0, e1, e2, (left + x0 + 0.5) * step, f0, f1, f2):
+            left += 1
+        while left <= right and not _inside(e0, e1, e2, (right + x0 + 0.5) * step, f0, f1, f2):
+            right -= 1
+        uy, s = np.uintp(y), n[1] * py + n[2]
+        for x in range(left, right + 1):
+            inverse = n[0] * ((x + x0 + 0.5) * step) + s
+            ux = np.uintp(x)
+            better = inverse > nearest[uy, ux]
+            nearest[uy, ux] = inverse if better else nearest[uy, ux]
+            seen[uy, ux] = t if better else seen[uy, ux]
+
+
+@njit
+def _draw_checked(t, q0, q1, q2, box, canvas, bounds, cutout, cutouts, nearest, seen):
+    """Draw a cut-out, or a sliver whose facing is uncertain: either sign will do, 1/z stays within the corners' `bounds`."""
+    xa, ya, xb, yb = box
+    samples, x0, y0 = canvas
+    step = 1.0 / samples
+    nx, ny, nz, det = plane(q0, q1, q2)
+    a, b, c = edge(q1, q2), edge(q2, q0), edge(q0, q1)
+    for y in range(ya, yb + 1):
+        py = (y + y0 + 0.5) * step
+        for x in range(xa, xb + 1):
+            px = (x + x0 + 0.5) * step
+            e0, e1, e2 = a[0] * px + (a[1] * py + a[2]), b[0] * px + (b[1] * py + b[2]), c[0] * px + (c[1] * py + c[2])
+            if not ((e0 >= 0.0 and e1 >= 0.0 and e2 >= 0.0) or (e0 <= 0.0 and e1 <= 0.0 and e2 <= 0.0)):
+                continue
+            inverse = min(max((nx * px + (ny * py + nz)) / det, bounds[0]), bounds[1])
+            if inverse > nearest[y, x] and hits_surface(cutouts, cutout, e0, e1, e2):
+                nearest[y, x] = inverse
+                seen[y, x] = t
+
+
+@njit
+def hits_surface(cutouts, cutout, e0, e1, e2):
+    """Whether the triangle has no cut-out, or is surface where its edges' functions have these values."""
+    total = e0 + e1 + e2
+    return cutout < 0 or (total != 0.0 and is_surface(cutouts, cutout, e0 / total, e1 / total, e2 / total))

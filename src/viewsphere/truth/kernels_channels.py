@@ -13,6 +13,7 @@ import numpy as np
 from viewsphere.geometry.jit import njit
 
 ONE = np.float32(1)
+NONE = -2  # no triangle, nor the background's -1
 
 
 @njit
@@ -37,7 +38,7 @@ def labels(seen, table, empty, out):
             out[y, x] = table[np.uintp(t)] if t >= 0 else empty
 
 
-@njit(inline="always")
+@njit
 def _edges(q, i0, i1, i2, px, py, pz):
     """det[p, q_j, q_k] of the three edges. Taking p's share from each corner first keeps them exact for tiny triangles."""
     a, b, c = np.uintp(0), np.uintp(1), np.uintp(2)
@@ -59,7 +60,7 @@ def _edges(q, i0, i1, i2, px, py, pz):
     return e0, e1, e2
 
 
-@njit(inline="always")
+@njit
 def _weights(q, i0, i1, i2, px, py, pz):
     """Barycentrics of the ray in the triangle."""
     e0, e1, e2 = _edges(q, i0, i1, i2, px, py, pz)
@@ -149,7 +150,7 @@ def normals_shading(seen, triangles, q, rays, values, side, triangle_normals, ca
     table = rays.shape[0] > 0
     m = camera_from_p
     a, b, c = np.uintp(0), np.uintp(1), np.uintp(2)
-    last, nx, ny, nz = -1, 0.0, 0.0, 0.0
+    last, nx, ny, nz = NONE, 0.0, 0.0, 0.0
     for y in range(height):
         uy = np.uintp(y)
         for x in range(width):
@@ -166,7 +167,7 @@ def normals_shading(seen, triangles, q, rays, values, side, triangle_normals, ca
             px, py, pz = (rays[uy, ux, a], rays[uy, ux, b], rays[uy, ux, c]) if table else (x + 0.5, y + 0.5, 1.0)
             i0, i1, i2 = np.uintp(triangles[ut, a]), np.uintp(triangles[ut, b]), np.uintp(triangles[ut, c])
             e0, e1, e2 = _edges(q, i0, i1, i2, px, py, pz)
-            # the e_i have the sign of g . ray, g the normal by winding: this sum lies on g's side if seen from the front, else not
+            # the e_i have the sign of g . ray, g the normal by winding: the sum turns with the side that is seen
             sign = -np.float64(side[ut])
             nx = sign * (e0 * values[i0, a] + e1 * values[i1, a] + e2 * values[i2, a])
             ny = sign * (e0 * values[i0, b] + e1 * values[i1, b] + e2 * values[i2, b])
@@ -185,7 +186,7 @@ def normals_shading(seen, triangles, q, rays, values, side, triangle_normals, ca
             s = 1.0 / math.sqrt(square) if square > 0.0 else 0.0
             nx, ny, nz = nx * s, ny * s, nz * s
             out[uy, ux, a], out[uy, ux, b], out[uy, ux, c] = nx, ny, nz
-            last = t if side[ut] == 2 or side[ut] == -2 else -1
+            last = t if side[ut] == 2 or side[ut] == -2 else NONE
 
 
 @njit

@@ -1,8 +1,10 @@
-"""Exact rasterisation along a table of rays (distorted lenses): a quadtree over the picture finds a triangle's pixels.
+"""Exact rasterisation along a table of rays (distorted lenses).
 
 A ray d meets a triangle where all e_i . d have the sign of det, e_i = X_j x X_k in camera axes: the pinhole's test without the
-projection, so it holds for rays that look sideways or back. A node of the tree keeps the box of its rays; products and sums are
-monotone in floating point too, so the same expression over the box bounds it over the rays, and no hit is lost.
+projection, so it holds for rays that look sideways or back. Two indices say which rays to test. A cube around the camera, each
+face cut into cells that know the pixels whose rays pass them, serves small triangles: projected on a face they are bounded by
+their corners. A quadtree over the picture serves the others: a node keeps the box of its rays, and as products and sums are
+monotone in floating point too, the same expression over the box bounds it over the rays. No hit is lost either way.
 """
 
 from __future__ import annotations
@@ -12,10 +14,13 @@ import math
 import numpy as np
 
 from viewsphere.geometry.jit import njit
-from viewsphere.truth.kernels import _plane, is_surface
+from viewsphere.truth.kernels import NEVER, edge, hits_surface, negated, plane
 
 LEAF = 8  # pixels of a leaf's side
+MANY_CELLS, MANY_PIXELS = 64, 1024  # of a triangle's box: beyond them the tree is faster
+WIDER = 1e-9  # of a face: more than the rounding of a projection
 SLIVER = 1e-12  # of the corners' distances' product: below it the sign of det is not trusted
+ORIGIN = (0.0, 0.0, 0.0)
 
 
 @njit
@@ -59,106 +64,184 @@ def build_tree(rays, levels):
     return boxes
 
 
-@njit(inline="always")
-def _highest(a, b, c, box):
-    return max(a * box[0], a * box[3]) + (max(b * box[1], b * box[4]) + max(c * box[2], c * box[5]))
+@njit
+def _on_face(face, x, y, z):
+    """Projection on a cube's face (0 to 5: +z, -z, +x, -x, +y, -y) and the distance along its axis, not positive if behind."""
+    sign = 1.0 - 2.0 * (face % 2)
+    if face < 2:
+        return x / (sign * z), y / (sign * z), sign * z
+    if face < 4:
+        return y / (sign * x), z / (sign * x), sign * x
+    return z / (sign * y), x / (sign * y), sign * y
 
 
-@njit(inline="always")
-def _lowest(a, b, c, box):
-    return min(a * box[0], a * box[3]) + (min(b * box[1], b * box[4]) + min(c * box[2], c * box[5]))
+@njit
+def build_faces(rays, count, size):
+    """First and last pixel whose ray passes each cell of the first `count` faces: (count, size, size, 4) x, y, x, y."""
+    height, width = rays.shape[:2]
+    cells = np.empty((count, size, size, 4), np.int32)
+    cells[..., 0], cells[..., 1], cells[..., 2:] = width, height, -1
+    for y in range(height):
+        for x in range(width):
+            for face in range(count):
+                u, v, along = _on_face(face, rays[y, x, 0], rays[y, x, 1], rays[y, x, 2])
+                if along > 0.0 and abs(u) <= 1.0 and abs(v) <= 1.0:
+                    cell = cells[face, _cell(v, size), _cell(u, size)]
+                    cell[0], cell[1] = min(cell[0], x), min(cell[1], y)
+                    cell[2], cell[3] = max(cell[2], x), max(cell[3], y)
+    return cells
+
+
+@njit
+def _cell(u, size):
+    return min(np.int64((u + 1.0) * 0.5 * size), size - 1)
+
+
+@njit
+def _box(cells, q0, q1, q2):
+    """Whether the triangle is small and on one face, and if so the box of pixels that may see it."""
+    count, size = cells.shape[:2]
+    ax, ay, az = abs(q0[0]), abs(q0[1]), abs(q0[2])
+    axis = 0 if az >= ax and az >= ay else 1 if ax >= ay else 2
+    face = 2 * axis + (1 if (q0[2], q0[0], q0[1])[axis] < 0.0 else 0)
+    none = (0, 0, -1, -1)
+    if face >= count:
+        return False, none
+    u0, v0, a0 = _on_face(face, q0[0], q0[1], q0[2])
+    u1, v1, a1 = _on_face(face, q1[0], q1[1], q1[2])
+    u2, v2, a2 = _on_face(face, q2[0], q2[1], q2[2])
+    if not (a0 > 0.0 and a1 > 0.0 and a2 > 0.0):
+        return False, none
+    ua, va = min(u0, u1, u2) - WIDER, min(v0, v1, v2) - WIDER
+    ub, vb = max(u0, u1, u2) + WIDER, max(v0, v1, v2) + WIDER
+    if not (ua >= -1.0 and va >= -1.0 and ub <= 1.0 and vb <= 1.0):
+        return False, none
+    ia, ja, ib, jb = _cell(ua, size), _cell(va, size), _cell(ub, size), _cell(vb, size)
+    if (ib - ia + 1) * (jb - ja + 1) > MANY_CELLS:
+        return False, none
+    xa, ya, xb, yb = np.int32(2**30), np.int32(2**30), np.int32(-1), np.int32(-1)
+    for j in range(ja, jb + 1):
+        for i in range(ia, ib + 1):
+            cell = cells[face, j, i]
+            xa, ya, xb, yb = min(xa, cell[0]), min(ya, cell[1]), max(xb, cell[2]), max(yb, cell[3])
+    return (xb - xa + 1) * (yb - ya + 1) <= MANY_PIXELS or xb < 0, (xa, ya, xb, yb)
+
+
+@njit
+def _highest(e, box):
+    return max(e[0] * box[0], e[0] * box[3]) + (max(e[1] * box[1], e[1] * box[4]) + max(e[2] * box[2], e[2] * box[5]))
+
+
+@njit
+def _lowest(e, box):
+    return min(e[0] * box[0], e[0] * box[3]) + (min(e[1] * box[1], e[1] * box[4]) + min(e[2] * box[2], e[2] * box[5]))
+
+
+@njit
+def _may_hit(e0, e1, e2, sliver, box):
+    """Whether some ray in the box may pass the test of all three edges, with the other sign too for a sliver."""
+    if box[0] > box[3]:
+        return False
+    if _highest(e0, box) >= 0.0 and _highest(e1, box) >= 0.0 and _highest(e2, box) >= 0.0:
+        return True
+    return sliver and _lowest(e0, box) <= 0.0 and _lowest(e1, box) <= 0.0 and _lowest(e2, box) <= 0.0
 
 
 @njit
 def _bounds(q0, q1, q2, unit):
     """Least and greatest 1/s on a triangle."""
-    if not unit and q0[2] > 0.0 and q1[2] > 0.0 and q2[2] > 0.0:
+    if unit:
+        farthest = max(_distance(q0, ORIGIN), _distance(q1, ORIGIN), _distance(q2, ORIGIN))
+        nearest = farthest - max(_distance(q0, q1), _distance(q1, q2), _distance(q2, q0))
+        return 1.0 / farthest, 1.0 / nearest if nearest > 0.0 else np.inf
+    if q0[2] > 0.0 and q1[2] > 0.0 and q2[2] > 0.0:
         return 1.0 / max(q0[2], q1[2], q2[2]), 1.0 / min(q0[2], q1[2], q2[2])
-    if not unit:
-        return 0.0, np.inf
-    farthest = max(_distance(q0, 0.0, q0), _distance(q1, 0.0, q1), _distance(q2, 0.0, q2))
-    nearest = farthest - max(_distance(q0, 1.0, q1), _distance(q1, 1.0, q2), _distance(q2, 1.0, q0))
-    return 1.0 / farthest, 1.0 / nearest if nearest > 0.0 else np.inf
+    return 0.0, np.inf
 
 
 @njit
-def _distance(a, s, b):
-    x, y, z = a[0] - s * b[0], a[1] - s * b[1], a[2] - s * b[2]
+def _distance(a, b):
+    x, y, z = a[0] - b[0], a[1] - b[1], a[2] - b[2]
     return math.sqrt(x * x + y * y + z * z)
 
 
 @njit
-def draw(q, triangles, first, last, base, rays, levels, boxes, unit, cutout, texels, layout, levels_alpha, corners, material, nearest, seen):
-    """Draw triangles [first, last) into nearest (1/s, 0 where none) and seen (triangle, -1 where none).
+def draw(q, triangles, span, table, origin, unit, cutout, cutouts, nearest, seen):
+    """Draw triangles into nearest (1/s, 0 where none) and seen (triangle, -1 where none), whose first pixel is the table's `origin`.
 
-    q holds the vertices from `base` on in camera axes; `unit` says that the rays have length 1 rather than z = 1.
+    `span` is the first triangle, the one after the last, and the vertex that q[0] stands for; q is in camera axes; `table` is
+    (rays, levels, boxes, cells). `unit` says that the rays have length 1 rather than z = 1.
     """
-    height, width = nearest.shape
-    stack = np.empty((4 * 64, 3), np.int64)
-    top_level = len(levels) - 1
+    rays, levels, boxes, cells = table
+    first, last, base = span
+    stack = np.empty((256, 3), np.int64)
     for t in range(first, last):
-        if cutout[t] == -2:
-            continue
         i0, i1, i2 = triangles[t, 0] - base, triangles[t, 1] - base, triangles[t, 2] - base
         q0, q1, q2 = (q[i0, 0], q[i0, 1], q[i0, 2]), (q[i1, 0], q[i1, 1], q[i1, 2]), (q[i2, 0], q[i2, 1], q[i2, 2])
-        if not unit and q0[2] <= 0.0 and q1[2] <= 0.0 and q2[2] <= 0.0:
+        if cutout[t] == NEVER or (not unit and q0[2] <= 0.0 and q1[2] <= 0.0 and q2[2] <= 0.0):
             continue
-        nx, ny, nz, det = _plane(q0, q1, q2)
+        small, box = _box(cells, q0, q1, q2)
+        if small and box[2] < 0:
+            continue
+        nx, ny, nz, det = plane(q0, q1, q2)
         if det == 0.0:
             continue
-        a0, b0, c0 = q1[1] * q2[2] - q1[2] * q2[1], q1[2] * q2[0] - q1[0] * q2[2], q1[0] * q2[1] - q1[1] * q2[0]
-        a1, b1, c1 = q2[1] * q0[2] - q2[2] * q0[1], q2[2] * q0[0] - q2[0] * q0[2], q2[0] * q0[1] - q2[1] * q0[0]
-        a2, b2, c2 = q0[1] * q1[2] - q0[2] * q1[1], q0[2] * q1[0] - q0[0] * q1[2], q0[0] * q1[1] - q0[1] * q1[0]
+        e0, e1, e2 = edge(q1, q2), edge(q2, q0), edge(q0, q1)
         if det < 0.0:
-            a0, b0, c0 = -a0, -b0, -c0
-            a1, b1, c1 = -a1, -b1, -c1
-            a2, b2, c2 = -a2, -b2, -c2
-        nx, ny, nz = nx / det, ny / det, nz / det
-        sizes = _distance(q0, 0.0, q0) * _distance(q1, 0.0, q1) * _distance(q2, 0.0, q2)
+            e0, e1, e2 = negated(e0), negated(e1), negated(e2)
+        sizes = _distance(q0, ORIGIN) * _distance(q1, ORIGIN) * _distance(q2, ORIGIN)
         sliver = abs(det) < SLIVER * sizes
-        least, most = _bounds(q0, q1, q2, unit) if sliver else (0.0, np.inf)
-        stack[0] = (top_level, 0, 0)
-        depth = 1
-        while depth > 0:
-            depth -= 1
-            level, row, column = stack[depth]
-            box = boxes[levels[level, 0] + row * levels[level, 2] + column]
-            if box[0] > box[3]:
-                continue
-            outside = _highest(a0, b0, c0, box) < 0.0 or _highest(a1, b1, c1, box) < 0.0 or _highest(a2, b2, c2, box) < 0.0
-            if outside and not (
-                sliver
-                and _lowest(a0, b0, c0, box) <= 0.0
-                and _lowest(a1, b1, c1, box) <= 0.0
-                and _lowest(a2, b2, c2, box) <= 0.0
-            ):
-                continue
-            if level > 0:
-                below = level - 1
-                for k in range(4):
-                    j, i = 2 * row + (k >> 1), 2 * column + (k & 1)
-                    if j < levels[below, 1] and i < levels[below, 2]:
-                        stack[depth] = (below, j, i)
-                        depth += 1
-                continue
-            for y in range(row * LEAF, min(row * LEAF + LEAF, height)):
-                for x in range(column * LEAF, min(column * LEAF + LEAF, width)):
-                    dx, dy, dz = rays[y, x, 0], rays[y, x, 1], rays[y, x, 2]
-                    e0 = a0 * dx + (b0 * dy + c0 * dz)
-                    e1 = a1 * dx + (b1 * dy + c1 * dz)
-                    e2 = a2 * dx + (b2 * dy + c2 * dz)
-                    inside = e0 >= 0.0 and e1 >= 0.0 and e2 >= 0.0
-                    if not inside and not (sliver and e0 <= 0.0 and e1 <= 0.0 and e2 <= 0.0):
-                        continue
-                    inverse = min(max(nx * dx + (ny * dy + nz * dz), least), most)
-                    if inverse > nearest[y, x]:
-                        total = e0 + e1 + e2
-                        if cutout[t] >= 0 and (
-                            total == 0.0
-                            or not is_surface(
-                                texels, layout, levels_alpha, corners, material, cutout[t], e0 / total, e1 / total, e2 / total
-                            )
-                        ):
-                            continue
-                        nearest[y, x] = inverse
-                        seen[y, x] = t
+        bounds = _bounds(q0, q1, q2, unit) if sliver else (0.0, np.inf)
+        n = (nx / det, ny / det, nz / det)
+        if small:
+            _draw_box(t, e0, e1, e2, n, sliver, bounds, rays, box, origin, cutout[t], cutouts, nearest, seen)
+        else:
+            tree = (levels, boxes, stack)
+            _draw_tree(t, e0, e1, e2, n, sliver, bounds, rays, tree, origin, cutout[t], cutouts, nearest, seen)
+
+
+@njit
+def _draw_tree(t, e0, e1, e2, n, sliver, bounds, rays, tree, origin, cutout, cutouts, nearest, seen):
+    """Descend to the leaves the triangle may touch."""
+    levels, boxes, stack = tree
+    height, width = nearest.shape
+    stack[0] = (len(levels) - 1, 0, 0)
+    depth = 1
+    while depth > 0:
+        depth -= 1
+        level, row, column = stack[depth]
+        side = LEAF << level
+        x, y = column * side, row * side
+        if y >= origin[1] + height or y + side <= origin[1] or x >= origin[0] + width or x + side <= origin[0]:
+            continue
+        if not _may_hit(e0, e1, e2, sliver, boxes[levels[level, 0] + row * levels[level, 2] + column]):
+            continue
+        if level == 0:
+            box = (x, y, x + LEAF - 1, y + LEAF - 1)
+            _draw_box(t, e0, e1, e2, n, sliver, bounds, rays, box, origin, cutout, cutouts, nearest, seen)
+            continue
+        below = level - 1
+        for j in range(2 * row, min(2 * row + 2, levels[below, 1])):
+            for i in range(2 * column, min(2 * column + 2, levels[below, 2])):
+                stack[depth] = (below, j, i)
+                depth += 1
+
+
+@njit
+def _draw_box(t, a, b, c, n, sliver, bounds, rays, box, origin, cutout, cutouts, nearest, seen):
+    """Test each ray of a box of pixels (both ends included), as far as the canvas reaches."""
+    height, width = nearest.shape
+    x0, y0 = origin
+    for y in range(max(box[1], y0), min(box[3] + 1, y0 + height)):
+        for x in range(max(box[0], x0), min(box[2] + 1, x0 + width)):
+            dx, dy, dz = rays[y, x, 0], rays[y, x, 1], rays[y, x, 2]
+            e0 = a[0] * dx + (a[1] * dy + a[2] * dz)
+            e1 = b[0] * dx + (b[1] * dy + b[2] * dz)
+            e2 = c[0] * dx + (c[1] * dy + c[2] * dz)
+            inside = e0 >= 0.0 and e1 >= 0.0 and e2 >= 0.0
+            if inside or (sliver and e0 <= 0.0 and e1 <= 0.0 and e2 <= 0.0):
+                inverse = min(max(n[0] * dx + (n[1] * dy + n[2] * dz), bounds[0]), bounds[1])
+                i, j = x - x0, y - y0
+                if inverse > nearest[j, i] and hits_surface(cutouts, cutout, e0, e1, e2):
+                    nearest[j, i] = inverse
+                    seen[j, i] = t

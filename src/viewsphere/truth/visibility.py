@@ -12,6 +12,8 @@ from viewsphere.geometry.camera import Window, pixel_rays
 from viewsphere.model.camera import Camera, Intrinsics
 from viewsphere.truth.geometry import Geometry
 
+LARGEST_AROUND = 4_000_000  # pixels of a ray table that reaches beyond the image (100 MB)
+
 
 @dataclass(frozen=True, eq=False)
 class Visibility:
@@ -75,26 +77,46 @@ def homogeneous(geometry: Geometry, camera: Camera, base: int = 0, stop: int | N
 
 def lens_rays(camera: Camera) -> NDArray[np.float64] | None:
     """The image's ray table, (H, W, 3), None for a pinhole; kept for the next frame, so not to be written to."""
-    return None if camera.distortion is None else _ray_table(camera.intrinsics, 1, None).rays
+    image = (0, 0, camera.width, camera.height)
+    return None if camera.distortion is None else _ray_table(camera.intrinsics.model_dump_json(), 1, image).rays
 
 
 @dataclass(frozen=True, eq=False)
 class _RayTable:
-    """Rays of a lens and the quadtree over them."""
+    """Rays of a lens, and the indices over them that `kernels_rays` builds."""
 
     rays: NDArray[np.float64]
     levels: NDArray[np.int64]
     boxes: NDArray[np.float64]
+    cells: NDArray[np.int32]
+
+
+def _canvas(camera: Camera, window: Window) -> Window:
+    """The pixels to tabulate for this window: few different ones, so that tables serve many windows and frames."""
+    w, h = camera.width, camera.height
+    image, around = (0, 0, w, h), (-w, -h, 2 * w, 2 * h)
+    if _within(window, image):
+        return image
+    return around if _within(window, around) and 9 * w * h <= LARGEST_AROUND else window
+
+
+def _within(a: Window, b: Window) -> bool:
+    return a[0] >= b[0] and a[1] >= b[1] and a[2] <= b[2] and a[3] <= b[3]
 
 
 @lru_cache(maxsize=4)
-def _ray_table(intrinsics: Intrinsics, samples: int, window: Window | None) -> _RayTable:
+def _ray_table(lens: str, samples: int, canvas: Window) -> _RayTable:
+    """Of the intrinsics with this JSON."""
     from viewsphere.truth import kernels_rays as kernels
 
-    rays = pixel_rays(intrinsics, samples, window)
+    intrinsics = Intrinsics.model_validate_json(lens)
+    rays = pixel_rays(intrinsics, samples, canvas)
     rays.setflags(write=False)
     levels = kernels.tree_levels(rays.shape[0], rays.shape[1])
-    return _RayTable(rays, levels, kernels.build_tree(rays, levels))
+    fisheye = intrinsics.distortion is not None and intrinsics.distortion.model == "fisheye"
+    size = min(max(int(intrinsics.fx * samples), 16), 512)  # cells of about two pixels
+    cells = kernels.build_faces(rays, 6 if fisheye else 1, size)
+    return _RayTable(rays, levels, kernels.build_tree(rays, levels), cells)
 
 
 def _draw(
@@ -103,20 +125,21 @@ def _draw(
     """1/s (0 where none) and triangle (-1 where none) over the window, of triangles [first, last)."""
     from viewsphere.truth import kernels, kernels_rays
 
-    x0, y0, x1, y1 = (samples * edge for edge in window or (0, 0, camera.width, camera.height))
+    window = window or (0, 0, camera.width, camera.height)
+    x0, y0, x1, y1 = (samples * edge for edge in window)
     nearest, seen = np.zeros((y1 - y0, x1 - x0)), np.full((y1 - y0, x1 - x0), -1, np.int32)
     first, last, base, stop = part
+    span = (first, last, base)
     q = homogeneous(geometry, camera, base, stop)
-    c = geometry.cutouts
-    surface = (geometry.triangle_cutout, c.texels, c.layout, c.levels, c.corners, c.material)
+    cut = (geometry.triangle_cutout, geometry.cutouts.arrays)
     if camera.distortion is not None:
-        table = _ray_table(camera.intrinsics, samples, window)
-        unit = camera.distortion.model == "fisheye"
-        kernels_rays.draw(
-            q, geometry.triangles, first, last, base, table.rays, table.levels, table.boxes, unit, *surface, nearest, seen
-        )
+        canvas = _canvas(camera, window)
+        t = _ray_table(camera.intrinsics.model_dump_json(), samples, canvas)
+        origin = (x0 - samples * canvas[0], y0 - samples * canvas[1])
+        table, unit = (t.rays, t.levels, t.boxes, t.cells), camera.distortion.model == "fisheye"
+        kernels_rays.draw(q, geometry.triangles, span, table, origin, unit, *cut, nearest, seen)
         return nearest, seen
     cell = np.empty((stop - base, 4), np.int32)
     kernels.cells(q, samples, x0, y0, x1 - x0, y1 - y0, cell)
-    kernels.draw(q, cell, geometry.triangles, first, last, base, samples, x0, y0, *surface, nearest, seen)
+    kernels.draw(q, cell, geometry.triangles, span, (samples, x0, y0), *cut, nearest, seen)
     return nearest, seen

@@ -22,6 +22,6 @@ def read_gltf(folder: ModelFolder) -> tuple[Mesh, FileFacts]:
     """
     document = Document.read(folder)
     pieces = read_pieces(document)
-    materials = read_materials(document)
+    materials = read_materials(document, {piece.material for piece in pieces})
     facts = FileFacts(folder.model, folder.model.suffix[1:].lower(), "+y", "+z", 1.0)
     return assemble(folder, pieces, materials, facts)

@@ -81,15 +81,11 @@ class Document:
         asset = self.root.get("asset")
         version = asset.text("minVersion", asset.text("version", "missing"))
         if version != "2.0" and not (version.startswith("2.") and "minVersion" not in asset):
-            raise self.folder.error(
-                f"expected glTF version 2.0, found {version}; export the model as glTF 2.0"
-            )
+            raise self.folder.error(f"expected glTF version 2.0, found {version}; export the model as glTF 2.0")
         required = {str(extension.value) for extension in self.root.items("extensionsRequired")}
         unknown = sorted(required - READ_EXTENSIONS - HARMLESS_EXTENSIONS)
         if unknown:
-            raise self.folder.error(
-                f"requires the extension {', '.join(unknown)}, not read here; export without it"
-            )
+            raise self.folder.error(f"requires the extension {', '.join(unknown)}, not read here; export without it")
 
     def buffer(self, index: int) -> bytes:
         """Bytes of a buffer; ModelError when it is missing or shorter than it says."""
@@ -103,9 +99,7 @@ class Document:
             else:
                 raise self.folder.error(f"buffers[{index}] has neither a uri nor a binary chunk")
             if len(data) < length:
-                raise self.folder.error(
-                    f"buffers[{index}]: expected {length} bytes, found {len(data)}: truncated"
-                )
+                raise self.folder.error(f"buffers[{index}]: expected {length} bytes, found {len(data)}: truncated")
             self._buffers[index] = data
         return self._buffers[index]
 
@@ -124,9 +118,7 @@ class Document:
         offset, length = entry.integer("byteOffset", 0), entry.integer("byteLength")
         data = self.buffer(entry.integer("buffer"))
         if offset + length > len(data):
-            raise self.folder.error(
-                f"bufferViews[{index}]: expected bytes up to {offset + length}, the buffer has {len(data)}"
-            )
+            raise self.folder.error(f"bufferViews[{index}]: expected bytes up to {offset + length}, the buffer has {len(data)}")
         stride = entry.integer("byteStride", 0) or None
         return memoryview(data)[offset : offset + length], stride
 
@@ -150,10 +142,10 @@ class Document:
     def _dense(self, entry: Field, dtype: np.dtype[Any], width: int, kind: str) -> NDArray[Any]:
         count = entry.integer("count")
         if count > 3 * limits.MAX_TRIANGLES:
-            raise self.folder.error(
-                f"{entry.where}: expected at most {3 * limits.MAX_TRIANGLES:,} elements, found {count:,}"
-            )
+            raise self.folder.error(f"{entry.where}: expected at most {3 * limits.MAX_TRIANGLES:,} elements, found {count:,}")
         if "bufferView" not in entry:
+            if count > limits.MAX_ZEROS:
+                raise self.folder.error(f"{entry.where}: expected a bufferView for {count:,} elements, found none")
             return np.zeros((count, width), dtype)
         data, stride = self.view(entry.integer("bufferView"))
         return self._strided(entry, data[entry.integer("byteOffset", 0) :], dtype, count, width, stride, kind)
@@ -176,13 +168,9 @@ class Document:
         step = stride or element
         if count and (step < element or (count - 1) * step + element > len(data)):
             found = f"{len(data)} bytes in steps of {step}"
-            raise self.folder.error(
-                f"{entry.where}: expected {count} elements of {element} bytes, found {found}: truncated"
-            )
+            raise self.folder.error(f"{entry.where}: expected {count} elements of {element} bytes, found {found}: truncated")
         values = np.ndarray((count, stored), dtype, data if count else b"", 0, (step, dtype.itemsize))
-        return (
-            values.reshape(count, -1, rows + pad)[:, :, :rows].reshape(count, width) if pad else values.copy()
-        )
+        return values.reshape(count, -1, rows + pad)[:, :, :rows].reshape(count, width) if pad else values.copy()
 
     def _patched(self, sparse: Field, values: NDArray[Any]) -> NDArray[Any]:
         count = sparse.integer("count")
@@ -194,9 +182,7 @@ class Document:
         dtype = np.dtype(COMPONENTS[code]).newbyteorder("<")
         indices = self._strided(at, index_data[at.integer("byteOffset", 0) :], dtype, count, 1)[:, 0]
         value_data, _ = self.view(new.integer("bufferView"))
-        replacement = self._strided(
-            new, value_data[new.integer("byteOffset", 0) :], values.dtype, count, values.shape[1]
-        )
+        replacement = self._strided(new, value_data[new.integer("byteOffset", 0) :], values.dtype, count, values.shape[1])
         if count and int(indices.max()) >= len(values):
             raise at.fail(f"sparse indices below {len(values)}")
         values[indices] = replacement
@@ -217,9 +203,7 @@ def _chunks(folder: ModelFolder, data: bytes) -> tuple[bytes, bytes | None]:
     while offset + 8 <= length:
         size, kind = struct.unpack_from("<I4s", data, offset)
         if offset + 8 + size > length:
-            raise folder.error(
-                f"expected a chunk of {size} bytes at {offset}, found {length - offset - 8}: truncated"
-            )
+            raise folder.error(f"expected a chunk of {size} bytes at {offset}, found {length - offset - 8}: truncated")
         chunks.setdefault(kind, data[offset + 8 : offset + 8 + size])
         offset += 8 + size
     if b"JSON" not in chunks:

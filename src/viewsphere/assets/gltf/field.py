@@ -18,9 +18,7 @@ class Field:
     def fail(self, expected: str) -> ModelError:
         """The error that says what was expected here."""
         found = repr(self.value)
-        return ModelError(
-            f"{self.where}: expected {expected}, found {found if len(found) < 60 else found[:57] + '...'}"
-        )
+        return ModelError(f"{self.where}: expected {expected}, found {found if len(found) < 60 else found[:57] + '...'}")
 
     def __contains__(self, key: str) -> bool:
         """Whether this object has the key."""
@@ -71,19 +69,13 @@ class Field:
         """A member that is a finite number."""
         return self.numbers(key, 1, (default,), scalar=True)[0]
 
-    def numbers(
-        self, key: str, count: int, default: tuple[float, ...], scalar: bool = False
-    ) -> tuple[float, ...]:
+    def numbers(self, key: str, count: int, default: tuple[float, ...], scalar: bool = False) -> tuple[float, ...]:
         """A member that is an array of `count` finite numbers."""
         value = self.mapping().get(key)
         if value is None:
             return default
         values: list[Any] = [value] if scalar else cast("list[Any]", value) if isinstance(value, list) else []
-        real = [
-            float(v)
-            for v in values
-            if isinstance(v, int | float) and not isinstance(v, bool) and abs(v) < 1e30
-        ]
+        real = [float(v) for v in values if isinstance(v, int | float) and not isinstance(v, bool) and abs(v) < 1e30]
         if len(real) != count or len(values) != count:
             raise Field(value, f"{self.where}.{key}").fail("a number" if scalar else f"{count} numbers")
         return tuple(real)

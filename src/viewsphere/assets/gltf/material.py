@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 from urllib.parse import unquote
@@ -17,13 +18,15 @@ NEAREST = 9728
 DIELECTRIC = 0.04  # reflectance at normal incidence of ior 1.5
 
 
-def read_materials(document: Document) -> list[Material]:
-    """All materials in file order, then one for primitives that name none.
+def read_materials(document: Document, used: Collection[int]) -> list[Material]:
+    """All materials in file order (those not used are left plain), then one for primitives that name none.
 
     Primitives without material are plain white plastic rather than the specification's mirror-like metal.
     """
     reader = _Reader(document)
-    return [*(reader.material(entry) for entry in document.root.items("materials")), Material(name="default")]
+    entries = document.root.items("materials")
+    read = [reader.material(entry) if i in used else Material() for i, entry in enumerate(entries)]
+    return [*read, Material(name="default")]
 
 
 @dataclass(frozen=True)
@@ -122,15 +125,9 @@ class _Reader:
         texcoord = transform.integer("texCoord", info.integer("texCoord", 0))
         if image is None or texcoord > 1:
             if image is not None:
-                self.document.folder.warn(
-                    f"{key} uses TEXCOORD_{texcoord}, only 0 and 1 are read; its factor is used"
-                )
+                self.document.folder.warn(f"{key} uses TEXCOORD_{texcoord}, only 0 and 1 are read; its factor is used")
             return None
-        sampler = (
-            self.document.root.at("samplers", entry.integer("sampler"))
-            if "sampler" in entry
-            else Field({}, "")
-        )
+        sampler = self.document.root.at("samplers", entry.integer("sampler")) if "sampler" in entry else Field({}, "")
         offset = transform.numbers("offset", 2, (0.0, 0.0))
         scale = transform.numbers("scale", 2, (1.0, 1.0))
         return Texture(
@@ -173,9 +170,7 @@ def _metallic(diffuse: tuple[float, ...], specular: tuple[float, ...]) -> tuple[
     else:
         b = d * strength / (1 - DIELECTRIC) + s - 2 * DIELECTRIC
         c = DIELECTRIC - s
-        metallic = float(
-            np.clip((-b + np.sqrt(max(b * b - 4 * DIELECTRIC * c, 0.0))) / (2 * DIELECTRIC), 0.0, 1.0)
-        )
+        metallic = float(np.clip((-b + np.sqrt(max(b * b - 4 * DIELECTRIC * c, 0.0))) / (2 * DIELECTRIC), 0.0, 1.0))
     tiny = 1e-6
     from_diffuse = np.array(diffuse) * strength / (1 - DIELECTRIC) / max(1 - metallic, tiny)
     from_specular = (np.array(specular) - DIELECTRIC * (1 - metallic)) / max(metallic, tiny)

@@ -9,7 +9,7 @@ import numpy as np
 from viewsphere.assets import limits
 from viewsphere.assets.gltf.document import Document
 from viewsphere.assets.gltf.field import Field
-from viewsphere.assets.piece import Float, Int, Piece
+from viewsphere.assets.piece import Float, Int, Piece, compact
 from viewsphere.assets.smoothing import flat
 from viewsphere.assets.transform import moved, unit
 
@@ -47,8 +47,7 @@ def read_pieces(document: Document) -> list[Piece]:
 def _check_total(document: Document, total: int) -> None:
     if total > limits.MAX_TRIANGLES:
         raise document.folder.error(
-            f"expected at most {limits.MAX_TRIANGLES:,} triangles, found {total:,} "
-            "with all instances; simplify the model"
+            f"expected at most {limits.MAX_TRIANGLES:,} triangles, found {total:,} with all instances; simplify the model"
         )
 
 
@@ -74,9 +73,7 @@ def _world_matrices(document: Document) -> dict[int, Float]:
     while stack:
         index, parent = stack.pop()
         if index in worlds:
-            raise document.folder.error(
-                f"nodes[{index}] is reached twice: expected a tree, found a cycle or a shared child"
-            )
+            raise document.folder.error(f"nodes[{index}] is reached twice: expected a tree, found a cycle or a shared child")
         node = root.at("nodes", index)
         worlds[index] = parent @ _local_matrix(node)
         stack.extend((child, worlds[index]) for child in reversed(_indices(node, "children")))
@@ -140,16 +137,15 @@ def _instances(document: Document, node: Field, world: Float) -> list[Float]:
     return list(world @ _compose(t, r, s))
 
 
-def _primitives(
-    document: Document, mesh: Field, weights: tuple[float, ...], joints: Float | None
-) -> list[Piece]:
+def _primitives(document: Document, mesh: Field, weights: tuple[float, ...], joints: Float | None) -> list[Piece]:
     """A mesh's triangles in its own axes, or in the world's when `joints` (J, 4, 4) bend it."""
     pieces: list[Piece] = []
     for entry in mesh.items("primitives"):
         piece = _primitive(document, entry)
         if piece is not None:
             piece = _morphed(document, entry, piece, weights)
-            pieces.append(piece if joints is None else _skinned(document, entry, piece, joints))
+            pieces.append(compact(piece if joints is None else _skinned(document, entry, piece, joints)))
+            _check_total(document, sum(len(piece.triangles) for piece in pieces))
     return pieces
 
 
@@ -205,9 +201,7 @@ def _primitive(document: Document, entry: Field) -> Piece | None:
         return None
     if "POSITION" not in attributes:
         if entry.extension("KHR_draco_mesh_compression") is not None:
-            raise document.folder.error(
-                "uses KHR_draco_mesh_compression, not read here; export without compression"
-            )
+            raise document.folder.error("uses KHR_draco_mesh_compression, not read here; export without compression")
         document.folder.warn("a primitive without positions is left out")
         return None
     positions = _attribute(document, attributes, "POSITION", (3,), None)
@@ -228,9 +222,7 @@ def _primitive(document: Document, entry: Field) -> Piece | None:
     )
 
 
-def _attribute(
-    document: Document, attributes: Field, key: str, widths: tuple[int, ...], count: int | None
-) -> Float | None:
+def _attribute(document: Document, attributes: Field, key: str, widths: tuple[int, ...], count: int | None) -> Float | None:
     if key not in attributes:
         return None
     values = document.accessor(attributes.integer(key), widths).astype(np.float64)
@@ -255,9 +247,7 @@ def _triangles(document: Document, entry: Field, mode: int, count: int) -> Int:
     else:
         indices = np.arange(count)
     if len(indices) and int(indices.max()) >= count:
-        raise document.folder.error(
-            f"{entry.where}.indices: expected indices below {count}, found {indices.max()}"
-        )
+        raise document.folder.error(f"{entry.where}.indices: expected indices below {count}, found {indices.max()}")
     if mode == TRIANGLES:
         return indices[: len(indices) // 3 * 3].reshape(-1, 3)
     if len(indices) < 3:

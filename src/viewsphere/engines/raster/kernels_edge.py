@@ -16,7 +16,7 @@ U = nb.uintp
 
 @njit
 def seen_samples(triangle, wanted):
-    """Indices of the samples whose triangle is wanted (T + 1,) bool, the last entry for triangle -1; int32."""
+    """Indices (int32) of the samples whose triangle is wanted: (T + 1,) bool, the last entry for triangle -1."""
     count = 0
     for i in range(triangle.shape[0]):
         count += wanted[triangle[i]]
@@ -33,7 +33,7 @@ def seen_samples(triangle, wanted):
 def edge_pixels(triangle, depth, fine_triangle, fine_depth, owner, normals):
     """Pixels whose four quarters do not all show the surface at the centre, flat indices int32.
 
-    owner (T,) int32: equal where neighbouring triangles look alike (same object and material); normals (T, 3) float32.
+    owner (T,) int32: equal where neighbouring triangles look alike (same object and material); normals (T, 3).
     """
     height, width = triangle.shape
     found = np.empty(height * width, np.int32)
@@ -50,11 +50,7 @@ def edge_pixels(triangle, depth, fine_triangle, fine_depth, owner, normals):
                 if q < 0 or t < 0 or owner[q] != owner[t]:
                     edge = True
                     break
-                bend = abs(
-                    normals[q, 0] * normals[t, 0]
-                    + normals[q, 1] * normals[t, 1]
-                    + normals[q, 2] * normals[t, 2]
-                )
+                bend = abs(normals[q, 0] * normals[t, 0] + normals[q, 1] * normals[t, 1] + normals[q, 2] * normals[t, 2])
                 ratio = fine_depth[v, u] / depth[y, x]
                 if bend < f4(0.94) or ratio > f4(1.01) or ratio < f4(0.99):
                     edge = True
@@ -67,7 +63,7 @@ def edge_pixels(triangle, depth, fine_triangle, fine_depth, owner, normals):
 
 @njit
 def quarters(pixels, width, fine_triangle, fine_depth, background):
-    """The four samples of each pixel: index in the fine grid, triangle, inverse depth, colour beneath (from the pixel)."""
+    """The four samples of each pixel: index in the fine grid, triangle, inverse depth, the pixel's background."""
     n = pixels.shape[0]
     where = np.empty(4 * n, np.int32)
     triangle = np.empty(4 * n, np.int32)
@@ -107,7 +103,10 @@ def encode(color, curve):
 
 @njit(fastmath=FAST)
 def sky_picture(view, light, knee, count):
-    """The sky behind everything, (count, 3) float32 linear: a gradient over elevation, brighter around the sun."""
+    """The sky behind everything, (count, 3) float32 display-linear: a gradient, brighter around the sun.
+
+    Black where the lens has no ray.
+    """
     out = np.empty((count, 3), np.float32)
     one, zero = f4(1), f4(0)
     r = view.rotation
@@ -124,6 +123,9 @@ def sky_picture(view, light, knee, count):
         x = r[0, 0] * a + r[1, 0] * b + r[2, 0] * c
         y = r[0, 1] * a + r[1, 1] * b + r[2, 1] * c
         z = r[0, 2] * a + r[1, 2] * b + r[2, 2] * c
+        if not z == z:
+            out[i] = zero
+            continue
         s = one / f4(math.sqrt(x * x + y * y + z * z))
         up = min(max(z * s, zero), one)
         rest = (one - up) * (one - up) * (one - up)
@@ -132,11 +134,7 @@ def sky_picture(view, light, knee, count):
         p *= p
         glow = p * f4(0.12) + p * p * p * p * p * p * f4(0.25)
         for k in range(3):
-            v = (
-                light.zenith[k]
-                + (light.horizon[k] - light.zenith[k]) * rest
-                + glow * light.sun_color[k] * f4(0.32)
-            )
+            v = light.zenith[k] + (light.horizon[k] - light.zenith[k]) * rest + glow * light.sun_color[k] * f4(0.32)
             over = max(v - knee, zero) / (one - knee)
             out[i, k] = min(v, knee) + (one - knee) * over / (one + over)
     return out

@@ -19,7 +19,8 @@ BLOCK = 8
 def nearest_depth(points, surfaces, textures, size):
     """Parallel projection: smallest depth over each cell's centre, (size, size) float32, infinity where none.
 
-    points (V, 3) float64: column, row, depth. A surface is there where its alpha reaches its material's last column.
+    points (V, 3) float64: column, row, depth. A surface is there where its alpha reaches its material's last
+    column.
     """
     depth = np.full((size, size), np.inf, np.float32)
     uv = np.zeros(4, np.float32)
@@ -90,10 +91,10 @@ def depth_bounds(depth):
 
 @njit
 def sky_left(low, high, directions, reach):
-    """Share of the sky's light that reaches the ground, (n, n) float32, objects being columns from `low` to `high`.
+    """Share of the sky's light that reaches the ground, (n, n) float32; objects are columns from low to high.
 
-    low, high (n, n): heights above the ground in cells, low infinite where there is nothing. In each direction the elevations
-    behind columns are struck from 64 bins of equal cosine-weighted solid angle.
+    low, high (n, n): heights above the ground in cells, low infinite where there is nothing. In each direction the
+    elevations behind columns are struck from 64 bins of equal cosine-weighted solid angle.
     """
     n = low.shape[0]
     left = np.ones((n, n), np.float32)
@@ -104,7 +105,8 @@ def sky_left(low, high, directions, reach):
         for x in range(n):
             hidden = 0
             for d in range(directions):
-                angle = (d + 0.5) * 2.0 * math.pi / directions
+                # Each cell of a 4 x 4 tile looks in other directions; blurring over a tile averages them.
+                angle = (d + ((x & 3) * 4 + (y & 3)) / 16.0) * 2.0 * math.pi / directions
                 dx, dy = math.cos(angle), math.sin(angle)
                 mask = nb.uint64(0)
                 r = 0.35

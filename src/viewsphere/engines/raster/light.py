@@ -18,7 +18,8 @@ Float = NDArray[np.float64]
 
 _CELLS = 128  # of the ground's light map, each way
 _FINE = 4  # samples a cell, each way
-_DIRECTIONS = 16
+_DIRECTIONS = 12
+_DEEPEST = 0.88  # the rest is light that objects and ground throw back and forth
 _MARGIN = 8  # empty texels around the shadow map
 _SURROUNDINGS = 0.3  # reflectance of what lies below the horizon when there is no ground
 
@@ -37,9 +38,7 @@ class Extent:
         return float(np.linalg.norm(self.high - self.low)) / 2 or 1.0
 
 
-def bake_light(
-    scene: Scene, extent: Extent, surfaces: Surfaces, textures: Textures, exposure: float, resolution: int
-) -> Light:
+def bake_light(scene: Scene, extent: Extent, surfaces: Surfaces, textures: Textures, exposure: float, resolution: int) -> Light:
     """All that depends on scene and objects but not on the camera; `resolution` is the shadow map's width."""
     strength = exposure * scene.sky.strength
     zenith, horizon = (strength * np.array(c) for c in (scene.sky.zenith, scene.sky.horizon))
@@ -47,9 +46,7 @@ def bake_light(
     direction, irradiance = np.array([0.0, 0.0, 1.0]), np.zeros(3)
     shadow, matrix = np.full((kernels.BLOCK, kernels.BLOCK), np.inf, np.float32), np.zeros((3, 4))
     if scene.sun is not None and scene.sun.strength > 0:
-        direction = orbit_center(
-            math.radians(scene.sun.azimuth_deg), math.radians(scene.sun.elevation_deg), 1.0
-        )
+        direction = orbit_center(math.radians(scene.sun.azimuth_deg), math.radians(scene.sun.elevation_deg), 1.0)
         irradiance = exposure * scene.sun.strength * np.array(scene.sun.color)
         shadow, matrix = _shadow_map(direction, extent, surfaces, textures, resolution)
     low, high = kernels.depth_bounds(shadow)
@@ -59,12 +56,21 @@ def bake_light(
     if extent.ground_z is not None:
         total = float((from_sky + from_sun).sum())
         sun_share = float(from_sun.sum()) / total if total > 0 else 0.0
-        ground, frame = _ground_light(extent, surfaces, textures, shadow, matrix, sun_share)
-    colors = (direction, irradiance, sky, zenith, horizon, albedo * (from_sky + from_sun))
+        ground, frame = _ground_light(extent, extent.ground_z, surfaces, textures, shadow, matrix, sun_share)
     return Light(
-        *(np.ascontiguousarray(a, np.float32) for a in colors),
-        shadow, low, high, matrix.astype(np.float32), ground, frame,
-    )  # fmt: skip
+        sun=direction.astype(np.float32),
+        sun_color=irradiance.astype(np.float32),
+        sky=np.ascontiguousarray(sky, np.float32),
+        zenith=zenith.astype(np.float32),
+        horizon=horizon.astype(np.float32),
+        earth=(albedo * (from_sky + from_sun)).astype(np.float32),
+        shadow=shadow,
+        shadow_low=low,
+        shadow_high=high,
+        shadow_from_world=np.ascontiguousarray(matrix, np.float32),
+        ground=ground,
+        ground_frame=frame,
+    )
 
 
 def _sky_on_white(zenith: Float, horizon: Float) -> Float:
@@ -80,9 +86,7 @@ def _sky_on_white(zenith: Float, horizon: Float) -> Float:
     return np.linalg.lstsq(np.vander(tilt[:, 0, 0], 4, increasing=True), received, rcond=None)[0]
 
 
-def _shadow_map(
-    direction: Float, extent: Extent, surfaces: Surfaces, textures: Textures, size: int
-) -> tuple[Float32, Float]:
+def _shadow_map(direction: Float, extent: Extent, surfaces: Surfaces, textures: Textures, size: int) -> tuple[Float32, Float]:
     """Nearest depths seen from the sun, fitted to the objects, and the (3, 4) matrix from the world to its texels."""
     right = np.array([-direction[1], direction[0], 0.0])
     length = float(np.linalg.norm(right))
@@ -102,35 +106,37 @@ def _shadow_map(
 
 
 def _ground_light(
-    extent: Extent, surfaces: Surfaces, textures: Textures, shadow: Float32, matrix: Float, sun_share: float
+    extent: Extent,
+    ground_z: float,
+    surfaces: Surfaces,
+    textures: Textures,
+    shadow: Float32,
+    matrix: Float,
+    sun_share: float,
 ) -> tuple[Float32, Float32]:
     """What the objects leave to the ground, (n, n, 2): share of the sky's light, share of all light; and its frame."""
-    height = extent.high[2] - extent.ground_z
+    height = extent.high[2] - ground_z
     half = float(max((extent.high - extent.low)[:2].max() / 2, 1e-3 * extent.radius) + 0.9 * height)
     corner = (extent.low + extent.high)[:2] / 2 - half
     scale = _CELLS / (2 * half)
-    low, high = _columns(extent.ground_z, scale, corner, surfaces, textures)
+    low, high = _columns(ground_z, scale, corner, surfaces, textures)
     left = kernels.sky_left(low, high, _DIRECTIONS, _CELLS * 0.6)
     inward = np.minimum(np.arange(_CELLS) + 0.5, _CELLS - np.arange(_CELLS) - 0.5) / (0.15 * _CELLS)
     window = np.clip(np.minimum(inward[:, None], inward), 0, 1)
-    left = 1 - (1 - _smoothed(left)) * window
+    left = 1 - (1 - _smoothed(left)) * window * _DEEPEST
     fine = (np.arange(2 * _CELLS) + 0.5) / (2 * scale)
     x, y = np.meshgrid(corner[0] + fine, corner[1] + fine)
-    u, v, w = (
-        matrix[k, 0] * x + matrix[k, 1] * y + matrix[k, 2] * extent.ground_z + matrix[k, 3] for k in range(3)
-    )
+    u, v, w = (matrix[k, 0] * x + matrix[k, 1] * y + matrix[k, 2] * ground_z + matrix[k, 3] for k in range(3))
     inside = (u >= 0) & (v >= 0) & (u < len(shadow)) & (v < len(shadow))
     column, row = (np.where(inside, a, 0).astype(np.int32) for a in (u, v))
     lit = ~inside | (shadow[row, column] >= w - 1)
     lit = _smoothed(lit.reshape(_CELLS, 2, _CELLS, 2).mean(axis=(1, 3)))
     total = (1 - sun_share) * left + sun_share * (1 - (1 - lit) * window)
-    frame = [scale, *corner, extent.radius, extent.ground_z, max(height, 1e-6 * extent.radius), 1.0]
+    frame = [scale, *corner, extent.radius, ground_z, max(height, 1e-6 * extent.radius), 1.0]
     return np.ascontiguousarray(np.stack([left, total], axis=-1), np.float32), np.array(frame, np.float32)
 
 
-def _columns(
-    ground_z: float, scale: float, corner: Float, surfaces: Surfaces, textures: Textures
-) -> tuple[Float32, Float32]:
+def _columns(ground_z: float, scale: float, corner: Float, surfaces: Surfaces, textures: Textures) -> tuple[Float32, Float32]:
     """Lowest and highest surface above each cell of the ground, in cells; low is infinite where there is none."""
     points = surfaces.vertices[:, 11:14].astype(np.float64)
     points[:, :2] = (points[:, :2] - corner) * (scale * _FINE)
@@ -144,7 +150,8 @@ def _columns(
 
 
 def _smoothed(grid: NDArray[np.floating]) -> NDArray[np.floating]:
-    """Blurred by (1, 2, 1) / 4 each way."""
-    padded = np.pad(grid, 1, mode="edge")
-    rows = (padded[:-2] + 2 * padded[1:-1] + padded[2:]) / 4
-    return (rows[:, :-2] + 2 * rows[:, 1:-1] + rows[:, 2:]) / 4
+    """Blurred by (1, 2, 2, 2, 1) / 8 each way, which averages tiles of four."""
+    for _ in range(2):
+        p = np.pad(grid, ((2, 2), (0, 0)), mode="edge")
+        grid = ((p[:-4] + p[4:] + 2 * (p[1:-3] + p[2:-2] + p[3:-1])) / 8).T
+    return grid

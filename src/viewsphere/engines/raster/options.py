@@ -27,9 +27,7 @@ def parse_options(given: Mapping[str, JsonValue]) -> Options:
         if name not in known:
             near = get_close_matches(name, known, 1)
             hint = f"; did you mean {near[0]!r}?" if near else ""
-            raise UserError(
-                f"raster engine: unknown option {name!r}: expected one of {', '.join(known)}{hint}"
-            )
+            raise UserError(f"raster engine: unknown option {name!r}: expected one of {', '.join(known)}{hint}")
     default = Options()
     antialias = given.get("antialias", default.antialias)
     if isinstance(antialias, bool) or antialias not in (1, 4):
@@ -39,7 +37,5 @@ def parse_options(given: Mapping[str, JsonValue]) -> Options:
         raise UserError(f"raster engine: exposure: expected stops from -16 to 16, found {exposure!r}")
     resolution = given.get("shadow_resolution", default.shadow_resolution)
     if isinstance(resolution, bool) or not isinstance(resolution, int) or not 64 <= resolution <= 8192:
-        raise UserError(
-            f"raster engine: shadow_resolution: expected an integer in 64..8192, found {resolution!r}"
-        )
+        raise UserError(f"raster engine: shadow_resolution: expected an integer in 64..8192, found {resolution!r}")
     return Options(4 if antialias == 4 else 1, float(exposure), resolution - resolution % 8)

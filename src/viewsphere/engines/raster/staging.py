@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,11 +41,13 @@ class RasterStage:
     seen: NDArray[np.bool_]
     see_through: NDArray[np.bool_]
     _backgrounds: dict[tuple[Background, int, int], Float32 | None] = field(default_factory=dict)
+    _rays: dict[tuple[Intrinsics, int], Float32] = field(default_factory=dict)
 
     def color(self, camera: Camera, frame: Frame, visibility: Visibility) -> NDArray[np.uint8]:
         """The picture, (H, W, 3) uint8 sRGB; `visibility` is truth's buffer for this camera.
 
-        Edge pixels are the mean of their four quarters in linear light. Raises UserError for an unreadable background image.
+        Edge pixels are the mean of their four quarters in linear light. Raises UserError for an unreadable
+        background image.
         """
         background = self._background(camera, frame.background or self.scene.background)
         color = background.copy()
@@ -66,12 +67,10 @@ class RasterStage:
         plain = self._backgrounds[key]
         if plain is not None:
             return plain
-        view = _view(camera, self.origin, 1)
+        view = self._view(camera, 1)
         return kernels_edge.sky_picture(view, self.light, _KNEE, camera.width * camera.height)
 
-    def _smooth_edges(
-        self, camera: Camera, visibility: Visibility, background: Float32, color: Float32
-    ) -> None:
+    def _smooth_edges(self, camera: Camera, visibility: Visibility, background: Float32, color: Float32) -> None:
         fine = rasterize(self.geometry, camera, subdivision=2)
         pixels = kernels_edge.edge_pixels(
             visibility.triangle, visibility.inverse_depth, fine.triangle, fine.inverse_depth,
@@ -83,11 +82,9 @@ class RasterStage:
         self._paint(camera, 2, where, triangle, depth, samples)
         kernels_edge.average_quarters(pixels, samples, color)
 
-    def _paint(
-        self, camera: Camera, subdivision: int, where: Int32, triangle: Int32, depth: Float32, color: Float32
-    ) -> None:
+    def _paint(self, camera: Camera, subdivision: int, where: Int32, triangle: Int32, depth: Float32, color: Float32) -> None:
         """Shade samples over `color`; see-through surfaces over the nearest solid one behind them."""
-        view = _view(camera, self.origin, subdivision)
+        view = self._view(camera, subdivision)
         front = kernels_edge.seen_samples(triangle, self.see_through)
         if len(front):
             solid = rasterize(self._solid(), camera, subdivision)
@@ -100,14 +97,30 @@ class RasterStage:
 
     def _shade(self, view: View, where: Int32, triangle: Int32, depth: Float32, color: Float32) -> None:
         slots = kernels_edge.seen_samples(triangle, self.seen)
-        kernels_shade.shade(
-            view, self.surfaces, self.textures, self.light, _KNEE, slots, where, triangle, depth, color
-        )
+        kernels_shade.shade(view, self.surfaces, self.textures, self.light, _KNEE, slots, where, triangle, depth, color)
 
     def _solid(self) -> Geometry:
         """The geometry without its see-through surfaces."""
         hidden = np.where(self.see_through[:-1], np.int32(-2), self.geometry.triangle_cutout)
         return replace(self.geometry, triangle_cutout=hidden.astype(np.int32))
+
+    def _view(self, camera: Camera, subdivision: int) -> View:
+        lens = inverse_camera_matrix(camera.intrinsics)[:2] / [subdivision, subdivision, 1.0]
+        rays = np.zeros((0, 3), np.float32)
+        if camera.distortion is not None:
+            key = camera.intrinsics, subdivision
+            if key not in self._rays:
+                table = pixel_rays(camera.intrinsics, subdivision)
+                self._rays[key] = table.astype(np.float32).reshape(-1, 3)
+            rays = self._rays[key]
+        return View(
+            (camera.center - self.origin).astype(np.float32),
+            camera.R.astype(np.float32),
+            lens.astype(np.float32),
+            rays,
+            np.uint32(camera.width * subdivision),
+            np.float32(1 / np.sqrt(camera.intrinsics.fx * camera.intrinsics.fy)),
+        )
 
 
 def build_stage(shot: Shot, load: Callable[[ModelSpec], Mesh]) -> RasterStage:
@@ -138,23 +151,3 @@ def _baked(geometry: Geometry, meshes: Sequence[Mesh], scene: Scene, options: Op
     seen = np.append(np.ones(len(own), np.bool_), False)
     owner = (geometry.triangle_object * len(surfaces.materials) + surfaces.material).astype(np.int32)
     return RasterStage(geometry, scene, options, origin, surfaces, textures, light, owner, seen, see_through)
-
-
-def _view(camera: Camera, origin: NDArray[np.float64], subdivision: int) -> View:
-    lens = inverse_camera_matrix(camera.intrinsics)[:2] @ np.diag([1 / subdivision, 1 / subdivision, 1.0])
-    rays = np.zeros((0, 3), np.float32)
-    if camera.distortion is not None:
-        rays = _distorted_rays(camera.intrinsics, subdivision)
-    return View(
-        (camera.center - origin).astype(np.float32),
-        camera.R.astype(np.float32),
-        lens.astype(np.float32),
-        rays,
-        np.uint32(camera.width * subdivision),
-        np.float32(1 / np.sqrt(camera.intrinsics.fx * camera.intrinsics.fy)),
-    )
-
-
-@lru_cache(maxsize=2)
-def _distorted_rays(intrinsics: Intrinsics, subdivision: int) -> Float32:
-    return pixel_rays(intrinsics, subdivision).astype(np.float32).reshape(-1, 3)

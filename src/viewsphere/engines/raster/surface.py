@@ -14,9 +14,9 @@ from viewsphere.engines.raster.tone import linear_from_srgb
 from viewsphere.model.shot import Ground
 from viewsphere.truth.geometry import Geometry
 
-# Columns of Surfaces.materials: base colour and alpha (4), roughness, metallic, emission (3), reflectance at normal incidence,
-# clear coat and its roughness, unlit, ground, blended, transmission, alpha from which it casts a shadow (0: always, above 1:
-# never). Columns of Surfaces.slots: base colour, metallic-roughness, emission.
+# Columns of Surfaces.materials: base colour and alpha (4), roughness, metallic, emission (3), reflectance at normal
+# incidence, clear coat and its roughness, unlit, ground, blended, transmission, alpha from which it casts a shadow
+# (0: always, above 1: never). Columns of Surfaces.slots: base colour, metallic-roughness, emission.
 BLENDED, TRANSMISSION = 14, 15
 _NO_SHADOW = 2.0
 
@@ -28,7 +28,7 @@ def pack_surfaces(
     origin: NDArray[np.float64],
     exposure: float,
 ) -> tuple[Surfaces, Textures]:
-    """Arrays for all triangles of the geometry; `meshes` as it was built from; positions relative to `origin`."""
+    """Arrays for all triangles of a geometry and of the meshes it was built from; positions from `origin`."""
     vertices = np.zeros((len(geometry.vertices), 16), np.float32)
     vertices[:, :3] = geometry.normals
     vertices[:, 7:11] = 1.0
@@ -93,7 +93,7 @@ def _ground_row(ground: Ground) -> list[float]:
 
 
 def _uv_density(vertices: Float32, triangles: NDArray[np.int32]) -> Float32:
-    """Texture coordinates per metre on each triangle, (T, 2) for both sets: the root mean square over directions."""
+    """Texture coordinates per metre on each triangle, (T, 2) for both sets: root mean square over directions."""
     density = np.zeros((len(triangles), 2), np.float32)
     a, b, c = (vertices[triangles[:, k]] for k in range(3))
     p, q = b[:, 11:14] - a[:, 11:14], c[:, 11:14] - a[:, 11:14]

@@ -14,6 +14,7 @@ from viewsphere.engines.raster.tone import linear_words
 
 _WRAPS = ("repeat", "clamp", "mirror")
 _LEVELS = 16
+_LARGEST = 8192  # texels; larger images start at a smaller level
 
 
 class TexturePacker:
@@ -22,16 +23,17 @@ class TexturePacker:
     def __init__(self) -> None:
         self._slots: dict[tuple[int, bool, Texture], int] = {}
         self._images: dict[tuple[int, bool], list[tuple[int, int, int]]] = {}
-        self._kept: list[Image] = []  # an image that lives keeps its id to itself
         self._texels: list[NDArray[np.uint16]] = []
         self._count = 0
 
     def slot(self, images: Sequence[Image], texture: Texture | None, is_color: bool) -> int:
-        """This use's index in `Textures`, -1 for no texture; colours are decoded from sRGB, data are taken as they are."""
+        """This use's index in `Textures`, -1 for no texture; colours are decoded from sRGB, data are not.
+
+        The images must outlive the packer: it tells them apart by identity.
+        """
         if texture is None:
             return -1
         image = images[texture.image]
-        self._kept.append(image)
         key = (id(image), is_color)
         if key not in self._images:
             self._images[key] = [self._store(level) for level in _mip_levels(image.pixels, is_color)]
@@ -69,7 +71,7 @@ def _transform(texture: Texture) -> NDArray[np.float64]:
 
 
 def _mip_levels(pixels: NDArray[np.uint8], is_color: bool) -> list[NDArray[np.uint16]]:
-    """The image and its halvings, (H, W, 4) uint16 linear; colours weighted by alpha, so that hidden ones do not bleed."""
+    """The image and its halvings, (H, W, 4) uint16 linear; colours weighted by alpha: hidden ones do not bleed."""
     base = pixels.astype(np.uint16) * np.uint16(257)
     if is_color:
         base[..., :3] = linear_words()[pixels[..., :3]]
@@ -78,7 +80,7 @@ def _mip_levels(pixels: NDArray[np.uint8], is_color: bool) -> list[NDArray[np.ui
     while max(current.shape[:2]) > 1 and len(levels) < _LEVELS:
         current = _halved(current, is_color)
         levels.append(np.round(current).astype(np.uint16))
-    return levels
+    return [level for level in levels if max(level.shape[:2]) <= _LARGEST]
 
 
 def _halved(image: NDArray[np.float32], is_color: bool) -> NDArray[np.float32]:

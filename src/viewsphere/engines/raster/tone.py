@@ -1,7 +1,8 @@
 """Colour: the sRGB curve both ways, exposure and the highlight roll-off.
 
-Display-linear values lie in [0, 1] and go through the sRGB curve (IEC 61966-2-1) alone. Light becomes display-linear by
-`EXPOSURE` and, above `KNEE`, the roll-off k + (1 - k) y / (1 + y), y = (x - k) / (1 - k): smooth, never clipped.
+Display-linear values lie in [0, 1] and go through the sRGB curve (IEC 61966-2-1) alone. Light becomes
+display-linear by `EXPOSURE` and, above `KNEE`, the roll-off k + (1 - k) y / (1 + y), y = (x - k) / (1 - k): smooth,
+never clipped.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ def srgb_from_linear(value: ArrayLike) -> NDArray[np.float64]:
 
 @cache
 def srgb_bytes() -> NDArray[np.uint8]:
-    """sRGB bytes of 65,536 linear values from 0 to 1: fine enough that every byte survives the way there and back."""
+    """sRGB bytes of 65,536 linear values from 0 to 1: every byte survives the way there and back."""
     return np.round(srgb_from_linear(np.arange(65536) / 65535) * 255).astype(np.uint8)
 
 

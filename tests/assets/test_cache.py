@@ -1,0 +1,151 @@
+"""The cache never changes what is loaded, only how long it takes."""
+
+import io
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from viewsphere.assets import cache
+from viewsphere.assets.cache import cache_folder, load_normalised, real_size
+from viewsphere.assets.mesh import Mesh
+from viewsphere.errors import ModelError
+from viewsphere.model.shot import ModelSpec
+
+CUBE = "v 0 0 0\nv 1 0 0\nv 0 2 0\nv 0 0 3\n"
+FACES = "vt 0 0\nusemtl m\ng base\nf 1/1 3/1 2/1\nf 1/1 2/1 4/1\ng top\nf 2/1 3/1 4/1\nf 3/1 1/1 4/1\n"
+
+
+def png(color):
+    file = io.BytesIO()
+    Image.new("RGBA", (2, 3), color).save(file, "PNG")
+    return file.getvalue()
+
+
+@pytest.fixture
+def spec(write):
+    write("m/skin.png", png("red"))
+    write("m/a.mtl", "newmtl m\nKd 0.1 0.2 0.3\nmap_Kd skin.png\nmap_Bump lost.png\n")
+    path = write("m/a.obj", "mtllib a.mtl\n" + CUBE + FACES)
+    return ModelSpec(key="a", source=str(path), category="thing", category_id=1)
+
+
+@pytest.fixture
+def counted(monkeypatch):
+    """How often a model file was read."""
+    calls = []
+    read = cache.load_model
+    monkeypatch.setattr(cache, "load_model", lambda *args, **kw: calls.append(args) or read(*args, **kw))
+    return calls
+
+
+def assert_same(a: Mesh, b: Mesh):
+    for name in cache.ARRAYS:
+        left, right = getattr(a, name), getattr(b, name)
+        assert (left is None) == (right is None)
+        if left is not None:
+            assert left.dtype == right.dtype
+            assert left.tobytes() == right.tobytes()
+    assert (a.materials, a.parts, a.warnings) == (b.materials, b.parts, b.warnings)
+    assert [(i.name, i.pixels.tobytes()) for i in a.images] == [(i.name, i.pixels.tobytes()) for i in b.images]
+
+
+def test_a_second_load_is_equal_and_reads_nothing(spec, counted, tmp_path):
+    first = load_normalised(spec, folder=tmp_path / "cache")
+    second = load_normalised(spec.model_copy(update={"key": "b", "category": "other"}), folder=tmp_path / "cache")
+    assert len(counted) == 1
+    assert_same(first, second)
+    assert first.parts == ("base", "top")
+    assert any("lost.png" in warning for warning in first.warnings)
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("m/a.obj", "mtllib a.mtl\n" + CUBE.replace("3\n", "4\n") + FACES),
+        ("m/a.mtl", "newmtl m\nKd 1 0 0\n"),
+        ("m/skin.png", png("blue")),
+        ("m/lost.png", png((128, 128, 255))),
+    ],
+)
+def test_a_change_of_any_file_is_seen_and_undone(spec, counted, write, tmp_path, name, content):
+    folder = tmp_path / "cache"
+    before = load_normalised(spec, folder=folder)
+    path = tmp_path / name
+    old = path.read_bytes() if path.exists() else None
+    write(name, content)
+    changed = load_normalised(spec, folder=folder)
+    assert len(counted) == 2
+    assert_same(changed, load_normalised(spec, folder=tmp_path / "fresh"))
+    with pytest.raises(AssertionError):
+        assert_same(before, changed)
+    if old is None:
+        path.unlink()
+    else:
+        path.write_bytes(old)
+    assert_same(before, load_normalised(spec, folder=folder))
+
+
+def test_settings_and_readers_are_part_of_the_key(spec, counted, monkeypatch, tmp_path):
+    folder = tmp_path / "cache"
+    load_normalised(spec, folder=folder)
+    tall = load_normalised(spec.model_copy(update={"scale": 2.0}), folder=folder)
+    assert np.ptp(tall.bounds, axis=0)[1] == pytest.approx(2)
+    monkeypatch.setattr(cache, "_readers_digest", lambda: "other readers")
+    load_normalised(spec, folder=folder)
+    assert len(counted) == 3
+
+
+def test_damaged_entries_are_built_again(spec, tmp_path):
+    folder = tmp_path / "cache"
+    first = load_normalised(spec, folder=folder)
+    entries = sorted(folder.iterdir())
+    assert {entry.suffix for entry in entries} == {".json", ".npz"}
+    for entry in entries:
+        whole = entry.read_bytes()
+        for damaged in (b"", whole[: len(whole) // 2], b"x" * len(whole)):
+            entry.write_bytes(damaged)
+            assert_same(first, load_normalised(spec, folder=folder))
+            assert entry.read_bytes() == whole
+
+
+def test_an_unwritable_cache_is_no_error(spec, write):
+    blocked = write("blocked", b"a file, not a folder")
+    assert len(load_normalised(spec, folder=blocked / "cache").triangles) == 4
+
+
+def test_equal_files_in_two_folders_share_an_entry(spec, counted, write, tmp_path):
+    import shutil
+
+    copy = shutil.copytree(tmp_path / "m", tmp_path / "copy")
+    first = load_normalised(spec, folder=tmp_path / "cache")
+    second = load_normalised(spec.model_copy(update={"source": str(copy / "a.obj")}), folder=tmp_path / "cache")
+    assert len(counted) == 1
+    assert_same(first, second)
+
+
+def test_zoo_models_are_built_normalised_and_not_cached(spec, tmp_path):
+    mesh = load_normalised(spec, folder=tmp_path / "cache")
+    zoo = spec.model_copy(update={"source": "zoo:thing", "centring": "floor"})
+    found = load_normalised(zoo, lambda _: mesh, tmp_path / "other")
+    assert found.bounds[0, 2] == 0
+    assert not (tmp_path / "other").exists()
+    with pytest.raises(ModelError, match="zoo:thing"):
+        load_normalised(zoo)
+
+
+def test_the_real_size_may_be_the_file_s(spec, tmp_path):
+    assert real_size(spec) is None
+    assert real_size(spec.model_copy(update={"real_size": (1.0, 2.0, 3.0)})) == (1, 2, 3)
+    scaled = spec.model_copy(update={"real_size": "file", "scale": 5.0})
+    assert real_size(scaled, folder=tmp_path / "cache") == (1, 2, 3)
+
+
+def test_missing_models_are_reported_by_the_reader(spec, tmp_path):
+    with pytest.raises(ModelError, match="no such file"):
+        load_normalised(spec.model_copy(update={"source": str(tmp_path / "no.obj")}), folder=tmp_path / "cache")
+
+
+def test_the_environment_moves_the_cache(monkeypatch, tmp_path):
+    monkeypatch.setenv("VIEWSPHERE_CACHE", str(tmp_path))
+    assert cache_folder() == tmp_path / "models"

@@ -1,0 +1,361 @@
+import json
+import shutil
+
+import numpy as np
+import pytest
+
+import viewsphere.check
+from cube_dataset import LENS, make
+from viewsphere.check import check
+from viewsphere.errors import MissingExtraError
+from viewsphere.formats import coco, native
+from viewsphere.geometry.mask import encode_rle
+from viewsphere.model.camera import Distortion
+from viewsphere.model.channel import CHANNELS
+from viewsphere.store import Dataset, encode
+
+
+def export(dataset):
+    for name, module in (("coco", coco), ("native", native)):
+        (dataset.root / name).mkdir()
+        module.export(dataset, dataset.root / name)
+    return dataset
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    return export(make(tmp_path_factory.mktemp("check") / "out", ground=True))
+
+
+@pytest.fixture
+def dataset(whole, tmp_path):
+    """A copy, free to be spoilt."""
+    return Dataset(shutil.copytree(whole.root, tmp_path / "out"))
+
+
+def failures(dataset, **options):
+    report = check(dataset, **options)
+    assert report.ok == (not report.findings)
+    return {(f.check, f.frame) for f in report.findings}
+
+
+def edit_record(dataset, frame, change):
+    """Change the record of a frame; all shots have four frames."""
+    file = dataset.store.shot_folder(f"shot-{frame // 4}") / "frames.json"
+    records = json.loads(file.read_text())
+    change(records[frame % 4])
+    file.write_text(json.dumps(records))
+
+
+def edit_channel(dataset, frame, name, change):
+    sample = dataset[frame]
+    array = np.array(sample.channels[name])
+    change(array)
+    dataset.path(sample.files[name]).write_bytes(encode(CHANNELS[name], array))
+
+
+def edit_json(file, change):
+    value = json.loads(file.read_text())
+    change(value)
+    file.write_text(json.dumps(value))
+
+
+def test_a_whole_data_set_passes(whole):
+    report = check(whole)
+    assert report.ok, report.findings
+    assert report.notes == ()
+    names = ["files", "ids", "masks", "boxes", "projection", "poses", "surface", "coco", "native"]
+    assert report.checked == dict.fromkeys(names, 12)
+    assert json.loads(json.dumps(report.to_json()))["ok"] is True
+
+
+LENSES = {
+    "brown_conrady": Distortion(model="brown_conrady", coefficients=(-0.2, 0.05, 0.001, 0.0, 0.0)),
+    "fisheye": Distortion(model="fisheye", coefficients=(0.02, 0.05, 0.001, 0.0)),
+}
+
+
+@pytest.mark.parametrize("lens", LENSES)
+def test_bent_pictures_pass(tmp_path, lens):
+    report = check(make(tmp_path, intrinsics=LENS.model_copy(update={"distortion": LENSES[lens]})))
+    assert report.ok, report.findings
+
+
+def test_several_objects_pass_with_and_without_exports(tmp_path):
+    dataset = make(tmp_path, several=True)
+    report = check(dataset)
+    assert report.ok, report.findings
+    assert any(note.startswith("coco: not exported") for note in report.notes)
+    assert any(note.startswith("native: not exported") for note in report.notes)
+    assert "native" not in report.checked
+    assert check(export(dataset)).ok
+
+
+def test_pictures_alone_pass_with_notes(tmp_path):
+    report = check(make(tmp_path, channels=("rgb",)))
+    assert report.ok, report.findings
+    assert any("depth and instances" in note for note in report.notes)
+
+
+def test_rays_are_cast_on_the_frames_asked_for(whole, monkeypatch):
+    assert check(whole, sample=3).checked["surface"] == 3
+    assert "surface" not in check(whole, rays=False).checked
+    monkeypatch.setattr("viewsphere.check.rays.find_spec", lambda name: None)
+    assert any(note.startswith("surface: not checked") for note in check(whole).notes)
+    with pytest.raises(MissingExtraError, match=r"viewsphere\[check\]"):
+        check(whole, rays=True)
+
+
+@pytest.mark.parametrize("spoil", [lambda f: f.unlink(), lambda f: f.write_bytes(f.read_bytes()[:-20])])
+def test_a_missing_or_broken_file(dataset, spoil):
+    spoil(dataset.path(dataset[5].files["normals"]))
+    assert failures(dataset) == {("files", 5)}
+
+
+def test_a_file_of_another_size(dataset):
+    file = dataset.path(dataset[5].files["depth"])
+    file.write_bytes(encode(CHANNELS["depth"], np.ones((9, 9), np.float32)))
+    assert ("files", 5) in failures(dataset, rays=False)
+
+
+def test_a_broken_record(dataset):
+    (dataset.store.shot_folder("shot-1") / "frames.json").write_text("[{}")
+    assert {("files", i) for i in range(4, 8)} <= failures(dataset)
+
+
+def test_a_missing_shot_and_model(dataset):
+    shutil.rmtree(dataset.store.shot_folder("shot-2"))
+    dataset.path("store/models/block-1/block-1.glb").unlink()
+    report = check(Dataset(dataset.root), rays=False)
+    messages = [f.message for f in report.findings if f.check == "counts"]
+    assert "expected 12 frames (3 models x 4 poses), found 8" in messages[0]
+    assert "block-1.glb" in messages[1]
+
+
+def test_what_was_left_out_on_purpose_is_a_note(tmp_path):
+    dataset = make(tmp_path, leave_out=(2,))
+    assert failures(dataset) == {("counts", None)}
+    (dataset.store.folder / "skipped.json").write_text(json.dumps({"shot-2": "no triangles"}))
+    report = check(Dataset(dataset.root))
+    assert report.ok
+    assert "shot-2 was left out: no triangles" in report.notes
+
+
+def test_a_record_of_another_frame(dataset):
+    edit_record(dataset, 6, lambda r: r.update(index=3))
+    assert ("ids", 6) in failures(dataset)
+
+
+def test_an_unknown_id_in_the_map(dataset):
+    edit_channel(dataset, 2, "instances", lambda a: a.__setitem__((0, 0), 9))
+    assert ("ids", 2) in failures(dataset)
+
+
+def test_a_wrong_category(dataset):
+    edit_channel(dataset, 2, "categories", lambda a: a.__setitem__(dataset[2].instances > 0, 3))
+    assert failures(dataset) == {("ids", 2)}
+
+
+def test_a_pixel_more_in_the_map(dataset):
+    edit_channel(dataset, 9, "instances", lambda a: a.__setitem__((0, 0), 1))
+    edit_channel(dataset, 9, "categories", lambda a: a.__setitem__((0, 0), 3))
+    assert {("masks", 9), ("coco", 9)} <= failures(dataset)
+
+
+def test_wrong_run_lengths(dataset):
+    def change(record):
+        mask = dataset[1].objects[0].mask.copy()
+        mask[mask.any(axis=1).argmax()] = False
+        record["objects"][0]["rle"]["counts"] = encode_rle(mask)
+
+    edit_record(dataset, 1, change)
+    assert {("masks", 1), ("boxes", 1)} <= failures(dataset)
+
+
+def test_run_lengths_that_are_none(dataset):
+    edit_record(dataset, 1, lambda r: r["objects"][0]["rle"].update(counts="?!"))
+    assert ("masks", 1) in failures(dataset)
+
+
+@pytest.mark.parametrize(("key", "value"), [("area", 7), ("visibility", 0.0), ("truncation", 1.5)])
+def test_a_wrong_number_of_pixels(dataset, key, value):
+    edit_record(dataset, 1, lambda r: r["objects"][0].update({key: value}))
+    assert ("masks", 1) in failures(dataset)
+
+
+@pytest.mark.parametrize("name", ["box2d", "box2d_projected", "box2d_unclipped"])
+def test_a_wrong_2d_box(dataset, name):
+    def change(record):
+        box = record["objects"][0][name]
+        record["objects"][0][name] = [box[0] + 2, *box[1:]]
+
+    edit_record(dataset, 3, change)
+    assert {f for f in failures(dataset) if f[0] != "coco"} == {("boxes", 3)}
+
+
+@pytest.mark.parametrize("name", ["box3d_object", "box3d", "box3d_camera", "box3d_pixels", "camera_from_object"])
+def test_a_wrong_3d_box_or_pose(dataset, name):
+    def change(record):
+        record["objects"][0][name][1][1] += 3e-6
+
+    edit_record(dataset, 3, change)
+    assert ("projection", 3) in failures(dataset)
+
+
+def test_a_vertex_that_is_not_behind(dataset):
+    def change(record):
+        record["objects"][0]["box3d_in_front"][0] = False
+
+    edit_record(dataset, 3, change)
+    assert failures(dataset) == {("projection", 3)}
+
+
+def test_a_wrong_quaternion_and_size(dataset):
+    edit_record(dataset, 3, lambda r: r["objects"][0].update(quaternion=[1, 0, 0, 0]))
+    edit_record(dataset, 4, lambda r: r["objects"][0].update(size=[1, 2, 3]))
+    assert failures(dataset) == {("projection", 3), ("projection", 4)}
+
+
+def test_a_wrong_camera(dataset):
+    edit_record(dataset, 3, lambda r: r["camera"]["t"].__setitem__(2, 2.5))
+    assert {("projection", 3), ("poses", 3)} <= failures(dataset)
+
+
+@pytest.mark.parametrize("name", ["azimuth_deg", "elevation_deg", "tilt_deg", "distance"])
+def test_a_wrong_pose(dataset, name):
+    edit_record(dataset, 3, lambda r: r["pose"].update({name: r["pose"][name] + 0.01}))
+    assert {f for f in failures(dataset) if f[0] != "native"} == {("poses", 3)}
+
+
+def test_a_wrong_view(dataset):
+    edit_record(dataset, 3, lambda r: r["objects"][0]["view"].update(azimuth_deg=11))
+    assert failures(dataset) == {("poses", 3)}
+
+
+def test_depth_that_is_not_the_models(dataset):
+    edit_channel(dataset, 7, "depth", lambda a: a.__imul__(np.float32(1.001)))
+    assert failures(dataset) == {("surface", 7)}
+    assert failures(dataset, rays=False) == set()
+
+
+def test_another_model_than_was_drawn(dataset):
+    shutil.copy(dataset.path("store/models/block-2/block-2.glb"), dataset.path("store/models/block-0/block-0.glb"))
+    assert failures(dataset) == {("surface", i) for i in range(4)}
+
+
+def instances_file(dataset, split="train"):
+    return dataset.root / "coco" / "annotations" / f"instances_{split}.json"
+
+
+def spoil_segmentation(value):
+    value["annotations"][2]["segmentation"][0][0] += 3
+
+
+def spoil_area(value):
+    value["annotations"][2]["area"] += 1
+
+
+def spoil_bbox(value):
+    value["annotations"][2]["bbox"][2] += 1
+
+
+def spoil_category(value):
+    value["annotations"][2]["category_id"] = 92
+
+
+def drop_annotation(value):
+    del value["annotations"][2]
+
+
+def drop_image(value):
+    del value["images"][2], value["annotations"][2]
+
+
+@pytest.mark.parametrize("spoil", [spoil_segmentation, spoil_area, spoil_bbox, spoil_category, drop_annotation, drop_image])
+def test_a_wrong_coco_annotation(dataset, spoil):
+    edit_json(instances_file(dataset), spoil)
+    found = failures(dataset, rays=False)
+    assert ("coco", 2) in found
+    assert {name for name, _ in found} == {"coco"}
+
+
+def test_average_precision_is_demanded(dataset):
+    edit_json(instances_file(dataset), lambda v: v["annotations"][2].update(segmentation=[[0, 0, 3, 0, 3, 3, 0, 3]]))
+    messages = [f.message for f in check(dataset, rays=False).findings]
+    assert any(m.startswith("segm: expected AP 1.0") for m in messages)
+
+
+@pytest.mark.parametrize("kind", ["images", "annotations"])
+def test_coco_ids_that_are_not_unique_or_start_at_0(dataset, kind):
+    edit_json(instances_file(dataset), lambda v: v[kind][2].update(id=v[kind][1]["id"]))
+    assert any("unique" in f.message for f in check(dataset, rays=False).findings)
+    edit_json(instances_file(dataset), lambda v: v[kind][2].update(id=0))
+    assert any("from 1" in f.message for f in check(dataset, rays=False).findings)
+
+
+@pytest.mark.parametrize("name", ["000000000003.png", "MASK/000000000003.png"])
+def test_a_missing_coco_file(dataset, name):
+    (dataset.root / "coco" / "train" / name).unlink()
+    assert failures(dataset, rays=False) == {("coco", 2)}
+
+
+def test_a_coco_file_that_is_none(dataset):
+    instances_file(dataset, "val").write_text("{}")
+    assert failures(dataset, rays=False) == {("coco", None)}
+
+
+def native_entry(value):
+    return value["poses"]["2"]["vehicles_rendered"]["block-1"]  # frame 6
+
+
+def drop_key(value):
+    del native_entry(value)["render_scale"]
+
+
+def drop_entry(value):
+    del value["poses"]["2"]["vehicles_rendered"]["block-1"]
+
+
+def negative_distance(value):
+    value["poses"]["2"]["distance"] *= -1
+
+
+def rename_mask(value):
+    native_entry(value)["path_mask"] = "nowhere.png"
+
+
+def move_box(value):
+    native_entry(value)["bbox_2D"][0] += 1
+
+
+@pytest.mark.parametrize("spoil", [drop_key, drop_entry, negative_distance, rename_mask, move_box])
+def test_a_wrong_native_entry(dataset, spoil):
+    edit_json(dataset.root / "native" / "dataset1.json", spoil)
+    found = failures(dataset, rays=False)
+    assert ("native", 6) in found
+    assert {name for name, _ in found} == {"native"}
+
+
+def drop_vehicle(value):
+    del value["vehicles"]["block-0"]
+
+
+def drop_face(value):
+    del value["vehicles"]["block-0"]["bbox3D_model"]["left"]
+
+
+def drop_poses(value):
+    del value["poses"]
+
+
+@pytest.mark.parametrize("spoil", [drop_vehicle, drop_face, drop_poses])
+def test_a_wrong_native_file(dataset, spoil):
+    edit_json(dataset.root / "native" / "dataset1.json", spoil)
+    assert failures(dataset, rays=False) == {("native", None)}
+
+
+def test_findings_say_where(dataset):
+    edit_record(dataset, 3, lambda r: r["objects"][0].update(area=1))
+    finding = next(f for f in check(dataset, rays=False).findings if f.check == "masks")
+    assert str(finding).startswith("masks: frame 3: object 1: expected area")
+    assert viewsphere.check.Finding("counts", None, "x").__str__() == "counts: x"
