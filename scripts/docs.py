@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 import sys
+from enum import Enum
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
-from typer.main import get_command
+from typer.models import ArgumentInfo
 
-from viewsphere.cli import app
+from viewsphere import cli
 from viewsphere.model.channel import CHANNELS
 from viewsphere.model.recipe_file import schema
 
@@ -19,40 +21,45 @@ NOTE = "<!-- written by scripts/docs; do not edit -->\n\n"
 
 
 def cli_page() -> str:
-    text = (
-        NOTE
-        + "# Command line\n\n"
+    text = NOTE + "# Command line\n\n"
     text += "Exit status: 0 done, 1 a data set failed its check, 2 a mistake that can be mended, 130 stopped with Ctrl-C.\n"
-    )
-    for name, command in get_command(app).commands.items():  # type: ignore[attr-defined]
-        arguments = [p for p in command.params if p.param_type_name == "argument"]
-        options = [p for p in command.params if p.param_type_name == "option" and p.name != "help"]
-        usage = " ".join(
-            ["viewsphere", name, *(p.name.upper() for p in arguments), *(["[OPTIONS]"] if options else [])]
-        )
-        text += f"\n## {name}\n\n{command.help.strip()}\n\n```\n{usage}\n```\n"
-        if command.params:
-            text += "\n| | |\n|---|---|\n" + "".join(f"| {label(p)} | {meaning(p)} |\n" for p in arguments + options)
+    for command in cli.app.registered_commands:
+        function = command.callback
+        assert function is not None
+        rows = [row(p) for p in inspect.signature(function, eval_str=True).parameters.values()]
+        arguments = [name for name, _ in rows if not name.startswith("-")]
+        usage = " ".join(["viewsphere", command.name or function.__name__, *arguments])
+        options = " [OPTIONS]" if len(rows) > len(arguments) else ""
+        text += f"\n## {function.__name__}\n\n{inspect.getdoc(function)}\n\n```\n{usage}{options}\n```\n"
+        if rows:
+            cells = "".join(f"| {', '.join(f'`{n}`' for n in name.split())} | {help_} |\n" for name, help_ in rows)
+            text += f"\n| | |\n|---|---|\n{cells}"
     return text
 
 
-def label(parameter: Any) -> str:
-    if parameter.param_type_name == "argument":
-        return f"`{parameter.name.upper()}`"
-    return ", ".join(f"`{o}`" for o in (*parameter.opts, *parameter.secondary_opts))
+def row(parameter: inspect.Parameter) -> tuple[str, str]:
+    """Names and meaning of one argument or option."""
+    kind, info = get_args(parameter.annotation)[:2]
+    plain = parameter.name.strip("_").replace("_", "-")
+    if isinstance(info, ArgumentInfo):
+        return plain.upper(), info.help or ""
+    words = (info.default, *(info.param_decls or ()))  # in Annotated, typer keeps the first name as the default
+    declared = [word for word in words if isinstance(word, str) and word.startswith("-")]
+    names = " ".join(declared or ([f"--{plain}", f"--no-{plain}"] if kind is bool else [f"--{plain}"]))
+    return names, f"{info.help}{choices(kind)}{default(parameter.default)}"
 
 
-def meaning(parameter: Any) -> str:
-    text = parameter.help or ""
-    choices = getattr(parameter.type, "choices", None)
-    if choices:
-        text += " One of " + ", ".join(str(getattr(c, "value", c)) for c in choices) + "."
-    if parameter.required and parameter.param_type_name == "option":
-        text += " Required."
-    default = parameter.default
-    if default not in (None, False, ()) and not callable(default) and isinstance(default, (int, str, Path)):
-        text += f" Default: {default}."
-    return text.strip()
+def choices(kind: Any) -> str:
+    """The values of an enumeration, wherever it hides in a type."""
+    if inspect.isclass(kind) and issubclass(kind, Enum):
+        return f" One of {', '.join(member.value for member in kind)}."
+    return "".join(choices(inner) for inner in get_args(kind))
+
+
+def default(value: Any) -> str:
+    if value is inspect.Parameter.empty:
+        return " Required."
+    return "" if value in (None, False) else f" Default: {value}."
 
 
 def channels_page() -> str:
@@ -63,9 +70,7 @@ def channels_page() -> str:
     )
     for c in CHANNELS.values():
         file = {"png": "PNG", "png16": "16-bit PNG", "tiff": "TIFF"}[c.encoding]
-        text += (
-            f"| `{c.name}` | {np.dtype(c.dtype)} | {c.components} | {c.unit} | {c.empty:g} | {file} | {c.meaning} |\n"
-        )
+        text += f"| `{c.name}` | {np.dtype(c.dtype)} | {c.components} | {c.unit} | {c.empty:g} | {file} | {c.meaning} |\n"
     return text
 
 
@@ -77,14 +82,10 @@ PAGES = {
 
 
 def main() -> None:
-    stale = [
-        name for name, make in PAGES.items() if not (DOCS / name).exists() or (DOCS / name).read_text("utf-8") != make()
-    ]
+    stale = [name for name, make in PAGES.items() if not (DOCS / name).exists() or (DOCS / name).read_text("utf-8") != make()]
     if "--check" in sys.argv:
         if stale:
-            sys.exit(
-                f"docs/{', docs/'.join(stale)}: expected what the code says, found something else: run scripts/docs"
-            )
+            sys.exit(f"docs/{', docs/'.join(stale)}: expected what the code says, found something else: run scripts/docs")
         return
     for name in stale:
         (DOCS / name).write_text(PAGES[name](), "utf-8")

@@ -34,7 +34,7 @@ def dataset(whole, tmp_path):
 
 
 def failures(dataset, **options):
-    report = check(dataset, **options)
+    report = check(Dataset(dataset.root), **options)  # afresh: an open one keeps what it has read
     assert report.ok == (not report.findings)
     return {(f.check, f.frame) for f in report.findings}
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+from collections import Counter
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -13,6 +14,7 @@ import typer
 from viewsphere.errors import CheckFailedError, StoreError, UserError, ViewsphereError
 
 if TYPE_CHECKING:
+    from viewsphere.check import Report
     from viewsphere.model.recipe import Recipe
     from viewsphere.run.generate import Listener, Progress, Summary
     from viewsphere.sampling.plan import Plan
@@ -25,6 +27,8 @@ app = typer.Typer(
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
+
+MOST_FINDINGS = 20
 
 RecipeFile = Annotated[Path, typer.Argument(help="Recipe (YAML).", show_default=False)]
 DataFolder = Annotated[Path, typer.Argument(help="Folder that `render` wrote.", show_default=False)]
@@ -210,8 +214,7 @@ def check(
     if json_:
         _print_json(report.to_json())
     else:
-        for line in report.lines():
-            typer.echo(line)
+        _print_report(report)
     if not report.ok:
         raise typer.Exit(1)
 
@@ -277,6 +280,19 @@ def _print_plan(planned: Plan) -> None:
     )
     for warning in planned.warnings:
         typer.echo(f"warning: {warning}", err=True)
+
+
+def _print_report(report: Report) -> None:
+    failed = Counter(finding.check for finding in report.findings)
+    for name, count in report.checked.items():
+        typer.echo(f"{name:12} {f'{failed[name]:,} findings' if failed[name] else 'ok':14} {count:,} checked")
+    for note in report.notes:
+        typer.echo(f"note: {note}")
+    for finding in report.findings[:MOST_FINDINGS]:
+        typer.echo(f"failed: {finding}", err=True)
+    if len(report.findings) > MOST_FINDINGS:
+        typer.echo(f"and {len(report.findings) - MOST_FINDINGS:,} findings more; --json lists all", err=True)
+    typer.echo("all proofs hold" if report.ok else f"{len(report.findings):,} findings")
 
 
 def _print_summary(summary: Summary, as_json: bool) -> None:

@@ -154,3 +154,18 @@ def test_run_lengths_are_pycocotools_own(mask):
     if mask.any():
         rows, columns = np.nonzero(mask)
         assert box == (columns.min(), rows.min(), columns.max() + 1, rows.max() + 1)
+
+
+@pytest.mark.parametrize("code", ["", "0", "abc", "zzzzzz", "PPPPPPPPPPPP1", "?!", "é", encode_rle(np.ones((4, 6), bool))])
+def test_run_lengths_that_do_not_fill_the_image_are_refused(code):
+    with pytest.raises(ValueError, match="expected runs that fill 5 x 4 pixels"):
+        decode_rle(4, 5, code)
+
+
+@settings(max_examples=50, deadline=None)
+@given(st.integers(1, 300), st.integers(1, 300), st.floats(0, 1), st.integers(0, 2**32))
+def test_decoding_is_pycocotools_own(height, width, share, seed):
+    mask = np.random.default_rng(seed).random((height, width)) < share
+    mask[: height // 2] = mask[0, 0]
+    code = coco.encode(np.asfortranarray(mask, np.uint8))
+    np.testing.assert_array_equal(decode_rle(height, width, code["counts"].decode()), coco.decode(code))

@@ -175,6 +175,7 @@ def test_to_yaml_reads_back_as_the_same_recipe(write, fields):
     again = Recipe.load(path)
     assert again.model_dump() == recipe.model_dump()
     assert again.digest == recipe.digest
+    assert Recipe.model_validate(recipe.model_dump(mode="json")).digest == recipe.digest
     validator().validate(read(path)[0])
 
 

@@ -5,10 +5,13 @@ import time
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from viewsphere.geometry.box import box_vertices
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.recipe import Recipe
+from viewsphere.model.recipe_viewpoints import Range, axis_count, axis_value
 from viewsphere.model.shot import Pose
 from viewsphere.sampling.viewpoints import camera_for, distance_problem, poses
 
@@ -60,6 +63,14 @@ def test_steps_do_not_drift():
     assert values[3] == 0.3
     assert values == [i / 10 for i in range(3001)]
     assert azimuths(start=0.1, stop=0.7, step=0.2) == [0.1, 0.3, 0.5, 0.7]
+
+
+@given(st.integers(-2000, 2000), st.integers(1, 700), st.integers(0, 400), st.integers(0, 6), st.floats(0, 0.99))
+def test_any_decimal_range_has_exactly_its_values(start, step, steps, digits, beyond):
+    unit = 10**digits
+    span = Range(start=start / unit, stop=(start + (steps + beyond) * step) / unit, step=step / unit)
+    assert axis_count(span) == steps + 1
+    assert [axis_value(span, i) for i in range(steps + 1)] == [(start + i * step) / unit for i in range(steps + 1)]
 
 
 def test_azimuth_runs_fastest_then_elevation_distance_tilt():

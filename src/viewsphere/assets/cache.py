@@ -25,8 +25,7 @@ import platformdirs
 from viewsphere.assets.load import load_model
 from viewsphere.assets.mesh import Image, Material, Mesh, Texture
 from viewsphere.assets.normalise import normalise
-from viewsphere.assets.piece import TEXTURE_FIELDS, FileFacts
-from viewsphere.errors import ModelError
+from viewsphere.assets.piece import TEXTURE_FIELDS
 from viewsphere.model.shot import ModelSpec, Size
 
 SETTINGS = ("up", "forward", "unit", "centring", "scale", "real_size", "confined")
@@ -43,9 +42,8 @@ def load_normalised(spec: ModelSpec, build: Callable[[ModelSpec], Mesh] | None =
     Raises ModelError as the readers do.
     """
     if spec.source.startswith(ZOO):
-        if build is None:
-            raise ModelError(f"{spec.source}: no builder for procedural models was given")
-        return normalise(build(spec), FileFacts(Path(spec.source), "zoo", "+z", "-y", 1.0), spec)
+        raw, facts = load_zoo(spec, build)
+        return normalise(raw, facts, spec)
     path = Path(spec.source)
     folder = folder or cache_folder()
     try:

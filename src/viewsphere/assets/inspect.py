@@ -9,12 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from viewsphere.assets.cache import ZOO
+from viewsphere.assets.cache import ZOO, load_zoo
 from viewsphere.assets.load import load_model
 from viewsphere.assets.mesh import Material, Mesh
 from viewsphere.assets.normalise import normalise
 from viewsphere.assets.piece import FileFacts
-from viewsphere.errors import ModelError
 from viewsphere.model.shot import Axis, ModelSpec, Size
 
 
@@ -53,9 +52,7 @@ def describe(source: Path | ModelSpec, build: Callable[[ModelSpec], Mesh] | None
     """
     spec = source if isinstance(source, ModelSpec) else _default_spec(source)
     if spec.source.startswith(ZOO):
-        if build is None:
-            raise ModelError(f"{spec.source}: no builder for procedural models was given")
-        raw, facts = build(spec), FileFacts(Path(spec.source), "zoo", "+z", "-y", 1.0)
+        raw, facts = load_zoo(spec, build)
     else:
         raw, facts = load_model(Path(spec.source), confined=spec.confined)
     mesh = normalise(raw, facts, spec)

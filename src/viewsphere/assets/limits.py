@@ -7,6 +7,7 @@ MAX_TEXTURE_PIXELS = 1 << 27  # 512 MiB once it is RGBA
 MAX_TEXTURES = 1_024
 MAX_ALL_TEXTURE_PIXELS = 1 << 29  # of all textures of a model, 2 GiB as RGBA
 MAX_ZEROS = 10_000_000  # elements of a glTF accessor that has no bytes in the file
+MAX_INSTANCES = 1_000_000  # of objects in a scene of a DAE or 3MF file
 MAX_ARCHIVE_BYTES = 1 << 30  # a 3MF archive once it is unpacked
 
 MIN_SIZE = 1e-4

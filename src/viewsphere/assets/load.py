@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
+
 from viewsphere.assets.folder import ModelFolder
 from viewsphere.assets.mesh import Mesh
 from viewsphere.assets.piece import FileFacts
@@ -33,7 +35,12 @@ def load_model(path: Path, *, confined: bool = True) -> tuple[Mesh, FileFacts]:
     suffix = path.suffix[1:].lower()
     if suffix not in SUFFIXES:
         raise ModelError(f"{path}: expected a model file with suffix {', '.join(SUFFIXES)}, found {path.suffix or 'none'!r}")
-    folder = ModelFolder(path, confined)
+    # NaN and infinity are found and reported once the whole file is read.
+    with np.errstate(all="ignore"):
+        return _read(ModelFolder(path, confined), suffix)
+
+
+def _read(folder: ModelFolder, suffix: str) -> tuple[Mesh, FileFacts]:
     if suffix in {"glb", "gltf"}:
         from viewsphere.assets.gltf import read_gltf
 

@@ -124,5 +124,7 @@ class Mesh:
     @property
     def bounds(self) -> NDArray[np.float64]:
         """Lowest and highest corner of the vertices that triangles use, (2, 3) float64."""
-        used = self.vertices[np.unique(self.triangles)].astype(np.float64)
-        return np.array([used.min(axis=0), used.max(axis=0)])
+        used = np.zeros(len(self.vertices), bool)
+        used[self.triangles] = True
+        corners = self.vertices[used].astype(np.float64)
+        return np.array([corners.min(axis=0), corners.max(axis=0)])

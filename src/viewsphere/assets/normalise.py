@@ -30,7 +30,7 @@ def normalise(mesh: Mesh, facts: FileFacts, spec: ModelSpec) -> Mesh:
     """
     turn = rotation(spec.up or facts.up, spec.forward or facts.forward, str(facts.path))
     vertices = mesh.vertices.astype(np.float64) @ turn.T
-    low, high = _bounds(vertices, mesh)
+    low, high = np.sort(mesh.bounds @ turn.T, axis=0)
     factor, warnings = _factor(high - low, facts, spec)
     vertices *= factor
     low, high = low * factor, high * factor
@@ -70,11 +70,6 @@ def _direction(axis: Axis) -> Float:
     vector = np.zeros(3)
     vector["xyz".index(axis[1])] = 1.0 if axis[0] == "+" else -1.0
     return vector
-
-
-def _bounds(vertices: Float, mesh: Mesh) -> tuple[Float, Float]:
-    used = vertices[np.unique(mesh.triangles)]
-    return used.min(axis=0), used.max(axis=0)
 
 
 def _factor(size: Float, facts: FileFacts, spec: ModelSpec) -> tuple[float, tuple[str, ...]]:

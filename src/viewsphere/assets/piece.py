@@ -209,8 +209,7 @@ def unit_normals(
 def face_normals(positions: Float, triangles: NDArray[np.integer]) -> Float:
     """Normals (T, 3) whose length is twice the triangle's area, counter-clockwise side."""
     a, b, c = (positions[triangles[:, i]] for i in range(3))
-    with np.errstate(invalid="ignore", over="ignore"):
-        return np.cross(b - a, c - a)
+    return np.cross(b - a, c - a)
 
 
 def _used_images(materials: Sequence[Material], images: Sequence[Image]) -> tuple[tuple[Material, ...], tuple[Image, ...]]:

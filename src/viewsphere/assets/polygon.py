@@ -49,10 +49,9 @@ def triangulate(positions: Float, corners: Int, counts: Int) -> tuple[Int, Int]:
 def _lean(points: Float, triangles: Int, owner: Int, first: Int) -> tuple[Float, Float]:
     """For each polygon the least component of its triangles' normals along its own, and that normal."""
     a, b, c = (points[triangles[:, i]] for i in range(3))
-    with np.errstate(invalid="ignore", over="ignore"):
-        faces = np.cross(b - a, c - a)
-        normals = np.add.reduceat(faces, first)
-        along = np.einsum("ij,ij->i", faces, normals[owner])
+    faces = np.cross(b - a, c - a)
+    normals = np.add.reduceat(faces, first)
+    along = np.einsum("ij,ij->i", faces, normals[owner])
     return np.minimum.reduceat(np.nan_to_num(along), first), normals
 
 

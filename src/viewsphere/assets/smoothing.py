@@ -60,10 +60,9 @@ def creased(piece: Piece, groups: NDArray[np.int64] | None = None) -> Piece:
 def _angles(positions: Float, triangles: Int) -> Float:
     """Angle of each corner, (3 T,) radians."""
     corners = positions[triangles]
-    with np.errstate(invalid="ignore", over="ignore"):
-        u = np.roll(corners, -1, axis=1) - corners
-        v = np.roll(corners, 1, axis=1) - corners
-        angles = np.arctan2(np.linalg.norm(np.cross(u, v), axis=2), np.einsum("ijk,ijk->ij", u, v))
+    u = np.roll(corners, -1, axis=1) - corners
+    v = np.roll(corners, 1, axis=1) - corners
+    angles = np.arctan2(np.linalg.norm(np.cross(u, v), axis=2), np.einsum("ijk,ijk->ij", u, v))
     return np.nan_to_num(angles).reshape(-1)
 
 

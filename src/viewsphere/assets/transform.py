@@ -15,9 +15,8 @@ def moved(piece: Piece, matrix: Float) -> Piece:
     mirrored = bool(np.linalg.det(linear) < 0)
     # The cofactor matrix is det times the inverse transpose and exists for flattening matrices too.
     cofactor = np.cross(linear[[1, 2, 0]], linear[[2, 0, 1]]) * (-1.0 if mirrored else 1.0)
-    with np.errstate(over="ignore", invalid="ignore"):
-        positions = piece.positions @ linear.T + matrix[:3, 3]
-        normals = None if piece.normals is None else unit(piece.normals @ cofactor.T)
+    positions = piece.positions @ linear.T + matrix[:3, 3]
+    normals = None if piece.normals is None else unit(piece.normals @ cofactor.T)
     triangles = piece.triangles[:, ::-1] if mirrored else piece.triangles
     return replace(piece, positions=positions, normals=normals, triangles=triangles)
 

@@ -9,7 +9,7 @@ import io
 import re
 import warnings
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, cast
 
@@ -18,12 +18,14 @@ from numpy.typing import NDArray
 
 from viewsphere.assets import limits
 from viewsphere.assets.folder import ModelFolder, image_pixels
+from viewsphere.assets.instances import count_instances, dae_references, threemf_references
 from viewsphere.assets.mesh import Image, Material, Mesh, Texture
 from viewsphere.assets.mtl import alpha_mode
 from viewsphere.assets.piece import FileFacts, Float, Piece, assemble
 from viewsphere.assets.smoothing import creased, split
 from viewsphere.assets.srgb import linear
 from viewsphere.assets.transform import moved
+from viewsphere.errors import ModelError
 from viewsphere.model.shot import Axis
 
 UNITS = {
@@ -83,20 +85,34 @@ def _check_promises(folder: ModelFolder, kind: str, data: bytes) -> None:
         counts = []
     if any(count > len(data) for count in counts):
         raise folder.error(f"promises {max(counts):,} elements in {len(data):,} bytes: truncated or damaged")
-    if kind == "3mf":
-        _check_archive(folder, data)
+    try:
+        if kind == "dae":
+            _check_instances(folder, dae_references(data))
+        elif kind == "3mf":
+            _check_archive(folder, data)
+    except ModelError:
+        raise
+    except Exception as error:  # zipfile and lxml raise whatever a damaged file leads them to
+        raise _unreadable(folder, kind, error) from None
 
 
 def _check_archive(folder: ModelFolder, data: bytes) -> None:
-    try:
-        with zipfile.ZipFile(io.BytesIO(data)) as archive:
-            size = sum(entry.file_size for entry in archive.infolist())
-    except zipfile.BadZipFile:
-        raise folder.error("expected a 3MF archive (zip), found something else or a truncated one") from None
-    if size > limits.MAX_ARCHIVE_BYTES:
-        raise folder.error(
-            f"expected an archive of at most {limits.MAX_ARCHIVE_BYTES >> 20} MiB unpacked, found {size >> 20} MiB"
-        )
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        size = sum(entry.file_size for entry in archive.infolist())
+        if size > limits.MAX_ARCHIVE_BYTES:
+            most = limits.MAX_ARCHIVE_BYTES >> 20
+            raise folder.error(f"expected an archive of at most {most} MiB unpacked, found {size >> 20} MiB")
+        _check_instances(folder, threemf_references(archive))
+
+
+def _unreadable(folder: ModelFolder, kind: str, error: Exception) -> ModelError:
+    reason = str(error).split("\n")[0][:120]
+    return folder.error(f"cannot be read as {kind.upper()} ({type(error).__name__}: {reason}): damaged?")
+
+
+def _check_instances(folder: ModelFolder, references: Mapping[str, Sequence[str]]) -> None:
+    if count_instances(references, "") >= limits.MAX_INSTANCES:
+        raise folder.error(f"expected fewer than {limits.MAX_INSTANCES:,} instances, found more or a cycle; simplify it")
 
 
 def _parse(folder: ModelFolder, kind: str, data: bytes) -> dict[str, Any]:
@@ -113,8 +129,7 @@ def _parse(folder: ModelFolder, kind: str, data: bytes) -> dict[str, Any]:
             warnings.simplefilter("ignore")
             loaded = mesh_loaders[kind](io.BytesIO(data), file_type=kind, resolver=_Resolver(folder))
     except Exception as error:  # each parser raises whatever its code stumbles over
-        reason = str(error).split("\n")[0][:120]
-        raise folder.error(f"cannot be read as {kind.upper()} ({type(error).__name__}: {reason}): damaged?") from None
+        raise _unreadable(folder, kind, error) from None
     return cast("dict[str, Any]", loaded)
 
 
@@ -144,8 +159,10 @@ class _Builder:
         vertices, faces = geometry.get("vertices"), geometry.get("faces")
         if vertices is None or faces is None or not len(faces):
             return []
-        positions = np.asarray(vertices, np.float64).reshape(-1, 3)
-        triangles = np.asarray(faces).astype(np.int64)
+        positions, triangles = _rows(vertices, len(vertices), 3), np.asarray(faces)
+        if positions is None or triangles.dtype.kind not in "iu":
+            raise self.folder.error("expected three coordinates a vertex and whole numbers in faces: damaged?")
+        triangles = triangles.astype(np.int64)
         if triangles.ndim != 2 or triangles.shape[1] not in (3, 4):
             raise self.folder.error("expected triangles or quadrilaterals, found other faces")
         repeats = np.ones(len(triangles), np.int64)
@@ -217,8 +234,8 @@ def _unit_color(color: Any, default: Rgba) -> Rgba:
 def _rows(values: Any, count: int, width: int) -> Float | None:
     if values is None:
         return None
-    array = np.asarray(values, np.float64)
-    return array if array.shape == (count, width) else None
+    array = np.asarray(values)
+    return array.astype(np.float64) if array.shape == (count, width) and array.dtype.kind in "iuf" else None
 
 
 def _uv(visual: Any, count: int) -> Float | None:
@@ -232,7 +249,7 @@ def _vertex_colors(values: Any, count: int) -> Float | None:
     if values is None:
         return None
     array = np.asarray(values)
-    if array.ndim != 2 or len(array) != count or array.shape[1] not in (3, 4):
+    if array.shape not in {(count, 3), (count, 4)} or array.dtype.kind not in "iuf":
         return None
     unit = np.clip(array.astype(np.float64) / (255.0 if array.dtype.kind in "iu" else 1.0), 0.0, 1.0)
     alpha = unit[:, 3] if array.shape[1] == 4 else np.ones(count)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.errors import ViewsphereError
-from viewsphere.geometry.box import box_size
+from viewsphere.geometry.box import box_size, clip_to_image
 from viewsphere.geometry.camera import orbit_center, orbit_rotation, project
 from viewsphere.geometry.mask import mask_box, mask_polygons
 from viewsphere.geometry.rotation import matrix_from_quaternion, rigid, transform
@@ -52,8 +52,8 @@ def ids(sample: Sample, models: Mapping[str, ModelInfo]) -> Iterator[str]:
         if info is None or (info.category, info.category_id) != (o.category, o.category_id):
             yield f"object {o.id}: expected a model of the data set, found {o.key!r} ({o.category})"
     instances, categories = _channel(sample, "instances"), _channel(sample, "categories")
-    if instances is not None and not np.isin(np.unique(instances), [0, *found]).all():
-        yield f"instances: expected ids 0..{len(found)}, found {np.unique(instances).tolist()}"
+    if instances is not None and not 0 <= instances.min() <= instances.max() <= len(found):
+        yield f"instances: expected ids 0..{len(found)}, found {instances.min()}..{instances.max()}"
     elif instances is not None and categories is not None:
         by_id = np.array([0, *(o.category_id for o in sample.objects)])
         wrong = categories != by_id[instances]
@@ -85,7 +85,7 @@ def masks(sample: Sample, models: Mapping[str, ModelInfo]) -> Iterator[str]:
 
 
 def boxes(sample: Sample, models: Mapping[str, ModelInfo]) -> Iterator[str]:
-    """`box2d` is the mask's tight box, and lies in the projected model's box but for the pixels its edges cut."""
+    """`box2d` is the mask's tight box; the projected model's box holds it, lies in the 3D box's, and is clipped to the image."""
     for o in sample.objects:
         tight = mask_box(o.mask)
         if o.box2d != tight:
@@ -93,8 +93,13 @@ def boxes(sample: Sample, models: Mapping[str, ModelInfo]) -> Iterator[str]:
         around = o.box2d_projected
         if tight and (around is None or not _within(tight, around, 1.0)):
             yield f"object {o.id}: expected the visible box in the projected one, found {tight} and {around}"
-        if around and o.box2d_unclipped and not _within(around, o.box2d_unclipped, 0.0):
-            yield f"object {o.id}: expected {around} within the unclipped box, found {o.box2d_unclipped}"
+        unclipped = o.box2d_unclipped
+        if unclipped and around != clip_to_image(unclipped, sample.camera.width, sample.camera.height):
+            yield f"object {o.id}: expected box2d_projected to be the clipped {unclipped}, found {around}"
+        if unclipped and sample.camera.distortion is None and o.box3d_in_front.all():
+            x, y = o.box3d_pixels.T
+            if not _within(unclipped, (x.min(), y.min(), x.max(), y.max()), 1e-3):
+                yield f"object {o.id}: expected box2d_unclipped within the projected 3D box, found {unclipped}"
 
 
 def projection(sample: Sample, models: Mapping[str, ModelInfo]) -> Iterator[str]:

@@ -33,15 +33,9 @@ def encode_png(array: NDArray[Any]) -> bytes:
     """A PNG file of a picture: (H, W) bool (1 bit), uint8 or uint16, or (H, W, 3 or 4) uint8, not empty."""
     components = 1 if array.ndim == 2 else array.shape[-1]
     dtypes = (np.bool_, np.uint8, np.uint16) if array.ndim == 2 else (np.uint8,)
-    if (
-        array.ndim not in (2, 3)
-        or array.size == 0
-        or components not in _COLOR_TYPES
-        or array.dtype not in dtypes
-    ):
+    if array.ndim not in (2, 3) or array.size == 0 or components not in _COLOR_TYPES or array.dtype not in dtypes:
         raise ValueError(
-            "encode_png: expected (H, W) bool, uint8 or uint16, or (H, W, 3 or 4) uint8, "
-            f"got {array.shape} {array.dtype}"
+            f"encode_png: expected (H, W) bool, uint8 or uint16, or (H, W, 3 or 4) uint8, got {array.shape} {array.dtype}"
         )
     height, width = array.shape[:2]
     depth = 1 if array.dtype == np.bool_ else 8 * array.dtype.itemsize
@@ -79,18 +73,14 @@ def decode_png(data: bytes) -> NDArray[Any]:
     Raises UserError when the file is damaged or was written by another program.
     """
     if not data.startswith(_SIGNATURE):
-        raise UserError(
-            "PNG: expected a PNG file's first 8 bytes, found others: the file is damaged or no PNG"
-        )
+        raise UserError("PNG: expected a PNG file's first 8 bytes, found others: the file is damaged or no PNG")
     header, body, position = b"", b"", len(_SIGNATURE)
     while position + 12 <= len(data):
         (length,) = struct.unpack_from(">I", data, position)
         kind, content = data[position + 4 : position + 8], data[position + 8 : position + 8 + length]
         check = data[position + 8 + length : position + 12 + length]
         if check != struct.pack(">I", isal_zlib.crc32(kind + content)):
-            raise UserError(
-                f"PNG: expected a whole {kind!r} chunk, its checksum is wrong: the file is damaged"
-            )
+            raise UserError(f"PNG: expected a whole {kind!r} chunk, its checksum is wrong: the file is damaged")
         header = content if kind == b"IHDR" else header
         body += content if kind == b"IDAT" else b""
         position += 12 + length
@@ -108,9 +98,7 @@ def _png_pixels(header: bytes, body: bytes) -> NDArray[Any]:
     lines = np.frombuffer(_inflated(body, height * (1 + stride), "PNG"), np.uint8).reshape(height, -1)
     sub = depth == 8
     if not components or depth not in (1, 8, 16) or np.any(lines[:, 0] != (_SUB if sub else 0)):
-        raise UserError(
-            "PNG: expected viewsphere's own, found another program's: read it with an image library"
-        )
+        raise UserError("PNG: expected viewsphere's own, found another program's: read it with an image library")
     if depth == 1:
         return np.unpackbits(lines[:, 1:], axis=1, count=width).astype(np.bool_)
     if depth == 16:
@@ -125,9 +113,7 @@ def _inflated(body: bytes, expected: int, kind: str) -> bytes:
     except isal_zlib.error as error:  # pyright: ignore[reportGeneralTypeIssues]
         raise UserError(f"{kind}: expected deflated pixels, found damage ({error})") from error
     if len(pixels) != expected:
-        raise UserError(
-            f"{kind}: expected {expected} bytes of pixels, found {len(pixels)}: the file is damaged"
-        )
+        raise UserError(f"{kind}: expected {expected} bytes of pixels, found {len(pixels)}: the file is damaged")
     return pixels
 
 
@@ -137,15 +123,8 @@ def encode_tiff(array: NDArray[Any]) -> bytes:
     One strip, deflate, little-endian, no predictor: any reader of 32-bit TIFF takes it.
     """
     components = 1 if array.ndim == 2 else array.shape[-1]
-    if (
-        array.ndim not in (2, 3)
-        or array.size == 0
-        or components not in (1, 2, 3)
-        or array.dtype not in _SAMPLE_FORMATS
-    ):
-        raise ValueError(
-            f"encode_tiff: expected (H, W) or (H, W, 1..3) float32 or int32, got {array.shape} {array.dtype}"
-        )
+    if array.ndim not in (2, 3) or array.size == 0 or components not in (1, 2, 3) or array.dtype not in _SAMPLE_FORMATS:
+        raise ValueError(f"encode_tiff: expected (H, W) or (H, W, 1..3) float32 or int32, got {array.shape} {array.dtype}")
     height, width = array.shape[:2]
     little = np.ascontiguousarray(array, array.dtype.newbyteorder("<"))
     strip = isal_zlib.compress(little, _LEVEL)
@@ -193,9 +172,7 @@ def decode_tiff(data: bytes) -> NDArray[Any]:
         (count,) = struct.unpack_from("<H", data, position)
         tags = {
             tag: (numbers, value if kind == 4 else value & 0xFFFF)
-            for tag, kind, numbers, value in struct.iter_unpack(
-                "<HHII", data[position + 2 : position + 2 + 12 * count]
-            )
+            for tag, kind, numbers, value in struct.iter_unpack("<HHII", data[position + 2 : position + 2 + 12 * count])
         }
         height, width, components = tags[_HEIGHT][1], tags[_WIDTH][1], tags[_SAMPLES][1]
         offset, length = tags[_OFFSET][1], tags[_BYTES][1]

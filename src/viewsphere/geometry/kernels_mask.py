@@ -186,8 +186,12 @@ def decode_runs(codes, height, width):
         if run < 0 or position + run > height * width:
             return mask, False
         if count % 2:
-            for p in range(position, position + run):
-                mask[p % height, p // height] = True
+            x, y = position // height, position % height
+            for _ in range(run):
+                mask[y, x] = True
+                y += 1
+                if y == height:
+                    x, y = x + 1, 0
         runs[count] = run
         count += 1
         position += run

@@ -27,6 +27,7 @@ from viewsphere.model.recipe_values import (
     OrShort,
     Positive,
     SrgbColor,
+    pair,
     parse_color,
     shape_of,
     switch,
@@ -40,10 +41,6 @@ Row = tuple[Number, Number, Number]
 Pixels = Annotated[Count, Field(le=LARGEST_IMAGE)]
 
 
-def _both(value: Any) -> Any:
-    return (value, value) if isinstance(value, (int, float)) and not isinstance(value, bool) else value
-
-
 class CameraEntry(Frozen):
     """Image size, and one description of the lens."""
 
@@ -52,7 +49,7 @@ class CameraEntry(Frozen):
         default=None, description="angle of view in degrees, across the image's width unless fov_axis says otherwise"
     )
     fov_axis: Literal["horizontal", "vertical"] = Field(default="horizontal", description="what fov_deg measures")
-    focal_px: Annotated[tuple[Positive, Positive], BeforeValidator(_both), OrShort({"type": "number"})] | None = Field(
+    focal_px: Annotated[tuple[Positive, Positive], BeforeValidator(pair), OrShort({"type": "number"})] | None = Field(
         default=None, description="focal length in pixels: a number or [fx, fy]"
     )
     focal_mm: Positive | None = Field(default=None, description="focal length in millimetres; needs sensor_mm")
@@ -131,8 +128,8 @@ class BackgroundEntry(Frozen):
         given = [name for name in ("color", "image", "images") if getattr(self, name) is not None]
         if len(given) > 1:
             raise ValueError(f"expected one of color, image, images; found {' and '.join(given)}")
-        if "draw" in self.model_fields_set and self.images is None:
-            raise ValueError("expected images beside draw; found none")
+        if self.draw == "fixed" and self.images is None:
+            raise ValueError("expected images beside draw: fixed; found none")
         return self
 
     @property

@@ -37,11 +37,12 @@ def _whole(value: object) -> object:
     return int(value) if isinstance(value, float) and value.is_integer() else value
 
 
-def _pair(value: object) -> object:
+def pair(value: object) -> object:
+    """A number twice, for a field of two; lists as they are."""
     if isinstance(value, (int, float)) and not isinstance(value, bool):
         return value, value
     if not isinstance(value, (list, tuple)):
-        raise ValueError(f"expected a number or [low, high]; found {shown(value)}")
+        raise ValueError(f"expected a number or a list of two; found {shown(value)}")
     return value
 
 
@@ -105,7 +106,7 @@ Values = Annotated[
 
 Interval = Annotated[
     tuple[Number, Number],
-    BeforeValidator(_pair),
+    BeforeValidator(pair),
     AfterValidator(_ordered),
     OrShort({"type": "number"}),
 ]

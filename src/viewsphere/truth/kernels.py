@@ -16,6 +16,7 @@ from viewsphere.geometry.jit import njit
 
 EPSILON = 1e-5  # pixels a bounding box is widened by: more than the edge functions' rounding
 BEHIND = -(1 << 30)
+ROUNDED_UP = 1.0 + 1e-9  # of 1/z between a triangle's corners
 SLIVER = 1e-5  # twice the area in pixels below which the sign of a triangle's area is not trusted
 SMALL = 8  # pixels: the width up to which testing every pixel beats computing spans
 NEVER, CLAMP, MIRROR = -2, 1, 2  # as in cutouts.py
@@ -23,7 +24,7 @@ NEVER, CLAMP, MIRROR = -2, 1, 2  # as in cutouts.py
 
 @njit
 def transform(vertices, start, stop, k, rotation, translation, homogeneous):
-    """K (R X + t) of vertices [start, stop) into homogeneous (n, 3); no BLAS, whose rounding depends on the processor."""
+    """K (R X + t) = (u, v, w) of vertices [start, stop) and 1/w, (n, 4); no BLAS, whose rounding depends on the processor."""
     m = np.empty((3, 4))
     for r in range(3):
         for c in range(3):
@@ -33,7 +34,8 @@ def transform(vertices, start, stop, k, rotation, translation, homogeneous):
         x, y, z = vertices[i, 0], vertices[i, 1], vertices[i, 2]
         homogeneous[i - start, 0] = m[0, 0] * x + m[0, 1] * y + m[0, 2] * z + m[0, 3]
         homogeneous[i - start, 1] = m[1, 0] * x + m[1, 1] * y + m[1, 2] * z + m[1, 3]
-        homogeneous[i - start, 2] = m[2, 0] * x + m[2, 1] * y + m[2, 2] * z + m[2, 3]
+        w = m[2, 0] * x + m[2, 1] * y + m[2, 2] * z + m[2, 3]
+        homogeneous[i - start, 2], homogeneous[i - start, 3] = w, 1.0 / w if w > 0.0 else np.inf
 
 
 @njit
@@ -45,8 +47,8 @@ def cells(q, samples, x0, y0, width, height, cell):
     for i in range(q.shape[0]):
         w = q[i, 2]
         if w > 0.0:
-            x = q[i, 0] / w * samples - (0.5 + x0)
-            y = q[i, 1] / w * samples - (0.5 + y0)
+            x = q[i, 0] * q[i, 3] * samples - (0.5 + x0)
+            y = q[i, 1] * q[i, 3] * samples - (0.5 + y0)
             cell[i, 0] = math.ceil(min(max(x - EPSILON, 0.0), float(width)))
             cell[i, 1] = math.ceil(min(max(y - EPSILON, 0.0), float(height)))
             cell[i, 2] = -math.floor(min(max(x + EPSILON, -1.0), width - 1.0))
@@ -124,6 +126,9 @@ def draw(q, cell, triangles, span, canvas, cutout, cutouts, nearest, seen):
         xb, yb = -min(cell[i0, c], cell[i1, c], cell[i2, c]), -min(cell[i0, d], cell[i1, d], cell[i2, d])
         if xa > xb or ya > yb or cutout[ut] == NEVER:
             continue
+        most = max(q[i0, d], q[i1, d], q[i2, d]) * ROUNDED_UP
+        if xb - xa < SMALL and _hidden(nearest, xa, ya, xb, yb, most):
+            continue
         q0, q1, q2 = (q[i0, a], q[i0, b], q[i0, c]), (q[i1, a], q[i1, b], q[i1, c]), (q[i2, a], q[i2, b], q[i2, c])
         crossing = xa == BEHIND
         if crossing:
@@ -151,6 +156,16 @@ def draw(q, cell, triangles, span, canvas, cutout, cutouts, nearest, seen):
 
 
 @njit
+def _hidden(nearest, xa, ya, xb, yb, most):
+    """Whether all pixels of the box already show something nearer than 1/z = most."""
+    for y in range(max(ya, 0), yb + 1):
+        for x in range(max(xa, 0), xb + 1):
+            if nearest[np.uintp(y), np.uintp(x)] < most:
+                return False
+    return True
+
+
+@njit
 def _draw_small(t, e0, e1, e2, n, box, canvas, nearest, seen):
     """Draw a narrow triangle: every pixel of its box is tested."""
     xa, ya, xb, yb = box
@@ -159,15 +174,16 @@ def _draw_small(t, e0, e1, e2, n, box, canvas, nearest, seen):
     for y in range(ya, yb + 1):
         py = (y + y0 + 0.5) * step
         f0, f1, f2 = e0[1] * py + e0[2], e1[1] * py + e1[2], e2[1] * py + e2[2]
-        uy = np.uintp(y)
+        uy, s = np.uintp(y), n[1] * py + n[2]
         for x in range(xa, xb + 1):
             px = (x + x0 + 0.5) * step
-            if _inside(e0, e1, e2, px, f0, f1, f2):
-                inverse = n[0] * px + (n[1] * py + n[2])
-                ux = np.uintp(x)
-                if inverse > nearest[uy, ux]:
-                    nearest[uy, ux] = inverse
-                    seen[uy, ux] = t
+            inverse = n[0] * px + s
+            ux = np.uintp(x)
+            # one branch for four comparisons: which of them fails is hard to predict
+            inside = (e0[0] * px + f0 >= 0.0) & (e1[0] * px + f1 >= 0.0) & (e2[0] * px + f2 >= 0.0)
+            if inside & (inverse > nearest[uy, ux]):
+                nearest[uy, ux] = inverse
+                seen[uy, ux] = t
 
 
 @njit

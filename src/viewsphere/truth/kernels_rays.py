@@ -167,10 +167,11 @@ def _distance(a, b):
 
 @njit
 def draw(q, triangles, span, table, origin, unit, cutout, cutouts, nearest, seen):
-    """Draw triangles into nearest (1/s, 0 where none) and seen (triangle, -1 where none), whose first pixel is the table's `origin`.
+    """Draw triangles into nearest (1/s, 0 where none) and seen (triangle, -1 where none).
 
     `span` is the first triangle, the one after the last, and the vertex that q[0] stands for; q is in camera axes; `table` is
-    (rays, levels, boxes, cells). `unit` says that the rays have length 1 rather than z = 1.
+    (rays, levels, boxes, cells) and `origin` the canvas' first pixel (x, y) in it. `unit` says that the rays have length 1
+    rather than z = 1.
     """
     rays, levels, boxes, cells = table
     first, last, base = span

@@ -62,14 +62,14 @@ def _range(geometry: Geometry, object_id: int) -> tuple[int, int, int, int]:
 
 
 def homogeneous(geometry: Geometry, camera: Camera, base: int = 0, stop: int | None = None) -> NDArray[np.float64]:
-    """Vertices [base, stop) before the perspective division, (n, 3).
+    """Vertices [base, stop) before the perspective division, and the inverse of their third coordinate, (n, 4).
 
-    K (R X + t) for a pinhole; camera axes, R X + t, for a distorted lens.
+    K (R X + t) for a pinhole; camera axes, R X + t, for a distorted lens. The inverse is infinite unless positive.
     """
     from viewsphere.truth import kernels
 
     stop = len(geometry.vertices) if stop is None else stop
-    q = np.empty((stop - base, 3))
+    q = np.empty((stop - base, 4))
     k = camera.K if camera.distortion is None else np.eye(3)
     kernels.transform(geometry.vertices, base, stop, k, camera.R, camera.t, q)
     return q

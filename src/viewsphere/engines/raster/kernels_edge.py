@@ -123,7 +123,7 @@ def sky_picture(view, light, knee, count):
         x = r[0, 0] * a + r[1, 0] * b + r[2, 0] * c
         y = r[0, 1] * a + r[1, 1] * b + r[2, 1] * c
         z = r[0, 2] * a + r[1, 2] * b + r[2, 2] * c
-        if not z == z:
+        if math.isnan(z):
             out[i] = zero
             continue
         s = one / f4(math.sqrt(x * x + y * y + z * z))

@@ -89,7 +89,7 @@ def _gather(view, surfaces, start, stop, slots, where, triangle, depth, b, mater
 def _materials(surfaces, textures, start, stop, slots, triangle, b, material):
     """Base colour, alpha, roughness, metallic, emission: factors times textures."""
     uv = np.empty(4, np.float32)
-    footprint = np.empty(2, np.float32)
+    footprint = np.empty(4, np.float32)
     for i in range(stop - start):
         m = U(material[i])
         factor = surfaces.materials[m]
@@ -108,10 +108,10 @@ def _materials(surfaces, textures, start, stop, slots, triangle, b, material):
         t = U(triangle[U(slots[start + i])])
         uv[0], uv[1], uv[2], uv[3] = b[U0 + i], b[V0 + i], b[U1 + i], b[V1 + i]
         dx, dy, dz = b[DX + i], b[DY + i], b[DZ + i]
-        facing = abs(dx * b[GX + i] + dy * b[GY + i] + dz * b[GZ + i]) / f4(math.sqrt(dx * dx + dy * dy + dz * dz))
-        stretched = b[PIXEL + i] / f4(math.sqrt(max(facing, f4(0.02))))
-        footprint[0] = surfaces.density[t, U(0)] * stretched
-        footprint[1] = surfaces.density[t, U(1)] * stretched
+        facing = abs(dx * b[GX + i] + dy * b[GY + i] + dz * b[GZ + i])
+        squared = b[PIXEL + i] * b[PIXEL + i] / max(facing, f4(0.02))
+        for a in range(4):
+            footprint[a] = surfaces.density[t, U(a)] * squared
         if base >= 0:
             c = look_up(textures, base, uv, footprint)
             b[RED + i] *= c[0]
@@ -166,7 +166,7 @@ def _orient(count, light, b):
         b[SV + i] = m10 * x + m11 * y + m12 * z + m13
         b[SW + i] = m20 * x + m21 * y + m22 * z + m23 - f4(1.2) - f4(0.6) * (abs(du) + abs(dv))
         b[SDU + i], b[SDV + i] = du, dv
-        b[PIXEL + i] = min(max(b[PIXEL + i] * texels * f4(0.45), f4(0.8)), f4(6))
+        b[PIXEL + i] = min(max(b[PIXEL + i] * texels * f4(0.45), f4(0.8)), f4(SHADOW_BLOCK - 2))
         # Smooth normals on coarse triangles: the sun fades before the first facet turns away from it.
         turned = nx * sx + ny * sy + nz * sz
         fade = min(max(turned, zero) / (f4(3) * abs(turned - facing) + f4(1e-6)), one)
@@ -203,8 +203,10 @@ def _sun_share(light, u, v, w, du, dv, step):
         iu, iv = nb.int32(min(max(u + ou, low), high)), nb.int32(min(max(v + ov, low), high))
         near = w + du * (f4(iu) + f4(0.5) - u) + dv * (f4(iv) + f4(0.5) - v)
         agree += nb.int32(1) if light.shadow[U(iv), U(iu)] >= near else nb.int32(0)
-    if agree == 0 or agree == 5:
-        return f4(1) if agree else f4(0)
+    if agree == 0:
+        return f4(0)
+    if agree == 5:
+        return f4(1)
     lit = f4(0)
     for row in range(-1, 2):
         cv = min(max(v + f4(row) * step - f4(0.5), f4(0)), f4(size - 2))

@@ -12,7 +12,7 @@ from viewsphere.geometry.jit import njit
 
 f4 = nb.float32
 U = nb.uintp
-BLOCK = 8
+BLOCK = 16
 
 
 @njit
@@ -24,7 +24,7 @@ def nearest_depth(points, surfaces, textures, size):
     """
     depth = np.full((size, size), np.inf, np.float32)
     uv = np.zeros(4, np.float32)
-    sharp = np.zeros(2, np.float32)
+    sharp = np.zeros(4, np.float32)
     for t in range(surfaces.triangles.shape[0]):
         threshold = surfaces.materials[surfaces.material[t], 16]
         if threshold > f4(1):
@@ -33,10 +33,10 @@ def nearest_depth(points, surfaces, textures, size):
         ax, ay, az = points[i, 0], points[i, 1], points[i, 2]
         bx, by, bz = points[j, 0], points[j, 1], points[j, 2]
         cx, cy, cz = points[k, 0], points[k, 1], points[k, 2]
-        left = max(0, int(math.ceil(min(ax, bx, cx) - 0.5)))
-        right = min(size - 1, int(math.floor(max(ax, bx, cx) - 0.5)))
-        top = max(0, int(math.ceil(min(ay, by, cy) - 0.5)))
-        bottom = min(size - 1, int(math.floor(max(ay, by, cy) - 0.5)))
+        left = max(0, math.ceil(min(ax, bx, cx) - 0.5))
+        right = min(size - 1, math.floor(max(ax, bx, cx) - 0.5))
+        top = max(0, math.ceil(min(ay, by, cy) - 0.5))
+        bottom = min(size - 1, math.floor(max(ay, by, cy) - 0.5))
         area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
         if left > right or top > bottom or area == 0.0:
             continue
@@ -111,7 +111,7 @@ def sky_left(low, high, directions, reach):
                 mask = nb.uint64(0)
                 r = 0.35
                 while r < reach:
-                    u, v = int(math.floor(x + 0.5 + r * dx)), int(math.floor(y + 0.5 + r * dy))
+                    u, v = math.floor(x + 0.5 + r * dx), math.floor(y + 0.5 + r * dy)
                     if u < 0 or v < 0 or u >= n or v >= n:
                         break
                     bottom = float(low[v, u])

@@ -65,7 +65,10 @@ def _bilinear(textures, slot, level, u, v):
 
 @njit(fastmath=FAST)
 def look_up(textures, slot, uv, footprint):
-    """Linear RGBA of a texture at these coordinates ((4,): both sets); footprint: pixel sizes in units of both uv sets."""
+    """Linear RGBA of a texture at these coordinates ((4,): u and v of both sets).
+
+    footprint (4,): squares of a pixel's size in each coordinate; the mip level is that of the mean square in texels.
+    """
     slot = U(slot)
     second = textures.modes[slot, U(4)] == 1
     s = uv[2] if second else uv[0]
@@ -73,11 +76,15 @@ def look_up(textures, slot, uv, footprint):
     m = textures.transforms[slot]
     u = m[0] * s + m[1] * t + m[2]
     v = m[3] * s + m[4] * t + m[5]
-    texels = (footprint[1] if second else footprint[0]) * m[6]
-    if texels <= f4(1):
+    ss = footprint[2] if second else footprint[0]
+    tt = footprint[3] if second else footprint[1]
+    width, height = f4(textures.levels[slot, U(0), U(1)]), f4(textures.levels[slot, U(0), U(2)])
+    across = (m[0] * m[0] * ss + m[1] * m[1] * tt) * width * width
+    texels = f4(0.5) * (across + (m[3] * m[3] * ss + m[4] * m[4] * tt) * height * height)
+    if texels <= f4(1.001):
         return _bilinear(textures, slot, U(0), u, v)
     last = f4(textures.modes[slot, U(0)] - 1)
-    lod = min(f4(math.log2(texels)), last)
+    lod = min(f4(0.5) * f4(math.log2(texels)), last)
     level = f4(math.floor(lod))
     fraction = lod - level
     a = _bilinear(textures, slot, U(level), u, v)

@@ -38,4 +38,4 @@ def parse_options(given: Mapping[str, JsonValue]) -> Options:
     resolution = given.get("shadow_resolution", default.shadow_resolution)
     if isinstance(resolution, bool) or not isinstance(resolution, int) or not 64 <= resolution <= 8192:
         raise UserError(f"raster engine: shadow_resolution: expected an integer in 64..8192, found {resolution!r}")
-    return Options(4 if antialias == 4 else 1, float(exposure), resolution - resolution % 8)
+    return Options(4 if antialias == 4 else 1, float(exposure), resolution - resolution % 16)

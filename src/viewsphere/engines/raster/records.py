@@ -15,7 +15,7 @@ class Surfaces(NamedTuple):
     """What the triangles are made of.
 
     vertices (V, 16): shading normal, both uv sets, linear colour and alpha, position from `origin`, two unused (a row is
-    a cache line); triangles (T, 3) uint32; material (T,) int32; density (T, 2): texture coordinates per metre of each uv
+    a cache line); triangles (T, 3) uint32; material (T,) int32; density (T, 4): square per metre squared of each uv
     set; normals (T, 3): geometric, unit; materials (M, 17) and slots (M, 3) int32: columns named in `surface.py`.
     """
 
@@ -32,8 +32,8 @@ class Textures(NamedTuple):
     """All mip levels of all textures in one array.
 
     texels (N, 4) uint16, linear; levels (X, 16, 3) int32: first texel, width and height of each level; modes (X, 5) int32:
-    number of levels, wrap along u and v, nearest, uv set; transforms (X, 7): rows of the 2 x 3 matrix on (u, v, 1), then
-    texels per unit of uv.
+    number of levels, wrap along u and v, nearest, uv set; transforms (X, 6): rows of the 2 x 3 matrix on
+    (u, v, 1).
     """
 
     texels: NDArray[np.uint16]

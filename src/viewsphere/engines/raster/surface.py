@@ -93,18 +93,15 @@ def _ground_row(ground: Ground) -> list[float]:
 
 
 def _uv_density(vertices: Float32, triangles: NDArray[np.int32]) -> Float32:
-    """Texture coordinates per metre on each triangle, (T, 2) for both sets: root mean square over directions."""
-    density = np.zeros((len(triangles), 2), np.float32)
+    """Squared gradients of u and v of both uv sets on each triangle, (T, 4) per square metre."""
+    density = np.zeros((len(triangles), 4), np.float32)
     a, b, c = (vertices[triangles[:, k]] for k in range(3))
     p, q = b[:, 11:14] - a[:, 11:14], c[:, 11:14] - a[:, 11:14]
     pp, pq, qq = (p * p).sum(1), (p * q).sum(1), (q * q).sum(1)
     area = pp * qq - pq * pq
     safe = np.where(area > 0, area, 1)
-    for k, column in enumerate((3, 5)):
-        s, t = (
-            b[:, column : column + 2] - a[:, column : column + 2],
-            c[:, column : column + 2] - a[:, column : column + 2],
-        )
-        squared = qq * (s * s).sum(1) - 2 * pq * (s * t).sum(1) + pp * (t * t).sum(1)
-        density[:, k] = np.sqrt(np.where(area > 0, np.maximum(squared, 0) / safe, 0) / 2)
+    for k in range(4):
+        s, t = b[:, 3 + k] - a[:, 3 + k], c[:, 3 + k] - a[:, 3 + k]
+        squared = qq * s * s - 2 * pq * s * t + pp * t * t
+        density[:, k] = np.where(area > 0, np.maximum(squared, 0) / safe, 0)
     return density

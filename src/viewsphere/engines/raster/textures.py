@@ -50,15 +50,13 @@ class TexturePacker:
         count = max(len(self._slots), 1)
         levels = np.zeros((count, _LEVELS, 3), np.int32)
         modes = np.zeros((count, 5), np.int32)
-        transforms = np.zeros((count, 7), np.float32)
+        transforms = np.zeros((count, 6), np.float32)
         for (image, is_color, texture), slot in self._slots.items():
             mips = self._images[image, is_color]
             levels[slot, : len(mips)] = mips
             wraps = _WRAPS.index(texture.wrap_s), _WRAPS.index(texture.wrap_t)
             modes[slot] = len(mips), *wraps, texture.nearest, texture.texcoord
-            matrix = _transform(texture)
-            scale = math.sqrt(mips[0][1] * mips[0][2] * abs(texture.scale[0] * texture.scale[1]))
-            transforms[slot] = *matrix.reshape(-1), scale
+            transforms[slot] = _transform(texture).reshape(-1)
         texels = np.concatenate(self._texels) if self._texels else np.zeros((1, 4), np.uint16)
         return Textures(np.ascontiguousarray(texels), levels, modes, transforms)
 

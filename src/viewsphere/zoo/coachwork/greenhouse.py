@@ -40,7 +40,7 @@ class Greenhouse:
     roof: Knots
     drop: float = 0.05
     bulge: float = 0.018
-    fillet: float = 0.86
+    fillet: float = 0.9
 
     def _corners(self, u: Float) -> tuple[Float, Float]:
         """Points on the belt and on the (unrounded) roof edge."""
@@ -57,9 +57,13 @@ class Greenhouse:
         points[..., :2] += self.base.normal(u) * (self.bulge * 4 * v * (1 - v))[..., None]
         return points
 
+    def roof_height(self, y: ArrayLike) -> Float:
+        """Height of the roof's middle line."""
+        return curve(y, self.roof)
+
     def roof_solid(self) -> Solid:
         """Rounded edge and crown of the whole roof."""
-        u = np.linspace(-4, 4, 96, endpoint=False)
+        u = np.linspace(-4, 4, 80, endpoint=False)
         _, edge = self._corners(u)
         start = self.surface(u, np.ones_like(u))
         middle = np.array([0.0, (self.top.front + self.top.rear) / 2])
@@ -90,11 +94,11 @@ class Greenhouse:
 
     def framed(self, cell: Cell, rounding: float = 0.09) -> tuple[Solid, Solid, Solid]:
         """A cell's frame, its rubber seal and its pane."""
-        count = max(8, round((cell.stop - cell.start) * 10))
+        count = max(5, round((cell.stop - cell.start) * 8))
         corners = [(cell.start, 0.0), (cell.stop, 0.0), (cell.stop, 1.0), (cell.start, 1.0)]
         around, ring = frame(self.surface, corners, self.opening(cell), rounding, count)
         seal = rim(self.surface, ring, (0.0, -0.5 * GLASS_DEPTH), 0.012)
-        u, v = np.meshgrid(np.linspace(cell.start, cell.stop, 2 * count), np.linspace(-0.03, 1.02, 10), indexing="ij")
+        u, v = np.meshgrid(np.linspace(cell.start, cell.stop, 2 * count), np.linspace(-0.03, 1.02, 8), indexing="ij")
         return around, seal, grid(self._inset(u, v))
 
     def _inset(self, u: Float, v: Float) -> Float:

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from viewsphere.zoo.coachwork.outline import Outline
 from viewsphere.zoo.shapes.solids import Float, Solid, curve, grid
 
-LOWER, UPPER, EDGE = 5, 14, 5
+LOWER, UPPER, EDGE = 4, 11, 4
 """Rows of the wall below the bumper line, above it, and around its top edge."""
 
 
@@ -82,12 +82,12 @@ class Hull:
     def stations(self) -> Float:
         """Parameters u of the left half's columns, dense around arches and corners."""
         o = self.outline
-        ends = [np.linspace(0, 0.8, 9), np.linspace(0.8, 1.25, 15), np.linspace(2.75, 3.2, 15), np.linspace(3.2, 4, 9)]
-        flank = o.u_at_y(np.arange(o.point(1.25)[1], o.point(2.75)[1], 0.1))
+        ends = [np.linspace(0, 0.8, 8), np.linspace(0.8, 1.25, 13), np.linspace(2.75, 3.2, 13), np.linspace(3.2, 4, 8)]
+        flank = o.u_at_y(np.arange(o.point(1.25)[1], o.point(2.75)[1], 0.13))
         free = np.unique(np.concatenate([*ends, flank]))
         y = o.point(free)[:, 1]
         away = np.all([np.abs(y - a.y) > 1.06 * a.radius for a in self.arches], axis=0)
-        across = np.concatenate([[1.03], np.cos(np.linspace(0, np.pi, 27)), [-1.03]])
+        across = np.concatenate([[1.03], np.cos(np.linspace(0, np.pi, 25)), [-1.03]])
         return np.sort(np.concatenate([free[away], *(o.u_at_y(a.y - a.radius * across) for a in self.arches)]))
 
     def lower_edge(self, u: Float) -> Float:
@@ -120,7 +120,7 @@ class Hull:
         rise = (top - self.edge)[:, None] + self.edge * np.sin(angle)
         return np.concatenate([rows, np.concatenate([plan, rise[..., None]], axis=-1)], axis=1)
 
-    def deck_to(self, inner: Float, steps: int = 14) -> Solid:
+    def deck_to(self, inner: Float, steps: int = 9) -> Solid:
         """The left half of the deck, from the wall's top inwards to a plan curve (stations, 2)."""
         outer, _ = self.top(self.stations)
         share = np.linspace(0, 1, steps + 1)[:, None]

@@ -8,7 +8,7 @@ import numpy as np
 
 from viewsphere.zoo.shapes.solids import Float, Solid, curve, join, lathe, loft, moved, superellipse, turned
 
-SEGMENTS = 44
+SEGMENTS = 40
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,8 @@ def tyre(w: Wheel) -> Solid:
     tread: list[tuple[float, float]] = []
     for c in (-0.45, 0.0, 0.45):
         tread += [(r, c - 0.055), (r - 0.007, c - 0.05), (r - 0.007, c + 0.05), (r, c + 0.055)]
-    profile = np.array([*((a, -b) for a, b in side), (r, -0.7), *tread, (r, 0.7), *side[::-1]])
+    back = [(0.0, -0.6), (q, -0.6)]
+    profile = np.array([*back, *((a, -b) for a, b in side), (r, -0.7), *tread, (r, 0.7), *side[::-1]])
     return _on_axle(lathe(profile * (1, half), SEGMENTS))
 
 
@@ -75,13 +76,13 @@ def _angles(w: Wheel) -> Float:
 def _spoke(w: Wheel) -> Solid:
     """One spoke along +x, its face towards +z."""
     q, half = w.radius * w.rim, w.width / 2
-    f = np.linspace(0, 1, 7)
+    f = np.linspace(0, 1, 6)
     r = 0.14 * q + f * (q - 0.015 - 0.14 * q)
     pitch = 2 * np.pi * 0.3 * q / (w.spokes * (2 if w.paired else 1))
     wide = 0.5 * w.spoke_width * pitch * (1 + (w.flare * 2 - 1) * f)
     face = half * curve(f, [(0, 0.6), (0.5, 0.74), (1, 0.84)])
     thick = 0.011 - 0.002 * f
-    ring = superellipse(1.0, 1.0, 4.0, 12)
+    ring = superellipse(1.0, 1.0, 4.0, 8)
     lean = w.twist * f**1.5
     y = ring[:, 0] * wide[:, None]
     z = face[:, None] - thick[:, None] + ring[:, 1] * thick[:, None]

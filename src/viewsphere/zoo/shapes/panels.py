@@ -29,7 +29,7 @@ def raised(surface: Surface, uv: Float, offset: ArrayLike) -> Float:
     return surface(u, v) + normals(surface, u, v) * np.asarray(offset, np.float64)[..., None]
 
 
-def rounded_square(rounding: float, count: int, corner: int = 4) -> Float:
+def rounded_square(rounding: float, count: int, corner: int = 3) -> Float:
     """A counter-clockwise ring of the square [0, 1]^2 with rounded corners: (4 (count + 2 corner), 2)."""
     straight = np.linspace(rounding, 1 - rounding, count, endpoint=False)
     angle = np.linspace(-np.pi / 2, 0, 2 * corner, endpoint=False)
@@ -59,7 +59,7 @@ def panel(
     rounding: float = 0.2,
     count: int = 8,
     depth: float = 0.012,
-    rings: int = 4,
+    rings: int = 3,
 ) -> Solid:
     """A rounded plate that follows the surface, `height` above it, with a skirt down to `depth` below."""
     square = rounded_square(rounding, count)
