@@ -13,6 +13,7 @@ import platform
 import tempfile
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,7 @@ from viewsphere.annotate import annotate
 from viewsphere.assets.mesh import Mesh
 from viewsphere.geometry.box import box_vertices
 from viewsphere.model.sample import Sample
+from viewsphere.model.shot import Frame, Shot
 from viewsphere.run.stages import Stages
 from viewsphere.sampling.viewpoints import camera_for
 from viewsphere.store import Store
@@ -51,38 +53,30 @@ def reference_recipe(frames: int, antialias: int) -> Recipe:
 
 
 def subdivide(mesh: Mesh) -> Mesh:
-    """Split every triangle into four until there are enough; new corners are midpoints."""
-    from dataclasses import replace
-
-    while len(mesh.triangles) < TRIANGLES:
-        t = mesh.triangles.astype(np.int64)
-        edges = np.sort(t[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-        pairs, where = np.unique(edges, axis=0, return_inverse=True)
-        m = len(mesh.vertices) + where.reshape(-1, 3)
-        a, b, c = t.T
-        split = np.stack([[a, m[:, 0], m[:, 2]], [m[:, 0], b, m[:, 1]], [m[:, 2], m[:, 1], c], m.T], axis=0)
-        triangles = split.transpose(2, 0, 1).reshape(-1, 3).astype(np.int32)
-
-        def add(array: Any, unit: bool = False, pairs: Any = pairs) -> Any:
-            if array is None:
-                return None
-            middle = array[pairs].mean(axis=1, dtype=np.float64)
-            if unit:
-                middle /= np.maximum(np.linalg.norm(middle, axis=1, keepdims=True), 1e-12)
-            return np.concatenate([array, middle.astype(np.float32)])
-
+    """Split the largest triangles in three around their centroids until there are enough: no seams, no gaps."""
+    while (lacking := TRIANGLES - len(mesh.triangles)) > 0:
+        corners = mesh.vertices[mesh.triangles]
+        areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+        chosen = np.argsort(-areas, kind="stable")[: -(-lacking // 2)]
+        owners = mesh.triangles[chosen]
+        a, b, c = owners.T
+        middle = (len(mesh.vertices) + np.arange(len(chosen))).astype(np.int32)
+        kept = np.delete(np.arange(len(mesh.triangles)), chosen)
+        parts = [np.stack(t, axis=1) for t in ((a, b, middle), (b, c, middle), (c, a, middle))]
+        source = np.concatenate([kept, chosen, chosen, chosen])
         mesh = replace(
             mesh,
-            vertices=add(mesh.vertices),
-            normals=add(mesh.normals, unit=True),
-            uv0=add(mesh.uv0),
-            uv1=add(mesh.uv1),
-            colors=add(mesh.colors),
-            triangles=triangles,
-            triangle_material=np.repeat(mesh.triangle_material, 4),
-            triangle_part=np.repeat(mesh.triangle_part, 4),
+            triangles=np.concatenate([mesh.triangles[kept], *parts]),
+            triangle_material=mesh.triangle_material[source],
+            triangle_part=mesh.triangle_part[source],
+            **{name: with_means(getattr(mesh, name), owners) for name in ("vertices", "normals", "uv0", "uv1", "colors")},
         )
     return mesh
+
+
+def with_means(values: Any, owners: Any) -> Any:
+    """Per-vertex values and, behind them, the means of these triples of vertices."""
+    return None if values is None else np.concatenate([values, values[owners].mean(axis=1, dtype=np.float32)])
 
 
 class Clock:
@@ -112,50 +106,51 @@ def embree_scene(geometry: Any) -> Any:
 
 def embree_frame(scene: Any, camera: Any) -> Any:
     """One ray a pixel with camera-space z = 1, so that hit distance is z-depth; building the rays is part of the price."""
-    u, v = np.meshgrid(np.arange(camera.width) + 0.5, np.arange(camera.height) + 0.5)
-    local = np.stack([(u - camera.K[0, 2]) / camera.K[0, 0], (v - camera.K[1, 2]) / camera.K[1, 1], np.ones_like(u)], -1)
-    directions = (local.reshape(-1, 3) @ camera.R).astype(np.float32)
-    origins = np.broadcast_to(camera.center.astype(np.float32), directions.shape).copy()
+    x = ((np.arange(camera.width) + 0.5 - camera.K[0, 2]) / camera.K[0, 0]).astype(np.float32)
+    y = ((np.arange(camera.height) + 0.5 - camera.K[1, 2]) / camera.K[1, 1]).astype(np.float32)
+    r = camera.R.astype(np.float32)
+    directions = (x[None, :, None] * r[0] + (y[:, None, None] * r[1] + r[2])).reshape(-1, 3)
+    origins = np.tile(camera.center.astype(np.float32), (len(directions), 1))
     return scene.run(origins, directions, output=True)
 
 
 def measure(frames: int, antialias: int, folder: Path) -> Clock:
     clock = Clock()
     planned = clock("plan (273,600 frames)", lambda: plan(Recipe.load(ROOT / "recipes" / "car_poses.yaml")))
-    clock("plan, every pose", lambda: len(planned.pose_list))
+    clock("plan, all of its shots", lambda: sum(1 for _ in planned.shots()))
     shot = next(iter(plan(reference_recipe(frames, antialias), shot_frames=frames).shots()))
     mesh = subdivide(Stages().model(shot.placements[0].model))
     engine: plugins.Engine = plugins.load("engines", "raster")
+    store = Store(folder)
+    (folder / "store" / "writing").mkdir(parents=True)
+    warm_up = engine.stage(shot, lambda spec: mesh)  # compiles, or reads the cache
+    one_frame(Clock(), shot, shot.frames[0], warm_up, mesh, store, None)
     stage = clock("stage (once a shot)", lambda: engine.stage(shot, lambda spec: mesh))
-    boxes = [box_vertices(*mesh.bounds)]
     try:
         scene = embree_scene(stage.geometry)
     except ImportError:
         scene = None
-    store = Store(folder)
-    (folder / "store" / "writing").mkdir(parents=True)
-    names = ["depth", "instances", "normals"]
-    for turn in range(2):  # the first turn compiles and warms up
-        if turn == 1:
-            clock.times = {k: v for k, v in clock.times.items() if "plan" in k}
-            stage = clock("stage (once a shot)", lambda: engine.stage(shot, lambda spec: mesh))
-        for frame in shot.frames if turn else shot.frames[:2]:
-            camera = camera_for(shot.intrinsics, frame.pose, boxes[0].mean(axis=0))
-            begun = time.process_time()
-            visibility = clock("truth: raster", lambda: rasterize(stage.geometry, camera))
-            observed = clock("truth: channels", lambda: observe(stage.geometry, camera, visibility, names))
-            observed["rgb"] = clock("colour", lambda: stage.color(camera, frame, visibility))
-            objects = clock(
-                "annotations",
-                lambda: annotate(shot, frame, camera, stage.geometry, visibility, boxes, ["model.obj"]),
-            )
-            sample = Sample(frame.index, "train", camera, frame.pose, objects, observed, {})
-            clock("files", lambda: store.write_shot(f"{turn}-{frame.index}", [sample]))
-            clock.times.setdefault("whole frame", []).append(1e3 * (time.process_time() - begun))
-            if scene is not None:
-                clock("Embree, one ray a pixel", lambda: embree_frame(scene, camera))
+    for frame in shot.frames:
+        one_frame(clock, shot, frame, stage, mesh, store, scene)
     print(f"scene: {len(mesh.triangles):,} triangles + ground, 640x480, antialias {antialias}")
     return clock
+
+
+def one_frame(clock: Clock, shot: Shot, frame: Frame, stage: plugins.Stage, mesh: Mesh, store: Store, scene: Any) -> None:
+    """One frame stage by stage, and Embree's rays for the same one."""
+    boxes = [box_vertices(*mesh.bounds)]
+    camera = camera_for(shot.intrinsics, frame.pose, boxes[0].mean(axis=0))
+    begun = time.process_time()
+    visibility = clock("truth: raster", lambda: rasterize(stage.geometry, camera))
+    names = ["depth", "instances", "normals"]
+    observed = clock("truth: channels", lambda: observe(stage.geometry, camera, visibility, names))
+    observed["rgb"] = clock("colour", lambda: stage.color(camera, frame, visibility))
+    objects = clock("annotations", lambda: annotate(shot, frame, camera, stage.geometry, visibility, boxes, ["model.obj"]))
+    sample = Sample(frame.index, "train", camera, frame.pose, objects, observed, {})
+    clock("files", lambda: store.write_shot(f"{id(clock)}-{frame.index}", [sample]))
+    clock.times.setdefault("whole frame", []).append(1e3 * (time.process_time() - begun))
+    if scene is not None:
+        clock("Embree, one ray a pixel", lambda: embree_frame(scene, camera))
 
 
 def throughput(folder: Path, frames: int, workers: int) -> float:

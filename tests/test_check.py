@@ -177,6 +177,18 @@ def test_run_lengths_that_are_none(dataset):
     assert ("masks", 1) in failures(dataset)
 
 
+def test_run_lengths_that_are_none_where_there_is_no_map(tmp_path):
+    dataset = make(tmp_path, channels=("rgb",))
+    edit_record(dataset, 1, lambda r: r["objects"][0]["rle"].update(counts="?!"))
+    assert {("masks", 1), ("boxes", 1), ("coco", None)} <= failures(dataset)
+
+
+@pytest.mark.parametrize("text", ["", "{}"])
+def test_a_model_without_its_facts(dataset, text):
+    (dataset.store.model_folder("block-1") / "model.json").write_text(text)
+    assert failures(dataset) == {("counts", None)}
+
+
 @pytest.mark.parametrize(("key", "value"), [("area", 7), ("visibility", 0.0), ("truncation", 1.5)])
 def test_a_wrong_number_of_pixels(dataset, key, value):
     edit_record(dataset, 1, lambda r: r["objects"][0].update({key: value}))

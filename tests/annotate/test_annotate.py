@@ -44,12 +44,10 @@ def scene(meshes, motions, pose=None, intrinsics=LENS, ground=False, category_de
     rotation = orbit_rotation(*angles)
     camera = Camera(intrinsics, rotation, -rotation @ orbit_center(*angles[:2], pose.distance))
     specs = [
-        ModelSpec(key=f"m{i}", source="x.obj", category="cube", category_id=1, real_size=(1, 2, 3))
-        for i in range(len(meshes))
+        ModelSpec(key=f"m{i}", source="x.obj", category="cube", category_id=1, real_size=(1, 2, 3)) for i in range(len(meshes))
     ]
     placements = tuple(
-        Placement(id=i + 1, model=s, world_from_object=m)
-        for i, (s, m) in enumerate(zip(specs, motions, strict=True))
+        Placement(id=i + 1, model=s, world_from_object=m) for i, (s, m) in enumerate(zip(specs, motions, strict=True))
     )
     frame = Frame(index=5, pose=pose, split="train")
     shot = Shot(
@@ -59,9 +57,7 @@ def scene(meshes, motions, pose=None, intrinsics=LENS, ground=False, category_de
     geometry = build_geometry(placements, meshes, ground, 0.01)
     visibility = rasterize(geometry, camera)
     boxes = [box_vertices(*m.bounds) for m in meshes]
-    objects = annotate(
-        shot, frame, camera, geometry, visibility, boxes, [f"MODELS/{s.key}.glb" for s in specs]
-    )
+    objects = annotate(shot, frame, camera, geometry, visibility, boxes, [f"MODELS/{s.key}.glb" for s in specs])
     return objects, camera, geometry, visibility, pose
 
 
@@ -81,9 +77,7 @@ def test_a_cube_seen_head_on():
     assert (cube.id, cube.category, cube.key, cube.model) == (1, "cube", "m0", "MODELS/m0.glb")
     np.testing.assert_allclose(cube.box3d_camera.mean(axis=0), (0, 0, 4), atol=1e-15)
     np.testing.assert_array_equal(cube.box3d, cube.box3d_object)
-    np.testing.assert_allclose(
-        cube.box3d_pixels[1], (80 + half, 60 + half)
-    )  # front, left of the object, bottom
+    np.testing.assert_allclose(cube.box3d_pixels[1], (80 + half, 60 + half))  # front, left of the object, bottom
     assert cube.box3d_in_front.all()
     assert cube.quaternion == pytest.approx((np.sqrt(0.5), np.sqrt(0.5), 0, 0))  # z up to y down
 
@@ -105,12 +99,8 @@ def test_p_times_the_box_is_the_box_in_pixels(seed):
         pixels = homogeneous[front, :2] / homogeneous[front, 2:]
         np.testing.assert_allclose(o.box3d_pixels[front], pixels, rtol=1e-9, atol=1e-6)
         assert np.isnan(o.box3d_pixels[~front]).all()
-        np.testing.assert_allclose(
-            o.camera_from_object, rigid(camera.R, camera.t) @ o.world_from_object, atol=1e-12
-        )
-        np.testing.assert_allclose(
-            matrix_from_quaternion(o.quaternion), o.camera_from_object[:3, :3], atol=1e-12
-        )
+        np.testing.assert_allclose(o.camera_from_object, rigid(camera.R, camera.t) @ o.world_from_object, atol=1e-12)
+        np.testing.assert_allclose(matrix_from_quaternion(o.quaternion), o.camera_from_object[:3, :3], atol=1e-12)
         ids = np.where(visibility.triangle < 0, 0, geometry.triangle_object[visibility.triangle])
         np.testing.assert_array_equal(o.mask, ids == o.id)
         assert o.area == o.mask.sum()

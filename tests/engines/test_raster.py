@@ -334,6 +334,43 @@ def test_edge_coverage_and_no_fringe(angle):
     assert set(np.unique(seen)) <= set(as_bytes(0.5 * np.arange(5) / 4).tolist())
 
 
+@pytest.mark.parametrize("size", [1e-6, 1e6])
+def test_size_does_not_change_the_picture(size):
+    """A small or huge scene looks like the one of a metre: shadows, textures and all."""
+    image = texture_image(16, 16, seed=2)
+    uv = np.tile(CARD_UV, (6, 1))
+    material = Material(base_color_texture=Texture(0))
+    plain, scaled = (
+        picture(
+            mesh_of(BOX * s, material, uv0=uv, images=(image,)),
+            Scene(ground=Ground()),
+            camera(48, 48, 40.0, 30, 25, 4 * s),
+            antialias=1,
+        )
+        for s in (1.0, size)
+    )
+    difference = np.abs(plain.astype(int) - scaled.astype(int)).max(axis=2)
+    assert plain.std() > 20
+    assert (difference > 3).mean() < 0.01
+
+
+def test_ground_without_objects_and_nothing_at_all():
+    shot = Shot(
+        key="shot",
+        placements=(),
+        intrinsics=Intrinsics(width=16, height=16, fx=16, fy=16, cx=8, cy=8),
+        scene=Scene(ground=Ground(), background=Background(color=(0, 0, 1))),
+        frames=(FRAME,),
+        channels=("rgb",),
+    )
+    view = camera(16, 16, 16.0, elevation=45, distance=3.0)
+    for scene, expected in ((shot.scene, False), (shot.scene.model_copy(update={"ground": None}), True)):
+        stage = raster.stage(shot.model_copy(update={"scene": scene}), lambda _: pytest.fail("nothing to load"))
+        seen = stage.color(view, FRAME, rasterize(stage.geometry, view))
+        assert bool((seen == [0, 0, 255]).all()) is expected
+        assert np.ptp(seen[-4:].reshape(-1, 3), axis=0).max() <= 1
+
+
 def test_two_runs_are_equal_byte_for_byte():
     mesh = mesh_of(BOX, Material(metallic=0.5, roughness=0.3, clearcoat=1.0))
     scene = Scene(ground=Ground())

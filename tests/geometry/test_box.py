@@ -15,16 +15,12 @@ from viewsphere.geometry.camera import orbit_center, orbit_rotation, project
 from viewsphere.geometry.pose_category import SIDES, pose_category
 from viewsphere.model.camera import Camera, Distortion, Intrinsics
 
-CUBE_TRIANGLES = np.array(
-    [(f[a], f[b], f[c]) for f in FACES.values() for a, b, c in ((0, 1, 2), (0, 2, 3))], np.int32
-)
+CUBE_TRIANGLES = np.array([(f[a], f[b], f[c]) for f in FACES.values() for a, b, c in ((0, 1, 2), (0, 2, 3))], np.int32)
 
 
 def camera_at(azimuth=0.0, elevation=0.0, distance=4.0, lens=None, size=(640, 480), focal=500.0):
     rotation = orbit_rotation(azimuth, elevation)
-    intrinsics = Intrinsics(
-        width=size[0], height=size[1], fx=focal, fy=focal, cx=size[0] / 2, cy=size[1] / 2, distortion=lens
-    )
+    intrinsics = Intrinsics(width=size[0], height=size[1], fx=focal, fy=focal, cx=size[0] / 2, cy=size[1] / 2, distortion=lens)
     return Camera(intrinsics, rotation, -rotation @ orbit_center(azimuth, elevation, distance))
 
 
@@ -73,9 +69,7 @@ def test_a_cube_seen_head_on():
 
 def test_only_vertices_of_triangles_count():
     vertices = np.vstack([box_vertices((-0.5,) * 3, (0.5,) * 3), [[100, 0, 0]]])
-    np.testing.assert_array_equal(
-        bounds_of(camera_at(), vertices)[0], bounds_of(camera_at(), vertices[:8])[0]
-    )
+    np.testing.assert_array_equal(bounds_of(camera_at(), vertices)[0], bounds_of(camera_at(), vertices[:8])[0])
 
 
 def test_triangles_that_cross_the_camera_plane_are_cut():
@@ -102,9 +96,7 @@ def test_cutting_agrees_with_a_finely_divided_model():
         camera = camera_at(distance=0.3)
         triangle = rng.uniform(-1, 1, (3, 3))
         bounds, _ = bounds_of(camera, triangle, np.array([[0, 1, 2]], np.int32))
-        points = np.concatenate(
-            [a + s[:, None] * (b - a) for a, b in zip(triangle, triangle[[1, 2, 0]], strict=True)]
-        )
+        points = np.concatenate([a + s[:, None] * (b - a) for a, b in zip(triangle, triangle[[1, 2, 0]], strict=True)])
         local = points @ camera.R.T + camera.t
         local = local[local[:, 2] > 1e-3]
         if bounds is None:

@@ -12,9 +12,7 @@ from viewsphere.geometry.rotation import (
 )
 
 coordinates = st.floats(-1, 1, allow_subnormal=False)
-quaternions = st.tuples(coordinates, coordinates, coordinates, coordinates).filter(
-    lambda q: np.linalg.norm(q) > 1e-3
-)
+quaternions = st.tuples(coordinates, coordinates, coordinates, coordinates).filter(lambda q: np.linalg.norm(q) > 1e-3)
 
 
 @given(quaternions)
@@ -51,9 +49,7 @@ def test_half_turns_have_one_name():
         assert back[np.flatnonzero(np.abs(back) > 1e-9)[0]] > 0
 
 
-@pytest.mark.parametrize(
-    "bad", [np.zeros((3, 3)), np.diag([1, 1, -1]), 2 * np.eye(3), np.eye(4), np.full((3, 3), np.nan)]
-)
+@pytest.mark.parametrize("bad", [np.zeros((3, 3)), np.diag([1, 1, -1]), 2 * np.eye(3), np.eye(4), np.full((3, 3), np.nan)])
 def test_what_is_no_rotation_is_refused(bad):
     with pytest.raises(ValueError, match="rotation"):
         quaternion_from_matrix(bad)

@@ -191,8 +191,9 @@ def test_ids_and_depth_on_real_models():
         errors.append(error)
     assert overruled < 1e-5 * pixels
     assert toss_ups < 2e-3 * pixels  # real models hold doubled faces: equal depth to the last bit
-    assert np.quantile(np.concatenate(errors), 0.999) <= 1e-4
-    print(f"{pixels} pixels, {toss_ups} toss-ups, {overruled} where Embree was wrong")
+    worst = np.quantile(np.concatenate(errors), 0.999)
+    assert worst <= 1e-4
+    print(f"{pixels} pixels: {toss_ups} toss-ups, {overruled} where Embree was wrong, depth p99.9 {worst:.1e} m at 10 m")
 
 
 def opaque(geometry):

@@ -38,7 +38,7 @@ def test_equals_brute_force_on_soups(name, seed):
     assert (seen.inverse_depth[seen.triangle < 0] == 0).all()
 
 
-def test_deep_inside_the_pinhole_and_rays_agree():
+def test_pinhole_and_ray_table_agree():
     """The same view drawn by the projection and by the ray table: a lens whose coefficients are all zero."""
     geometry = placed(random_soup(np.random.default_rng(5), 400), ground=True)
     straight = lens(160, 120, 1.2, skew=3.0)

@@ -25,7 +25,8 @@ import platformdirs
 from viewsphere.assets.load import load_model
 from viewsphere.assets.mesh import Image, Material, Mesh, Texture
 from viewsphere.assets.normalise import normalise
-from viewsphere.assets.piece import TEXTURE_FIELDS
+from viewsphere.assets.piece import TEXTURE_FIELDS, FileFacts
+from viewsphere.errors import ModelError
 from viewsphere.model.shot import ModelSpec, Size
 
 SETTINGS = ("up", "forward", "unit", "centring", "scale", "real_size", "confined")
@@ -59,6 +60,13 @@ def load_normalised(spec: ModelSpec, build: Callable[[ModelSpec], Mesh] | None =
     if first is not None:
         _store(folder, first, path, facts.files, mesh)
     return mesh
+
+
+def load_zoo(spec: ModelSpec, build: Callable[[ModelSpec], Mesh] | None) -> tuple[Mesh, FileFacts]:
+    """A procedural model and its facts; ModelError when there is nothing to build it with."""
+    if build is None:
+        raise ModelError(f"{spec.source}: no builder for procedural models was given")
+    return build(spec), FileFacts(Path(spec.source), "zoo", "+z", "-y", 1.0)
 
 
 def real_size(spec: ModelSpec, build: Callable[[ModelSpec], Mesh] | None = None, folder: Path | None = None) -> Size | None:

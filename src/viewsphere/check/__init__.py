@@ -58,7 +58,10 @@ def check(dataset: Dataset, *, sample: int = 50, rays: bool | None = None) -> Re
     """
     findings: list[Finding] = []
     notes: list[str] = []
-    findings += [Finding("counts", None, message) for message in _counts(dataset, notes)]
+    try:
+        findings += [Finding("counts", None, message) for message in _counts(dataset, notes)]
+    except (ViewsphereError, LookupError, TypeError, ValueError) as error:
+        return Report({}, (Finding("counts", None, f"expected models that can be read, found {error}"),), ())
     caster = None if rays is False else _caster(dataset, rays is True, notes)
     chosen = set(range(0, len(dataset), max(1, -(-len(dataset) // sample)))) if caster and sample else set[int]()
     checked = dict.fromkeys(FRAME_PROOFS, 0)

@@ -47,7 +47,10 @@ def frame_truth(sample: Sample) -> Iterator[FrameTruth]:
     except (KeyError, ViewsphereError):
         instances = None
     for o in sample.objects:
-        mask = o.mask if instances is None else instances == o.id
+        try:
+            mask = o.mask if instances is None else instances == o.id
+        except ValueError:
+            continue  # the frame's own proofs say so
         yield FrameTruth(
             sample.index,
             sample.split,

@@ -85,7 +85,7 @@ def masks(sample: Sample, models: Mapping[str, ModelInfo]) -> Iterator[str]:
 
 
 def boxes(sample: Sample, models: Mapping[str, ModelInfo]) -> Iterator[str]:
-    """`box2d` is the mask's tight box; the projected model's box holds it, lies in the 3D box's, and is clipped to the image."""
+    """`box2d` is the mask's tight box; the projected model's box holds it and lies in the 3D box's."""
     for o in sample.objects:
         tight = mask_box(o.mask)
         if o.box2d != tight:

@@ -1,0 +1,1 @@
+"""Data-set formats: each module exports a store in one."""

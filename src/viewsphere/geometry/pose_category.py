@@ -19,9 +19,7 @@ def pose_category(azimuth_deg: float, elevation_deg: float, resolution_deg: floa
     """
     sectors = round(360 / resolution_deg) if resolution_deg > 0 else 0
     if sectors < 1 or not math.isclose(sectors * resolution_deg, 360):
-        raise ValueError(
-            f"pose_category: expected a resolution that divides 360 degrees, got {resolution_deg}"
-        )
+        raise ValueError(f"pose_category: expected a resolution that divides 360 degrees, got {resolution_deg}")
     elevation = round(elevation_deg, 6)
     if elevation >= 60:
         return "top"

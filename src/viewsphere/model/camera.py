@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
+from viewsphere.geometry.rotation import transform
 from viewsphere.model.frozen import Frozen
 
 
@@ -65,12 +66,13 @@ class Camera:
     @property
     def P(self) -> NDArray[np.float64]:
         """Projection matrix K [R|t], (3, 4) float64; exact for an undistorted lens."""
-        return self.K @ np.column_stack([self.R, self.t])
+        motion = np.column_stack([self.R, self.t])
+        return transform(self.K, motion.T).T
 
     @property
     def center(self) -> NDArray[np.float64]:
         """Camera centre in the world, (3,) metres."""
-        return -self.R.T @ self.t
+        return -transform(self.R.T, self.t)
 
     @property
     def width(self) -> int:

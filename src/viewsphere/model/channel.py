@@ -44,13 +44,9 @@ CHANNELS: dict[str, Channel] = {
         Channel("categories", np.int32, 1, "category id", 0, "png16", "category of the object seen; 0 is background"),
         Channel("parts", np.int32, 1, "part id", 0, "png16", "named part of the object's model, from 1; 0 is none"),
         Channel("normals", np.float32, 3, "1", 0, "tiff", "shading normal, camera axes, towards the camera"),
-        Channel(
-            "normals_geometric", np.float32, 3, "1", 0, "tiff", "triangle's normal, camera axes, towards the camera"
-        ),
+        Channel("normals_geometric", np.float32, 3, "1", 0, "tiff", "triangle's normal, camera axes, towards the camera"),
         Channel("coordinates", np.float32, 3, "m", np.nan, "tiff", "the seen point in its object's own axes"),
-        Channel(
-            "triangles", np.int32, 1, "triangle", -1, "tiff", "index in the object's exported model; -1 where no object"
-        ),
+        Channel("triangles", np.int32, 1, "triangle", -1, "tiff", "index in the object's exported model; -1 where no object"),
         Channel("barycentrics", np.float32, 3, "1", 0, "tiff", "weights of the triangle's corners at the seen point"),
     )
 }

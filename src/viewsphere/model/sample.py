@@ -118,7 +118,6 @@ class Sample:
                 return self.channels[name]
             except KeyError:
                 raise AttributeError(
-                    f"this sample has no channel {name!r}; it has {', '.join(self.channels)}: "
-                    "add it to the recipe's channels"
+                    f"this sample has no channel {name!r}; it has {', '.join(self.channels)}: add it to the recipe's channels"
                 ) from None
         raise AttributeError(f"Sample has no attribute {name!r}")

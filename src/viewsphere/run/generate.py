@@ -9,6 +9,8 @@ from dataclasses import dataclass, field
 from importlib.metadata import version
 from pathlib import Path
 
+import numpy as np
+
 from viewsphere import plugins
 from viewsphere.errors import ModelError, RecipeError, UserError, ViewsphereError
 from viewsphere.model.recipe import Recipe
@@ -122,14 +124,17 @@ def _prepare_models(planned: Plan, store: Store, workers: int, keep_going: bool,
 
 def _distance_problems(planned: Plan, store: Store) -> Iterator[tuple[str, ViewsphereError]]:
     """Models that some pose's camera would stand inside of; each is named once."""
-    poses = {
-        (p.distance, p.target, p.azimuth_deg if p.target else 0, p.elevation_deg if p.target else 0): p
-        for p in planned.pose_list
-    }
+    poses = planned.pose_list
+    distances = np.fromiter((poses.view(i).distance for i in range(len(poses))), np.float64, len(poses))
+    target = poses[0].target
     for spec in planned.model_specs:
         info = store.model_info(spec.key)
-        problems = (distance_problem(p, info.box3d_object) for p in poses.values()) if info else ()
-        first = next((p for p in problems if p), None)
+        if info is None:
+            continue
+        around = info.box3d_object.mean(axis=0) if target is None else np.array(target)
+        reach = np.linalg.norm(info.box3d_object - around, axis=1).max()
+        near = (distance_problem(poses[int(i)], info.box3d_object) for i in np.flatnonzero(distances <= reach))
+        first = next((problem for problem in near if problem), None)
         if first:
             yield spec.key, RecipeError(f"viewpoints.distance: {first} (model {spec.key})")
 

@@ -12,6 +12,7 @@ from viewsphere.annotate import annotate
 from viewsphere.assets.cache import load_normalised, real_size
 from viewsphere.assets.mesh import Mesh
 from viewsphere.geometry.box import box_vertices
+from viewsphere.geometry.rotation import transform
 from viewsphere.model.sample import Float, Sample
 from viewsphere.model.shot import Frame, ModelSpec, Shot, Size
 from viewsphere.sampling.viewpoints import camera_for
@@ -95,5 +96,4 @@ def render_frame(
 
 def _target(shot: Shot, boxes: Sequence[Float]) -> Float:
     """Box centre of object 1 in the world: what a pose without a target of its own looks at."""
-    world = np.array(shot.placements[0].world_from_object)
-    return world[:3, :3] @ boxes[0].mean(axis=0) + world[:3, 3]
+    return transform(shot.placements[0].world_from_object, boxes[0].mean(axis=0))

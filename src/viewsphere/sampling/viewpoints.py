@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from viewsphere.geometry.camera import orbit_center, orbit_rotation
 from viewsphere.geometry.pose_category import pose_category
+from viewsphere.geometry.rotation import transform
 from viewsphere.model.camera import Camera, Intrinsics
 from viewsphere.model.recipe_viewpoints import Grid, Jitter, Normal, Sphere, axis_value
 from viewsphere.model.shot import Pose
@@ -231,7 +232,7 @@ def camera_for(intrinsics: Intrinsics, pose: Pose, target: ArrayLike) -> Camera:
     at = np.asarray(target if pose.target is None else pose.target, np.float64)
     rotation = orbit_rotation(azimuth, elevation, tilt)
     center = at + orbit_center(azimuth, elevation, pose.distance)
-    return Camera(intrinsics, rotation, -rotation @ center)
+    return Camera(intrinsics, rotation, -transform(rotation, center))
 
 
 def distance_problem(pose: Pose, box: Float) -> str | None:

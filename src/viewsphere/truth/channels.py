@@ -45,7 +45,10 @@ class _View:
     @cached_property
     def rays(self) -> NDArray[np.float64]:
         rays = lens_rays(self.camera)
-        return np.empty((0, 0, 3)) if rays is None else rays
+        if rays is None:
+            rays = np.empty((0, 0, 3))
+            rays.setflags(write=False)  # as a lens' are: the kernels are compiled once for both
+        return rays
 
     @cached_property
     def q(self) -> NDArray[np.float64]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -14,16 +14,17 @@ from viewsphere.zoo.coachwork.shape import PROPORTIONS, Body, Proportions, Shape
 from viewsphere.zoo.coachwork.wheels import Wheel
 from viewsphere.zoo.shapes.assembly import Piece, assemble
 from viewsphere.zoo.shapes.paint import Color
+from viewsphere.zoo.shapes.solids import both_sides
 
 
 @dataclass(frozen=True)
 class Car:
     """Parameters of a car; lengths in metres, colours sRGB 0..1.
 
-    length, width (without mirrors) and height (without rack and aerial) are the body's; None takes what is usual for the
-    body style. proportions: its side view; roundness: 0 boxy to 1 soft; dome: height of a bulge in the bonnet; windows: 1 to 3 on a
-    side; slant: how far the rear side windows rise towards the rear, fraction of their height; flare: lip of the wheel
-    arches; flakes: 0 solid paint to 1 strong metallic; phase: turn of the rims, radians.
+    length, width (without mirrors) and height (without rack and aerial) are the body's; None takes what is usual for
+    the body style. proportions: its side view; roundness: 0 boxy to 1 soft; dome: height of a bulge in the bonnet;
+    windows: 1 to 3 on a side; slant: how far the rear side windows rise towards the rear, fraction of their height;
+    flare: lip of the wheel arches; flakes: 0 solid paint to 1 strong metallic; phase: turn of the rims, radians.
     """
 
     body: Body = "sedan"
@@ -36,7 +37,7 @@ class Car:
     windows: int | None = None
     slant: float = 0.08
     flare: float = 0.01
-    wheel: Wheel = Wheel()
+    wheel: Wheel = field(default_factory=Wheel)
     phase: float = 0.3
     lamps: Lamps = "swept"
     tail_lamps: Lamps = "swept"
@@ -69,15 +70,13 @@ SIZES: dict[Body, tuple[float, float, float]] = {
 def car(parameters: Car | None = None) -> Mesh:
     """The car in metres: front towards -Y, wheels on z = 0, centred in x and y.
 
-    Parts: body, roof, bumper_*, sill, underbody, wheel_arch, window_*, windshield, seal, seam, wheel_<end>_<side>_tyre and _rim,
-    headlight_*, taillight_*, indicator_*, fog_light_*, grille, intake, badge, licence_plate, mirror_*, door_handle_*, scuttle,
-    wiper, and where fitted cargo_bed, roof_rack, spoiler, aerial, exhaust.
+    Parts: body, roof, bumper_*, sill, underbody, wheel_arch, window_*, windshield, seal, seam, headlight_*, taillight_*,
+    wheel_<end>_<side>_tyre and _rim, indicator_*, fog_light_*, grille, intake, badge, licence_plate, mirror_*, wiper,
+    door_handle_*, scuttle, and where fitted cargo_bed, roof_rack, spoiler, aerial, exhaust.
     """
     p = parameters or Car()
     shape = _shape(p)
-    materials = coats(
-        p.color, p.roof_color or p.color, p.flakes, p.rim_color, p.painted_cladding, p.glass_color
-    )
+    materials = coats(p.color, p.roof_color or p.color, p.flakes, p.rim_color, p.painted_cladding, p.glass_color)
     pieces = [*_shell(p, shape, materials), *_fitted(p, shape, materials)]
     return assemble(pieces, crease_deg=36)
 
@@ -100,11 +99,11 @@ def _shell(p: Car, shape: Shape, c: Coats) -> list[Piece]:
     pickup = p.body == "pickup"
     names = ("bumper_front", "sill" if pickup else "bumper_rear")
     pieces = structure.hull_pieces(shape, hull, c, names)
-    pieces.append(Piece("body", c.paint, structure.whole_deck(hull.deck_to(shape.deck_inner()))))
-    pieces += structure.arch_trims(shape, hull, c, p.flare)
+    pieces.append(Piece("body", c.paint, both_sides(hull.deck_to(shape.deck_inner()))))
+    pieces += structure.arch_trims(hull, c, p.flare)
     if pickup:
         pieces += structure.bed_pieces(shape, c)
-        pieces += structure.arch_trims(shape, shape.bed, c, p.flare)
+        pieces += structure.arch_trims(shape.bed, c, p.flare)
     cells = shape.side_cells(_windows(p), p.slant)
     pieces += structure.cabin_pieces(shape, c, cells, p.black_pillars, p.rear_window)
     return pieces + structure.wheel_pieces(shape, p.wheel, c, p.phase)
@@ -112,14 +111,14 @@ def _shell(p: Car, shape: Shape, c: Coats) -> list[Piece]:
 
 def _fitted(p: Car, shape: Shape, c: Coats) -> list[Piece]:
     """Everything that is screwed on."""
-    rear_door = p.body != "van" or _windows(p) > 1
+    rear_door = p.body != "pickup" or _windows(p) > 1
     pieces = [
         *lights.headlights(shape, p.lamps, c),
         *lights.taillights(shape, p.tail_lamps, c),
         *lights.front_face(shape, p.grille, c),
         *lights.rear_face(shape, c, p.exhausts),
-        *fittings.seams(shape, c, True),
-        *fittings.handles(shape, c, rear_door or p.body == "van", p.chrome_handles),
+        *fittings.seams(shape, c, rear_door),
+        *fittings.handles(shape, c, rear_door, p.chrome_handles),
         *fittings.mirrors(shape, c, p.body in ("van", "pickup")),
         *fittings.wipers(shape, c),
     ]
@@ -171,7 +170,7 @@ def draw(rng: np.random.Generator) -> Car:
         black_pillars=bool(rng.random() < 0.65),
         chrome_handles=bool(rng.random() < 0.25),
         rear_window=body != "van" or windows > 1 or bool(rng.random() < 0.5),
-        roof_rack=body == "hatchback" and bool(rng.random() < 0.45) or body == "van" and bool(rng.random() < 0.3),
+        roof_rack=(body == "hatchback" and bool(rng.random() < 0.45)) or (body == "van" and bool(rng.random() < 0.3)),
         rack_bars=bool(rng.random() < 0.5),
         rear_spoiler=body == "hatchback" and bool(rng.random() < 0.6),
         shark_fin=bool(rng.random() < 0.7),
@@ -190,19 +189,19 @@ _LAMPS: tuple[Lamps, ...] = ("swept", "round", "slim", "block")
 _TOPS: tuple[Color, ...] = ((0.05, 0.05, 0.055), (0.93, 0.93, 0.92), (0.35, 0.36, 0.38))
 _RIMS: tuple[Color, ...] = ((0.76, 0.77, 0.79), (0.5, 0.51, 0.53), (0.13, 0.13, 0.14), (0.62, 0.5, 0.3))
 _PAINTS: tuple[tuple[float, Color], ...] = (
-    (0.13, (0.93, 0.93, 0.91)),  # white
-    (0.09, (0.07, 0.07, 0.08)),  # black
-    (0.09, (0.66, 0.68, 0.7)),  # silver
-    (0.08, (0.35, 0.37, 0.39)),  # grey
-    (0.08, (0.08, 0.2, 0.5)),  # blue
+    (0.11, (0.93, 0.93, 0.91)),  # white
+    (0.07, (0.07, 0.07, 0.08)),  # black
+    (0.07, (0.66, 0.68, 0.7)),  # silver
+    (0.06, (0.35, 0.37, 0.39)),  # grey
+    (0.1, (0.08, 0.2, 0.5)),  # blue
     (0.1, (0.68, 0.05, 0.07)),  # red
     (0.05, (0.1, 0.13, 0.24)),  # midnight blue
     (0.05, (0.35, 0.04, 0.09)),  # burgundy
-    (0.05, (0.95, 0.76, 0.08)),  # yellow
+    (0.06, (0.95, 0.76, 0.08)),  # yellow
     (0.05, (0.92, 0.38, 0.06)),  # orange
     (0.05, (0.1, 0.3, 0.18)),  # racing green
     (0.04, (0.45, 0.72, 0.12)),  # lime
-    (0.05, (0.12, 0.55, 0.62)),  # turquoise
+    (0.06, (0.12, 0.55, 0.62)),  # turquoise
     (0.04, (0.75, 0.68, 0.54)),  # beige
     (0.03, (0.36, 0.23, 0.14)),  # brown
     (0.02, (0.4, 0.2, 0.5)),  # violet

@@ -252,7 +252,13 @@ def _diffuser(p: HairDrier, mouth: float, end: float, coats: _Coats) -> list[Pie
     """A wide bowl with blunt fingers on its floor."""
     wide, tip = max(1.25 * _radius(p), 0.058), p.length
     floor = end + 0.45 * (tip - end)
-    bowl = [(mouth - 0.003, end - 0.02), (mouth + 0.002, end - 0.02), (mouth + 0.003, end), (0.7 * wide, end + 0.3 * (tip - end)), (0.94 * wide, floor)]
+    bowl = [
+        (mouth - 0.003, end - 0.02),
+        (mouth + 0.002, end - 0.02),
+        (mouth + 0.003, end),
+        (0.7 * wide, end + 0.3 * (tip - end)),
+        (0.94 * wide, floor),
+    ]
     bowl += [(wide, tip - 0.003), (wide - 0.001, tip), (wide - 0.003, tip - 0.001), (0.9 * wide, floor + 0.004), (0, floor)]
     finger = lathe([(0.0052, 0), (0.0042, 0.6), (0.0036, 0.9), (0.002, 1.0), (0, 1.02)], 10)
     scale = (1, 1, 0.9 * (tip - floor))
@@ -353,7 +359,9 @@ def _foot_filter(p: HairDrier, coats: _Coats, bottom: float, y: float) -> list[P
     a, b = p.handle_width / 2 + 0.0012, p.handle_depth / 2 + 0.0012
     heights = bottom + np.array([0.006, 0.008, 0.046, 0.048])
     grow = np.array([-0.0015, 0, 0, -0.0015])
-    rings = np.array([np.column_stack([superellipse(a + g, b + g, 2, 36), np.full(36, h)]) for g, h in zip(grow, heights, strict=True)])
+    rings = np.array(
+        [np.column_stack([superellipse(a + g, b + g, 2, 36), np.full(36, h)]) for g, h in zip(grow, heights, strict=True)]
+    )
     slot = rounded_box((0.0016, 0.002, 0.005), 0.0007, 1)
     angles = np.arange(24) * 2 * np.pi / 24
     slots = [

@@ -17,7 +17,7 @@ SHOT_FRAMES = 16
 def stage(shot: Shot, load: Callable[[ModelSpec], Mesh]) -> RasterStage:
     """Build geometry, textures, shadow map and ambient light, once for all frames of the shot.
 
-    Raises UserError for an unknown or ill-typed engine option, or a background image that cannot be read.
+    Raises UserError for an unknown engine option or one out of range.
     """
     from viewsphere.engines.raster.staging import build_stage
 

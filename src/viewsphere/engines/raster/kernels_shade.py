@@ -53,7 +53,7 @@ def _gather(view, surfaces, start, stop, slots, where, triangle, depth, b, mater
         dx = r[0, 0] * x + r[1, 0] * y + r[2, 0] * z
         dy = r[0, 1] * x + r[1, 1] * y + r[2, 1] * z
         dz = r[0, 2] * x + r[1, 2] * y + r[2, 2] * z
-        s = one / depth[slot]
+        s = view.scale / depth[slot]
         b[DX + i], b[DY + i], b[DZ + i] = dx, dy, dz
         b[PX + i], b[PY + i], b[PZ + i] = e[0] + s * dx, e[1] + s * dy, e[2] + s * dz
         b[PIXEL + i] = s * view.pixel
@@ -136,14 +136,13 @@ def _orient(count, light, b):
     A triangle is lit on the side that is seen, whatever its winding.
     """
     zero, one, tiny = f4(0), f4(1), f4(1e-20)
-    m, frame = light.shadow_from_world, light.ground_frame
+    m = light.shadow_from_world
     texels = f4(math.sqrt(m[0, 0] * m[0, 0] + m[0, 1] * m[0, 1] + m[0, 2] * m[0, 2]))
     metres = one / max(texels, tiny)
     sx, sy, sz = light.sun[0], light.sun[1], light.sun[2]
     m00, m01, m02, m03 = m[0, 0], m[0, 1], m[0, 2], m[0, 3]
     m10, m11, m12, m13 = m[1, 0], m[1, 1], m[1, 2], m[1, 3]
     m20, m21, m22, m23 = m[2, 0], m[2, 1], m[2, 2], m[2, 3]
-    reach = one / frame[3] if frame[3] > zero else zero
     for i in range(count):
         x, y, z = b[PX + i], b[PY + i], b[PZ + i]
         dx, dy, dz = b[DX + i], b[DY + i], b[DZ + i]
@@ -171,7 +170,7 @@ def _orient(count, light, b):
         turned = nx * sx + ny * sy + nz * sz
         fade = min(max(turned, zero) / (f4(3) * abs(turned - facing) + f4(1e-6)), one)
         b[FACING + i] = min(facing * f4(10), one) * fade * fade * (f4(3) - fade - fade)
-        far = min(max((np.sqrt(x * x + y * y) * reach - f4(4)) * f4(1 / 26.0), zero), one)
+        far = min(max((np.sqrt(x * x + y * y) - f4(4)) * f4(1 / 26.0), zero), one)
         far = one - (one - far) * (one - far)
         low = min(max(f4(0.09) - dz, zero) * f4(12), one)
         far = one - (one - far * far * (f4(3) - far - far)) * (one - low * low * (f4(3) - low - low))
@@ -233,8 +232,8 @@ def _occlusion(count, light, b):
     zero, one, half = f4(0), f4(1), f4(0.5)
     frame, ground = light.ground_frame, light.ground
     last = f4(ground.shape[0] - 1)
-    cells, corner_x, corner_y, grounded = frame[0], frame[1], frame[2], frame[6] > zero
-    rise = one / (f4(0.35) * frame[5]) if grounded else zero
+    cells, corner_x, corner_y, grounded = frame[0], frame[1], frame[2], frame[5] > zero
+    rise = one / (f4(0.35) * frame[4]) if grounded else zero
     for i in range(count):
         share = b[FACING + i]
         if share > zero:
@@ -253,7 +252,7 @@ def _occlusion(count, light, b):
                 bounce = above[c, 1] * p + above[d, 1] * q + below[c, 1] * r + below[d, 1] * s
             if b[GROUND + i] == zero:
                 sky = one
-                bounce += (one - bounce) * f4(0.6) * min(max((b[PZ + i] - frame[4]) * rise, zero), one)
+                bounce += (one - bounce) * f4(0.6) * min(max((b[PZ + i] - frame[3]) * rise, zero), one)
         b[SKYLIT + i], b[BOUNCE + i] = sky, bounce
 
 

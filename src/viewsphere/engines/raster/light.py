@@ -26,16 +26,11 @@ _SURROUNDINGS = 0.3  # reflectance of what lies below the horizon when there is 
 
 @dataclass(frozen=True, eq=False)
 class Extent:
-    """The objects' bounds from the stage's origin: low, high (3,) metres, and the ground's z or None."""
+    """The objects' bounds, low and high (3,), and the ground's z or None; the centre is 0, half the diagonal 1."""
 
     low: Float
     high: Float
     ground_z: float | None
-
-    @property
-    def radius(self) -> float:
-        """Half the diagonal."""
-        return float(np.linalg.norm(self.high - self.low)) / 2 or 1.0
 
 
 def bake_light(scene: Scene, extent: Extent, surfaces: Surfaces, textures: Textures, exposure: float, resolution: int) -> Light:
@@ -52,7 +47,7 @@ def bake_light(scene: Scene, extent: Extent, surfaces: Surfaces, textures: Textu
     low, high = kernels.depth_bounds(shadow)
     from_sky, from_sun = sky.sum(axis=0), irradiance * direction[2] / math.pi
     albedo = linear_from_srgb(scene.ground.color) if scene.ground else np.full(3, _SURROUNDINGS)
-    ground, frame = np.ones((2, 2, 2), np.float32), np.zeros(7, np.float32)
+    ground, frame = np.ones((2, 2, 2), np.float32), np.zeros(6, np.float32)
     if extent.ground_z is not None:
         total = float((from_sky + from_sun).sum())
         sun_share = float(from_sun.sum()) / total if total > 0 else 0.0
@@ -116,7 +111,7 @@ def _ground_light(
 ) -> tuple[Float32, Float32]:
     """What the objects leave to the ground, (n, n, 2): share of the sky's light, share of all light; and its frame."""
     height = extent.high[2] - ground_z
-    half = float(max((extent.high - extent.low)[:2].max() / 2, 1e-3 * extent.radius) + 0.9 * height)
+    half = float(max((extent.high - extent.low)[:2].max() / 2, 1e-3) + 0.9 * height)
     corner = (extent.low + extent.high)[:2] / 2 - half
     scale = _CELLS / (2 * half)
     low, high = _columns(ground_z, scale, corner, surfaces, textures)
@@ -132,7 +127,7 @@ def _ground_light(
     lit = ~inside | (shadow[row, column] >= w - 1)
     lit = _smoothed(lit.reshape(_CELLS, 2, _CELLS, 2).mean(axis=(1, 3)))
     total = (1 - sun_share) * left + sun_share * (1 - (1 - lit) * window)
-    frame = [scale, *corner, extent.radius, ground_z, max(height, 1e-6 * extent.radius), 1.0]
+    frame = [scale, *corner, ground_z, max(height, 1e-6), 1.0]
     return np.ascontiguousarray(np.stack([left, total], axis=-1), np.float32), np.array(frame, np.float32)
 
 

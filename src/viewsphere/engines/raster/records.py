@@ -1,4 +1,7 @@
-"""The arrays that the shading kernels read, packed once per stage (View: once per picture). All float32 unless said."""
+"""The arrays that the shading kernels read, packed once per stage (View: once per picture). All float32 unless said.
+
+Lengths are in units of half the diagonal of the objects' bounds, from their centre: models of any size keep their digits.
+"""
 
 from __future__ import annotations
 
@@ -14,8 +17,8 @@ Int32 = NDArray[np.int32]
 class Surfaces(NamedTuple):
     """What the triangles are made of.
 
-    vertices (V, 16): shading normal, both uv sets, linear colour and alpha, position from `origin`, two unused (a row is
-    a cache line); triangles (T, 3) uint32; material (T,) int32; density (T, 4): square per metre squared of each uv
+    vertices (V, 16): shading normal, both uv sets, linear colour and alpha, position, two unused (a row is
+    a cache line); triangles (T, 3) uint32; material (T,) int32; density (T, 4): square per square length of each uv
     set; normals (T, 3): geometric, unit; materials (M, 17) and slots (M, 3) int32: columns named in `surface.py`.
     """
 
@@ -48,9 +51,8 @@ class Light(NamedTuple):
     sun (3,) direction; sun_color (3,) irradiance; sky (4, 3): radiance of a white surface under the upper half of the sky
     as a cubic in its normal's z; zenith, horizon, earth (3,) radiance above, beside and below; shadow (N, N): nearest
     depth seen from the sun; shadow_low and shadow_high: its bounds around each block; shadow_from_world (3, 4) in texels;
-    ground (n, n, 2): share of the sky's and of all light that the objects leave to the ground; ground_frame (7,): map cells
-    per metre, its corner x and y, fade radius, ground z, extent, 1 if there is a ground (all relative to the stage's
-    origin).
+    ground (n, n, 2): share of the sky's and of all light that the objects leave to the ground; ground_frame (6,): map cells
+    per length, its corner x and y, ground z, the objects' height, 1 if there is a ground.
     """
 
     sun: Float32
@@ -70,8 +72,9 @@ class Light(NamedTuple):
 class View(NamedTuple):
     """One picture's rays: direction = rotation.T @ ray.
 
-    eye (3,) from the stage's origin; rotation (3, 3) world to camera; lens (2, 3): ray = lens @ (column, row, 1) in samples;
-    rays (rows * columns, 3), empty for a pinhole; columns: samples in a row; pixel: a pixel's size at distance 1.
+    eye (3,); rotation (3, 3) world to camera; lens (2, 3): ray = lens @ (column, row, 1) in samples;
+    rays (rows * columns, 3), empty for a pinhole; columns: samples in a row; pixel: a pixel's size at distance 1;
+    scale: of depths.
     """
 
     eye: Float32
@@ -80,3 +83,4 @@ class View(NamedTuple):
     rays: Float32
     columns: np.uint32
     pixel: np.float32
+    scale: np.float32

@@ -34,6 +34,7 @@ class RasterStage:
     scene: Scene
     options: Options
     origin: NDArray[np.float64]
+    unit: float
     surfaces: Surfaces
     textures: Textures
     light: Light
@@ -114,12 +115,13 @@ class RasterStage:
                 self._rays[key] = table.astype(np.float32).reshape(-1, 3)
             rays = self._rays[key]
         return View(
-            (camera.center - self.origin).astype(np.float32),
+            ((camera.center - self.origin) / self.unit).astype(np.float32),
             camera.R.astype(np.float32),
             lens.astype(np.float32),
             rays,
             np.uint32(camera.width * subdivision),
             np.float32(1 / np.sqrt(camera.intrinsics.fx * camera.intrinsics.fy)),
+            np.float32(1 / self.unit),
         )
 
 
@@ -140,14 +142,14 @@ def build_stage(shot: Shot, load: Callable[[ModelSpec], Mesh]) -> RasterStage:
 def _baked(geometry: Geometry, meshes: Sequence[Mesh], scene: Scene, options: Options) -> RasterStage:
     used = geometry.vertices[np.unique(geometry.triangles[: geometry.triangle_start[-1]])]
     low, high = (used.min(axis=0), used.max(axis=0)) if len(used) else (np.zeros(3), np.zeros(3))
-    origin = (low + high) / 2
+    origin, unit = (low + high) / 2, float(np.linalg.norm(high - low)) / 2 or 1.0
     exposure = EXPOSURE * 2.0**options.exposure
-    surfaces, textures = pack_surfaces(geometry, meshes, scene.ground, origin, exposure)
-    ground_z = None if geometry.ground_z is None else geometry.ground_z - float(origin[2])
-    extent = Extent(low - origin, high - origin, ground_z)
+    surfaces, textures = pack_surfaces(geometry, meshes, scene.ground, origin, unit, exposure)
+    ground_z = None if geometry.ground_z is None else (geometry.ground_z - float(origin[2])) / unit
+    extent = Extent((low - origin) / unit, (high - origin) / unit, ground_z)
     light = bake_light(scene, extent, surfaces, textures, exposure, options.shadow_resolution)
     own = surfaces.materials[surfaces.material]
     see_through = np.append((own[:, BLENDED] > 0) | (own[:, TRANSMISSION] > 0), False)
     seen = np.append(np.ones(len(own), np.bool_), False)
     owner = (geometry.triangle_object * len(surfaces.materials) + surfaces.material).astype(np.int32)
-    return RasterStage(geometry, scene, options, origin, surfaces, textures, light, owner, seen, see_through)
+    return RasterStage(geometry, scene, options, origin, unit, surfaces, textures, light, owner, seen, see_through)

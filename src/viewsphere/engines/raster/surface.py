@@ -26,13 +26,14 @@ def pack_surfaces(
     meshes: Sequence[Mesh],
     ground: Ground | None,
     origin: NDArray[np.float64],
+    unit: float,
     exposure: float,
 ) -> tuple[Surfaces, Textures]:
-    """Arrays for all triangles of a geometry and of the meshes it was built from; positions from `origin`."""
+    """Arrays for all triangles of a geometry and of the meshes it was built from; positions from `origin` in `unit`s."""
     vertices = np.zeros((len(geometry.vertices), 16), np.float32)
     vertices[:, :3] = geometry.normals
     vertices[:, 7:11] = 1.0
-    vertices[:, 11:14] = geometry.vertices - origin
+    vertices[:, 11:14] = (geometry.vertices - origin) / unit
     material = np.zeros(len(geometry.triangles), np.int32)
     rows: list[list[float]] = []
     slots: list[list[int]] = []

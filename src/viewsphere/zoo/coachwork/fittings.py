@@ -11,7 +11,7 @@ from viewsphere.zoo.shapes.assembly import Piece
 from viewsphere.zoo.shapes.panels import raised, ribbon, straight
 from viewsphere.zoo.shapes.solids import Float, Solid, both_sides, join, mirrored, moved, rounded_box, tube, turned
 
-SEAM = 0.009
+SEAM = 0.01
 """Width of the gaps between panels, metres."""
 
 
@@ -51,21 +51,28 @@ def _upright(hull: Hull, y: float, sill: float) -> Solid:
 
 
 def _deck_seams(shape: Shape, coats: Coats) -> list[Piece]:
-    """The bonnet's sides, and the boot lid's or tailgate's outline."""
-    hull, p = shape.hull, shape.proportions
-    half = shape.width / 2
+    """The bonnet's sides, the outline of boot lid or tailgate, a van's sliding rail."""
+    hull, half = shape.hull, shape.width / 2
     front, back = shape.y(0.0) + hull.outline.bow[0] * 0.7 + 0.12, shape.cabin.base.point(0.98)[1] - 0.05
     side = straight((0.70 * half, front), (0.80 * half, back), 20)
-    solids = [both_sides(ribbon(hull.deck_surface, side[::-1], SEAM))]
-    if shape.body != "pickup":
-        edge = hull.outline.u_at_x(0.66 * half, rear=True)
-        line = np.linspace(edge, 8 - edge, 20)
-        low = np.full(20, hull.bumper_line + 0.03)
-        solids.append(ribbon(hull.surface, np.stack([line, low], axis=1), SEAM))
-        top = float(hull.top(np.array([float(edge)]))[1][0]) - hull.edge
-        solids.append(both_sides(ribbon(hull.surface, straight((edge, low[0]), (edge, top), 12), SEAM)))
-    del p
+    solids = [both_sides(ribbon(hull.deck_surface, side[::-1], SEAM, 0.005)), _gate(shape)]
+    if shape.body == "van":
+        y = np.linspace(shape.y(shape.proportions.doors[2]) + 0.03, shape.y(0.955), 20)
+        u = hull.outline.u_at_y(y)
+        z = hull.top(u)[1] - hull.edge - 0.16
+        solids.append(both_sides(ribbon(hull.surface, np.stack([u, z], axis=1), 0.028, 0.004)))
     return [Piece("seam", coats.seam, join(*solids))]
+
+
+def _gate(shape: Shape) -> Solid:
+    """The gaps below and beside the boot lid or tailgate."""
+    hull = shape.bed if shape.body == "pickup" else shape.hull
+    edge = float(hull.outline.u_at_x(0.7 * shape.width / 2, rear=True))
+    low = hull.bumper_line + 0.03
+    line = np.stack([np.linspace(edge, 8 - edge, 20), np.full(20, low)], axis=1)
+    top = float(hull.top(np.array([edge]))[1][0]) - hull.edge
+    upright = ribbon(hull.surface, straight((edge, low), (edge, top), 12), SEAM, 0.004)
+    return join(ribbon(hull.surface, line, SEAM, 0.004), both_sides(upright))
 
 
 def handles(shape: Shape, coats: Coats, rear_door: bool, chrome: bool) -> list[Piece]:
@@ -77,11 +84,14 @@ def handles(shape: Shape, coats: Coats, rear_door: bool, chrome: bool) -> list[P
         u = float(hull.outline.u_at_y(y - 0.17))
         z = float(hull.top(np.array([u]))[1][0]) - hull.edge - 0.085
         at = raised(hull.surface, np.array([[u, z]]), 0.018)[0]
-        grip = moved(rounded_box((0.018, 0.2, 0.028), 0.009), at)
-        feet = [moved(rounded_box((0.04, 0.03, 0.022), 0.006, 2), at + (-0.014, dy, 0)) for dy in (-0.08, 0.08)]
+        grip = moved(rounded_box((0.018, 0.2, 0.028), 0.009, 2), at)
+        feet = [moved(rounded_box((0.04, 0.03, 0.022), 0.006, 1), np.add(at, (-0.014, dy, 0))) for dy in (-0.08, 0.08)]
         material = coats.chrome if chrome else coats.paint
         solid = join(grip, *feet)
-        pieces += [Piece(f"door_handle_{name}_left", material, solid), Piece(f"door_handle_{name}_right", material, mirrored(solid))]
+        pieces += [
+            Piece(f"door_handle_{name}_left", material, solid),
+            Piece(f"door_handle_{name}_right", material, mirrored(solid)),
+        ]
     return pieces
 
 
@@ -90,10 +100,10 @@ def mirrors(shape: Shape, coats: Coats, tall: bool) -> list[Piece]:
     u = 1.17
     root = shape.cabin.surface(u, 0.1)
     height = 0.25 if tall else 0.145
-    at = root + (0.155, 0.02, 0.075 if tall else 0.05)
-    shell = moved(turned(rounded_box((0.21, 0.1, height), 0.048, 4), 2, -0.12), at)
-    glass = moved(turned(rounded_box((0.17, 0.012, height - 0.035), 0.005, 2), 2, -0.12), at + (-0.006, 0.046, 0))
-    arm = tube([root - (0.03, 0, 0.02), root + (0.03, 0.01, 0.0), at - (0.03, 0, 0.03)], 0.022, 10)
+    at = np.add(root, (0.155, 0.02, 0.075 if tall else 0.05))
+    shell = moved(turned(rounded_box((0.21, 0.1, height), 0.048, 3), 2, -0.12), at)
+    glass = moved(turned(rounded_box((0.17, 0.012, height - 0.035), 0.005, 2), 2, -0.12), np.add(at, (-0.006, 0.046, 0)))
+    arm = tube([root - (0.03, 0, 0.02), np.add(root, (0.03, 0.01, 0.0)), at - (0.03, 0, 0.03)], 0.022, 10)
     pieces: list[Piece] = []
     for side, place in (("left", None), ("right", mirrored)):
         for material, solid in ((coats.paint, shell), (coats.chrome, glass), (coats.black, arm)):
@@ -104,10 +114,10 @@ def mirrors(shape: Shape, coats: Coats, tall: bool) -> list[Piece]:
 def wipers(shape: Shape, coats: Coats) -> list[Piece]:
     """A dark scuttle before the windshield and two blades on it."""
     cabin, hull = shape.cabin, shape.hull
-    u = np.linspace(-0.93, 0.93, 31)
+    u = np.linspace(-0.88, 0.88, 31)
     foot = cabin.base.point(u)
-    plan = foot + cabin.base.normal(u) * 0.03
-    scuttle = ribbon(hull.deck_surface, plan, 0.085, 0.004)
+    plan = foot + cabin.base.normal(u) * 0.045
+    scuttle = ribbon(hull.deck_surface, plan, 0.085, 0.003)
     blades = [_blade(shape, 0.12, 0.8, 0.05), _blade(shape, -0.62, 0.12, 0.05)]
     return [Piece("scuttle", coats.black, scuttle), Piece("wiper", coats.black, join(*blades))]
 
@@ -153,7 +163,7 @@ def aerial(shape: Shape, coats: Coats) -> list[Piece]:
     height = (lean[:, 2] + 0.05) / 0.1
     lean[:, 1] = lean[:, 1] * (1 - 0.65 * height) + 0.05 * height
     lean[:, 0] *= 1 - 0.6 * height
-    return [Piece("aerial", coats.paint, moved(Solid(lean, box.triangles), at + (0, 0, 0.02)))]
+    return [Piece("aerial", coats.paint, moved(Solid(lean, box.triangles), np.add(at, (0, 0, 0.02))))]
 
 
 def spoiler(shape: Shape, coats: Coats) -> list[Piece]:
@@ -164,8 +174,8 @@ def spoiler(shape: Shape, coats: Coats) -> list[Piece]:
     bent = wing.vertices.copy()
     bent[:, 2] -= 0.05 * (np.abs(bent[:, 0]) / top.half_width) ** 2.5
     bent[:, 1] -= 0.07 * (np.abs(bent[:, 0]) / top.half_width) ** 2
-    lamp = moved(rounded_box((0.3, 0.02, 0.018), 0.006, 2), at + (0, 0.172, -0.012))
+    lamp = moved(rounded_box((0.3, 0.02, 0.018), 0.006, 2), np.add(at, (0, 0.172, -0.012)))
     return [
-        Piece("spoiler", coats.paint, moved(Solid(bent, wing.triangles), at + (0, 0.05, -0.012))),
+        Piece("spoiler", coats.paint, moved(Solid(bent, wing.triangles), np.add(at, (0, 0.05, -0.012)))),
         Piece("brake_light", coats.red_lamp, lamp),
     ]

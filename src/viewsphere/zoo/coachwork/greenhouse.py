@@ -63,7 +63,9 @@ class Greenhouse:
 
     def roof_solid(self) -> Solid:
         """Rounded edge and crown of the whole roof."""
-        u = np.linspace(-4, 4, 80, endpoint=False)
+        near = np.linspace(1, 0, 10, endpoint=False) ** 1.8
+        left = np.concatenate([1 - near, [1.0], 1 + near[:0:-1], 3 - near, [3.0], 3 + near[::-1]])
+        u = np.concatenate([-left[:0:-1], left])
         _, edge = self._corners(u)
         start = self.surface(u, np.ones_like(u))
         middle = np.array([0.0, (self.top.front + self.top.rear) / 2])

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from viewsphere.zoo.coachwork.outline import Outline
 from viewsphere.zoo.shapes.solids import Float, Solid, curve, grid
 
-LOWER, UPPER, EDGE = 4, 11, 4
+LOWER, UPPER, EDGE = 3, 8, 4
 """Rows of the wall below the bumper line, above it, and around its top edge."""
 
 
@@ -37,9 +37,9 @@ Knots = tuple[tuple[float, float], ...]
 class Hull:
     """A lower body, metres.
 
-    center (y, z): the deck's line in side view; crown: how much lower the deck's sides lie; sill: (y, z) of the wall's lower edge;
-    side, nose, tail: (z, inset from the outline) on flanks, front and rear; edge: radius between wall and deck; bumper_line: z that
-    parts bumpers from body; dome: height of a bonnet bulge.
+    center (y, z): the deck's line in side view; crown: how much lower the deck's sides lie; sill: (y, z) of the wall's
+    lower edge; side, nose, tail: (z, inset from the outline) on flanks, front and rear; edge: radius between wall and
+    deck; bumper_line: z that parts bumpers from body; dome: height of a bonnet bulge that ends at y = dome_end.
     """
 
     outline: Outline
@@ -87,7 +87,7 @@ class Hull:
         free = np.unique(np.concatenate([*ends, flank]))
         y = o.point(free)[:, 1]
         away = np.all([np.abs(y - a.y) > 1.06 * a.radius for a in self.arches], axis=0)
-        across = np.concatenate([[1.03], np.cos(np.linspace(0, np.pi, 25)), [-1.03]])
+        across = np.concatenate([[1.03], np.cos(np.linspace(0, np.pi, 23)), [-1.03]])
         return np.sort(np.concatenate([free[away], *(o.u_at_y(a.y - a.radius * across) for a in self.arches)]))
 
     def lower_edge(self, u: Float) -> Float:
@@ -98,7 +98,7 @@ class Hull:
     def top(self, u: Float) -> tuple[Float, Float]:
         """Plan points (..., 2) and heights where the wall ends and the deck begins."""
         plan, n = self.outline.point(u), self.outline.normal(u)
-        z = self.deck(plan[..., 0], plan[..., 1])
+        at, z = plan, self.deck(plan[..., 0], plan[..., 1])
         for _ in range(3):
             at = plan - (self.inset(u, z - self.edge) + self.edge)[..., None] * n
             z = self.deck(at[..., 0], at[..., 1])
@@ -120,7 +120,7 @@ class Hull:
         rise = (top - self.edge)[:, None] + self.edge * np.sin(angle)
         return np.concatenate([rows, np.concatenate([plan, rise[..., None]], axis=-1)], axis=1)
 
-    def deck_to(self, inner: Float, steps: int = 9) -> Solid:
+    def deck_to(self, inner: Float, steps: int = 7) -> Solid:
         """The left half of the deck, from the wall's top inwards to a plan curve (stations, 2)."""
         outer, _ = self.top(self.stations)
         share = np.linspace(0, 1, steps + 1)[:, None]
@@ -139,3 +139,14 @@ class Hull:
         keel = np.stack([np.zeros(len(u)), edge[:, 1], floor], axis=1)
         return grid(np.stack([keel, foot, house, edge], axis=1))
 
+
+def follow(hull: Hull, inner: Outline, corner: float) -> Float:
+    """A point on an inner outline for each of the hull's stations, (stations, 2).
+
+    Beside the inner outline's flank (parameters corner to 4 - corner) at the same y, ahead and behind spread around its ends.
+    """
+    u = hull.stations
+    y = hull.outline.point(u)[:, 1]
+    u0, u1 = (float(hull.outline.u_at_y(inner.point(end)[1])) for end in (corner, 4 - corner))
+    ahead, behind = corner * u / u0, 4 - corner * (4 - u) / (4 - u1)
+    return inner.point(np.where(u < u0, ahead, np.where(u > u1, behind, inner.u_at_y(y))))

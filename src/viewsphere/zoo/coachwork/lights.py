@@ -9,7 +9,7 @@ import numpy as np
 from viewsphere.zoo.coachwork.coats import Coats
 from viewsphere.zoo.coachwork.shape import Shape
 from viewsphere.zoo.shapes.assembly import Piece
-from viewsphere.zoo.shapes.panels import in_quad, normals, panel, raised, ribbon
+from viewsphere.zoo.shapes.panels import in_quad, panel, raised, ribbon
 from viewsphere.zoo.shapes.solids import Float, Solid, join, mirrored, moved, rounded_box, tube
 
 Lamps = Literal["swept", "round", "slim", "block"]
@@ -39,13 +39,13 @@ def headlights(shape: Shape, style: Lamps, coats: Coats) -> list[Piece]:
     quad = np.array([[inner, top[0] - tall], [outer, top[1] - tall + slope], [outer, top[1]], [inner, top[0] - 0.2 * slope]])
     surface = hull.surface
     round_ = {"swept": 0.22, "round": 0.5, "slim": 0.3, "block": 0.16}[style]
-    pieces = _pair("headlight", coats.black, panel(surface, quad, 0.004, round_, 12))
+    pieces = _pair("headlight", coats.black, panel(surface, quad, 0.004, round_, 8))
     lens = _shrunk(quad, 0.06, 0.94, 0.1, 0.9)
-    pieces += _pair("headlight", coats.white_lamp, panel(surface, lens, 0.009, round_, 12, depth=0.008))
+    pieces += _pair("headlight", coats.white_lamp, panel(surface, lens, 0.009, round_, 8, depth=0.008))
     for share in (0.3,) if style == "round" else (0.16, 0.42):
         size = 0.34 if style == "round" else 0.22
         eye = _shrunk(quad, share, share + size, 0.22, 0.8)
-        pieces += _pair("headlight", coats.chrome, panel(surface, eye, 0.012, 0.5, 2, 0.008, 2))
+        pieces += _pair("headlight", coats.chrome, panel(surface, eye, 0.012, 0.5, 1, 0.008, 1))
     mark = _shrunk(quad, 0.8, 0.93, 0.15, 0.85)
     return pieces + _pair("indicator", coats.amber_lamp, panel(surface, mark, 0.011, 0.3, 3, 0.008, 1))
 
@@ -61,13 +61,13 @@ def taillights(shape: Shape, style: Lamps, coats: Coats) -> list[Piece]:
     top = hull.top(np.array([outer, inner]))[1] - hull.edge - 0.01
     tuck = 0.0 if upright else 0.25 * tall
     quad = np.array([[outer, top[0] - tall + tuck], [inner, top[1] - tall], [inner, top[1]], [outer, top[0]]])
-    pieces = _pair("taillight", coats.black, panel(surface, quad, 0.004, 0.14, 12))
+    pieces = _pair("taillight", coats.black, panel(surface, quad, 0.004, 0.14, 8))
     red = _shrunk(quad, 0.04, 0.96, 0.34 if upright else 0.06, 0.96 if upright else 0.94)
-    pieces += _pair("taillight", coats.red_lamp, panel(surface, red, 0.009, 0.14, 12, depth=0.008))
+    pieces += _pair("taillight", coats.red_lamp, panel(surface, red, 0.009, 0.14, 6, depth=0.008))
     amber = _shrunk(quad, 0.06, 0.94, 0.19, 0.31) if upright else _shrunk(quad, 0.7, 0.93, 0.55, 0.88)
     white = _shrunk(quad, 0.06, 0.94, 0.05, 0.16) if upright else _shrunk(quad, 0.7, 0.93, 0.14, 0.45)
-    pieces += _pair("indicator_rear", coats.amber_lamp, panel(surface, amber, 0.011, 0.2, 5, 0.008, 1))
-    return pieces + _pair("reversing_light", coats.white_lamp, panel(surface, white, 0.011, 0.2, 5, 0.008, 1))
+    pieces += _pair("indicator_rear", coats.amber_lamp, panel(surface, amber, 0.011, 0.2, 3, 0.008, 1))
+    return pieces + _pair("reversing_light", coats.white_lamp, panel(surface, white, 0.011, 0.2, 3, 0.008, 1))
 
 
 def front_face(shape: Shape, style: Grille, coats: Coats) -> list[Piece]:
@@ -91,8 +91,10 @@ def front_face(shape: Shape, style: Grille, coats: Coats) -> list[Piece]:
     pieces.append(Piece("intake", coats.black, panel(surface, duct, 0.006, 0.2, 10)))
     a, b = (float(shape.hull.outline.u_at_x(f * half)) for f in (0.66, 0.8))
     fog = np.array([[a, low + 0.09], [b, low + 0.09], [b, low + 0.16], [a, low + 0.16]])
-    pieces += _pair("fog_light", coats.black, panel(surface, fog, 0.005, 0.4, 4, rings=2))
-    pieces += _pair("fog_light", coats.white_lamp, panel(surface, _shrunk(fog, 0.25, 0.75, 0.15, 0.85), 0.009, 0.5, 2, 0.008, 2))
+    pieces += _pair("fog_light", coats.black, panel(surface, fog, 0.005, 0.4, 2, rings=2))
+    pieces += _pair(
+        "fog_light", coats.white_lamp, panel(surface, _shrunk(fog, 0.25, 0.75, 0.15, 0.85), 0.009, 0.5, 1, 0.008, 1)
+    )
     return pieces + plate(surface, 0.0, 0.5 * (low + 0.16 + line) + 0.01, 1.0, coats)
 
 
@@ -118,11 +120,9 @@ def _slats(surface: object, quad: Float, rows: int, upright: bool) -> list[Solid
 def plate(surface: object, u: float, z: float, facing: float, coats: Coats) -> list[Piece]:
     """A licence plate with a few letters, flat, at (u, z); facing 1 front, -1 rear."""
     at = raised(surface, np.array([[u, z]]), 0.014)[0]  # type: ignore[arg-type]
-    n = normals(surface, np.array([u]), np.array([z]))[0]  # type: ignore[arg-type]
-    tilt = float(np.clip(n[2], -0.2, 0.2)) * 0.5
-    board = moved(rounded_box((0.5, 0.018, 0.115), 0.006, 2), at)
+    board = moved(rounded_box((0.5, 0.018, 0.115), 0.004, 1), at)
     rows = [-0.17, -0.11, -0.02, 0.04, 0.1, 0.17]
-    marks = [moved(rounded_box((0.036, 0.004, 0.07), 0.0015, 1), at + (x, -facing * 0.0095, tilt * 0)) for x in rows]
+    marks = [moved(rounded_box((0.036, 0.004, 0.07), 0.001, 1), np.add(at, (x, -facing * 0.009, 0))) for x in rows]
     return [Piece("licence_plate", coats.plate, board), Piece("licence_plate", coats.letters, join(*marks))]
 
 
@@ -135,12 +135,22 @@ def rear_face(shape: Shape, coats: Coats, exhausts: int) -> list[Piece]:
     at = line + 0.13 if high else line - 0.09
     low = float(hull.lower_edge(np.array([4.0]))[0])
     mouth = 4 - float(hull.outline.u_at_x(0.6 * half, rear=True))
-    apron = np.array([[4 - mouth, low + 0.02], [4 + mouth, low + 0.02], [4 + mouth * 0.9, low + 0.1], [4 - mouth * 0.9, low + 0.1]])
+    apron = np.array(
+        [[4 - mouth, low + 0.02], [4 + mouth, low + 0.02], [4 + mouth * 0.9, low + 0.1], [4 - mouth * 0.9, low + 0.1]]
+    )
     pieces = [*plate(surface, 4.0, at, -1.0, coats), Piece("bumper_rear", coats.black, panel(surface, apron, 0.006, 0.2, 10))]
     grip = raised(surface, np.array([[4.0, at + 0.09]]), 0.006)[0]
     pieces.append(Piece("tailgate_handle", coats.chrome, moved(rounded_box((0.34, 0.02, 0.025), 0.009), grip)))
     for side in (-1, 1)[2 - exhausts :]:
         x = side * 0.5 * half
-        pipe = tube([(x, hull.outline.rear - 0.5, low + 0.03), (x, hull.outline.rear - 0.3, low + 0.03), (x, hull.outline.rear - 0.085, low + 0.03)], 0.032, 16)
+        pipe = tube(
+            [
+                (x, hull.outline.rear - 0.5, low + 0.03),
+                (x, hull.outline.rear - 0.3, low + 0.03),
+                (x, hull.outline.rear - 0.085, low + 0.03),
+            ],
+            0.032,
+            16,
+        )
         pieces.append(Piece("exhaust", coats.steel, pipe))
     return pieces

@@ -17,9 +17,9 @@ _SAMPLES = 80
 class Outline:
     """A loop in plan, metres: front at y = front, rear at y = rear, symmetric in x.
 
-    u runs counter-clockwise seen from above: 0 middle of the front, 1 front left corner, 2 middle of the left side (+x), 3 rear left
-    corner, 4 middle of the rear; negative u is the right side. `cross` and `along` are the superellipse's exponents (front,
-    rear): the higher, the squarer; `bow` is how far the ends' corners lie behind their middles.
+    u runs counter-clockwise seen from above: 0 middle of the front, 1 front left corner, 2 middle of the left side (+x),
+    3 rear left corner, 4 middle of the rear; negative u is the right side. `cross` and `along` are the superellipse's
+    exponents (front, rear): the higher, the squarer; `bow` is how far the ends' corners lie behind their middles.
     """
 
     front: float
@@ -81,7 +81,7 @@ class Outline:
 
     def u_at_y(self, y: ArrayLike) -> Float:
         """The left side's u at this y."""
-        return np.interp(y, self._table[1][:, 1], self._table[0])
+        return np.interp(np.asarray(y, np.float64), self._table[1][:, 1], self._table[0])
 
     def u_at_x(self, x: ArrayLike, rear: bool = False) -> Float:
         """u on the front (or rear) face at this x; negative for the right side."""

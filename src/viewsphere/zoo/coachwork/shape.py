@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 
 from viewsphere.zoo.coachwork.greenhouse import Cell, Greenhouse
-from viewsphere.zoo.coachwork.hull import Arch, Hull, Knots
+from viewsphere.zoo.coachwork.hull import Arch, Hull, Knots, follow
 from viewsphere.zoo.coachwork.outline import Outline
 from viewsphere.zoo.coachwork.wheels import Wheel
 from viewsphere.zoo.shapes.solids import Float
@@ -43,15 +43,11 @@ class Proportions:
 
 
 PROPORTIONS: dict[Body, Proportions] = {
-    "sedan": Proportions(
-        0.185, 0.775, 0.275, 0.42, 0.71, 0.855, (0.3, 0.495, 0.7), 0.5, 0.635, 0.63, 0.665, 0.65, 0.125, 0.15
-    ),
+    "sedan": Proportions(0.185, 0.775, 0.275, 0.42, 0.71, 0.855, (0.3, 0.495, 0.7), 0.5, 0.635, 0.63, 0.665, 0.65, 0.125, 0.15),
     "hatchback": Proportions(
         0.195, 0.815, 0.25, 0.4, 0.885, 0.965, (0.29, 0.53, 0.76), 0.51, 0.635, 0.625, 0.66, 0.65, 0.125, 0.14
     ),
-    "van": Proportions(
-        0.175, 0.79, 0.135, 0.285, 0.965, 0.985, (0.2, 0.41, 0.66), 0.46, 0.6, 0.585, 0.59, 0.585, 0.11, 0.1
-    ),
+    "van": Proportions(0.175, 0.79, 0.135, 0.285, 0.965, 0.985, (0.2, 0.41, 0.66), 0.46, 0.6, 0.585, 0.59, 0.585, 0.11, 0.1),
     "pickup": Proportions(
         0.17, 0.775, 0.245, 0.345, 0.525, 0.565, (0.265, 0.425, 0.575), 0.61, 0.69, 0.65, 0.655, 0.65, 0.17, 0.13, 0.595
     ),
@@ -109,8 +105,20 @@ class Shape:
             (0.1 + 0.1 * soft, 0.0 if pickup else 0.05 + 0.06 * soft),
         )
         arches = self.arches[:1] if pickup else self.arches
-        return Hull(outline, self._center_line, self.crown, self._sill, self._side, self._nose, self._tail, arches,
-                    edge=0.03 + 0.02 * soft, bumper_line=self.z(0.34), dome=self.dome, dome_end=self.y(p.cowl) + 0.1)
+        return Hull(
+            outline,
+            self._center_line,
+            self.crown,
+            self._sill,
+            self._side,
+            self._nose,
+            self._tail,
+            arches,
+            edge=0.03 + 0.02 * soft,
+            bumper_line=self.z(0.34),
+            dome=self.dome,
+            dome_end=self.y(p.cowl) + 0.1,
+        )
 
     @cached_property
     def _center_line(self) -> Knots:
@@ -157,15 +165,30 @@ class Shape:
         z, p = self.z, self.proportions
         low, line, top = z(p.clearance), z(0.34), z(p.nose)
         lean = 0.05 + 0.05 * self.roundness
-        return ((low, 0.11), (low + 0.12, 0.025), (line - 0.03, 0.0), (line, 0.004), (line + 0.02, 0.02),
-                (top, lean), (top + 0.25, lean + 0.12))
+        return (
+            (low, 0.11),
+            (low + 0.12, 0.025),
+            (line - 0.03, 0.0),
+            (line, 0.004),
+            (line + 0.02, 0.02),
+            (top, lean),
+            (top + 0.25, lean + 0.12),
+        )
 
     @cached_property
     def _tail(self) -> Knots:
         z, p = self.z, self.proportions
         low, line, top = z(p.clearance), z(0.34), z(p.tail)
-        return ((low, 0.13), (low + 0.15, 0.03), (line - 0.03, 0.0), (line, 0.004), (line + 0.02, 0.028),
-                (0.5 * (line + top), 0.034), (top, 0.06 + 0.03 * self.roundness), (top + 0.3, 0.14))
+        return (
+            (low, 0.13),
+            (low + 0.15, 0.03),
+            (line - 0.03, 0.0),
+            (line, 0.004),
+            (line + 0.02, 0.028),
+            (0.5 * (line + top), 0.034),
+            (top, 0.06 + 0.03 * self.roundness),
+            (top + 0.3, 0.14),
+        )
 
     @cached_property
     def cabin(self) -> Greenhouse:
@@ -179,7 +202,12 @@ class Shape:
             self.y(p.cowl), self.y(p.rear_glass), half, (6.0, rear[0]), (12.0, rear[1] * 1.5), (0.2, 0.03 if square else 0.1)
         )
         top = Outline(
-            self.y(p.roof_front), self.y(p.roof_rear), half - lean, (6.0, rear[0]), (11.0, rear[1]), (0.11, 0.02 if square else 0.05)
+            self.y(p.roof_front),
+            self.y(p.roof_rear),
+            half - lean,
+            (6.0, rear[0]),
+            (11.0, rear[1]),
+            (0.11, 0.02 if square else 0.05),
         )
         return Greenhouse(self.hull, base, top, self._roof, drop=0.045 + 0.03 * self.roundness)
 
@@ -198,27 +226,22 @@ class Shape:
         end = min(end, last - 0.12)
         margins = (0.045, 0.035, 0.03, 0.035)
         front = Cell(first, pillar, "window_front", (0.07, 0.035, 0.03, 0.035))
-        rest = [Cell(pillar, end, "window_rear", margins, slant), Cell(end, last, "window_quarter", (0.04, 0.08, 0.045, 0.05), slant)]
+        rest = [
+            Cell(pillar, end, "window_rear", margins, slant),
+            Cell(end, last, "window_quarter", (0.04, 0.08, 0.045, 0.05), slant),
+        ]
         plain = [Cell(c.start, c.stop) for c in rest]
-        return (Cell(0.9, first), front, *rest[: windows - 1], *plain[windows - 1 :], Cell(last, 3.12))
+        return (Cell(0.94, first), front, *rest[: windows - 1], *plain[windows - 1 :], Cell(last, 3.12))
 
     def deck_inner(self) -> Float:
         """Where the deck meets the cabin, (stations, 2), one point for each of the hull's stations."""
-        hull, base = self.hull, self.cabin.base
-        u = hull.stations
-        y = hull.outline.point(u)[:, 1]
-        start, stop = base.point(1.15)[1], base.point(2.85)[1]
-        u0, u1 = float(hull.outline.u_at_y(start)), float(hull.outline.u_at_y(stop))
-        ahead, behind = 1.15 * u / u0, 4 - 1.15 * (4 - u) / (4 - u1)
-        return base.point(np.where(u < u0, ahead, np.where(u > u1, behind, base.u_at_y(y))))
+        return follow(self.hull, self.cabin.base, 1.15)
 
     @cached_property
     def bed(self) -> Hull:
         """A pickup's load bed from outside."""
         p, hull = self.proportions, self.hull
-        outline = Outline(
-            self.y(p.cab_end) + 0.025, self.length / 2, self.width / 2, (12.0, 9.0), (40.0, 26.0), (0.0, 0.02)
-        )
+        outline = Outline(self.y(p.cab_end) + 0.025, self.length / 2, self.width / 2, (12.0, 9.0), (40.0, 26.0), (0.0, 0.02))
         line = ((self.y(0.0), self.z(p.belt) + 0.015), (self.y(1.0), self.z(p.tail) + 0.015))
         flat = ((0.0, 0.02), (3.0, 0.02))
         return Hull(outline, line, 0.015, self._sill, self._side, flat, self._tail, self.arches[1:], 0.025, hull.bumper_line)
@@ -232,5 +255,3 @@ class Shape:
     def nose_top(self, u: Float) -> Float:
         """Height where the wall's rounded top edge begins."""
         return self.hull.top(np.asarray(u, np.float64))[1] - self.hull.edge
-
-

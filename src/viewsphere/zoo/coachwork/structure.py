@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
+from viewsphere.assets.mesh import Material
 from viewsphere.zoo.coachwork.coats import Coats
 from viewsphere.zoo.coachwork.greenhouse import Cell
-from viewsphere.zoo.coachwork.hull import LOWER, Hull
+from viewsphere.zoo.coachwork.hull import LOWER, Hull, follow
 from viewsphere.zoo.coachwork.shape import Shape
 from viewsphere.zoo.coachwork.wheels import Wheel, rim, tyre
 from viewsphere.zoo.shapes.assembly import Piece
-from viewsphere.zoo.shapes.solids import Float, Solid, both_sides, flipped, grid, mirrored, moved, rounded_box
+from viewsphere.zoo.shapes.solids import both_sides, flipped, grid, mirrored, moved, rounded_box
 
 
 def hull_pieces(shape: Shape, hull: Hull, coats: Coats, bumpers: tuple[str, str]) -> list[Piece]:
@@ -31,7 +32,7 @@ def hull_pieces(shape: Shape, hull: Hull, coats: Coats, bumpers: tuple[str, str]
     ]
 
 
-def arch_trims(shape: Shape, hull: Hull, coats: Coats, flare: float) -> list[Piece]:
+def arch_trims(hull: Hull, coats: Coats, flare: float) -> list[Piece]:
     """A raised lip around each opening; flare is its height, metres."""
     pieces: list[Piece] = []
     angle = np.linspace(0.0, np.pi, 33)
@@ -52,19 +53,19 @@ def cabin_pieces(shape: Shape, coats: Coats, cells: tuple[Cell, ...], black_pill
     """Roof, pillars, panes and their seals."""
     cabin = shape.cabin
     pieces = [Piece("roof", coats.roof, cabin.roof_solid())]
-    front = Cell(-0.9, 0.9, "windshield", (0.05, 0.05, 0.0, 0.03))
+    front = Cell(-0.94, 0.94, "windshield", (0.04, 0.04, 0.018, 0.015))
     rear = Cell(3.12, 4.88, "window_tailgate" if rear_window else "", (0.07, 0.07, 0.05, 0.05))
     for cell in (front, rear):
-        pieces += _cell_pieces(shape, cell, coats, cell.name, coats.paint, mirror=False)
+        pieces += _cell_pieces(shape, cell, coats, coats.paint, mirror=False)
     for cell in cells:
         pillar = coats.black if black_pillars and cell.name else coats.paint
-        pieces += _cell_pieces(shape, cell, coats, cell.name, pillar, mirror=True)
+        pieces += _cell_pieces(shape, cell, coats, pillar, mirror=True)
     return pieces
 
 
-def _cell_pieces(shape: Shape, cell: Cell, coats: Coats, name: str, pillar: object, mirror: bool) -> list[Piece]:
+def _cell_pieces(shape: Shape, cell: Cell, coats: Coats, material: Material, mirror: bool) -> list[Piece]:
     """A cell's frame, seal and pane; on both sides if asked."""
-    material = coats.black if pillar is coats.black else coats.paint
+    name = cell.name
     if not cell.name:
         wall = shape.cabin.wall(cell)
         return [Piece("body", material, both_sides(wall) if mirror else wall)]
@@ -83,36 +84,38 @@ def bed_pieces(shape: Shape, coats: Coats) -> list[Piece]:
     """A pickup's load bed: outer walls, rails, inner walls, floor, wheel boxes."""
     hull, opening = shape.bed, shape.bed_inner
     u = hull.stations
-    inner = opening.point(_stretched(u, hull, shape))
+    inner = follow(hull, opening, 1.0)
     floor = shape.z(0.34)
-    heights = np.linspace(0, 1, 6)
+    heights = np.linspace(0, 1, 3)
     top = hull.deck(inner[:, 0], inner[:, 1])
     z = top[:, None] * (1 - heights) + floor * heights
-    walls = np.concatenate([np.broadcast_to(inner[:, None], (len(u), 6, 2)), z[..., None]], axis=-1)
+    walls = np.concatenate([np.broadcast_to(inner[:, None], (len(u), 3, 2)), z[..., None]], axis=-1)
     middle = np.stack([np.zeros(len(u)), inner[:, 1], np.full(len(u), floor)], axis=1)
     ground = grid(np.stack([walls[:, -1], middle], axis=1))
     arch = hull.arches[0]
-    box = rounded_box((0.26, 2 * arch.radius, 0.24), 0.06)
-    box = moved(box, (opening.half_width - 0.1, arch.y, floor + 0.08))
-    ribs = [moved(rounded_box((0.05, opening.rear - opening.front - 0.1, 0.02), 0.008, 2),
-                  (x, (opening.front + opening.rear) / 2, floor + 0.004)) for x in np.linspace(-0.6, 0.6, 9)]
+    top_z, inside = arch.z + arch.radius + 0.04, shape.width / 2 - shape.wheel.width - 0.13
+    box = rounded_box((shape.width / 2 - 0.06 - inside, 2 * arch.radius + 0.12, 2 * (top_z - floor)), 0.06)
+    box = moved(box, ((shape.width / 2 - 0.06 + inside) / 2, arch.y, floor))
+    ribs = [
+        moved(
+            rounded_box((0.05, opening.rear - opening.front - 0.1, 0.02), 0.008, 2),
+            (x, (opening.front + opening.rear) / 2, floor + 0.004),
+        )
+        for x in np.linspace(-0.6, 0.6, 9)
+    ]
     low, high = shape.z(0.22), float(hull.deck(0.0, hull.outline.front)) - 0.12
-    bridge = moved(rounded_box((shape.width - 0.25, 0.12, high - low), 0.01, 1), (0, hull.outline.front - 0.01, (low + high) / 2))
+    bridge = moved(
+        rounded_box((shape.width - 0.25, 0.12, high - low), 0.01, 1), (0, hull.outline.front - 0.01, (low + high) / 2)
+    )
     return [
         *hull_pieces(shape, hull, coats, ("cargo_bed", "bumper_rear")),
         Piece("underbody", coats.under, bridge),
-        Piece("cargo_bed", coats.paint, both_sides(hull.deck_to(inner, 3))),
+        Piece("cargo_bed", coats.paint, both_sides(hull.deck_to(inner, 1))),
         Piece("cargo_bed", coats.black, both_sides(grid(walls))),
         Piece("cargo_bed", coats.black, both_sides(ground)),
         Piece("cargo_bed", coats.black, both_sides(box)),
         *(Piece("cargo_bed", coats.under, rib) for rib in ribs),
     ]
-
-
-def _stretched(u: Float, hull: Hull, shape: Shape) -> Float:
-    """The opening's parameter for each station of the bed's wall."""
-    y, o = hull.outline.point(u)[:, 1], shape.bed_inner
-    return np.where((u > 1.1) & (u < 2.9), np.clip(o.u_at_y(y), 1.0 + 0.1 * u / 4, 3.0 - 0.1 * (4 - u) / 4), u)
 
 
 def wheel_pieces(shape: Shape, wheel: Wheel, coats: Coats, phase: float) -> list[Piece]:
@@ -132,10 +135,3 @@ def wheel_pieces(shape: Shape, wheel: Wheel, coats: Coats, phase: float) -> list
                 here = moved(solid, at)
                 pieces.append(Piece(f"wheel_{end}_{side}_{name}", material, place(here) if place else here))
     return pieces
-
-
-
-
-def whole_deck(left: Solid) -> Solid:
-    """The deck of both sides."""
-    return both_sides(left)

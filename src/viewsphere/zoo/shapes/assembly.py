@@ -54,9 +54,7 @@ def assemble(pieces: Sequence[Piece], crease_deg: float = 40.0) -> Mesh:
     )
 
 
-def _welded(
-    vertices: NDArray[np.float32], triangles: NDArray[np.int64], material: NDArray[np.int64]
-) -> NDArray[np.int64]:
+def _welded(vertices: NDArray[np.float32], triangles: NDArray[np.int64], material: NDArray[np.int64]) -> NDArray[np.int64]:
     """For each corner (T, 3) a number that corners of one material at one place share."""
     q = np.round(vertices / WELD).astype(np.int64) + (1 << 19)
     key = (q[:, 0] << 40 | q[:, 1] << 20 | q[:, 2])[triangles]

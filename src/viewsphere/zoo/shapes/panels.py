@@ -114,7 +114,7 @@ def rim(surface: Surface, ring: Float, heights: tuple[float, float], width: floa
     return _closed(np.stack([raised(surface, ring, heights[0]), raised(surface, inner, heights[1])]))
 
 
-def ribbon(surface: Surface, line: ArrayLike, width: float, height: float = 0.002) -> Solid:
+def ribbon(surface: Surface, line: ArrayLike, width: float, height: float = 0.003) -> Solid:
     """A flat band of this width (metres) along a (N, 2) line in (u, v), `height` above the surface."""
     uv = np.asarray(line, np.float64)
     middle = surface(uv[:, 0], uv[:, 1])
@@ -128,4 +128,3 @@ def straight(start: ArrayLike, stop: ArrayLike, count: int = 12) -> Float:
     """A (count, 2) line."""
     share = np.linspace(0, 1, count)[:, None]
     return np.asarray(start, np.float64) * (1 - share) + np.asarray(stop, np.float64) * share
-

@@ -99,7 +99,7 @@ def loft(rings: Float, caps: tuple[bool, bool] = (True, True)) -> Solid:
 
 def frames_along(path: Float) -> tuple[Float, Float]:
     """Two unit vectors (N, 3) across a path that turn as little as possible (parallel transport)."""
-    tangent = np.gradient(path, axis=0)
+    tangent: Float = np.gradient(path, axis=0)
     tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
     first = np.cross(tangent[0], np.eye(3)[np.argmin(np.abs(tangent[0]))])
     across = [first / np.linalg.norm(first)]

@@ -1,0 +1,87 @@
+"""Pictures for people show what they say."""
+
+import numpy as np
+import pytest
+from conftest import small_recipe
+
+from viewsphere.model.shot import ModelSpec
+from viewsphere.preview import PALETTE, contact_sheet, depth_picture, draw_sample, four_sides, preview_samples
+
+
+@pytest.fixture(scope="module")
+def samples():
+    return list(preview_samples(small_recipe(), count=4))
+
+
+def test_a_preview_spreads_over_models_and_poses(samples):
+    assert {s.objects[0].key for s in samples} == {"hair_drier_000", "hair_drier_001"}
+    assert len({s.pose.index for s in samples}) == 4
+
+
+def test_a_small_preview_sees_what_the_full_picture_sees():
+    small = next(iter(preview_samples(small_recipe(), count=1, width=48)))
+    full = next(iter(preview_samples(small_recipe(), count=1)))
+    assert small.rgb.shape == (36, 48, 3)
+    assert np.allclose(small.objects[0].box2d_unclipped, np.array(full.objects[0].box2d_unclipped) / 2, atol=1e-9)
+
+
+def test_the_2d_box_is_drawn_where_it_is(samples):
+    sample = samples[0]
+    drawn = draw_sample(sample, ["boxes"])
+    changed = (drawn != sample.rgb).any(axis=2)
+    rows, columns = np.nonzero(changed)
+    x0, y0, x1, y1 = sample.objects[0].box2d
+    assert (columns.min(), rows.min(), columns.max() + 1, rows.max() + 1) == (x0, y0, x1, y1)
+
+
+def test_masks_tint_the_object_and_nothing_else(samples):
+    sample = samples[0]
+    drawn = draw_sample(sample, ["masks"])
+    mask = sample.objects[0].mask
+    assert np.array_equal(drawn[~mask], sample.rgb[~mask])
+    expected = (0.5 * sample.rgb[mask] + 0.5 * np.array(PALETTE[0])).round()
+    assert np.array_equal(drawn[mask], expected)
+
+
+def test_3d_boxes_and_depth_are_drawn(samples):
+    drawn = draw_sample(samples[0], ["boxes3d", "depth"])
+    height, width = samples[0].rgb.shape[:2]
+    assert drawn.shape == (height, 2 * width, 3)
+    assert (drawn[:, :width] != samples[0].rgb).any()
+
+
+def test_near_is_light_and_nothing_is_black():
+    picture = depth_picture(np.array([[1.0, 2.0, 3.0, np.inf]], np.float32))[0, :, 0]
+    assert picture[0] > picture[1] > picture[2] > picture[3] == 0
+    assert not depth_picture(np.full((2, 2), np.inf, np.float32)).any()
+
+
+def test_contact_sheet_holds_every_tile(samples):
+    sheet = contact_sheet(samples, columns=2)
+    tile = samples[0].rgb
+    found = sum(
+        np.array_equal(sheet[y : y + tile.shape[0], x : x + tile.shape[1]], s.rgb)
+        for i, s in enumerate(samples)
+        for y, x in [(8 + i // 2 * (tile.shape[0] + 26), 8 + i % 2 * (tile.shape[1] + 8))]
+    )
+    assert found == 4
+
+
+def test_the_first_of_four_sides_shows_the_front(tmp_path):
+    """A white box with a red face at -Y: the first view is red, the others are not."""
+    corners = [(x, y, z) for z in (0, 1) for y in (0, 1) for x in (0, 1)]
+    lines = ["mtllib box.mtl", *(f"v {x} {y} {z}" for x, y, z in corners)]
+    faces = {"red": ["1 2 6 5"], "white": ["2 4 8 6", "4 3 7 8", "3 1 5 7", "5 6 8 7", "3 4 2 1"]}
+    for name, rings in faces.items():
+        lines += [f"usemtl {name}", *(f"f {ring}" for ring in rings)]
+    (tmp_path / "box.obj").write_text("\n".join(lines) + "\n")
+    (tmp_path / "box.mtl").write_text("newmtl red\nKd 1 0 0\nnewmtl white\nKd 1 1 1\n")
+    spec = ModelSpec(key="b", source=str(tmp_path / "box.obj"), category="c", category_id=1, up="+z", forward="-y")
+    picture = four_sides(spec, size=120).astype(int)
+    width = picture.shape[1] // 4
+    redness = [
+        int(((p[..., 0] - p[..., 1:].max(axis=2)) > 60).sum())
+        for p in (picture[:, i * width : (i + 1) * width] for i in range(4))
+    ]
+    assert redness[0] > 500
+    assert max(redness[1:]) < redness[0] / 20
