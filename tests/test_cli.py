@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from conftest import ROOT, small_recipe
+from small import ROOT, small_recipe
 
 
 def viewsphere(*words, cwd=None, timeout=110):

@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from conftest import ROOT
+from small import ROOT
 
 README = (ROOT / "README.md").read_text("utf-8")
 

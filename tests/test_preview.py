@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from conftest import small_recipe
 
+from small import small_recipe
 from viewsphere.model.shot import ModelSpec
 from viewsphere.preview import PALETTE, contact_sheet, depth_picture, draw_sample, four_sides, preview_samples
 

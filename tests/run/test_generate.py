@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import viewsphere as vs
-from conftest import small_recipe, tree_hash
+from small import small_recipe, tree_hash
 from viewsphere.errors import ModelError, RecipeError, StoreError, UserError
 from viewsphere.run.generate import Progress, export, generate
 from viewsphere.run.pool import Job, run_jobs

@@ -1,0 +1,1 @@
+"""Pure functions on arrays: cameras, rotations, boxes, masks, picture files."""

@@ -63,7 +63,7 @@ class Greenhouse:
 
     def roof_solid(self) -> Solid:
         """Rounded edge and crown of the whole roof."""
-        near = np.linspace(1, 0, 10, endpoint=False) ** 1.8
+        near = np.linspace(1, 0, 8, endpoint=False) ** 1.7
         left = np.concatenate([1 - near, [1.0], 1 + near[:0:-1], 3 - near, [3.0], 3 + near[::-1]])
         u = np.concatenate([-left[:0:-1], left])
         _, edge = self._corners(u)

@@ -120,7 +120,7 @@ class Hull:
         rise = (top - self.edge)[:, None] + self.edge * np.sin(angle)
         return np.concatenate([rows, np.concatenate([plan, rise[..., None]], axis=-1)], axis=1)
 
-    def deck_to(self, inner: Float, steps: int = 7) -> Solid:
+    def deck_to(self, inner: Float, steps: int = 6) -> Solid:
         """The left half of the deck, from the wall's top inwards to a plan curve (stations, 2)."""
         outer, _ = self.top(self.stations)
         share = np.linspace(0, 1, steps + 1)[:, None]
@@ -140,13 +140,15 @@ class Hull:
         return grid(np.stack([keel, foot, house, edge], axis=1))
 
 
-def follow(hull: Hull, inner: Outline, corner: float) -> Float:
+def follow(hull: Hull, inner: Outline, corner: float, overlap: float = 0.0) -> Float:
     """A point on an inner outline for each of the hull's stations, (stations, 2).
 
-    Beside the inner outline's flank (parameters corner to 4 - corner) at the same y, ahead and behind spread around its ends.
+    Beside the inner outline's flank (parameters corner to 4 - corner) at the same y, ahead and behind spread around its
+    ends; overlap metres further inwards.
     """
     u = hull.stations
     y = hull.outline.point(u)[:, 1]
     u0, u1 = (float(hull.outline.u_at_y(inner.point(end)[1])) for end in (corner, 4 - corner))
     ahead, behind = corner * u / u0, 4 - corner * (4 - u) / (4 - u1)
-    return inner.point(np.where(u < u0, ahead, np.where(u > u1, behind, inner.u_at_y(y))))
+    at = np.where(u < u0, ahead, np.where(u > u1, behind, inner.u_at_y(y)))
+    return inner.point(at) - overlap * inner.normal(at)

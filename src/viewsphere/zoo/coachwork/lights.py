@@ -61,7 +61,7 @@ def taillights(shape: Shape, style: Lamps, coats: Coats) -> list[Piece]:
     top = hull.top(np.array([outer, inner]))[1] - hull.edge - 0.01
     tuck = 0.0 if upright else 0.25 * tall
     quad = np.array([[outer, top[0] - tall + tuck], [inner, top[1] - tall], [inner, top[1]], [outer, top[0]]])
-    pieces = _pair("taillight", coats.black, panel(surface, quad, 0.004, 0.14, 8))
+    pieces = _pair("taillight", coats.black, panel(surface, quad, 0.004, 0.14, 6, rings=2))
     red = _shrunk(quad, 0.04, 0.96, 0.34 if upright else 0.06, 0.96 if upright else 0.94)
     pieces += _pair("taillight", coats.red_lamp, panel(surface, red, 0.009, 0.14, 6, depth=0.008))
     amber = _shrunk(quad, 0.06, 0.94, 0.19, 0.31) if upright else _shrunk(quad, 0.7, 0.93, 0.55, 0.88)
@@ -88,7 +88,7 @@ def front_face(shape: Shape, style: Grille, coats: Coats) -> list[Piece]:
     pieces.append(Piece("badge", coats.chrome, badge))
     mouth = float(shape.hull.outline.u_at_x(0.55 * half))
     duct = np.array([[-mouth * 0.92, low + 0.07], [mouth * 0.92, low + 0.07], [mouth, low + 0.16], [-mouth, low + 0.16]])
-    pieces.append(Piece("intake", coats.black, panel(surface, duct, 0.006, 0.2, 10)))
+    pieces.append(Piece("intake", coats.black, panel(surface, duct, 0.006, 0.2, 7, rings=2)))
     a, b = (float(shape.hull.outline.u_at_x(f * half)) for f in (0.66, 0.8))
     fog = np.array([[a, low + 0.09], [b, low + 0.09], [b, low + 0.16], [a, low + 0.16]])
     pieces += _pair("fog_light", coats.black, panel(surface, fog, 0.005, 0.4, 2, rings=2))
@@ -138,7 +138,7 @@ def rear_face(shape: Shape, coats: Coats, exhausts: int) -> list[Piece]:
     apron = np.array(
         [[4 - mouth, low + 0.02], [4 + mouth, low + 0.02], [4 + mouth * 0.9, low + 0.1], [4 - mouth * 0.9, low + 0.1]]
     )
-    pieces = [*plate(surface, 4.0, at, -1.0, coats), Piece("bumper_rear", coats.black, panel(surface, apron, 0.006, 0.2, 10))]
+    pieces = [*plate(surface, 4.0, at, -1.0, coats), Piece("bumper_rear", coats.black, panel(surface, apron, 0.006, 0.2, 7, rings=2))]
     grip = raised(surface, np.array([[4.0, at + 0.09]]), 0.006)[0]
     pieces.append(Piece("tailgate_handle", coats.chrome, moved(rounded_box((0.34, 0.02, 0.025), 0.009), grip)))
     for side in (-1, 1)[2 - exhausts :]:

@@ -235,7 +235,7 @@ class Shape:
 
     def deck_inner(self) -> Float:
         """Where the deck meets the cabin, (stations, 2), one point for each of the hull's stations."""
-        return follow(self.hull, self.cabin.base, 1.15)
+        return follow(self.hull, self.cabin.base, 1.15, overlap=0.035)
 
     @cached_property
     def bed(self) -> Hull:
@@ -250,7 +250,7 @@ class Shape:
     def bed_inner(self) -> Outline:
         """The bed's opening."""
         o = self.bed.outline
-        return Outline(o.front + 0.07, o.rear - 0.11, o.half_width - 0.13, (12.0, 12.0), (40.0, 40.0), (0.0, 0.0))
+        return Outline(o.front + 0.07, o.rear - 0.175, o.half_width - 0.13, (12.0, 12.0), (40.0, 40.0), (0.0, 0.0))
 
     def nose_top(self, u: Float) -> Float:
         """Height where the wall's rounded top edge begins."""

@@ -35,7 +35,7 @@ def hull_pieces(shape: Shape, hull: Hull, coats: Coats, bumpers: tuple[str, str]
 def arch_trims(hull: Hull, coats: Coats, flare: float) -> list[Piece]:
     """A raised lip around each opening; flare is its height, metres."""
     pieces: list[Piece] = []
-    angle = np.linspace(0.0, np.pi, 33)
+    angle = np.linspace(0.0, np.pi, 27)
     for arch in hull.arches:
         grow = np.array([0.0, 0.004, 0.03 + flare, 0.045 + flare, 0.05 + flare])
         height = np.array([-0.004, flare, flare, 0.5 * flare, -0.003])

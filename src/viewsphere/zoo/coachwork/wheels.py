@@ -8,7 +8,7 @@ import numpy as np
 
 from viewsphere.zoo.shapes.solids import Float, Solid, curve, join, lathe, loft, moved, turned
 
-SEGMENTS = 34
+SEGMENTS = 32
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,7 @@ _SECTION = np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 0.4), (0.75, 1.0), (-0.75,
 def _spoke(w: Wheel) -> Solid:
     """One spoke along +x, its face towards +z."""
     q, half = w.radius * w.rim, w.width / 2
-    f = np.linspace(0, 1, 5)
+    f = np.linspace(0, 1, 4)
     r = 0.14 * q + f * (q - 0.015 - 0.14 * q)
     pitch = 2 * np.pi * 0.3 * q / (w.spokes * (2 if w.paired else 1))
     wide = 0.5 * w.spoke_width * pitch * (1 + (w.flare * 2 - 1) * f)

@@ -17,9 +17,8 @@ Surface = Callable[[Float, Float], Float]
 
 def normals(surface: Surface, u: Float, v: Float, step: float = 2e-3) -> Float:
     """Unit normals (..., 3) by central differences."""
-    across = surface(u + step, v) - surface(u - step, v)
-    along = surface(u, v + step) - surface(u, v - step)
-    n = np.cross(across, along)
+    east, west, north, south = surface(np.stack([u + step, u - step, u, u]), np.stack([v, v, v + step, v - step]))
+    n = np.cross(east - west, north - south)
     return n / np.linalg.norm(n, axis=-1, keepdims=True)
 
 

@@ -1,0 +1,34 @@
+"""A small recipe that renders in a second, and a digest of what it makes."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+
+ROOT = Path(__file__).parent.parent
+
+
+def small_recipe(**changes):
+    """Two hair driers from six sides on 96 x 72 pixels, with ground and all channels."""
+    from viewsphere import Recipe
+    from viewsphere.model.channel import CHANNELS
+
+    values = {
+        "name": "small",
+        "models": [{"source": "zoo:hair_drier", "category": "hair drier", "count": 2, "scale": {"length": 0.3}}],
+        "viewpoints": {"azimuth": [0, 120, 240], "elevation": [15, 50], "distance": 1.0},
+        "camera": {"size": [96, 72], "fov_deg": 35},
+        "scene": {"ground": True},
+        "channels": list(CHANNELS),
+        "formats": ["native", "coco"],
+        "shot_frames": 2,
+    }
+    return Recipe(**{**values, **changes})
+
+
+def tree_hash(folder: Path) -> str:
+    """One digest of all file names and bytes below a folder."""
+    digest = hashlib.sha256()
+    for path in sorted(p for p in folder.rglob("*") if p.is_file()):
+        digest.update(f"{path.relative_to(folder).as_posix()}\0{hashlib.sha256(path.read_bytes()).hexdigest()}\n".encode())
+    return digest.hexdigest()
