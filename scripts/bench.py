@@ -33,6 +33,7 @@ from viewsphere.truth.visibility import rasterize
 
 ROOT = Path(__file__).parent.parent
 TRIANGLES = 75_000
+VERTEX_FIELDS = ("vertices", "normals", "uv0", "uv1", "colors")
 
 
 def reference_recipe(frames: int, antialias: int) -> Recipe:
@@ -53,30 +54,51 @@ def reference_recipe(frames: int, antialias: int) -> Recipe:
 
 
 def subdivide(mesh: Mesh) -> Mesh:
-    """Split the largest triangles in three around their centroids until there are enough: no seams, no gaps."""
-    while (lacking := TRIANGLES - len(mesh.triangles)) > 0:
-        corners = mesh.vertices[mesh.triangles]
-        areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
-        chosen = np.argsort(-areas, kind="stable")[: -(-lacking // 2)]
-        owners = mesh.triangles[chosen]
-        a, b, c = owners.T
-        middle = (len(mesh.vertices) + np.arange(len(chosen))).astype(np.int32)
-        kept = np.delete(np.arange(len(mesh.triangles)), chosen)
-        parts = [np.stack(t, axis=1) for t in ((a, b, middle), (b, c, middle), (c, a, middle))]
-        source = np.concatenate([kept, chosen, chosen, chosen])
+    """Halve the longest edges, of both triangles that share them, until there are about enough triangles.
+
+    Vertices are numbered in order of use, as in any file.
+    """
+    while len(mesh.triangles) < TRIANGLES:
+        edges = np.sort(mesh.triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+        ends = mesh.vertices[edges]
+        lengths = np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1)
+        lacking = TRIANGLES - len(mesh.triangles)
+        longest = np.sort(lengths)[-min(max(lacking, 1), len(lengths) // 4)]
+        pairs, inverse = np.unique(edges[lengths >= longest], axis=0, return_inverse=True)
+        middles = np.full(len(edges), -1)
+        middles[lengths >= longest] = len(mesh.vertices) + inverse.reshape(-1)
+        triangles, source = split_triangles(mesh.triangles, middles.reshape(-1, 3))
         mesh = replace(
             mesh,
-            triangles=np.concatenate([mesh.triangles[kept], *parts]),
+            triangles=triangles,
             triangle_material=mesh.triangle_material[source],
             triangle_part=mesh.triangle_part[source],
-            **{name: with_means(getattr(mesh, name), owners) for name in ("vertices", "normals", "uv0", "uv1", "colors")},
+            **{name: with_means(getattr(mesh, name), pairs) for name in VERTEX_FIELDS},
         )
-    return mesh
+    used, first, inverse = np.unique(mesh.triangles, return_index=True, return_inverse=True)
+    order = np.argsort(first)
+    rank = np.argsort(order).astype(np.int32)
+    fields = {name: getattr(mesh, name) for name in VERTEX_FIELDS}
+    moved = {name: None if values is None else values[used[order]] for name, values in fields.items()}
+    return replace(mesh, triangles=rank[inverse].reshape(-1, 3), **moved)
 
 
-def with_means(values: Any, owners: Any) -> Any:
-    """Per-vertex values and, behind them, the means of these triples of vertices."""
-    return None if values is None else np.concatenate([values, values[owners].mean(axis=1, dtype=np.float32)])
+def split_triangles(triangles: Any, middles: Any) -> tuple[Any, Any]:
+    """Triangles cut at the middles (T, 3) of their edges 01, 12, 20 (-1: not cut), and the triangle each came from."""
+    corners, sources = [], []
+    for t, (corner, middle) in enumerate(zip(triangles.tolist(), middles.tolist(), strict=True)):
+        ring = [v for pair in zip(corner, middle, strict=True) for v in pair if v >= 0]
+        start = ring.index(next((m for m in middle if m >= 0), ring[0]))
+        fan = ring[start:] + ring[:start]
+        pieces = [(fan[0], fan[k], fan[k + 1]) for k in range(1, len(fan) - 1)]
+        corners += pieces
+        sources += [t] * len(pieces)
+    return np.array(corners, np.int32), np.array(sources)
+
+
+def with_means(values: Any, pairs: Any) -> Any:
+    """Per-vertex values and, behind them, the means of these pairs of vertices."""
+    return None if values is None else np.concatenate([values, values[pairs].mean(axis=1, dtype=np.float32)])
 
 
 class Clock:

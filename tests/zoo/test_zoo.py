@@ -54,6 +54,7 @@ def assert_sound(mesh: Mesh, most: int) -> None:
 
 def outward_share(mesh: Mesh) -> float:
     """Share of what a camera sees, from 26 sides, that shows its outside (rays of Embree, an independent caster)."""
+    pytest.importorskip("embreex")
     from trimesh import Trimesh
     from trimesh.ray.ray_pyembree import RayMeshIntersector
 
@@ -133,7 +134,7 @@ def test_a_car_faces_minus_y_and_has_its_parts(body: str) -> None:
 @pytest.mark.parametrize("body", BODIES)
 def test_a_car_is_sound_and_symmetric(body: str) -> None:
     mesh = car(Car(body=body, roof_rack=True, rack_bars=True, rear_spoiler=True, exhausts=2))
-    assert_sound(mesh, 48_000)
+    assert_sound(mesh, 44_500)
     assert outward_share(mesh) > 0.997
     walls = part_vertices(mesh, "body", "roof", "window", "bumper", "cargo_bed")
     right = {tuple(v) for v in np.round(walls * (-1, 1, 1) * 5000).astype(int)}
@@ -180,7 +181,7 @@ def test_one_seed_gives_one_mesh(family: str) -> None:
 @pytest.mark.parametrize(
     ("family", "ranges", "most"),
     [
-        ("car", ((1.75, 2.6), (1.38, 2.4), (3.6, 5.75)), 48_000),
+        ("car", ((1.75, 2.6), (1.38, 2.4), (3.6, 5.75)), 44_500),
         ("hair_drier", ((0.07, 0.16), (0.2, 0.4), (0.1, 0.32)), 17_000),
     ],
 )

@@ -52,7 +52,7 @@ class _View:
 
     @cached_property
     def q(self) -> NDArray[np.float64]:
-        return homogeneous(self.geometry, self.camera)
+        return homogeneous(self.geometry, self.camera) if self.visibility.corners is None else self.visibility.corners
 
     @cached_property
     def camera_from_p(self) -> NDArray[np.float64]:
@@ -91,9 +91,8 @@ def _normals(view: _View) -> Array:
     from viewsphere.truth import kernels_channels as kernels
 
     out, g = view.empty("normals"), view.geometry
-    values = kernels.rotated(g.normals, view.camera.R)
     kernels.normals_shading(
-        view.visibility.triangle, g.triangles, view.q, view.rays, values, g.triangle_side, g.triangle_normals,
+        view.visibility.triangle, g.triangles, view.q, view.rays, g.normals, g.triangle_side, g.triangle_normals,
         view.camera_from_p, view.camera.R, out,
     )  # fmt: skip
     return out

@@ -188,19 +188,26 @@ def _draw_small(t, e0, e1, e2, n, box, canvas, nearest, seen):
 
 @njit
 def _draw_rows(t, e0, e1, e2, n, box, canvas, nearest, seen):
-    """Draw a wide triangle row by row: where it begins and ends is found by division, then settled by the exact test."""
+    """Draw a wide triangle row by row: where it begins and ends is computed, then settled by the exact test.
+
+    The crossing -f / e uses the very f of the test, so it is off by a few roundings of itself: far less than EPSILON.
+    """
     xa, ya, xb, yb = box
     samples, x0, y0 = canvas
-    step = 1.0 / samples
+    step, first = 1.0 / samples, x0 + 0.5
+    k0, k1, k2 = _crossing(e0[0], samples), _crossing(e1[0], samples), _crossing(e2[0], samples)
     for y in range(ya, yb + 1):
         py = (y + y0 + 0.5) * step
         f0, f1, f2 = e0[1] * py + e0[2], e1[1] * py + e1[2], e2[1] * py + e2[2]
         low, high = float(xa), float(xb)
-        for e, f in ((e0[0], f0), (e1[0], f1), (e2[0], f2)):
+        for e, k, f in ((e0[0], k0, f0), (e1[0], k1, f1), (e2[0], k2, f2)):
+            cross = f * k - first
             if e > 0.0:
-                low = max(low, -f / e * samples - (x0 + 1.5))  # a pixel early
+                low = max(low, cross - EPSILON)
             elif e < 0.0:
-                high = min(high, -f / e * samples - (x0 - 0.5))  # a pixel late
+                high = min(high, cross + EPSILON)
+            elif f < 0.0:
+                high = -1.0
         if low > high:
             continue
         left, right = math.ceil(low), math.floor(high)
@@ -215,6 +222,12 @@ def _draw_rows(t, e0, e1, e2, n, box, canvas, nearest, seen):
             better = inverse > nearest[uy, ux]
             nearest[uy, ux] = inverse if better else nearest[uy, ux]
             seen[uy, ux] = t if better else seen[uy, ux]
+
+
+@njit
+def _crossing(e, samples):
+    """What f is multiplied by to give the sample at which e x + f is 0; 0 for an edge along the row."""
+    return -samples / e if e != 0.0 else 0.0
 
 
 @njit

@@ -127,21 +127,17 @@ def normals_geometric(seen, triangle_normals, rays, camera_from_p, rotation, out
 
 
 @njit
-def rotated(vectors, rotation):
-    """R v of each row, (n, 3) float64."""
-    out = np.empty((vectors.shape[0], 3))
-    r = rotation
-    for i in range(vectors.shape[0]):
-        x, y, z = np.float64(vectors[i, 0]), np.float64(vectors[i, 1]), np.float64(vectors[i, 2])
-        out[i, 0] = r[0, 0] * x + r[0, 1] * y + r[0, 2] * z
-        out[i, 1] = r[1, 0] * x + r[1, 1] * y + r[1, 2] * z
-        out[i, 2] = r[2, 0] * x + r[2, 1] * y + r[2, 2] * z
-    return out
+def _rotated(r, x, y, z):
+    return (
+        r[0, 0] * x + r[0, 1] * y + r[0, 2] * z,
+        r[1, 0] * x + r[1, 1] * y + r[1, 2] * z,
+        r[2, 0] * x + r[2, 1] * y + r[2, 2] * z,
+    )
 
 
 @njit
 def normals_shading(seen, triangles, q, rays, values, side, triangle_normals, camera_from_p, rotation, out):
-    """Interpolated vertex normals (`values`, camera axes) on the triangle's visible side, never turned away from the ray.
+    """Interpolated vertex normals (`values`, world) in camera axes, on the triangle's visible side, never away from the ray.
 
     `side` is 1 where a triangle's vertex normals agree with its winding, -1 where they oppose it, 2 or -2 likewise where all
     three equal the triangle's own normal.
@@ -169,9 +165,10 @@ def normals_shading(seen, triangles, q, rays, values, side, triangle_normals, ca
             e0, e1, e2 = _edges(q, i0, i1, i2, px, py, pz)
             # the e_i have the sign of g . ray, g the normal by winding: the sum turns with the side that is seen
             sign = -np.float64(side[ut])
-            nx = sign * (e0 * values[i0, a] + e1 * values[i1, a] + e2 * values[i2, a])
-            ny = sign * (e0 * values[i0, b] + e1 * values[i1, b] + e2 * values[i2, b])
-            nz = sign * (e0 * values[i0, c] + e1 * values[i1, c] + e2 * values[i2, c])
+            wx = sign * (e0 * values[i0, a] + e1 * values[i1, a] + e2 * values[i2, a])
+            wy = sign * (e0 * values[i0, b] + e1 * values[i1, b] + e2 * values[i2, b])
+            wz = sign * (e0 * values[i0, c] + e1 * values[i1, c] + e2 * values[i2, c])
+            nx, ny, nz = _rotated(rotation, wx, wy, wz)
             dx = m[0, 0] * px + m[0, 1] * py + m[0, 2] * pz
             dy = m[1, 0] * px + m[1, 1] * py + m[1, 2] * pz
             dz = m[2, 0] * px + m[2, 1] * py + m[2, 2] * pz
@@ -192,7 +189,5 @@ def normals_shading(seen, triangles, q, rays, values, side, triangle_normals, ca
 @njit
 def _towards(normal, r, dx, dy, dz):
     """The world normal in camera axes, turned towards the camera along ray d."""
-    x = r[0, 0] * normal[0] + r[0, 1] * normal[1] + r[0, 2] * normal[2]
-    y = r[1, 0] * normal[0] + r[1, 1] * normal[1] + r[1, 2] * normal[2]
-    z = r[2, 0] * normal[0] + r[2, 1] * normal[1] + r[2, 2] * normal[2]
+    x, y, z = _rotated(r, np.float64(normal[0]), np.float64(normal[1]), np.float64(normal[2]))
     return (-x, -y, -z) if x * dx + y * dy + z * dz > 0.0 else (x, y, z)

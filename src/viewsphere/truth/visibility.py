@@ -25,6 +25,7 @@ class Visibility:
 
     triangle: NDArray[np.int32]
     inverse_depth: NDArray[np.float32]
+    corners: NDArray[np.float64] | None = None  # `homogeneous` of all vertices, for those who need it next
 
 
 def rasterize(
@@ -41,8 +42,9 @@ def rasterize(
     may lie outside it.
     """
     everything = (0, len(geometry.triangles), 0, len(geometry.vertices))
-    nearest, seen = _draw(geometry, camera, subdivision, _range(geometry, object_id) if object_id else everything, window)
-    return Visibility(seen, nearest.astype(np.float32))
+    part = _range(geometry, object_id) if object_id else everything
+    nearest, seen, q = _draw(geometry, camera, subdivision, part, window)
+    return Visibility(seen, nearest.astype(np.float32), q if part == everything else None)
 
 
 def silhouette(geometry: Geometry, camera: Camera, object_id: int, window: Window) -> NDArray[np.bool_]:
@@ -121,8 +123,8 @@ def _ray_table(lens: str, samples: int, canvas: Window) -> _RayTable:
 
 def _draw(
     geometry: Geometry, camera: Camera, samples: int, part: tuple[int, int, int, int], window: Window | None
-) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
-    """1/s (0 where none) and triangle (-1 where none) over the window, of triangles [first, last)."""
+) -> tuple[NDArray[np.float64], NDArray[np.int32], NDArray[np.float64]]:
+    """1/s (0 where none) and triangle (-1 where none) over the window, of the part's triangles; its `homogeneous` vertices."""
     from viewsphere.truth import kernels, kernels_rays
 
     window = window or (0, 0, camera.width, camera.height)
@@ -138,8 +140,8 @@ def _draw(
         origin = (x0 - samples * canvas[0], y0 - samples * canvas[1])
         table, unit = (t.rays, t.levels, t.boxes, t.cells), camera.distortion.model == "fisheye"
         kernels_rays.draw(q, geometry.triangles, span, table, origin, unit, *cut, nearest, seen)
-        return nearest, seen
+        return nearest, seen, q
     cell = np.empty((stop - base, 4), np.int32)
     kernels.cells(q, samples, x0, y0, x1 - x0, y1 - y0, cell)
     kernels.draw(q, cell, geometry.triangles, span, (samples, x0, y0), *cut, nearest, seen)
-    return nearest, seen
+    return nearest, seen, q

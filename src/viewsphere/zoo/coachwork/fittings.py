@@ -68,7 +68,7 @@ def _gate(shape: Shape) -> Solid:
     """The gaps below and beside the boot lid or tailgate."""
     hull = shape.bed if shape.body == "pickup" else shape.hull
     edge = float(hull.outline.u_at_x(0.7 * shape.width / 2, rear=True))
-    low = hull.bumper_line + 0.03
+    low = hull.bumper_line + 0.035
     line = np.stack([np.linspace(edge, 8 - edge, 20), np.full(20, low)], axis=1)
     top = float(hull.top(np.array([edge]))[1][0]) - hull.edge
     upright = ribbon(hull.surface, straight((edge, low), (edge, top), 12), SEAM, 0.004)
@@ -172,9 +172,9 @@ def spoiler(shape: Shape, coats: Coats) -> list[Piece]:
     at = roof_line(shape, 0.0, np.array([top.rear - 0.03]), 0.0)[0]
     wing = rounded_box((1.72 * top.half_width, 0.26, 0.045), 0.02, 3)
     bent = wing.vertices.copy()
-    bent[:, 2] -= 0.05 * (np.abs(bent[:, 0]) / top.half_width) ** 2.5
+    bent[:, 2] -= 0.05 * (np.abs(bent[:, 0]) / top.half_width) ** 2.5 + 0.12 * bent[:, 1]
     bent[:, 1] -= 0.07 * (np.abs(bent[:, 0]) / top.half_width) ** 2
-    lamp = moved(rounded_box((0.3, 0.02, 0.018), 0.006, 2), np.add(at, (0, 0.172, -0.012)))
+    lamp = moved(rounded_box((0.3, 0.02, 0.018), 0.006, 2), np.add(at, (0, 0.166, -0.046)))
     return [
         Piece("spoiler", coats.paint, moved(Solid(bent, wing.triangles), np.add(at, (0, 0.05, -0.012)))),
         Piece("brake_light", coats.red_lamp, lamp),

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from viewsphere.zoo.coachwork.outline import Outline
 from viewsphere.zoo.shapes.solids import Float, Solid, curve, grid
 
-LOWER, UPPER, EDGE = 3, 8, 4
+LOWER, UPPER, EDGE = 3, 9, 4
 """Rows of the wall below the bumper line, above it, and around its top edge."""
 
 
@@ -39,7 +39,8 @@ class Hull:
 
     center (y, z): the deck's line in side view; crown: how much lower the deck's sides lie; sill: (y, z) of the wall's
     lower edge; side, nose, tail: (z, inset from the outline) on flanks, front and rear; edge: radius between wall and
-    deck; bumper_line: z that parts bumpers from body; dome: height of a bonnet bulge that ends at y = dome_end.
+    deck; bumper_line: z that parts bumpers from body; crease: z of the fold along the flanks; dome: height of a bonnet
+    bulge that ends at y = dome_end.
     """
 
     outline: Outline
@@ -52,6 +53,7 @@ class Hull:
     arches: tuple[Arch, ...]
     edge: float = 0.05
     bumper_line: float = 0.52
+    crease: float = 0.7
     dome: float = 0.0
     dome_end: float = 0.0
 
@@ -111,7 +113,11 @@ class Hull:
         low, high = self.lower_edge(u), top - self.edge
         line = np.clip(self.bumper_line, low + 0.12 * (high - low), low + 0.7 * (high - low))
         lower = low[:, None] + (line - low)[:, None] * np.linspace(0, 1, LOWER + 1)
-        upper = line[:, None] + (high - line)[:, None] * np.linspace(0, 1, UPPER + 1)[1:]
+        shoulder = line + np.minimum(0.024, 0.1 * (high - line))  # the ledge above the bumpers
+        fold = np.minimum(self.crease, shoulder + 0.6 * (high - shoulder))
+        after = fold + np.minimum(0.023, 0.2 * (high - fold))
+        below = shoulder[:, None] + (fold - shoulder)[:, None] * np.linspace(0, 1, UPPER - 4)
+        upper = np.concatenate([below, after[:, None] + (high - after)[:, None] * np.linspace(0, 1, 4)], axis=1)
         rows = self.surface(u[:, None], np.concatenate([lower, upper], axis=1))
         angle = np.linspace(0, np.pi / 2, EDGE + 1)[1:]
         n = self.outline.normal(u)[:, None]

@@ -6,19 +6,20 @@ from typing import Literal
 
 import numpy as np
 
+from viewsphere.assets.mesh import Material
 from viewsphere.zoo.coachwork.coats import Coats
 from viewsphere.zoo.coachwork.shape import Shape
 from viewsphere.zoo.shapes.assembly import Piece
-from viewsphere.zoo.shapes.panels import in_quad, panel, raised, ribbon
+from viewsphere.zoo.shapes.panels import Surface, in_quad, panel, raised, ribbon
 from viewsphere.zoo.shapes.solids import Float, Solid, join, mirrored, moved, rounded_box, tube
 
 Lamps = Literal["swept", "round", "slim", "block"]
 Grille = Literal["bars", "mesh", "wide", "slim"]
 
 
-def _pair(part: str, material: object, solid: Solid) -> list[Piece]:
+def _pair(part: str, material: Material, solid: Solid) -> list[Piece]:
     """A piece on the left and its mirror image on the right."""
-    return [Piece(f"{part}_left", material, solid), Piece(f"{part}_right", material, mirrored(solid))]  # type: ignore[arg-type]
+    return [Piece(f"{part}_left", material, solid), Piece(f"{part}_right", material, mirrored(solid))]
 
 
 def _shrunk(corners: Float, left: float, right: float, low: float, high: float) -> Float:
@@ -76,7 +77,7 @@ def front_face(shape: Shape, style: Grille, coats: Coats) -> list[Piece]:
     top = float(shape.nose_top(np.array(0.0))) - 0.02
     line, low = shape.hull.bumper_line, shape.z(shape.proportions.clearance) * 1.25
     wide = {"bars": 0.42, "mesh": 0.36, "wide": 0.47, "slim": 0.46}[style] * half
-    bottom = {"bars": line + 0.03, "mesh": line - 0.1, "wide": line + 0.05, "slim": top - 0.09}[style]
+    bottom = {"bars": line + 0.03, "mesh": line - 0.015, "wide": line + 0.05, "slim": top - 0.09}[style]
     u = float(shape.hull.outline.u_at_x(wide))
     pinch = 0.8 if style in ("bars", "mesh") else 0.93
     quad = np.array([[-u * pinch, bottom], [u * pinch, bottom], [u, top], [-u, top]])
@@ -104,22 +105,22 @@ def _square(shape: Shape, z: float, size: float) -> Float:
     return np.array([[-u, z - size], [u, z - size], [u, z + size], [-u, z + size]])
 
 
-def _slats(surface: object, quad: Float, rows: int, upright: bool) -> list[Solid]:
+def _slats(surface: Surface, quad: Float, rows: int, upright: bool) -> list[Solid]:
     """Bars across a grille, and along it for a mesh."""
     solids: list[Solid] = []
     for share in (np.arange(rows) + 0.5) / rows:
         line = in_quad(quad, np.stack([np.linspace(0.04, 0.96, 15), np.full(15, share)], axis=1))
-        solids.append(ribbon(surface, line, 0.014, 0.014))  # type: ignore[arg-type]
+        solids.append(ribbon(surface, line, 0.014, 0.014))
     if upright:
         for share in np.linspace(0.08, 0.92, 13):
             line = in_quad(quad, np.stack([np.full(5, share), np.linspace(0.06, 0.94, 5)], axis=1))
-            solids.append(ribbon(surface, line, 0.009, 0.0145))  # type: ignore[arg-type]
+            solids.append(ribbon(surface, line, 0.009, 0.0145))
     return solids
 
 
-def plate(surface: object, u: float, z: float, facing: float, coats: Coats) -> list[Piece]:
+def plate(surface: Surface, u: float, z: float, facing: float, coats: Coats) -> list[Piece]:
     """A licence plate with a few letters, flat, at (u, z); facing 1 front, -1 rear."""
-    at = raised(surface, np.array([[u, z]]), 0.014)[0]  # type: ignore[arg-type]
+    at = raised(surface, np.array([[u, z]]), 0.014)[0]
     board = moved(rounded_box((0.5, 0.018, 0.115), 0.004, 1), at)
     rows = [-0.17, -0.11, -0.02, 0.04, 0.1, 0.17]
     marks = [moved(rounded_box((0.036, 0.004, 0.07), 0.001, 1), np.add(at, (x, -facing * 0.009, 0))) for x in rows]
@@ -132,13 +133,14 @@ def rear_face(shape: Shape, coats: Coats, exhausts: int) -> list[Piece]:
     surface, half = hull.surface, shape.width / 2
     line = hull.bumper_line
     high = shape.body in ("sedan", "hatchback")
-    at = line + 0.13 if high else line - 0.09
+    at = line + 0.13 if high else line - 0.072
     low = float(hull.lower_edge(np.array([4.0]))[0])
-    mouth = 4 - float(hull.outline.u_at_x(0.6 * half, rear=True))
-    apron = np.array(
-        [[4 - mouth, low + 0.02], [4 + mouth, low + 0.02], [4 + mouth * 0.9, low + 0.1], [4 - mouth * 0.9, low + 0.1]]
-    )
-    pieces = [*plate(surface, 4.0, at, -1.0, coats), Piece("bumper_rear", coats.black, panel(surface, apron, 0.006, 0.2, 7, rings=2))]
+    m = 4 - float(hull.outline.u_at_x(0.6 * half, rear=True))
+    apron = np.array([[4 - m, low + 0.02], [4 + m, low + 0.02], [4 + m * 0.9, low + 0.1], [4 - m * 0.9, low + 0.1]])
+    pieces = [
+        *plate(surface, 4.0, at, -1.0, coats),
+        Piece("bumper_rear", coats.black, panel(surface, apron, 0.006, 0.2, 7, rings=2)),
+    ]
     grip = raised(surface, np.array([[4.0, at + 0.09]]), 0.006)[0]
     pieces.append(Piece("tailgate_handle", coats.chrome, moved(rounded_box((0.34, 0.02, 0.025), 0.009), grip)))
     for side in (-1, 1)[2 - exhausts :]:

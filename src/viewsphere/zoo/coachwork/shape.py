@@ -116,6 +116,7 @@ class Shape:
             arches,
             edge=0.03 + 0.02 * soft,
             bumper_line=self.z(0.34),
+            crease=self._crease,
             dome=self.dome,
             dome_end=self.y(p.cowl) + 0.1,
         )
@@ -148,7 +149,7 @@ class Shape:
     def _side(self) -> Knots:
         z, p = self.z, self.proportions
         low, belt = z(p.clearance), z(p.belt)
-        crease = low + 0.72 * (belt - low)
+        crease = self._crease
         return (
             (low, 0.07),
             (low + 0.08, 0.03),
@@ -159,6 +160,11 @@ class Shape:
             (belt, 0.04 + 0.015 * self.roundness),
             (belt + 0.3, 0.12),
         )
+
+    @property
+    def _crease(self) -> float:
+        p = self.proportions
+        return self.z(p.clearance + 0.72 * (p.belt - p.clearance))
 
     @cached_property
     def _nose(self) -> Knots:
@@ -244,7 +250,19 @@ class Shape:
         outline = Outline(self.y(p.cab_end) + 0.025, self.length / 2, self.width / 2, (12.0, 9.0), (40.0, 26.0), (0.0, 0.02))
         line = ((self.y(0.0), self.z(p.belt) + 0.015), (self.y(1.0), self.z(p.tail) + 0.015))
         flat = ((0.0, 0.02), (3.0, 0.02))
-        return Hull(outline, line, 0.015, self._sill, self._side, flat, self._tail, self.arches[1:], 0.025, hull.bumper_line)
+        return Hull(
+            outline,
+            line,
+            0.015,
+            self._sill,
+            self._side,
+            flat,
+            self._tail,
+            self.arches[1:],
+            edge=0.025,
+            bumper_line=hull.bumper_line,
+            crease=self._crease,
+        )
 
     @cached_property
     def bed_inner(self) -> Outline:

@@ -37,8 +37,8 @@ def arch_trims(hull: Hull, coats: Coats, flare: float) -> list[Piece]:
     pieces: list[Piece] = []
     angle = np.linspace(0.0, np.pi, 27)
     for arch in hull.arches:
-        grow = np.array([0.0, 0.004, 0.03 + flare, 0.045 + flare, 0.05 + flare])
-        height = np.array([-0.004, flare, flare, 0.5 * flare, -0.003])
+        grow = np.array([0.0, 0.004, 0.03 + flare, 0.044 + flare, 0.047 + flare])
+        height = np.array([-0.004, flare, flare, 0.6 * flare, -0.012])
         r = arch.radius + grow[:, None]
         cos = np.cos(angle)
         y = arch.y - r * cos
@@ -94,8 +94,8 @@ def bed_pieces(shape: Shape, coats: Coats) -> list[Piece]:
     ground = grid(np.stack([walls[:, -1], middle], axis=1))
     arch = hull.arches[0]
     top_z, inside = arch.z + arch.radius + 0.04, shape.width / 2 - shape.wheel.width - 0.13
-    box = rounded_box((shape.width / 2 - 0.06 - inside, 2 * arch.radius + 0.12, 2 * (top_z - floor)), 0.06)
-    box = moved(box, ((shape.width / 2 - 0.06 + inside) / 2, arch.y, floor))
+    box = rounded_box((shape.width / 2 - 0.06 - inside, 2 * arch.radius + 0.12, top_z - floor + 0.05), 0.06)
+    box = moved(box, ((shape.width / 2 - 0.06 + inside) / 2, arch.y, (top_z + floor - 0.05) / 2))
     ribs = [
         moved(
             rounded_box((0.05, opening.rear - opening.front - 0.1, 0.02), 0.008, 2),
