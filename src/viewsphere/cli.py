@@ -189,7 +189,11 @@ def export(
     """Write a finished or half-finished data set in other formats, without rendering."""
     from viewsphere.run.generate import export as write_formats
 
-    names = _split(format_) or ()
+    names = _split(format_)
+    if not names:
+        from viewsphere import plugins
+
+        raise UserError(f"--format: expected one or more of {', '.join(plugins.names('formats'))}; found none")
     notes = write_formats(folder, names)
     if json_:
         _print_json({"formats": list(names), "notes": list(notes)})
@@ -301,6 +305,11 @@ def _print_summary(summary: Summary, as_json: bool) -> None:
         return
     for key, why in summary.skipped.items():
         typer.echo(f"left out {key}: {why}", err=True)
+    for key, warnings in list(summary.warnings.items())[:MOST_FINDINGS]:
+        for warning in warnings:
+            typer.echo(f"warning: model {key}: {warning}", err=True)
+    if len(summary.warnings) > MOST_FINDINGS:
+        typer.echo(f"and warnings of {len(summary.warnings) - MOST_FINDINGS:,} models more; --json lists all", err=True)
     for note in summary.notes:
         typer.echo(note)
     rate = f", {summary.rendered / summary.seconds:.1f} frames/s" if summary.rendered else ""

@@ -51,7 +51,9 @@ class Engine(Protocol):
 
 
 class Format(Protocol):
-    """A module that writes a data set in one format: `export`."""
+    """A module that writes a data set in one format: `export`; with `CHANNELS`, the names of the channels it needs, a run
+    that does not keep them is refused before it begins.
+    """
 
     def export(self, dataset: Dataset, folder: Path) -> None:
         """Write the finished frames of the data set into this empty folder; images by `dataset.link`."""

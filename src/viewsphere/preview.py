@@ -131,7 +131,7 @@ def draw_sample(sample: Sample, draw: Sequence[Drawing] = (), width: int | None 
     for o in sample.objects:
         color = PALETTE[(o.id - 1) % len(PALETTE)]
         if "boxes3d" in draw:
-            _draw_box3d(pen, o, scale, color)
+            _draw_box3d(pen, o, scale, tuple(int(0.55 * c) for c in color))
         if "boxes" in draw and o.box2d is not None:
             x0, y0, x1, y1 = (v * scale for v in o.box2d)
             pen.rectangle((x0, y0, x1 - 1, y1 - 1), outline=color, width=2)
@@ -159,7 +159,7 @@ def _tint(rgb: Picture, objects: Sequence[ObjectAnnotation]) -> Picture:
     return tinted.round().astype(np.uint8)
 
 
-def _draw_box3d(pen: ImageDraw.ImageDraw, o: ObjectAnnotation, scale: float, color: tuple[int, int, int]) -> None:
+def _draw_box3d(pen: ImageDraw.ImageDraw, o: ObjectAnnotation, scale: float, color: tuple[int, ...]) -> None:
     corners = o.box3d_pixels * scale
     for name, face in FACES.items():
         ring = [tuple(corners[i]) for i in face]

@@ -28,7 +28,7 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.errors import StoreError
+from viewsphere.errors import StoreError, UserError
 from viewsphere.model.channel import CHANNELS, Channel
 from viewsphere.model.record import sample_from_record, sample_to_record
 from viewsphere.model.sample import Sample
@@ -127,19 +127,42 @@ class Store:
     def open_for(self, plan: PlanRecord) -> None:
         """Make the folder ready for this plan, or find it half done by the same one.
 
-        Raises StoreError if it cannot be written, holds another recipe's data, or files that viewsphere did not make.
+        Another recipe's plan gives way while none of its frames is finished and nobody works on them, so that a recipe
+        can be mended and tried again. Raises StoreError if the folder cannot be written, holds another recipe's data, or
+        files that viewsphere did not make.
         """
-        if self.plan_file.exists():
-            self._refuse_other(plan)
-        else:
-            if self.root.is_dir() and any(self.root.iterdir()) and not self.folder.is_dir():
-                raise StoreError(
-                    f"{self.root}: expected an empty or new folder, found other files: choose another output folder"
-                )
-            self._make(self.folder / "writing")
-            self._write_atomically(self.plan_file, plan.to_json())
-        self._make(self.folder / "writing")
+        writing = self.folder / "writing"
+        known = self.plan_file.exists()
+        if not known and self.root.is_dir() and any(self.root.iterdir()) and not writing.is_dir():
+            raise StoreError(f"{self.root}: expected an empty or new folder, found other files: choose another output folder")
+        self._make(writing)
         self._sweep()
+        if known:
+            if any(writing.iterdir()) or any((self.folder / "shots").glob("*/*")):
+                self._refuse_other(plan)
+                return
+            if not self._is_of(plan):
+                shutil.rmtree(self.folder / "models", ignore_errors=True)
+        self._write_atomically(self.plan_file, plan.to_json())
+
+    @contextmanager
+    def occupied(self) -> Generator[None]:
+        """Show other runs that this one is at work, as long as the block lasts."""
+        sign = self.folder / "writing" / f"{_writer()}run"
+        with _disk_errors(self.root):
+            sign.touch()
+        try:
+            yield
+        finally:
+            with suppress(OSError):
+                sign.unlink(missing_ok=True)
+
+    def _is_of(self, plan: PlanRecord) -> bool:
+        try:
+            found = self.plan()
+        except StoreError:
+            return False
+        return (found.digest, found.version) == (plan.digest, plan.version)
 
     def _refuse_other(self, plan: PlanRecord) -> None:
         found = self.plan()
@@ -266,17 +289,21 @@ class Store:
         (folder / "model.json").write_text(json.dumps(value, indent=1), "utf-8")
 
     def model_info(self, key: str) -> ModelInfo | None:
-        """What is known of a finished model; None if it is not there."""
+        """What is known of a finished model; None if it is not there, StoreError if it cannot be read."""
+        file = self.model_folder(key) / "model.json"
         try:
-            value = json.loads((self.model_folder(key) / "model.json").read_text("utf-8"))
+            value = json.loads(file.read_text("utf-8"))
+            value["box3d_object"] = np.array(value["box3d_object"])
+            for name in ("size", "real_size", "parts", "warnings"):
+                value[name] = None if value[name] is None else tuple(value[name])
+            return ModelInfo(**value)
         except FileNotFoundError:
             return None
-        except ValueError as error:
-            raise StoreError(f"{self.model_folder(key) / 'model.json'}: expected JSON, found {error}") from None
-        value["box3d_object"] = np.array(value["box3d_object"])
-        for name in ("size", "real_size", "parts", "warnings"):
-            value[name] = None if value[name] is None else tuple(value[name])
-        return ModelInfo(**value)
+        except (OSError, LookupError, TypeError, ValueError) as error:
+            raise StoreError(
+                f"{file}: expected what is known of a model, found {type(error).__name__}: {error}: "
+                f"delete {file.parent} and render again"
+            ) from None
 
 
 class Dataset(Sequence[Sample]):
@@ -350,23 +377,33 @@ class Dataset(Sequence[Sample]):
             raise IndexError(f"{self.root}: expected a frame in 0..{len(self) - 1}, got {index}")
         keys, starts = self._shots
         shot = bisect_right(starts, i) - 1
-        return self._sample(self._records(keys[shot])[i - starts[shot]])
+        return self._sample(keys[shot], self._records(keys[shot])[i - starts[shot]])
 
     def __iter__(self) -> Iterator[Sample]:
         for key in self._shots[0]:
             for record in self._read_records(key):
-                yield self._sample(record)
+                yield self._sample(key, record)
+
+    @cached_property
+    def _frames_of(self) -> dict[str, int]:
+        return {key: count for key, _, count in self.plan.shots}
 
     def _read_records(self, key: str) -> list[dict[str, Any]]:
         file = self.store.shot_folder(key) / "frames.json"
         try:
-            return json.loads(file.read_text("utf-8"))
-        except (OSError, ValueError) as error:
-            raise StoreError(f"{file}: expected the frames of a finished shot, found {error}") from None
+            records: list[dict[str, Any]] = json.loads(file.read_text("utf-8"))
+            if len(records) != self._frames_of[key]:
+                raise ValueError(f"{len(records)} frames instead of {self._frames_of[key]}")
+        except (OSError, TypeError, ValueError) as error:
+            raise _damaged(file, error) from None
+        return records
 
-    def _sample(self, record: dict[str, Any]) -> Sample:
-        files: dict[str, str] = record["files"]
-        return sample_from_record(record, channels=_ChannelFiles(self.root, files), files=files)
+    def _sample(self, key: str, record: dict[str, Any]) -> Sample:
+        try:
+            files: dict[str, str] = record["files"]
+            return sample_from_record(record, channels=_ChannelFiles(self.root, files), files=files)
+        except (LookupError, TypeError, ValueError, AttributeError) as error:
+            raise _damaged(self.store.shot_folder(key) / "frames.json", error) from None
 
     def path(self, relative: str) -> Path:
         """A file of the data set."""
@@ -422,9 +459,20 @@ def decode(channel: Channel, file: Path) -> NDArray[Any]:
     try:
         data = file.read_bytes()
         array = image_files.decode_tiff(data) if channel.encoding == "tiff" else image_files.decode_png(data)
-    except (OSError, ValueError) as error:
-        raise StoreError(f"{file}: expected a readable {channel.encoding} file, found {error}") from None
+    except (OSError, ValueError, UserError) as error:
+        problem = error.strerror if isinstance(error, OSError) else error
+        raise StoreError(
+            f"{file}: expected a readable {channel.encoding} file, found: {problem}: "
+            f"delete {file.parent.parent} and render again"
+        ) from None
     return array.astype(channel.dtype, copy=False)
+
+
+def _damaged(file: Path, error: Exception) -> StoreError:
+    return StoreError(
+        f"{file}: expected the frames of a finished shot, found {type(error).__name__}: {error}: "
+        f"delete {file.parent} and render again"
+    )
 
 
 def _writer() -> str:

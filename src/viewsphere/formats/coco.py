@@ -83,7 +83,7 @@ def export(dataset: Dataset, folder: Path) -> None:
 
     Raises UserError if the data set has no `rgb` channel.
     """
-    if "rgb" not in dataset.plan.channels:
+    if not set(CHANNELS) <= set(dataset.plan.channels):
         raise UserError(f"{dataset.root}: format coco: expected channel rgb, found none: add it to the recipe's channels")
     write_annotations(dataset, folder, pictures=True)
     for info in dataset.models:

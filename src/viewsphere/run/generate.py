@@ -37,7 +37,9 @@ class Progress:
 
 @dataclass(frozen=True)
 class Summary:
-    """What a run left: frames in the data set, frames it rendered itself, what it skipped, seconds, formats, notes."""
+    """What a run left: frames in the data set, frames it rendered itself, what it skipped, seconds, formats, notes, and
+    warnings about its models by their keys.
+    """
 
     root: Path
     frames: int
@@ -46,6 +48,7 @@ class Summary:
     seconds: float
     formats: tuple[str, ...]
     notes: tuple[str, ...] = field(default=())
+    warnings: dict[str, tuple[str, ...]] = field(default_factory=dict[str, tuple[str, ...]])
 
 
 Listener = Callable[[Progress], None]
@@ -70,16 +73,30 @@ def generate(
     tell = listener or _unheard
     wanted = tuple(formats if formats is not None else recipe.formats)
     for name in wanted:
-        plugins.load("formats", name)
+        _check_channels(name, recipe.channels)
     planned = plan(recipe)
+    check_backgrounds(planned)
     store = Store(Path(out))
     store.open_for(plan_record(planned))
-    skipped = _prepare_models(planned, store, workers, keep_going, tell)
-    rendered = _render_shots(planned, store, workers, keep_going, skipped, tell)
-    _note_skipped(store, skipped)
-    notes = export(store.root, wanted, listener=tell)
-    frames = len(Dataset(store.root))
-    return Summary(store.root, frames, rendered, skipped, time.monotonic() - begun, wanted, notes)
+    with store.occupied():
+        skipped = _prepare_models(planned, store, workers, keep_going, tell)
+        rendered = _render_shots(planned, store, workers, keep_going, skipped, tell)
+        _note_skipped(store, skipped)
+        notes = export(store.root, wanted, listener=tell)
+    dataset = Dataset(store.root)
+    warnings = {info.key: info.warnings for info in dataset.models if info.warnings}
+    return Summary(store.root, len(dataset), rendered, skipped, time.monotonic() - begun, wanted, notes, warnings)
+
+
+def _check_channels(name: str, channels: Sequence[str]) -> None:
+    """Raises UserError for a format that is not known, or that needs a channel which is not kept."""
+    needed: Sequence[str] = getattr(plugins.load("formats", name), "CHANNELS", ())
+    missing = [channel for channel in needed if channel not in channels]
+    if missing:
+        raise RecipeError(
+            f"channels: expected {missing[0]}, which format {name} needs; found {', '.join(channels)}: "
+            f"add it, or leave {name} out of formats"
+        )
 
 
 def _unheard(progress: Progress) -> None:
