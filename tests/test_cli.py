@@ -148,3 +148,7 @@ def test_ctrl_c_keeps_what_is_finished(tmp_path):
     assert run.returncode == 130
     assert "are kept" in err
     assert "Traceback" not in err
+
+
+def test_an_export_to_no_format_is_a_mistake(small_run):
+    assert "expected one or more of coco, native" in fails("export", small_run, "-f", ",")

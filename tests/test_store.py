@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import socket
 from dataclasses import replace
 
@@ -80,8 +81,59 @@ def test_leftovers_of_the_dead_are_swept_and_those_of_the_living_stay(tmp_path):
 def test_data_of_another_plan_are_refused(tmp_path, changes):
     store = Store(tmp_path / "out")
     store.open_for(plan_record())
+    store.shot_folder("m-0").mkdir(parents=True)
     with pytest.raises(StoreError, match="another output folder"):
         store.open_for(plan_record(**changes))
+
+
+def test_a_plan_without_frames_gives_way_to_the_mended_one(tmp_path):
+    store = Store(tmp_path / "out")
+    store.open_for(plan_record())
+    store.model_folder("m").mkdir(parents=True)
+    store.open_for(plan_record(digest="other"))
+    assert store.plan().digest == "other"
+    assert not store.model_folder("m").exists()
+
+
+def test_a_plan_that_a_run_works_on_stays(tmp_path):
+    store = Store(tmp_path / "out")
+    store.open_for(plan_record())
+    with store.occupied(), pytest.raises(StoreError, match="another output folder"):
+        store.open_for(plan_record(digest="other"))
+    assert not any((store.folder / "writing").iterdir())
+
+
+def test_a_folder_named_store_is_no_store(tmp_path):
+    (tmp_path / "store").mkdir()
+    (tmp_path / "native").mkdir()
+    with pytest.raises(StoreError, match="other files"):
+        Store(tmp_path).open_for(plan_record())
+
+
+@pytest.mark.parametrize("text", ["[{}]", "[", "{}", "[1, 2]", "[]"])
+def test_damaged_frames_are_named_with_a_way_out(small_dataset, text):
+    file = next(small_dataset.store.folder.rglob("frames.json"))
+    file.unlink()  # the files of this fixture may be hard links
+    file.write_text(text)
+    with pytest.raises(StoreError, match=f"{re.escape(str(file))}.*delete .* and render again"):
+        list(small_dataset)
+
+
+def test_a_damaged_picture_is_named_with_a_way_out(small_dataset):
+    file = next(small_dataset.store.folder.rglob("instances/*.png"))
+    data = file.read_bytes()
+    file.unlink()
+    file.write_bytes(data[:-20])
+    with pytest.raises(StoreError, match=f"{re.escape(str(file))}.*delete .* and render again"):
+        [s.instances for s in small_dataset]
+
+
+def test_a_damaged_model_record_is_named_with_a_way_out(small_dataset):
+    file = next(small_dataset.store.folder.rglob("model.json"))
+    file.unlink()
+    file.write_text("{}")
+    with pytest.raises(StoreError, match=f"{re.escape(str(file))}.*delete .* and render again"):
+        _ = small_dataset.models
 
 
 @pytest.mark.parametrize("text", ["", "{}", "[]", '{"store": 99}', json.dumps({"store": 1})])

@@ -86,6 +86,7 @@ def inspect(
     from viewsphere.preview import four_sides
     from viewsphere.run.inspection import inspect_model, model_spec, report_lines
 
+    _announce_compilation()
     spec = model_spec(model, up=up, forward=forward, unit=unit, seed=seed)
     report = inspect_model(spec)
     picture = output or Path(f"{Path(model.replace(':', '-')).stem}-sides.png")
@@ -135,6 +136,8 @@ def preview(
     from viewsphere.preview import contact_sheet, dataset_samples, preview_samples
     from viewsphere.store import Dataset
 
+    if not source.is_dir():
+        _announce_compilation()
     samples = dataset_samples(Dataset(source), count) if source.is_dir() else list(preview_samples(_recipe(source), count))
     if not samples:
         raise StoreError(f"{source}: expected finished frames, found none: render first")
@@ -241,6 +244,14 @@ def _complain(error: ViewsphereError, status: int) -> None:
     for line in str(error).splitlines():
         typer.echo(f"viewsphere: {line}", err=True)
     sys.exit(status)
+
+
+def _announce_compilation() -> None:
+    """Say why the first picture on a machine takes longer."""
+    from viewsphere.geometry.jit import kernel_folder
+
+    if not kernel_folder().is_dir():
+        typer.echo("compiling kernels, once on this machine: about 20 seconds", err=True)
 
 
 def _recipe(file: Path) -> Recipe:

@@ -254,3 +254,11 @@ def test_a_record_gives_back_every_bit():
             else:
                 assert other == value, name
     assert json.dumps(sample_to_record(back)) == json.dumps(json.loads(text))
+
+
+def test_an_object_that_fills_the_whole_field_of_a_lens():
+    narrow = LENS.model_copy(update={"distortion": Distortion(model="brown_conrady", coefficients=(-50, 0, 0, 0))})
+    pose = Pose(index=0, azimuth_deg=0, elevation_deg=0, distance=1.5)
+    (cube,), *_ = scene([UNIT], [at()], pose, narrow)  # no edge of it is where the lens sees
+    assert cube.area > 100
+    assert (cube.visibility, cube.truncation) == (1, 0)

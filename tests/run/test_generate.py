@@ -15,7 +15,6 @@ import viewsphere as vs
 from small import small_recipe, tree_hash
 from viewsphere.errors import ModelError, RecipeError, StoreError, UserError
 from viewsphere.run.generate import Progress, export, generate
-from viewsphere.run.pool import Job, run_jobs
 
 
 def command(recipe_file, out, workers):
@@ -146,6 +145,46 @@ def test_unknown_format_is_refused_before_rendering(tmp_path):
     assert not (tmp_path / "out").exists()
 
 
+def test_a_channel_that_a_format_needs_is_missed_before_rendering(tmp_path):
+    with pytest.raises(RecipeError, match="channels: expected rgb, which format coco needs; found depth"):
+        generate(small_recipe(channels=["depth"]), tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("how", [{"image": "{}/bad.png"}, {"images": "{}"}])
+def test_a_background_that_is_no_image_is_refused_before_rendering(how, tmp_path):
+    (tmp_path / "bad.png").write_text("no picture")
+    background = {key: value.format(tmp_path) for key, value in how.items()}
+    recipe = small_recipe(scene={"background": background})
+    with pytest.raises(RecipeError, match=r"scene.background.*bad.png"):
+        generate(recipe, tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+    with pytest.raises(RecipeError, match=r"scene.background.*bad.png"):
+        next(vs.render(recipe))
+
+
+def test_a_recipe_can_be_mended_and_tried_again(tmp_path):
+    near = small_recipe(viewpoints={"azimuth": 0, "elevation": 0, "distance": 0.05}, formats=[])
+    with pytest.raises(RecipeError, match="outside the model"):
+        generate(near, tmp_path / "out")
+    mended = small_recipe(viewpoints={"azimuth": 0, "elevation": 0, "distance": 1}, formats=[])
+    assert generate(mended, tmp_path / "out").frames == 2
+
+
+def test_warnings_of_models_are_told(tmp_path):
+    (tmp_path / "card.obj").write_text("mtllib none.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3\n")
+    models = [{"source": str(tmp_path / "card.obj"), "category": "card"}]
+    summary = generate(small_recipe(models=models, formats=[]), tmp_path / "out")
+    assert list(summary.warnings) == ["card"]
+    assert "none.mtl" in summary.warnings["card"][0]
+
+
+def test_camera_inside_the_model_is_refused_in_memory():
+    near = small_recipe(viewpoints={"azimuth": 0, "elevation": 0, "distance": 0.05})
+    with pytest.raises(RecipeError, match="outside the model"):
+        next(vs.render(near))
+
+
 def test_camera_inside_the_model_is_refused(tmp_path):
     near = small_recipe(viewpoints={"azimuth": 0, "elevation": 0, "distance": 0.05})
     with pytest.raises(RecipeError, match="distance"):
@@ -196,16 +235,3 @@ def test_export_of_a_half_finished_store(small_dataset):
     ]
     assert len(ids) == 10
     assert set(ids) == {s.index + 1 for s in vs.open(small_dataset.root)}
-
-
-class Deadly:
-    """A task that ends the process which unpacks it."""
-
-    def __reduce__(self):
-        return os._exit, (3,)
-
-
-def test_a_worker_that_dies_costs_a_retry_then_an_error(tmp_path):
-    outcomes = list(run_jobs([Job("x", "x", Deadly)], tmp_path, 1))
-    assert len(outcomes) == 1
-    assert "died 2 times (exit code 3)" in str(outcomes[0].error)

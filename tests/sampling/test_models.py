@@ -164,3 +164,10 @@ def test_a_faulty_table_is_reported_at_its_line(build, tmp_path, text, message):
 def test_a_missing_table_is_reported(build):
     message = error(build([entry("a.obj", real_size="none.csv")], ["a.obj"]))
     assert message.endswith("expected a readable CSV file of name, width, height, length; found: No such file or directory")
+
+
+def test_keys_of_very_long_names_are_shortened_and_stay_distinct(build):
+    files = [f"{'n' * 200}{i}.obj" for i in range(2)] + ["日本" * 40 + ".obj"]
+    found = keys(build([entry("*.obj")], files))
+    assert len(set(found)) == 3
+    assert all(len(key.encode()) <= 150 for key in found)

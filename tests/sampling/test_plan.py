@@ -233,3 +233,25 @@ def test_the_digest_follows_what_the_store_holds_not_where_it_lies(tmp_path):
     assert digest(tmp_path / "two", frames=3) != first
     assert digest(tmp_path / "two", seed=1) != first
     assert digest(tmp_path / "two", files=("b.obj",)) != first
+
+
+def test_a_mistake_found_by_planning_is_reported_at_its_line(tmp_path):
+    file = tmp_path / "recipe.yaml"
+    file.write_text("viewpoints: {distance: 8}\nmodels:\n  - source: zoo:car\n  - source: none.obj\n    category: x\n")
+    with pytest.raises(RecipeError) as error:
+        plan(Recipe.load(file))
+    assert str(error.value).startswith(f"{file}:4: models[1].source: expected a file")
+
+
+@pytest.mark.parametrize(
+    ("viewpoints", "ground", "warned"),
+    [
+        ({"elevation": {"start": -10, "stop": 20, "step": 10}, "distance": 8}, "auto", True),
+        ({"kind": "sphere", "count": 3, "distance": 8}, "auto", True),
+        ({"elevation": -10, "distance": 8}, "off", False),
+        ({"elevation": [0, 20], "distance": 8}, "on", False),
+    ],
+)
+def test_cameras_below_the_ground_are_warned_of(viewpoints, ground, warned):
+    recipe = Recipe(models=[{"source": "zoo:car", "count": 9}], viewpoints=viewpoints, scene={"ground": ground})
+    assert any("ground hides" in warning for warning in plan(recipe).warnings) is warned

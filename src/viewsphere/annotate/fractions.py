@@ -33,7 +33,9 @@ def visible_and_cut(
     """
     own = bounds[object_id - 1]
     if own is None:
-        return 0.0, 1.0
+        if not area:
+            return 0.0, 1.0
+        own = (-math.inf, -math.inf, math.inf, math.inf)  # no edge is in the lens' field because the object fills it
     width, height = camera.width, camera.height
     inside = whole[object_id - 1] and own[0] >= 0 and own[1] >= 0 and own[2] <= width and own[3] <= height
     if inside and _unobstructed(geometry, camera, object_id, bounds, whole):

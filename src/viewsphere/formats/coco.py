@@ -30,6 +30,8 @@ from viewsphere.model.sample import Box, ObjectAnnotation, Sample
 if TYPE_CHECKING:
     from viewsphere.store import Category, Dataset
 
+CHANNELS = ("rgb",)
+
 _NAMES = {
     1: "person bicycle car motorcycle airplane bus train truck boat",
     10: "traffic_light fire_hydrant",

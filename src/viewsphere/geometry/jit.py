@@ -33,6 +33,11 @@ def njit(function: Callable[..., Any] | None = None, **options: Any) -> Any:
     return numba.njit(nogil=True, cache=True, error_model="numpy", **options)(function)
 
 
+def kernel_folder() -> Path:
+    """Where compiled kernels are kept: `$VIEWSPHERE_CACHE/kernels`, else in the user's cache folder."""
+    return Path(os.environ.get("VIEWSPHERE_CACHE") or platformdirs.user_cache_dir("viewsphere")) / "kernels"
+
+
 def _sources(function: Callable[..., Any], seen: set[str]) -> set[str]:
     """Files of a function and of all kernels within its reach."""
     file = function.__code__.co_filename
@@ -50,9 +55,8 @@ def _cache_folder(sources: frozenset[str]) -> str:
     digest = hashlib.sha256(repr(_BUILD).encode())
     for source in sorted(sources):
         digest.update(Path(source).read_bytes())
-    wanted = Path(os.environ.get("VIEWSPHERE_CACHE") or platformdirs.user_cache_dir("viewsphere"))
-    for root in (wanted, Path(tempfile.gettempdir()) / f"viewsphere-{Path.home().name}"):
-        folder = root / "kernels" / digest.hexdigest()[:16]
+    for root in (kernel_folder(), Path(tempfile.gettempdir()) / f"viewsphere-{Path.home().name}" / "kernels"):
+        folder = root / digest.hexdigest()[:16]
         try:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from difflib import get_close_matches
 from typing import Any, cast
 
@@ -17,16 +17,26 @@ EXPLAINED = "explained"
 
 @dataclass(frozen=True)
 class Marks:
-    """Where the values of a file stand: path of keys and indices -> line, counted from 1."""
+    """Where the values of a file stand: path of keys and indices -> line, counted from 1. It is no part of what they say:
+    all marks are equal.
+    """
 
-    file: str
-    lines: Mapping[Path, int]
+    file: str = field(default="", compare=False)
+    lines: Mapping[Path, int] = field(default_factory=dict[Path, int], compare=False)
 
     def line(self, path: Path) -> int:
         """Line of the value, else of the innermost value around it that stands in the file."""
         while path and path not in self.lines:
             path = path[:-1]
         return self.lines.get(path, 1)
+
+    def located(self, message: str) -> str:
+        """A message that begins with a field, `models[0].source: ...`, with file and line before it."""
+        field_ = re.match(r"[A-Za-z_]+(?:\[\d+\]|\.\w+)*(?=: )", message)
+        if not self.file or field_ is None:
+            return message
+        steps = re.findall(r"\[(\d+)\]|(\w+)", field_[0])
+        return f"{self.file}:{self.line(tuple(int(i) if i else name for i, name in steps))}: {message}"
 
 
 def nearest(name: object, known: Iterable[str]) -> str:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Generator, Mapping
+from contextlib import contextmanager
 from os import PathLike
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
@@ -131,6 +132,7 @@ class Recipe(Frozen):
     max_frames: Count = Field(default=1_000_000, description="planning more frames than this is taken for a typing mistake")
 
     _folder: Path = PrivateAttr()
+    _marks: Marks = PrivateAttr()
 
     @model_validator(mode="before")
     @classmethod
@@ -154,8 +156,17 @@ class Recipe(Frozen):
         return value
 
     def model_post_init(self, context: Any, /) -> None:
-        """Remember the folder that relative paths start from."""
+        """Remember the folder that relative paths start from, and the file's lines."""
         self._folder = Path((context or {}).get("folder", Path.cwd())).absolute()
+        self._marks = (context or {}).get("marks") or Marks()
+
+    @contextmanager
+    def located(self) -> Generator[None]:
+        """Put the recipe's file and line before the message of a RecipeError that begins with a field's name."""
+        try:
+            yield
+        except RecipeError as error:
+            raise RecipeError("\n".join(map(self._marks.located, str(error).splitlines()))) from None
 
     @property
     def folder(self) -> Path:

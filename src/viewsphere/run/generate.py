@@ -9,16 +9,13 @@ from dataclasses import dataclass, field
 from importlib.metadata import version
 from pathlib import Path
 
-import numpy as np
-
 from viewsphere import plugins
 from viewsphere.errors import ModelError, RecipeError, UserError, ViewsphereError
 from viewsphere.model.recipe import Recipe
 from viewsphere.run.pool import Job, Outcome, run_jobs
 from viewsphere.run.tasks import Task
 from viewsphere.run.warm import compile_kernels
-from viewsphere.sampling.plan import Plan, plan
-from viewsphere.sampling.viewpoints import distance_problem
+from viewsphere.sampling.plan import Plan, check_images, plan
 from viewsphere.store import Category, Dataset, PlanRecord, Store
 
 
@@ -72,13 +69,14 @@ def generate(
     begun = time.monotonic()
     tell = listener or _unheard
     wanted = tuple(formats if formats is not None else recipe.formats)
-    for name in wanted:
-        _check_channels(name, recipe.channels)
+    with recipe.located():
+        for name in wanted:
+            _check_channels(name, recipe.channels)
     planned = plan(recipe)
-    check_backgrounds(planned)
+    check_images(planned)
     store = Store(Path(out))
     store.open_for(plan_record(planned))
-    with store.occupied():
+    with recipe.located(), store.occupied():
         skipped = _prepare_models(planned, store, workers, keep_going, tell)
         rendered = _render_shots(planned, store, workers, keep_going, skipped, tell)
         _note_skipped(store, skipped)
@@ -141,26 +139,18 @@ def _prepare_models(planned: Plan, store: Store, workers: int, keep_going: bool,
 
 def _distance_problems(planned: Plan, store: Store) -> Iterator[tuple[str, ViewsphereError]]:
     """Models that some pose's camera would stand inside of; each is named once."""
-    poses = planned.pose_list
-    distances = np.fromiter((poses.view(i).distance for i in range(len(poses))), np.float64, len(poses))
-    target = poses[0].target
     for spec in planned.model_specs:
         info = store.model_info(spec.key)
-        if info is None:
-            continue
-        around = info.box3d_object.mean(axis=0) if target is None else np.array(target)
-        reach = np.linalg.norm(info.box3d_object - around, axis=1).max()
-        near = (distance_problem(poses[int(i)], info.box3d_object) for i in np.flatnonzero(distances <= reach))
-        first = next((problem for problem in near if problem), None)
-        if first:
-            yield spec.key, RecipeError(f"viewpoints.distance: {first} (model {spec.key})")
+        problem = info and planned.distance_problem(spec, info.box3d_object)
+        if problem:
+            yield spec.key, problem
 
 
 def _joined(errors: Sequence[ViewsphereError]) -> ViewsphereError:
     """All of them, a line each; of their common type if they have one."""
     kinds = {type(e) for e in errors}
     kind = kinds.pop() if len(kinds) == 1 else UserError
-    return kind("\n".join(str(e) for e in errors))
+    return kind("\n".join(dict.fromkeys(str(e) for e in errors)))
 
 
 def _render_shots(planned: Plan, store: Store, workers: int, keep_going: bool, skipped: dict[str, str], tell: Listener) -> int:

@@ -49,7 +49,7 @@ def run_jobs(jobs: Iterable[Job], root: Path, workers: int) -> Iterator[Outcome]
     if workers == 0:
         yield from _run_here(jobs, root)
         return
-    queue = _Queue(jobs)
+    queue = Queue(jobs)
     crew: dict[Connection, _Hand] = {}
     try:
         for _ in range(min(workers, len(queue))):
@@ -76,7 +76,7 @@ def _run_here(jobs: Iterable[Job], root: Path) -> Iterator[Outcome]:
             yield Outcome(job.key, error=error)
 
 
-def _hear(crew: dict[Connection, _Hand], pipe: Connection, queue: _Queue, root: Path) -> Iterator[Outcome]:
+def _hear(crew: dict[Connection, _Hand], pipe: Connection, queue: Queue, root: Path) -> Iterator[Outcome]:
     """Take one answer, or the news of a death, and hand out the next job."""
     hand = crew[pipe]
     job = hand.job
@@ -103,7 +103,7 @@ def _hear(crew: dict[Connection, _Hand], pipe: Connection, queue: _Queue, root: 
     yield answer
 
 
-class _Queue:
+class Queue:
     """Jobs by affinity: a worker is given what it has warm, then what nobody has, then of what most is left."""
 
     def __init__(self, jobs: Iterable[Job]) -> None:
@@ -118,6 +118,7 @@ class _Queue:
         return self._count
 
     def next(self, warm: str) -> Job:
+        """The next job for a worker that has this affinity warm."""
         affinity = warm if warm in self._left else self._coldest()
         line = self._left[affinity]
         job = line.popleft()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import hashlib
 import math
 import os
 import re
@@ -24,6 +25,9 @@ from viewsphere.store import Category
 
 MODEL_SUFFIXES = frozenset({".obj", ".glb", ".gltf", ".ply", ".stl", ".off", ".dae", ".3mf"})
 """Endings that folders and patterns are searched for."""
+
+LONGEST_KEY = 150
+"""Bytes; names of files and of folders that are being written add up to some hundred more."""
 
 COLUMNS = ("name", "width", "height", "length")
 Sizes = Mapping[str, tuple[float, float, float]]
@@ -108,12 +112,20 @@ def _found(recipe: Recipe, index: int) -> Iterator[_Found]:
     if not entry.families:
         prefix = f"{entry.name}_" if entry.name else ""
         for file in _files(recipe, index):
-            yield _Found(index, prefix + _as_key(file.stem), str(file))
+            yield _Found(index, _short(prefix + _as_key(file.stem)), str(file))
 
 
 def _as_key(text: str) -> str:
     """The text as a part of a folder's name: letters, digits, `_`, `-` and inner dots."""
     return re.sub(r"[^\w.-]", "_", text).strip(".") or "model"
+
+
+def _short(key: str) -> str:
+    """The key, or its beginning and a digest of all of it where file systems would find it too long (255 bytes)."""
+    data = key.encode()
+    if len(data) <= LONGEST_KEY:
+        return key
+    return f"{data[: LONGEST_KEY - 13].decode(errors='ignore')}-{hashlib.sha256(data).hexdigest()[:12]}"
 
 
 def _files(recipe: Recipe, index: int) -> tuple[Path, ...]:
@@ -179,7 +191,7 @@ def _longer_key(item: _Found, group: list[_Found]) -> str:
 def _variant(item: _Found, folders: int, *, ending: bool) -> str:
     path = Path(item.source)
     names = path.parent.parts[len(path.parent.parts) - folders :] if folders else ()
-    return "-".join([item.key, *map(_as_key, names), *([path.suffix[1:]] if ending else [])])
+    return _short("-".join([item.key, *map(_as_key, names), *([path.suffix[1:]] if ending else [])]))
 
 
 def _real_size(recipe: Recipe, found: _Found, table: Callable[[Path], Sizes]) -> Size | Literal["file"] | None:

@@ -13,14 +13,18 @@ from functools import cached_property
 from itertools import accumulate
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
 from viewsphere import plugins
 from viewsphere.errors import RecipeError
 from viewsphere.model.mistakes import nearest, one_of
 from viewsphere.model.recipe import Recipe
+from viewsphere.model.recipe_values import Range
 from viewsphere.model.shot import Background, Frame, ModelSpec, Placement, Scene, Shot
 from viewsphere.sampling.models import categories, count_models, model_specs
 from viewsphere.sampling.seeds import generator, share
-from viewsphere.sampling.viewpoints import Poses, poses
+from viewsphere.sampling.viewpoints import Poses, distance_problem, poses
 from viewsphere.store import Category
 
 SHOT_FRAMES = 16
@@ -84,11 +88,20 @@ class Plan:
     def warnings(self) -> tuple[str, ...]:
         """What may be meant otherwise."""
         by = self.recipe.splits.by
-        return tuple(
+        found = [
             f"split {name!r} is empty: too few {by}s for its share; list models for it, or split by something else"
             for name, count in self.split_counts.items()
             if count == 0
-        )
+        ]
+        elevation = self.recipe.viewpoints.elevation
+        if isinstance(elevation, Range):
+            elevation = elevation.start
+        lowest = min(elevation) if isinstance(elevation, tuple) else elevation
+        if lowest < 0 and self.recipe.scene.floor is not None:
+            found.append(
+                f"elevations go down to {lowest:g}: from below, the ground hides the models; set scene.ground: off to see them"
+            )
+        return tuple(found)
 
     def split(self, spec: ModelSpec, pose: int) -> str:
         """The split of a frame; it follows from the seed and the names of what is kept together, and nothing else."""
@@ -193,6 +206,20 @@ class Plan:
             background = self._drawn()
         return Scene(sun=entry.light, sky=entry.sky, ground=entry.floor, background=background)
 
+    def distance_problem(self, spec: ModelSpec, box: NDArray[np.float64]) -> RecipeError | None:
+        """The first pose whose camera would stand inside the model's box (8, 3), in words; None if there is none."""
+        target = self.pose_list[0].target
+        reach = np.linalg.norm(box - (box.mean(axis=0) if target is None else np.array(target)), axis=1).max()
+        for i in np.flatnonzero(self._distances <= reach):
+            problem = distance_problem(self.pose_list[int(i)], box)
+            if problem:
+                return RecipeError(f"viewpoints.distance: {problem} (model {spec.key})")
+        return None
+
+    @cached_property
+    def _distances(self) -> NDArray[np.float64]:
+        return np.fromiter((self.pose_list.view(i).distance for i in range(self.poses)), np.float64, self.poses)
+
     @cached_property
     def digest(self) -> str:
         """SHA-256 of all that a store of this plan holds: the recipe, the models, the backgrounds and the chunks.
@@ -211,19 +238,36 @@ def plan(recipe: Recipe, shot_frames: int | None = None) -> Plan:
     `shot_frames`: most frames of a shot, where the recipe does not say.
     Raises RecipeError for files that are not there, unknown engines and formats, more frames than `max_frames`.
     """
-    _check_names(recipe)
-    views = poses(recipe.viewpoints, recipe.seed)
-    _check_frames(recipe, views)
-    specs = model_specs(recipe)
-    _check_listed(recipe, specs)
-    return Plan(
-        recipe,
-        specs,
-        views,
-        categories(recipe),
-        _images(recipe),
-        recipe.shot_frames or shot_frames or SHOT_FRAMES,
-    )
+    with recipe.located():
+        _check_names(recipe)
+        views = poses(recipe.viewpoints, recipe.seed)
+        _check_frames(recipe, views)
+        specs = model_specs(recipe)
+        _check_listed(recipe, specs)
+        return Plan(
+            recipe,
+            specs,
+            views,
+            categories(recipe),
+            _images(recipe),
+            recipe.shot_frames or shot_frames or SHOT_FRAMES,
+        )
+
+
+def check_images(planned: Plan) -> None:
+    """See that the background's images are images; raises RecipeError for the first that is not."""
+    from PIL import Image, UnidentifiedImageError
+
+    field = "image" if planned.recipe.scene.background.image is not None else "images"
+    for path in planned.images:
+        try:
+            Image.open(path).close()
+        except (OSError, ValueError, UnidentifiedImageError, Image.DecompressionBombError) as error:
+            problem = "no image" if isinstance(error, UnidentifiedImageError) else error
+            with planned.recipe.located():
+                raise RecipeError(
+                    f"scene.background.{field}: expected a readable image; found {problem} in {path}: mend or remove it"
+                ) from None
 
 
 def _check_names(recipe: Recipe) -> None:
