@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import importlib
 import pkgutil
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from difflib import get_close_matches
 from importlib.metadata import entry_points
 from pathlib import Path
@@ -20,6 +20,8 @@ from numpy.typing import NDArray
 from viewsphere.errors import UserError
 
 if TYPE_CHECKING:
+    from pydantic import JsonValue
+
     from viewsphere.assets.mesh import Mesh
     from viewsphere.model.camera import Camera
     from viewsphere.model.shot import Frame, ModelSpec, Shot
@@ -41,9 +43,11 @@ class Stage(Protocol):
 
 
 class Engine(Protocol):
-    """A module that paints pictures: `stage` and the frames a shot holds by default."""
+    """A module that paints pictures: `check` its options, `stage` a shot."""
 
-    SHOT_FRAMES: int
+    def check(self, options: Mapping[str, JsonValue]) -> None:
+        """Raise UserError for an option that is not known, or out of range; asked before anything is rendered."""
+        ...
 
     def stage(self, shot: Shot, load: Callable[[ModelSpec], Mesh]) -> Stage:
         """Build what all frames of the shot share; `load` gives a model's normalised mesh."""

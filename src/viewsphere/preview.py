@@ -15,8 +15,8 @@ from viewsphere.model.camera import Intrinsics
 from viewsphere.model.recipe import Recipe
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.model.shot import Frame, Ground, ModelSpec, Placement, Pose, Scene, Shot
-from viewsphere.run.stages import Stages
-from viewsphere.sampling.plan import Plan, plan
+from viewsphere.run.stages import Stages, prepare
+from viewsphere.sampling.plan import Plan
 from viewsphere.store import Dataset
 
 Drawing = Literal["boxes", "boxes3d", "masks", "depth"]
@@ -32,9 +32,10 @@ SIDES = (("front", 0.0), ("left side", 90.0), ("back", 180.0), ("right side", 27
 
 def preview_samples(recipe: Recipe, count: int = 12, width: int = 320) -> Iterator[Sample]:
     """Render `count` frames spread over all models and poses, `width` pixels wide, in memory."""
-    planned = plan(recipe)
+    planned = prepare(recipe)
     stages = Stages()
     for model, poses in _spread(planned, count):
+        stages.check_distances(planned, planned.model_specs[model])
         shot = planned.shot(model * planned.shot_count // planned.models)
         channels = tuple(dict.fromkeys((*shot.channels, "rgb", "depth", "instances")))
         frames = tuple(planned.frame(model, pose) for pose in poses)

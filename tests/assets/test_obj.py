@@ -147,6 +147,22 @@ def test_materials(write):
     assert any("'gone'" in warning for warning in mesh.warnings)
 
 
+@pytest.mark.parametrize(
+    ("lines", "opacity", "mode"),
+    [
+        ("Tr 1", 1.0, "OPAQUE"),
+        ("Tr 0", 1.0, "OPAQUE"),
+        ("Tr 0.25", 0.75, "BLEND"),
+        ("Tr 1\nd 1", 1.0, "OPAQUE"),
+        ("Tr 1\nd 0", 0.0, "BLEND"),
+    ],
+)
+def test_tr_alone_hides_nothing(write, lines, opacity, mode):
+    write("a.mtl", f"newmtl a\n{lines}\n")
+    mesh, _ = load_model(write("a.obj", "mtllib a.mtl\nusemtl a\n" + SQUARE + "f 1 2 3\n"))
+    assert (mesh.materials[0].base_color[3], mesh.materials[0].alpha_mode) == (opacity, mode)
+
+
 def test_maps_and_their_options(write):
     clear = np.full((2, 2, 3), 200)
     write("skin.png", png(clear))

@@ -8,10 +8,8 @@ from hypothesis import strategies as st
 from viewsphere.geometry.camera import (
     focal_from_fov,
     focal_from_sensor,
-    fov_from_focal,
     inverse_camera_matrix,
     lens_limit,
-    orbit_angles,
     orbit_center,
     orbit_rotation,
     pixel_rays,
@@ -170,8 +168,6 @@ def test_focal_lengths():
     assert focal_from_fov(math.pi / 2, 640) == pytest.approx(320)
     assert focal_from_fov(math.pi, 640, fisheye=True) == pytest.approx(640 / math.pi)
     assert focal_from_sensor(50.0, 36.0, 720) == pytest.approx(1000)
-    for fisheye_lens in (False, True):
-        assert fov_from_focal(focal_from_fov(1.1, 99, fisheye_lens), 99, fisheye_lens) == pytest.approx(1.1)
 
 
 @PROFILE
@@ -187,12 +183,8 @@ def test_orbit(a, e, d, tilt):
     if math.cos(e) > 1e-3:
         # a camera that rolls clockwise sees the world turn counter-clockwise: what was up moves to the left
         assert math.atan2(-rolled[0], -rolled[1]) == pytest.approx(tilt, abs=1e-9)
-    azimuth, elevation = orbit_angles(center)
-    assert elevation == pytest.approx(e, abs=1e-9)
-    assert abs((azimuth - a + math.pi) % (2 * math.pi) - math.pi) < 1e-9
 
 
 def test_orbit_above():
     np.testing.assert_allclose(orbit_rotation(0.0, math.pi / 2), [[1, 0, 0], [0, -1, 0], [0, 0, -1]], atol=1e-15)
-    assert orbit_angles([0, 0, 3]) == (0.0, math.pi / 2)
     np.testing.assert_allclose(orbit_center(math.pi / 2, 0, 2.0), [2, 0, 0], atol=1e-15)  # azimuth 90: on +X

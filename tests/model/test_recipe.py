@@ -61,6 +61,7 @@ def test_numpy_values_and_paths_are_plain_data():
 
 LENSES = [
     ({"fov_deg": 90}, 320, 320),
+    ({"fov_deg": 90, "distortion": {"model": "fisheye", "coefficients": [0, 0, 0, 0]}}, 1280 / math.pi, 1280 / math.pi),
     ({"fov_deg": 90, "fov_axis": "vertical"}, 240, 240),
     ({"focal_px": 500}, 500, 500),
     ({"focal_px": [500, 510]}, 500, 510),

@@ -235,3 +235,9 @@ def test_export_of_a_half_finished_store(small_dataset):
     ]
     assert len(ids) == 10
     assert set(ids) == {s.index + 1 for s in vs.open(small_dataset.root)}
+
+
+def test_an_unknown_engine_option_is_refused_before_anything_is_made(tmp_path):
+    with pytest.raises(UserError, match="did you mean 'antialias'"):
+        generate(small_recipe(engine={"name": "raster", "antialiased": 4}), tmp_path / "out")
+    assert not (tmp_path / "out").exists()

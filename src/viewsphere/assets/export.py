@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from viewsphere.assets.glb import glb_bytes
 from viewsphere.assets.mesh import Material, Mesh, Texture
-from viewsphere.assets.png import png_bytes
 from viewsphere.assets.runs import runs
 from viewsphere.assets.srgb import encoded
+from viewsphere.geometry.image_files import encode_png
 
 
 def export_glb(mesh: Mesh, path: Path) -> Path:
@@ -122,8 +122,8 @@ def _maps(mesh: Mesh, material: Material, folder: Path, name: str, written: set[
     color = rgb if material.alpha_mode == "OPAQUE" else rgba
     wanted = (
         ("map_Kd", material.base_color_texture, *color),
-        ("map_Pr", material.metallic_roughness_texture, [1], "roughness"),
-        ("map_Pm", material.metallic_roughness_texture, [2], "metallic"),
+        ("map_Pr", material.metallic_roughness_texture, 1, "roughness"),
+        ("map_Pm", material.metallic_roughness_texture, 2, "metallic"),
         ("map_Ke", material.emissive_texture, *rgb),
         ("norm", material.normal_texture, *rgb),
     )
@@ -134,7 +134,7 @@ def _maps(mesh: Mesh, material: Material, folder: Path, name: str, written: set[
         file = f"{name}_{texture.image}_{kind}.png"
         image = mesh.images[texture.image]
         if file not in written:
-            (folder / file).write_bytes(png_bytes(image.pixels[..., channels]))
+            (folder / file).write_bytes(encode_png(image.pixels[..., channels]))
             written.add(file)
         clamp = "-clamp on " if texture.wrap_s == "clamp" else ""
         strength = f"-bm {_numbers((material.normal_scale,))} " if keyword == "norm" else ""

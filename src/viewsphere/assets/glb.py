@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.assets.mesh import Material, Mesh, Texture
-from viewsphere.assets.png import png_bytes
 from viewsphere.assets.runs import Run, runs
+from viewsphere.geometry.image_files import encode_png
 
 WRAP_CODES = {"clamp": 33071, "mirror": 33648, "repeat": 10497}
 NEAREST, LINEAR, LINEAR_MIPMAP_LINEAR = 9728, 9729, 9987
@@ -197,7 +197,7 @@ class _Writer:
                 {
                     "name": image.name,
                     "mimeType": "image/png",
-                    "bufferView": self.view(png_bytes(image.pixels)),
+                    "bufferView": self.view(encode_png(image.pixels)),
                 }
             )
         count = len(self.meshes)

@@ -75,7 +75,7 @@ class _Builder:
         color = self.color("kd", (0.8, 0.8, 0.8) if color_map is None else (1.0, 1.0, 1.0))
         if color_map is not None and max(color) == 0:
             color = (1.0, 1.0, 1.0)
-        opacity = min(max(self.number("d", 1.0 - self.number("tr", 0.0)), 0.0), 1.0)
+        opacity = self.opacity()
         color_texture, mode = self.base(color_map)
         rough_map, metal_map = self.map("map_pr"), self.map("map_pm")
         emissive_map, normal_map = self.map("map_ke"), self.map("norm")
@@ -100,6 +100,11 @@ class _Builder:
             clearcoat_roughness=min(max(self.number("pcr", 0.0), 0.0), 1.0),
             specular=self.specular(),
         )
+
+    def opacity(self) -> float:
+        """`d`, else 1 - `Tr`. A lone `Tr 1` is opaque: some exporters write opacity there, none an invisible material."""
+        transparency = self.number("tr", 0.0)
+        return min(max(self.number("d", 1.0 if transparency >= 1.0 else 1.0 - transparency), 0.0), 1.0)
 
     def number(self, key: str, default: float) -> float:
         words = self.block.get(key, "").replace("-halo", "").split()

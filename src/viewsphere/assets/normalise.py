@@ -112,4 +112,5 @@ def _check_size(size: float, facts: FileFacts) -> None:
 
 def _area_centroid(vertices: Float, mesh: Mesh) -> Float:
     areas = np.linalg.norm(face_normals(vertices, mesh.triangles), axis=1)
-    return areas @ vertices[mesh.triangles].mean(axis=1) / areas.sum()
+    # Not @: BLAS rounds by processor.
+    return (areas[:, None] * vertices[mesh.triangles].mean(axis=1)).sum(axis=0) / areas.sum()

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from viewsphere.assets.piece import Float, Piece
+from viewsphere.geometry.rotation import transform
 
 
 def moved(piece: Piece, matrix: Float) -> Piece:
@@ -15,8 +16,8 @@ def moved(piece: Piece, matrix: Float) -> Piece:
     mirrored = bool(np.linalg.det(linear) < 0)
     # The cofactor matrix is det times the inverse transpose and exists for flattening matrices too.
     cofactor = np.cross(linear[[1, 2, 0]], linear[[2, 0, 1]]) * (-1.0 if mirrored else 1.0)
-    positions = piece.positions @ linear.T + matrix[:3, 3]
-    normals = None if piece.normals is None else unit(piece.normals @ cofactor.T)
+    positions = transform(matrix, piece.positions)
+    normals = None if piece.normals is None else unit(transform(cofactor, piece.normals))
     triangles = piece.triangles[:, ::-1] if mirrored else piece.triangles
     return replace(piece, positions=positions, normals=normals, triangles=triangles)
 

@@ -41,28 +41,12 @@ def orbit_rotation(azimuth: float, elevation: float, tilt: float = 0.0) -> Float
     return np.array([c * level[0] + s * level[1], c * level[1] - s * level[0], level[2]])  # not @: BLAS rounds by processor
 
 
-def orbit_angles(direction: ArrayLike) -> tuple[float, float]:
-    """Azimuth and elevation (radians) of a camera that stands in this direction from its target.
-
-    The inverse of `orbit_center`; azimuth in [0, 2 pi), and 0 at the poles.
-    """
-    x, y, z = np.asarray(direction, np.float64)
-    elevation = float(np.arctan2(z, np.hypot(x, y)))
-    azimuth = float(np.arctan2(x, -y)) % (2 * np.pi) if np.hypot(x, y) > 1e-12 * abs(z) else 0.0
-    return azimuth, elevation
-
-
 def focal_from_fov(fov: float, extent: float, fisheye: bool = False) -> float:
     """Focal length in pixels that makes `extent` pixels span the full angle `fov` (radians).
 
     A pinhole's is extent / (2 tan(fov / 2)); a fisheye's is extent / fov (equidistant).
     """
     return extent / fov if fisheye else extent / (2 * math.tan(fov / 2))
-
-
-def fov_from_focal(focal: float, extent: float, fisheye: bool = False) -> float:
-    """The full angle in radians that `extent` pixels span; the inverse of `focal_from_fov`."""
-    return extent / focal if fisheye else 2 * math.atan(extent / (2 * focal))
 
 
 def focal_from_sensor(focal: float, sensor: float, extent: float) -> float:

@@ -97,8 +97,8 @@ def _png_pixels(header: bytes, body: bytes) -> NDArray[Any]:
         raise UserError(_FOREIGN_PNG)
     lines = np.frombuffer(_inflated(body, height * (1 + stride), "PNG"), np.uint8).reshape(height, -1)
     sub = depth == 8
-    if not components or depth not in (1, 8, 16) or np.any(lines[:, 0] != (_SUB if sub else 0)):
-        raise UserError("PNG: expected viewsphere's own, found another program's: read it with an image library")
+    if np.any(lines[:, 0] != (_SUB if sub else 0)):
+        raise UserError(_FOREIGN_PNG)
     if depth == 1:
         return np.unpackbits(lines[:, 1:], axis=1, count=width).astype(np.bool_)
     if depth == 16:

@@ -69,6 +69,6 @@ def rigid(rotation: ArrayLike, translation: ArrayLike) -> Float:
 
 
 def compose(a: ArrayLike, b: ArrayLike) -> Float:
-    """The rigid motion `b` followed by `a`, (4, 4) each."""
+    """The affine motion `b` followed by `a`, (4, 4) each; no BLAS, as in `transform`."""
     a, b = np.asarray(a, np.float64), np.asarray(b, np.float64)
     return rigid(transform(a[:3, :3], b[:3, :3].T).T, transform(a, b[:3, 3]))

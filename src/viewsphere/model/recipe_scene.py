@@ -17,6 +17,7 @@ from pydantic import (
     model_validator,
 )
 
+from viewsphere.geometry.camera import focal_from_fov, focal_from_sensor
 from viewsphere.model.camera import Distortion, Intrinsics
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.mistakes import shown
@@ -104,12 +105,13 @@ class CameraEntry(Frozen):
             fx, fy = self.focal_px
         elif self.focal_mm is not None and self.sensor_mm is not None:
             sensor = self.sensor_mm if isinstance(self.sensor_mm, tuple) else (self.sensor_mm, None)
-            fx = self.focal_mm / sensor[0] * width
-            fy = fx if sensor[1] is None else self.focal_mm / sensor[1] * height
+            fx = focal_from_sensor(self.focal_mm, sensor[0], width)
+            fy = fx if sensor[1] is None else focal_from_sensor(self.focal_mm, sensor[1], height)
         else:
             assert self.fov_deg is not None
             across = width if self.fov_axis == "horizontal" else height
-            fx = fy = across / 2 / math.tan(math.radians(self.fov_deg) / 2)
+            is_fisheye = self.distortion is not None and self.distortion.model == "fisheye"
+            fx = fy = focal_from_fov(math.radians(self.fov_deg), across, is_fisheye)
         return Intrinsics(width=width, height=height, fx=fx, fy=fy, cx=cx, cy=cy, skew=skew, distortion=self.distortion)
 
 

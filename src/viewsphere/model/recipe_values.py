@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
+from decimal import Decimal
 from typing import Annotated, Any, cast
 
 from pydantic import (
@@ -89,8 +90,8 @@ class Range(Frozen):
         return math.floor((self.stop - self.start) / self.step + 1e-9) + 1
 
     def value(self, index: int) -> float:
-        """start + index * step, so that no error adds up; rounded to 12 digits (0.3, not 0.30000000000000004)."""
-        return float(f"{self.start + index * self.step:.12g}")
+        """start + index * step in decimals, as they were written: 0.3, not 0.30000000000000004; -0.3 + 3 * 0.1 is 0."""
+        return float(Decimal(repr(self.start)) + index * Decimal(repr(self.step)))
 
 
 Values = Annotated[

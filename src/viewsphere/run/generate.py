@@ -13,9 +13,10 @@ from viewsphere import plugins
 from viewsphere.errors import ModelError, RecipeError, UserError, ViewsphereError
 from viewsphere.model.recipe import Recipe
 from viewsphere.run.pool import Job, Outcome, run_jobs
+from viewsphere.run.stages import prepare
 from viewsphere.run.tasks import Task
 from viewsphere.run.warm import compile_kernels
-from viewsphere.sampling.plan import Plan, check_images, plan
+from viewsphere.sampling.plan import Plan
 from viewsphere.store import Category, Dataset, PlanRecord, Store
 
 
@@ -72,8 +73,7 @@ def generate(
     with recipe.located():
         for name in wanted:
             _check_channels(name, recipe.channels)
-    planned = plan(recipe)
-    check_images(planned)
+    planned = prepare(recipe)
     store = Store(Path(out))
     store.open_for(plan_record(planned))
     with recipe.located(), store.occupied():

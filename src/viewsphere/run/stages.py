@@ -13,8 +13,10 @@ from viewsphere.assets.cache import load_normalised, real_size
 from viewsphere.assets.mesh import Mesh
 from viewsphere.geometry.box import box_vertices
 from viewsphere.geometry.rotation import transform
+from viewsphere.model.recipe import Recipe
 from viewsphere.model.sample import Float, Sample
 from viewsphere.model.shot import Frame, ModelSpec, Shot, Size
+from viewsphere.sampling.plan import Plan, check_images, plan
 from viewsphere.sampling.viewpoints import camera_for
 from viewsphere.truth.channels import observe
 from viewsphere.truth.visibility import rasterize
@@ -26,6 +28,19 @@ WARM_MODELS = 8
 def build_zoo_model(spec: ModelSpec) -> Mesh:
     """The procedural model a `zoo:family` source names, drawn from its seed."""
     return build(spec.source.removeprefix("zoo:"), np.random.default_rng(spec.seed))
+
+
+def prepare(recipe: Recipe) -> Plan:
+    """The recipe's plan, once everything is checked that can be before a model is read.
+
+    Raises UserError for the user's mistakes: files, names, counts, engine options, background images.
+    """
+    planned = plan(recipe)
+    engine: plugins.Engine = plugins.load("engines", recipe.engine.name)
+    with recipe.located():
+        engine.check(recipe.engine.options)
+    check_images(planned)
+    return planned
 
 
 def model_files(key: str) -> tuple[str, str]:
@@ -57,6 +72,13 @@ class Stages:
         if name not in self._sizes:
             self._sizes[name] = real_size(spec, build_zoo_model)
         return self._sizes[name]
+
+    def check_distances(self, planned: Plan, spec: ModelSpec) -> None:
+        """Raise RecipeError if a pose's camera would stand inside this model."""
+        problem = planned.distance_problem(spec, box_vertices(*self.model(spec).bounds))
+        with planned.recipe.located():
+            if problem:
+                raise problem
 
     def stage(self, shot: Shot) -> plugins.Stage:
         """The engine's stage for this shot, built anew only when the scene is another one."""

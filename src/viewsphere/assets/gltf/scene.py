@@ -12,6 +12,7 @@ from viewsphere.assets.gltf.field import Field
 from viewsphere.assets.piece import Float, Int, Piece, compact
 from viewsphere.assets.smoothing import flat
 from viewsphere.assets.transform import moved, unit
+from viewsphere.geometry.rotation import compose
 
 TRIANGLES, STRIP, FAN = 4, 5, 6
 
@@ -75,7 +76,7 @@ def _world_matrices(document: Document) -> dict[int, Float]:
         if index in worlds:
             raise document.folder.error(f"nodes[{index}] is reached twice: expected a tree, found a cycle or a shared child")
         node = root.at("nodes", index)
-        worlds[index] = parent @ _local_matrix(node)
+        worlds[index] = compose(parent, _local_matrix(node))
         stack.extend((child, worlds[index]) for child in reversed(_indices(node, "children")))
     return worlds
 
@@ -134,7 +135,7 @@ def _instances(document: Document, node: Field, world: Float) -> list[Float]:
         raise attributes.fail("attributes of one length")
     count = counts.pop()
     t, r, s = (read.get(key, np.full((count, width), empty)) for key, (width, empty) in widths.items())
-    return list(world @ _compose(t, r, s))
+    return [compose(world, local) for local in _compose(t, r, s)]
 
 
 def _primitives(document: Document, mesh: Field, weights: tuple[float, ...], joints: Float | None) -> list[Piece]:
@@ -164,7 +165,8 @@ def _joints(document: Document, node: Field, worlds: dict[int, Float]) -> Float 
     inverse = document.accessor(skin.integer("inverseBindMatrices"), (16,)).astype(np.float64)
     if len(inverse) < len(joints):
         raise skin.fail(f"{len(joints)} inverse bind matrices, not {len(inverse)}")
-    return matrices @ inverse[: len(joints)].reshape(-1, 4, 4).transpose(0, 2, 1)
+    local = inverse[: len(joints)].reshape(-1, 4, 4).transpose(0, 2, 1)
+    return np.array([compose(joint, bind) for joint, bind in zip(matrices, local, strict=True)])
 
 
 def _skinned(document: Document, entry: Field, piece: Piece, joints: Float) -> Piece:

@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from pydantic import JsonValue
+
     from viewsphere.assets.mesh import Mesh
     from viewsphere.engines.raster.staging import RasterStage
     from viewsphere.model.shot import ModelSpec, Shot
 
-SHOT_FRAMES = 16
-"""Frames a shot holds by default: enough to pay for building its stage."""
+
+def check(options: Mapping[str, JsonValue]) -> None:
+    """Raise UserError for an option that is not known (with the nearest name) or out of range."""
+    from viewsphere.engines.raster.options import parse_options
+
+    parse_options(options)
 
 
 def stage(shot: Shot, load: Callable[[ModelSpec], Mesh]) -> RasterStage:

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from viewsphere.assets.srgb import linear
 from viewsphere.engines.raster import kernels_shadow as kernels
 from viewsphere.engines.raster.records import Float32, Light, Surfaces, Textures
-from viewsphere.engines.raster.tone import linear_from_srgb
 from viewsphere.geometry.camera import orbit_center
 from viewsphere.model.shot import Scene
 
@@ -46,7 +46,7 @@ def bake_light(scene: Scene, extent: Extent, surfaces: Surfaces, textures: Textu
         shadow, matrix = _shadow_map(direction, extent, surfaces, textures, resolution)
     low, high = kernels.depth_bounds(shadow)
     from_sky, from_sun = sky.sum(axis=0), irradiance * direction[2] / math.pi
-    albedo = linear_from_srgb(scene.ground.color) if scene.ground else np.full(3, _SURROUNDINGS)
+    albedo = linear(scene.ground.color) if scene.ground else np.full(3, _SURROUNDINGS)
     ground, frame = np.ones((2, 2, 2), np.float32), np.zeros(6, np.float32)
     if extent.ground_z is not None:
         total = float((from_sky + from_sun).sum())

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.assets.mesh import Material, Mesh
+from viewsphere.assets.srgb import linear
 from viewsphere.engines.raster.records import Float32, Surfaces, Textures
 from viewsphere.engines.raster.textures import TexturePacker
-from viewsphere.engines.raster.tone import linear_from_srgb
 from viewsphere.model.shot import Ground
 from viewsphere.truth.geometry import Geometry
 
@@ -89,7 +89,7 @@ def _material_slots(m: Material, mesh: Mesh, packer: TexturePacker) -> list[int]
 
 
 def _ground_row(ground: Ground) -> list[float]:
-    color = linear_from_srgb(ground.color).tolist()
+    color = linear(ground.color).tolist()
     return [*color, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, _NO_SHADOW]
 
 

@@ -10,7 +10,9 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
+
+from viewsphere.assets.srgb import encoded, linear
 
 EXPOSURE = 0.7
 """Display value of unit radiance: level ground in the default sun and sky shows its own colour."""
@@ -19,25 +21,13 @@ KNEE = 0.6
 """Display values below are shown as they are."""
 
 
-def linear_from_srgb(value: ArrayLike) -> NDArray[np.float64]:
-    """sRGB 0..1 to linear 0..1."""
-    v = np.asarray(value, np.float64)
-    return np.where(v <= 0.04045, v / 12.92, ((v + 0.055) / 1.055) ** 2.4)
-
-
-def srgb_from_linear(value: ArrayLike) -> NDArray[np.float64]:
-    """Linear 0..1 to sRGB 0..1."""
-    v = np.asarray(value, np.float64)
-    return np.where(v <= 0.0031308, v * 12.92, 1.055 * np.maximum(v, 0.0031308) ** (1 / 2.4) - 0.055)
-
-
 @cache
 def srgb_bytes() -> NDArray[np.uint8]:
     """sRGB bytes of 65,536 linear values from 0 to 1: every byte survives the way there and back."""
-    return np.round(srgb_from_linear(np.arange(65536) / 65535) * 255).astype(np.uint8)
+    return np.round(encoded(np.arange(65536) / 65535) * 255).astype(np.uint8)
 
 
 @cache
 def linear_words() -> NDArray[np.uint16]:
     """Linear values, scaled to 65,535, of the 256 sRGB bytes."""
-    return np.round(linear_from_srgb(np.arange(256) / 255) * 65535).astype(np.uint16)
+    return np.round(linear(np.arange(256) / 255) * 65535).astype(np.uint16)
