@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from collections import Counter
+from dataclasses import asdict
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -92,7 +93,7 @@ def inspect(
     picture = output or Path(f"{Path(model.replace(':', '-')).stem}-sides.png")
     _write_picture(picture, four_sides(spec))
     if json_:
-        _print_json({**report.__dict__, "picture": str(picture)})
+        _print_json({**asdict(report), "picture": str(picture)})
         return
     for line in report_lines(report):
         typer.echo(line)
@@ -285,7 +286,7 @@ def _write_picture(file: Path, picture: Any) -> None:
 def _print_json(value: object) -> None:
     import json
 
-    typer.echo(json.dumps(value, indent=2, default=repr))
+    typer.echo(json.dumps(value, indent=2))
 
 
 def _print_plan(planned: Plan) -> None:
