@@ -7,6 +7,7 @@ import pytest
 import viewsphere.check
 from cube_dataset import LENS, make
 from viewsphere.check import check
+from viewsphere.check.frames import FRAME_PROOFS
 from viewsphere.errors import MissingExtraError
 from viewsphere.formats import coco, native
 from viewsphere.geometry.mask import encode_rle
@@ -364,6 +365,41 @@ def drop_poses(value):
 def test_a_wrong_native_file(dataset, spoil):
     edit_json(dataset.root / "native" / "dataset1.json", spoil)
     assert failures(dataset, rays=False) == {("native", None)}
+
+
+def test_wrong_polygons_are_the_file_s_fault(dataset):
+    edit_json(instances_file(dataset), lambda v: v["annotations"][2].update(segmentation=[[1, 2]]))
+    messages = [f.message for f in check(dataset, rays=False).findings]
+    assert len(messages) == 1
+    assert messages[0].startswith(f"{instances_file(dataset)}: expected COCO instances, found Exception: ")
+
+
+@pytest.mark.parametrize(
+    ("error", "message"),
+    [
+        (IndexError("7"), "expected data that can be checked, found IndexError: 7"),
+        (RuntimeError("no luck"), "the check itself failed: RuntimeError: no luck"),
+    ],
+)
+def test_a_proof_that_breaks_off_blames_the_data_only_for_what_data_causes(whole, monkeypatch, error, message):
+    def broken(*_):
+        raise error
+
+    monkeypatch.setitem(FRAME_PROOFS, "boxes", broken)
+    findings = check(whole, rays=False).findings
+    assert {(f.check, f.message) for f in findings} == {("boxes", message)}
+    assert len(findings) == len(whole)
+
+
+def test_exports_that_cannot_be_checked(whole, monkeypatch):
+    def broken(*_):
+        raise RuntimeError("no luck")
+
+    monkeypatch.setattr("viewsphere.check.exports._load", broken)
+    monkeypatch.setattr("viewsphere.check.exports._native", broken)
+    messages = [f.message for f in check(whole, rays=False).findings]
+    assert len(messages) == len(whole.splits) + 1
+    assert all(m.endswith(".json: the check itself failed: RuntimeError: no luck") for m in messages)
 
 
 def test_findings_say_where(dataset):

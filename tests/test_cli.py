@@ -138,10 +138,16 @@ def test_ctrl_c_keeps_what_is_finished(tmp_path):
     out = tmp_path / "out"
     run = subprocess.Popen(
         [sys.executable, "-m", "viewsphere", "render", str(recipe), "-o", str(out), "--workers", "2"],
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
-    )  # fmt: skip
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        # a job in the background inherits an ignored SIGINT
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    )
     deadline = time.monotonic() + 60
-    while not any((out / "store" / "shots").glob("*/*")) and time.monotonic() < deadline:
+    while not any((out / "store" / "shots").glob("*/*")):
+        assert time.monotonic() < deadline
         time.sleep(0.1)
     os.killpg(run.pid, signal.SIGINT)
     _, err = run.communicate(timeout=30)

@@ -1,9 +1,12 @@
 """Pictures for people show what they say."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from small import small_recipe
+from viewsphere.geometry.box import EDGES
 from viewsphere.model.shot import ModelSpec
 from viewsphere.preview import PALETTE, contact_sheet, depth_picture, draw_sample, four_sides, preview_samples
 
@@ -48,6 +51,21 @@ def test_3d_boxes_and_depth_are_drawn(samples):
     height, width = samples[0].rgb.shape[:2]
     assert drawn.shape == (height, 2 * width, 3)
     assert (drawn[:, :width] != samples[0].rgb).any()
+
+
+def test_every_edge_of_a_3d_box_is_drawn_but_those_to_vertices_that_are_not_seen(samples):
+    sample, black = samples[0], np.zeros((200, 200, 3), np.uint8)
+    pixels = np.array([(150, 30), (130, 190), (10, 170), (40, 50), (170, 5), (190, 140), (60, 120), (20, 10)], float)
+    hidden = pixels.copy()
+    hidden[7] = np.nan
+    drawn = {}
+    for name, vertices in (("all", pixels), ("hidden", hidden)):
+        o = replace(sample.objects[0], box3d_pixels=vertices)
+        picture = draw_sample(replace(sample, objects=(o,), channels={"rgb": black}), ["boxes3d"]).max(axis=2)
+        middles = [(pixels[a] + pixels[b]) / 2 for a, b in EDGES]
+        drawn[name] = [bool(picture[int(y) - 1 : int(y) + 2, int(x) - 1 : int(x) + 2].max() > 100) for x, y in middles]
+    assert all(drawn["all"])
+    assert drawn["hidden"] == [7 not in edge for edge in EDGES]
 
 
 def test_near_is_light_and_nothing_is_black():

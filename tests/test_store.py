@@ -2,6 +2,7 @@
 
 import json
 import os
+import pickle
 import re
 import socket
 from dataclasses import replace
@@ -159,6 +160,17 @@ def test_link_is_a_hard_link_where_it_can_be(small_dataset):
     assert small_dataset.link_kinds == {"hard link"}
 
 
+def test_link_models_puts_all_but_the_record_in_a_folder_a_model(small_dataset):
+    small_dataset.link_models(small_dataset.root / "x")
+    stored, linked = (
+        {f.relative_to(folder).as_posix(): f for f in folder.rglob("*") if f.is_file()}
+        for folder in (small_dataset.root / "store" / "models", small_dataset.root / "x")
+    )
+    assert linked.keys() == {name for name in stored if not name.endswith("/model.json")}
+    assert all(file.samefile(stored[name]) for name, file in linked.items())
+    assert {f"{i.key}/{i.key}.{s}" for i in small_dataset.models for s in ("obj", "glb")} <= linked.keys()
+
+
 def test_link_copies_where_links_fail(small_dataset, monkeypatch):
     def refuse(*_: object) -> None:
         raise OSError
@@ -168,3 +180,13 @@ def test_link_copies_where_links_fail(small_dataset, monkeypatch):
     small_dataset.link(file, small_dataset.root / "x" / "a.png")
     assert (small_dataset.root / "x" / "a.png").read_bytes() == small_dataset.path(file).read_bytes()
     assert small_dataset.link_kinds <= {"reflink", "copy"}
+
+
+def test_a_data_set_and_its_samples_travel_to_other_processes(small_run):
+    dataset = Dataset(small_run)
+    dataset[3]
+    copy, sample = pickle.loads(pickle.dumps((dataset, dataset[3])))
+    assert len(copy) == len(dataset)
+    assert np.array_equal(copy[3].depth, sample.depth)
+    assert np.array_equal(sample.depth, dataset[3].depth)
+    assert sample.objects[0].box2d == dataset[3].objects[0].box2d

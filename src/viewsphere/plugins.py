@@ -9,7 +9,6 @@ from __future__ import annotations
 import importlib
 import pkgutil
 from collections.abc import Callable, Mapping
-from difflib import get_close_matches
 from importlib.metadata import entry_points
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Protocol
@@ -18,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.errors import UserError
+from viewsphere.model.mistakes import one_of
 
 if TYPE_CHECKING:
     from pydantic import JsonValue
@@ -81,9 +81,7 @@ def load(kind: Kind, name: str) -> Any:
             return entry.load()
     known = names(kind)
     if name not in known:
-        near = get_close_matches(name, known, 1)
-        hint = f"; did you mean {near[0]!r}?" if near else ""
-        raise UserError(f"{kind[:-1]} {name!r}: expected one of {', '.join(known)}{hint}")
+        raise UserError(f"{kind[:-1]}: {one_of(name, known)}")
     return importlib.import_module(f"viewsphere.{kind}.{name}")
 
 
@@ -103,7 +101,5 @@ def family(name: str) -> Any:
     """The module of a zoo family; raises UserError for an unknown name, with the nearest known one."""
     known = families()
     if name not in known:
-        near = get_close_matches(name, known, 1)
-        hint = f"; did you mean {near[0]!r}?" if near else ""
-        raise UserError(f"zoo family {name!r}: expected one of {', '.join(known)}{hint}")
+        raise UserError(f"zoo family: {one_of(name, known)}")
     return importlib.import_module(f"viewsphere.zoo.{name}")

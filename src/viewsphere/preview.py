@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
-from viewsphere.geometry.box import FACES
+from viewsphere.geometry.box import EDGES, FACES
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.recipe import Recipe
 from viewsphere.model.sample import ObjectAnnotation, Sample
@@ -162,13 +162,13 @@ def _tint(rgb: Picture, objects: Sequence[ObjectAnnotation]) -> Picture:
 
 def _draw_box3d(pen: ImageDraw.ImageDraw, o: ObjectAnnotation, scale: float, color: tuple[int, ...]) -> None:
     corners = o.box3d_pixels * scale
-    for name, face in FACES.items():
-        ring = [tuple(corners[i]) for i in face]
-        if not np.isfinite(corners[list(face)]).all():
-            continue
-        if name == "front":
-            pen.polygon(ring, fill=(*color, 70))
-        pen.line([*ring, ring[0]], fill=(*color, 255), width=2)
+    points = {i: tuple(p) for i, p in enumerate(corners.tolist()) if np.isfinite(p).all()}
+    front = [points[i] for i in FACES["front"] if i in points]
+    if len(front) == 4:
+        pen.polygon(front, fill=(*color, 70))
+    for a, b in EDGES:
+        if a in points and b in points:
+            pen.line((points[a], points[b]), fill=(*color, 255), width=2)
 
 
 def _sheet(tiles: Sequence[tuple[Picture, str]], columns: int) -> Picture:

@@ -319,6 +319,10 @@ class Dataset(Sequence[Sample]):
         self.link_kinds: set[str] = set()
         self._records = lru_cache(maxsize=8)(self._read_records)
 
+    def __reduce__(self) -> tuple[type[Dataset], tuple[Path]]:
+        """A data set travels to other processes (data loaders) as its folder."""
+        return Dataset, (self.root,)
+
     @property
     def name(self) -> str:
         """The recipe's name."""
@@ -413,6 +417,13 @@ class Dataset(Sequence[Sample]):
         """Put a stored file at `destination`: a hard link, else a reflink, else a copy; `link_kinds` says which."""
         destination.parent.mkdir(parents=True, exist_ok=True)
         self.link_kinds.add(_link(self.root / relative, destination))
+
+    def link_models(self, folder: Path) -> None:
+        """Put every finished model's OBJ, GLB, materials and textures into `folder`/<key>, as `link` does."""
+        for info in self.models:
+            for file in sorted(self.path(info.obj).parent.iterdir()):
+                if file.name != "model.json":
+                    self.link(file.relative_to(self.root).as_posix(), folder / info.key / file.name)
 
 
 class _ChannelFiles(Mapping[str, NDArray[Any]]):

@@ -176,6 +176,13 @@ def test_alpha_modes():
     assert cutoffs == {0.25, 0.5, 0.75}
 
 
+def test_specks_in_an_atlas_leave_a_chair_opaque():
+    mesh, _ = load_model(MODELS / "chair" / "ChairA_dae" / "meshes" / "aws_ChairA_01_visual.DAE", confined=False)
+    (material,) = mesh.materials
+    assert mesh.images[material.base_color_texture.image].pixels[..., 3].min() < 250
+    assert material.alpha_mode == "OPAQUE"
+
+
 LOOP = """
 import json, resource, sys, time, warnings
 from pathlib import Path

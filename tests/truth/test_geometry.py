@@ -112,6 +112,15 @@ def test_texture_transform():
     assert np.mean(seen_head_on(card(material, image)) != expected) < 0.01
 
 
+def test_texture_matrix():
+    """The product of the specification's three matrices: translation, rotation, scale."""
+    texture = Texture(0, offset=(0.1, -0.2), rotation=0.7, scale=(2.0, 3.0))
+    c, s = math.cos(0.7), math.sin(0.7)
+    product = np.array([[1, 0, 0.1], [0, 1, -0.2], [0, 0, 1]]) @ [[c, s, 0], [-s, c, 0], [0, 0, 1]] @ np.diag([2, 3, 1])
+    assert texture.matrix.dtype == np.float64
+    assert np.allclose(texture.matrix, product[:2], rtol=0, atol=1e-15)
+
+
 def test_vertex_alpha_is_interpolated():
     colors = np.ones((4, 4), np.float32)
     colors[:, 3] = UV[:, 0]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterable
 from pathlib import Path
@@ -76,7 +77,7 @@ def _coordinates(mesh: Mesh, material: Material) -> NDArray[np.float32] | None:
     if uv is None:
         return None
     u, v = (uv.astype(np.float64) * texture.scale).T
-    sine, cosine = np.sin(texture.rotation), np.cos(texture.rotation)
+    sine, cosine = math.sin(texture.rotation), math.cos(texture.rotation)
     x = cosine * u + sine * v + texture.offset[0]
     y = cosine * v - sine * u + texture.offset[1]
     return np.column_stack([x, 1.0 - y]).astype(np.float32)

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 Wrap = Literal["repeat", "clamp", "mirror"]
+WRAPS: tuple[Wrap, ...] = get_args(Wrap)
+"""Wrap modes in the order of the numbers by which kernels know them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,6 +34,17 @@ class Texture:
     offset: tuple[float, float] = (0.0, 0.0)
     rotation: float = 0.0
     scale: tuple[float, float] = (1.0, 1.0)
+
+    @property
+    def matrix(self) -> NDArray[np.float64]:
+        """KHR_texture_transform, (2, 3) float64: scale, then rotate by r radians, then offset.
+
+        With c = cos r and s = sin r, u' = c scale_u u + s scale_v v + offset_u and v' = -s scale_u u + c scale_v v + offset_v
+        (https://github.com/KhronosGroup/glTF/tree/main/extensions/2.0/Khronos/KHR_texture_transform).
+        """
+        c, s = math.cos(self.rotation), math.sin(self.rotation)
+        (u, v), (x, y) = self.scale, self.offset
+        return np.array([[c * u, s * v, x], [-s * u, c * v, y]])
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,8 +19,6 @@ from viewsphere.assets.text import statements
 SCALAR_OPTIONS = ("-blendu", "-blendv", "-bm", "-boost", "-cc", "-clamp", "-imfchan", "-texres", "-type")
 OPTION_ARGUMENTS = {"-mm": 2, **dict.fromkeys(SCALAR_OPTIONS, 1)}
 VECTOR_OPTIONS = ("-o", "-s", "-t")
-BINARY_SHARE = 0.02
-"""A texture with at most this share of its texels neither clear nor solid is a cut-out (MASK)."""
 
 Pixels = NDArray[np.uint8]
 
@@ -48,8 +45,8 @@ def read_materials(folder: ModelFolder, texts: Sequence[str], wanted: set[str]) 
 
     `Kd` multiplies `map_Kd`, except a black one, which many exporters write beside a texture. `Ns` becomes a
     roughness of sqrt(2 / (Ns + 2)) unless `Pr` gives one. A `map_bump` is read if it is a normal map, not if
-    it holds heights. `d < 1` blends; a texture's alpha or `map_d` cuts out or blends by what it holds. All
-    are double-sided, as OBJ has no other.
+    it holds heights. `d < 1` blends, all others are opaque: whether a texture's alpha or `map_d` cuts out or
+    blends, `alpha.with_alpha_modes` says. All are double-sided, as OBJ has no other.
     """
     blocks: dict[str, dict[str, str]] = {}
     block: dict[str, str] = {}
@@ -76,7 +73,6 @@ class _Builder:
         if color_map is not None and max(color) == 0:
             color = (1.0, 1.0, 1.0)
         opacity = self.opacity()
-        color_texture, mode = self.base(color_map)
         rough_map, metal_map = self.map("map_pr"), self.map("map_pm")
         emissive_map, normal_map = self.map("map_ke"), self.map("norm")
         emissive = self.color("ke", (0.0, 0.0, 0.0))
@@ -87,7 +83,7 @@ class _Builder:
         return Material(
             name=self.name,
             base_color=(*color, opacity),
-            base_color_texture=color_texture,
+            base_color_texture=self.base(color_map),
             metallic=self.number("pm", 1.0 if metal_map is not None else 0.0),
             roughness=self.roughness(rough_map),
             metallic_roughness_texture=self.metallic_roughness(rough_map, metal_map),
@@ -95,7 +91,7 @@ class _Builder:
             normal_scale=normal_map.strength if normal_map is not None else bump.strength if bump is not None else 1.0,
             emissive=emissive,
             emissive_texture=emissive_texture,
-            alpha_mode="BLEND" if opacity < 1.0 else mode,
+            alpha_mode="BLEND" if opacity < 1.0 else "OPAQUE",
             clearcoat=min(max(self.number("pc", 0.0), 0.0), 1.0),
             clearcoat_roughness=min(max(self.number("pcr", 0.0), 0.0), 1.0),
             specular=self.specular(),
@@ -167,16 +163,16 @@ class _Builder:
         image = self.image(source)
         return None if source is None or image is None else source.texture(image)
 
-    def base(self, color_map: _Map | None) -> tuple[Texture | None, Literal["OPAQUE", "MASK", "BLEND"]]:
-        """Base colour texture with `map_d` as its alpha, and the alpha mode that its texels ask for."""
+    def base(self, color_map: _Map | None) -> Texture | None:
+        """Base colour texture with `map_d` as its alpha."""
         opacity_map = self.map("map_d") or self.map("map_opacity")
         color, opacity = self.image(color_map), self.image(opacity_map)
         if opacity is not None and opacity != color:
             color = self.folder.derived(f"#{color} with opacity {opacity}", lambda: self.with_opacity(color, opacity))
         source = color_map or opacity_map
         if color is None or source is None:
-            return None, "OPAQUE"
-        return source.texture(color), alpha_mode(self.folder.images[color].pixels[..., 3])
+            return None
+        return source.texture(color)
 
     def metallic_roughness(self, rough_map: _Map | None, metal_map: _Map | None) -> Texture | None:
         """Roughness in green and metallic in blue of one new image."""
@@ -244,11 +240,3 @@ def _resized(channel: Pixels, shape: tuple[int, ...]) -> Pixels:
     if channel.shape == shape:
         return channel
     return np.asarray(Pillow.fromarray(channel).resize((shape[1], shape[0]), Pillow.Resampling.BILINEAR))
-
-
-def alpha_mode(alpha: Pixels) -> Literal["OPAQUE", "MASK", "BLEND"]:
-    """What a texture's alpha is for; one that is clear all over is an exporter's slip."""
-    if alpha.min() >= 250 or alpha.max() == 0:
-        return "OPAQUE"
-    between = np.count_nonzero((alpha > 8) & (alpha < 247)) / alpha.size
-    return "MASK" if between <= BINARY_SHARE else "BLEND"

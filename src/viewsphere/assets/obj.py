@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from viewsphere.assets.alpha import with_alpha_modes
 from viewsphere.assets.folder import ModelFolder, UnreadableError
 from viewsphere.assets.mesh import Material, Mesh
 from viewsphere.assets.mtl import read_materials
@@ -40,7 +41,8 @@ def read_obj(folder: ModelFolder) -> tuple[Mesh, FileFacts]:
     parts = np.array(source.parts())[owner]
     material = np.array([material_of[name] for name in source.materials])[np.array(source.face_material)[owner]]
     facts = FileFacts(folder.model, "obj", "+y", "+z", 1.0)
-    return assemble(folder, _pieces(whole, parts, source.part_names(), material), materials, facts)
+    pieces = _pieces(whole, parts, source.part_names(), material)
+    return assemble(folder, pieces, with_alpha_modes(pieces, materials, folder.images), facts)
 
 
 @dataclass(eq=False)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from viewsphere.assets.piece import Float, Int
+from viewsphere.assets.transform import unit
 
 MAX_EARS = 2_048
 """Polygons with more corners are cut as a fan whatever their shape: cutting ears takes quadratic time."""
@@ -57,13 +58,13 @@ def _lean(points: Float, triangles: Int, owner: Int, first: Int) -> tuple[Float,
 
 def _flattened(points: Float, normal: Float) -> Float | None:
     """The polygon's points (n, 2) in its own plane, counter-clockwise; None without area."""
-    length = float(np.linalg.norm(normal))
-    if not np.isfinite(length) or length == 0 or not np.isfinite(points).all():
+    # Neither @ nor the norm of one vector: BLAS, which rounds by processor, does both.
+    (z,) = unit(normal[None])
+    if not z.any() or not np.isfinite(z).all() or not np.isfinite(points).all():
         return None
-    z = normal / length
-    x = np.cross(np.eye(3)[int(np.argmin(np.abs(z)))], z)
-    x /= np.linalg.norm(x)
-    return (points - points[0]) @ np.column_stack([x, np.cross(z, x)])
+    (x,) = unit(np.cross(np.eye(3)[int(np.argmin(np.abs(z)))], z)[None])
+    from_first = points - points[0]
+    return np.column_stack([(from_first * axis).sum(axis=1) for axis in (x, np.cross(z, x))])
 
 
 def _ears(points: Float) -> Int:

@@ -17,10 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.assets import limits
+from viewsphere.assets.alpha import with_alpha_modes
 from viewsphere.assets.folder import ModelFolder, image_pixels
 from viewsphere.assets.instances import count_instances, dae_references, threemf_references
 from viewsphere.assets.mesh import Image, Material, Mesh, Texture
-from viewsphere.assets.mtl import alpha_mode
 from viewsphere.assets.piece import FileFacts, Float, Piece, assemble
 from viewsphere.assets.smoothing import creased, split
 from viewsphere.assets.srgb import linear
@@ -54,7 +54,7 @@ def read_via_trimesh(folder: ModelFolder) -> tuple[Mesh, FileFacts]:
     builder = _Builder(folder, [])
     pieces = builder.scene(loaded) if "geometry" in loaded else builder.placed(loaded, "object", np.eye(4))
     facts = _facts(folder, kind, data, loaded)
-    return assemble(folder, pieces, builder.materials, facts)
+    return assemble(folder, pieces, with_alpha_modes(pieces, builder.materials, folder.images), facts)
 
 
 class _Resolver:
@@ -191,7 +191,6 @@ class _Builder:
         image = getattr(source, "baseColorTexture", None) or getattr(source, "image", None)
         texture = self._texture(image)
         color = _unit_color(getattr(source, "baseColorFactor", None), (1.0, 1.0, 1.0, 1.0))
-        mode = "OPAQUE" if texture is None else alpha_mode(self.folder.images[texture.image].pixels[..., 3])
         emissive = _unit_color(getattr(source, "emissiveFactor", None), (0.0, 0.0, 0.0, 1.0))
         rough, metal = getattr(source, "roughnessFactor", None), getattr(source, "metallicFactor", None)
         material = Material(
@@ -202,7 +201,7 @@ class _Builder:
             roughness=Material().roughness if rough is None else float(rough),
             normal_texture=self._texture(getattr(source, "normalTexture", None)),
             emissive=emissive[:3],
-            alpha_mode="BLEND" if color[3] < 1.0 else mode,
+            alpha_mode="BLEND" if color[3] < 1.0 else "OPAQUE",
         )
         if material not in self.materials:
             self.materials.append(material)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import asdict, dataclass
 from functools import partial
 from typing import Any
 
 from viewsphere.check.exports import FrameTruth, check_coco, check_native, frame_truth
+from viewsphere.check.failure import failure
 from viewsphere.check.frames import FRAME_PROOFS
 from viewsphere.check.rays import RayCaster
 from viewsphere.errors import MissingExtraError, ViewsphereError
@@ -89,11 +89,8 @@ def check(dataset: Dataset, *, sample: int = 50, rays: bool | None = None) -> Re
 def _counts(dataset: Dataset, notes: list[str]) -> Iterator[str]:
     """Frames and models that the plan asks for and the store lacks; what a run left out on purpose is noted."""
     plan, store = dataset.plan, dataset.store
-    skipped = set[str]()
-    if (store.folder / "skipped.json").is_file():
-        reasons: dict[str, str] = json.loads((store.folder / "skipped.json").read_text("utf-8"))
-        skipped = set(reasons)
-        notes += [f"{key} was left out: {reason}" for key, reason in reasons.items()]
+    skipped = store.skipped()
+    notes += [f"{key} was left out: {reason}" for key, reason in skipped.items()]
     wanted = [s for s in plan.shots if s[0] not in skipped and s[0].rpartition("-")[0] not in skipped]
     missing = [key for key, _, _ in wanted if not store.has_shot(key)]
     if sum(count for _, _, count in plan.shots) != plan.frames:
@@ -142,7 +139,7 @@ def _proofs(dataset: Dataset, sample: Sample, caster: RayCaster | None) -> Itera
         try:
             yield name, list(proof())
         except Exception as error:
-            yield name, [f"expected data that can be checked, found {type(error).__name__}: {error}"]
+            yield name, [failure("data that can be checked", error)]
 
 
 def _caster(dataset: Dataset, demanded: bool, notes: list[str]) -> RayCaster | None:

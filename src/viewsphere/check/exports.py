@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from viewsphere.check.failure import failure
 from viewsphere.errors import ViewsphereError
 from viewsphere.formats import coco, native
 from viewsphere.geometry.mask import encode_rle, mask_box
@@ -75,7 +76,7 @@ def check_coco(dataset: Dataset, truths: Sequence[FrameTruth], notes: list[str])
             try:
                 coco.write_annotations(dataset, folder)
             except Exception as error:
-                yield None, f"expected annotations that can be written, found {type(error).__name__}: {error}"
+                yield None, failure("annotations that can be written", error)
                 return
         seen = set[int]()
         for split in dataset.splits:
@@ -89,7 +90,7 @@ def check_coco(dataset: Dataset, truths: Sequence[FrameTruth], notes: list[str])
                     yield from _coco_files(truth, folder / split)
                 yield from _precision(dataset, truth, own)
             except Exception as error:
-                yield None, f"{file}: expected COCO instances, found {type(error).__name__}: {error}"
+                yield None, f"{file}: {failure('COCO instances', error)}"
 
 
 def _load(file: Path) -> Any:
@@ -195,7 +196,7 @@ def check_native(dataset: Dataset, truths: Sequence[FrameTruth]) -> Iterator[Rem
         value = json.loads((folder / "dataset1.json").read_text("utf-8"))
         yield from _native(dataset, folder, value, truths)
     except Exception as error:
-        yield None, f"{folder / 'dataset1.json'}: expected the native format, found {type(error).__name__}: {error}"
+        yield None, f"{folder / 'dataset1.json'}: {failure('the native format', error)}"
 
 
 def _native(dataset: Dataset, folder: Path, value: dict[str, Any], truths: Sequence[FrameTruth]) -> Iterator[Remark]:

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from viewsphere.errors import UserError
 from viewsphere.geometry.image_files import encode_png
 from viewsphere.geometry.mask import mask_polygons
-from viewsphere.model.paper_json import faces, json_bytes, transformation_matrix, vehicle
+from viewsphere.model.paper_json import faces, json_bytes, transformation_matrix, vehicles
 from viewsphere.model.sample import Box, ObjectAnnotation, Sample
 
 if TYPE_CHECKING:
@@ -88,11 +88,7 @@ def export(dataset: Dataset, folder: Path) -> None:
     if not set(CHANNELS) <= set(dataset.plan.channels):
         raise UserError(f"{dataset.root}: format coco: expected channel rgb, found none: add it to the recipe's channels")
     write_annotations(dataset, folder, pictures=True)
-    for info in dataset.models:
-        for file in sorted(dataset.path(info.obj).parent.iterdir()):
-            if file.name != "model.json":
-                relative = file.relative_to(dataset.root).as_posix()
-                dataset.link(relative, folder / "MODELS" / info.key / file.name)
+    dataset.link_models(folder / "MODELS")
 
 
 def image_file(dataset: Dataset, sample: Sample) -> str:
@@ -176,10 +172,7 @@ def _head(dataset: Dataset, ids: Mapping[int, int]) -> dict[str, Any]:
         "info": {"description": dataset.name, "version": "1.0", "contributor": f"viewsphere {dataset.plan.version}"},
         "licenses": [],
         "categories": [{"id": ids[c.id], "name": c.name, "supercategory": c.supercategory} for c in dataset.categories],
-        "models": {
-            i.key: vehicle(i.category, i.supercategory, f"./MODELS/{i.key}/{Path(i.obj).name}", i.box3d_object, i.real_size)
-            for i in dataset.models
-        },
+        "models": vehicles(dataset.models),
     }
 
 

@@ -17,7 +17,7 @@ from tempfile import TemporaryFile
 from typing import IO, TYPE_CHECKING, Any
 
 from viewsphere.geometry.image_files import encode_png
-from viewsphere.model.paper_json import faces, json_bytes, transformation_matrix, vehicle
+from viewsphere.model.paper_json import faces, json_bytes, transformation_matrix, vehicles
 from viewsphere.model.sample import ObjectAnnotation, Sample
 
 if TYPE_CHECKING:
@@ -31,14 +31,10 @@ def export(dataset: Dataset, folder: Path) -> None:
     with TemporaryFile(dir=folder) as entries:
         places = [place for sample in dataset for place in _write_frame(dataset, sample, folder, entries)]
         with (folder / "dataset1.json").open("wb") as file:
-            file.write(b'{"vehicles":' + json_bytes(_vehicles(dataset)) + b',\n"poses":{')
+            file.write(b'{"vehicles":' + json_bytes(vehicles(dataset.models)) + b',\n"poses":{')
             _write_poses(file, entries, sorted(places))
             file.write(b"\n}}\n")
-    for info in dataset.models:
-        for source in sorted(dataset.path(info.obj).parent.iterdir()):
-            if source.name != "model.json":
-                relative = source.relative_to(dataset.root).as_posix()
-                dataset.link(relative, folder / "MODELS" / info.key / source.name)
+    dataset.link_models(folder / "MODELS")
 
 
 Place = tuple[int, int, int, int]
@@ -104,13 +100,6 @@ def _group(dataset: Dataset, sample: Sample) -> str:
     plan = dataset.plan
     number, count = (n * dataset.max_objects // plan.poses for n in (sample.index, plan.frames))
     return f"{number // _FOLDER_SIZE:04d}/" if count > _FOLDER_SIZE else ""
-
-
-def _vehicles(dataset: Dataset) -> dict[str, Any]:
-    return {
-        i.key: vehicle(i.category, i.supercategory, f"./MODELS/{i.key}/{Path(i.obj).name}", i.box3d_object, i.real_size)
-        for i in dataset.models
-    }
 
 
 def _pose(dataset: Dataset, sample: Sample) -> dict[str, Any]:

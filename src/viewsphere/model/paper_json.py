@@ -6,14 +6,18 @@ from __future__ import annotations
 
 import json
 import math
-from typing import Any
+from collections.abc import Iterable
+from pathlib import PurePosixPath
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.geometry.box import FACES
 from viewsphere.model.camera import Camera
-from viewsphere.model.shot import Size
+
+if TYPE_CHECKING:
+    from viewsphere.store import ModelInfo
 
 
 def json_bytes(value: Any) -> bytes:
@@ -28,14 +32,18 @@ def faces(points: NDArray[np.float64]) -> dict[str, dict[str, list[float] | None
     return {name: {str(v): values[v] for v in face} for name, face in named}
 
 
-def vehicle(category: str, supercategory: str, file: str, box: NDArray[np.float64], real_size: Size | None) -> dict[str, Any]:
-    """A model: its file, its 3D box in its own axes and its true size, in metres."""
-    sizes = zip(("width", "height", "length"), real_size or (None, None, None), strict=True)
+def vehicles(models: Iterable[ModelInfo]) -> dict[str, dict[str, Any]]:
+    """Models by key: file, 3D box in the model's own axes and true size, in metres."""
+    return {info.key: _vehicle(info) for info in models}
+
+
+def _vehicle(info: ModelInfo) -> dict[str, Any]:
+    sizes = zip(("width", "height", "length"), info.real_size or (None, None, None), strict=True)
     return {
-        "supercategory": supercategory,
-        "category": category,
-        "model_file": file,
-        "bbox3D_model": faces(box),
+        "supercategory": info.supercategory,
+        "category": info.category,
+        "model_file": f"./MODELS/{info.key}/{PurePosixPath(info.obj).name}",
+        "bbox3D_model": faces(info.box3d_object),
         "real_size": dict(sizes),
     }
 

@@ -10,7 +10,7 @@ from typing import Literal
 from viewsphere.assets.export import export_glb, export_obj
 from viewsphere.assets.mesh import Mesh
 from viewsphere.errors import StoreError
-from viewsphere.geometry.box import box_vertices
+from viewsphere.geometry.box import box_size, box_vertices
 from viewsphere.model.shot import ModelSpec, Shot
 from viewsphere.run.stages import Stages, model_files
 from viewsphere.store import ModelInfo, Store
@@ -58,8 +58,7 @@ class Worker:
                     "put the old file back, or choose another output folder"
                 )
             return
-        low, high = mesh.bounds
-        width, length, height = (float(x) for x in high - low)
+        box = box_vertices(*mesh.bounds)
         obj, glb = model_files(spec.key)
         info = ModelInfo(
             key=spec.key,
@@ -68,8 +67,8 @@ class Worker:
             category_id=spec.category_id,
             obj=obj,
             glb=glb,
-            box3d_object=box_vertices(low, high),
-            size=(width, height, length),
+            box3d_object=box,
+            size=box_size(box),
             real_size=self.stages.real_size(spec),
             parts=mesh.parts,
             triangles=len(mesh.triangles),

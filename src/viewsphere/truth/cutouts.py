@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -10,9 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.assets.mesh import Material, Mesh, Texture
+from viewsphere.assets.mesh import WRAPS, Material, Mesh
 
-WRAPS = ("repeat", "clamp", "mirror")
 SURFACE, NEVER = -1, -2
 
 
@@ -98,7 +96,7 @@ def _material_cutouts(mesh: Mesh, material: Material, chosen: NDArray[np.intp], 
     corners[:, :, 2] = 1.0 if mesh.colors is None else mesh.colors[used][:, :, 3]
     texels, wraps = np.full((1, 1), 255, np.uint8), (0, 0)
     if texture is not None and uv is not None:
-        corners[:, :, :2] = _transformed(texture, uv[used].astype(np.float64))
+        corners[:, :, :2] = _transformed(texture.matrix, uv[used].astype(np.float64))
         texels = mesh.images[texture.image].pixels[:, :, 3]
         wraps = (WRAPS.index(texture.wrap_s), WRAPS.index(texture.wrap_t))
     return Cutouts(
@@ -110,8 +108,7 @@ def _material_cutouts(mesh: Mesh, material: Material, chosen: NDArray[np.intp], 
     )
 
 
-def _transformed(texture: Texture, uv: NDArray[np.float64]) -> NDArray[np.float64]:
-    """KHR_texture_transform: scale, then rotate, then offset."""
-    c, s = math.cos(texture.rotation), math.sin(texture.rotation)
-    u, v = uv[..., 0] * texture.scale[0], uv[..., 1] * texture.scale[1]
-    return np.stack([c * u + s * v + texture.offset[0], -s * u + c * v + texture.offset[1]], axis=-1)
+def _transformed(matrix: NDArray[np.float64], uv: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Written out, because BLAS rounds differently from processor to processor."""
+    u, v = uv[..., 0], uv[..., 1]
+    return np.stack([a * u + b * v + c for a, b, c in matrix], axis=-1)

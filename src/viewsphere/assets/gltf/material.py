@@ -163,7 +163,7 @@ class _Reader:
 def _metallic(diffuse: tuple[float, ...], specular: tuple[float, ...]) -> tuple[float, tuple[float, ...]]:
     """Metallic factor and base colour with the same diffuse and specular brightness."""
     weights = np.array([0.299, 0.587, 0.114])
-    d, s = (float(np.sqrt(weights @ np.square(c))) for c in (diffuse, specular))
+    d, s = (float(np.sqrt((weights * np.square(c)).sum())) for c in (diffuse, specular))
     strength = 1.0 - max(specular)
     if s < DIELECTRIC:
         metallic = 0.0

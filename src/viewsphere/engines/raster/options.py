@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
-from difflib import get_close_matches
 
 from pydantic import JsonValue
 
 from viewsphere.errors import UserError
+from viewsphere.model.mistakes import one_of
 
 
 @dataclass(frozen=True)
@@ -25,9 +25,7 @@ def parse_options(given: Mapping[str, JsonValue]) -> Options:
     known = [f.name for f in fields(Options)]
     for name in given:
         if name not in known:
-            near = get_close_matches(name, known, 1)
-            hint = f"; did you mean {near[0]!r}?" if near else ""
-            raise UserError(f"raster engine: unknown option {name!r}: expected one of {', '.join(known)}{hint}")
+            raise UserError(f"raster engine: options: {one_of(name, known)}")
     default = Options()
     antialias = given.get("antialias", default.antialias)
     if isinstance(antialias, bool) or antialias not in (1, 4):

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.assets.mesh import Image, Texture
+from viewsphere.assets.mesh import WRAPS, Image, Texture
 from viewsphere.engines.raster.records import Textures
 from viewsphere.engines.raster.tone import linear_words
 
-_WRAPS = ("repeat", "clamp", "mirror")
 _LEVELS = 16
 _LARGEST = 8192  # texels; larger images start at a smaller level
 
@@ -54,18 +52,11 @@ class TexturePacker:
         for (image, is_color, texture), slot in self._slots.items():
             mips = self._images[image, is_color]
             levels[slot, : len(mips)] = mips
-            wraps = _WRAPS.index(texture.wrap_s), _WRAPS.index(texture.wrap_t)
+            wraps = WRAPS.index(texture.wrap_s), WRAPS.index(texture.wrap_t)
             modes[slot] = len(mips), *wraps, texture.nearest, texture.texcoord
-            transforms[slot] = _transform(texture).reshape(-1)
+            transforms[slot] = texture.matrix.reshape(-1)
         texels = np.concatenate(self._texels) if self._texels else np.zeros((1, 4), np.uint16)
         return Textures(np.ascontiguousarray(texels), levels, modes, transforms)
-
-
-def _transform(texture: Texture) -> NDArray[np.float64]:
-    """KHR_texture_transform as a (2, 3) matrix: scale, then rotate, then offset."""
-    c, s = math.cos(texture.rotation), math.sin(texture.rotation)
-    (u, v), (x, y) = texture.scale, texture.offset
-    return np.array([[c * u, s * v, x], [-s * u, c * v, y]])
 
 
 def _mip_levels(pixels: NDArray[np.uint8], is_color: bool) -> list[NDArray[np.uint16]]:

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-import numpy as np
-
+from viewsphere.assets import srgb
 from viewsphere.assets.mesh import Material
 
 Color = tuple[float, float, float]
@@ -14,8 +13,7 @@ Finish = Literal["gloss", "matte", "metal"]
 
 def linear(color: Color, alpha: float = 1.0) -> tuple[float, float, float, float]:
     """Linear RGBA of an sRGB colour in 0..1 (IEC 61966-2-1)."""
-    c = np.asarray(color, np.float64)
-    r, g, b = np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4).round(5).tolist()
+    r, g, b = srgb.linear(color).round(5).tolist()
     return r, g, b, alpha
 
 

@@ -1,0 +1,89 @@
+"""What the alpha of a base-colour texture is for, where the file's format has no word for it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.assets.mesh import Image, Material, Texture
+from viewsphere.assets.piece import Float, Piece
+
+SOLID = 250
+"""Texels with at least this alpha are taken as opaque."""
+
+SLIGHT_SHARE = 0.001
+"""A material that shows at most this share of texels that are not solid is opaque: specks, not a shape."""
+
+BINARY_SHARE = 0.02
+"""A material that shows at most this share of texels neither clear nor solid is a cut-out (MASK)."""
+
+
+def with_alpha_modes(pieces: Sequence[Piece], materials: Sequence[Material], images: Sequence[Image]) -> list[Material]:
+    """The materials, those opaque so far with the alpha mode that the texels their triangles show ask for.
+
+    What an atlas holds between its islands is not shown and does not count, nor do texels on the rim of an
+    island, where its edge and the picture's seldom agree to the texel, unless all lie there. A texture that
+    is clear all over is an exporter's slip.
+    """
+    return [
+        material if material.alpha_mode != "OPAQUE" else replace(material, alpha_mode=_mode(index, material, pieces, images))
+        for index, material in enumerate(materials)
+    ]
+
+
+def _mode(
+    index: int, material: Material, pieces: Sequence[Piece], images: Sequence[Image]
+) -> Literal["OPAQUE", "MASK", "BLEND"]:
+    texture = material.base_color_texture
+    if texture is None:
+        return "OPAQUE"
+    alpha = images[texture.image].pixels[..., 3]
+    uv = [piece.uv0[piece.triangles] for piece in pieces if piece.material == index and piece.uv0 is not None]
+    if alpha.min() >= SOLID or alpha.max() == 0 or not uv:
+        return "OPAQUE"
+    shown = alpha[_without_rim(shown_texels(texture, np.concatenate(uv), alpha.shape))]
+    if np.count_nonzero(shown < SOLID) <= SLIGHT_SHARE * shown.size:
+        return "OPAQUE"
+    between = np.count_nonzero((shown > 8) & (shown < 247))
+    return "MASK" if between <= BINARY_SHARE * shown.size else "BLEND"
+
+
+def shown_texels(texture: Texture, uv: Float, shape: tuple[int, ...]) -> NDArray[np.bool_]:
+    """Texels (H, W) of a picture of this shape that triangles with corners `uv` (T, 3, 2) show: those whose
+    centre lies in a triangle, and each triangle's own centre.
+
+    Of a triangle wider than the picture, or beyond the edge of a clamped one, its whole box counts. The
+    texture's offset and scale apply; it must not be turned or mirrored.
+    """
+    from viewsphere.assets.kernels_coverage import add_triangles
+
+    uv = uv * texture.scale + texture.offset
+    uv = uv[np.isfinite(uv).all(axis=(1, 2))]
+    clamped = np.array([texture.wrap_s == "clamp", texture.wrap_t == "clamp"])
+    low, high = uv.min(axis=1), uv.max(axis=1)
+    outside = np.where(clamped, (low < 0) | (high > 1), high - low > 1).any(axis=1)
+    period = np.where(clamped, 0.0, np.floor(low))
+    last = np.nextafter(1.0, 0.0)
+    uv, low, high = (
+        np.where(clamped, np.clip(corner - start, 0.0, last), corner - start)
+        for corner, start in ((uv, period[:, None]), (low, period), (high, period))
+    )
+    high = np.minimum(high, low + 1.0)
+    box = np.stack([low, np.column_stack([high[:, 0], low[:, 1]]), high, np.column_stack([low[:, 0], high[:, 1]])], axis=1)
+    box = box[outside]
+    steps = np.zeros((shape[0], shape[1] + 1), np.int32)
+    size = np.array([shape[1], shape[0]], np.float64)
+    add_triangles(steps, np.concatenate([uv[~outside], box[:, [0, 1, 2]], box[:, [0, 2, 3]]]) * size)
+    return np.cumsum(steps, axis=1, out=steps)[:, :-1] > 0
+
+
+def _without_rim(texels: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """The texels whose four neighbours are among them, or all when there are none."""
+    inner = texels.copy()
+    for axis in (0, 1):
+        inner &= np.roll(texels, 1, axis) & np.roll(texels, -1, axis)
+    return inner if inner.any() else texels

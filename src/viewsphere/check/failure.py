@@ -1,0 +1,18 @@
+"""What to say of a proof that broke off."""
+
+from __future__ import annotations
+
+from viewsphere.errors import ViewsphereError
+
+_BY_DATA = (
+    *(ViewsphereError, OSError, LookupError, TypeError, ValueError, AttributeError, ArithmeticError),
+    AssertionError,  # pycocotools refuses files by assertions
+)
+"""Exceptions that damaged data causes."""
+
+
+def failure(expected: str, error: Exception) -> str:
+    """That something else than `expected` was found; for an exception that data does not cause, that the check is at fault."""
+    found = f"{type(error).__name__}: {error}"
+    by_data = isinstance(error, _BY_DATA) or type(error) is Exception  # pycocotools raises bare ones for wrong polygons
+    return f"expected {expected}, found {found}" if by_data else f"the check itself failed: {found}"
