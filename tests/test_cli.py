@@ -143,7 +143,7 @@ def test_ctrl_c_keeps_what_is_finished(tmp_path):
         text=True,
         start_new_session=True,
         # a job in the background inherits an ignored SIGINT
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # noqa: PLW1509
     )
     deadline = time.monotonic() + 60
     while not any((out / "store" / "shots").glob("*/*")):

@@ -1,0 +1,18 @@
+"""The store: finished shots on disk, each written aside and renamed when whole, and the data set they make up.
+
+    OUT/store/plan.json                        what was asked for
+    OUT/store/models/<key>/                    the normalised model (OBJ, GLB) and model.json
+    OUT/store/shots/<hh>/<shot>/frames.json    records of the shot's frames
+    OUT/store/shots/<hh>/<shot>/<channel>/<pose>.png|.tiff
+    OUT/store/writing/                         what is not whole yet
+
+`hh` are the first two hexadecimal digits of the shot key's SHA-256, so that no folder grows large. Workers never share
+a file.
+"""
+
+from viewsphere.store.channel_files import decode, encode
+from viewsphere.store.dataset import Dataset
+from viewsphere.store.folder import Store
+from viewsphere.store.records import Category, ModelInfo, PlanRecord
+
+__all__ = ["Category", "Dataset", "ModelInfo", "PlanRecord", "Store", "decode", "encode"]

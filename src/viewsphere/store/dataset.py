@@ -1,0 +1,184 @@
+"""The data set that a store's finished shots make up."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+from bisect import bisect_right
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
+from functools import cached_property, lru_cache
+from pathlib import Path
+from typing import Any, overload
+
+from numpy.typing import NDArray
+
+from viewsphere.errors import StoreError
+from viewsphere.model.channel import CHANNELS
+from viewsphere.model.record import sample_from_record
+from viewsphere.model.sample import Sample
+from viewsphere.store.channel_files import decode
+from viewsphere.store.folder import Store
+from viewsphere.store.records import Category, ModelInfo
+
+
+class Dataset(Sequence[Sample]):
+    """The finished frames of a data set, in frame order; what `viewsphere.open` gives.
+
+    `len`, indexing and iteration give samples whose channels are read when asked for. `link` and `path` serve exporters.
+    """
+
+    def __init__(self, root: str | os.PathLike[str]) -> None:
+        self.root = Path(root)
+        self.store = Store(self.root)
+        self.plan = self.store.plan()
+        self.link_kinds: set[str] = set()
+        self._records = lru_cache(maxsize=8)(self._read_records)
+
+    def __reduce__(self) -> tuple[type[Dataset], tuple[Path]]:
+        """A data set travels to other processes (data loaders) as its folder."""
+        return Dataset, (self.root,)
+
+    @property
+    def name(self) -> str:
+        """The recipe's name."""
+        return self.plan.name
+
+    @property
+    def recipe(self) -> dict[str, Any]:
+        """The recipe, normalised, as plain data."""
+        return self.plan.recipe
+
+    @property
+    def categories(self) -> tuple[Category, ...]:
+        """All categories of the plan."""
+        return self.plan.categories
+
+    @property
+    def splits(self) -> tuple[str, ...]:
+        """Names of the splits, in the recipe's order."""
+        return self.plan.splits
+
+    @property
+    def max_objects(self) -> int:
+        """Most objects in one frame."""
+        return self.plan.max_objects
+
+    @cached_property
+    def models(self) -> tuple[ModelInfo, ...]:
+        """The finished models, in the plan's order."""
+        found = (self.store.model_info(key) for key in self.plan.models)
+        return tuple(m for m in found if m is not None)
+
+    @cached_property
+    def _shots(self) -> tuple[list[str], list[int]]:
+        """Keys of the finished shots in frame order, and the number of frames before each."""
+        keys, starts, total = [], [], 0
+        for key, _, count in self.plan.shots:
+            if self.store.has_shot(key):
+                keys.append(key)
+                starts.append(total)
+                total += count
+        return keys, [*starts, total]
+
+    def __len__(self) -> int:
+        return self._shots[1][-1]
+
+    @overload
+    def __getitem__(self, index: int) -> Sample: ...
+    @overload
+    def __getitem__(self, index: slice) -> Sequence[Sample]: ...
+    def __getitem__(self, index: int | slice) -> Sample | Sequence[Sample]:
+        """The i-th finished frame; raises IndexError past the end."""
+        if isinstance(index, slice):
+            return [self[i] for i in range(*index.indices(len(self)))]
+        i = index + len(self) if index < 0 else index
+        if not 0 <= i < len(self):
+            raise IndexError(f"{self.root}: expected a frame in 0..{len(self) - 1}, got {index}")
+        keys, starts = self._shots
+        shot = bisect_right(starts, i) - 1
+        return self._sample(keys[shot], self._records(keys[shot])[i - starts[shot]])
+
+    def __iter__(self) -> Iterator[Sample]:
+        for key in self._shots[0]:
+            for record in self._read_records(key):
+                yield self._sample(key, record)
+
+    @cached_property
+    def _frames_of(self) -> dict[str, int]:
+        return {key: count for key, _, count in self.plan.shots}
+
+    def _read_records(self, key: str) -> list[dict[str, Any]]:
+        file = self.store.shot_folder(key) / "frames.json"
+        try:
+            records: list[dict[str, Any]] = json.loads(file.read_text("utf-8"))
+            if len(records) != self._frames_of[key]:
+                raise ValueError(f"{len(records)} frames instead of {self._frames_of[key]}")
+        except (OSError, TypeError, ValueError) as error:
+            raise _damaged(file, error) from None
+        return records
+
+    def _sample(self, key: str, record: dict[str, Any]) -> Sample:
+        try:
+            files: dict[str, str] = record["files"]
+            return sample_from_record(record, channels=_ChannelFiles(self.root, files), files=files)
+        except (LookupError, TypeError, ValueError, AttributeError) as error:
+            raise _damaged(self.store.shot_folder(key) / "frames.json", error) from None
+
+    def path(self, relative: str) -> Path:
+        """A file of the data set."""
+        return self.root / relative
+
+    def link(self, relative: str, destination: Path) -> None:
+        """Put a stored file at `destination`: a hard link, else a reflink, else a copy; `link_kinds` says which."""
+        destination.parent.mkdir(parents=True, exist_ok=True)
+        self.link_kinds.add(_link(self.root / relative, destination))
+
+    def link_models(self, folder: Path) -> None:
+        """Put every finished model's OBJ, GLB, materials and textures into `folder`/<key>, as `link` does."""
+        for info in self.models:
+            for file in sorted(self.path(info.obj).parent.iterdir()):
+                if file.name != "model.json":
+                    self.link(file.relative_to(self.root).as_posix(), folder / info.key / file.name)
+
+
+class _ChannelFiles(Mapping[str, NDArray[Any]]):
+    """A frame's channels, each read from its file the first time it is asked for."""
+
+    def __init__(self, root: Path, files: Mapping[str, str]) -> None:
+        self._root, self._files = root, files
+        self._arrays: dict[str, NDArray[Any]] = {}
+
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        if name not in self._arrays:
+            self._arrays[name] = decode(CHANNELS[name], self._root / self._files[name])
+        return self._arrays[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._files)
+
+    def __len__(self) -> int:
+        return len(self._files)
+
+
+def _link(source: Path, destination: Path) -> str:
+    with suppress(OSError):
+        os.link(source, destination)
+        return "hard link"
+    try:
+        import fcntl
+
+        with source.open("rb") as read, destination.open("wb") as write:
+            fcntl.ioctl(write.fileno(), 0x40049409, read.fileno())  # FICLONE of linux/fs.h
+        return "reflink"
+    except (ImportError, OSError):
+        shutil.copyfile(source, destination)
+        return "copy"
+
+
+def _damaged(file: Path, error: Exception) -> StoreError:
+    return StoreError(
+        f"{file}: expected the frames of a finished shot, found {type(error).__name__}: {error}: "
+        f"delete {file.parent} and render again"
+    )

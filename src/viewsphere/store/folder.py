@@ -1,0 +1,259 @@
+"""The store's folder: finished shots and models, each written aside and renamed when whole."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import shutil
+import socket
+from collections.abc import Generator, Iterable
+from contextlib import contextmanager, suppress
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from viewsphere.errors import StoreError
+from viewsphere.model.channel import CHANNELS
+from viewsphere.model.record import sample_to_record
+from viewsphere.model.sample import Sample
+from viewsphere.store.channel_files import encode
+from viewsphere.store.records import ModelInfo, PlanRecord
+
+
+class Store:
+    """The finished models and shots below OUT/store."""
+
+    def __init__(self, root: Path) -> None:
+        self.root = root
+        self.folder = root / "store"
+
+    @property
+    def plan_file(self) -> Path:
+        """Where the plan is kept."""
+        return self.folder / "plan.json"
+
+    def plan(self) -> PlanRecord:
+        """The plan this store was made for; raises StoreError if there is none or it cannot be read."""
+        try:
+            return PlanRecord.from_json(self.plan_file.read_text("utf-8"))
+        except FileNotFoundError:
+            raise StoreError(f"{self.root}: expected a data set (store/plan.json), found none: render one first") from None
+        except (KeyError, TypeError, ValueError, OSError) as error:
+            raise StoreError(f"{self.plan_file}: expected a readable plan, found {type(error).__name__}: {error}") from None
+
+    def open_for(self, plan: PlanRecord) -> None:
+        """Make the folder ready for this plan, or find it half done by the same one.
+
+        Another recipe's plan gives way while none of its frames is finished and nobody works on them, so that a recipe
+        can be mended and tried again. Raises StoreError if the folder cannot be written, holds another recipe's data, or
+        files that viewsphere did not make.
+        """
+        writing = self.folder / "writing"
+        known = self.plan_file.exists()
+        if not known and self.root.is_dir() and any(self.root.iterdir()) and not writing.is_dir():
+            raise StoreError(f"{self.root}: expected an empty or new folder, found other files: choose another output folder")
+        self._make(writing)
+        self._sweep()
+        if known:
+            if any(writing.iterdir()) or any((self.folder / "shots").glob("*/*")):
+                self._refuse_other(plan)
+                return
+            if not self._is_of(plan):
+                shutil.rmtree(self.folder / "models", ignore_errors=True)
+        self._write_atomically(self.plan_file, plan.to_json())
+
+    @contextmanager
+    def occupied(self) -> Generator[None]:
+        """Show other runs that this one is at work, as long as the block lasts."""
+        sign = self.folder / "writing" / f"{_writer()}run"
+        with _disk_errors(self.root):
+            sign.touch()
+        try:
+            yield
+        finally:
+            with suppress(OSError):
+                sign.unlink(missing_ok=True)
+
+    def _is_of(self, plan: PlanRecord) -> bool:
+        try:
+            found = self.plan()
+        except StoreError:
+            return False
+        return (found.digest, found.version) == (plan.digest, plan.version)
+
+    def _refuse_other(self, plan: PlanRecord) -> None:
+        found = self.plan()
+        if found.digest != plan.digest:
+            raise StoreError(
+                f"{self.root}: expected data of recipe {plan.name!r} (digest {plan.digest[:12]}), found that of "
+                f"{found.name!r} ({found.digest[:12]}): choose another output folder, or delete this one"
+            )
+        if found.version != plan.version:
+            raise StoreError(
+                f"{self.root}: expected data made by viewsphere {plan.version}, found {found.version}: "
+                "install that version to go on, or choose another output folder"
+            )
+
+    def _make(self, folder: Path) -> None:
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise StoreError(f"{self.root}: expected a writable output folder, found {error.strerror or error}") from None
+        if not os.access(folder, os.W_OK):
+            raise StoreError(f"{self.root}: expected a writable output folder, found one that cannot be written")
+
+    def _write_atomically(self, file: Path, text: str) -> None:
+        aside = self.folder / "writing" / f"{_writer()}{file.name}"
+        with _disk_errors(self.root):
+            aside.write_text(text, "utf-8")
+            aside.replace(file)
+
+    def _sweep(self) -> None:
+        """Remove what dead writers of this machine left unfinished."""
+        for path in (self.folder / "writing").iterdir():
+            host, _, rest = path.name.partition("~")
+            pid = rest.partition("~")[0]
+            if host == socket.gethostname() and pid.isdigit() and not _alive(int(pid)):
+                shutil.rmtree(path, ignore_errors=True)
+                path.unlink(missing_ok=True)
+
+    def shot_folder(self, key: str) -> Path:
+        """Where a finished shot lies."""
+        return self.folder / "shots" / hashlib.sha256(key.encode()).hexdigest()[:2] / key
+
+    def model_folder(self, key: str) -> Path:
+        """Where a normalised model lies."""
+        return self.folder / "models" / key
+
+    def has_shot(self, key: str) -> bool:
+        """Whether this shot is finished."""
+        return self.shot_folder(key).is_dir()
+
+    @contextmanager
+    def aside(self, target: Path) -> Generator[Path]:
+        """A folder to write into that becomes `target` when the block ends well, and is removed when it does not.
+
+        If another writer finished the same target first, that one stays: both hold the same bytes.
+        """
+        folder = self.folder / "writing" / f"{_writer()}{target.name}"
+        with _disk_errors(self.root):
+            shutil.rmtree(folder, ignore_errors=True)
+            folder.mkdir(parents=True)
+        try:
+            with _disk_errors(self.root):
+                yield folder
+                target.parent.mkdir(parents=True, exist_ok=True)
+                _become(folder, target)
+        finally:
+            shutil.rmtree(folder, ignore_errors=True)
+
+    @contextmanager
+    def replacing(self, target: Path) -> Generator[Path]:
+        """A folder to write into that takes the place of `target` when the block ends well."""
+        if target == self.folder:
+            raise StoreError(f"{target}: expected a format's name, found the store's")
+        self._make(self.folder / "writing")
+        old = self.folder / "writing" / f"{_writer()}old~{target.name}"
+        shutil.rmtree(old, ignore_errors=True)
+        folder = self.folder / "writing" / f"{_writer()}{target.name}"
+        with _disk_errors(self.root):
+            shutil.rmtree(folder, ignore_errors=True)
+            folder.mkdir()
+        try:
+            with _disk_errors(self.root):
+                yield folder
+                if target.exists():
+                    target.rename(old)
+                folder.rename(target)
+        finally:
+            shutil.rmtree(folder, ignore_errors=True)
+            shutil.rmtree(old, ignore_errors=True)
+
+    def write_file(self, name: str, text: str) -> None:
+        """Write a small file of the store in one step."""
+        self._write_atomically(self.folder / name, text)
+
+    def skipped(self) -> dict[str, str]:
+        """Models and shots that were left out at the user's wish, and why."""
+        try:
+            return json.loads((self.folder / "skipped.json").read_text("utf-8"))
+        except FileNotFoundError:
+            return {}
+
+    def write_shot(self, key: str, samples: Iterable[Sample]) -> int:
+        """Write all frames of a shot, with the channels their samples hold; gives their number."""
+        target = self.shot_folder(key)
+        prefix = target.relative_to(self.root).as_posix()
+        records: list[dict[str, Any]] = []
+        with self.aside(target) as folder:
+            for sample in samples:
+                files: dict[str, str] = {}
+                for name, array in sample.channels.items():
+                    channel = CHANNELS[name]
+                    inside = f"{name}/{sample.pose.index:06d}{channel.suffix}"
+                    (folder / name).mkdir(exist_ok=True)
+                    (folder / inside).write_bytes(encode(channel, array))
+                    files[name] = f"{prefix}/{inside}"
+                records.append(sample_to_record(replace(sample, files=files)))
+            lines = (json.dumps(r, separators=(",", ":"), allow_nan=False) for r in records)
+            text = "[\n" + ",\n".join(lines) + "\n]\n"
+            (folder / "frames.json").write_text(text, "utf-8")
+        return len(records)
+
+    def write_model_info(self, folder: Path, info: ModelInfo) -> None:
+        """Write model.json into a model's folder that is being made."""
+        value = {**info.__dict__, "box3d_object": info.box3d_object.tolist()}
+        (folder / "model.json").write_text(json.dumps(value, indent=1), "utf-8")
+
+    def model_info(self, key: str) -> ModelInfo | None:
+        """What is known of a finished model; None if it is not there, StoreError if it cannot be read."""
+        file = self.model_folder(key) / "model.json"
+        try:
+            value = json.loads(file.read_text("utf-8"))
+            value["box3d_object"] = np.array(value["box3d_object"])
+            for name in ("size", "real_size", "parts", "warnings"):
+                value[name] = None if value[name] is None else tuple(value[name])
+            return ModelInfo(**value)
+        except FileNotFoundError:
+            return None
+        except (OSError, LookupError, TypeError, ValueError) as error:
+            raise StoreError(
+                f"{file}: expected what is known of a model, found {type(error).__name__}: {error}: "
+                f"delete {file.parent} and render again"
+            ) from None
+
+
+def _writer() -> str:
+    return f"{socket.gethostname()}~{os.getpid()}~"
+
+
+def _become(folder: Path, target: Path) -> None:
+    try:
+        folder.rename(target)
+    except OSError:
+        if not target.is_dir():
+            raise
+
+
+def _alive(pid: int) -> bool:
+    if pid == os.getpid() or os.name == "nt":  # on Windows os.kill would end the process
+        return True
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    except OSError:
+        return True
+    return True
+
+
+@contextmanager
+def _disk_errors(root: Path) -> Generator[None]:
+    """Say in one line what the disk refused; what is finished stays."""
+    try:
+        yield
+    except OSError as error:
+        raise StoreError(f"{root}: expected to write, found: {error.strerror or error}; what is finished is kept") from error
