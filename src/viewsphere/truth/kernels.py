@@ -72,7 +72,7 @@ def is_surface(cutouts, row, b0, b1, b2):
 
 @njit
 def _texel(u, size, wrap):
-    """Index of the nearest texel; wrap as in `cutouts.WRAPS`."""
+    """Index of the nearest texel; wrap as in `mesh.WRAPS`."""
     if wrap == CLAMP:
         u = min(max(u, 0.0), 1.0)
     else:
