@@ -7,7 +7,7 @@ import pytest
 from PIL import Image
 
 from viewsphere.assets import cache
-from viewsphere.assets.cache import cache_folder, load_normalised, real_size
+from viewsphere.assets.cache import cache_folder, load_normalised
 from viewsphere.assets.mesh import Mesh
 from viewsphere.errors import ModelError
 from viewsphere.model.shot import ModelSpec
@@ -132,13 +132,6 @@ def test_zoo_models_are_built_normalised_and_not_cached(spec, tmp_path):
     assert not (tmp_path / "other").exists()
     with pytest.raises(ModelError, match="zoo:thing"):
         load_normalised(zoo)
-
-
-def test_the_real_size_may_be_the_file_s(spec, tmp_path):
-    assert real_size(spec) is None
-    assert real_size(spec.model_copy(update={"real_size": (1.0, 2.0, 3.0)})) == (1, 2, 3)
-    scaled = spec.model_copy(update={"real_size": "file", "scale": 5.0})
-    assert real_size(scaled, folder=tmp_path / "cache") == (1, 2, 3)
 
 
 def test_missing_models_are_reported_by_the_reader(spec, tmp_path):

@@ -27,7 +27,7 @@ from viewsphere.assets.mesh import Image, Material, Mesh, Texture
 from viewsphere.assets.normalise import normalise
 from viewsphere.assets.piece import TEXTURE_FIELDS, FileFacts
 from viewsphere.errors import ModelError
-from viewsphere.model.shot import ModelSpec, Size
+from viewsphere.model.shot import ModelSpec
 
 SETTINGS = ("up", "forward", "unit", "centring", "scale", "real_size", "confined")
 ARRAYS = ("vertices", "triangles", "normals", "triangle_material", "triangle_part", "uv0", "uv1", "colors")
@@ -67,15 +67,6 @@ def load_zoo(spec: ModelSpec, build: Callable[[ModelSpec], Mesh] | None) -> tupl
     if build is None:
         raise ModelError(f"{spec.source}: no builder for procedural models was given")
     return build(spec), FileFacts(Path(spec.source), "zoo", "+z", "-y", 1.0)
-
-
-def real_size(spec: ModelSpec, build: Callable[[ModelSpec], Mesh] | None = None, folder: Path | None = None) -> Size | None:
-    """The model's true (width, height, length) in metres: the one set, or the file's own for `file`."""
-    if spec.real_size != "file":
-        return spec.real_size
-    low, high = load_normalised(spec.model_copy(update={"scale": "as_is"}), build, folder).bounds
-    width, length, height = (float(x) for x in high - low)
-    return (width, height, length)
 
 
 def cache_folder() -> Path:

@@ -9,9 +9,9 @@ import numpy as np
 
 from viewsphere import plugins
 from viewsphere.annotate import annotate
-from viewsphere.assets.cache import load_normalised, real_size
+from viewsphere.assets.cache import load_normalised
 from viewsphere.assets.mesh import Mesh
-from viewsphere.geometry.box import box_vertices
+from viewsphere.geometry.box import box_size, box_vertices
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.recipe import Recipe
 from viewsphere.model.sample import Float, Sample
@@ -55,7 +55,7 @@ class Stages:
     _stage: plugins.Stage | None = None
     _stage_key: str = ""
     _models: dict[str, Mesh] = field(default_factory=dict[str, Mesh])
-    _sizes: dict[str, Size | None] = field(default_factory=dict[str, Size | None])
+    _sizes: dict[str, Size] = field(default_factory=dict[str, Size])
 
     def model(self, spec: ModelSpec) -> Mesh:
         """The normalised model; raises ModelError if its file cannot be used."""
@@ -68,9 +68,12 @@ class Stages:
 
     def real_size(self, spec: ModelSpec) -> Size | None:
         """The model's true (width, height, length) in metres, None if nobody said."""
+        if spec.real_size != "file":
+            return spec.real_size
         name = spec.model_dump_json()
         if name not in self._sizes:
-            self._sizes[name] = real_size(spec, build_zoo_model)
+            unscaled = self.model(spec.model_copy(update={"scale": "as_is"}))
+            self._sizes[name] = box_size(box_vertices(*unscaled.bounds))
         return self._sizes[name]
 
     def check_distances(self, planned: Plan, spec: ModelSpec) -> None:

@@ -1,0 +1,30 @@
+"""What a worker keeps warm."""
+
+import numpy as np
+
+from viewsphere.model.shot import ModelSpec
+from viewsphere.run import stages
+from viewsphere.run.stages import Stages
+
+DRIER = ModelSpec(key="d", source="zoo:hair_drier", seed=3, category="hair drier", category_id=1)
+
+
+def test_the_real_size_is_the_one_set_or_that_of_the_file_before_scaling():
+    warm = Stages()
+    assert warm.real_size(DRIER) is None
+    assert warm.real_size(DRIER.model_copy(update={"real_size": (1.0, 2.0, 3.0)})) == (1, 2, 3)
+    file = DRIER.model_copy(update={"real_size": "file"})
+    width, length, height = np.ptp(warm.model(file).bounds, axis=0)
+    scaled = file.model_copy(update={"scale": 5.0})
+    assert np.ptp(warm.model(scaled).bounds, axis=0)[1] == np.float32(5)
+    assert np.allclose(warm.real_size(scaled), (width, height, length), rtol=1e-12)
+
+
+def test_a_model_at_its_own_scale_is_built_once(monkeypatch):
+    built = []
+    build = stages.build
+    monkeypatch.setattr(stages, "build", lambda *words: built.append(words) or build(*words))
+    warm, spec = Stages(), DRIER.model_copy(update={"real_size": "file"})
+    warm.model(spec)
+    warm.real_size(spec)
+    assert len(built) == 1
