@@ -1,0 +1,168 @@
+"""Commands that start from a recipe or a model."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import asdict
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from viewsphere.cli.arguments import AsJson, Formats, RecipeFile, load_recipe, split
+from viewsphere.cli.terminal import ProgressBar, print_json, print_plan, print_summary, write, write_picture
+from viewsphere.errors import StoreError, UserError
+
+
+class Draw(StrEnum):
+    """What a contact sheet shows over its pictures."""
+
+    boxes = "boxes"
+    boxes3d = "boxes3d"
+    masks = "masks"
+    depth = "depth"
+
+
+def new(
+    folder: Annotated[Path, typer.Argument(help="Folder to make the recipe in.", show_default=False)],
+) -> None:
+    """Write a commented recipe to start from."""
+    from viewsphere.model.recipe_file import template
+
+    file = folder if folder.suffix in {".yaml", ".yml"} else folder / "recipe.yaml"
+    if file.exists():
+        raise UserError(f"{file}: expected a new file, found one that exists: choose another folder")
+    write(file, template().encode())
+    typer.echo(f"wrote {file}; next: viewsphere preview {file}")
+
+
+def schema() -> None:
+    """Print the recipe's JSON schema, for editors."""
+    import json
+
+    from viewsphere.model.recipe_file import schema as recipe_schema
+
+    typer.echo(json.dumps(recipe_schema(), indent=2))
+
+
+def inspect(
+    model: Annotated[str, typer.Argument(help="Model file, or zoo:<family>.", show_default=False)],
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", help="Where the picture goes; default: beside you, <model>-sides.png."),
+    ] = None,
+    up: Annotated[str | None, typer.Option(help="Up axis, such as +z; default: the format's.")] = None,
+    forward: Annotated[str | None, typer.Option(help="Axis the front faces; default: the format's.")] = None,
+    unit: Annotated[float | None, typer.Option(help="Metres in one unit; default: the file's.")] = None,
+    seed: Annotated[int, typer.Option(help="Which draw of a zoo family.")] = 0,
+    json_: AsJson = False,
+) -> None:
+    """Show a model's size, axes, parts, materials, textures and warnings, and a picture from four sides."""
+    from viewsphere.preview import four_sides
+    from viewsphere.run.inspection import inspect_model, model_spec, report_lines
+
+    _announce_compilation()
+    spec = model_spec(model, up=up, forward=forward, unit=unit, seed=seed)
+    report = inspect_model(spec)
+    picture = output or Path(f"{Path(model.replace(':', '-')).stem}-sides.png")
+    write_picture(picture, four_sides(spec))
+    if json_:
+        print_json({**asdict(report), "picture": str(picture)})
+        return
+    for line in report_lines(report):
+        typer.echo(line)
+    typer.echo(f"picture from four sides: {picture} (the first view must show the front; if not, set up and forward)")
+
+
+def plan(recipe: RecipeFile, json_: AsJson = False) -> None:
+    """Say what a recipe would make: models, poses, frames, splits. Nothing is rendered, no model is read."""
+    from viewsphere.sampling.plan import plan as make_plan
+
+    planned = make_plan(load_recipe(recipe))
+    counts = {
+        "name": planned.recipe.name,
+        "models": planned.models,
+        "poses": planned.poses,
+        "frames": planned.frames,
+    }
+    if json_:
+        print_json(
+            {
+                **counts,
+                "splits": dict(planned.split_counts),
+                "shots": planned.shot_count,
+                "warnings": list(planned.warnings),
+            }
+        )
+        return
+    print_plan(planned)
+
+
+def preview(
+    source: Annotated[Path, typer.Argument(help="Recipe (YAML), or a folder that `render` wrote.", show_default=False)],
+    output: Annotated[Path, typer.Option("-o", "--output", help="Picture to write.")] = Path("preview.png"),
+    count: Annotated[int, typer.Option("-n", "--count", min=1, help="Frames shown.")] = 12,
+    draw: Annotated[list[Draw] | None, typer.Option(help="Draw over the pictures; may be given several times.")] = None,
+    columns: Annotated[int, typer.Option(min=1, help="Pictures in a row.")] = 4,
+) -> None:
+    """Write a contact sheet: a recipe's frames rendered small, or a data set's."""
+    from viewsphere.preview import contact_sheet, dataset_samples, preview_samples
+    from viewsphere.store import Dataset
+
+    if not source.is_dir():
+        _announce_compilation()
+    samples = dataset_samples(Dataset(source), count) if source.is_dir() else list(preview_samples(load_recipe(source), count))
+    if not samples:
+        raise StoreError(f"{source}: expected finished frames, found none: render first")
+    write_picture(output, contact_sheet(samples, [d.value for d in draw or ()], columns))
+    typer.echo(f"wrote {output} ({len(samples)} frames)")
+
+
+def render(
+    recipe: RecipeFile,
+    output: Annotated[Path, typer.Option("-o", "--output", help="Folder of the data set.", show_default=False)],
+    format_: Formats = None,
+    workers: Annotated[
+        int | None,
+        typer.Option(min=0, help="Processes; default: one a core. 0: this one.", show_default=False),
+    ] = None,
+    keep_going: Annotated[bool, typer.Option(help="Leave out models that cannot be used.")] = False,
+    json_: AsJson = False,
+) -> None:
+    """Render a recipe into a data set. Run it again to resume: finished frames are never rendered twice."""
+    from viewsphere.run.generate import generate
+    from viewsphere.sampling.plan import plan as make_plan
+
+    loaded = load_recipe(recipe)
+    planned = make_plan(loaded)
+    if not json_:
+        print_plan(planned)
+    crew = _cores() if workers is None else workers
+    with ProgressBar(quiet=json_) as bar:
+        try:
+            summary = generate(
+                loaded,
+                output,
+                workers=crew,
+                formats=split(format_),
+                keep_going=keep_going,
+                listener=bar.show,
+            )
+        except KeyboardInterrupt:
+            bar.stop()
+            typer.echo(f"stopped; {bar.kept}. Run the same command to go on", err=True)
+            raise typer.Exit(130) from None
+    print_summary(summary, json_)
+
+
+def _announce_compilation() -> None:
+    """Say why the first picture on a machine takes longer."""
+    from viewsphere.geometry.jit import kernel_folder
+
+    if not kernel_folder().is_dir():
+        typer.echo("compiling kernels, once on this machine: about 20 seconds", err=True)
+
+
+def _cores() -> int:
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

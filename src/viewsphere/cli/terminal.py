@@ -1,0 +1,143 @@
+"""What the user sees: progress, summaries, complaints; and the files commands leave beside data sets."""
+
+from __future__ import annotations
+
+import sys
+from collections import Counter
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from viewsphere.errors import UserError, ViewsphereError
+
+if TYPE_CHECKING:
+    from viewsphere.check import Report
+    from viewsphere.run.generate import Listener, Progress, Summary
+    from viewsphere.sampling.plan import Plan
+
+MOST_FINDINGS = 20
+
+
+def complain(error: ViewsphereError, status: int) -> None:
+    """Print an error, a line each problem, and leave with this status."""
+    for line in str(error).splitlines():
+        typer.echo(f"viewsphere: {line}", err=True)
+    sys.exit(status)
+
+
+def write(file: Path, data: bytes) -> None:
+    """Write a file and the folders it needs; UserError if that is not possible."""
+    try:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_bytes(data)
+    except OSError as error:
+        raise UserError(f"{file}: expected a place to write, found: {error.strerror or error}") from None
+
+
+def write_picture(file: Path, picture: Any) -> None:
+    """Write (H, W, 3) uint8 as PNG."""
+    from viewsphere.geometry.image_files import encode_png
+
+    write(file, encode_png(picture))
+
+
+def print_json(value: object) -> None:
+    """Print for scripts."""
+    import json
+
+    typer.echo(json.dumps(value, indent=2))
+
+
+def print_plan(planned: Plan) -> None:
+    """Print the counts of a plan, and its warnings."""
+    splits = ", ".join(f"{name} {count:,}" for name, count in planned.split_counts.items())
+    typer.echo(
+        f"{planned.recipe.name}: {planned.models:,} models x {planned.poses:,} poses = {planned.frames:,} frames ({splits})"
+    )
+    for warning in planned.warnings:
+        typer.echo(f"warning: {warning}", err=True)
+
+
+def print_report(report: Report) -> None:
+    """Print what `check` found."""
+    failed = Counter(finding.check for finding in report.findings)
+    for name, count in report.checked.items():
+        typer.echo(f"{name:12} {f'{failed[name]:,} findings' if failed[name] else 'ok':14} {count:,} checked")
+    for note in report.notes:
+        typer.echo(f"note: {note}")
+    for finding in report.findings[:MOST_FINDINGS]:
+        typer.echo(f"failed: {finding}", err=True)
+    if len(report.findings) > MOST_FINDINGS:
+        typer.echo(f"and {len(report.findings) - MOST_FINDINGS:,} findings more; --json lists all", err=True)
+    typer.echo("all proofs hold" if report.ok else f"{len(report.findings):,} findings")
+
+
+def print_summary(summary: Summary, as_json: bool) -> None:
+    """Print what a run left."""
+    if as_json:
+        print_json({**summary.__dict__, "root": str(summary.root)})
+        return
+    for key, why in summary.skipped.items():
+        typer.echo(f"left out {key}: {why}", err=True)
+    for key, warnings in list(summary.warnings.items())[:MOST_FINDINGS]:
+        for warning in warnings:
+            typer.echo(f"warning: model {key}: {warning}", err=True)
+    if len(summary.warnings) > MOST_FINDINGS:
+        typer.echo(f"and warnings of {len(summary.warnings) - MOST_FINDINGS:,} models more; --json lists all", err=True)
+    for note in summary.notes:
+        typer.echo(note)
+    rate = f", {summary.rendered / summary.seconds:.1f} frames/s" if summary.rendered else ""
+    formats = ", ".join(summary.formats) or "no format asked for"
+    typer.echo(f"{summary.root}: {summary.frames:,} frames ({summary.rendered:,} new{rate}); {formats}")
+
+
+class ProgressBar:
+    """A line a phase: what is done, frames a second, time left."""
+
+    def __init__(self, quiet: bool) -> None:
+        self.kept = "nothing was finished yet"
+        self._quiet = quiet
+        self._bars: dict[str, Any] = {}
+        self._rich: Any = None
+
+    def __enter__(self) -> ProgressBar:
+        if not self._quiet:
+            from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+            self._rich = Progress(
+                TextColumn("{task.description:8}"),
+                BarColumn(),
+                MofNCompleteColumn(),
+                TextColumn("{task.fields[rate]}"),
+                TimeRemainingColumn(),
+            )
+            self._rich.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.stop()
+
+    def stop(self) -> None:
+        """Leave the terminal as it was."""
+        if self._rich is not None:
+            self._rich.stop()
+
+    @property
+    def show(self) -> Listener:
+        """A listener for `generate`."""
+
+        def listen(progress: Progress) -> None:
+            if progress.phase == "frames":
+                self.kept = f"{progress.done:,} of {progress.total:,} frames are kept"
+            if self._rich is None:
+                return
+            if progress.phase not in self._bars:
+                self._bars[progress.phase] = self._rich.add_task(progress.phase, total=progress.total, rate="")
+            bar = self._bars[progress.phase]
+            elapsed = self._rich.tasks[bar].elapsed or 0.0
+            made = progress.done - progress.resumed
+            rate = f"{made / elapsed:.1f} frames/s" if progress.phase == "frames" and made and elapsed else ""
+            self._rich.update(bar, completed=progress.done, rate=rate)
+
+        return listen
