@@ -41,6 +41,23 @@ def orbit_rotation(azimuth: float, elevation: float, tilt: float = 0.0) -> Float
     return np.array([c * level[0] + s * level[1], c * level[1] - s * level[0], level[2]])  # not @: BLAS rounds by processor
 
 
+def orbit_angles(rotation: ArrayLike) -> tuple[float, float, float]:
+    """Azimuth, elevation and tilt, radians, whose `orbit_rotation` is this world-to-camera rotation (3, 3).
+
+    Straight above and below, where azimuth and tilt are one, tilt is 0.
+    """
+    right, _, forward = np.asarray(rotation, np.float64).tolist()
+    level = math.hypot(forward[0], forward[1])
+    elevation = math.atan2(-forward[2], level)
+    if level < 1e-12:
+        return math.atan2(right[1], right[0]), elevation, 0.0
+    azimuth = math.atan2(-forward[0], forward[1])
+    ca, sa, ce, se = math.cos(azimuth), math.sin(azimuth), math.cos(elevation), math.sin(elevation)
+    across = right[0] * ca + right[1] * sa
+    down = right[0] * se * sa - right[1] * se * ca - right[2] * ce
+    return azimuth, elevation, math.atan2(down, across)
+
+
 def focal_from_fov(fov: float, extent: float, fisheye: bool = False) -> float:
     """Focal length in pixels that makes `extent` pixels span the full angle `fov` (radians).
 

@@ -36,7 +36,7 @@ from viewsphere.model.recipe_values import (
 from viewsphere.model.shot import Ground, Sky, Sun
 
 LARGEST_IMAGE = 16384
-LENSES = ("fov_deg", "focal_px", "focal_mm", "K")
+LENSES = ("fov_deg", "focal_px", "focal_mm", "K", "of_viewpoints")
 
 Row = tuple[Number, Number, Number]
 Pixels = Annotated[Count, Field(le=LARGEST_IMAGE)]
@@ -62,6 +62,9 @@ class CameraEntry(Frozen):
         description="full 3x3 camera matrix in pixels, origin at the image's corner (centre: width/2, height/2)",
     )
     distortion: Distortion | None = Field(default=None, description="lens distortion with OpenCV's coefficients")
+    of_viewpoints: Literal[True] | None = Field(
+        default=None, description="true: size and lens as the viewpoints' file says (nerfstudio, COLMAP)"
+    )
 
     @model_validator(mode="before")
     @classmethod
@@ -89,7 +92,9 @@ class CameraEntry(Frozen):
         given = [name for name in LENSES if getattr(self, name) is not None]
         if len(given) != 1:
             found = " and ".join(given) or "none"
-            raise ValueError(f"expected one of fov_deg, focal_px, focal_mm with sensor_mm, K; found {found}")
+            raise ValueError(f"expected one of fov_deg, focal_px, focal_mm with sensor_mm, K, of_viewpoints; found {found}")
+        if self.of_viewpoints and (self.size != type(self).model_fields["size"].default or self.distortion):
+            raise ValueError("expected no size and no distortion beside of_viewpoints, which says both; found one")
         if (self.focal_mm is None) != (self.sensor_mm is None):
             raise ValueError("expected focal_mm and sensor_mm together; found one of them")
         return self

@@ -9,6 +9,7 @@ from pydantic import Discriminator, Field, Tag, field_validator, model_validator
 from viewsphere.geometry.pose_category import pose_category
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.recipe_values import Count, Interval, Number, Point, Positive, Range, Values
+from viewsphere.model.shot import Axis
 
 AZIMUTH = "0: the camera faces the model's front; 90: it stands on the model's left, +X"
 ELEVATION = "above the horizon, -90 to 90"
@@ -185,6 +186,34 @@ class Normal(_Aimed):
     sd: Spread = Field(description="standard deviations")
 
 
+class PoseList(_Aimed):
+    """Viewpoints from a file: orbits around the target, or a camera's motion through the file's own world.
+
+    A motion is turned so that the file's `up` is +Z and its `forward` is -Y, moved so that `origin` lies where the models
+    stand, and scaled; its cameras look where they looked, whatever the target.
+    """
+
+    kind: Literal["file"] = Field(description="from a file")
+    path: Annotated[str, Field(min_length=1)] = Field(description="the file, or COLMAP's folder")
+    format: Literal["auto", "csv", "view", "tum", "kitti", "nerfstudio", "colmap"] = Field(
+        default="auto", description="auto: by the file's ending, and by the numbers in its first line"
+    )
+    every: Count = Field(default=1, description="take every n-th pose")
+    origin: Point = Field(default=(0.0, 0.0, 0.0), description="motions: where the models stand, in the file's world and unit")
+    scale: Positive = Field(default=1.0, description="motions: metres in one unit of the file")
+    up: Axis | None = Field(default=None, description="motions: the file's axis that points up; default: the format's")
+    forward: Axis | None = Field(
+        default=None,
+        description="motions: the file's axis that becomes -Y, where models face; default: -y, or -z if that is up or down",
+    )
+
+    @model_validator(mode="after")
+    def _right_angles(self) -> PoseList:
+        if self.up and self.forward and self.up[1] == self.forward[1]:
+            raise ValueError(f"expected up and forward at right angles; found up {self.up} and forward {self.forward}")
+        return self
+
+
 def _kind(value: Any) -> Any:
     return value.get("kind", "grid") if isinstance(value, dict) else getattr(value, "kind", None)
 
@@ -193,6 +222,7 @@ Viewpoints = Annotated[
     Annotated[Grid, Tag("grid")]
     | Annotated[Sphere, Tag("sphere")]
     | Annotated[Normal, Tag("normal")]
-    | Annotated[Jitter, Tag("jitter")],
+    | Annotated[Jitter, Tag("jitter")]
+    | Annotated[PoseList, Tag("file")],
     Discriminator(_kind),
 ]

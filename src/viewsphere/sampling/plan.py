@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 
 from viewsphere import plugins
 from viewsphere.errors import RecipeError
+from viewsphere.model.camera import Intrinsics
 from viewsphere.model.mistakes import nearest, one_of
 from viewsphere.model.recipe import Recipe
-from viewsphere.model.recipe_values import Range
 from viewsphere.model.shot import Background, Frame, ModelSpec, Placement, Scene, Shot
 from viewsphere.sampling.models import categories, count_models, model_specs
 from viewsphere.sampling.seeds import generator, share
@@ -43,6 +43,11 @@ class Plan:
     categories: tuple[Category, ...]
     images: tuple[str, ...]  # absolute paths of the background's images, sorted
     shot_frames: int
+
+    @cached_property
+    def intrinsics(self) -> Intrinsics:
+        """The lens of all frames."""
+        return _lens(self.recipe, self.pose_list)
 
     @property
     def models(self) -> int:
@@ -93,10 +98,7 @@ class Plan:
             for name, count in self.split_counts.items()
             if count == 0
         ]
-        elevation = self.recipe.viewpoints.elevation
-        if isinstance(elevation, Range):
-            elevation = elevation.start
-        lowest = min(elevation) if isinstance(elevation, tuple) else elevation
+        lowest = self.pose_list.lowest_elevation
         if lowest < 0 and self.recipe.scene.floor is not None:
             found.append(
                 f"elevations go down to {lowest:g}: from below, the ground hides the models; set scene.ground: off to see them"
@@ -165,7 +167,7 @@ class Plan:
         return Shot(
             key=self.shot_key(index),
             placements=(Placement(id=1, model=spec),),
-            intrinsics=self.recipe.camera.intrinsics,
+            intrinsics=self.intrinsics,
             scene=self._scene,
             frames=frames,
             engine=self.recipe.engine.name,
@@ -228,7 +230,7 @@ class Plan:
         """
         models = [m.model_dump(mode="json") | {"source": Path(m.source).name} for m in self.model_specs]
         images = [Path(i).name for i in self.images]
-        value = [self.recipe.digest, models, images, self._chunks]
+        value = [self.recipe.digest, models, self.pose_list.digest, images, self._chunks]
         return hashlib.sha256(json.dumps(value, separators=(",", ":")).encode()).hexdigest()
 
 
@@ -240,7 +242,8 @@ def plan(recipe: Recipe, shot_frames: int | None = None) -> Plan:
     """
     with recipe.located():
         _check_names(recipe)
-        views = poses(recipe.viewpoints, recipe.seed)
+        views = poses(recipe.viewpoints, recipe.seed, recipe.folder)
+        _lens(recipe, views)
         _check_frames(recipe, views)
         specs = model_specs(recipe)
         _check_listed(recipe, specs)
@@ -278,6 +281,14 @@ def _check_names(recipe: Recipe) -> None:
     for i, name in enumerate(recipe.formats):
         if name not in formats:
             raise RecipeError(f"formats[{i}]: {one_of(name, formats)}")
+
+
+def _lens(recipe: Recipe, views: Poses) -> Intrinsics:
+    if not recipe.camera.of_viewpoints:
+        return recipe.camera.intrinsics
+    if views.intrinsics is None:
+        raise RecipeError("camera.of_viewpoints: expected a file of poses that names a lens; found none: give fov_deg or K")
+    return views.intrinsics
 
 
 def _check_frames(recipe: Recipe, views: Poses) -> None:

@@ -2,22 +2,28 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
 from abc import abstractmethod
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 from typing import NamedTuple, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from viewsphere.geometry.camera import orbit_center, orbit_rotation
+from viewsphere.assets.normalise import rotation as axes_rotation
+from viewsphere.geometry.camera import orbit_angles, orbit_center, orbit_rotation
 from viewsphere.geometry.pose_category import pose_category
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.camera import Camera, Intrinsics
-from viewsphere.model.recipe_viewpoints import Grid, Jitter, Normal, Sphere, axis_value
-from viewsphere.model.shot import Pose
+from viewsphere.model.recipe_values import Range
+from viewsphere.model.recipe_viewpoints import Grid, Jitter, Normal, PoseList, Sphere, Viewpoints, axis_value
+from viewsphere.model.shot import Pose, Vector
+from viewsphere.sampling.pose_files import Motion, PoseFile, read_poses
 from viewsphere.sampling.seeds import generator
 
 Float = NDArray[np.float64]
@@ -39,8 +45,32 @@ class Poses(Sequence[Pose]):
     `counts` are the factors of their number, outermost loop first.
     """
 
-    viewpoints: Grid | Sphere | Normal | Jitter
+    viewpoints: Grid | Sphere | Normal | Jitter | PoseList
     seed: int
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 of what the recipe does not say of the poses, as it stands in a file; empty if there is no such thing."""
+        return ""
+
+    @property
+    def intrinsics(self) -> Intrinsics | None:
+        """The lens that a file of poses names."""
+        return None
+
+    @property
+    def lowest_elevation(self) -> float:
+        """The lowest elevation there can be, degrees; where they are normal around one, that one."""
+        assert not isinstance(self.viewpoints, PoseList)
+        elevation = self.viewpoints.elevation
+        if isinstance(elevation, Range):
+            elevation = elevation.start
+        return min(elevation) if isinstance(elevation, tuple) else elevation
+
+    def target(self, index: int) -> Vector | None:
+        """What the camera looks at, world metres; None: the centre of the model's box."""
+        target = self.viewpoints.target
+        return None if target == "center" else target
 
     @property
     @abstractmethod
@@ -76,14 +106,13 @@ class Poses(Sequence[Pose]):
 
     def _pose(self, index: int) -> Pose:
         view = self.view(index)
-        target = self.viewpoints.target
         return Pose(
             index=index,
             azimuth_deg=view.azimuth,
             elevation_deg=view.elevation,
             distance=view.distance,
             tilt_deg=view.tilt,
-            target=None if target == "center" else target,
+            target=self.target(index),
             category=pose_category(view.azimuth, view.elevation, self.viewpoints.bins),
         )
 
@@ -213,9 +242,89 @@ class NormalPoses(Poses):
                 return view
 
 
-def poses(viewpoints: Grid | Sphere | Normal | Jitter, seed: int) -> Poses:
-    """The poses of a recipe's viewpoints; `seed` is the recipe's."""
+@dataclass(frozen=True)
+class ListedPoses(Poses):
+    """Poses of a file. A motion's target is the point on the optical axis that is nearest to the models, 1 m ahead of the
+    camera if that lies behind it.
+    """
+
+    viewpoints: PoseList
+    file: PoseFile
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """The number of poses."""
+        return {"poses": len(self.file.entries)}
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 of the poses and the lens."""
+        return hashlib.sha256(repr(self.file).encode()).hexdigest()
+
+    @property
+    def intrinsics(self) -> Intrinsics | None:
+        """The file's lens, if it names one."""
+        return self.file.intrinsics
+
+    @property
+    def lowest_elevation(self) -> float:
+        """Of orbits; motions may be below the ground, or not, whatever their angles."""
+        return min((view.elevation for view, target in self._views if target is None), default=90.0)
+
+    def name(self, index: int) -> str:
+        """The pose's values, and how often they were there before: a camera that rests has equal poses."""
+        return self._names[index]
+
+    def view(self, index: int) -> View:
+        """The values of the file, or those of a motion."""
+        return self._views[index][0]
+
+    def target(self, index: int) -> Vector | None:
+        """The recipe's for orbits; of a motion, a point on the optical axis."""
+        return self._views[index][1] or super().target(index)
+
+    @cached_property
+    def _views(self) -> tuple[tuple[View, Vector | None], ...]:
+        turn = self._turn
+        return tuple(
+            self._view_of(turn, entry) if isinstance(entry, Motion) else (View(*entry), None) for entry in self.file.entries
+        )
+
+    @cached_property
+    def _names(self) -> tuple[str, ...]:
+        seen: Counter[str] = Counter()
+        names: list[str] = []
+        for view, target in self._views:
+            name = "pose " + " ".join(repr(v + 0.0) for v in (*view, *(target or ())))
+            names.append(f"{name} again {seen[name]}" if seen[name] else name)
+            seen[name] += 1
+        return tuple(names)
+
+    @property
+    def _turn(self) -> Float:
+        """Our world from the file's, (3, 3)."""
+        up = self.viewpoints.up or self.file.up
+        return axes_rotation(up, self.viewpoints.forward or ("-z" if up[1] == "y" else "-y"), "viewpoints")
+
+    def _view_of(self, turn: Float, motion: Motion) -> tuple[View, Vector]:
+        rotation = transform(turn, motion.R)  # rows: the camera's axes, in our world
+        center = self.viewpoints.scale * transform(turn, np.subtract(motion.center, self.viewpoints.origin))
+        ahead = -float((rotation[2] * center).sum())
+        distance = ahead if ahead > 1e-3 else 1.0
+        azimuth, elevation, tilt = (math.degrees(a) for a in orbit_angles(rotation))
+        x, y, z = (center + distance * rotation[2]).tolist()
+        return View(azimuth % 360.0, elevation, distance, tilt), (x, y, z)
+
+
+def poses(viewpoints: Viewpoints, seed: int, folder: Path = Path()) -> Poses:
+    """The poses of a recipe's viewpoints; `seed` and `folder`, from which paths start, are the recipe's.
+
+    Raises RecipeError for a file of poses that cannot be read.
+    """
     match viewpoints:
+        case PoseList():
+            path = folder / Path(viewpoints.path).expanduser()
+            return ListedPoses(viewpoints, seed, read_poses(path, viewpoints.format, viewpoints.every))
         case Jitter():
             return JitteredPoses(viewpoints, seed)
         case Sphere():

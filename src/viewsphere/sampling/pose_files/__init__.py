@@ -1,0 +1,68 @@
+"""Files of poses: orbits (CSV, Render for CNN's view files) and motions (TUM, KITTI, nerfstudio, COLMAP)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+from viewsphere.errors import RecipeError
+from viewsphere.model.mistakes import one_of
+from viewsphere.sampling.pose_files.entries import Motion, Orbit, PoseFile
+from viewsphere.sampling.pose_files.lines import read_lines
+
+FORMATS = ("csv", "view", "tum", "kitti", "nerfstudio", "colmap")
+COLUMNS = {4: "view", 8: "tum", 12: "kitti"}
+"""Numbers in a line of the formats that have nothing else."""
+
+__all__ = ["FORMATS", "Motion", "Orbit", "PoseFile", "read_poses"]
+
+
+def read_poses(path: Path, kind: str = "auto", every: int = 1) -> PoseFile:
+    """Every `every`-th pose of a file (of COLMAP: a folder), and the file's lens if it has one.
+
+    `kind` is one of FORMATS, or `auto`: by the path's ending, and for text by the numbers in its first line. Raises
+    RecipeError, with file and line, for anything that cannot be read, and for a file without poses.
+    """
+    kind = _kind(path) if kind == "auto" else kind
+    found = _read(path, kind)
+    if not found.entries:
+        raise RecipeError(f"{path}: expected at least one pose; found none")
+    return replace(found, entries=found.entries[::every])
+
+
+def _kind(path: Path) -> str:
+    if path.is_dir():
+        return "colmap"
+    if path.suffix.lower() in {".json", ".csv"}:
+        return {".json": "nerfstudio", ".csv": "csv"}[path.suffix.lower()]
+    if path.name == "images.txt":
+        return "colmap"
+    number, first = next(iter(read_lines(path)), (1, []))
+    if len(first) not in COLUMNS:
+        raise RecipeError(
+            f"{path}:{number}: expected 4 numbers in a line (azimuth elevation tilt distance), 8 (TUM) or 12 (KITTI); "
+            f"found {len(first)}: say which format it is"
+        )
+    return COLUMNS[len(first)]
+
+
+def _read(path: Path, kind: str) -> PoseFile:
+    match kind:
+        case "csv" | "view":
+            from viewsphere.sampling.pose_files import orbits
+
+            return orbits.read_csv(path) if kind == "csv" else orbits.read_view(path)
+        case "tum" | "kitti":
+            from viewsphere.sampling.pose_files import trajectories
+
+            return trajectories.read_tum(path) if kind == "tum" else trajectories.read_kitti(path)
+        case "nerfstudio":
+            from viewsphere.sampling.pose_files.nerfstudio import read_nerfstudio
+
+            return read_nerfstudio(path)
+        case "colmap":
+            from viewsphere.sampling.pose_files.colmap import read_colmap
+
+            return read_colmap(path)
+        case _:
+            raise RecipeError(f"viewpoints.format: {one_of(kind, FORMATS)}")
