@@ -236,8 +236,9 @@ BLOCKS = re.findall(r"```yaml\n(.*?)```", (ROOT / "docs" / "recipe.md").read_tex
 def test_every_block_of_the_documentation_is_a_recipe_or_a_part_of_one(write, block):
     part, _ = read(write(block))
     whole = {"models": [{"source": "zoo:car"}], "viewpoints": {"distance": 5}, **part}
-    Recipe(**whole)
     validator().validate(whole)
+    whole.pop("extends", None)
+    Recipe(**whole)
 
 
 def test_the_documentation_names_every_field():

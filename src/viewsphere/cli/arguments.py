@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -12,15 +13,20 @@ if TYPE_CHECKING:
 
 RecipeFile = Annotated[Path, typer.Argument(help="Recipe (YAML).", show_default=False)]
 DataFolder = Annotated[Path, typer.Argument(help="Folder that `render` wrote.", show_default=False)]
+Changes = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="FIELD=VALUE", help="Set a field: viewpoints.elevation=[10,20]; several times for several."),
+]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON for scripts.")]
 Formats = Annotated[str | None, typer.Option("--format", "-f", help="Formats, with commas; default: the recipe's.")]
 
 
-def load_recipe(file: Path) -> Recipe:
-    """The recipe of a file; RecipeError names every mistake."""
+def load_recipe(file: Path, changes: Sequence[str] | None = None) -> Recipe:
+    """The recipe of a file with some fields set; RecipeError names every mistake."""
     from viewsphere.model.recipe import Recipe
+    from viewsphere.model.recipe_extends import parse_change
 
-    return Recipe.load(file)
+    return Recipe.load(file, dict(map(parse_change, changes or ())))
 
 
 def split(formats: str | None) -> tuple[str, ...] | None:

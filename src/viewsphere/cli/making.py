@@ -10,7 +10,7 @@ from typing import Annotated
 
 import typer
 
-from viewsphere.cli.arguments import AsJson, Formats, RecipeFile, load_recipe, split
+from viewsphere.cli.arguments import AsJson, Changes, Formats, RecipeFile, load_recipe, split
 from viewsphere.cli.terminal import ProgressBar, print_json, print_plan, print_summary, write, write_picture
 from viewsphere.errors import StoreError, UserError
 
@@ -75,11 +75,11 @@ def inspect(
     typer.echo(f"picture from four sides: {picture} (the first view must show the front; if not, set up and forward)")
 
 
-def plan(recipe: RecipeFile, json_: AsJson = False) -> None:
+def plan(recipe: RecipeFile, changes: Changes = None, json_: AsJson = False) -> None:
     """Say what a recipe would make: models, poses, frames, splits. Nothing is rendered, no model is read."""
     from viewsphere.sampling.plan import plan as make_plan
 
-    planned = make_plan(load_recipe(recipe))
+    planned = make_plan(load_recipe(recipe, changes))
     counts = {
         "name": planned.recipe.name,
         "models": planned.models,
@@ -105,14 +105,18 @@ def preview(
     count: Annotated[int, typer.Option("-n", "--count", min=1, help="Frames shown.")] = 12,
     draw: Annotated[list[Draw] | None, typer.Option(help="Draw over the pictures; may be given several times.")] = None,
     columns: Annotated[int, typer.Option(min=1, help="Pictures in a row.")] = 4,
+    changes: Changes = None,
 ) -> None:
     """Write a contact sheet: a recipe's frames rendered small, or a data set's."""
     from viewsphere.preview import contact_sheet, dataset_samples, preview_samples
     from viewsphere.store import Dataset
 
-    if not source.is_dir():
+    if source.is_dir():
+        samples = dataset_samples(Dataset(source), count)
+    else:
+        recipe = load_recipe(source, changes)
         _announce_compilation()
-    samples = dataset_samples(Dataset(source), count) if source.is_dir() else list(preview_samples(load_recipe(source), count))
+        samples = list(preview_samples(recipe, count))
     if not samples:
         raise StoreError(f"{source}: expected finished frames, found none: render first")
     write_picture(output, contact_sheet(samples, [d.value for d in draw or ()], columns))
@@ -120,8 +124,9 @@ def preview(
 
 
 def render(
-    recipe: RecipeFile,
-    output: Annotated[Path, typer.Option("-o", "--output", help="Folder of the data set.", show_default=False)],
+    recipe: Annotated[Path | None, typer.Argument(help="Recipe (YAML).", show_default=False)] = None,
+    output: Annotated[Path | None, typer.Option("-o", "--output", help="Folder of the data set.", show_default=False)] = None,
+    changes: Changes = None,
     format_: Formats = None,
     workers: Annotated[
         int | None,
@@ -134,7 +139,9 @@ def render(
     from viewsphere.run.generate import generate
     from viewsphere.sampling.plan import plan as make_plan
 
-    loaded = load_recipe(recipe)
+    if recipe is None or output is None:
+        raise UserError(_next_step(recipe, output))
+    loaded = load_recipe(recipe, changes)
     planned = make_plan(loaded)
     if not json_:
         print_plan(planned)
@@ -154,6 +161,19 @@ def render(
             typer.echo(f"stopped; {bar.kept}. Run the same command to go on", err=True)
             raise typer.Exit(130) from None
     print_summary(summary, json_)
+
+
+def _next_step(recipe: Path | None, output: Path | None) -> str:
+    """What to write after `viewsphere render` when something is missing."""
+    if recipe is None:
+        near = sorted(f for pattern in ("*.yaml", "*.yml", "*/recipe.yaml") for f in Path().glob(pattern))
+        recipe = near[0] if near else Path("cars/recipe.yaml")
+        first = f"found {recipe} here" if near else "no recipe yet? `viewsphere new cars` writes one"
+        found = "found nothing" if output is None else "found no recipe"
+    else:
+        first, found = "the folder need not exist", f"found no folder for {recipe}"
+    folder = output or Path(f"{recipe.parent.name or recipe.stem}-ds")
+    return f"render: expected a recipe and -o FOLDER; {found}\n{first}; next: viewsphere render {recipe} -o {folder}"
 
 
 def _announce_compilation() -> None:

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from difflib import get_close_matches
-from typing import Any, cast
+from typing import Any, NamedTuple, cast
 
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails, InitErrorDetails, PydanticCustomError
@@ -15,20 +15,30 @@ Path = tuple[str | int, ...]
 EXPLAINED = "explained"
 
 
+class Place(NamedTuple):
+    """Where a value stands: a file and a line, counted from 1; or what else the user wrote, and 0."""
+
+    file: str
+    line: int
+
+    def __str__(self) -> str:
+        return f"{self.file}:{self.line}" if self.line else self.file
+
+
 @dataclass(frozen=True)
 class Marks:
-    """Where the values of a file stand: path of keys and indices -> line, counted from 1. It is no part of what they say:
-    all marks are equal.
+    """Where the values of a recipe's file stand, and those it took from elsewhere. It is no part of what they say: all marks
+    are equal.
     """
 
     file: str = field(default="", compare=False)
-    lines: Mapping[Path, int] = field(default_factory=dict[Path, int], compare=False)
+    places: Mapping[Path, Place] = field(default_factory=dict[Path, Place], compare=False)
 
-    def line(self, path: Path) -> int:
-        """Line of the value, else of the innermost value around it that stands in the file."""
-        while path and path not in self.lines:
+    def place(self, path: Path) -> Place:
+        """Place of the value, else of the innermost value around it that was written."""
+        while path and path not in self.places:
             path = path[:-1]
-        return self.lines.get(path, 1)
+        return self.places.get(path, Place(self.file, 1))
 
     def located(self, message: str) -> str:
         """A message that begins with a field, `models[0].source: ...`, with file and line before it."""
@@ -36,7 +46,7 @@ class Marks:
         if not self.file or field_ is None:
             return message
         steps = re.findall(r"\[(\d+)\]|(\w+)", field_[0])
-        return f"{self.file}:{self.line(tuple(int(i) if i else name for i, name in steps))}: {message}"
+        return f"{self.place(tuple(int(i) if i else name for i, name in steps))}: {message}"
 
 
 def nearest(name: object, known: Iterable[str]) -> str:
@@ -85,12 +95,12 @@ def _follows(error: ErrorDetails, errors: Sequence[ErrorDetails]) -> bool:
 
 def report(error: ValidationError, data: object, marks: Marks | None = None) -> str:
     """All mistakes, a line each in the file's order: `recipe.yaml:12: models[0].categry: expected ...`."""
-    found: list[tuple[int, str]] = []
+    found: list[tuple[Place, str]] = []
     for e in error.errors(include_url=False):
         path = _path_in(data, e["loc"]) + _below(e)
-        line = marks.line(path) if marks else 0
-        where = f"{marks.file}:{line}: " if marks else ""
-        found.append((line, f"{where}{dotted(path)}: {_words(e, ())}"))
+        place = marks.place(path) if marks else Place("", 0)
+        where = f"{place}: " if marks else ""
+        found.append((place, f"{where}{dotted(path)}: {_words(e, ())}"))
     return "\n".join(dict.fromkeys(text for _, text in sorted(found, key=lambda f: f[0])))
 
 

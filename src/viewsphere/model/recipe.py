@@ -174,11 +174,14 @@ class Recipe(Frozen):
         return self._folder
 
     @classmethod
-    def load(cls, path: str | PathLike[str]) -> Self:
-        """Read a recipe file; raises RecipeError with file, line and field of every mistake."""
-        from viewsphere.model.recipe_file import read
+    def load(cls, path: str | PathLike[str], changes: Mapping[str, Any] | None = None) -> Self:
+        """Read a recipe file and those it extends; `changes` are fields to set: `{"viewpoints.elevation": [10, 20]}`.
 
-        data, marks = read(Path(path))
+        Raises RecipeError with file, line and field of every mistake.
+        """
+        from viewsphere.model.recipe_extends import assemble
+
+        data, marks = assemble(Path(path), _plain(changes))
         return cls.model_validate(data, context={"marks": marks, "folder": Path(path).parent})
 
     @property

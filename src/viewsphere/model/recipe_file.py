@@ -12,8 +12,8 @@ import yaml
 from yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
 from viewsphere.errors import RecipeError
-from viewsphere.model.mistakes import Marks, dotted, shown
-from viewsphere.model.mistakes import Path as Place
+from viewsphere.model.mistakes import Marks, Place, dotted, shown
+from viewsphere.model.mistakes import Path as Steps
 
 LARGEST_FILE = 10_000_000
 MOST_VALUES = 200_000
@@ -49,21 +49,26 @@ _use_yaml_12(_Dumper)
 
 
 def read(path: Path) -> tuple[Any, Marks]:
-    """Plain data of a recipe file, and the line of every value in it; raises RecipeError naming file and line."""
-    text = _text(path)
-    loader = _Loader(text)
-    try:
-        root = loader.get_single_node()
-        reader = _Reader(str(path))
-        data = reader.value(root, ()) if root is not None else None
-    except yaml.MarkedYAMLError as error:
-        raise RecipeError(_syntax(path, text, error)) from None
-    except RecursionError:
-        raise RecipeError(f"{path}: expected a recipe, found lists or mappings nested too deeply") from None
+    """Plain data of one recipe file, and the place of every value in it; raises RecipeError naming file and line."""
+    data, marks = parse(_text(path), str(path))
     if not isinstance(data, dict):
         found = "an empty file" if data is None else shown(data)
         raise RecipeError(f"{path}:1: expected a mapping of name, models, viewpoints, ...; found {found}")
-    return data, Marks(str(path), reader.lines)
+    return data, marks
+
+
+def parse(text: str, source: str) -> tuple[Any, Marks]:
+    """Any YAML text as plain data, and the place of every value in it; raises RecipeError beginning with `source` and line."""
+    loader = _Loader(text)
+    try:
+        root = loader.get_single_node()
+        reader = _Reader(source)
+        data = reader.value(root, ()) if root is not None else None
+    except yaml.MarkedYAMLError as error:
+        raise RecipeError(_syntax(source, text, error)) from None
+    except RecursionError:
+        raise RecipeError(f"{source}: expected a recipe, found lists or mappings nested too deeply") from None
+    return data, Marks(source, {steps: Place(source, line) for steps, line in reader.lines.items()})
 
 
 def _text(path: Path) -> str:
@@ -89,7 +94,7 @@ def _text(path: Path) -> str:
     return text
 
 
-def _syntax(path: Path, text: str, error: yaml.MarkedYAMLError) -> str:
+def _syntax(path: str, text: str, error: yaml.MarkedYAMLError) -> str:
     mark = error.problem_mark or error.context_mark
     line = mark.line + 1 if mark else 1
     around = text.splitlines()[mark.line] if mark and mark.line < text.count("\n") + 1 and text else ""
@@ -104,11 +109,11 @@ class _Reader:
 
     def __init__(self, file: str) -> None:
         self.file = file
-        self.lines: dict[Place, int] = {}
+        self.lines: dict[Steps, int] = {}
         self._count = 0
         self._open: set[int] = set()
 
-    def value(self, node: Node, place: Place) -> Any:
+    def value(self, node: Node, place: Steps) -> Any:
         """The node's plain data; raises RecipeError for duplicate keys, tags and endless or exploding aliases."""
         line = node.start_mark.line + 1
         self.lines.setdefault(place, line)
@@ -129,7 +134,7 @@ class _Reader:
             self._open.discard(id(node))
         raise self._error(line, place, f"expected plain YAML; found the tag {node.tag!r}")
 
-    def _mapping(self, node: MappingNode, place: Place) -> dict[str, Any]:
+    def _mapping(self, node: MappingNode, place: Steps) -> dict[str, Any]:
         result: dict[str, Any] = {}
         for key_node, value_node in node.value:
             line = key_node.start_mark.line + 1
@@ -143,7 +148,7 @@ class _Reader:
             result[key] = self.value(value_node, (*place, key))
         return result
 
-    def _scalar(self, node: ScalarNode, place: Place) -> Any:
+    def _scalar(self, node: ScalarNode, place: Steps) -> Any:
         text: str = node.value
         match node.tag.removeprefix(_TAG):
             case "null":
@@ -160,7 +165,7 @@ class _Reader:
                 line = node.start_mark.line + 1
                 raise self._error(line, place, f"expected plain YAML; found {shown(text)} with the tag {node.tag!r}")
 
-    def _error(self, line: int, place: Place, problem: str) -> RecipeError:
+    def _error(self, line: int, place: Steps, problem: str) -> RecipeError:
         return RecipeError(f"{self.file}:{line}: {dotted(place)}: {problem}")
 
 
@@ -180,9 +185,18 @@ def schema() -> dict[str, Any]:
     """JSON schema (draft 2020-12) of recipe files, with a description of every field."""
     from viewsphere.model.recipe import Recipe
 
+    whole = Recipe.model_json_schema()
+    path = {"type": "string", "minLength": 1}
+    extends = {
+        "anyOf": [path, {"type": "array", "items": path}],
+        "description": "another recipe, or several, whose fields hold where this one says nothing",
+    }
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
-        **Recipe.model_json_schema(),
+        **whole,
+        "properties": {"extends": extends, **whole["properties"]},
+        "required": [],
+        "anyOf": [{"required": ["extends"]}, {"required": whole["required"]}],
         "title": "viewsphere recipe",
     }
 

@@ -1,0 +1,180 @@
+"""Recipes made of others: `extends: base.yaml`, and fields set from outside (`--set`)."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, cast
+
+from viewsphere.errors import RecipeError
+from viewsphere.model.mistakes import Marks, Place, dotted, shown
+from viewsphere.model.mistakes import Path as Steps
+from viewsphere.model.recipe_file import parse, read
+from viewsphere.model.recipe_models import ZOO
+
+PATHS: tuple[tuple[str, ...], ...] = (
+    ("models", "*", "source"),
+    ("models", "*", "source", "*"),
+    ("models", "*", "real_size"),
+    ("models", "*", "real_size", "csv"),
+    ("viewpoints", "path"),
+    ("scene", "background", "image"),
+    ("scene", "background", "images"),
+    ("scene", "place"),
+    ("scene", "place", "source"),
+    ("scene", "planes", "*", "image"),
+    ("scene", "planes", "*", "images"),
+)
+"""Fields that hold a path, which is relative to the file it is written in."""
+
+WORDS = {"file"}
+"""What stands in these fields besides paths and the zoo's names."""
+
+_STEP = re.compile(r"(?:^|\.)([A-Za-z_][\w-]*)|\[(\d+)\]")
+
+
+@dataclass(frozen=True)
+class _Layer:
+    """Plain data, and where every value of it stands."""
+
+    data: dict[str, Any]
+    places: dict[Steps, Place]
+
+
+def assemble(path: Path, changes: Mapping[str, Any] | None = None) -> tuple[dict[str, Any], Marks]:
+    """The data of a recipe file upon those it extends, with `changes` (`viewpoints.elevation` -> value), and its places.
+
+    A mapping is merged field by field, but one of another `kind` takes the other's place, as everything else does; null takes
+    a field away. Raises RecipeError as `read` does, and for files that extend one another in a circle.
+    """
+    layer = _extended(path, ())
+    for name, value in (changes or {}).items():
+        layer = _set(layer, name, value)
+    return layer.data, Marks(str(path), layer.places)
+
+
+def parse_change(text: str) -> tuple[str, Any]:
+    """Field and value of `viewpoints.elevation=[10, 20]`; the value is YAML. Raises RecipeError for anything else."""
+    name, equals, value = text.partition("=")
+    if not equals:
+        raise RecipeError(f"--set {text}: expected field=value, such as viewpoints.elevation=[10,20]; found no '='")
+    return name.strip(), parse(value, f"--set {name.strip()}")[0]
+
+
+def _extended(path: Path, above: tuple[Path, ...]) -> _Layer:
+    data, marks = read(path)
+    layer = _Layer(cast(dict[str, Any], data), dict(marks.places))
+    names = layer.data.pop("extends", ())
+    where = marks.place(("extends",))
+    chain = (*above, path.resolve())
+    whole = _Layer({}, {})
+    for name in cast(list[Any], names) if isinstance(names, list) else (names,) if names else ():
+        if not isinstance(name, str):
+            raise RecipeError(f"{where}: extends: expected the path of a recipe, or a list of them; found {shown(name)}")
+        base = path.parent / Path(name).expanduser()
+        if base.resolve() in chain:
+            raise RecipeError(f"{where}: extends: expected recipes that do not extend one another; found {name} again")
+        if not base.is_file():
+            raise RecipeError(f"{where}: extends: expected a recipe file; found none at {base}")
+        found = _extended(base, chain)
+        _rebase(found.data, os.path.relpath(base.parent, path.parent))
+        whole = _merged(whole, found)
+    return _merged(whole, layer)
+
+
+def _merged(under: _Layer, over: _Layer) -> _Layer:
+    places = dict(under.places)
+    data = _merge(under.data, over.data, (), lambda steps: _forget(places, steps))
+    return _Layer(data, places | over.places)
+
+
+def _merge(under: dict[str, Any], over: dict[str, Any], steps: Steps, forget: Callable[[Steps], None]) -> dict[str, Any]:
+    result = dict(under)
+    for name, value in over.items():
+        inside = (*steps, name)
+        old = result.get(name)
+        if isinstance(old, dict) and isinstance(value, dict) and not _of_other_kind(old, value):
+            result[name] = _merge(cast(dict[str, Any], old), cast(dict[str, Any], value), inside, forget)
+            continue
+        forget(inside)
+        result.pop(name, None)
+        if value is not None:
+            result[name] = value
+    return result
+
+
+def _of_other_kind(old: Any, new: Any) -> bool:
+    return "kind" in new and new["kind"] != old.get("kind", "grid")
+
+
+def _forget(places: dict[Steps, Place], steps: Steps) -> None:
+    for known in [p for p in places if p[: len(steps)] == steps]:
+        del places[known]
+
+
+def _set(layer: _Layer, name: str, value: Any) -> _Layer:
+    """The layer with one field of another value."""
+    where = f"--set {name}"
+    steps = _steps(name, where)
+    places = dict(layer.places)
+    _forget(places, steps)
+    places[steps] = Place(where, 0)
+    return _Layer(cast(dict[str, Any], _replaced(layer.data, steps, value, where)), places)
+
+
+def _steps(name: str, where: str) -> Steps:
+    steps: list[str | int] = []
+    end = 0
+    while end < len(name):
+        step = _STEP.match(name, end)
+        if step is None or (not steps and step[1] is None):
+            break
+        steps.append(step[1] or int(step[2]))
+        end = step.end()
+    if not steps or end < len(name):
+        raise RecipeError(f"{where}: expected a field, such as viewpoints.elevation or models[0].count; found {name!r}")
+    return tuple(steps)
+
+
+def _replaced(data: Any, steps: Steps, value: Any, where: str) -> Any:
+    if not steps:
+        return value
+    step, rest = steps[0], steps[1:]
+    if isinstance(step, int):
+        items = list(cast(list[Any], data)) if isinstance(data, list) else []
+        if step >= len(items):
+            raise RecipeError(f"{where}: expected an index below {len(items)}; found {step}")
+        items[step] = _replaced(items[step], rest, value, where)
+        return items
+    if data is not None and not isinstance(data, dict):
+        raise RecipeError(f"{where}: expected a mapping to set {dotted(steps)} in; found {shown(data)}")
+    fields = dict(cast(dict[str, Any], data or {}))
+    if not rest and value is None:
+        fields.pop(step, None)
+    else:
+        fields[step] = _replaced(fields.get(step), rest, value, where)
+    return fields
+
+
+def _rebase(data: Any, folder: str) -> None:
+    """Make the relative paths of a recipe start from another folder, in place."""
+    if folder != ".":
+        for pattern in PATHS:
+            _rebase_at(data, pattern, folder)
+
+
+def _rebase_at(data: Any, pattern: tuple[str, ...], folder: str) -> None:
+    step, rest = pattern[0], pattern[1:]
+    if step == "*":
+        keys: list[Any] = list(range(len(cast(list[Any], data)))) if isinstance(data, list) else []
+    else:
+        keys = [step] if isinstance(data, dict) and step in data else []
+    for key in keys:
+        value = data[key]
+        if rest:
+            _rebase_at(value, rest, folder)
+        elif isinstance(value, str) and value not in WORDS and not value.startswith((ZOO, "~")):
+            data[key] = Path(folder, value).as_posix()
