@@ -23,22 +23,25 @@ _ARRAYS = (
     "camera_from_object",
 )
 _TUPLES = ("box2d", "box2d_projected", "box2d_unclipped", "quaternion", "size", "real_size")
+_SHARES = ("visibility", "truncation")
 
 
 def sample_to_record(sample: Sample) -> dict[str, Any]:
     """The sample without its arrays of pixels, as `json.dumps(..., allow_nan=False)` takes it; NaN becomes
     null.
     """
-    camera = sample.camera
+    camera, pose = sample.known_camera, sample.known_pose
     return {
         "index": sample.index,
         "split": sample.split,
-        "pose": sample.pose.model_dump(mode="json"),
-        "camera": {
+        "pose": pose and pose.model_dump(mode="json"),
+        "camera": camera
+        and {
             "intrinsics": camera.intrinsics.model_dump(mode="json"),
             "R": camera.R.tolist(),
             "t": camera.t.tolist(),
         },
+        **({"size": sample.image_size} if sample.image_size else {}),
         "objects": [_object_to_record(o) for o in sample.objects],
         "files": dict(sample.files),
     }
@@ -46,16 +49,18 @@ def sample_to_record(sample: Sample) -> dict[str, Any]:
 
 def sample_from_record(record: Mapping[str, Any], channels: Mapping[str, NDArray[Any]], files: Mapping[str, str]) -> Sample:
     """The sample a record was made of, with these channels and files; every number is equal to the last bit."""
-    camera = record["camera"]
+    camera, pose, size = record["camera"], record["pose"], record.get("size")
     return Sample(
         index=record["index"],
         split=record["split"],
-        camera=Camera(
+        known_camera=camera
+        and Camera(
             Intrinsics.model_validate(camera["intrinsics"]),
             np.array(camera["R"], np.float64),
             np.array(camera["t"], np.float64),
         ),
-        pose=Pose.model_validate(record["pose"]),
+        known_pose=pose and Pose.model_validate(pose),
+        image_size=size and (int(size[0]), int(size[1])),
         objects=tuple(_object_from_record(o) for o in record["objects"]),
         channels=channels,
         files=files,
@@ -65,23 +70,33 @@ def sample_from_record(record: Mapping[str, Any], channels: Mapping[str, NDArray
 def _object_to_record(annotation: ObjectAnnotation) -> dict[str, Any]:
     record = dict(annotation.__dict__)
     record["rle"] = dict(annotation.rle.__dict__)
-    record["view"] = dict(annotation.view.__dict__)
+    record["view"] = {name: _without_nan(value) for name, value in annotation.view.__dict__.items()}
     for name in _ARRAYS:
         record[name] = _without_nan(record[name].tolist())
     for name in _TUPLES:
-        record[name] = None if record[name] is None else list(record[name])
+        record[name] = None if record[name] is None else _without_nan(list(record[name]))
+    for name in _SHARES:
+        record[name] = _without_nan(record[name])
+    if annotation.source is None:
+        del record["source"]
     return record
 
 
 def _object_from_record(record: Mapping[str, Any]) -> ObjectAnnotation:
     values = dict(record)
     values["rle"] = Rle(**record["rle"])
-    values["view"] = View(**record["view"])
+    values["view"] = View(**{name: _number(value) for name, value in record["view"].items()})
     for name in _ARRAYS:
         values[name] = np.array(record[name], np.bool_ if name == "box3d_in_front" else np.float64)
     for name in _TUPLES:
-        values[name] = None if record[name] is None else tuple(record[name])
+        values[name] = None if record[name] is None else tuple(map(_number, record[name]))
+    for name in _SHARES:
+        values[name] = _number(record[name])
     return ObjectAnnotation(**values)
+
+
+def _number(value: float | None) -> float:
+    return math.nan if value is None else value
 
 
 def _without_nan(value: Any) -> Any:

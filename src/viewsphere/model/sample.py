@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -9,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from viewsphere.errors import StoreError
 from viewsphere.model.camera import Camera
 from viewsphere.model.channel import CHANNELS
 from viewsphere.model.shot import Pose, Size
@@ -52,6 +54,9 @@ class ObjectAnnotation:
     visible pixels over all the pixels the object alone would cover, those outside the image included (BOP's
     visib_fract, on a canvas of three times the image's width and height); `truncation` is the share of the
     latter outside the image.
+
+    An object of an imported data set has `source`, its annotation there; what that does not say is NaN, and its
+    key and model may be empty. Where it says no mask, the mask is empty, but `box2d` and `area` are the source's.
     """
 
     id: int
@@ -79,6 +84,12 @@ class ObjectAnnotation:
     real_size: Size | None
     visibility: float
     truncation: float
+    source: Mapping[str, Any] | None = None
+
+    @property
+    def is_placed(self) -> bool:
+        """Whether the object's place in space is known."""
+        return not math.isnan(self.world_from_object[0, 0])
 
     @property
     def mask(self) -> NDArray[np.bool_]:
@@ -100,16 +111,43 @@ class ObjectAnnotation:
 @dataclass(frozen=True, eq=False)
 class Sample:
     """One frame: camera, pose, objects and channels. `channels` maps names of `CHANNELS` to arrays (loaded
-    when asked).
+    when asked). Pictures that were imported may have no known camera and pose; `image_size` is theirs.
     """
 
     index: int
     split: str
-    camera: Camera
-    pose: Pose
+    known_camera: Camera | None
+    known_pose: Pose | None
     objects: tuple[ObjectAnnotation, ...]
     channels: Mapping[str, NDArray[Any]]
     files: Mapping[str, str]  # channel -> path relative to the data set's root; empty in memory
+    image_size: tuple[int, int] | None = None  # (width, height) where there is no camera to say it
+
+    @property
+    def camera(self) -> Camera:
+        """Raises StoreError for an imported picture of which nobody knows the camera."""
+        if self.known_camera is None:
+            raise StoreError(
+                f"frame {self.index}: expected a camera, found an imported picture: nobody knows where it was taken"
+            )
+        return self.known_camera
+
+    @property
+    def pose(self) -> Pose:
+        """Raises StoreError for an imported picture of which nobody knows the pose."""
+        if self.known_pose is None:
+            raise StoreError(f"frame {self.index}: expected a pose, found an imported picture: nobody knows where it was taken")
+        return self.known_pose
+
+    @property
+    def width(self) -> int:
+        """Pixels."""
+        return self.image_size[0] if self.known_camera is None and self.image_size else self.camera.width
+
+    @property
+    def height(self) -> int:
+        """Pixels."""
+        return self.image_size[1] if self.known_camera is None and self.image_size else self.camera.height
 
     def __getattr__(self, name: str) -> NDArray[Any]:
         """Any channel by name: `sample.rgb`, `sample.depth`, `sample.instances`, ..."""
