@@ -9,6 +9,7 @@ from PIL import Image
 from viewsphere.assets import cache
 from viewsphere.assets.cache import cache_folder, load_normalised
 from viewsphere.assets.mesh import Mesh
+from viewsphere.assets.mesh_file import ARRAYS
 from viewsphere.errors import ModelError
 from viewsphere.model.shot import ModelSpec
 
@@ -34,13 +35,13 @@ def spec(write):
 def counted(monkeypatch):
     """How often a model file was read."""
     calls = []
-    read = cache.load_model
-    monkeypatch.setattr(cache, "load_model", lambda *args, **kw: calls.append(args) or read(*args, **kw))
+    read = cache.read_apart
+    monkeypatch.setattr(cache, "read_apart", lambda *args: calls.append(args) or read(*args))
     return calls
 
 
 def assert_same(a: Mesh, b: Mesh):
-    for name in cache.ARRAYS:
+    for name in ARRAYS:
         left, right = getattr(a, name), getattr(b, name)
         assert (left is None) == (right is None)
         if left is not None:

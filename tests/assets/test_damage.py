@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from viewsphere.assets.instances import count_instances
-from viewsphere.assets.limits import MAX_INSTANCES
+from viewsphere.assets.instances import ENOUGH, count_instances
 from viewsphere.assets.load import load_model
 from viewsphere.errors import ModelError
 
@@ -60,10 +59,12 @@ def test_damage_costs_one_clear_error(kind, write, tmp_path):
 
 
 def test_counting_follows_every_reference():
-    assert count_instances({"": ["a", "a", "b"], "a": ["b", "b"]}, "") == 1 + 3 + 3 + 1
-    assert count_instances({f"{i}": [f"{i + 1}"] * 2 for i in range(90)}, "0") == MAX_INSTANCES
-    assert count_instances({"": ["a"], "a": ["b"], "b": ["a"]}, "") == MAX_INSTANCES
-    assert count_instances({}, "") == 1
+    assert count_instances({"": ["a", "a", "b"], "a": ["b", "b"]}, "") == (1 + 3 + 3 + 1, 3)
+    assert count_instances({f"{i}": [f"{i + 1}"] * 2 for i in range(30)}, "0") == (2**31 - 1, 31)
+    assert count_instances({f"{i}": [f"{i + 1}"] * 2 for i in range(9000)}, "0") == (ENOUGH, 9001)
+    assert count_instances({"": ["a"], "a": ["b"], "b": ["a"]}, "")[0] is None
+    assert count_instances({"": ["a", "b"], "a": ["b"], "b": []}, "") == (4, 3)
+    assert count_instances({}, "") == (1, 1)
 
 
 def test_nested_instances_may_not_explode(write, tmp_path):

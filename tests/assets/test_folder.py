@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from viewsphere.assets import limits
 from viewsphere.assets.folder import ModelFolder, UnreadableError, decode_image
 from viewsphere.assets.load import load_model
 from viewsphere.errors import ModelError
@@ -70,16 +69,17 @@ def test_a_bad_image_is_a_warning(folder, write, data):
     assert "factor is used" in folder.warnings[0]
 
 
-def test_a_huge_image_is_refused_before_it_is_decoded(monkeypatch):
-    data = png(Image.new("1", (limits.MAX_TEXTURE_SIDE + 1, 1)))
-    with pytest.raises(UnreadableError, match=str(limits.MAX_TEXTURE_SIDE)):
-        decode_image(data, "t")
-    with pytest.raises(UnreadableError, match="in all"):
-        decode_image(png(Image.new("1", (16_000, 9_000))), "t")
-
-
 @pytest.mark.parametrize(
-    ("name", "message"), [("a.blend", "glb, gltf, obj"), ("a", "found 'none'"), ("a.obj", "no such file"), ("d.obj", "a file")]
+    ("name", "message"),
+    [
+        ("a.blend", "Blender files are not read; convert it to GLB .in Blender"),
+        ("a.usdz", "USD files are not read; convert it to GLB .in Blender"),
+        ("a.step", "STEP .CAD. files are not read; convert it to GLB .with its program"),
+        ("a.xyz", "glb, gltf, obj"),
+        ("a", "found 'none'"),
+        ("a.obj", "no such file"),
+        ("d.obj", "a file"),
+    ],
 )
 def test_paths_that_are_no_models(tmp_path, name, message):
     (tmp_path / "d.obj").mkdir()

@@ -4,7 +4,7 @@ readers change.
 An entry is two files: `<first>.json` lists the files that the model named when it was last read, and
 `<second>.npz` holds the mesh. The first name is the digest of the model's bytes, its settings and the
 readers; the second adds the bytes of the files listed. So an entry is never stale, and two folders with equal
-files share it.
+files share it. What is not in the cache is read in a process of its own (`isolated`).
 """
 
 from __future__ import annotations
@@ -12,61 +12,97 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import shutil
 import tempfile
-from collections.abc import Callable, Iterable
-from dataclasses import asdict
+import time
+from collections.abc import Callable, Generator, Iterable
+from contextlib import contextmanager, suppress
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any, cast
 
-import numpy as np
 import platformdirs
 
-from viewsphere.assets.load import load_model
-from viewsphere.assets.mesh import Image, Material, Mesh, Texture
+from viewsphere.assets import limits
+from viewsphere.assets.isolated import read_apart
+from viewsphere.assets.load import check_source
+from viewsphere.assets.mesh import Mesh
+from viewsphere.assets.mesh_file import read_mesh
 from viewsphere.assets.normalise import normalise
-from viewsphere.assets.piece import TEXTURE_FIELDS, FileFacts
+from viewsphere.assets.piece import FileFacts, extents
 from viewsphere.errors import ModelError
 from viewsphere.model.shot import ModelSpec
 
 SETTINGS = ("up", "forward", "unit", "centring", "scale", "real_size", "confined")
-ARRAYS = ("vertices", "triangles", "normals", "triangle_material", "triangle_part", "uv0", "uv1", "colors")
 ZOO = "zoo:"
+ASIDE = "reading-"
+STALE_SECONDS = 86_400.0
 
 
 def load_normalised(spec: ModelSpec, build: Callable[[ModelSpec], Mesh] | None = None, folder: Path | None = None) -> Mesh:
-    """The model in object axes and metres, from the cache when it holds it.
+    """The model in object axes and metres: the mesh that `load` gives."""
+    return load(spec, build, folder)[0]
+
+
+def load(
+    spec: ModelSpec, build: Callable[[ModelSpec], Mesh] | None = None, folder: Path | None = None
+) -> tuple[Mesh, FileFacts]:
+    """The model in object axes and metres, and what its file says of itself; from the cache when it holds them.
 
     `build` makes the mesh of a source that begins with `zoo:` (in object axes, metres); such meshes are
-    normalised too but not cached. `folder` is the cache's, by default `cache_folder()`. A damaged entry is
-    built again; a cache that cannot be written is no error. Read back, every array is equal bit for bit.
-    Raises ModelError as the readers do.
+    normalised too but neither cached nor made in another process. `folder` is the cache's, by default
+    `cache_folder()`. A damaged entry is built again; a cache that cannot be written is no error. Read back, every
+    array is equal bit for bit. Raises ModelError as the readers do and when reading takes too long or too much.
     """
     if spec.source.startswith(ZOO):
         raw, facts = load_zoo(spec, build)
-        return normalise(raw, facts, spec)
+        return normalise(raw, facts, spec), facts
     path = Path(spec.source)
     folder = folder or cache_folder()
+    check_source(path)
     try:
         first = _first_digest(path, spec)
     except OSError:
         first = None  # the reader says what is wrong with the file
-    if first is not None:
-        mesh = _stored(folder, first, path)
-        if mesh is not None:
-            return mesh
-    raw, facts = load_model(path, confined=spec.confined)
-    mesh = normalise(raw, facts, spec)
-    if first is not None:
-        _store(folder, first, path, facts.files, mesh)
-    return mesh
+    stored = None if first is None else _stored(folder, first, path)
+    if stored is not None:
+        return stored
+    with _aside(folder) as place:
+        file, named = read_apart(spec, place)
+        mesh, facts = read_mesh(file, path)
+        if first is not None:
+            _store(folder, first, path, named, file)
+    return mesh, facts
+
+
+@contextmanager
+def _aside(folder: Path) -> Generator[Path]:
+    """A new folder in the cache (in the system's folder for such, if that cannot be written) that does not stay."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        place = Path(tempfile.mkdtemp(prefix=ASIDE, dir=folder))
+    except OSError:
+        place = Path(tempfile.mkdtemp(prefix=f"viewsphere-{ASIDE}"))
+    try:
+        yield place
+    finally:
+        shutil.rmtree(place, ignore_errors=True)
+        _sweep(folder)
+
+
+def _sweep(folder: Path) -> None:
+    """Remove what processes that were killed left behind."""
+    with suppress(OSError):
+        for left in folder.glob(f"{ASIDE}*"):
+            if left.stat().st_mtime < time.time() - STALE_SECONDS:
+                shutil.rmtree(left, ignore_errors=True)
 
 
 def load_zoo(spec: ModelSpec, build: Callable[[ModelSpec], Mesh] | None) -> tuple[Mesh, FileFacts]:
     """A procedural model and its facts; ModelError when there is nothing to build it with."""
     if build is None:
         raise ModelError(f"{spec.source}: no builder for procedural models was given")
-    return build(spec), FileFacts(Path(spec.source), "zoo", "+z", "-y", 1.0)
+    mesh = build(spec)
+    return mesh, FileFacts(Path(spec.source), "zoo", "+z", "-y", 1.0, size=extents(mesh))
 
 
 def cache_folder() -> Path:
@@ -75,6 +111,8 @@ def cache_folder() -> Path:
 
 
 def _first_digest(path: Path, spec: ModelSpec) -> str:
+    if not path.is_file() or path.stat().st_size > limits.MAX_FILE_BYTES:
+        raise FileNotFoundError(path)
     digest = hashlib.sha256(_readers_digest().encode())
     digest.update(spec.model_dump_json(include=set(SETTINGS)).encode())
     digest.update(path.suffix.lower().encode() + path.name.encode())
@@ -100,84 +138,32 @@ def _second_digest(first: str, path: Path, names: Iterable[str]) -> str:
     digest = hashlib.sha256(first.encode())
     for name in names:
         digest.update(name.encode(errors="surrogateescape") + b"\0")
+        other = path.parent / name
         try:
-            with (path.parent / name).open("rb") as file:
+            if not other.is_file():  # a pipe would never end
+                raise FileNotFoundError(other)
+            with other.open("rb") as file:
                 digest.update(hashlib.file_digest(file, "sha256").digest())
-        except OSError:
+        except (OSError, ValueError):
             digest.update(b"absent")
     return digest.hexdigest()
 
 
-def _stored(folder: Path, first: str, path: Path) -> Mesh | None:
-    """The mesh in the cache, None when it is not there or damaged."""
+def _stored(folder: Path, first: str, path: Path) -> tuple[Mesh, FileFacts] | None:
+    """The mesh in the cache and its facts, None when they are not there or damaged."""
     try:
         names = json.loads((folder / f"{first}.json").read_text(encoding="utf-8"))
-        return read_mesh(folder / f"{_second_digest(first, path, names)}.npz")
+        return read_mesh(folder / f"{_second_digest(first, path, names)}.npz", path)
     except Exception:  # whatever is wrong with an entry, the answer is to build it again
         return None
 
 
-def _store(folder: Path, first: str, path: Path, files: Iterable[Path], mesh: Mesh) -> None:
-    root = path.parent.resolve()
-    names = [os.path.relpath(file.resolve(), root).replace(os.sep, "/") for file in files]
-    text = json.dumps(sorted(set(names)))
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        second = _second_digest(first, path, json.loads(text))
-        write_mesh(folder / f"{second}.npz", mesh)
-        _replace(folder / f"{first}.json", lambda file: file.write_text(text, encoding="utf-8"))
-    except OSError:
-        return
-
-
-def write_mesh(path: Path, mesh: Mesh) -> None:
-    """Write a mesh with its materials and images to one .npz file, which appears whole or not at all."""
-    arrays = {name: getattr(mesh, name) for name in ARRAYS if getattr(mesh, name) is not None}
-    arrays |= {f"image{i}": image.pixels for i, image in enumerate(mesh.images)}
-    header = {
-        "materials": [asdict(material) for material in mesh.materials],
-        "parts": mesh.parts,
-        "images": [image.name for image in mesh.images],
-        "warnings": mesh.warnings,
-    }
-    arrays["header"] = np.frombuffer(json.dumps(header).encode(), np.uint8)
-    _replace(path, lambda file: np.savez(file, **arrays))
-
-
-def read_mesh(path: Path) -> Mesh:
-    """Read what `write_mesh` wrote; raises whatever numpy or json do for a damaged file."""
-    with np.load(path, allow_pickle=False) as stored:
-        header: dict[str, Any] = json.loads(stored["header"].tobytes())
-        arrays = {name: stored[name] for name in ARRAYS if name in stored}
-        pixels = [stored[f"image{i}"] for i in range(len(header["images"]))]
-    return Mesh(
-        **arrays,
-        materials=tuple(_material(fields) for fields in header["materials"]),
-        parts=tuple(header["parts"]),
-        images=tuple(Image(name, array) for name, array in zip(header["images"], pixels, strict=True)),
-        warnings=tuple(header["warnings"]),
-    )
-
-
-def _material(fields: dict[str, Any]) -> Material:
-    values = {key: _tupled(value) for key, value in fields.items()}
-    for name in TEXTURE_FIELDS:
-        if fields[name] is not None:
-            values[name] = Texture(**{key: _tupled(value) for key, value in fields[name].items()})
-    return Material(**values)
-
-
-def _tupled(value: Any) -> Any:
-    return tuple(cast("list[Any]", value)) if isinstance(value, list) else value
-
-
-def _replace(path: Path, write: Callable[[Path], object]) -> None:
-    """Write a file aside and rename it, so that no reader sees half of it."""
-    handle, name = tempfile.mkstemp(dir=path.parent, suffix=path.suffix)
-    os.close(handle)
-    aside = Path(name)
-    try:
-        write(aside)
-        aside.replace(path)
-    finally:
-        aside.unlink(missing_ok=True)
+def _store(folder: Path, first: str, path: Path, files: Iterable[Path], mesh: Path) -> None:
+    """Move a mesh's file into the cache; each of the two files appears whole or not at all."""
+    root = os.path.realpath(path.parent)
+    names = sorted({os.path.relpath(os.path.realpath(file), root).replace(os.sep, "/") for file in files})
+    aside = mesh.with_name("files.json")
+    with suppress(OSError):
+        mesh.replace(folder / f"{_second_digest(first, path, names)}.npz")
+        aside.write_text(json.dumps(names), encoding="utf-8")
+        aside.replace(folder / f"{first}.json")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import binascii
 import io
+import os
 import re
 import warnings
 from collections.abc import Callable
@@ -40,17 +41,25 @@ class ModelFolder:
     files: list[Path] = field(default_factory=list[Path])
     warnings: list[str] = field(default_factory=list[str])
     images: list[Image] = field(default_factory=list[Image])
+    _said: set[str] = field(default_factory=set[str])
     _indices: dict[str, int | None] = field(default_factory=dict[str, "int | None"])
 
     def warn(self, message: str) -> None:
         """Add a warning, once, with the model's name before it."""
         line = f"{self.model.name}: {message}"
-        if line not in self.warnings:
+        if line not in self._said:
+            self._said.add(line)
             self.warnings.append(line)
 
     def error(self, message: str) -> ModelError:
         """The error that says this of the model's file."""
         return ModelError(f"{self.model}: {message}")
+
+    def check(self, limit: str, found: int, what: str) -> None:
+        """Raise ModelError when there are more of something than the limit of this name allows."""
+        most: int = getattr(limits, limit)
+        if found > most:
+            raise self.error(f"expected at most {most:,} {what} (limit {limit}), found {found:,}; simplify the model")
 
     def read_model(self) -> bytes:
         """The model file's own bytes; ModelError when it is missing, empty, unreadable or too large."""
@@ -59,8 +68,7 @@ class ModelFolder:
             size = self.model.stat().st_size
             if not self.model.is_file():
                 raise self.error("expected a file, found a folder or a device")
-            if size > limits.MAX_FILE_BYTES:
-                raise self.error(f"expected at most {limits.MAX_FILE_BYTES >> 30} GiB, found {size / 2**30:.1f} GiB")
+            self.check("MAX_FILE_BYTES", size, "bytes")
             data = self.model.read_bytes()
         except FileNotFoundError:
             raise self.error("no such file; check the path") from None
@@ -80,8 +88,10 @@ class ModelFolder:
         if reference.startswith("data:"):
             return _data_uri(reference)
         path = self._find(reference, what)
-        if path.stat().st_size > limits.MAX_FILE_BYTES:
-            raise UnreadableError(f"{what} {reference!r} is larger than {limits.MAX_FILE_BYTES >> 30} GiB")
+        if (size := path.stat().st_size) > (most := limits.MAX_FILE_BYTES):
+            raise UnreadableError(
+                f"{what} {_short(reference)}: expected at most {most:,} bytes (limit MAX_FILE_BYTES), found {size:,}"
+            )
         try:
             return path.read_bytes()
         except OSError as error:
@@ -90,9 +100,9 @@ class ModelFolder:
     def _find(self, reference: str, what: str) -> Path:
         if re.match(r"(?i)[a-z][a-z0-9+.-]+://", reference) or "\0" in reference:
             raise UnreadableError(f"{what} {_short(reference)} is not a path below the model's folder; it is not fetched")
-        root = self.model.parent.resolve()
+        root = _resolved(self.model.parent)
         name = reference.replace("\\", "/").strip()
-        target = (root / name).resolve()
+        target = _resolved(root / name)
         inside = target.is_relative_to(root)
         drive = re.match(r"[A-Za-z]:", name) is not None
         if not drive and (inside or not self.confined):
@@ -100,7 +110,7 @@ class ModelFolder:
             if found is not None:
                 return found
         beside = self._existing(root / PurePosixPath(name).name) if PurePosixPath(name).name else None
-        if beside is not None and beside.resolve().is_relative_to(root):
+        if beside is not None and _resolved(beside).is_relative_to(root):
             self.warn(f"{what} {reference!r} was read from beside the model instead")
             return beside
         if inside or drive or not self.confined:
@@ -128,6 +138,7 @@ class ModelFolder:
 
     def _remember(self, path: Path) -> None:
         if path not in self.files:
+            self.check("MAX_FILES", len(self.files), "files that it names")
             self.files.append(path)
 
     def image(self, key: str, name: str, data: bytes | None = None) -> int | None:
@@ -155,22 +166,21 @@ class ModelFolder:
 
     def add_image(self, image: Image) -> int:
         """Keep an image; its index."""
-        if len(self.images) >= limits.MAX_TEXTURES:
-            raise self.error(f"expected at most {limits.MAX_TEXTURES} textures; merge some into an atlas")
-        pixels = image.pixels[..., 0].size + sum(known.pixels[..., 0].size for known in self.images)
-        if pixels > limits.MAX_ALL_TEXTURE_PIXELS:
-            raise self.error(f"expected textures of at most {limits.MAX_ALL_TEXTURE_PIXELS:,} px in all; make them smaller")
         self.images.append(image)
+        self.check("MAX_TEXTURES", len(self.images), "textures")
+        pixels = sum(known.pixels[..., 0].size for known in self.images)
+        self.check("MAX_ALL_TEXTURE_PIXELS", pixels, "pixels in all textures together")
         return len(self.images) - 1
 
 
-def decode_image(data: bytes, where: str) -> NDArray[np.uint8]:
+def decode_image(data: bytes, where: str, *, upright: bool = False) -> NDArray[np.uint8]:
     """Decode a texture to (H, W, 4) uint8; 16-bit channels keep their upper byte.
 
-    Raises UnreadableError, beginning with `where`: no image, a damaged one, or one beyond `limits`.
+    With `upright` a photograph is turned as its camera says (EXIF orientation), which no texture is. Raises
+    UnreadableError, beginning with `where`: no image, a damaged one, or one beyond `limits`.
     """
     from PIL import Image as Pillow
-    from PIL import UnidentifiedImageError
+    from PIL import ImageOps, UnidentifiedImageError
 
     try:
         with warnings.catch_warnings():
@@ -178,16 +188,21 @@ def decode_image(data: bytes, where: str) -> NDArray[np.uint8]:
             picture = Pillow.open(io.BytesIO(data), formats=IMAGE_FORMATS)
             width, height = picture.size
             if max(width, height) <= limits.MAX_TEXTURE_SIDE and width * height <= limits.MAX_TEXTURE_PIXELS:
-                return image_pixels(picture)
-            found = f"{width}x{height}"
+                return image_pixels(ImageOps.exif_transpose(picture) if upright else picture)
+            found = f"{width} x {height}"
     except UnidentifiedImageError:
         raise UnreadableError(f"{where} is not an image in one of {', '.join(IMAGE_FORMATS)}") from None
     except Pillow.DecompressionBombError:
         found = "many more"
+    except MemoryError:
+        raise
     except Exception as error:  # Pillow's decoders raise whatever their format's parser does
         raise UnreadableError(f"{where} cannot be decoded ({str(error)[:80]})") from None
-    most = f"{limits.MAX_TEXTURE_SIDE} px a side and {limits.MAX_TEXTURE_PIXELS:,} in all"
-    raise UnreadableError(f"{where}: expected at most {most}, found {found}")
+    side, most = f"{limits.MAX_TEXTURE_SIDE:,}", f"{limits.MAX_TEXTURE_PIXELS:,}"
+    raise UnreadableError(
+        f"{where}: expected at most {side} px a side (limit MAX_TEXTURE_SIDE) and {most} in all (limit MAX_TEXTURE_PIXELS), "
+        f"found {found}"
+    )
 
 
 def image_pixels(picture: Any) -> NDArray[np.uint8]:
@@ -198,6 +213,11 @@ def image_pixels(picture: Any) -> NDArray[np.uint8]:
         grey = (np.asarray(picture).astype(np.int64) >> 8).clip(0, 255).astype(np.uint8)
         picture = Pillow.fromarray(grey)
     return np.array(picture.convert("RGBA"), dtype=np.uint8)
+
+
+def _resolved(path: Path) -> Path:
+    """The path without links; unlike `Path.resolve` it has an answer for links that lead in circles."""
+    return Path(os.path.realpath(path))
 
 
 def _data_uri(uri: str) -> bytes:

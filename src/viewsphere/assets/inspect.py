@@ -9,10 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from viewsphere.assets.cache import ZOO, load_zoo
-from viewsphere.assets.load import load_model
+from viewsphere.assets.cache import load
+from viewsphere.assets.load import PICTURE_SUFFIXES
 from viewsphere.assets.mesh import Material, Mesh
-from viewsphere.assets.normalise import normalise
 from viewsphere.assets.piece import FileFacts
 from viewsphere.model.shot import Axis, ModelSpec, Size
 
@@ -51,14 +50,9 @@ def describe(source: Path | ModelSpec, build: Callable[[ModelSpec], Mesh] | None
     `build` makes the mesh of a `zoo:` source. Raises ModelError as reading and normalising do.
     """
     spec = source if isinstance(source, ModelSpec) else _default_spec(source)
-    if spec.source.startswith(ZOO):
-        raw, facts = load_zoo(spec, build)
-    else:
-        raw, facts = load_model(Path(spec.source), confined=spec.confined)
-    mesh = normalise(raw, facts, spec)
+    mesh, facts = load(spec, build)
     low, high = mesh.bounds
     width, length, height = (float(x) for x in high - low)
-    raw_size = raw.bounds[1] - raw.bounds[0]
     counts = np.bincount(mesh.triangle_part, minlength=len(mesh.parts))
     return ModelReport(
         source=spec.source,
@@ -71,7 +65,7 @@ def describe(source: Path | ModelSpec, build: Callable[[ModelSpec], Mesh] | None
             (float(low[0]), float(low[1]), float(low[2])),
             (float(high[0]), float(high[1]), float(high[2])),
         ),
-        raw_size=(float(raw_size[0]), float(raw_size[1]), float(raw_size[2])),
+        raw_size=facts.size,
         triangles=len(mesh.triangles),
         vertices=len(mesh.vertices),
         parts=tuple((name, int(count)) for name, count in zip(mesh.parts, counts, strict=True)),
@@ -104,7 +98,7 @@ def _suggestions(spec: ModelSpec, facts: FileFacts, size: Size) -> tuple[str, ..
             said.append(f"{longest:.4g} m across: set unit: 0.001 if the file is in millimetres, 0.01 if in centimetres")
         elif longest < 0.01:
             said.append(f"{longest:.4g} m across: set unit (metres in one unit of the file) or scale")
-    if spec.forward is None and width > 1.5 * length:
+    if spec.forward is None and width > 1.5 * length and facts.format not in PICTURE_SUFFIXES:
         sideways = "+x" if facts.forward[1] != "x" and (spec.up or facts.up)[1] != "x" else "+y"
         said.append(f"wider than long: if the picture shows its side at the front, set forward: {sideways} or its opposite")
     if spec.up is None and facts.format in {"obj", "ply", "stl", "off"} and height > 2 * max(width, length):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import io
 import re
 import zipfile
@@ -10,53 +11,71 @@ from typing import Any
 
 from viewsphere.assets import limits
 
+ENOUGH = 10**12
+"""Counting stops here: more digits would be a message of pages."""
+
 _OBJECT = re.compile(rb"<(?:\w+:)?(object|component|item)\b([^>]*)>")
 _ID = re.compile(rb"\b(?:object)?id\s*=\s*[\"']([^\"']+)[\"']")
 
 
-def count_instances(references: Mapping[str, Sequence[str]], root: str) -> int:
-    """Number of objects that `root` stands for, itself included, when every reference is followed.
+def count_instances(references: Mapping[str, Sequence[str]], root: str) -> tuple[int | None, int]:
+    """Number of objects that `root` stands for, itself included, when every reference is followed, and how many of
+    them lie within one another at most.
 
-    Counting stops at `limits.MAX_INSTANCES`. Cycles count as that many.
+    The number is None when an object is part of itself, and at most `ENOUGH`.
     """
-    counts: dict[str, int] = {}
+    counts: dict[str, int | None] = {}
+    depths: dict[str, int] = {}
     stack = [(root, False)]
     while stack:
         name, is_done = stack.pop()
         inner = references.get(name, ())
         if is_done:
-            counts[name] = min(1 + sum(counts[other] for other in inner), limits.MAX_INSTANCES)
+            counts[name] = min(1 + sum(counts[other] or 0 for other in inner), ENOUGH)
+            depths[name] = 1 + max((depths[other] for other in inner), default=0)
         elif name not in counts:
-            # Whoever meets this name again before it is done has met a cycle.
-            counts[name] = limits.MAX_INSTANCES
+            counts[name] = None
             stack.append((name, True))
-            stack.extend((other, False) for other in inner)
-    return counts[root]
+            for other in inner:
+                if other in counts and counts[other] is None:
+                    return None, 0
+                stack.append((other, False))
+    return counts[root], depths[root]
 
 
 def dae_references(data: bytes) -> dict[str, list[str]]:
-    """For each node of a COLLADA file its child nodes and the nodes it instantiates; the root is `""`."""
-    if b"instance_node" not in data:
+    """For each node of a COLLADA file its child nodes and the nodes it instantiates; the root is `""`.
+
+    Nothing for a file that has too few nodes to break a limit.
+    """
+    is_wide = b"\0" in data[:64]  # UTF-16
+    if not is_wide and b"instance_node" not in data and data.count(b"node") <= limits.MAX_NESTING:
         return {}
     from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
-    references: dict[str, list[str]] = {"": []}
-    open_nodes = [""]
-    unnamed = 0
-    parser: Any = etree.iterparse(io.BytesIO(data), events=("start", "end"), recover=True)
+    # Nodes are told apart by their numbers: files in which two have the same id are common.
+    root, library = "", "library"
+    references: dict[str, list[str]] = {root: [], library: []}
+    by_url: dict[str, str] = {}
+    open_nodes = [library]
+    parser: Any = etree.iterparse(
+        io.BytesIO(data), events=("start", "end"), recover=True, resolve_entities=False, no_network=True, load_dtd=False
+    )
     for event, element in parser:
         tag = str(element.tag).rpartition("}")[2]
         if tag == "instance_node" and event == "start":
-            references[open_nodes[-1]].append(str(element.get("url", "")).lstrip("#"))
+            references[open_nodes[-1]].append(str(element.get("url", "")))
         elif tag == "node" and event == "start":
-            unnamed += 1
-            name = str(element.get("id") or f"#{unnamed}")
-            references.setdefault(name, [])
+            name = f"node {len(references)}"
+            by_url.setdefault(f"#{element.get('id')}", name)
+            references[name] = []
             references[open_nodes[-1]].append(name)
             open_nodes.append(name)
-        elif tag == "node":
+        elif tag == "visual_scene" and event == "start":
+            open_nodes.append(root)
+        elif tag in {"node", "visual_scene"}:
             open_nodes.pop()
-    return references
+    return {name: [by_url.get(other, other) for other in inner] for name, inner in references.items()}
 
 
 def threemf_references(archive: zipfile.ZipFile) -> dict[str, list[str]]:
@@ -66,7 +85,10 @@ def threemf_references(archive: zipfile.ZipFile) -> dict[str, list[str]]:
         if not entry.lower().endswith(".model"):
             continue
         current = ""
-        for kind, attributes in _OBJECT.findall(archive.read(entry)):
+        data = archive.read(entry)
+        if data[:2] in {codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE}:
+            data = data.decode("utf-16", errors="replace").encode()
+        for kind, attributes in _OBJECT.findall(data):
             found = _ID.search(attributes)
             name = found[1].decode(errors="replace") if found else ""
             if kind == b"object":

@@ -1,16 +1,45 @@
-"""How much a model file may ask for: a file cannot make the reader run out of memory or time."""
+"""How much a model file may ask for: no file makes the reader run out of memory or time.
+
+An error that a limit causes gives its name, its value and what was found.
+"""
+
+from __future__ import annotations
+
+import os
+
+from viewsphere.errors import UserError
+
+MAX_READ_SECONDS = 120.0
+"""Time to read one file; `$VIEWSPHERE_MAX_READ_SECONDS` overrides it."""
+MAX_READ_BYTES = 4 << 30
+"""Address space of the process that reads one file; `$VIEWSPHERE_MAX_READ_BYTES` overrides it."""
 
 MAX_FILE_BYTES = 4 << 30
+MAX_FILES = 10_000  # that one model names: textures, buffers, material libraries
 MAX_TRIANGLES = 20_000_000
-MAX_TEXTURE_SIDE = 16_384
+MAX_VERTICES = 3 * MAX_TRIANGLES
+MAX_TEXTURE_SIDE = 16_384  # pixels
 MAX_TEXTURE_PIXELS = 1 << 27  # 512 MiB once it is RGBA
 MAX_TEXTURES = 1_024
 MAX_ALL_TEXTURE_PIXELS = 1 << 29  # of all textures of a model, 2 GiB as RGBA
 MAX_ZEROS = 10_000_000  # elements of a glTF accessor that has no bytes in the file
-MAX_INSTANCES = 1_000_000  # of objects in a scene of a DAE or 3MF file
+MAX_INSTANCES = 1_000_000  # of objects in a scene
+MAX_NESTING = 500  # nodes or components within one another
 MAX_ARCHIVE_BYTES = 1 << 30  # a 3MF archive once it is unpacked
 
 MIN_SIZE = 1e-4
 """Smallest longest side of a normalised model, metres."""
 MAX_SIZE = 1e5
 """Greatest longest side of a normalised model, metres."""
+
+
+def from_environment(name: str) -> float:
+    """The limit of this name, or what `$VIEWSPHERE_<name>` says instead; UserError when that is no positive number."""
+    text = os.environ.get(f"VIEWSPHERE_{name}", "")
+    try:
+        value = float(text or globals()[name])
+    except ValueError:
+        value = 0.0
+    if not 0 < value < float("inf"):
+        raise UserError(f"VIEWSPHERE_{name}: expected a number above 0, found {text!r}")
+    return value

@@ -12,10 +12,39 @@ from viewsphere.assets.piece import FileFacts
 from viewsphere.errors import ModelError
 
 SUFFIXES = ("3mf", "dae", "glb", "gltf", "obj", "off", "ply", "stl")
+PICTURE_SUFFIXES = ("bmp", "jpeg", "jpg", "png", "tif", "tiff", "webp")
+
+KNOWN = {
+    "3ds": "3D Studio",
+    "abc": "Alembic",
+    "blend": "Blender",
+    "fbx": "FBX",
+    "iges": "IGES (CAD)",
+    "igs": "IGES (CAD)",
+    "max": "3ds Max",
+    "mb": "Maya",
+    "ma": "Maya",
+    "c4d": "Cinema 4D",
+    "lwo": "LightWave",
+    "skp": "SketchUp",
+    "step": "STEP (CAD)",
+    "stp": "STEP (CAD)",
+    "usd": "USD",
+    "usda": "USD",
+    "usdc": "USD",
+    "usdz": "USD",
+    "wrl": "VRML",
+    "x": "DirectX",
+    "x3d": "X3D",
+}
+"""Model formats that are not read, by suffix."""
+
+IN_BLENDER = {"blend", "fbx", "usd", "usda", "usdc", "usdz", "abc", "x3d", "wrl"}
+"""Those of them that Blender opens."""
 
 
 def load_model(path: Path, *, confined: bool = True) -> tuple[Mesh, FileFacts]:
-    """Read a model file: its triangles in its own axes and unit, and what it says of these.
+    """Read a model file, in this process: its triangles in its own axes and unit, and what it says of these.
 
     | suffix    | up            | front        | unit                  | source                              |
     |-----------|---------------|--------------|-----------------------|-------------------------------------|
@@ -26,18 +55,29 @@ def load_model(path: Path, *, confined: bool = True) -> tuple[Mesh, FileFacts]:
     | ply       | +z            | -y           | unknown, taken as 1 m | no rule; scanners, CAD              |
     | stl       | +z            | -y           | unknown, taken as 1 m | no rule; CAD, often in millimetres  |
     | off       | +z            | -y           | unknown, taken as 1 m | no rule                             |
+    | pictures  | +z            | -y           | its height            | `picture`                           |
 
     COLLADA: Y_UP has its front at +z, Z_UP at -y, X_UP at +z. With `confined`, files that the model names
     (textures, buffers, material libraries) are read only from its own folder and below. Raises ModelError in
     one line that names the file: missing, empty, truncated, not a model, no triangles, or more of them than
     `limits` allows.
     """
-    suffix = path.suffix[1:].lower()
-    if suffix not in SUFFIXES:
-        raise ModelError(f"{path}: expected a model file with suffix {', '.join(SUFFIXES)}, found {path.suffix or 'none'!r}")
+    suffix = check_source(path)
     # NaN and infinity are found and reported once the whole file is read.
     with np.errstate(all="ignore"):
         return _read(ModelFolder(path, confined), suffix)
+
+
+def check_source(path: Path) -> str:
+    """The path's suffix in lower case, without its dot; ModelError when files of its kind are not read."""
+    suffix = path.suffix[1:].lower()
+    if suffix in SUFFIXES or suffix in PICTURE_SUFFIXES:
+        return suffix
+    if suffix in KNOWN:
+        how = "in Blender: File > Open or Import, then File > Export > glTF 2.0" if suffix in IN_BLENDER else "with its program"
+        raise ModelError(f"{path}: {KNOWN[suffix]} files are not read; convert it to GLB ({how}) and use that")
+    expected = f"{', '.join(SUFFIXES)} or a picture ({', '.join(PICTURE_SUFFIXES)})"
+    raise ModelError(f"{path}: expected a model file with suffix {expected}, found {path.suffix or 'none'!r}")
 
 
 def _read(folder: ModelFolder, suffix: str) -> tuple[Mesh, FileFacts]:
@@ -49,6 +89,10 @@ def _read(folder: ModelFolder, suffix: str) -> tuple[Mesh, FileFacts]:
         from viewsphere.assets.obj import read_obj
 
         return read_obj(folder)
+    if suffix in PICTURE_SUFFIXES:
+        from viewsphere.assets.picture import read_picture
+
+        return read_picture(folder)
     from viewsphere.assets.via_trimesh import read_via_trimesh
 
     return read_via_trimesh(folder)

@@ -23,7 +23,7 @@ def normalise(mesh: Mesh, facts: FileFacts, spec: ModelSpec) -> Mesh:
     until the length (along Y) is the real one's: the model keeps its proportions, and a warning says when
     they differ from the real ones by more than 10 %; a number is the length in metres. Centring: `box` puts
     the box's centre at the origin, `area` the area-weighted centroid of the surface, `floor` the box's centre
-    in x and y and its lowest point at z = 0.
+    in x and y and its lowest point at z = 0; `as_is` keeps the file's own origin.
 
     Computed in float64, stored as float32; triangles come sorted by part and material, otherwise in the
     file's order. Raises ModelError for parallel axes and for a result smaller or larger than `limits` allows.
@@ -37,6 +37,8 @@ def normalise(mesh: Mesh, facts: FileFacts, spec: ModelSpec) -> Mesh:
     _check_size(float((high - low).max()), facts)
     if spec.centring == "area":
         center = _area_centroid(vertices, mesh)
+    elif spec.centring == "as_is":
+        center = np.zeros(3)
     else:
         center = (low + high) / 2
         if spec.centring == "floor":
@@ -104,9 +106,8 @@ def _proportion_warnings(size: Float, facts: FileFacts, real_size: Size) -> tupl
 def _check_size(size: float, facts: FileFacts) -> None:
     if not limits.MIN_SIZE <= size <= limits.MAX_SIZE:
         raise ModelError(
-            f"{facts.path}: expected a model between {limits.MIN_SIZE:g} and {limits.MAX_SIZE:g} m across, "
-            f"found {size:.3g} m; "
-            "set unit (metres in one unit of the file) or scale"
+            f"{facts.path}: expected a model between {limits.MIN_SIZE:g} m (limit MIN_SIZE) and {limits.MAX_SIZE:g} m (limit "
+            f"MAX_SIZE) across, found {size:.3g} m; set unit (metres in one unit of the file) or scale"
         )
 
 

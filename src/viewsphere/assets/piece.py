@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.assets import limits
 from viewsphere.assets.folder import ModelFolder
 from viewsphere.assets.mesh import Image, Material, Mesh, Texture
 from viewsphere.model.shot import Axis
@@ -32,8 +31,8 @@ class FileFacts:
     """What a file, or its format's specification, says about its axes and its unit.
 
     `unit` is metres in one unit of the file. The raw mesh's vertices plus `origin` are the file's
-    coordinates: it is zero unless the model lies so far away that float32 would lose its shape. `files` are
-    all files read or looked for.
+    coordinates: it is zero unless the model lies so far away that float32 would lose its shape. `size` are the
+    extents along the file's own x, y and z, in its unit. `files` are all files read or looked for.
     """
 
     path: Path
@@ -42,6 +41,7 @@ class FileFacts:
     forward: Axis
     unit: float
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    size: tuple[float, float, float] = (0.0, 0.0, 0.0)
     files: tuple[Path, ...] = ()
 
 
@@ -96,8 +96,8 @@ def assemble(
     count = sum(len(piece.triangles) for piece in pieces)
     if count == 0:
         raise folder.error("no triangles found; export the model as a mesh of faces")
-    if count > limits.MAX_TRIANGLES:
-        raise folder.error(f"expected at most {limits.MAX_TRIANGLES:,} triangles, found {count:,}; simplify the model")
+    folder.check("MAX_TRIANGLES", count, "triangles")
+    folder.check("MAX_VERTICES", sum(len(piece.positions) for piece in pieces), "vertices")
     names = list(dict.fromkeys(piece.part for piece in pieces))
     part_of = {name: i for i, name in enumerate(names)}
     starts = np.cumsum([0, *(len(piece.positions) for piece in pieces)])
@@ -135,7 +135,14 @@ def assemble(
         images=images,
         warnings=tuple(folder.warnings),
     )
-    return mesh, replace(facts, origin=(origin[0], origin[1], origin[2]), files=tuple(folder.files))
+    return mesh, replace(facts, origin=(origin[0], origin[1], origin[2]), size=extents(mesh), files=tuple(folder.files))
+
+
+def extents(mesh: Mesh) -> tuple[float, float, float]:
+    """Sizes along the mesh's x, y and z."""
+    low, high = mesh.bounds
+    x, y, z = (float(v) for v in high - low)
+    return x, y, z
 
 
 def _finite_triangles(folder: ModelFolder, positions: Float, triangles: Int) -> NDArray[np.bool_]:

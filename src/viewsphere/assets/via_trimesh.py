@@ -16,7 +16,6 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.assets import limits
 from viewsphere.assets.alpha import with_alpha_modes
 from viewsphere.assets.folder import ModelFolder, image_pixels
 from viewsphere.assets.instances import count_instances, dae_references, threemf_references
@@ -90,7 +89,7 @@ def _check_promises(folder: ModelFolder, kind: str, data: bytes) -> None:
             _check_instances(folder, dae_references(data))
         elif kind == "3mf":
             _check_archive(folder, data)
-    except ModelError:
+    except (ModelError, MemoryError):
         raise
     except Exception as error:  # zipfile and lxml raise whatever a damaged file leads them to
         raise _unreadable(folder, kind, error) from None
@@ -99,9 +98,7 @@ def _check_promises(folder: ModelFolder, kind: str, data: bytes) -> None:
 def _check_archive(folder: ModelFolder, data: bytes) -> None:
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
         size = sum(entry.file_size for entry in archive.infolist())
-        if size > limits.MAX_ARCHIVE_BYTES:
-            most = limits.MAX_ARCHIVE_BYTES >> 20
-            raise folder.error(f"expected an archive of at most {most} MiB unpacked, found {size >> 20} MiB")
+        folder.check("MAX_ARCHIVE_BYTES", size, "bytes in the unpacked archive")
         _check_instances(folder, threemf_references(archive))
 
 
@@ -111,8 +108,11 @@ def _unreadable(folder: ModelFolder, kind: str, error: Exception) -> ModelError:
 
 
 def _check_instances(folder: ModelFolder, references: Mapping[str, Sequence[str]]) -> None:
-    if count_instances(references, "") >= limits.MAX_INSTANCES:
-        raise folder.error(f"expected fewer than {limits.MAX_INSTANCES:,} instances, found more or a cycle; simplify it")
+    count, depth = count_instances(references, "")
+    if count is None:
+        raise folder.error("an object is part of itself: expected a tree, found a cycle")
+    folder.check("MAX_NESTING", depth, "objects within one another")
+    folder.check("MAX_INSTANCES", count, "instances")
 
 
 def _parse(folder: ModelFolder, kind: str, data: bytes) -> dict[str, Any]:
@@ -128,6 +128,8 @@ def _parse(folder: ModelFolder, kind: str, data: bytes) -> dict[str, Any]:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             loaded = mesh_loaders[kind](io.BytesIO(data), file_type=kind, resolver=_Resolver(folder))
+    except (ModelError, MemoryError):
+        raise
     except Exception as error:  # each parser raises whatever its code stumbles over
         raise _unreadable(folder, kind, error) from None
     return cast("dict[str, Any]", loaded)
@@ -146,8 +148,7 @@ class _Builder:
         ]
         edges = [edge for edge in graph if edge.get("geometry") in geometry]
         total = sum(len(geometry[edge["geometry"]]["faces"]) for edge in edges)
-        if total > limits.MAX_TRIANGLES:
-            raise self.folder.error(f"expected at most {limits.MAX_TRIANGLES:,} triangles, found {total:,}; simplify it")
+        self.folder.check("MAX_TRIANGLES", total, "triangles, all instances counted,")
         return [
             piece
             for edge in edges

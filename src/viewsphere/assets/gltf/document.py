@@ -11,7 +11,6 @@ from urllib.parse import unquote
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.assets import limits
 from viewsphere.assets.folder import ModelFolder, UnreadableError
 from viewsphere.assets.gltf.field import Field
 
@@ -141,11 +140,10 @@ class Document:
 
     def _dense(self, entry: Field, dtype: np.dtype[Any], width: int, kind: str) -> NDArray[Any]:
         count = entry.integer("count")
-        if count > 3 * limits.MAX_TRIANGLES:
-            raise self.folder.error(f"{entry.where}: expected at most {3 * limits.MAX_TRIANGLES:,} elements, found {count:,}")
+        place = entry.where.rpartition(".")[2]
+        self.folder.check("MAX_VERTICES", count, f"elements in {place}")
         if "bufferView" not in entry:
-            if count > limits.MAX_ZEROS:
-                raise self.folder.error(f"{entry.where}: expected a bufferView for {count:,} elements, found none")
+            self.folder.check("MAX_ZEROS", count, f"elements without a bufferView in {place}")
             return np.zeros((count, width), dtype)
         data, stride = self.view(entry.integer("bufferView"))
         return self._strided(entry, data[entry.integer("byteOffset", 0) :], dtype, count, width, stride, kind)

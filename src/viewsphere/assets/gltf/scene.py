@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
-from viewsphere.assets import limits
 from viewsphere.assets.gltf.document import Document
 from viewsphere.assets.gltf.field import Field
 from viewsphere.assets.piece import Float, Int, Piece, compact
@@ -21,7 +21,7 @@ def read_pieces(document: Document) -> list[Piece]:
     """The triangles of the default scene, node by node, transforms applied."""
     worlds = _world_matrices(document)
     pieces: list[Piece] = []
-    parts: set[str] = set()
+    parts: dict[str, int] = {}
     meshes: dict[int, list[Piece]] = {}  # unmorphed and unskinned, for instances
     total = 0
     for index, world in worlds.items():
@@ -39,24 +39,20 @@ def read_pieces(document: Document) -> list[Piece]:
             meshes[mesh] = local
         matrices = [np.eye(4)] if "skin" in node else _instances(document, node, world)
         total += len(matrices) * sum(len(piece.triangles) for piece in local)
-        _check_total(document, total)
+        document.folder.check("MAX_TRIANGLES", total, "triangles, all instances counted,")
         placed = (replace(moved(piece, matrix), part=part) for matrix in matrices for piece in local)
         pieces.extend(piece if piece.normals is not None else flat(piece) for piece in placed)
     return pieces
 
 
-def _check_total(document: Document, total: int) -> None:
-    if total > limits.MAX_TRIANGLES:
-        raise document.folder.error(
-            f"expected at most {limits.MAX_TRIANGLES:,} triangles, found {total:,} with all instances; simplify the model"
-        )
-
-
-def _unused(name: str, taken: set[str]) -> str:
-    unique, number = name, 2
+def _unused(name: str, taken: dict[str, int]) -> str:
+    """The name, or the first of name_2, name_3, ... that is free."""
+    unique, number = name, taken.get(name, 0)
     while unique in taken:
-        unique, number = f"{name}_{number}", number + 1
-    taken.add(unique)
+        number += 1
+        unique = f"{name}_{number}"
+    taken[name] = max(number, 1)
+    taken.setdefault(unique, 1)
     return unique
 
 
@@ -70,19 +66,21 @@ def _world_matrices(document: Document) -> dict[int, Float]:
         children = {child for node in nodes for child in _indices(node, "children")}
         starts = [i for i in range(len(nodes)) if i not in children]
     worlds: dict[int, Float] = {}
-    stack = [(index, np.eye(4)) for index in reversed(starts)]
+    stack = [(index, np.eye(4), 1) for index in reversed(starts)]
     while stack:
-        index, parent = stack.pop()
+        index, parent, depth = stack.pop()
+        document.folder.check("MAX_NESTING", depth, "nodes within one another")
         if index in worlds:
             raise document.folder.error(f"nodes[{index}] is reached twice: expected a tree, found a cycle or a shared child")
         node = root.at("nodes", index)
         worlds[index] = compose(parent, _local_matrix(node))
-        stack.extend((child, worlds[index]) for child in reversed(_indices(node, "children")))
+        stack.extend((child, worlds[index], depth + 1) for child in reversed(_indices(node, "children")))
     return worlds
 
 
 def _indices(entry: Field, key: str) -> list[int]:
-    values = [item.value for item in entry.items(key)]
+    found = (item.value for item in entry.items(key))
+    values: list[Any] = [int(v) if isinstance(v, float) and v.is_integer() else v for v in found]
     if not all(isinstance(v, int) and not isinstance(v, bool) and v >= 0 for v in values):
         raise Field(values, f"{entry.where}.{key}").fail("whole numbers")
     return values
@@ -134,6 +132,7 @@ def _instances(document: Document, node: Field, world: Float) -> list[Float]:
     if len(counts) != 1:
         raise attributes.fail("attributes of one length")
     count = counts.pop()
+    document.folder.check("MAX_INSTANCES", count, "instances")
     t, r, s = (read.get(key, np.full((count, width), empty)) for key, (width, empty) in widths.items())
     return [compose(world, local) for local in _compose(t, r, s)]
 
@@ -146,7 +145,7 @@ def _primitives(document: Document, mesh: Field, weights: tuple[float, ...], joi
         if piece is not None:
             piece = _morphed(document, entry, piece, weights)
             pieces.append(compact(piece if joints is None else _skinned(document, entry, piece, joints)))
-            _check_total(document, sum(len(piece.triangles) for piece in pieces))
+            document.folder.check("MAX_TRIANGLES", sum(len(piece.triangles) for piece in pieces), "triangles")
     return pieces
 
 

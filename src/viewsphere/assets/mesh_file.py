@@ -1,0 +1,59 @@
+"""A mesh and the facts of its file as one .npz file."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+
+from viewsphere.assets.mesh import Image, Material, Mesh, Texture
+from viewsphere.assets.piece import TEXTURE_FIELDS, FileFacts
+
+ARRAYS = ("vertices", "triangles", "normals", "triangle_material", "triangle_part", "uv0", "uv1", "colors")
+FACTS = ("format", "up", "forward", "unit", "origin", "size")
+
+
+def write_mesh(path: Path, mesh: Mesh, facts: FileFacts) -> None:
+    """Write a mesh with its materials and images, and all of its file's facts but `path` and `files`."""
+    arrays = {name: getattr(mesh, name) for name in ARRAYS if getattr(mesh, name) is not None}
+    arrays |= {f"image{i}": image.pixels for i, image in enumerate(mesh.images)}
+    header = {
+        "materials": [asdict(material) for material in mesh.materials],
+        "parts": mesh.parts,
+        "images": [image.name for image in mesh.images],
+        "warnings": mesh.warnings,
+        "facts": {name: getattr(facts, name) for name in FACTS},
+    }
+    arrays["header"] = np.frombuffer(json.dumps(header).encode(), np.uint8)
+    np.savez(path, **arrays)
+
+
+def read_mesh(path: Path, source: Path) -> tuple[Mesh, FileFacts]:
+    """What `write_mesh` wrote of the model `source`, bit for bit; raises whatever numpy or json do for a damaged file."""
+    with np.load(path, allow_pickle=False) as stored:
+        header: dict[str, Any] = json.loads(stored["header"].tobytes())
+        arrays = {name: stored[name] for name in ARRAYS if name in stored}
+        pixels = [stored[f"image{i}"] for i in range(len(header["images"]))]
+    mesh = Mesh(
+        **arrays,
+        materials=tuple(_material(fields) for fields in header["materials"]),
+        parts=tuple(header["parts"]),
+        images=tuple(Image(name, array) for name, array in zip(header["images"], pixels, strict=True)),
+        warnings=tuple(header["warnings"]),
+    )
+    return mesh, FileFacts(source, **{name: _tupled(value) for name, value in header["facts"].items()})
+
+
+def _material(fields: dict[str, Any]) -> Material:
+    values = {key: _tupled(value) for key, value in fields.items()}
+    for name in TEXTURE_FIELDS:
+        if fields[name] is not None:
+            values[name] = Texture(**{key: _tupled(value) for key, value in fields[name].items()})
+    return Material(**values)
+
+
+def _tupled(value: Any) -> Any:
+    return tuple(cast("list[Any]", value)) if isinstance(value, list) else value

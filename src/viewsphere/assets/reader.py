@@ -1,0 +1,114 @@
+"""The program that reads one model file, so that a crash costs a message: `python -m viewsphere.assets.reader JOB`.
+
+JOB is JSON: the model's specification, the folder for the result, the limits and the process that asked. The folder
+receives `mesh.npz` and `outcome.json`: the files that the model named, or the error. Its standard input is a pipe that
+nobody writes to; its end means that whoever asked is gone.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import sys
+from contextlib import suppress
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from threading import Thread
+from typing import Any
+
+from viewsphere.errors import ModelError
+
+MESH, OUTCOME = "mesh.npz", "outcome.json"
+
+
+@dataclass(frozen=True)
+class Job:
+    """What to read (a ModelSpec's fields), where the result goes, seconds, bytes and the asking process's id."""
+
+    spec: dict[str, Any]
+    folder: str
+    seconds: float
+    memory: int
+    parent: int
+
+    def to_json(self) -> str:
+        """One line of text."""
+        return json.dumps(asdict(self))
+
+
+def main() -> None:
+    """Read what the first argument says, write the result, end."""
+    job = Job(**json.loads(sys.argv[1]))
+    _end_with(job.parent)
+    _limit(job)
+    outcome = read(job)
+    (Path(job.folder) / OUTCOME).write_text(json.dumps(outcome), encoding="utf-8")
+    sys.stderr.flush()
+    os._exit(0)  # at once: a library's own clearing up may crash too
+
+
+def read(job: Job) -> dict[str, Any]:
+    """Read and normalise the model into the job's folder: the files it named, or the error, as `outcome.json` has them.
+
+    Whatever goes wrong in a reader becomes one line that names the model.
+    """
+    from viewsphere.assets.load import load_model
+    from viewsphere.assets.mesh_file import write_mesh
+    from viewsphere.assets.normalise import normalise
+    from viewsphere.model.shot import ModelSpec
+
+    spec = ModelSpec.model_validate(job.spec)
+    try:
+        raw, facts = load_model(Path(spec.source), confined=spec.confined)
+        write_mesh(Path(job.folder) / MESH, normalise(raw, facts, spec), facts)
+    except ModelError as error:
+        return {"error": str(error)}
+    except MemoryError:
+        problem = f"reading it takes more than {job.memory:,} bytes of memory (limit MAX_READ_BYTES)"
+        return {"error": f"{spec.source}: {problem}; simplify the model, or set VIEWSPHERE_MAX_READ_BYTES higher"}
+    except RecursionError:
+        depth = sys.getrecursionlimit()
+        return {"error": f"{spec.source}: expected at most {depth:,} things within one another (recursion), found more"}
+    except Exception as error:
+        said = " ".join(str(error).split())[:200]
+        return {"error": f"{spec.source}: its reader failed ({type(error).__name__}: {said}): damaged?"}
+    return {"files": [str(file) for file in facts.files]}
+
+
+def _end_with(parent: int) -> None:
+    """Die when the process that asked does."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # whoever asked decides
+    if sys.platform == "linux":
+        import ctypes
+
+        set_death_signal = 1  # PR_SET_PDEATHSIG, prctl(2)
+        with suppress(OSError, AttributeError):
+            ctypes.CDLL(None).prctl(set_death_signal, signal.SIGKILL, 0, 0, 0)
+        if os.getppid() != parent:
+            os._exit(1)
+    Thread(target=_watch, daemon=True).start()
+
+
+def _watch() -> None:
+    while os.read(0, 64):
+        pass
+    os._exit(1)
+
+
+def _limit(job: Job) -> None:
+    """Bound memory and the size of files, and processor time should nobody be left to stop this process."""
+    if sys.platform == "win32":
+        return
+    import resource
+
+    wanted = {"RLIMIT_AS": job.memory, "RLIMIT_FSIZE": job.memory, "RLIMIT_CPU": int(2 * job.seconds) + 1, "RLIMIT_CORE": 0}
+    for name, most in wanted.items():
+        with suppress(ValueError, OSError, AttributeError):  # what a platform lacks, or has set lower
+            kind = getattr(resource, name)
+            hard = resource.getrlimit(kind)[1]
+            resource.setrlimit(kind, (most if hard == resource.RLIM_INFINITY else min(most, hard), hard))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,167 @@
+"""docs/formats-in.md: its limits are the code's, its tables what happens; and no file of the corpus does harm.
+
+`python tests/assets/test_formats_in.py` prints the tables.
+"""
+
+import os
+import re
+import sys
+import time
+from collections import Counter
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+
+from viewsphere.assets import limits
+from viewsphere.assets.cache import load
+from viewsphere.assets.isolated import READ_HERE
+from viewsphere.assets.load import KNOWN, PICTURE_SUFFIXES, SUFFIXES, load_model
+from viewsphere.errors import ModelError
+from viewsphere.model.shot import ModelSpec
+
+ROOT = Path(__file__).parents[2]
+PAGE = ROOT / "docs" / "formats-in.md"
+MODELS = ROOT.parent / "shared" / "models"
+KINDS = {"glb": "GLB", "gltf": "glTF", "obj": "OBJ", "off": "OFF", "ply": "PLY", "stl": "STL"}
+
+corpus = pytest.mark.skipif(not (MODELS / "broken").is_dir(), reason="the folder of real models is not there")
+
+
+def table(header):
+    """Cells of the page's table with this header, row by row."""
+    lines = PAGE.read_text("utf-8").split("\n")
+    rows = []
+    for line in lines[lines.index(header) + 2 :]:
+        if not line.startswith("|"):
+            break
+        rows.append([cell.strip() for cell in line.strip("|").split("|")])
+    return rows
+
+
+def read_apart(path, folder):
+    """What becomes of a file in a process of its own, in words, and the seconds it took."""
+    start = time.monotonic()
+    spec = ModelSpec(key="a", source=str(path), category="thing", category_id=1)
+    try:
+        mesh, _ = load(spec, folder=folder)
+    except ModelError as error:
+        return str(error), time.monotonic() - start
+    count = len(mesh.warnings)
+    words = f"{len(mesh.triangles):,} triangle{'s' * (len(mesh.triangles) != 1)}"
+    return words + (f", {count} warning{'s' * (count != 1)}" if count else ""), time.monotonic() - start
+
+
+def awkward_rows():
+    """Each awkward model's name and its outcome."""
+    rows = []
+    for path in sorted((MODELS / "awkward").iterdir()):
+        if path.suffix != ".mtl":
+            said, _ = read_apart(path, Path(os.environ["VIEWSPHERE_CACHE"]))
+            rows.append((path.name, "refused" if said.startswith(str(path)) else said, said))
+    return rows
+
+
+def kind(path):
+    """The row of the broken files' table that a file belongs to."""
+    suffix = path.suffix[1:].lower()
+    return KINDS.get(suffix) or ("pictures" if suffix in PICTURE_SUFFIXES else "other endings")
+
+
+def broken_files():
+    return sorted(path for path in (MODELS / "broken").rglob("*") if path.is_file())
+
+
+def broken_rows(outcomes):
+    """Kind, loaded, refused."""
+    loaded, refused = Counter(), Counter()
+    for path, said in outcomes:
+        (refused if said.startswith(str(path)) else loaded)[kind(path)] += 1
+    names = sorted(loaded | refused, key=lambda name: (name == "other endings", name.lower()))
+    return [[name, f"{loaded[name]}", f"{refused[name]}"] for name in names]
+
+
+def test_limits_are_those_of_the_code():
+    found = {name.strip("`"): float(value.replace(",", "")) for name, value, _ in table("| Limit | Value | Of what |")}
+    assert found == {name: value for name, value in vars(limits).items() if name.startswith(("MAX_", "MIN_"))}
+
+
+def test_every_kind_that_is_read_is_named():
+    text = " ".join(row[0] for row in table("| Kind | Kept | Lost | Up, front; unit |")).lower()
+    names = {"3mf": "3mf", "jpg": "jpeg", "tif": "tiff"}
+    assert all(names.get(suffix, suffix) in text for suffix in (*SUFFIXES, *PICTURE_SUFFIXES))
+
+
+def test_axes_are_those_of_the_code(write):
+    files = {
+        "OBJ": ("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"),
+        "OFF": ("a.off", "OFF\n3 1 0\n0 0 0\n2 0 0\n0 3 0\n3 0 1 2\n"),
+    }
+    for row in table("| Kind | Kept | Lost | Up, front; unit |"):
+        if row[0].split()[0] in files:
+            _, facts = load_model(write(*files[row[0].split()[0]]))
+            assert row[3] == f"{facts.up}, {facts.forward}; {facts.unit:g} m"
+
+
+@pytest.mark.parametrize("suffix", KNOWN)
+def test_known_kinds_that_are_not_read_say_what_to_do(suffix, tmp_path):
+    with pytest.raises(ModelError, match="convert it to GLB") as error:
+        load_model(tmp_path / f"a.{suffix}")
+    assert KNOWN[suffix] in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+@corpus
+@pytest.mark.slow
+def test_awkward_files_become_what_the_page_says(monkeypatch, tmp_path):
+    monkeypatch.delenv(READ_HERE)
+    monkeypatch.setenv("VIEWSPHERE_CACHE", str(tmp_path))
+    rows = awkward_rows()
+    said = table("| File | Outcome | Remark |")
+    assert [tuple(row[:2]) for row in said] == [(f"`{name}`", outcome) for name, outcome, _ in rows]
+    for (name, outcome, error), (_, _, remark) in zip(rows, said, strict=True):
+        if outcome == "refused":
+            quoted = re.search(r'"(.+?)"', remark)
+            assert quoted is not None, name
+            assert quoted[1] in error
+
+
+@corpus
+@pytest.mark.slow
+@pytest.mark.timeout(180)
+def test_no_broken_file_does_harm(monkeypatch, tmp_path):
+    """Each in a process of its own: loaded, or one line that names the file; quick, small, and nothing written elsewhere."""
+    import resource
+
+    monkeypatch.delenv(READ_HERE)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(limits, "MAX_READ_SECONDS", 30.0)
+    files = broken_files()
+    assert len(files) > 250
+    with ThreadPoolExecutor(min(4, os.cpu_count() or 1)) as crew:
+        outcomes = list(crew.map(lambda path: read_apart(path, tmp_path / "cache"), files))
+    for path, (said, seconds) in zip(files, outcomes, strict=True):
+        assert seconds < 30
+        assert "\n" not in said
+        assert said.startswith(f"{path}: ") or said.startswith(f"{path}.") or re.match(r"[\d,]+ triangle", said), said
+        assert "crashed" not in said
+        assert "its reader failed" not in said
+    assert [p.name for p in tmp_path.iterdir()] == ["cache"]
+    assert {p.suffix for p in (tmp_path / "cache").iterdir()} == {".json", ".npz"}
+    most = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
+    assert most < limits.MAX_READ_BYTES
+    rows = broken_rows((path, said) for path, (said, _) in zip(files, outcomes, strict=True))
+    assert table("| Kind | Loaded | Refused |") == rows
+
+
+if __name__ == "__main__":
+    import tempfile
+
+    with tempfile.TemporaryDirectory() as place:
+        os.environ["VIEWSPHERE_CACHE"] = place
+        for name, outcome, error in awkward_rows():
+            print(f"| `{name}` | {outcome} | {error if outcome == 'refused' else ''} |")
+        with ThreadPoolExecutor(2) as pool:
+            found = list(pool.map(lambda path: (path, read_apart(path, Path(place))[0]), broken_files()))
+        for row in broken_rows(found):
+            print(f"| {' | '.join(row)} |")

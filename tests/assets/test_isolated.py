@@ -1,0 +1,241 @@
+"""A reader that crashes, hangs or floods the memory costs one message, and leaves nothing behind."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from viewsphere.assets import isolated, limits
+from viewsphere.assets.cache import ASIDE, cache_folder, load, load_normalised
+from viewsphere.assets.isolated import READ_HERE
+from viewsphere.assets.mesh_file import ARRAYS
+from viewsphere.assets.reader import Job
+from viewsphere.errors import ModelError
+from viewsphere.model.shot import ModelSpec
+
+CUBE = "".join(f"v {x} {y} {z}\n" for x in (0, 1) for y in (0, 2) for z in (0, 3)) + "f 1 2 4 3\nf 5 7 8 6\nf 1 5 6 2\n"
+
+PATCH = """
+import sys
+if "-m" in sys.orig_argv and "viewsphere.assets.reader" in sys.orig_argv:
+    import viewsphere.assets.load as load
+    def read(folder, suffix):
+{body}
+    load._read = read
+"""
+"""A `sitecustomize` that puts another reader into the child."""
+
+
+def alive(pid: int) -> bool:
+    try:
+        state = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
+    except OSError:
+        return False
+    return state != "Z"
+
+
+@pytest.fixture(autouse=True)
+def apart(monkeypatch, tmp_path):
+    """Models are read in processes of their own, and cached below the test's folder."""
+    monkeypatch.delenv(READ_HERE)
+    monkeypatch.setenv("VIEWSPHERE_CACHE", str(tmp_path / "cache"))
+
+
+@pytest.fixture
+def spec(write):
+    return ModelSpec(key="a", source=str(write("models/cube.obj", CUBE)), category="thing", category_id=1)
+
+
+@pytest.fixture
+def reader(monkeypatch, write, tmp_path):
+    """Replace the child's reader by these statements."""
+
+    def replace(*lines):
+        write("patch/sitecustomize.py", PATCH.format(body="\n".join(f"        {line}" for line in lines)))
+        monkeypatch.syspath_prepend(tmp_path / "patch")
+
+    return replace
+
+
+def refusal(spec):
+    """The one line by which a model is refused; nothing may stay in the cache."""
+    with pytest.raises(ModelError) as error:
+        load_normalised(spec)
+    text = str(error.value)
+    assert text.startswith(spec.source + ": ")
+    assert "\n" not in text
+    assert list(cache_folder().iterdir()) == []
+    return text.removeprefix(spec.source + ": ")
+
+
+def test_apart_and_here_are_equal_bit_for_bit(spec, monkeypatch, tmp_path):
+    mesh, facts = load(spec, folder=tmp_path / "one")
+    monkeypatch.setenv(READ_HERE, "1")
+    other, other_facts = load(spec, folder=tmp_path / "two")
+    for name in ARRAYS:
+        a, b = getattr(mesh, name), getattr(other, name)
+        assert (a is None) == (b is None)
+        assert a is None or a.tobytes() == b.tobytes()
+    assert facts == other_facts
+    assert (facts.format, facts.up, facts.size) == ("obj", "+y", (1, 2, 3))
+    names = {tuple(sorted(p.name for p in (tmp_path / where).iterdir())) for where in ("one", "two")}
+    assert len(names) == 1
+
+
+def test_a_known_model_starts_no_process(spec, monkeypatch):
+    first = load_normalised(spec)
+    monkeypatch.setattr(subprocess, "Popen", None)
+    second = load_normalised(spec)
+    assert first.vertices.tobytes() == second.vertices.tobytes()
+
+
+def test_a_reader_says_what_is_wrong(spec, write):
+    write("models/cube.obj", CUBE + "f 1 2 99\n")
+    assert refusal(spec) == "a face names vertex 99, expected 1 to 8; the file may be truncated"
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals")
+@pytest.mark.parametrize(
+    ("body", "said"),
+    [
+        ("import os; os.abort()", "reading it crashed (SIGABRT)"),
+        ("import ctypes; ctypes.string_at(0)", "reading it crashed (SIGSEGV)"),
+        ("import os; os.kill(os.getpid(), 9)", "reading it crashed (SIGKILL)"),
+        ("import os; os._exit(3)", "reading it crashed (exit code 3)"),
+        ("raise SystemExit('no\\nmore')", "the process that reads it failed (more)"),
+        ("raise TypeError('a\\nb')", "its reader failed (TypeError: a b)"),
+        ("f = lambda x: f(x) + 1; f(0)", "within one another (recursion)"),
+    ],
+)
+def test_a_crash_costs_one_message(spec, reader, body, said):
+    reader(body)
+    assert said in refusal(spec)
+
+
+def test_an_endless_loop_is_stopped(spec, reader, monkeypatch):
+    reader("while True: pass")
+    monkeypatch.setattr(limits, "MAX_READ_SECONDS", 1.0)
+    start = time.monotonic()
+    assert "within 1 s (limit MAX_READ_SECONDS)" in refusal(spec)
+    assert time.monotonic() - start < 10
+
+
+def test_a_loop_that_keeps_the_interpreter_to_itself_is_stopped(spec, reader, monkeypatch):
+    reader("import re; re.match(r'(a+)+b', 'a' * 60)")
+    monkeypatch.setenv("VIEWSPHERE_MAX_READ_SECONDS", "1")
+    assert "within 1 s (limit MAX_READ_SECONDS)" in refusal(spec)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems do not enforce it")
+@pytest.mark.parametrize("body", ["import numpy; numpy.ones(1 << 40)", "x = [bytearray(1 << 20) for _ in range(1 << 20)]"])
+def test_a_flood_of_memory_is_stopped(spec, reader, monkeypatch, body):
+    reader(body)
+    monkeypatch.setattr(limits, "MAX_READ_BYTES", 1 << 30)
+    assert "more than 1,073,741,824 bytes of memory (limit MAX_READ_BYTES)" in refusal(spec)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems do not enforce it")
+def test_too_little_memory_to_start_is_said(spec, monkeypatch):
+    monkeypatch.setattr(limits, "MAX_READ_BYTES", 1 << 24)
+    assert "the process that reads it failed" in refusal(spec) or "crashed" in refusal(spec)
+
+
+def test_without_processes_the_error_says_so(spec, monkeypatch):
+    monkeypatch.setattr(sys, "executable", "/no/such/python")
+    said = refusal(spec)
+    assert "none can be started" in said
+    assert f"{READ_HERE}=1" in said
+    monkeypatch.setenv(READ_HERE, "1")
+    assert len(load_normalised(spec).triangles) == 6
+
+
+def test_zoo_models_stay_here(spec, monkeypatch):
+    mesh = load_normalised(spec)
+    monkeypatch.setattr(subprocess, "Popen", None)
+    found = load_normalised(spec.model_copy(update={"source": "zoo:cube"}), lambda _: mesh)
+    np.testing.assert_array_equal(found.vertices, mesh.vertices)
+
+
+def test_what_was_left_behind_is_swept(spec):
+    folder = cache_folder()
+    old, new = folder / f"{ASIDE}old", folder / f"{ASIDE}new"
+    for place in (old, new):
+        place.mkdir(parents=True)
+        (place / "mesh.npz").write_bytes(b"half")
+    os.utime(old, (1, 1))
+    load_normalised(spec)
+    assert {p.name for p in folder.iterdir() if p.is_dir()} == {new.name}
+
+
+PARENT = """
+import sys
+from viewsphere.assets.cache import load_normalised
+from viewsphere.model.shot import ModelSpec
+load_normalised(ModelSpec(key="a", source=sys.argv[1], category="x", category_id=1))
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
+@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
+def test_no_child_outlives_its_parent(spec, reader, tmp_path, how):
+    pid_file = tmp_path / "pid"
+    reader("import os, pathlib, re", f"pathlib.Path({str(pid_file)!r}).write_text(str(os.getpid()))", "while True: pass")
+    environment = os.environ | {"PYTHONPATH": str(tmp_path / "patch")}
+    parent = subprocess.Popen([sys.executable, "-c", PARENT, spec.source], env=environment, stderr=subprocess.DEVNULL)
+    try:
+        deadline = time.monotonic() + 20
+        while not (pid_file.exists() and pid_file.read_text()) and time.monotonic() < deadline:
+            time.sleep(0.02)
+        child = int(pid_file.read_text())
+        assert alive(child)
+        parent.send_signal(how)
+        parent.wait(10)
+        while alive(child) and time.monotonic() < deadline:
+            time.sleep(0.02)
+        assert not alive(child)
+    finally:
+        parent.kill()
+        parent.wait()
+
+
+def test_a_child_ends_when_its_standard_input_does(spec, reader, tmp_path):
+    reader("while True: pass")
+    job = Job(spec.model_dump(mode="json"), str(tmp_path), 60.0, 1 << 32, os.getpid())
+    process, lifeline = isolated._started(job)
+    try:
+        with pytest.raises(subprocess.TimeoutExpired):
+            process.wait(1.0)
+        os.close(lifeline)
+        assert process.wait(10) == 1
+    finally:
+        process.kill()
+
+
+def test_a_daemonic_pool_worker_may_read(spec):
+    from multiprocessing import get_context
+
+    context = get_context("spawn")
+    ours, theirs = context.Pipe()
+    worker = context.Process(target=_work, args=(theirs, spec.model_dump_json()), daemon=True)
+    worker.start()
+    assert ours.poll(60)
+    assert ours.recv() == 6
+    worker.join()
+
+
+def _work(pipe, text):
+    pipe.send(len(load_normalised(ModelSpec.model_validate_json(text)).triangles))
+
+
+def test_the_reader_writes_nothing_elsewhere(spec, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    before = {p for p in tmp_path.rglob("*") if "cache" not in p.parts}
+    load_normalised(spec)
+    assert {p for p in tmp_path.rglob("*") if "cache" not in p.parts} == before
+    assert {p.suffix for p in cache_folder().iterdir()} == {".json", ".npz"}
+    assert isolated.LOG not in {p.name for p in cache_folder().rglob("*")}
