@@ -56,8 +56,8 @@ def assemble(pieces: Sequence[Piece], crease_deg: float = 40.0) -> Mesh:
 
 def _welded(vertices: NDArray[np.float32], triangles: NDArray[np.int64], material: NDArray[np.int64]) -> NDArray[np.int64]:
     """For each corner (T, 3) a number that corners of one material at one place share."""
-    q = np.round(vertices / WELD).astype(np.int64) + (1 << 19)
-    key = (q[:, 0] << 40 | q[:, 1] << 20 | q[:, 2])[triangles]
+    x, y, z = (np.unique(np.round(column / WELD), return_inverse=True)[1] for column in vertices.T)
+    key = ((x * (y.max() + 1) + y) * (z.max() + 1) + z)[triangles]
     _, place = np.unique(key, return_inverse=True)
     pair = place.reshape(-1, 3) * 256 + material[:, None]
     return np.unique(pair, return_inverse=True)[1].reshape(-1, 3)
