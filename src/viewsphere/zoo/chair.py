@@ -1,0 +1,62 @@
+"""Chairs: dining, office, armchairs, stools and folding chairs."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from viewsphere.assets.mesh import Mesh
+from viewsphere.zoo.joinery import armchair, dining, folding, office, stool, windsor
+from viewsphere.zoo.joinery.armchair import Armchair
+from viewsphere.zoo.joinery.dining import Dining
+from viewsphere.zoo.joinery.folding import Folding
+from viewsphere.zoo.joinery.office import Office
+from viewsphere.zoo.joinery.stool import Stool
+from viewsphere.zoo.joinery.windsor import Shell, Windsor
+from viewsphere.zoo.shapes.assembly import Piece, assemble
+from viewsphere.zoo.shapes.solids import moved
+
+Chair = Dining | Windsor | Shell | Office | Armchair | Stool | Folding
+"""Parameters of a chair, by its style; lengths in metres, colours sRGB 0..1."""
+
+
+def chair(parameters: Chair | None = None) -> Mesh:
+    """The chair in metres: the sitter looks towards -Y, feet on z = 0, centred in x and y.
+
+    Parts, by style: seat, seat_pad, seat_cushion, seat_slat, back_* and backrest, crest_rail, leg_*, foot, stretcher,
+    footrest, apron, armrest, base, castor, gas_lift, mechanism, lever, headrest, wing, button, hinge, shell.
+    """
+    found = _pieces(parameters or Dining())
+    corners = np.concatenate([q.solid.vertices for q in found])
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    home = -(low[0] + high[0]) / 2, -(low[1] + high[1]) / 2, -low[2]
+    return assemble([Piece(q.part, q.material, moved(q.solid, home)) for q in found], crease_deg=42)
+
+
+def _pieces(p: Chair) -> list[Piece]:
+    """What the chair is built from."""
+    match p:
+        case Dining():
+            return dining.pieces(p)
+        case Windsor():
+            return windsor.windsor_pieces(p)
+        case Shell():
+            return windsor.shell_pieces(p)
+        case Office():
+            return office.pieces(p)
+        case Armchair():
+            return armchair.pieces(p)
+        case Stool():
+            return stool.pieces(p)
+        case Folding():
+            return folding.pieces(p)
+
+
+def chair_random(rng: np.random.Generator) -> Mesh:
+    """A chair with parameters drawn from what stands in homes and offices."""
+    return chair(draw(rng))
+
+
+def draw(rng: np.random.Generator) -> Chair:
+    """The parameters of a random chair."""
+    drawers = (dining.draw, windsor.draw_windsor, windsor.draw_shell, office.draw, armchair.draw, stool.draw, folding.draw)
+    return drawers[int(rng.choice(len(drawers), p=(0.18, 0.08, 0.06, 0.18, 0.18, 0.16, 0.16)))](rng)
