@@ -20,8 +20,8 @@ def faces(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
     return corners, np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
 
 
-def assert_sound(mesh: Mesh, most: int) -> None:
-    assert 4_000 <= len(mesh.triangles) <= most
+def assert_sound(mesh: Mesh, most: int, least: int = 4_000) -> None:
+    assert least <= len(mesh.triangles) <= most
     assert np.isfinite(mesh.vertices).all() and np.isfinite(mesh.normals).all()
     np.testing.assert_allclose(np.linalg.norm(mesh.normals, axis=1), 1, atol=1e-5)
     _, area = faces(mesh)

@@ -13,13 +13,11 @@ from importlib.metadata import entry_points
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
 from viewsphere.errors import UserError
-from viewsphere.model.mistakes import one_of
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
     from pydantic import JsonValue
 
     from viewsphere.assets.mesh import Mesh
@@ -56,7 +54,8 @@ class Engine(Protocol):
 
 class Format(Protocol):
     """A module that writes a data set in one format: `export`; with `CHANNELS`, the names of the channels it needs, a run
-    that does not keep them is refused before it begins.
+    that does not keep them is refused before it begins. One that has `read(path, *, keep_going) -> ForeignDataset`
+    (`viewsphere.store.foreign`) can be imported, too.
     """
 
     def export(self, dataset: Dataset, folder: Path) -> None:
@@ -81,7 +80,7 @@ def load(kind: Kind, name: str) -> Any:
             return entry.load()
     known = names(kind)
     if name not in known:
-        raise UserError(f"{kind[:-1]}: {one_of(name, known)}")
+        raise _unknown(kind[:-1], name, known)
     return importlib.import_module(f"viewsphere.{kind}.{name}")
 
 
@@ -93,13 +92,37 @@ def attribute(path: str) -> Any:
 
 def families() -> tuple[str, ...]:
     """Names of the zoo's families (its modules, not its packages), sorted; none is imported."""
-    package = importlib.import_module("viewsphere.zoo")
-    return tuple(sorted(m.name for m in pkgutil.iter_modules(package.__path__) if not m.ispkg))
+    return _modules("viewsphere.zoo")
 
 
 def family(name: str) -> Any:
     """The module of a zoo family; raises UserError for an unknown name, with the nearest known one."""
-    known = families()
+    return _module("viewsphere.zoo", "zoo family", name)
+
+
+def places() -> tuple[str, ...]:
+    """Names of the zoo's places, sorted; none is imported."""
+    return _modules("viewsphere.zoo.places")
+
+
+def place(name: str) -> Any:
+    """The module of a place; raises UserError for an unknown name, with the nearest known one."""
+    return _module("viewsphere.zoo.places", "zoo place", name)
+
+
+def _modules(package: str) -> tuple[str, ...]:
+    path = importlib.import_module(package).__path__
+    return tuple(sorted(m.name for m in pkgutil.iter_modules(path) if not m.ispkg))
+
+
+def _module(package: str, what: str, name: str) -> Any:
+    known = _modules(package)
     if name not in known:
-        raise UserError(f"zoo family: {one_of(name, known)}")
-    return importlib.import_module(f"viewsphere.zoo.{name}")
+        raise _unknown(what, name, known)
+    return importlib.import_module(f"{package}.{name}")
+
+
+def _unknown(what: str, name: str, known: tuple[str, ...]) -> UserError:
+    from viewsphere.model.mistakes import one_of
+
+    return UserError(f"{what}: {one_of(name, known)}")

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from viewsphere import plugins
 
 if TYPE_CHECKING:
+    import numpy as np
+
     from viewsphere.assets.mesh import Mesh
 
 
@@ -31,5 +31,6 @@ def build(family: str, rng: np.random.Generator) -> Mesh:
 
 def real_size(mesh: Mesh) -> tuple[float, float, float]:
     """Width, height, length (extent along x, z, y) in metres: a zoo mesh has its real size."""
-    x, y, z = np.ptp(mesh.bounds, axis=0)
-    return float(x), float(z), float(y)
+    low, high = mesh.bounds
+    x, y, z = (high - low).tolist()
+    return x, z, y

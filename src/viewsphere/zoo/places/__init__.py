@@ -1,0 +1,56 @@
+"""Places that ship with the tool: layouts of the zoo's families around a free spot where targets stand.
+
+A place is one module of this package, named as its file: `NAME(...)` lays out a Place from parameters and `NAME_random(rng)`
+draws them. Frame: metres, +Z up, the floor at z = 0, the origin on a free stretch of it.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from viewsphere import plugins
+from viewsphere.model.shot import Matrix4
+
+
+@dataclass(frozen=True)
+class Piece:
+    """One thing of a place: the member of a zoo family that `seed` draws, as `ModelSpec(source="zoo:<family>", seed=seed)`
+    names it with centring and scale "as_is". Pieces of one family and seed are instances of one mesh.
+
+    name is unique in its place; world_from_piece is rigid.
+    """
+
+    name: str
+    family: str
+    seed: int
+    category: str
+    world_from_piece: Matrix4
+
+
+@dataclass(frozen=True)
+class Place:
+    """A layout; nothing in it was built yet. `free`: lowest x and y, highest x and y of the floor that is left to targets, if
+    it ends anywhere.
+    """
+
+    pieces: tuple[Piece, ...]
+    free: tuple[float, float, float, float] | None = None
+
+
+def places() -> tuple[str, ...]:
+    """Names of all places, sorted; none is imported."""
+    return plugins.places()
+
+
+def standing(x: float, y: float, turn_deg: float = 0.0, z: float = 0.0) -> Matrix4:
+    """World from piece for a piece that stands at (x, y, z), turned counter-clockwise about the vertical seen from above.
+
+    Exact for multiples of 90 degrees. A piece's front is -Y, so 90 makes it face +X.
+    """
+    quarter, rest = divmod(turn_deg, 90.0)
+    if rest == 0.0:
+        c, s = ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))[int(quarter) % 4]
+    else:
+        c, s = math.cos(math.radians(turn_deg)), math.sin(math.radians(turn_deg))
+    return ((c, 0.0 - s, 0.0, x), (s, c, 0.0, y), (0.0, 0.0, 1.0, z), (0.0, 0.0, 0.0, 1.0))

@@ -1,0 +1,1 @@
+"""What streets, houses, trees and street furniture are built from."""
