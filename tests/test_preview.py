@@ -103,3 +103,8 @@ def test_the_first_of_four_sides_shows_the_front(tmp_path):
     ]
     assert redness[0] > 500
     assert max(redness[1:]) < redness[0] / 20
+
+
+def test_a_preview_of_few_frames_shows_each_of_them_once():
+    shown = [(s.objects[0].key, s.pose.index) for s in preview_samples(small_recipe(), 50, 48)]
+    assert len(shown) == len(set(shown)) == 12

@@ -36,12 +36,12 @@ def preview_samples(recipe: Recipe, count: int = 12, width: int = 320) -> Iterat
     stages = Stages()
     for model, poses in _spread(planned, count):
         stages.check_distances(planned, planned.model_specs[model])
-        shot = planned.shot(model * planned.shot_count // planned.models)
-        channels = tuple(dict.fromkeys((*shot.channels, "rgb", "depth", "instances")))
-        frames = tuple(planned.frame(model, pose) for pose in poses)
-        lens = _scaled(shot.intrinsics, width)
-        small = shot.model_copy(update={"intrinsics": lens, "channels": channels, "frames": frames})
-        yield from stages.render(small)
+        groups = [[pose] for pose in poses] if recipe.scene.is_new_each_frame else [poses]
+        for group in groups:
+            shot = planned.take(model, group, stages.box)
+            channels = tuple(dict.fromkeys((*shot.channels, "rgb", "depth", "instances")))
+            small = shot.model_copy(update={"intrinsics": _scaled(shot.intrinsics, width), "channels": channels})
+            yield from stages.render(small)
 
 
 def dataset_samples(dataset: Dataset, count: int = 12) -> list[Sample]:
@@ -51,8 +51,9 @@ def dataset_samples(dataset: Dataset, count: int = 12) -> list[Sample]:
 
 
 def _spread(planned: Plan, count: int) -> list[tuple[int, list[int]]]:
-    """Model and pose indices such that models follow in order and poses step through the grid."""
-    count = min(count, planned.frames)
+    """Model and pose indices such that models follow in order and poses step through the grid; all where there are so few."""
+    if count >= planned.frames:
+        return [(model, list(range(planned.poses))) for model in range(planned.models)]
     models = np.linspace(0, planned.models - 1, count).round().astype(int)
     poses = (np.arange(count) * planned.poses / count * (1 + 1 / max(count, 1))).astype(int) % planned.poses
     chosen: dict[int, list[int]] = {}
@@ -110,14 +111,15 @@ def four_sides(spec: ModelSpec, size: int = 320) -> Picture:
 
 def contact_sheet(samples: Sequence[Sample], draw: Sequence[Drawing] = (), columns: int = 4, width: int = 320) -> Picture:
     """All samples side by side with what was asked for drawn over them, (H, W, 3) uint8 sRGB."""
-    tiles = [
-        (
-            draw_sample(s, draw, width),
-            f"{s.objects[0].key}  az {s.pose.azimuth_deg:g}  el {s.pose.elevation_deg:g}  d {s.pose.distance:g}",
-        )
-        for s in samples
-    ]
-    return _sheet(tiles, columns)
+    return _sheet([(draw_sample(s, draw, width), _caption(s)) for s in samples], columns)
+
+
+def _caption(sample: Sample) -> str:
+    pose, seen = sample.known_pose, sample.objects
+    if pose is None:
+        return ", ".join(dict.fromkeys(o.category for o in seen)) or "nothing labelled"
+    key = f"{seen[0].key}  " if seen else ""
+    return f"{key}az {pose.azimuth_deg:g}  el {pose.elevation_deg:g}  d {pose.distance:g}"
 
 
 def draw_sample(sample: Sample, draw: Sequence[Drawing] = (), width: int | None = None) -> Picture:

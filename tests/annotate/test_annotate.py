@@ -226,7 +226,7 @@ def test_wrong_numbers_of_models_are_refused():
     objects, camera, geometry, visibility, pose = scene([UNIT], [at()])
     frame = Frame(index=5, pose=pose, split="train")
     shot = Shot(key="s", placements=(), intrinsics=LENS, scene=Scene(), frames=(frame,), channels=())
-    with pytest.raises(ValueError, match="frame 5: expected 1 placements"):
+    with pytest.raises(ValueError, match="frame 5: expected 1 objects"):
         annotate(shot, frame, camera, geometry, visibility, [objects[0].box3d_object], ["m"])
 
 

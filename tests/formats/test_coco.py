@@ -51,14 +51,14 @@ def test_the_80_categories_of_coco():
 @pytest.mark.parametrize("name", ["hair drier", "hair_drier", "Hair-Drier", "hairdrier", "hairdryer", "hair dryer"])
 def test_categories_keep_coco_ids_however_spelled(name):
     categories = (Category(1, "gizmo", ""), Category(2, name, ""), Category(3, "hair drier", ""))
-    assert coco.category_ids(categories) == {1: 91, 2: 89, 3: 93}
+    assert coco.official_ids(categories) == {1: 91, 2: 89, 3: 93}
 
 
 def test_detections_rebuilt_from_the_stored_maps_score_one(exported):
     dataset, folder = exported
     for split in dataset.splits:
         truth, detections = load(folder, split), []
-        ids = coco.category_ids(dataset.categories)
+        ids = coco.category_ids(dataset)
         for sample in dataset:
             if sample.split != split:
                 continue

@@ -28,3 +28,28 @@ def test_a_model_at_its_own_scale_is_built_once(monkeypatch):
     warm.model(spec)
     warm.real_size(spec)
     assert len(built) == 1
+
+
+def test_models_used_last_are_kept_as_far_as_there_is_room(monkeypatch):
+    built = []
+    build = stages.build
+    monkeypatch.setattr(stages, "build", lambda family, rng: built.append(family) or build(family, rng))
+    specs = [DRIER.model_copy(update={"key": f"d{i}", "seed": i}) for i in range(12)]
+    warm = Stages()
+    for spec in (*specs, *specs):
+        warm.model(spec)
+    assert len(built) == 12  # a place has many pieces, and all of them are needed again
+    monkeypatch.setattr(stages, "WARM_BYTES", 2.5 * sum(stages._size(warm.model(s)) for s in specs) / 12)
+    warm = Stages()
+    first, second, third = specs[:3]
+    for spec in (first, second, first, third):
+        warm.model(spec)
+    built.clear()
+    warm.model(first)
+    assert not built
+    warm.model(second)
+    assert len(built) == 1
+    boxes = [warm.box(s) for s in (first, second, third)]
+    assert len(built) == 1 and all(b.shape == (8, 3) for b in boxes)
+    monkeypatch.setattr(stages, "WARM_BYTES", 0)
+    assert warm.model(first) is warm.model(first)

@@ -65,8 +65,40 @@ def test_ids_must_be_in_order():
     from viewsphere.truth.geometry import build_geometry
 
     spec = ModelSpec(key="m", source="m", category="thing", category_id=1)
-    with pytest.raises(ValueError, match=r"expected ids 1\.\.1 in order, got \[2\]"):
+    with pytest.raises(ValueError, match=r"expected ids 1\.\.N in order, then 0, got \[2\]"):
         build_geometry([Placement(id=2, model=spec)], [cube()], False, 0.01)
+    with pytest.raises(ValueError, match=r"got \[0, 1\]"):
+        build_geometry([Placement(id=0, model=spec), Placement(id=1, model=spec)], [cube()] * 2, False, 0.01)
+
+
+def test_scenery_comes_after_the_objects_and_is_background():
+    move = np.eye(4)
+    move[:3, 3] = 5, 0, -1
+    geometry = placed(cube(), cube(), cube(), moves=[np.eye(4), np.eye(4), move], ground=True, scenery=1)
+    assert geometry.object_count == 2 and geometry.has_scenery
+    assert geometry.vertex_start == (0, 24, 48, 72) and geometry.triangle_start == (0, 12, 24, 36)
+    for name in ("object", "part", "category"):
+        assert (getattr(geometry, f"triangle_{name}")[24:] == 0).all()
+        assert (getattr(geometry, f"triangle_{name}")[:24] > 0).all()
+    assert geometry.ground_z == -1.5
+    assert not placed(cube(), ground=True).has_scenery
+    alone = placed(cube(), cube(), moves=[np.eye(4), move])
+    assert np.array_equal(geometry.triangle_normals[24:36], alone.triangle_normals[12:24])
+    assert np.array_equal(geometry.vertices[48:72], alone.vertices[24:48])
+
+
+def test_scenery_that_is_kept_is_told_from_another():
+    move = np.eye(4)
+    move[0, 3] = 5
+    a, b = cube(), cube(0.25)
+    first = placed(a, b, moves=[np.eye(4), move], scenery=1)
+    again = placed(a, b, moves=[move, move], scenery=1)
+    move[0, 3] = 7
+    moved = placed(a, b, moves=[np.eye(4), move], scenery=1)
+    other = placed(a, cube(0.3), moves=[np.eye(4), move], scenery=1)
+    assert first.vertices[24:, 0].max() == again.vertices[24:, 0].max() == 5.25
+    assert moved.vertices[24:, 0].max() == 7.25
+    assert other.vertices[24:, 0].max() == pytest.approx(7.3)
 
 
 def test_an_empty_stage_can_be_seen():

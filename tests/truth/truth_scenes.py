@@ -29,11 +29,12 @@ def mesh_of(vertices, triangles, normals=None, parts=None, **fields) -> Mesh:
     return Mesh(vertices, triangles, np.asarray(normals, np.float32), triangle_part=part, parts=names, **fields)
 
 
-def placed(*meshes: Mesh, moves=None, ground=False, label_alpha=0.01) -> Geometry:
+def placed(*meshes: Mesh, moves=None, ground=False, label_alpha=0.01, scenery=0) -> Geometry:
+    """A geometry of these meshes; the last `scenery` of them are."""
     moves = moves or [np.eye(4)] * len(meshes)
     placements = [
         Placement(
-            id=i + 1,
+            id=i + 1 if i < len(moves) - scenery else 0,
             model=ModelSpec(key=f"m{i}", source=f"m{i}", category="thing", category_id=i + 10),
             world_from_object=tuple(map(tuple, np.asarray(m, float).tolist())),
         )

@@ -37,21 +37,28 @@ def visible_and_cut(
             return 0.0, 1.0
         own = (-math.inf, -math.inf, math.inf, math.inf)  # no edge is in the lens' field because the object fills it
     width, height = camera.width, camera.height
+    image = (0.0, 0.0, float(width), float(height))
+    if whole[object_id - 1] and not overlap(own, image):
+        return 0.0, 1.0
     inside = whole[object_id - 1] and own[0] >= 0 and own[1] >= 0 and own[2] <= width and own[3] <= height
+    if inside and not area:
+        return 0.0, 0.0
     if inside and _unobstructed(geometry, camera, object_id, bounds, whole):
-        return (1.0 if area else 0.0), 0.0
+        return 1.0, 0.0
     total, kept = _pixels_alone(geometry, camera, object_id, own if whole[object_id - 1] else None)
     if total == 0:
-        return 0.0, 0.0 if overlap(own, (0.0, 0.0, float(width), float(height))) else 1.0
+        return 0.0, 0.0 if overlap(own, image) else 1.0
     return area / total, (total - kept) / total
 
 
 def _unobstructed(
     geometry: Geometry, camera: Camera, object_id: int, bounds: Sequence[Bounds | None], whole: Sequence[bool]
 ) -> bool:
-    """Whether nothing can hide any of the object: no other model's box meets its own, and no ground is in
-    the way.
+    """Whether nothing can hide any of the object: no other's box meets its own, no scenery is there, and no ground is in the
+    way.
     """
+    if geometry.has_scenery:
+        return False  # a street's box meets all others: to look at scenery's boxes would cost more than it saves
     own = bounds[object_id - 1]
     for i, other in enumerate(bounds):
         if i != object_id - 1 and own and other and (not whole[i] or overlap(own, other)):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -34,30 +35,30 @@ def annotate(
     models: Sequence[str],
     real_sizes: Sequence[Size | None] | None = None,
 ) -> tuple[ObjectAnnotation, ...]:
-    """Annotations of all placed objects, seen or not, in the order of their ids.
+    """Annotations of all objects (placements of an id), seen or not, in the order of their ids.
 
-    `boxes[i]` is the 3D box (8, 3) of placement i's model in the object's axes, `models[i]` the path of that model in the data
+    `boxes[i]` is the 3D box (8, 3) of object i + 1's model in the object's axes, `models[i]` the path of that model in the data
     set and `real_sizes[i]` its true size (by default the one its spec gives in numbers); `geometry` is the shot's stage and
     `visibility` what this camera sees of it. An object that covers no pixel has an empty mask, no `box2d` and visibility 0.
     """
     from viewsphere.geometry.kernels_box import instance_map
 
-    count = geometry.object_count
-    if not len(shot.placements) == len(boxes) == len(models) == count:
+    count, placements = geometry.object_count, shot.objects
+    if not len(placements) == len(boxes) == len(models) == count:
         raise ValueError(
-            f"annotate: frame {frame.index}: expected {count} placements, boxes and models, "
-            f"got {len(shot.placements)}, {len(boxes)}, {len(models)}"
+            f"annotate: frame {frame.index}: expected {count} objects, boxes and models, "
+            f"got {len(placements)}, {len(boxes)}, {len(models)}"
         )
     ids, areas, tight = instance_map(visibility.triangle, geometry.triangle_object, count)
-    parts = zip(geometry.triangle_start, geometry.triangle_start[1:], strict=False)
-    points = zip(geometry.vertex_start, geometry.vertex_start[1:], strict=False)
+    parts = pairwise(geometry.triangle_start[: count + 1])
+    points = pairwise(geometry.vertex_start[: count + 1])
     projections = [
         projected_bounds(camera, geometry.vertices, geometry.triangles, part, corners)
         for part, corners in zip(parts, points, strict=True)
     ]
     bounds, whole = [b for b, _ in projections], [w for _, w in projections]
     annotations: list[ObjectAnnotation] = []
-    for i, placement in enumerate(shot.placements):
+    for i, placement in enumerate(placements):
         area = int(areas[i + 1])
         x0, y0, x1, y1 = tight[i + 1].tolist() if area else (0, 0, 0, 0)
         visible, truncated = visible_and_cut(geometry, camera, i + 1, area, bounds, whole)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import asdict, dataclass
 from functools import partial
@@ -13,7 +14,7 @@ from viewsphere.check.frames import FRAME_PROOFS
 from viewsphere.check.rays import RayCaster
 from viewsphere.errors import MissingExtraError, ViewsphereError
 from viewsphere.model.sample import Sample
-from viewsphere.store import Dataset
+from viewsphere.store import Dataset, ShotRow
 
 
 @dataclass(frozen=True)
@@ -47,12 +48,13 @@ class Report:
         return {"ok": self.ok, **asdict(self)}
 
 
-def check(dataset: Dataset, *, sample: int = 50, rays: bool | None = None) -> Report:
+def check(dataset: Dataset, *, sample: int = 50, rays: bool | None = None, frames: int | None = None) -> Report:
     """Prove the finished frames of a data set, its COCO annotations and, if it was exported, its native JSON.
 
-    Every frame is read whole. On `sample` frames, spread evenly, stored depth is lifted to points and compared with rays that
-    Embree casts at the exported models: `rays` False leaves that out, None does too (with a note) where embreex is not
-    installed. COCO annotations are made afresh if the data set has no such export. Nothing is changed.
+    Every frame is read whole, or with `frames` at most so many, spread evenly, and the exports are left to a whole check. On
+    `sample` frames, spread evenly, stored depth is lifted to points and compared with rays that Embree casts at the
+    exported models: `rays` False leaves that out, None does too (with a note) where embreex is not installed. COCO
+    annotations are made afresh if the data set has no such export. Nothing is changed.
 
     Raises MissingExtraError for `rays` True without embreex.
     """
@@ -63,10 +65,11 @@ def check(dataset: Dataset, *, sample: int = 50, rays: bool | None = None) -> Re
     except (ViewsphereError, LookupError, TypeError, ValueError) as error:
         return Report({}, (Finding("counts", None, f"expected models that can be read, found {error}"),), ())
     caster = None if rays is False else _caster(dataset, rays is True, notes)
-    chosen = set(range(0, len(dataset), max(1, -(-len(dataset) // sample)))) if caster and sample else set[int]()
+    read_ones = range(0, len(dataset), max(1, -(-len(dataset) // frames)) if frames else 1)
+    chosen = set(read_ones[:: max(1, -(-len(read_ones) // sample))]) if caster and sample else set[int]()
     checked = dict.fromkeys(FRAME_PROOFS, 0)
     truths: list[FrameTruth] = []
-    for position, (index, read) in enumerate(_frames(dataset)):
+    for position, index, read in _frames(dataset, read_ones):
         if not isinstance(read, Sample):
             findings.append(Finding("files", index, read))
             continue
@@ -76,6 +79,12 @@ def check(dataset: Dataset, *, sample: int = 50, rays: bool | None = None) -> Re
             checked[name] = checked.get(name, 0) + 1
             findings += [Finding(name, index, message) for message in messages]
         truths += frame_truth(read)
+    notes += [] if caster is None else caster.notes
+    if len(read_ones) < len(dataset):
+        notes.append(
+            f"{len(read_ones):,} of {len(dataset):,} frames were read; coco, native: not checked, they need all of them"
+        )
+        return Report(checked, tuple(findings), tuple(notes))
     checked["coco"] = len(truths)
     findings += [Finding("coco", frame, message) for frame, message in check_coco(dataset, truths, notes)]
     if (dataset.root / "native").is_dir():
@@ -91,18 +100,14 @@ def _counts(dataset: Dataset, notes: list[str]) -> Iterator[str]:
     plan, store = dataset.plan, dataset.store
     skipped = store.skipped()
     notes += [f"{key} was left out: {reason}" for key, reason in skipped.items()]
-    wanted = [s for s in plan.shots if s[0] not in skipped and s[0].rpartition("-")[0] not in skipped]
-    missing = [key for key, _, _ in wanted if not store.has_shot(key)]
     if sum(count for _, _, count in plan.shots) != plan.frames:
         yield f"expected shots of {plan.frames} frames together, found {sum(count for _, _, count in plan.shots)}"
-    if plan.max_objects == 1 and plan.frames != len(plan.models) * plan.poses:
+    if not plan.parts and plan.max_objects == 1 and plan.frames != len(plan.models) * plan.poses:
         yield f"expected {len(plan.models)} models x {plan.poses} poses, found a plan of {plan.frames} frames"
-    if missing:
-        expected = sum(count for _, _, count in wanted)
-        yield (
-            f"expected {expected} frames ({len(plan.models)} models x {plan.poses} poses), found {len(dataset)}: "
-            f"shot {missing[0]} is the first of {len(missing)} missing: render again to go on"
-        )
+    for number, part in enumerate(plan.parts, 1):
+        if part.rows and part.frames != sum(row.frames for row in part.rows):
+            yield f"part {number}: expected {sum(row.frames for row in part.rows)} frames, found a plan of {part.frames}"
+    yield from _missing_shots(dataset)
     finished = {info.key: info for info in dataset.models}
     for key in plan.models:
         if key in skipped:
@@ -115,17 +120,43 @@ def _counts(dataset: Dataset, notes: list[str]) -> Iterator[str]:
                 yield f"model {key}: expected {file}, found none"
 
 
-def _frames(dataset: Dataset) -> Iterator[tuple[int, Sample | str]]:
-    """Index and sample of every finished frame, or what is wrong with its record."""
+def _missing_shots(dataset: Dataset) -> Iterator[str]:
+    """What is missing of each part, and of the channels that each one added to others."""
+    plan, store = dataset.plan, dataset.store
+    groups: defaultdict[tuple[int, bool], list[ShotRow]] = defaultdict(list)
+    for row in store.wanted(plan):
+        _, added, later = row[0].rpartition("+")
+        groups[int(later) if added else plan.part_of(row[1]), bool(added)].append(row)
+    for (number, added), rows in groups.items():
+        missing = [row for row in rows if not store.has_shot(row[0])]
+        if not missing:
+            continue
+        expected, lost = (sum(count for _, _, count in some) for some in (rows, missing))
+        what = f"{len(plan.models)} models x {plan.poses} poses"
+        if len(plan.parts) > 1:
+            channels = dict.fromkeys(name for _, names in plan.parts[number].supplies for name in names)
+            what = f"{', '.join(channels)} of older frames, " if added else ""
+            what += f"part {number + 1}, recipe {plan.parts[number].name!r}"
+        yield (
+            f"expected {expected} frames ({what}), found {expected - lost}: shot {missing[0][0]} is the first of "
+            f"{len(missing)} missing: render again to go on"
+        )
+
+
+def _frames(dataset: Dataset, positions: range) -> Iterator[tuple[int, int, Sample | str]]:
+    """Position, index and sample of these finished frames, or what is wrong with a record."""
     position = 0
     for key, first, count in dataset.plan.shots:
         if not dataset.store.has_shot(key):
             continue
         for i in range(count):
+            if position + i not in positions:
+                continue
             try:
-                yield first + i, dataset[position + i]
+                yield position + i, first + i, dataset[position + i]
             except (ViewsphereError, LookupError, TypeError, ValueError, AttributeError) as error:
-                yield first + i, f"shot {key}: expected a readable record, found {type(error).__name__}: {error}"
+                problem = f"{type(error).__name__}: {error}"
+                yield position + i, first + i, f"shot {key}: expected a readable record, found {problem}"
         position += count
 
 
@@ -133,7 +164,8 @@ def _proofs(dataset: Dataset, sample: Sample, caster: RayCaster | None) -> Itera
     """Every check of one frame and what it found; a proof that cannot be carried out counts as failed."""
     models = {info.key: info for info in dataset.models}
     proofs: dict[str, Callable[[], Iterable[str]]] = {n: partial(p, sample, models) for n, p in FRAME_PROOFS.items()}
-    if caster is not None:
+    placed = all(o.is_placed for o in sample.objects)
+    if caster is not None and placed and {"depth", "instances"} <= sample.files.keys():
         proofs["surface"] = partial(caster.off_surface, sample)
     for name, proof in proofs.items():
         try:

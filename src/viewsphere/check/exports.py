@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import io
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -23,6 +23,9 @@ from viewsphere.store import Dataset
 EVALUATED_IMAGES = 2000
 """Images a split is evaluated on at most, spread evenly: COCOeval keeps all of them in memory."""
 
+RENEWED = {"id", "image_id", "category_id", "path_mask"}
+"""What an imported annotation does not keep."""
+
 Remark = tuple[int | None, str]
 
 
@@ -32,17 +35,28 @@ class FrameTruth:
 
     frame: int
     split: str
-    pose: int
+    pose: int | None
     object_id: int
     key: str
     category_id: int
     size: tuple[int, int]
     counts: str
     box: tuple[int, int, int, int] | None
+    source: Mapping[str, Any] | None = None
+
+    @property
+    def is_expected(self) -> bool:
+        """Whether COCO has an annotation for it: it is seen, or was imported with one."""
+        return self.box is not None or self.source is not None
 
 
 def frame_truth(sample: Sample) -> Iterator[FrameTruth]:
-    """All objects of a frame, from its instance map; from the annotations where there is none to read."""
+    """All objects of a frame, from its instance map; from the annotations where there is none to read. Of a frame without
+    objects one that is not seen, number 0.
+    """
+    pose = sample.known_pose and sample.known_pose.index
+    if not sample.objects:
+        yield FrameTruth(sample.index, sample.split, pose, 0, "", 0, (sample.height, sample.width), "", None)
     try:
         instances = sample.channels["instances"]
     except (KeyError, ViewsphereError):
@@ -55,13 +69,14 @@ def frame_truth(sample: Sample) -> Iterator[FrameTruth]:
         yield FrameTruth(
             sample.index,
             sample.split,
-            sample.pose.index,
+            pose,
             o.id,
             o.key,
             o.category_id,
             mask.shape,
             encode_rle(mask),
             mask_box(mask),
+            o.source if o.box2d else None,
         )
 
 
@@ -100,7 +115,7 @@ def _load(file: Path) -> Any:
 
 
 def _annotation_id(dataset: Dataset, truth: FrameTruth) -> int:
-    return truth.frame * dataset.max_objects + truth.object_id
+    return dataset.plan.annotation_id(truth.frame, truth.object_id)
 
 
 def _coco_split(dataset: Dataset, truth: Any, own: Sequence[FrameTruth], seen: set[int]) -> Iterator[Remark]:
@@ -115,19 +130,32 @@ def _coco_split(dataset: Dataset, truth: Any, own: Sequence[FrameTruth], seen: s
     seen |= set(numbers)
     for frame in sorted({t.frame for t in own} ^ {i - 1 for i in images}):
         yield frame, "expected an image for each finished frame, found none, or one too many: export again"
-    expected = {_annotation_id(dataset, t): t for t in own if t.box}
+    expected = {_annotation_id(dataset, t): t for t in own if t.is_expected}
     for number in sorted(set(expected) - set(numbers)):
         yield expected[number].frame, f"object {expected[number].object_id}: expected annotation {number}, found none"
-    ids = coco.category_ids(dataset.categories)
+    ids = coco.category_ids(dataset)
     for annotation in annotations:
         mine = expected.get(annotation["id"])
-        if mine is None or mine.box is None:
+        if mine is None:
             yield annotation["image_id"] - 1, f"annotation {annotation['id']}: expected none, its object is not seen"
             continue
-        yield from ((mine.frame, message) for message in _coco_annotation(truth, annotation, mine, ids[mine.category_id]))
+        if (annotation["image_id"], annotation["category_id"]) != (mine.frame + 1, ids[mine.category_id]):
+            yield (
+                mine.frame,
+                f"annotation {annotation['id']}: expected image {mine.frame + 1}, category {ids[mine.category_id]}",
+            )
+        proof = _coco_annotation if mine.source is None else _foreign_annotation
+        yield from ((mine.frame, message) for message in proof(truth, annotation, mine))
 
 
-def _coco_annotation(truth: Any, annotation: dict[str, Any], mine: FrameTruth, category: int) -> Iterator[str]:
+def _foreign_annotation(truth: Any, annotation: dict[str, Any], mine: FrameTruth) -> Iterator[str]:
+    """An imported annotation is what it was, but for its ids."""
+    changed = {k for k, v in (mine.source or {}).items() if k not in RENEWED and annotation.get(k) != v}
+    if changed:
+        yield f"annotation {annotation['id']}: expected the imported one's {', '.join(sorted(changed))}; found others"
+
+
+def _coco_annotation(truth: Any, annotation: dict[str, Any], mine: FrameTruth) -> Iterator[str]:
     from pycocotools import mask as rle
 
     assert mine.box is not None
@@ -142,8 +170,6 @@ def _coco_annotation(truth: Any, annotation: dict[str, Any], mine: FrameTruth, c
         yield f"{name}: expected bbox {[x0, y0, x1 - x0, y1 - y0]}, found {annotation['bbox']}"
     if annotation["area"] != rle.area(code):
         yield f"{name}: expected area {rle.area(code)}, found {annotation['area']}"
-    if (annotation["image_id"], annotation["category_id"]) != (mine.frame + 1, category):
-        yield f"{name}: expected image {mine.frame + 1}, category {category}; found others"
 
 
 def _coco_files(truth: Any, folder: Path) -> Iterator[Remark]:
@@ -151,7 +177,7 @@ def _coco_files(truth: Any, folder: Path) -> Iterator[Remark]:
         if not (folder / image["file_name"]).is_file():
             yield image["id"] - 1, f"expected {folder.name}/{image['file_name']}, found no such file"
     for annotation in truth.dataset["annotations"]:
-        if not (folder / annotation["path_mask"]).is_file():
+        if "path_mask" in annotation and not (folder / annotation["path_mask"]).is_file():
             yield annotation["image_id"] - 1, f"expected {folder.name}/{annotation['path_mask']}, found no such file"
 
 
@@ -159,8 +185,9 @@ def _precision(dataset: Dataset, truth: Any, own: Sequence[FrameTruth]) -> Itera
     """Average precision of detections rebuilt from the stored maps; it must be 1."""
     from pycocotools.cocoeval import COCOeval
 
-    ids = coco.category_ids(dataset.categories)
-    frames = sorted({t.frame for t in own})
+    ids = coco.category_ids(dataset)
+    foreign = {t.frame for t in own if t.source is not None}
+    frames = sorted({t.frame for t in own} - foreign)
     images = {f + 1 for f in frames[:: max(1, -(-len(frames) // EVALUATED_IMAGES))]}
     detections: list[dict[str, Any]] = []
     for t in own:
@@ -190,7 +217,8 @@ FACE_NAMES = ["ground", "top", "right", "front", "left", "back"]
 
 
 def check_native(dataset: Dataset, truths: Sequence[FrameTruth]) -> Iterator[Remark]:
-    """The native JSON has the paper's keys, an entry for every object of every frame, and its files."""
+    """The native JSON has the paper's keys, an entry for every object of every frame with a pose, and its files."""
+    truths = [truth for truth in truths if truth.pose is not None]
     folder = dataset.root / "native"
     try:
         value = json.loads((folder / "dataset1.json").read_text("utf-8"))

@@ -27,7 +27,7 @@ ANGLE_TOLERANCE = 1e-6
 
 def files(sample: Sample, models: Mapping[str, ModelInfo]) -> Iterator[str]:
     """Every channel's file is there and holds an array of the image's size, with ids and directions that can be."""
-    height, width = sample.camera.height, sample.camera.width
+    height, width = sample.height, sample.width
     for name, file in sample.files.items():
         try:
             array = sample.channels[name]
@@ -47,7 +47,7 @@ def ids(sample: Sample, models: Mapping[str, ModelInfo]) -> Iterator[str]:
     found = [o.id for o in sample.objects]
     if found != list(range(1, len(found) + 1)):
         yield f"expected objects 1..{len(found)}, found {found}"
-    for o in sample.objects:
+    for o in _rendered(sample):
         info = models.get(o.key)
         if info is None or (info.category, info.category_id) != (o.category, o.category_id):
             yield f"object {o.id}: expected a model of the data set, found {o.key!r} ({o.category})"
@@ -68,11 +68,13 @@ def masks(sample: Sample, models: Mapping[str, ModelInfo]) -> Iterator[str]:
     instances = _channel(sample, "instances")
     for o in sample.objects:
         mask = o.mask
-        if mask.shape != (sample.camera.height, sample.camera.width):
+        if mask.shape != (sample.height, sample.width):
             yield f"object {o.id}: expected a mask of the image's size, found {mask.shape}"
             continue
         if instances is not None and not np.array_equal(mask, instances == o.id):
             yield f"object {o.id}: run lengths differ from the instance map at {(mask != (instances == o.id)).sum()} pixels"
+        if o.source is not None and not mask.any():
+            continue  # it came with a box alone
         if o.area != mask.sum():
             yield f"object {o.id}: expected area {mask.sum()}, found {o.area}"
         polygons: Any = mask_polygons(mask)
@@ -80,13 +82,14 @@ def masks(sample: Sample, models: Mapping[str, ModelInfo]) -> Iterator[str]:
             code: Any = coco.merge(coco.frPyObjects(polygons, *mask.shape))
             if not np.array_equal(coco.decode(code), mask):
                 yield f"object {o.id}: polygons differ from the mask"
-        if not (0 <= o.visibility <= 1 and 0 <= o.truncation <= 1) or (o.visibility > 0) != bool(mask.any()):
+        shares = (o.visibility, o.truncation) if o.source is None else (1.0, 0.0)
+        if not all(0 <= share <= 1 for share in shares) or (shares[0] > 0) != bool(mask.any()):
             yield f"object {o.id}: visibility {o.visibility}, truncation {o.truncation} and {mask.sum()} visible pixels"
 
 
 def boxes(sample: Sample, models: Mapping[str, ModelInfo]) -> Iterator[str]:
     """`box2d` is the mask's tight box; the projected model's box holds it and lies in the 3D box's."""
-    for o in sample.objects:
+    for o in _rendered(sample):
         tight = mask_box(o.mask)
         if o.box2d != tight:
             yield f"object {o.id}: expected box2d {tight}, found {o.box2d}"
@@ -104,11 +107,13 @@ def boxes(sample: Sample, models: Mapping[str, ModelInfo]) -> Iterator[str]:
 
 def projection(sample: Sample, models: Mapping[str, ModelInfo]) -> Iterator[str]:
     """The 3D boxes are the model's, moved to the world, to the camera and by P (and the lens) to pixels."""
+    if sample.known_camera is None:
+        return
     camera = sample.camera
     camera_from_world = rigid(camera.R, camera.t)
     if not np.allclose(camera.R @ camera.R.T, np.eye(3), atol=METRE_TOLERANCE) or np.linalg.det(camera.R) < 0:
         yield "expected a rotation R, found something else"
-    for o in sample.objects:
+    for o in _rendered(sample):
         if o.key in models and not np.array_equal(o.box3d_object, models[o.key].box3d_object):
             yield f"object {o.id}: expected the 3D box of model {o.key}, found another"
         scale = 1 + float(np.abs(o.box3d_camera).max())
@@ -149,6 +154,8 @@ def _projected(sample: Sample, o: ObjectAnnotation) -> Iterator[str]:
 
 def poses(sample: Sample, models: Mapping[str, ModelInfo]) -> Iterator[str]:
     """The camera stands and looks as its azimuth, elevation, distance and tilt say."""
+    if sample.known_pose is None or sample.known_camera is None or not all(o.is_placed for o in sample.objects):
+        return
     pose, camera = sample.pose, sample.camera
     azimuth, elevation, tilt = (math.radians(a) for a in (pose.azimuth_deg, pose.elevation_deg, pose.tilt_deg))
     if not np.allclose(camera.R, orbit_rotation(azimuth, elevation, tilt), rtol=0, atol=ANGLE_TOLERANCE):
@@ -176,13 +183,18 @@ FRAME_PROOFS: dict[str, Proof] = {
 """Checks of every frame by name."""
 
 
+def _rendered(sample: Sample) -> list[ObjectAnnotation]:
+    """The objects that were not imported."""
+    return [o for o in sample.objects if o.source is None]
+
+
 def _channel(sample: Sample, name: str) -> NDArray[Any] | None:
     """A channel, None if it is not there or `files` has said that it cannot be read."""
     try:
         array = sample.channels[name]
     except (KeyError, ViewsphereError):
         return None
-    return array if array.shape[:2] == (sample.camera.height, sample.camera.width) else None
+    return array if array.shape[:2] == (sample.height, sample.width) else None
 
 
 def _within(inner: tuple[float, ...], outer: tuple[float, ...], slack: float) -> bool:

@@ -1,23 +1,28 @@
-"""An independent witness: Embree casts rays at the exported models, read back by trimesh."""
+"""An independent witness: Embree casts rays at the exported models, read back by trimesh, and at the scenery, made anew."""
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Iterator
+from dataclasses import dataclass
 from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.errors import MissingExtraError
+from viewsphere.errors import MissingExtraError, ViewsphereError
 from viewsphere.geometry.camera import pixel_rays
+from viewsphere.geometry.rotation import transform
 from viewsphere.model.sample import Sample
+from viewsphere.run.stages import Stages
+from viewsphere.run.tasks import SceneryRecord, mesh_digest
 from viewsphere.store import Dataset
 
 Float = NDArray[np.float64]
 
 PIXELS = 5000
-"""Pixels of a frame that are cast, spread evenly over the objects."""
+"""Pixels of a frame that are cast at objects, spread evenly over them; as many at what is background."""
 
 TOLERANCE = 1e-4
 """Share of the distance by which Embree's float32 and the stored depth may differ."""
@@ -26,86 +31,164 @@ OUTLIERS = 0.01
 """Share of the pixels that may differ: where a ray passes within rounding of a triangle's edge, or meets it at a glance."""
 
 
+@dataclass(frozen=True, eq=False)
+class _Soup:
+    """Triangles (T, 3, 3) of one thing, and which of them cannot be seen through (T,) bool."""
+
+    corners: Float
+    opaque: NDArray[np.bool_]
+
+
 class RayCaster:
-    """Casts rays at a data set's models; the last scene is kept, because frames of one scene follow one another."""
+    """Casts rays at a data set's scenes; the last one is kept, because frames of one scene follow one another.
+
+    Scenery that is background is no part of a data set; it is made again from what its shot says of it. `notes` says where
+    that cannot be.
+    """
 
     def __init__(self, dataset: Dataset) -> None:
         if find_spec("embreex") is None:
             raise MissingExtraError("expected embreex, found none: pip install 'viewsphere[check]'")
+        self.notes: list[str] = []
+        self._dataset = dataset
         self._files = {info.key: dataset.path(info.glb) for info in dataset.models}
+        self._shots = [(first, key) for key, first, _ in dataset.plan.shots]
+        self._stages = Stages()
+        self._known: dict[str, _Soup | None] = {}
         self._key: object = None
-        self._scene: Any = None
-        self._triangle_object = np.zeros(0, np.int64)
+        self._all: Any = None
+        self._solid: Any = None
+        self._owner = np.zeros(0, np.int64)
         self._middle = np.zeros(3)
-        self._opaque = True
+        self._lowest = 0.0
+        self._complete = True
 
     def off_surface(self, sample: Sample) -> Iterator[str]:
-        """What stored depth and instances say and the exported models, seen by Embree, do not.
+        """What stored depth and instances say and the models, seen by Embree, do not.
 
-        Each point must be the first that its ray meets, and on the right object; of models with see-through materials it
-        must lie on a surface.
+        Each point must lie on the right object, and nothing that cannot be seen through may be in front of it; a point of the
+        background must lie on scenery, or on a ground at the lowest point of all; through empty pixels nothing may be seen.
         """
+        if not sample.objects:
+            return
         self._build(sample)
-        camera = sample.camera
-        rays = pixel_rays(camera.intrinsics)
         instances, depth = sample.channels["instances"], sample.channels["depth"]
-        rows, columns = np.nonzero((instances > 0) & np.isfinite(depth) & (np.abs(rays[..., 2]) > 1e-3))
+        rays = pixel_rays(sample.camera.intrinsics)
+        castable = np.abs(rays[..., 2]) > 1e-3
+        yield from self._off(
+            sample, rays, castable & (instances > 0) & np.isfinite(depth), "points are not on the exported model"
+        )
+        if self._complete:
+            rest = castable & (instances == 0)
+            yield from self._off(sample, rays, rest, "points of the background are not where scenery and ground are")
+
+    def _off(self, sample: Sample, rays: Float, asked: NDArray[np.bool_], what: str) -> Iterator[str]:
+        rows, columns = np.nonzero(asked)
         if not len(rows):
             return
         chosen = np.linspace(0, len(rows) - 1, min(PIXELS, len(rows))).astype(int)
         rows, columns = rows[chosen], columns[chosen]
-        directions = rays[rows, columns] @ camera.R
-        s = depth[rows, columns] / rays[rows, columns, 2]
-        slack = TOLERANCE * np.abs(s)
-        start = np.zeros_like(s) if self._opaque else s - slack
-        origins = camera.center - self._middle + start[:, None] * directions
-        hit = self._scene.run(origins.astype(np.float32), directions.astype(np.float32), output=True)
-        found = np.asarray(hit["tfar"], np.float64) + start
-        ids = np.append(self._triangle_object, 0)[np.asarray(hit["primID"], np.int64)]
-        wrong = ~(np.abs(found - s) <= slack) | (ids != instances[rows, columns])
+        ids, depth = sample.channels["instances"][rows, columns], sample.channels["depth"][rows, columns]
+        directions = rays[rows, columns] @ sample.camera.R
+        s = depth / rays[rows, columns, 2]
+        slack = TOLERANCE * np.abs(np.where(np.isfinite(s), s, 0.0))
+        eye = sample.camera.center - self._middle
+        start = np.where(np.isfinite(s), s - slack, 0.0)
+        found, owner = _cast(self._all, eye + start[:, None] * directions, directions)
+        found = found + start
+        first, _ = _cast(self._solid, np.broadcast_to(eye, directions.shape), directions)
+        with np.errstate(invalid="ignore"):
+            there = (np.abs(found - s) <= slack) & (np.append(self._owner, -1)[owner] == ids)
+            height = (eye + s[:, None] * directions)[:, 2]
+            there |= (ids == 0) & np.isfinite(s) & (np.abs(height - self._lowest) <= slack)
+        there |= np.isinf(s) & (ids == 0)
+        wrong = ~there | (first < np.where(np.isfinite(s), s - slack, np.inf))
         if wrong.sum() > max(2, OUTLIERS * len(s)):
             i = int(np.flatnonzero(wrong)[0])
-            stored, x, y = instances[rows[i], columns[i]], columns[i], rows[i]
+            nearest = min(found[i], first[i])
             yield (
-                f"{wrong.sum()} of {len(s)} points are not on the exported model: at pixel ({x}, {y}) object {stored} is "
-                f"stored at {s[i]:.6g} m along the ray, Embree finds {ids[i]} at {found[i]:.6g} m"
+                f"{wrong.sum()} of {len(s)} {what}: at pixel ({columns[i]}, {rows[i]}) object {ids[i]} is "
+                f"stored at {s[i]:.6g} m along the ray, Embree finds {np.append(self._owner, 0)[owner[i]]} at {nearest:.6g} m"
             )
 
     def _build(self, sample: Sample) -> None:
-        from embreex.mesh_construction import TriangleMesh
-        from embreex.rtcore_scene import EmbreeScene
-
-        key = [(o.key, o.world_from_object.tobytes()) for o in sample.objects]
+        scenery = self._scenery(sample.index)
+        key = [(o.key, o.world_from_object.tobytes()) for o in sample.objects], scenery
         if key == self._key:
             return
         self._middle = np.mean([o.box3d.mean(axis=0) for o in sample.objects], axis=0)
-        corners: list[Float] = []
-        owners: list[NDArray[np.int64]] = []
-        self._opaque = True
-        for o in sample.objects:
-            triangles, opaque = _read(self._files[o.key])
-            placed = triangles @ o.world_from_object[:3, :3].T + o.world_from_object[:3, 3] - self._middle
-            corners.append(placed)
-            owners.append(np.full(len(triangles), o.id, np.int64))
-            self._opaque &= opaque
-        self._triangle_object = np.concatenate(owners)
-        self._scene = EmbreeScene(robust=True)
-        TriangleMesh(self._scene, np.concatenate(corners).astype(np.float32))
+        placed = [(o.id, o.world_from_object, self._exported(o.key)) for o in sample.objects]
+        self._complete = True
+        if scenery is not None:
+            remade = [(p.world_from_object, self._remade(scenery, p.model.key)) for p in scenery.placements]
+            self._complete = all(soup is not None for _, soup in remade)
+            placed += [(0, np.array(world), soup) for world, soup in remade if soup is not None]
+        corners = np.concatenate([transform(world, soup.corners) - self._middle for _, world, soup in placed])
+        opaque = np.concatenate([soup.opaque for _, _, soup in placed])
+        self._owner = np.repeat([i for i, _, _ in placed], [len(soup.corners) for _, _, soup in placed])
+        self._lowest = float(corners[..., 2].min())
+        self._all, self._solid = _scene(corners), _scene(corners[opaque])
         self._key = key
 
+    def _scenery(self, frame: int) -> SceneryRecord | None:
+        key = self._shots[bisect_right(self._shots, (frame, "\U0010ffff")) - 1][1]
+        text = self._dataset.store.scenery(key)
+        return SceneryRecord.model_validate_json(text) if text else None
 
-def _read(file: Any) -> tuple[Float, bool]:
-    """Corners (T, 3, 3) of an exported GLB in the object's axes, and whether nothing of it can be seen through."""
+    def _exported(self, key: str) -> _Soup:
+        soup = self._known.get(key) or _read(self._files[key])
+        self._known[key] = soup
+        return soup
+
+    def _remade(self, record: SceneryRecord, key: str) -> _Soup | None:
+        """A piece of scenery, None where it is not what it was."""
+        if key not in self._known:
+            spec = next(p.model for p in record.placements if p.model.key == key)
+            self._known[key] = None
+            try:
+                mesh = self._stages.model(spec)
+                if mesh_digest(mesh) == record.digests[key]:
+                    solid = np.array([m.alpha_mode == "OPAQUE" for m in mesh.materials])
+                    self._known[key] = _Soup(mesh.vertices[mesh.triangles].astype(np.float64), solid[mesh.triangle_material])
+                else:
+                    self.notes.append(f"surface: background not checked where {key} stands: it is not what it was")
+            except ViewsphereError as error:
+                self.notes.append(f"surface: background not checked where {key} stands: {error}")
+        return self._known[key]
+
+
+def _scene(corners: Float) -> Any:
+    from embreex.mesh_construction import TriangleMesh
+    from embreex.rtcore_scene import EmbreeScene
+
+    if not len(corners):
+        return None
+    scene = EmbreeScene(robust=True)
+    TriangleMesh(scene, corners.astype(np.float32))
+    return scene
+
+
+def _cast(scene: Any, origins: Float, directions: Float) -> tuple[Float, NDArray[np.int64]]:
+    """Distance along each ray (infinite where nothing is hit) and triangle (-1)."""
+    if scene is None:
+        return np.full(len(origins), np.inf), np.full(len(origins), -1, np.int64)
+    hit = scene.run(np.ascontiguousarray(origins, np.float32), directions.astype(np.float32), output=True)
+    triangle = np.asarray(hit["primID"], np.int64)
+    return np.where(triangle < 0, np.inf, np.asarray(hit["tfar"], np.float64)), triangle
+
+
+def _read(file: Any) -> _Soup:
+    """An exported GLB in the object's axes."""
     import trimesh
 
     scene: Any = trimesh.load_scene(file, process=False)
     corners: list[Float] = []
-    opaque = True
+    opaque: list[NDArray[np.bool_]] = []
     for name in scene.graph.nodes_geometry:
         matrix, geometry = scene.graph[name]
         mesh = scene.geometry[geometry]
         x, y, z = (trimesh.transform_points(mesh.vertices, matrix)).T
         corners.append(np.stack([x, -z, y], axis=-1)[mesh.faces])
         material = getattr(mesh.visual, "material", None)
-        opaque &= getattr(material, "alphaMode", None) in (None, "OPAQUE")
-    return np.concatenate(corners), opaque
+        opaque.append(np.full(len(mesh.faces), getattr(material, "alphaMode", None) in (None, "OPAQUE")))
+    return _Soup(np.concatenate(corners), np.concatenate(opaque))

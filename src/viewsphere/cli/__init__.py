@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import os
 import sys
 
 import typer
 
-from viewsphere.cli import datasets, making
+from viewsphere.cli import completion, datasets, joining, making
+from viewsphere.cli.next_step import Command
 from viewsphere.cli.terminal import complain
 from viewsphere.errors import CheckFailedError, UserError, ViewsphereError
 
@@ -27,13 +29,18 @@ for command in (
     making.render,
     datasets.export,
     datasets.check,
+    datasets.report,
 ):
-    app.command()(command)
+    app.command(cls=Command)(command)
+app.command("merge", cls=Command)(joining.merge)
+app.command("import", cls=Command)(joining.import_)
 
 
 def main() -> None:
     """Run the command line; the user's mistakes are one line and exit status 2, never a traceback."""
     try:
+        if os.environ.get("_VIEWSPHERE_COMPLETE") == completion.BASH:
+            completion.in_bash(app, os.environ)
         app()
     except CheckFailedError as error:
         complain(error, 1)

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from viewsphere.cli import completion
+
 if TYPE_CHECKING:
     from viewsphere.model.recipe import Recipe
 
@@ -15,10 +17,18 @@ RecipeFile = Annotated[Path, typer.Argument(help="Recipe (YAML).", show_default=
 DataFolder = Annotated[Path, typer.Argument(help="Folder that `render` wrote.", show_default=False)]
 Changes = Annotated[
     list[str] | None,
-    typer.Option("--set", metavar="FIELD=VALUE", help="Set a field: viewpoints.elevation=[10,20]; several times for several."),
+    typer.Option(
+        "--set",
+        metavar="FIELD=VALUE",
+        help="Set a field: viewpoints.elevation=[10,20]; several times for several.",
+        autocompletion=completion.changes,
+    ),
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON for scripts.")]
-Formats = Annotated[str | None, typer.Option("--format", "-f", help="Formats, with commas; default: the recipe's.")]
+Formats = Annotated[
+    str | None,
+    typer.Option("--format", "-f", help="Formats, with commas; default: the recipe's.", autocompletion=completion.formats),
+]
 
 
 def load_recipe(file: Path, changes: Sequence[str] | None = None) -> Recipe:

@@ -2,18 +2,28 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from viewsphere.cli import completion
 from viewsphere.cli.arguments import AsJson, DataFolder, split
 from viewsphere.cli.terminal import print_json, print_report
 from viewsphere.errors import UserError
 
+if TYPE_CHECKING:
+    from viewsphere.report import Proof
+    from viewsphere.store import Dataset
+
 
 def export(
     folder: DataFolder,
-    format_: Annotated[str, typer.Option("--format", "-f", help="Formats, with commas.", show_default=False)],
+    format_: Annotated[
+        str | None,
+        typer.Option("--format", "-f", help="Formats, with commas.", show_default=False, autocompletion=completion.formats),
+    ] = None,
     json_: AsJson = False,
 ) -> None:
     """Write a finished or half-finished data set in other formats, without rendering."""
@@ -50,3 +60,45 @@ def check(
         print_report(report)
     if not report.ok:
         raise typer.Exit(1)
+
+
+def report(
+    folder: DataFolder,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="Page to write; default: report.html in the folder.")
+    ] = None,
+    frames: Annotated[int, typer.Option(min=1, max=2000, help="Frames shown; all are counted.")] = 240,
+    proofs: Annotated[bool, typer.Option("--check/--no-check", help="Show what `check` finds.")] = True,
+    check_frames: Annotated[int, typer.Option(min=1, help="Frames that `check` reads at most, spread evenly.")] = 1000,
+    json_: AsJson = False,
+) -> None:
+    """Write one HTML page to look at: pictures with their labels, viewpoints, distributions, models, recipe and proofs."""
+    from viewsphere.report import write_report
+    from viewsphere.store import Dataset
+
+    dataset = Dataset(folder)
+    page = output or folder / "report.html"
+
+    def tell(phase: str, done: int, total: int) -> None:
+        if not json_ and done == total:
+            typer.echo(f"{phase}: {total:,}", err=True)
+
+    proof = _proof(dataset, check_frames) if proofs and len(dataset) else None
+    size = write_report(dataset, page, frames=frames, proof=proof, workers=_cores(), listener=tell)
+    if json_:
+        print_json({"page": str(page), "bytes": size, "frames": len(dataset), "ok": None if proof is None else proof.ok})
+        return
+    typer.echo(f"wrote {page} ({size / 1e6:.1f} MB): open it in a browser")
+
+
+def _proof(dataset: Dataset, frames: int) -> Proof:
+    """What `check` finds, for a report."""
+    from viewsphere.check import check as prove
+    from viewsphere.report import Proof
+
+    found = prove(dataset, frames=frames)
+    return Proof(found.ok, found.checked, tuple(map(str, found.findings)), found.notes)
+
+
+def _cores() -> int:
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -6,13 +6,19 @@ import os
 from dataclasses import asdict
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from viewsphere.cli import completion
 from viewsphere.cli.arguments import AsJson, Changes, Formats, RecipeFile, load_recipe, split
-from viewsphere.cli.terminal import ProgressBar, print_json, print_plan, print_summary, write, write_picture
+from viewsphere.cli.next_step import for_render
+from viewsphere.cli.terminal import ProgressBar, print_estimate, print_json, print_plan, print_summary, write, write_picture
 from viewsphere.errors import StoreError, UserError
+
+if TYPE_CHECKING:
+    from viewsphere.model.recipe import Recipe
+    from viewsphere.run.estimate import Estimate
 
 
 class Draw(StrEnum):
@@ -47,13 +53,19 @@ def schema() -> None:
 
 
 def inspect(
-    model: Annotated[str, typer.Argument(help="Model file, or zoo:<family>.", show_default=False)],
+    model: Annotated[
+        str, typer.Argument(help="Model file, or zoo:<family>.", show_default=False, autocompletion=completion.models)
+    ],
     output: Annotated[
         Path | None,
         typer.Option("-o", "--output", help="Where the picture goes; default: beside you, <model>-sides.png."),
     ] = None,
-    up: Annotated[str | None, typer.Option(help="Up axis, such as +z; default: the format's.")] = None,
-    forward: Annotated[str | None, typer.Option(help="Axis the front faces; default: the format's.")] = None,
+    up: Annotated[
+        str | None, typer.Option(help="Up axis, such as +z; default: the format's.", autocompletion=completion.axes)
+    ] = None,
+    forward: Annotated[
+        str | None, typer.Option(help="Axis the front faces; default: the format's.", autocompletion=completion.axes)
+    ] = None,
     unit: Annotated[float | None, typer.Option(help="Metres in one unit; default: the file's.")] = None,
     seed: Annotated[int, typer.Option(help="Which draw of a zoo family.")] = 0,
     json_: AsJson = False,
@@ -75,11 +87,26 @@ def inspect(
     typer.echo(f"picture from four sides: {picture} (the first view must show the front; if not, set up and forward)")
 
 
-def plan(recipe: RecipeFile, changes: Changes = None, json_: AsJson = False) -> None:
-    """Say what a recipe would make: models, poses, frames, splits. Nothing is rendered, no model is read."""
+def plan(
+    recipe: RecipeFile,
+    changes: Changes = None,
+    estimate: Annotated[
+        bool, typer.Option("--estimate", help="Also make a few frames in a temporary folder, and say what all will take.")
+    ] = False,
+    workers: Annotated[
+        int | None,
+        typer.Option(min=0, help="Processes that the estimate is for; default: one a core.", show_default=False),
+    ] = None,
+    json_: AsJson = False,
+) -> None:
+    """Say what a recipe would make: models, poses, frames, splits. Without --estimate no model is read."""
     from viewsphere.sampling.plan import plan as make_plan
 
-    planned = make_plan(load_recipe(recipe, changes))
+    loaded = load_recipe(recipe, changes)
+    planned = make_plan(loaded)
+    if not json_:
+        print_plan(planned)
+    cost = _estimate(loaded, workers) if estimate else None
     counts = {
         "name": planned.recipe.name,
         "models": planned.models,
@@ -93,10 +120,11 @@ def plan(recipe: RecipeFile, changes: Changes = None, json_: AsJson = False) -> 
                 "splits": dict(planned.split_counts),
                 "shots": planned.shot_count,
                 "warnings": list(planned.warnings),
+                **({"estimate": asdict(cost)} if cost else {}),
             }
         )
-        return
-    print_plan(planned)
+    elif cost:
+        print_estimate(cost)
 
 
 def preview(
@@ -133,18 +161,26 @@ def render(
         typer.Option(min=0, help="Processes; default: one a core. 0: this one.", show_default=False),
     ] = None,
     keep_going: Annotated[bool, typer.Option(help="Leave out models that cannot be used.")] = False,
+    append: Annotated[
+        bool, typer.Option("--append", help="Add what a finished data set lacks: models, poses, channels.")
+    ] = False,
     json_: AsJson = False,
 ) -> None:
     """Render a recipe into a data set. Run it again to resume: finished frames are never rendered twice."""
     from viewsphere.run.generate import generate
+    from viewsphere.run.opening import to_append
     from viewsphere.sampling.plan import plan as make_plan
+    from viewsphere.store import Store
 
     if recipe is None or output is None:
-        raise UserError(_next_step(recipe, output))
+        raise UserError(for_render(recipe, output))
     loaded = load_recipe(recipe, changes)
     planned = make_plan(loaded)
+    addition = to_append(planned, Store(output)) if append else None
     if not json_:
         print_plan(planned)
+        if addition is not None and Store(output).missing(addition.record):
+            typer.echo(f"{output}: {addition}")
     crew = _cores() if workers is None else workers
     with ProgressBar(quiet=json_) as bar:
         try:
@@ -154,6 +190,7 @@ def render(
                 workers=crew,
                 formats=split(format_),
                 keep_going=keep_going,
+                append=append,
                 listener=bar.show,
             )
         except KeyboardInterrupt:
@@ -163,17 +200,11 @@ def render(
     print_summary(summary, json_)
 
 
-def _next_step(recipe: Path | None, output: Path | None) -> str:
-    """What to write after `viewsphere render` when something is missing."""
-    if recipe is None:
-        near = sorted(f for pattern in ("*.yaml", "*.yml", "*/recipe.yaml") for f in Path().glob(pattern))
-        recipe = near[0] if near else Path("cars/recipe.yaml")
-        first = f"found {recipe} here" if near else "no recipe yet? `viewsphere new cars` writes one"
-        found = "found nothing" if output is None else "found no recipe"
-    else:
-        first, found = "the folder need not exist", f"found no folder for {recipe}"
-    folder = output or Path(f"{recipe.parent.name or recipe.stem}-ds")
-    return f"render: expected a recipe and -o FOLDER; {found}\n{first}; next: viewsphere render {recipe} -o {folder}"
+def _estimate(recipe: Recipe, workers: int | None) -> Estimate:
+    from viewsphere.run.estimate import estimate
+
+    _announce_compilation()
+    return estimate(recipe, _cores() if workers is None else workers)
 
 
 def _announce_compilation() -> None:

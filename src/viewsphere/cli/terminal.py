@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from collections import Counter
 from pathlib import Path
@@ -13,6 +14,7 @@ from viewsphere.errors import UserError, ViewsphereError
 
 if TYPE_CHECKING:
     from viewsphere.check import Report
+    from viewsphere.run.estimate import Estimate
     from viewsphere.run.generate import Listener, Progress, Summary
     from viewsphere.sampling.plan import Plan
 
@@ -57,6 +59,30 @@ def print_plan(planned: Plan) -> None:
     )
     for warning in planned.warnings:
         typer.echo(f"warning: {warning}", err=True)
+
+
+def print_estimate(cost: Estimate) -> None:
+    """Print what a whole data set will take."""
+    crew = f"{cost.workers} worker{'s' if cost.workers > 1 else ''}"
+    typer.echo(f"about {_duration(cost.seconds)} with {crew}, {_size(cost.bytes)} on disk")
+
+
+def _duration(seconds: float) -> str:
+    """Two units at most: 40 s, 12 min, 6 h 20 min, 3 d 4 h."""
+    if seconds < 90:
+        return f"{math.ceil(seconds)} s"
+    minutes = round(seconds / 60)
+    hours, minutes = divmod(minutes, 60)
+    days, rest = divmod(hours, 24)
+    if days:
+        return f"{days} d {rest} h"
+    return f"{hours} h {minutes} min" if hours else f"{minutes} min"
+
+
+def _size(count: float) -> str:
+    """In decimal units, as disks are sold: 45 GB, 1.3 GB, 320 MB."""
+    unit, name = (1e9, "GB") if count >= 1e9 else (1e6, "MB")
+    return f"{count / unit:.1f} {name}" if 1e9 <= count < 1e10 else f"{math.ceil(count / unit)} {name}"
 
 
 def print_report(report: Report) -> None:

@@ -21,6 +21,7 @@ from viewsphere.geometry.camera import focal_from_fov, focal_from_sensor
 from viewsphere.model.camera import Distortion, Intrinsics
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.mistakes import shown
+from viewsphere.model.recipe_scenery import CompanyField, PlaceField, PlanesField
 from viewsphere.model.recipe_values import (
     COLOR_FORMS,
     Count,
@@ -167,8 +168,15 @@ SWITCH: list[Any] = [True, False, "on", "off"]
 
 
 class SceneEntry(Frozen):
-    """Light, ground and background."""
+    """Light, ground and background, and what stands around the targets."""
 
+    place: PlaceField = Field(
+        default=None, description="where the targets stand: zoo:neighbourhood, a model file, or a mapping of source and more"
+    )
+    company: CompanyField = Field(
+        default=None, description="how many other models of the same split stand beside each, or a mapping of count and layout"
+    )
+    planes: PlanesField = Field(default=(), description="upright planes with pictures")
     background: Annotated[BackgroundEntry, BeforeValidator(_background), OrShort({"const": "sky"}, *COLOR_FORMS)] = Field(
         default=BackgroundEntry(),
         description="sky, a colour, {image: path}, or {images: folder, draw: fixed or per_frame}",
@@ -185,6 +193,23 @@ class SceneEntry(Frozen):
         OrShort({"enum": SWITCH}),
     ] = Field(default=Sun(), description="off, or azimuth_deg, elevation_deg, strength, color (linear RGB)")
     sky: Sky = Field(default=Sky(), description="ambient light: zenith, horizon (linear RGB), strength")
+
+    @property
+    def is_composed(self) -> bool:
+        """Whether there is more than one model and the ground: then world z = 0 is the floor that all stand on."""
+        return bool(self.place or self.company or self.planes)
+
+    @property
+    def is_new_each_frame(self) -> bool:
+        """Whether anything but the background is drawn for every frame."""
+        drawn = (self.place, self.company, *self.planes)
+        return any(entry is not None and entry.draw == "per_frame" for entry in drawn)
+
+    @property
+    def has_fixed_scenery(self) -> bool:
+        """Whether there is a place or planes, the same for all models."""
+        drawn = (self.place, *self.planes)
+        return any(drawn) and not any(entry is not None and entry.draw != "fixed" for entry in drawn)
 
     @property
     def floor(self) -> Ground | None:

@@ -34,22 +34,27 @@ class ModelSpec(Frozen):
     seed: int | None = None
     category: str
     supercategory: str = ""
-    category_id: int = Field(ge=1)
+    category_id: int = Field(ge=0)  # 0: background, which only scenery is
     up: Axis | None = None
     forward: Axis | None = None
     unit: float | None = None  # metres in one unit of the file
-    centring: Literal["box", "area", "floor"] = "box"
+    centring: Literal["box", "area", "floor", "as_is"] = "box"
     scale: Literal["as_is", "real_size"] | float = "as_is"  # a number: metres from front to back
     real_size: Size | Literal["file"] | None = None  # "file": the size the file has, before any scaling
     confined: bool = True  # texture and buffer paths may not leave the model's folder
 
 
 class Placement(Frozen):
-    """One object of a scene: object ids are 1..N, 0 is background. `world_from_object` is rigid."""
+    """One thing of a scene: an object with an id of 1..N, or with id 0 scenery that is background to every label.
 
-    id: int = Field(ge=1)
+    `world_from_object` is rigid. Placements of one model are instances. `scenery` marks what the targets stand in front of,
+    labelled or not.
+    """
+
+    id: int = Field(ge=0)
     model: ModelSpec
     world_from_object: Matrix4 = ((1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1))
+    scenery: bool = False
 
 
 class Sun(Frozen):
@@ -70,7 +75,7 @@ class Sky(Frozen):
 
 
 class Ground(Frozen):
-    """A horizontal plane at the objects' lowest point."""
+    """A horizontal plane at the lowest point of all that is placed."""
 
     color: Color = (0.42, 0.41, 0.39)  # sRGB 0..1
 
@@ -113,10 +118,10 @@ class Frame(Frozen):
 
 
 class Shot(Frozen):
-    """One scene and the frames to take of it: all an engine needs, a few hundred bytes and a pose a frame."""
+    """One scene and the frames to take of it: all an engine needs, a few hundred bytes a placement and a pose a frame."""
 
     key: str  # stable, unique, fit for a folder's name
-    placements: tuple[Placement, ...]
+    placements: tuple[Placement, ...]  # ids 1..N in order, then those of id 0
     intrinsics: Intrinsics
     scene: Scene
     frames: tuple[Frame, ...]
@@ -125,6 +130,11 @@ class Shot(Frozen):
     channels: tuple[str, ...]
     label_alpha: float = 0.01
     category_deg: float = Field(default=45.0, gt=0)  # angular resolution of the pose categories
+
+    @property
+    def objects(self) -> tuple[Placement, ...]:
+        """What is labelled, in the order of the ids."""
+        return tuple(p for p in self.placements if p.id)
 
     @property
     def stage_key(self) -> str:

@@ -4,20 +4,22 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Container, Iterator, Sequence
 from dataclasses import dataclass, field
-from importlib.metadata import version
 from pathlib import Path
 
 from viewsphere import plugins
 from viewsphere.errors import ModelError, RecipeError, UserError, ViewsphereError
 from viewsphere.model.recipe import Recipe
+from viewsphere.run.opening import commit, to_append, to_render
 from viewsphere.run.pool import Job, Outcome, run_jobs
-from viewsphere.run.stages import prepare
-from viewsphere.run.tasks import Task
+from viewsphere.run.stages import Stages, StoredBoxes, prepare
+from viewsphere.run.tasks import Kind, Task
 from viewsphere.run.warm import compile_kernels
+from viewsphere.sampling.composition import BoxOf
+from viewsphere.sampling.extension import Portion
 from viewsphere.sampling.plan import Plan
-from viewsphere.store import Category, Dataset, PlanRecord, Store
+from viewsphere.store import Dataset, ShotRow, Store
 
 
 @dataclass(frozen=True)
@@ -59,9 +61,13 @@ def generate(
     workers: int = 0,
     formats: Sequence[str] | None = None,
     keep_going: bool = False,
+    append: bool = False,
     listener: Listener | None = None,
 ) -> Summary:
     """Render all frames of a recipe that `out` does not hold yet, then write the formats (default: the recipe's).
+
+    With `append`, `out` is a finished data set, and models, poses and channels of the recipe that it lacks are added to it;
+    what was there stays as it was.
 
     `workers` 0 renders in the calling process; more need a `__main__` guard in the calling script. A model that cannot be
     used is an error before rendering starts, or with `keep_going` left out and reported. Raises UserError for the user's
@@ -70,17 +76,23 @@ def generate(
     begun = time.monotonic()
     tell = listener or _unheard
     wanted = tuple(formats if formats is not None else recipe.formats)
-    with recipe.located():
-        for name in wanted:
-            _check_channels(name, recipe.channels)
     planned = prepare(recipe)
     store = Store(Path(out))
-    store.open_for(plan_record(planned))
+    portion = to_append(planned, store) if append else to_render(planned, store)
+    if portion.number:  # what is there would be out of date
+        wanted += tuple(n for n in plugins.names("formats") if n not in wanted and (store.root / n).is_dir())
+    with recipe.located():
+        for name in wanted:
+            _check_channels(name, portion.record.channels)
+    if portion.number:
+        store.make_ready()
+    else:
+        store.open_for(portion.record)
     with recipe.located(), store.occupied():
-        skipped = _prepare_models(planned, store, workers, keep_going, tell)
-        rendered = _render_shots(planned, store, workers, keep_going, skipped, tell)
-        _note_skipped(store, skipped)
+        rendered, skipped = (0, {}) if portion.adds_nothing else _render_part(portion, store, workers, keep_going, tell)
         notes = export(store.root, wanted, listener=tell)
+    if append and not rendered:
+        notes += (f"{store.root}: nothing to add, it has all that the recipe asks for",)
     dataset = Dataset(store.root)
     warnings = {info.key: info.warnings for info in dataset.models if info.warnings}
     return Summary(store.root, len(dataset), rendered, skipped, time.monotonic() - begun, wanted, notes, warnings)
@@ -101,27 +113,27 @@ def _unheard(progress: Progress) -> None:
     """Nobody listens."""
 
 
-def plan_record(planned: Plan) -> PlanRecord:
-    """What the store keeps of a plan."""
-    return PlanRecord(
-        version=version("viewsphere"),
-        digest=planned.digest,
-        name=planned.recipe.name,
-        recipe=planned.recipe.model_dump(mode="json"),
-        categories=tuple(Category(c.id, c.name, c.supercategory) for c in planned.categories),
-        splits=planned.splits,
-        channels=planned.recipe.channels,
-        models=tuple(m.key for m in planned.model_specs),
-        poses=planned.poses,
-        frames=planned.frames,
-        max_objects=planned.max_objects,
-        shots=tuple(planned.shot_table()),
-    )
+def _render_part(portion: Portion, store: Store, workers: int, keep_going: bool, tell: Listener) -> tuple[int, dict[str, str]]:
+    """Make the part's models, take it into the data set, render its shots; gives the frames made and what was left out."""
+    if portion.number:
+        store.drop_unnamed_models()  # of appending that ended before it began
+    try:
+        skipped = _prepare_models(portion, store, workers, keep_going, tell)
+        commit(portion, store)
+    except ViewsphereError:
+        if portion.number:
+            store.drop_unnamed_models()
+        raise
+    rendered = _render_shots(portion, store, workers, keep_going, skipped, tell)
+    _note_skipped(portion, store, skipped)
+    return rendered, skipped
 
 
-def _prepare_models(planned: Plan, store: Store, workers: int, keep_going: bool, tell: Listener) -> dict[str, str]:
+def _prepare_models(portion: Portion, store: Store, workers: int, keep_going: bool, tell: Listener) -> dict[str, str]:
     """Normalise and export every model; gives the keys left out, and why."""
-    jobs = [Job(m.key, m.key, lambda m=m: Task("model", m.key, m.key, m.model_dump_json())) for m in planned.model_specs]
+    planned = portion.plan
+    kind: Kind = "same model" if portion.number else "model"
+    jobs = [Job(m.key, m.key, lambda m=m: Task(kind, m.key, m.key, m.model_dump_json())) for m in portion.model_specs]
     total = len(jobs)
     failed: dict[str, ViewsphereError] = {}
     tell(Progress("models", 0, total))
@@ -129,19 +141,25 @@ def _prepare_models(planned: Plan, store: Store, workers: int, keep_going: bool,
         if outcome.error is not None:
             failed[outcome.key] = outcome.error
         tell(Progress("models", done, total))
-    for key, problem in _distance_problems(planned, store):
+    for key, problem in _distance_problems(planned, store, failed):
         failed.setdefault(key, problem)
-    stops = [e for e in failed.values() if not (keep_going and isinstance(e, (ModelError, RecipeError)))]
-    if stops or len(failed) == total:
+    own = {m.key for m in planned.model_specs}
+    stops = [e for k, e in failed.items() if not (keep_going and k in own and isinstance(e, (ModelError, RecipeError)))]
+    if stops or own <= failed.keys():
         raise _joined(stops or list(failed.values()))
     return {key: str(error) for key, error in failed.items()}
 
 
-def _distance_problems(planned: Plan, store: Store) -> Iterator[tuple[str, ViewsphereError]]:
-    """Models that some pose's camera would stand inside of; each is named once."""
+def _distance_problems(planned: Plan, store: Store, failed: Container[str]) -> Iterator[tuple[str, ViewsphereError]]:
+    """Models that some pose's camera would stand inside of, or that have no room; each is named once."""
+    box_of = StoredBoxes(store)
     for spec in planned.model_specs:
-        info = store.model_info(spec.key)
-        problem = info and planned.distance_problem(spec, info.box3d_object)
+        if any(member.key in failed for member in planned.cast(spec)):
+            continue
+        try:
+            problem = planned.distance_problem(spec, box_of)
+        except RecipeError as error:
+            problem = error
         if problem:
             yield spec.key, problem
 
@@ -153,31 +171,44 @@ def _joined(errors: Sequence[ViewsphereError]) -> ViewsphereError:
     return kind("\n".join(dict.fromkeys(str(e) for e in errors)))
 
 
-def _render_shots(planned: Plan, store: Store, workers: int, keep_going: bool, skipped: dict[str, str], tell: Listener) -> int:
+def _render_shots(
+    portion: Portion, store: Store, workers: int, keep_going: bool, skipped: dict[str, str], tell: Listener
+) -> int:
     """Render the shots that the store lacks; gives the number of frames made. Failed shots land in `skipped`."""
-    table = [row for row in planned.shot_table() if planned.shot_model(row[0]) not in skipped]
+    table = list(_wanted(portion, skipped))
+    missing = [row for row in table if not store.has_shot(row[0])]
     total = sum(count for _, _, count in table)
-    missing = {row[0] for row in table if not store.has_shot(row[0])}
-    resumed = total - sum(count for key, _, count in table if key in missing)
-    jobs = [_shot_job(planned, i, key) for i, (key, _, _) in enumerate(planned.shot_table()) if key in missing]
+    resumed = total - sum(count for _, _, count in missing)
+    box_of = StoredBoxes(store)
     rendered = 0
-    if jobs:
+    if missing:
+        Stages().check_scenery(portion.plan)
         tell(Progress("kernels", 0, 1))
-        compile_kernels(planned.shot(0))
+        compile_kernels(portion.shot(missing[0], box_of))
         tell(Progress("kernels", 1, 1))
     tell(Progress("frames", resumed, total, resumed))
-    for outcome in run_jobs(jobs, store.root, workers):
+    for outcome in run_jobs([_shot_job(portion, row, box_of) for row in missing], store.root, workers):
         _accept(outcome, keep_going, skipped)
         rendered += outcome.frames
         tell(Progress("frames", resumed + rendered, total, resumed))
     return rendered
 
 
-def _shot_job(planned: Plan, index: int, key: str) -> Job:
-    model = planned.shot_model(key)
+def _wanted(portion: Portion, skipped: dict[str, str]) -> Iterator[ShotRow]:
+    """The shots that no model left out is in; those that lack company land in `skipped`."""
+    for row in portion.shot_table():
+        lacking = [member.key for member in portion.cast(row) if member.key in skipped] if skipped else []
+        if not lacking:
+            yield row
+        elif portion.shot_model(row[0]) not in skipped:
+            skipped[row[0]] = f"beside its model stands {lacking[0]}, which was left out"
+
+
+def _shot_job(portion: Portion, row: ShotRow, box_of: BoxOf) -> Job:
+    key, model = row[0], portion.shot_model(row[0])
 
     def make() -> Task:
-        return Task("shot", key, model, planned.shot(index).model_dump_json())
+        return Task("shot", key, model, portion.shot(row, box_of).model_dump_json())
 
     return Job(key, model, make)
 
@@ -190,8 +221,11 @@ def _accept(outcome: Outcome, keep_going: bool, skipped: dict[str, str]) -> None
     skipped[outcome.key] = str(outcome.error)
 
 
-def _note_skipped(store: Store, skipped: dict[str, str]) -> None:
-    store.write_file("skipped.json", json.dumps(skipped, indent=1, sort_keys=True))
+def _note_skipped(portion: Portion, store: Store, skipped: dict[str, str]) -> None:
+    """Keep what was left out, of other parts too."""
+    own = {spec.key for spec in portion.model_specs} | {key for key, _, _ in portion.shot_table()}
+    others = {key: why for key, why in store.skipped().items() if key not in own} if portion.number else {}
+    store.write_file("skipped.json", json.dumps(others | skipped, indent=1, sort_keys=True))
 
 
 def export(out: Path | str, formats: Sequence[str], *, listener: Listener | None = None) -> tuple[str, ...]:

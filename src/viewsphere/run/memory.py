@@ -16,7 +16,7 @@ def render(recipe: Recipe) -> Iterator[Sample]:
     """
     planned = prepare(recipe)
     stages, last = Stages(), None
-    for shot in planned.shots():
+    for shot in planned.shots(stages.box):
         spec = shot.placements[0].model
         if spec is not last:
             stages.check_distances(planned, spec)

@@ -11,18 +11,28 @@ from viewsphere import plugins
 from viewsphere.annotate import annotate
 from viewsphere.assets.cache import load_normalised
 from viewsphere.assets.mesh import Mesh
+from viewsphere.errors import ModelError, RecipeError
 from viewsphere.geometry.box import box_size, box_vertices
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.recipe import Recipe
 from viewsphere.model.sample import Float, Sample
-from viewsphere.model.shot import Frame, ModelSpec, Shot, Size
+from viewsphere.model.shot import Frame, ModelSpec, Placement, Shot, Size
 from viewsphere.sampling.plan import Plan, check_images, plan
-from viewsphere.sampling.viewpoints import camera_for
+from viewsphere.sampling.viewpoints import camera_for, inside_box
+from viewsphere.store import Store
 from viewsphere.truth.channels import observe
+from viewsphere.truth.enclosure import sky_hidden
 from viewsphere.truth.visibility import rasterize
 from viewsphere.zoo import build
 
-WARM_MODELS = 8
+WARM_BYTES = 400_000_000
+"""Of models that are kept, the last ones used."""
+
+MOST_CAMERAS = 1000
+"""Cameras that are looked at before rendering; the others are when their turn comes."""
+
+MOST_SKY = 0.8
+"""Share of the sky that scenery may hide from a camera that is not inside of it."""
 
 
 def build_zoo_model(spec: ModelSpec) -> Mesh:
@@ -48,23 +58,51 @@ def model_files(key: str) -> tuple[str, str]:
     return f"store/models/{key}/{key}.obj", f"store/models/{key}/{key}.glb"
 
 
+@dataclass(frozen=True, eq=False)
+class StoredBoxes:
+    """The boxes (8, 3) of a data set's finished models; raises ModelError for another."""
+
+    store: Store
+    _known: dict[str, Float] = field(default_factory=dict[str, Float])
+
+    def __call__(self, spec: ModelSpec) -> Float:
+        """The box of this model."""
+        if spec.key not in self._known:
+            info = self.store.model_info(spec.key)
+            if info is None:
+                raise ModelError(f"model {spec.key}: expected a finished model in {self.store.root}, found none: render again")
+            self._known[spec.key] = info.box3d_object
+        return self._known[spec.key]
+
+
 @dataclass(eq=False)
 class Stages:
-    """Renders shots; keeps the last shot's stage and the last few models warm."""
+    """Renders shots; keeps the last shot's stage, and the models used last, warm."""
 
     _stage: plugins.Stage | None = None
     _stage_key: str = ""
     _models: dict[str, Mesh] = field(default_factory=dict[str, Mesh])
+    _boxes: dict[str, Float] = field(default_factory=dict[str, Float])
     _sizes: dict[str, Size] = field(default_factory=dict[str, Size])
 
     def model(self, spec: ModelSpec) -> Mesh:
         """The normalised model; raises ModelError if its file cannot be used."""
         name = spec.model_dump_json()
-        if name not in self._models:
-            self._models[name] = load_normalised(spec, build_zoo_model)
-            while len(self._models) > WARM_MODELS:
-                del self._models[next(iter(self._models))]
-        return self._models[name]
+        mesh = self._models.pop(name, None) or load_normalised(spec, build_zoo_model)
+        self._models[name] = mesh  # the last used comes last
+        if name not in self._boxes:
+            self._boxes[name] = box_vertices(*mesh.bounds)
+        held = sum(map(_size, self._models.values()))
+        while held > WARM_BYTES and len(self._models) > 1:
+            held -= _size(self._models.pop(next(iter(self._models))))
+        return mesh
+
+    def box(self, spec: ModelSpec) -> Float:
+        """The 3D box (8, 3) of the normalised model in its own axes; raises ModelError if its file cannot be used."""
+        name = spec.model_dump_json()
+        if name not in self._boxes:
+            self.model(spec)
+        return self._boxes[name]
 
     def real_size(self, spec: ModelSpec) -> Size | None:
         """The model's true (width, height, length) in metres, None if nobody said."""
@@ -72,16 +110,54 @@ class Stages:
             return spec.real_size
         name = spec.model_dump_json()
         if name not in self._sizes:
-            unscaled = self.model(spec.model_copy(update={"scale": "as_is"}))
-            self._sizes[name] = box_size(box_vertices(*unscaled.bounds))
+            self._sizes[name] = box_size(self.box(spec.model_copy(update={"scale": "as_is"})))
         return self._sizes[name]
 
     def check_distances(self, planned: Plan, spec: ModelSpec) -> None:
-        """Raise RecipeError if a pose's camera would stand inside this model."""
-        problem = planned.distance_problem(spec, box_vertices(*self.model(spec).bounds))
+        """Raise RecipeError if a pose's camera would stand inside this model, or one that stands beside it."""
+        problem = planned.distance_problem(spec, self.box)
         with planned.recipe.located():
             if problem:
                 raise problem
+
+    def check_scenery(self, planned: Plan) -> None:
+        """Raise RecipeError if a pose's camera would stand in a house, where all models have the same around them.
+
+        Scenery that is drawn for each model or frame is looked at when its shot is rendered.
+        """
+        scene = planned.recipe.scene
+        if planned.composition is None or not scene.has_fixed_scenery:
+            return
+        spec = planned.model_specs[0]
+        placements = planned.composition.placements(spec, None, self.box)
+        cameras = planned.cameras(placements, self.box)
+        with planned.recipe.located():
+            self._check_cameras(placements, cameras[:: -(-len(cameras) // MOST_CAMERAS)])
+
+    def _check_cameras(self, placements: Sequence[Placement], cameras: Float) -> None:
+        """Raise RecipeError for the first of the cameras (N, 3) that is inside of something.
+
+        Inside of a target means its box. Inside of scenery means that it hides the sky from the camera, but not from the
+        frame's model: under a tree, among hills or in the room where the model stands a camera may well be.
+        """
+        own = placements[0]
+        model = transform(own.world_from_object, self.box(own.model)).mean(axis=0)
+        for placement in placements:
+            box = transform(placement.world_from_object, self.box(placement.model))
+            for i in np.flatnonzero(inside_box(box, cameras)):
+                if not placement.scenery or (self._roofs(placement, cameras[i]) and not self._roofs(placement, model)):
+                    what = f"{placement.model.category or 'piece'} {placement.model.key}"
+                    x, y = np.array(placement.world_from_object)[:2, 3]
+                    raise RecipeError(
+                        f"viewpoints: expected the camera outside of all that is placed; found it at "
+                        f"({', '.join(f'{v:.3g}' for v in cameras[i])}) inside {what}, which stands at ({x:.3g}, {y:.3g})"
+                    )
+
+    def _roofs(self, placement: Placement, point: Float) -> bool:
+        """Whether scenery hides most of the sky from a point in the world."""
+        mesh = self.model(placement.model)
+        inside = transform(np.linalg.inv(np.array(placement.world_from_object)), point)
+        return sky_hidden(mesh.vertices.astype(np.float64), mesh.triangles, inside) > MOST_SKY
 
     def stage(self, shot: Shot) -> plugins.Stage:
         """The engine's stage for this shot, built anew only when the scene is another one."""
@@ -92,12 +168,21 @@ class Stages:
         return self._stage
 
     def render(self, shot: Shot) -> Iterator[Sample]:
-        """The shot's samples in order, channels in memory."""
+        """The shot's samples in order, channels in memory; raises RecipeError for a camera inside of scenery or a target."""
         stage = self.stage(shot)
-        boxes = [box_vertices(*self.model(p.model).bounds) for p in shot.placements]
-        sizes = [self.real_size(p.model) for p in shot.placements]
+        boxes = [self.box(p.model) for p in shot.objects]
+        sizes = [self.real_size(p.model) for p in shot.objects]
+        if any(p.scenery for p in shot.placements):
+            cameras = [camera_for(shot.intrinsics, f.pose, _target(shot, boxes)).center for f in shot.frames]
+            self._check_cameras(shot.placements, np.array(cameras))
         for frame in shot.frames:
             yield render_frame(shot, frame, stage, boxes, sizes)
+
+
+def _size(mesh: Mesh) -> int:
+    """Bytes, about."""
+    per_vertex = sum(a.nbytes for a in (mesh.vertices, mesh.normals, mesh.uv0, mesh.uv1, mesh.colors) if a is not None)
+    return per_vertex + 5 * mesh.triangles.nbytes // 3 + sum(i.pixels.nbytes for i in mesh.images)
 
 
 def render_frame(
@@ -113,7 +198,7 @@ def render_frame(
     observed = observe(stage.geometry, camera, visibility, names)
     if "rgb" in shot.channels:
         observed["rgb"] = stage.color(camera, frame, visibility)
-    files = [model_files(p.model.key)[0] for p in shot.placements]
+    files = [model_files(p.model.key)[0] for p in shot.objects]
     objects = annotate(shot, frame, camera, stage.geometry, visibility, boxes, files, sizes)
     channels = {name: observed[name] for name in shot.channels}
     return Sample(frame.index, frame.split, camera, frame.pose, objects, channels, {})

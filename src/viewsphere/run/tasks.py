@@ -11,19 +11,31 @@ from viewsphere.assets.export import export_glb, export_obj
 from viewsphere.assets.mesh import Mesh
 from viewsphere.errors import StoreError
 from viewsphere.geometry.box import box_size, box_vertices
-from viewsphere.model.shot import ModelSpec, Shot
+from viewsphere.model.frozen import Frozen
+from viewsphere.model.shot import ModelSpec, Placement, Shot
 from viewsphere.run.stages import Stages, model_files
 from viewsphere.store import ModelInfo, Store
+
+Kind = Literal["model", "same model", "shot"]
 
 
 @dataclass(frozen=True)
 class Task:
-    """A model or a shot as JSON. Tasks of one `affinity` share a warm stage."""
+    """A model or a shot as JSON; "same model" has to be what the store holds, if it is there. Tasks of one `affinity` share a
+    warm stage.
+    """
 
-    kind: Literal["model", "shot"]
+    kind: Kind
     key: str
     affinity: str
     payload: str
+
+
+class SceneryRecord(Frozen):
+    """What is background in a shot: placements of id 0, and the digest of each model's mesh by its key."""
+
+    placements: tuple[Placement, ...]
+    digests: dict[str, str]
 
 
 class Worker:
@@ -32,31 +44,38 @@ class Worker:
     def __init__(self, root: Path) -> None:
         self.store = Store(root)
         self.stages = Stages()
+        self._digests: dict[str, str] = {}
 
     def do(self, task: Task) -> int:
         """Do one task; gives the number of frames it made."""
-        if task.kind == "model":
-            self.make_model(ModelSpec.model_validate_json(task.payload))
+        if task.kind != "shot":
+            self.make_model(ModelSpec.model_validate_json(task.payload), trusted=task.kind == "model")
             return 0
         shot = Shot.model_validate_json(task.payload)
-        return self.store.write_shot(shot.key, self.stages.render(shot))
+        return self.store.write_shot(shot.key, self.stages.render(shot), self._scenery(shot))
 
-    def make_model(self, spec: ModelSpec) -> None:
+    def _scenery(self, shot: Shot) -> str:
+        """What is background in a shot, and digests of its meshes, as `SceneryRecord` reads it; empty if nothing is."""
+        placements = tuple(p for p in shot.placements if p.id == 0)
+        for spec in {p.model.key: p.model for p in placements}.values():
+            if spec.key not in self._digests:
+                self._digests[spec.key] = mesh_digest(self.stages.model(spec))
+        digests = {p.model.key: self._digests[p.model.key] for p in placements}
+        return SceneryRecord(placements=placements, digests=digests).model_dump_json() if placements else ""
+
+    def make_model(self, spec: ModelSpec, trusted: bool = True) -> None:
         """Normalise a model and export it into the store, or see that the one there is the same.
 
-        Raises ModelError for a file that cannot be used, StoreError for one that changed since its frames were made.
+        `trusted`: the plan's digest and version vouch for models of the zoo that are there. Raises ModelError for a file that
+        cannot be used, StoreError for one that changed since its frames were made.
         """
         known = self.store.model_info(spec.key)
-        if known is not None and spec.source.startswith("zoo:"):
-            return  # the plan's digest and version already vouch for it
+        if known is not None and trusted and spec.source.startswith("zoo:"):
+            return
         mesh = self.stages.model(spec)
         digest = mesh_digest(mesh)
         if known is not None:
-            if known.digest != digest:
-                raise StoreError(
-                    f"{self.store.root}: model {spec.key!r} ({spec.source}) changed since this data set was begun: "
-                    "put the old file back, or choose another output folder"
-                )
+            self._compare(spec, known, digest)
             return
         box = box_vertices(*mesh.bounds)
         obj, glb = model_files(spec.key)
@@ -79,6 +98,20 @@ class Worker:
             export_obj(mesh, folder, spec.key)
             export_glb(mesh, folder / f"{spec.key}.glb")
             self.store.write_model_info(folder, info)
+
+    def _compare(self, spec: ModelSpec, known: ModelInfo, digest: str) -> None:
+        if known.digest != digest:
+            raise StoreError(
+                f"{self.store.root}: model {spec.key!r} ({spec.source}) changed since this data set was begun: "
+                "put the old one back, or choose another output folder"
+            )
+        now = {"category": spec.category, "supercategory": spec.supercategory, "real_size": self.stages.real_size(spec)}
+        for name, value in now.items():
+            if getattr(known, name) != value:
+                raise StoreError(
+                    f"{self.store.root}: expected {name} {getattr(known, name)!r} of model {spec.key!r}, as the data set has; "
+                    f"found {value!r}: keep it, or choose another output folder"
+                )
 
 
 def mesh_digest(mesh: Mesh) -> str:

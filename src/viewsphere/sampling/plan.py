@@ -7,8 +7,8 @@ import json
 import math
 from bisect import bisect_right
 from collections import Counter
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import accumulate
 from pathlib import Path
@@ -18,19 +18,20 @@ from numpy.typing import NDArray
 
 from viewsphere import plugins
 from viewsphere.errors import RecipeError
+from viewsphere.geometry.rotation import transform
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.mistakes import nearest, one_of
 from viewsphere.model.recipe import Recipe
-from viewsphere.model.shot import Background, Frame, ModelSpec, Placement, Scene, Shot
+from viewsphere.model.shot import Background, Frame, ModelSpec, Placement, Scene, Shot, Vector
+from viewsphere.sampling.composition import BoxOf, Composition, compose
 from viewsphere.sampling.models import categories, count_models, model_specs
+from viewsphere.sampling.scenery import IMAGE_SUFFIXES, images_in, proportions
 from viewsphere.sampling.seeds import generator, share
-from viewsphere.sampling.viewpoints import Poses, distance_problem, poses
+from viewsphere.sampling.viewpoints import Poses, distance_problem, inside_box, poses
 from viewsphere.store import Category
 
 SHOT_FRAMES = 16
 """Most frames of a shot, unless the recipe or the caller says otherwise."""
-
-IMAGE_SUFFIXES = frozenset({".jpg", ".jpeg", ".png", ".webp", ".bmp", ".tif", ".tiff"})
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +44,7 @@ class Plan:
     categories: tuple[Category, ...]
     images: tuple[str, ...]  # absolute paths of the background's images, sorted
     shot_frames: int
+    composition: Composition | None = None  # of place, company and planes
 
     @cached_property
     def intrinsics(self) -> Intrinsics:
@@ -67,7 +69,12 @@ class Plan:
     @property
     def max_objects(self) -> int:
         """Most objects in one frame."""
-        return 1
+        return 1 if self.composition is None else self.composition.max_objects
+
+    @property
+    def kept_specs(self) -> tuple[ModelSpec, ...]:
+        """All models that the data set keeps: the recipe's, then labelled scenery's."""
+        return self.model_specs + (() if self.composition is None else self.composition.models)
 
     @property
     def splits(self) -> tuple[str, ...]:
@@ -99,7 +106,7 @@ class Plan:
             if count == 0
         ]
         lowest = self.pose_list.lowest_elevation
-        if lowest < 0 and self.recipe.scene.floor is not None:
+        if lowest < 0 and (self.recipe.scene.floor is not None or self.recipe.scene.place is not None):
             found.append(
                 f"elevations go down to {lowest:g}: from below, the ground hides the models; set scene.ground: off to see them"
             )
@@ -157,19 +164,34 @@ class Plan:
             first, last = self._chunks[chunk], self._chunks[chunk + 1]
             yield self.shot_key(index), model * self.poses + first, last - first
 
-    def shot(self, index: int) -> Shot:
-        """One shot; raises IndexError past the end."""
+    def shot(self, index: int, box_of: BoxOf | None = None) -> Shot:
+        """One shot; raises IndexError past the end.
+
+        `box_of` is needed where the recipe has a place, company or planes: what stands on the floor depends on its size.
+        Raises RecipeError where there is no room for all that is to stand there, and what `box_of` raises.
+        """
         if not 0 <= index < self.shot_count:
             raise IndexError(f"expected a shot of 0..{self.shot_count - 1}, got {index}")
         model, chunk = divmod(index, len(self._chunks) - 1)
+        return self.take(model, range(self._chunks[chunk], self._chunks[chunk + 1]), box_of, self.shot_key(index))
+
+    def take(self, model: int, chosen: Sequence[int], box_of: BoxOf | None = None, key: str = "") -> Shot:
+        """A shot of some poses of a model (their indices): of one pose where the recipe draws scenes for each frame."""
         spec = self.model_specs[model]
-        frames = tuple(self.frame(model, i) for i in range(self._chunks[chunk], self._chunks[chunk + 1]))
+        placements, target = (Placement(id=1, model=spec),), None
+        if self.composition is not None:
+            if box_of is None:
+                raise ValueError("expected box_of for a recipe with place, company or planes")
+            with self.recipe.located():
+                placements = self.composition.placements(spec, self._scene_pose(chosen[0]), box_of)
+            company = self.recipe.scene.company
+            target = self.composition.center(placements[: 1 + (company.number if company else 0)], box_of)
         return Shot(
-            key=self.shot_key(index),
-            placements=(Placement(id=1, model=spec),),
+            key=key or spec.key,
+            placements=placements,
             intrinsics=self.intrinsics,
             scene=self._scene,
-            frames=frames,
+            frames=tuple(self.frame(model, i, target) for i in chosen),
             engine=self.recipe.engine.name,
             engine_options=self.recipe.engine.options,
             channels=self.recipe.channels,
@@ -177,19 +199,37 @@ class Plan:
             category_deg=self.recipe.viewpoints.bins,
         )
 
-    def shots(self) -> Iterator[Shot]:
-        """All shots in order, made one by one."""
-        return (self.shot(i) for i in range(self.shot_count))
+    def _scene_pose(self, pose: int) -> str | None:
+        """Name of the pose, where scenes are drawn for each frame."""
+        return self.pose_list.name(pose) if self.recipe.scene.is_new_each_frame else None
 
-    def frame(self, model: int, pose: int) -> Frame:
-        """The frame of a model (its index) and a pose."""
-        spec = self.model_specs[model]
+    def shot_cast(self, index: int) -> tuple[ModelSpec, ...]:
+        """The recipe's models in a shot, the one it is about first."""
+        model, chunk = divmod(index, len(self._chunks) - 1)
+        return self.cast(self.model_specs[model], self._chunks[chunk])
+
+    def cast(self, spec: ModelSpec, pose: int | None = None) -> tuple[ModelSpec, ...]:
+        """A model and those that stand beside it, in a pose (its index) where they are drawn for each frame.
+
+        Without a pose, only the model itself then.
+        """
+        if self.composition is None or (pose is None and self.recipe.scene.is_new_each_frame):
+            return (spec,)
+        return self.composition.cast(spec, None if pose is None else self._scene_pose(pose))
+
+    def shots(self, box_of: BoxOf | None = None) -> Iterator[Shot]:
+        """All shots in order, made one by one."""
+        return (self.shot(i, box_of) for i in range(self.shot_count))
+
+    def frame(self, model: int, pose: int, target: Vector | None = None) -> Frame:
+        """The frame of a model (its index) and a pose, which looks at `target` unless it has a target of its own."""
+        spec, view = self.model_specs[model], self.pose_list[pose]
         background = None
         if self.recipe.scene.background.images is not None and self.recipe.scene.background.draw == "per_frame":
             background = self._drawn(spec.key, self.pose_list.name(pose))
         return Frame(
             index=model * self.poses + pose,
-            pose=self.pose_list[pose],
+            pose=view if target is None or view.target is not None else view.model_copy(update={"target": target}),
             split=self.split(spec, pose),
             background=background,
         )
@@ -208,19 +248,47 @@ class Plan:
             background = self._drawn()
         return Scene(sun=entry.light, sky=entry.sky, ground=entry.floor, background=background)
 
-    def distance_problem(self, spec: ModelSpec, box: NDArray[np.float64]) -> RecipeError | None:
-        """The first pose whose camera would stand inside the model's box (8, 3), in words; None if there is none."""
-        target = self.pose_list[0].target
-        reach = np.linalg.norm(box - (box.mean(axis=0) if target is None else np.array(target)), axis=1).max()
-        for i in np.flatnonzero(self._distances <= reach):
-            problem = distance_problem(self.pose_list[int(i)], box)
-            if problem:
-                return RecipeError(f"viewpoints.distance: {problem} (model {spec.key})")
+    def distance_problem(self, spec: ModelSpec, box_of: BoxOf) -> RecipeError | None:
+        """The first pose whose camera would stand inside a target's box, in words; None if there is none.
+
+        Company that is drawn for each frame is not looked at: that is left to whoever renders the frame.
+        """
+        placements, target = (Placement(id=1, model=spec),), None
+        if self.composition is not None and not self.recipe.scene.is_new_each_frame:
+            placements = self.composition.targets(spec, None, box_of)
+            target = self.composition.center(placements, box_of)
+        cameras = self.cameras(placements, box_of)
+        for placement in placements:
+            box = transform(placement.world_from_object, box_of(placement.model))
+            inside = inside_box(box, cameras)
+            if inside.any():
+                pose = self.frame(0, int(np.flatnonzero(inside)[0]), target).pose
+                problem = distance_problem(pose, box)
+                return RecipeError(f"viewpoints.distance: {problem} (model {placement.model.key})")
         return None
 
+    def cameras(self, placements: Sequence[Placement], box_of: BoxOf) -> NDArray[np.float64]:
+        """Where the cameras of all poses stand, (poses, 3) world metres, when these are placed."""
+        targets = [p for p in placements if p.id and not p.scenery]
+        corners = np.concatenate([transform(t.world_from_object, box_of(t.model)) for t in targets])
+        middle = corners.mean(axis=0) if len(targets) == 1 else (corners.min(axis=0) + corners.max(axis=0)) / 2
+        return self._offsets + np.where(np.isnan(self._targets), middle, self._targets)
+
     @cached_property
-    def _distances(self) -> NDArray[np.float64]:
-        return np.fromiter((self.pose_list.view(i).distance for i in range(self.poses)), np.float64, self.poses)
+    def _offsets(self) -> NDArray[np.float64]:
+        """From what the cameras look at to where they stand, (poses, 3)."""
+        views = (self.pose_list.view(i) for i in range(self.poses))
+        flat = np.fromiter((x for v in views for x in (v.azimuth, v.elevation, v.distance)), np.float64, 3 * self.poses)
+        azimuth, elevation = np.radians(flat.reshape(-1, 3)[:, :2]).T
+        level = np.cos(elevation)
+        direction = np.stack([level * np.sin(azimuth), -level * np.cos(azimuth), np.sin(elevation)], axis=1)
+        return flat.reshape(-1, 3)[:, 2:] * direction
+
+    @cached_property
+    def _targets(self) -> NDArray[np.float64]:
+        """What the cameras look at, (poses, 3); NaN where that is the models' centre."""
+        targets = (self.pose_list.target(i) or (math.nan,) * 3 for i in range(self.poses))
+        return np.fromiter((x for t in targets for x in t), np.float64, 3 * self.poses).reshape(-1, 3)
 
     @cached_property
     def digest(self) -> str:
@@ -228,8 +296,9 @@ class Plan:
 
         Files count by their names, so that folders can move; what is in a model's file, the store itself watches.
         """
-        models = [m.model_dump(mode="json") | {"source": Path(m.source).name} for m in self.model_specs]
-        images = [Path(i).name for i in self.images]
+        models = [m.model_dump(mode="json") | {"source": Path(m.source).name} for m in self.kept_specs]
+        planes = () if self.composition is None else self.composition.images
+        images = [Path(i).name for files in (self.images, *planes) for i in files]
         value = [self.recipe.digest, models, self.pose_list.digest, images, self._chunks]
         return hashlib.sha256(json.dumps(value, separators=(",", ":")).encode()).hexdigest()
 
@@ -247,18 +316,18 @@ def plan(recipe: Recipe, shot_frames: int | None = None) -> Plan:
         _check_frames(recipe, views)
         specs = model_specs(recipe)
         _check_listed(recipe, specs)
-        return Plan(
-            recipe,
-            specs,
-            views,
-            categories(recipe),
-            _images(recipe),
-            recipe.shot_frames or shot_frames or SHOT_FRAMES,
-        )
+        frames = 1 if recipe.scene.is_new_each_frame else recipe.shot_frames or shot_frames or SHOT_FRAMES
+        planned = Plan(recipe, specs, views, categories(recipe), _images(recipe), frames)
+        if not recipe.scene.is_composed:
+            return planned
+        apart = recipe.splits.by == "model"
+        splits = [planned.split(spec, 0) if apart else "" for spec in specs]
+        composition = compose(recipe, specs, planned.categories, splits)
+        return replace(planned, categories=composition.categories, composition=composition)
 
 
 def check_images(planned: Plan) -> None:
-    """See that the background's images are images; raises RecipeError for the first that is not."""
+    """See that the background's images, and those of planes, are images; raises RecipeError for the first that is not."""
     from PIL import Image, UnidentifiedImageError
 
     field = "image" if planned.recipe.scene.background.image is not None else "images"
@@ -271,6 +340,9 @@ def check_images(planned: Plan) -> None:
                 raise RecipeError(
                     f"scene.background.{field}: expected a readable image; found {problem} in {path}: mend or remove it"
                 ) from None
+    with planned.recipe.located():
+        for path in () if planned.composition is None else [p for files in planned.composition.images for p in files]:
+            proportions(path)
 
 
 def _check_names(recipe: Recipe) -> None:
@@ -327,8 +399,8 @@ def _images(recipe: Recipe) -> tuple[str, ...]:
     if background.images is None:
         return ()
     folder = recipe.folder / background.images
-    found = sorted(str(f) for f in folder.rglob("*") if f.suffix.lower() in IMAGE_SUFFIXES and f.is_file())
+    found = images_in(folder)
     if not found:
         endings = ", ".join(sorted(IMAGE_SUFFIXES))
         raise RecipeError(f"scene.background.images: expected a folder with images ({endings}); found none in {folder}")
-    return tuple(found)
+    return found

@@ -344,16 +344,21 @@ def camera_for(intrinsics: Intrinsics, pose: Pose, target: ArrayLike) -> Camera:
     return Camera(intrinsics, rotation, -transform(rotation, center))
 
 
-def distance_problem(pose: Pose, box: Float) -> str | None:
-    """Why the camera of this pose cannot stand where it does, inside the model's box (8, 3) in world metres; or None."""
-    center, corner = box.mean(axis=0), box[2]
-    target = center if pose.target is None else np.array(pose.target)
-    azimuth, elevation = np.radians([pose.azimuth_deg, pose.elevation_deg])
-    camera = target + orbit_center(azimuth, elevation, pose.distance)
+def inside_box(box: Float, points: Float) -> NDArray[np.bool_]:
+    """Which of the points (N, 3) lie inside an oriented box (8, 3) that has a volume."""
+    corner = box[2]
     edges = box[[1, 3, 6]] - corner
     lengths = np.einsum("ij,ij->i", edges, edges)
-    along = edges @ (camera - corner)
-    if not np.all((lengths > 0) & (along > 0) & (along < lengths)):
+    along = np.einsum("nj,ij->ni", points - corner, edges)
+    return np.all((lengths > 0) & (along > 0) & (along < lengths), axis=1)
+
+
+def distance_problem(pose: Pose, box: Float) -> str | None:
+    """Why the camera of this pose cannot stand where it does, inside the model's box (8, 3) in world metres; or None."""
+    target = box.mean(axis=0) if pose.target is None else np.array(pose.target)
+    azimuth, elevation = np.radians([pose.azimuth_deg, pose.elevation_deg])
+    camera = target + orbit_center(azimuth, elevation, pose.distance)
+    if not inside_box(box, camera[None])[0]:
         return None
     reach = float(np.linalg.norm(box - target, axis=1).max())
     return (

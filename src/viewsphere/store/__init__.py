@@ -13,6 +13,17 @@ a file.
 from viewsphere.store.channel_files import decode, encode
 from viewsphere.store.dataset import Dataset
 from viewsphere.store.folder import Store
-from viewsphere.store.records import Category, ModelInfo, PlanRecord
+from viewsphere.store.records import Category, ModelInfo, Part, PlanRecord, Row, ShotRow
 
-__all__ = ["Category", "Dataset", "ModelInfo", "PlanRecord", "Store", "decode", "encode"]
+__all__ = [
+    "Category",
+    "Dataset",
+    "ModelInfo",
+    "Part",
+    "PlanRecord",
+    "Row",
+    "ShotRow",
+    "Store",
+    "decode",
+    "encode",
+]

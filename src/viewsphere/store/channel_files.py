@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -31,16 +32,41 @@ def encode(channel: Channel, array: NDArray[Any]) -> bytes:
 
 
 def decode(channel: Channel, file: Path) -> NDArray[Any]:
-    """The array a channel's file holds, with the channel's dtype; raises StoreError if it is missing or broken."""
+    """The array a channel's file holds, with the channel's dtype; raises StoreError if it is missing or broken.
+
+    Pictures that were imported may be JPEG or anything else that Pillow reads.
+    """
     from viewsphere.geometry import image_files
 
     try:
         data = file.read_bytes()
+        if channel.name == "rgb":
+            return _rgb(data)
         array = image_files.decode_tiff(data) if channel.encoding == "tiff" else image_files.decode_png(data)
-    except (OSError, ValueError, UserError) as error:
-        problem = error.strerror if isinstance(error, OSError) else error
+    except (OSError, ValueError, SyntaxError, UserError) as error:
+        problem = (error.strerror if isinstance(error, OSError) else None) or error
         raise StoreError(
             f"{file}: expected a readable {channel.encoding} file, found: {problem}: "
             f"delete {file.parent.parent} and render again"
         ) from None
     return array.astype(channel.dtype, copy=False)
+
+
+def _is_rgb_png(data: bytes) -> bool:
+    """Whether this is a PNG of 8-bit red, green and blue, as this package writes them (PNG specification, 11.2.1)."""
+    return data[:8] == b"\x89PNG\r\n\x1a\n" and data[24:26] == b"\x08\x02"
+
+
+def _rgb(data: bytes) -> NDArray[np.uint8]:
+    """The picture in a file of this package, else in one of any other program."""
+    from io import BytesIO
+
+    from PIL import Image
+
+    from viewsphere.geometry import image_files
+
+    if _is_rgb_png(data):
+        with suppress(UserError):
+            return image_files.decode_png(data)
+    with Image.open(BytesIO(data)) as image:
+        return np.asarray(image.convert("RGB"))

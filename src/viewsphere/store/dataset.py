@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import json
 import os
-import shutil
 from bisect import bisect_right
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import suppress
 from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any, overload
@@ -20,7 +18,8 @@ from viewsphere.model.record import sample_from_record
 from viewsphere.model.sample import Sample
 from viewsphere.store.channel_files import decode
 from viewsphere.store.folder import Store
-from viewsphere.store.records import Category, ModelInfo
+from viewsphere.store.linking import link_file
+from viewsphere.store.records import Category, ModelInfo, ShotRow
 
 
 class Dataset(Sequence[Sample]):
@@ -121,10 +120,27 @@ class Dataset(Sequence[Sample]):
 
     def _sample(self, key: str, record: dict[str, Any]) -> Sample:
         try:
-            files: dict[str, str] = record["files"]
+            files: dict[str, str] = record["files"] | self._supplied(record)
             return sample_from_record(record, channels=_ChannelFiles(self.root, files), files=files)
         except (LookupError, TypeError, ValueError, AttributeError) as error:
             raise _damaged(self.store.shot_folder(key) / "frames.json", error) from None
+
+    def _supplied(self, record: dict[str, Any]) -> dict[str, str]:
+        """Files of channels that were added to a frame later."""
+        files: dict[str, str] = {}
+        for firsts, rows in self._supplements:
+            at = bisect_right(firsts, record["index"]) - 1
+            (key, first, count), channels = rows[at] if at >= 0 else (("", 0, 0), ())
+            if record["index"] < first + count:
+                files |= {name: self.store.channel_file(key, name, record["pose"]["index"]) for name in channels}
+        return files
+
+    @cached_property
+    def _supplements(self) -> list[tuple[list[int], list[tuple[ShotRow, tuple[str, ...]]]]]:
+        """Finished shots of added channels, and their first frames, for each part that added some."""
+        parts = (list(self.plan.supplements_of(i)) for i, part in enumerate(self.plan.parts) if part.supplies)
+        finished = ([row for row in rows if self.store.has_shot(row[0][0])] for rows in parts)
+        return [([row[1] for row, _ in rows], rows) for rows in finished]
 
     def path(self, relative: str) -> Path:
         """A file of the data set."""
@@ -133,7 +149,7 @@ class Dataset(Sequence[Sample]):
     def link(self, relative: str, destination: Path) -> None:
         """Put a stored file at `destination`: a hard link, else a reflink, else a copy; `link_kinds` says which."""
         destination.parent.mkdir(parents=True, exist_ok=True)
-        self.link_kinds.add(_link(self.root / relative, destination))
+        self.link_kinds.add(link_file(self.root / relative, destination))
 
     def link_models(self, folder: Path) -> None:
         """Put every finished model's OBJ, GLB, materials and textures into `folder`/<key>, as `link` does."""
@@ -160,21 +176,6 @@ class _ChannelFiles(Mapping[str, NDArray[Any]]):
 
     def __len__(self) -> int:
         return len(self._files)
-
-
-def _link(source: Path, destination: Path) -> str:
-    with suppress(OSError):
-        os.link(source, destination)
-        return "hard link"
-    try:
-        import fcntl
-
-        with source.open("rb") as read, destination.open("wb") as write:
-            fcntl.ioctl(write.fileno(), 0x40049409, read.fileno())  # FICLONE of linux/fs.h
-        return "reflink"
-    except (ImportError, OSError):
-        shutil.copyfile(source, destination)
-        return "copy"
 
 
 def _damaged(file: Path, error: Exception) -> StoreError:

@@ -7,9 +7,10 @@ import json
 import os
 import shutil
 import socket
-from collections.abc import Generator, Iterable
+from collections.abc import Generator, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import replace
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,7 @@ from viewsphere.model.channel import CHANNELS
 from viewsphere.model.record import sample_to_record
 from viewsphere.model.sample import Sample
 from viewsphere.store.channel_files import encode
-from viewsphere.store.records import ModelInfo, PlanRecord
+from viewsphere.store.records import ModelInfo, PlanRecord, ShotRow
 
 
 class Store:
@@ -55,8 +56,7 @@ class Store:
         known = self.plan_file.exists()
         if not known and self.root.is_dir() and any(self.root.iterdir()) and not writing.is_dir():
             raise StoreError(f"{self.root}: expected an empty or new folder, found other files: choose another output folder")
-        self._make(writing)
-        self._sweep()
+        self.make_ready()
         if known:
             if any(writing.iterdir()) or any((self.folder / "shots").glob("*/*")):
                 self._refuse_other(plan)
@@ -77,6 +77,36 @@ class Store:
             with suppress(OSError):
                 sign.unlink(missing_ok=True)
 
+    def save(self, plan: PlanRecord) -> None:
+        """Put a plan in the place of the one that it continues."""
+        self._write_atomically(self.plan_file, plan.to_json())
+
+    def missing(self, plan: PlanRecord) -> list[ShotRow]:
+        """The shots of a plan that are neither finished nor left out at the user's wish."""
+        return [row for row in self.wanted(plan) if not self.has_shot(row[0])]
+
+    def wanted(self, plan: PlanRecord) -> Iterator[ShotRow]:
+        """The shots of a plan, those with channels that were added later last, but for what was left out at the user's wish."""
+        skipped = self.skipped().keys()
+        for row in chain(plan.shots, (row for row, _ in plan.supplements)):
+            if not {row[0], row[0].rpartition("-")[0]} & skipped:
+                yield row
+
+    def drop_unnamed_models(self) -> None:
+        """Remove the models that the plan does not name, unless another run is at work on them."""
+        own = _writer()
+        if any(not path.name.startswith(own) for path in (self.folder / "writing").iterdir()):
+            return
+        named = set(self.plan().models)
+        for folder in (self.folder / "models").glob("*"):
+            if folder.name not in named:
+                shutil.rmtree(folder, ignore_errors=True)
+
+    def make_ready(self) -> None:
+        """See that the folder can be written, and clear what dead runs left; raises StoreError if it cannot."""
+        self._make(self.folder / "writing")
+        self._sweep()
+
     def _is_of(self, plan: PlanRecord) -> bool:
         try:
             found = self.plan()
@@ -89,7 +119,7 @@ class Store:
         if found.digest != plan.digest:
             raise StoreError(
                 f"{self.root}: expected data of recipe {plan.name!r} (digest {plan.digest[:12]}), found that of "
-                f"{found.name!r} ({found.digest[:12]}): choose another output folder, or delete this one"
+                f"{found.name!r} ({found.digest[:12]}): choose another output folder, add to it with --append, or delete it"
             )
         if found.version != plan.version:
             raise StoreError(
@@ -123,6 +153,10 @@ class Store:
     def shot_folder(self, key: str) -> Path:
         """Where a finished shot lies."""
         return self.folder / "shots" / hashlib.sha256(key.encode()).hexdigest()[:2] / key
+
+    def channel_file(self, key: str, channel: str, pose: int) -> str:
+        """Where a finished shot's channel of a pose lies, relative to the data set's root."""
+        return f"{self.shot_folder(key).relative_to(self.root).as_posix()}/{channel_path(channel, pose)}"
 
     def model_folder(self, key: str) -> Path:
         """Where a normalised model lies."""
@@ -183,8 +217,11 @@ class Store:
         except FileNotFoundError:
             return {}
 
-    def write_shot(self, key: str, samples: Iterable[Sample]) -> int:
-        """Write all frames of a shot, with the channels their samples hold; gives their number."""
+    def write_shot(self, key: str, samples: Iterable[Sample], scenery: str = "") -> int:
+        """Write all frames of a shot, with the channels their samples hold; gives their number.
+
+        `scenery`, if any, is a text that says what stands there that is no object.
+        """
         target = self.shot_folder(key)
         prefix = target.relative_to(self.root).as_posix()
         records: list[dict[str, Any]] = []
@@ -193,7 +230,7 @@ class Store:
                 files: dict[str, str] = {}
                 for name, array in sample.channels.items():
                     channel = CHANNELS[name]
-                    inside = f"{name}/{sample.pose.index:06d}{channel.suffix}"
+                    inside = channel_path(name, sample.pose.index)
                     (folder / name).mkdir(exist_ok=True)
                     (folder / inside).write_bytes(encode(channel, array))
                     files[name] = f"{prefix}/{inside}"
@@ -201,7 +238,16 @@ class Store:
             lines = (json.dumps(r, separators=(",", ":"), allow_nan=False) for r in records)
             text = "[\n" + ",\n".join(lines) + "\n]\n"
             (folder / "frames.json").write_text(text, "utf-8")
+            if scenery:
+                (folder / "scenery.json").write_text(scenery, "utf-8")
         return len(records)
+
+    def scenery(self, key: str) -> str:
+        """The text that `write_shot` was given of a shot's scenery; empty if none."""
+        try:
+            return (self.shot_folder(key) / "scenery.json").read_text("utf-8")
+        except FileNotFoundError:
+            return ""
 
     def write_model_info(self, folder: Path, info: ModelInfo) -> None:
         """Write model.json into a model's folder that is being made."""
@@ -224,6 +270,11 @@ class Store:
                 f"{file}: expected what is known of a model, found {type(error).__name__}: {error}: "
                 f"delete {file.parent} and render again"
             ) from None
+
+
+def channel_path(channel: str, pose: int) -> str:
+    """Where a channel of a pose lies in its shot's folder."""
+    return f"{channel}/{pose:06d}{CHANNELS[channel].suffix}"
 
 
 def _writer() -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -23,9 +24,9 @@ def observe(geometry: Geometry, camera: Camera, visibility: Visibility, names: I
     """The named channels of this view, each (H, W) or (H, W, 3) as its row of `model.channel.CHANNELS` says.
 
     `visibility` is `rasterize(geometry, camera)`. All channels but rgb: `depth` (z; behind a fisheye it is negative),
-    `instances`, `categories`, `parts`, `triangles` (index within its object; -1 on the ground), `normals` (interpolated, on
-    the visible side of its triangle, and bent to at most perpendicular to the ray where interpolation turns it away),
-    `normals_geometric`, `coordinates` (NaN on the ground), `barycentrics`. Raises ValueError for other names.
+    `instances`, `categories`, `parts`, `triangles` (index within its object; -1 on scenery and ground), `normals`
+    (interpolated, on the visible side of its triangle, and bent to at most perpendicular to the ray where interpolation turns
+    it away), `normals_geometric`, `coordinates` (NaN on scenery and ground), `barycentrics`. Raises ValueError for other names.
     """
     view, names = _View(geometry, camera, visibility), tuple(names)
     unknown = [name for name in names if name not in _CHANNELS]
@@ -82,7 +83,7 @@ def _labels(view: _View, name: str, table: NDArray[np.int32]) -> Array:
 def _triangles(view: _View) -> Array:
     g = view.geometry
     index = np.full(len(g.triangles), -1, np.int32)
-    for first, last in zip(g.triangle_start, g.triangle_start[1:], strict=False):
+    for first, last in pairwise(g.triangle_start[: g.object_count + 1]):
         index[first:last] = np.arange(last - first)
     return _labels(view, "triangles", index)
 

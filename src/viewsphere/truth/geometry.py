@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
+from itertools import accumulate, pairwise
 from typing import Any
 
 import numpy as np
@@ -11,28 +13,40 @@ from numpy.typing import ArrayLike, NDArray
 
 from viewsphere.assets.mesh import Mesh
 from viewsphere.model.shot import Placement
-from viewsphere.truth.cutouts import Cutouts, mesh_cutouts, stack_cutouts
+from viewsphere.truth.cutouts import NO_CUTOUTS, SURFACE, Cutouts, mesh_cutouts, stack_cutouts
 
-GROUND = 0
-"""Object, part and category id of the ground: it has depth and normals but is background to every label."""
+BACKGROUND = 0
+"""Object, part and category id of scenery and ground: they have depth and normals but are background to every label."""
 
 GROUND_REACH = 1000.0
+
+STACKED = (
+    "vertices",
+    "normals",
+    "coordinates",
+    "triangle_normals",
+    "triangle_side",
+    "triangle_object",
+    "triangle_part",
+    "triangle_category",
+)
+"""Arrays of a geometry that are those of its parts, one after another."""
 
 
 @dataclass(frozen=True, eq=False)
 class Geometry:
-    """World-space triangles, objects in id order, the ground (if any) last.
+    """World-space triangles: objects in id order, then scenery, the ground (if any) last.
 
     vertices (V, 3) float64 world metres; triangles (T, 3) int32; normals (V, 3) float32 world, unit; coordinates (V, 3)
     float32, each vertex in its object's axes (zero for the ground).
 
     triangle_normals (T, 3) float32 world, unit, by winding (zero for a degenerate triangle); triangle_side (T,) int8: 1 where
     the mean of the vertex normals agrees with the winding, -1 where it opposes it, 2 or -2 likewise where all three equal the
-    triangle's own; triangle_object, triangle_part, triangle_category (T,) int32, 0 for the ground; triangle_cutout (T,) int32:
-    -1 all surface, -2 never seen, else a row of `cutouts.corners`.
+    triangle's own; triangle_object, triangle_part, triangle_category (T,) int32, 0 for scenery and ground; triangle_cutout
+    (T,) int32: -1 all surface, -2 never seen, else a row of `cutouts.corners`.
 
-    Object i + 1 owns vertices [vertex_start[i], vertex_start[i + 1]) and triangles [triangle_start[i], triangle_start[i + 1]);
-    both have one entry more than there are objects.
+    Placement i owns vertices [vertex_start[i], vertex_start[i + 1]) and triangles [triangle_start[i], triangle_start[i + 1]);
+    both have one entry more than there are placements. The first `object_count` of them are the objects 1, 2, ...
     """
 
     vertices: NDArray[np.float64]
@@ -48,61 +62,123 @@ class Geometry:
     cutouts: Cutouts
     vertex_start: tuple[int, ...]
     triangle_start: tuple[int, ...]
+    object_count: int
     ground_z: float | None
 
     @property
-    def object_count(self) -> int:
-        """Number of objects, the ground not counted."""
-        return len(self.vertex_start) - 1
+    def has_scenery(self) -> bool:
+        """Whether anything but objects and the ground is there."""
+        return self.object_count < len(self.vertex_start) - 1
 
 
 def build_geometry(placements: Sequence[Placement], meshes: Sequence[Mesh], ground: bool, label_alpha: float) -> Geometry:
     """Place the meshes in the world and, if asked, lay the ground at their lowest point (z = 0 if there are none).
 
-    `meshes[i]` is the normalised model of `placements[i]`, whose id is i + 1. The ground is two triangles that reach 1,000
-    scene sizes to every side. A BLEND material is surface where alpha >= label_alpha, a MASK material where alpha >= its
-    cutoff; transmission always counts as surface. Fully transparent triangles (no texel is surface) are kept but never
-    seen. Raises ValueError when ids are not 1..N in order.
+    `meshes[i]` is the normalised model of `placements[i]`; ids are 1..N in order, then 0 for scenery. The ground is two
+    triangles that reach 1,000 scene sizes to every side. A BLEND material is surface where alpha >= label_alpha, a MASK
+    material where alpha >= its cutoff; transmission always counts as surface. Fully transparent triangles (no texel is
+    surface) are kept but never seen. Raises ValueError for other ids.
+
+    The last scenery is kept: where only objects change, it is not placed again.
     """
-    if [p.id for p in placements] != list(range(1, len(meshes) + 1)):
-        raise ValueError(f"placements: expected ids 1..{len(meshes)} in order, got {[p.id for p in placements]}")
-    world = [_moved(p.world_from_object, m.vertices, 1.0) for p, m in zip(placements, meshes, strict=True)]
-    vertex_start = (0, *np.cumsum([len(m.vertices) for m in meshes], dtype=int).tolist())
-    triangle_start = (0, *np.cumsum([len(m.triangles) for m in meshes], dtype=int).tolist())
-    surfaces = [mesh_cutouts(m, label_alpha) for m in meshes]
-    vertices = _joined(world, (0, 3), np.float64)
+    count = sum(p.id > 0 for p in placements)
+    if [p.id for p in placements] != [*range(1, count + 1), *[BACKGROUND] * (len(meshes) - count)]:
+        raise ValueError(f"placements: expected ids 1..N in order, then 0, got {[p.id for p in placements]}")
+    parts = [_placed(tuple(placements[:count]), tuple(meshes[:count]), label_alpha)]
+    if count < len(meshes):
+        parts.append(_scenery(tuple(placements[count:]), tuple(meshes[count:]), label_alpha))
+    return _stacked([*parts, _ground(parts)] if ground else parts)
+
+
+def _placed(placements: tuple[Placement, ...], meshes: tuple[Mesh, ...], label_alpha: float) -> Geometry:
+    moves = [p.world_from_object for p in placements]
+    vertex_start = (0, *accumulate(len(m.vertices) for m in meshes))
+    vertices = _joined([_moved(w, m.vertices, 1.0) for w, m in zip(moves, meshes, strict=True)], (0, 3), np.float64)
     triangles = _joined([m.triangles + s for m, s in zip(meshes, vertex_start, strict=False)], (0, 3), np.int32)
-    ground_z = None
-    if ground:
-        corners = _ground_corners(vertices[np.unique(triangles)])
-        ground_z = float(corners[0, 2])
-        n = len(vertices)
-        vertices = np.concatenate([vertices, corners])
-        triangles = np.concatenate([triangles, np.array([[n, n + 1, n + 2], [n, n + 2, n + 3]], np.int32)])
-    cutouts, rows = stack_cutouts(surfaces)
-    up = np.tile(np.array([0, 0, 1], np.float32), (4 * ground, 1))
-    moved = [_moved(p.world_from_object, m.normals, 0.0) for p, m in zip(placements, meshes, strict=True)]
-    normals = _joined([*moved, up], (0, 3), np.float32)
+    normals = _joined([_moved(w, m.normals, 0.0) for w, m in zip(moves, meshes, strict=True)], (0, 3), np.float32)
+    labels = _joined([_labels(p, m) for p, m in zip(placements, meshes, strict=True)], (0, 3), np.int32)
+    cutouts, rows = stack_cutouts([mesh_cutouts(m, label_alpha) for m in meshes])
     triangle_normals = _triangle_normals(vertices, triangles)
-    pad = np.zeros(2 * ground, np.int32)
-    objects = [np.full(len(m.triangles), p.id) for p, m in zip(placements, meshes, strict=True)]
-    categories = [np.full(len(m.triangles), p.model.category_id) for p, m in zip(placements, meshes, strict=True)]
     return Geometry(
         vertices=vertices,
         triangles=triangles,
         normals=normals,
-        coordinates=_joined([*(m.vertices for m in meshes), np.zeros_like(up)], (0, 3), np.float32),
+        coordinates=_joined([m.vertices for m in meshes], (0, 3), np.float32),
         triangle_normals=triangle_normals,
         triangle_side=_triangle_side(triangle_normals, normals[triangles]),
-        triangle_object=_joined([*objects, pad], (0,), np.int32),
-        triangle_part=_joined([*(m.triangle_part + 1 for m in meshes), pad], (0,), np.int32),
-        triangle_category=_joined([*categories, pad], (0,), np.int32),
-        triangle_cutout=_joined([rows, pad - 1], (0,), np.int32),
+        triangle_object=labels[:, 0],
+        triangle_part=labels[:, 1],
+        triangle_category=labels[:, 2],
+        triangle_cutout=rows,
         cutouts=cutouts,
         vertex_start=vertex_start,
-        triangle_start=triangle_start,
-        ground_z=ground_z,
+        triangle_start=(0, *accumulate(len(m.triangles) for m in meshes)),
+        object_count=sum(p.id > 0 for p in placements),
+        ground_z=None,
     )
+
+
+_scenery = lru_cache(maxsize=1)(_placed)
+
+
+def _stacked(parts: Sequence[Geometry]) -> Geometry:
+    """One after another; where the last is the ground, it stays that."""
+    firsts = (0, *accumulate(len(part.vertices) for part in parts))
+    cutouts, rows = stack_cutouts([(part.cutouts, part.triangle_cutout) for part in parts])
+    arrays = {name: np.concatenate([getattr(part, name) for part in parts]) for name in STACKED}
+    return Geometry(
+        **arrays,
+        triangles=np.concatenate([part.triangles + np.int32(first) for part, first in zip(parts, firsts, strict=False)]),
+        triangle_cutout=rows,
+        cutouts=cutouts,
+        vertex_start=(0, *accumulate(b - a for part in parts for a, b in pairwise(part.vertex_start))),
+        triangle_start=(0, *accumulate(b - a for part in parts for a, b in pairwise(part.triangle_start))),
+        object_count=sum(part.object_count for part in parts),
+        ground_z=parts[-1].ground_z,
+    )
+
+
+def _labels(placement: Placement, mesh: Mesh) -> NDArray[np.int32]:
+    labels = np.full((len(mesh.triangles), 3), BACKGROUND, np.int32)
+    if placement.id:
+        labels[:, 0], labels[:, 1], labels[:, 2] = placement.id, mesh.triangle_part + 1, placement.model.category_id
+    return labels
+
+
+def _ground(parts: Sequence[Geometry]) -> Geometry:
+    """Two triangles below all that is placed, counter-clockwise seen from above."""
+    used = np.concatenate([part.vertices[_used(part)] for part in parts])
+    low, high = (used.min(axis=0), used.max(axis=0)) if len(used) else (np.zeros(3), np.zeros(3))
+    size = float(np.max(high - low)) or 1.0
+    x, y = (low[:2] + high[:2]) / 2
+    r = GROUND_REACH * size
+    corners = np.array([[x - r, y - r, low[2]], [x + r, y - r, low[2]], [x + r, y + r, low[2]], [x - r, y + r, low[2]]])
+    triangles = np.array([[0, 1, 2], [0, 2, 3]], np.int32)
+    up = np.tile(np.array([0, 0, 1], np.float32), (4, 1))
+    normals, background = _triangle_normals(corners, triangles), np.full(2, BACKGROUND, np.int32)
+    return Geometry(
+        vertices=corners,
+        triangles=triangles,
+        normals=up,
+        coordinates=np.zeros_like(up),
+        triangle_normals=normals,
+        triangle_side=_triangle_side(normals, up[triangles]),
+        triangle_object=background,
+        triangle_part=background,
+        triangle_category=background,
+        triangle_cutout=np.full(2, SURFACE, np.int32),
+        cutouts=NO_CUTOUTS,
+        vertex_start=(0,),
+        triangle_start=(0,),
+        object_count=0,
+        ground_z=float(low[2]),
+    )
+
+
+def _used(part: Geometry) -> NDArray[np.bool_]:
+    used = np.zeros(len(part.vertices), np.bool_)
+    used[part.triangles] = True
+    return used
 
 
 def _joined(arrays: Sequence[NDArray[Any]], empty: tuple[int, ...], dtype: type) -> NDArray[Any]:
@@ -114,15 +190,6 @@ def _moved(matrix: ArrayLike, points: NDArray[np.float32], w: float) -> NDArray[
     m = np.asarray(matrix, np.float64)
     x, y, z = points.astype(np.float64).T
     return np.stack([m[r, 0] * x + m[r, 1] * y + m[r, 2] * z + m[r, 3] * w for r in range(3)], axis=1)
-
-
-def _ground_corners(used: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The ground's four corners, counter-clockwise seen from above."""
-    low, high = (used.min(axis=0), used.max(axis=0)) if len(used) else (np.zeros(3), np.zeros(3))
-    size = float(np.max(high - low)) or 1.0
-    x, y = (low[:2] + high[:2]) / 2
-    r = GROUND_REACH * size
-    return np.array([[x - r, y - r, low[2]], [x + r, y - r, low[2]], [x + r, y + r, low[2]], [x - r, y + r, low[2]]])
 
 
 def _triangle_normals(vertices: NDArray[np.float64], triangles: NDArray[np.int32]) -> NDArray[np.float32]:

@@ -38,8 +38,8 @@ def rasterize(
     """Cast one ray through the centre of each pixel, exactly; of two surfaces in one place the first triangle is seen.
 
     `subdivision` 2 gives the (2H, 2W) buffer of the centres of a pixel's 2 x 2 quarters (edge anti-aliasing). With an
-    `object_id` that object stands alone, without the ground. `window` replaces the image by another rectangle of pixels, which
-    may lie outside it.
+    `object_id` that object stands alone, without scenery and ground. `window` replaces the image by another rectangle of
+    pixels, which may lie outside it.
     """
     everything = (0, len(geometry.triangles), 0, len(geometry.vertices))
     part = _range(geometry, object_id) if object_id else everything

@@ -27,6 +27,7 @@ SUNLIT, SKYLIT, BOUNCE, FADE, BLEND, SOLID = range(31 * BLOCK, 37 * BLOCK, BLOCK
 SU, SV, SW, SDU, SDV, FACING = range(37 * BLOCK, 43 * BLOCK, BLOCK)
 SHINY, OM5, GRAZING, LOBE, UP, REST, COAT_SKY, COAT_LOBE = range(43 * BLOCK, 51 * BLOCK, BLOCK)
 COAT_UP, COAT_REST, BELOW, SHOWN, ALBEDO, EMISSION, RESULT, COVER = range(51 * BLOCK, 59 * BLOCK, BLOCK)
+FLOOR = RESULT  # which is free until then
 ROWS = 59
 
 
@@ -179,19 +180,17 @@ def _orient(count, light, b):
 
 
 @njit(fastmath=FAST)
-def _sun_share(light, u, v, w, du, dv, step):
-    """Share of the sun that reaches a point: nine bilinear look-ups `step` texels apart in the shadow map.
+def _sun_share(shadow, shadow_low, shadow_high, u, v, w, du, dv, step):
+    """Share of the sun that reaches a point: nine bilinear look-ups `step` texels apart in a shadow map and its bounds.
 
-    w is the point's depth less the bias; (du, dv) its plane's slope in depth per texel.
+    (u, v) lies in the map; w is the point's depth less the bias; (du, dv) its plane's slope in depth per texel.
     """
-    size = light.shadow.shape[0]
-    if u < f4(1) or v < f4(1) or u > f4(size - 1) or v > f4(size - 1):
-        return f4(1)
+    size = shadow.shape[0]
     reach = (abs(du) + abs(dv)) * (step + f4(1.5))
     row, column = U(nb.int32(v) // nb.int32(SHADOW_BLOCK)), U(nb.int32(u) // nb.int32(SHADOW_BLOCK))
-    if w + reach <= light.shadow_low[row, column]:
+    if w + reach <= shadow_low[row, column]:
         return f4(1)
-    if w - reach > light.shadow_high[row, column]:
+    if w - reach > shadow_high[row, column]:
         return f4(0)
     # Where the filter's corners and middle agree there is no edge of a shadow to smooth.
     low, high = f4(0.5), f4(size) - f4(0.5)
@@ -201,7 +200,7 @@ def _sun_share(light, u, v, w, du, dv, step):
         ov = (f4(corner >> 1) * f4(2) - f4(1)) * (step + f4(0.5)) if corner < 4 else f4(0)
         iu, iv = nb.int32(min(max(u + ou, low), high)), nb.int32(min(max(v + ov, low), high))
         near = w + du * (f4(iu) + f4(0.5) - u) + dv * (f4(iv) + f4(0.5) - v)
-        agree += nb.int32(1) if light.shadow[U(iv), U(iu)] >= near else nb.int32(0)
+        agree += nb.int32(1) if shadow[U(iv), U(iu)] >= near else nb.int32(0)
     if agree == 0:
         return f4(0)
     if agree == 5:
@@ -211,7 +210,7 @@ def _sun_share(light, u, v, w, du, dv, step):
         cv = min(max(v + f4(row) * step - f4(0.5), f4(0)), f4(size - 2))
         iv = nb.int32(cv)
         fv = cv - f4(iv)
-        a, c = light.shadow[U(iv)], light.shadow[U(iv) + U(1)]
+        a, c = shadow[U(iv)], shadow[U(iv) + U(1)]
         for column in range(-1, 2):
             cu = min(max(u + f4(column) * step - f4(0.5), f4(0)), f4(size - 2))
             iu = nb.int32(cu)
@@ -227,17 +226,48 @@ def _sun_share(light, u, v, w, du, dv, step):
 
 
 @njit(fastmath=FAST)
+def _is_on(u, v, size):
+    """Whether a place lies on a shadow map of this size."""
+    return u >= f4(1) and v >= f4(1) and u <= f4(size - 1) and v <= f4(size - 1)
+
+
+@njit(fastmath=FAST)
+def _wide_share(light, b, i):
+    """Share of the sun that scenery leaves to a sample beyond the shadow map: by the narrowest wide map it is on."""
+    x, y, z, gx, gy, gz = b[PX + i], b[PY + i], b[PZ + i], b[GX + i], b[GY + i], b[GZ + i]
+    fine = light.shadow_from_world
+    texels = f4(math.sqrt(fine[0, 0] * fine[0, 0] + fine[0, 1] * fine[0, 1] + fine[0, 2] * fine[0, 2]))
+    facing = gx * light.sun[0] + gy * light.sun[1] + gz * light.sun[2]
+    for k in range(light.wide.shape[0]):
+        m = light.wide_from_world[U(k)]
+        u = m[0, 0] * x + m[0, 1] * y + m[0, 2] * z + m[0, 3]
+        v = m[1, 0] * x + m[1, 1] * y + m[1, 2] * z + m[1, 3]
+        if _is_on(u, v, light.wide.shape[1]):
+            own = f4(math.sqrt(m[0, 0] * m[0, 0] + m[0, 1] * m[0, 1] + m[0, 2] * m[0, 2]))
+            slope = (f4(1) if facing > f4(0) else -f4(1)) / (own * max(abs(facing), f4(0.15)))
+            du = (gx * m[0, 0] + gy * m[0, 1] + gz * m[0, 2]) * slope
+            dv = (gx * m[1, 0] + gy * m[1, 1] + gz * m[1, 2]) * slope
+            w = m[2, 0] * x + m[2, 1] * y + m[2, 2] * z + m[2, 3] - f4(1.2) - f4(0.6) * (abs(du) + abs(dv))
+            step = max(b[PIXEL + i] * own / texels, f4(0.8))
+            return _sun_share(light.wide[U(k)], light.wide_low[U(k)], light.wide_high[U(k)], u, v, w, du, dv, step)
+    return f4(1)
+
+
+@njit(fastmath=FAST)
 def _occlusion(count, light, b):
-    """How much of the sun, of the sky and of the ground's light reaches each sample."""
+    """How much of the sun, of the sky and of the ground's light reaches each sample; objects get the whole sky."""
     zero, one, half = f4(0), f4(1), f4(0.5)
     frame, ground = light.ground_frame, light.ground
+    shadow, low, high = light.shadow, light.shadow_low, light.shadow_high
     last = f4(ground.shape[0] - 1)
     cells, corner_x, corner_y, grounded = frame[0], frame[1], frame[2], frame[5] > zero
     rise = one / (f4(0.35) * frame[4]) if grounded else zero
     for i in range(count):
         share = b[FACING + i]
         if share > zero:
-            share *= _sun_share(light, b[SU + i], b[SV + i], b[SW + i], b[SDU + i], b[SDV + i], b[PIXEL + i])
+            u, v = b[SU + i], b[SV + i]
+            if _is_on(u, v, shadow.shape[0]):
+                share *= _sun_share(shadow, low, high, u, v, b[SW + i], b[SDU + i], b[SDV + i], b[PIXEL + i])
         b[SUNLIT + i] = max(share, zero)
         sky, bounce = one, one
         if grounded:
@@ -251,9 +281,30 @@ def _occlusion(count, light, b):
                 sky = above[c, 0] * p + above[d, 0] * q + below[c, 0] * r + below[d, 0] * s
                 bounce = above[c, 1] * p + above[d, 1] * q + below[c, 1] * r + below[d, 1] * s
             if b[GROUND + i] == zero:
+                b[FLOOR + i] = sky
                 sky = one
                 bounce += (one - bounce) * f4(0.6) * min(max((b[PZ + i] - frame[3]) * rise, zero), one)
         b[SKYLIT + i], b[BOUNCE + i] = sky, bounce
+
+
+@njit(fastmath=FAST)
+def _scenery(count, surfaces, light, b, material):
+    """What else there is where there is scenery: its shadows beyond the shadow map, and the targets' on what they stand on."""
+    zero, one = f4(0), f4(1)
+    frame = light.ground_frame
+    rise = one / (f4(0.35) * frame[4]) if frame[5] > zero else zero
+    for i in range(count):
+        if b[SUNLIT + i] > zero and not _is_on(b[SU + i], b[SV + i], light.shadow.shape[0]):
+            b[SUNLIT + i] *= _wide_share(light, b, i)
+        if rise > zero and surfaces.materials[U(material[i]), U(17)] > zero:
+            # It is what they stand on where it faces up about as low as they stand.
+            close = max(one - abs(b[PZ + i] - frame[3]) * rise, zero)
+            b[SKYLIT + i] = one + (b[FLOOR + i] - one) * close * max(b[NZ + i], zero)
+
+
+@njit
+def _has_scenery(surfaces):
+    return surfaces.materials[:, 17].max() > f4(0)
 
 
 @njit(fastmath=FAST)
@@ -353,6 +404,7 @@ def shade(view, surfaces, textures, light, knee, slots, where, triangle, depth, 
     """
     b = np.empty(ROWS * BLOCK, np.float32)
     material = np.empty(BLOCK, np.int32)
+    scenery = _has_scenery(surfaces)
     for start in range(0, slots.shape[0], BLOCK):
         stop = min(start + BLOCK, slots.shape[0])
         count = stop - start
@@ -360,6 +412,8 @@ def shade(view, surfaces, textures, light, knee, slots, where, triangle, depth, 
         _materials(surfaces, textures, start, stop, slots, triangle, b, material)
         _orient(count, light, b)
         _occlusion(count, light, b)
+        if scenery:
+            _scenery(count, surfaces, light, b, material)
         _lobes(count, light, b)
         for c in range(3):
             _light(count, light, knee, c, b)

@@ -19,7 +19,7 @@ class Surfaces(NamedTuple):
 
     vertices (V, 16): shading normal, both uv sets, linear colour and alpha, position, two unused (a row is
     a cache line); triangles (T, 3) uint32; material (T,) int32; density (T, 4): square per square length of each uv
-    set; normals (T, 3): geometric, unit; materials (M, 17) and slots (M, 3) int32: columns named in `surface.py`.
+    set; normals (T, 3): geometric, unit; materials (M, 18) and slots (M, 3) int32: columns named in `surface.py`.
     """
 
     vertices: Float32
@@ -29,6 +29,11 @@ class Surfaces(NamedTuple):
     normals: Float32
     materials: Float32
     slots: Int32
+
+    @property
+    def has_scenery(self) -> bool:
+        """Whether any material is scenery's: the last column of `materials`."""
+        return bool(self.materials[:, -1].any())
 
 
 class Textures(NamedTuple):
@@ -51,8 +56,10 @@ class Light(NamedTuple):
     sun (3,) direction; sun_color (3,) irradiance; sky (4, 3): radiance of a white surface under the upper half of the sky
     as a cubic in its normal's z; zenith, horizon, earth (3,) radiance above, beside and below; shadow (N, N): nearest
     depth seen from the sun; shadow_low and shadow_high: its bounds around each block; shadow_from_world (3, 4) in texels;
-    ground (n, n, 2): share of the sky's and of all light that the objects leave to the ground; ground_frame (6,): map cells
-    per length, its corner x and y, ground z, the objects' height, 1 if there is a ground.
+    wide (K, N, N), wide_low, wide_high and wide_from_world (K, 3, 4): the same of scenery alone, each wider than the one
+    before, for what lies beyond `shadow`; ground (n, n, 2): share of the sky's and of all light that the targets leave to
+    what they stand on; ground_frame (6,): map cells per length, its corner x and y, the z they stand on, their height, 1 if
+    they stand on anything.
     """
 
     sun: Float32
@@ -65,6 +72,10 @@ class Light(NamedTuple):
     shadow_low: Float32
     shadow_high: Float32
     shadow_from_world: Float32
+    wide: Float32
+    wide_low: Float32
+    wide_high: Float32
+    wide_from_world: Float32
     ground: Float32
     ground_frame: Float32
 

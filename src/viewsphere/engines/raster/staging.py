@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -18,7 +19,7 @@ from viewsphere.engines.raster.surface import BLENDED, TRANSMISSION, pack_surfac
 from viewsphere.engines.raster.tone import EXPOSURE, KNEE, srgb_bytes
 from viewsphere.geometry.camera import inverse_camera_matrix, pixel_rays
 from viewsphere.model.camera import Camera, Intrinsics
-from viewsphere.model.shot import Background, Frame, ModelSpec, Scene, Shot
+from viewsphere.model.shot import Background, Frame, ModelSpec, Placement, Scene, Shot
 from viewsphere.truth.geometry import Geometry, build_geometry
 from viewsphere.truth.visibility import Visibility, rasterize
 
@@ -136,20 +137,42 @@ def build_stage(shot: Shot, load: Callable[[ModelSpec], Mesh]) -> RasterStage:
         meshes.append(loaded[placement.model])
     scene = shot.scene
     geometry = build_geometry(shot.placements, meshes, scene.ground is not None, shot.label_alpha)
-    return _baked(geometry, meshes, scene, options)
+    targets = sum(not p.scenery for p in shot.placements)
+    return _baked(geometry, meshes, shot.placements[targets:], scene, options)
 
 
-def _baked(geometry: Geometry, meshes: Sequence[Mesh], scene: Scene, options: Options) -> RasterStage:
-    used = geometry.vertices[np.unique(geometry.triangles[: geometry.triangle_start[-1]])]
-    low, high = (used.min(axis=0), used.max(axis=0)) if len(used) else (np.zeros(3), np.zeros(3))
+def _baked(
+    geometry: Geometry, meshes: Sequence[Mesh], scenery: tuple[Placement, ...], scene: Scene, options: Options
+) -> RasterStage:
+    """Lengths are in units of all there is; where there is scenery, from the world's origin, so that they stay the same when
+    the targets change.
+    """
+    targets = len(meshes) - len(scenery)
+    low, high = _bounds(geometry, geometry.triangle_start[-1])
     origin, unit = (low + high) / 2, float(np.linalg.norm(high - low)) / 2 or 1.0
     exposure = EXPOSURE * 2.0**options.exposure
-    surfaces, textures = pack_surfaces(geometry, meshes, scene.ground, origin, unit, exposure)
-    ground_z = None if geometry.ground_z is None else (geometry.ground_z - float(origin[2])) / unit
-    extent = Extent((low - origin) / unit, (high - origin) / unit, ground_z)
-    light = bake_light(scene, extent, surfaces, textures, exposure, options.shadow_resolution)
+    ground_z = geometry.ground_z
+    if scenery:
+        origin, unit = np.zeros(3), 2.0 ** math.ceil(math.log2(unit))
+    surfaces, textures = pack_surfaces(geometry, meshes, scene.ground, origin, unit, exposure, targets)
+    reach = float(np.abs(np.stack([low, high]) - origin).max()) / unit
+    if scenery:
+        low, high = _bounds(geometry, geometry.triangle_start[targets])
+        ground_z = float(low[2])
+    floor = None if ground_z is None else (ground_z - float(origin[2])) / unit
+    extent = Extent((low - origin) / unit, (high - origin) / unit, floor, geometry.triangle_start[targets], reach)
+    known = (scenery, tuple(meshes[targets:]), unit) if scenery else None
+    light = bake_light(scene, extent, surfaces, textures, exposure, options.shadow_resolution, known)
     own = surfaces.materials[surfaces.material]
     see_through = np.append((own[:, BLENDED] > 0) | (own[:, TRANSMISSION] > 0), False)
     seen = np.append(np.ones(len(own), np.bool_), False)
     owner = (geometry.triangle_object * len(surfaces.materials) + surfaces.material).astype(np.int32)
     return RasterStage(geometry, scene, options, origin, unit, surfaces, textures, light, owner, seen, see_through)
+
+
+def _bounds(geometry: Geometry, triangles: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Lowest and highest corner of the first so many triangles."""
+    is_used = np.zeros(len(geometry.vertices), np.bool_)
+    is_used[geometry.triangles[:triangles]] = True
+    used = geometry.vertices[is_used]
+    return (used.min(axis=0), used.max(axis=0)) if len(used) else (np.zeros(3), np.zeros(3))

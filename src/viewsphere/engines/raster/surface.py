@@ -16,9 +16,9 @@ from viewsphere.truth.geometry import Geometry
 
 # Columns of Surfaces.materials: base colour and alpha (4), roughness, metallic, emission (3), reflectance at normal
 # incidence, clear coat and its roughness, unlit, ground, blended, transmission, alpha from which it casts a shadow
-# (0: always, above 1: never). Columns of Surfaces.slots: base colour, metallic-roughness, emission.
-BLENDED, TRANSMISSION = 14, 15
-_NO_SHADOW = 2.0
+# (0: always, above 1: never), scenery. Columns of Surfaces.slots: base colour, metallic-roughness, emission.
+BLENDED, TRANSMISSION, CASTS_FROM = 14, 15, 16
+NO_SHADOW = 2.0
 
 
 def pack_surfaces(
@@ -28,8 +28,12 @@ def pack_surfaces(
     origin: NDArray[np.float64],
     unit: float,
     exposure: float,
+    targets: int,
 ) -> tuple[Surfaces, Textures]:
-    """Arrays for all triangles of a geometry and of the meshes it was built from; positions from `origin` in `unit`s."""
+    """Arrays for all triangles of a geometry and of the meshes it was built from; positions from `origin` in `unit`s.
+
+    The first `targets` meshes are what the picture is about, the others scenery.
+    """
     vertices = np.zeros((len(geometry.vertices), 16), np.float32)
     vertices[:, :3] = geometry.normals
     vertices[:, 7:11] = 1.0
@@ -38,7 +42,7 @@ def pack_surfaces(
     rows: list[list[float]] = []
     slots: list[list[int]] = []
     packer = TexturePacker()
-    first_row: dict[int, int] = {}
+    first_row: dict[tuple[int, bool], int] = {}
     for i, mesh in enumerate(meshes):
         own = slice(geometry.vertex_start[i], geometry.vertex_start[i + 1])
         for column, uv in ((3, mesh.uv0), (5, mesh.uv1)):
@@ -46,13 +50,14 @@ def pack_surfaces(
                 vertices[own, column : column + 2] = uv
         if mesh.colors is not None:
             vertices[own, 7:11] = mesh.colors
-        if id(mesh) not in first_row:
-            first_row[id(mesh)] = len(rows)
+        kind = id(mesh), i >= targets
+        if kind not in first_row:
+            first_row[kind] = len(rows)
             for m in mesh.materials:
-                rows.append(_material_row(m, exposure))
+                rows.append([*_material_row(m, exposure), float(i >= targets)])
                 slots.append(_material_slots(m, mesh, packer))
         own = slice(geometry.triangle_start[i], geometry.triangle_start[i + 1])
-        material[own] = mesh.triangle_material + first_row[id(mesh)]
+        material[own] = mesh.triangle_material + first_row[kind]
     material[geometry.triangle_start[-1] :] = len(rows)
     rows.append(_ground_row(ground or Ground()))
     slots.append([-1] * 3)
@@ -75,7 +80,7 @@ def _material_row(m: Material, exposure: float) -> list[float]:
     coat = [m.clearcoat, m.clearcoat_roughness]
     flags = [float(m.unlit), 0.0, float(m.alpha_mode == "BLEND"), m.transmission * (1 - m.metallic)]
     shadow = {"OPAQUE": 0.0, "MASK": m.alpha_cutoff, "BLEND": 0.5}[m.alpha_mode]
-    shadow = _NO_SHADOW if m.transmission > 0.5 else shadow
+    shadow = NO_SHADOW if m.transmission > 0.5 else shadow
     return [*m.base_color, m.roughness, m.metallic, *emission, reflectance, *coat, *flags, shadow]
 
 
@@ -90,7 +95,7 @@ def _material_slots(m: Material, mesh: Mesh, packer: TexturePacker) -> list[int]
 
 def _ground_row(ground: Ground) -> list[float]:
     color = linear(ground.color).tolist()
-    return [*color, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, _NO_SHADOW]
+    return [*color, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, NO_SHADOW, 0.0]
 
 
 def _uv_density(vertices: Float32, triangles: NDArray[np.int32]) -> Float32:

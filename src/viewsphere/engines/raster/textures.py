@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,7 +35,7 @@ class TexturePacker:
         image = images[texture.image]
         key = (id(image), is_color)
         if key not in self._images:
-            self._images[key] = [self._store(level) for level in _mip_levels(image.pixels, is_color)]
+            self._images[key] = [self._store(level) for level in _mip_levels(image, is_color)]
         return self._slots.setdefault((*key, texture), len(self._slots))
 
     def _store(self, level: NDArray[np.uint16]) -> tuple[int, int, int]:
@@ -59,8 +60,13 @@ class TexturePacker:
         return Textures(np.ascontiguousarray(texels), levels, modes, transforms)
 
 
-def _mip_levels(pixels: NDArray[np.uint8], is_color: bool) -> list[NDArray[np.uint16]]:
-    """The image and its halvings, (H, W, 4) uint16 linear; colours weighted by alpha: hidden ones do not bleed."""
+@lru_cache(maxsize=128)
+def _mip_levels(image: Image, is_color: bool) -> list[NDArray[np.uint16]]:
+    """The image and its halvings, (H, W, 4) uint16 linear; colours weighted by alpha: hidden ones do not bleed.
+
+    Kept, because the next model often stands in the same place.
+    """
+    pixels = image.pixels
     base = pixels.astype(np.uint16) * np.uint16(257)
     if is_color:
         base[..., :3] = linear_words()[pixels[..., :3]]

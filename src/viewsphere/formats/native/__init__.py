@@ -5,6 +5,8 @@ them.
     MODELS/<key>/<key>.obj, .glb, ...
     Pose-<index>/RGB|MASK|DEPTH/<object>-<pose>.png|.tiff
 
+Pictures that were imported without a camera are left out: the layout is one of poses.
+
 An object's name is its model's key; where a pose has several frames, or a frame several objects, the
 frame's and the object's numbers follow it.
 """
@@ -16,6 +18,7 @@ from pathlib import Path
 from tempfile import TemporaryFile
 from typing import IO, TYPE_CHECKING, Any
 
+from viewsphere.formats.native.reading import read as read
 from viewsphere.geometry.image_files import encode_png
 from viewsphere.model.paper_json import faces, json_bytes, transformation_matrix, vehicles
 from viewsphere.model.sample import ObjectAnnotation, Sample
@@ -29,7 +32,8 @@ _FOLDER_SIZE = 10_000
 def export(dataset: Dataset, folder: Path) -> None:
     """Write the finished frames: `dataset1.json`, pictures, masks and depth by pose, models."""
     with TemporaryFile(dir=folder) as entries:
-        places = [place for sample in dataset for place in _write_frame(dataset, sample, folder, entries)]
+        known = (sample for sample in dataset if sample.known_camera and sample.known_pose)
+        places = [place for sample in known for place in _write_frame(dataset, sample, folder, entries)]
         with (folder / "dataset1.json").open("wb") as file:
             file.write(b'{"vehicles":' + json_bytes(vehicles(dataset.models)) + b',\n"poses":{')
             _write_poses(file, entries, sorted(places))
@@ -98,7 +102,7 @@ def object_name(dataset: Dataset, frame: int, object_id: int, key: str) -> str:
 def _group(dataset: Dataset, sample: Sample) -> str:
     """Sub-folder of a pose's folders, where they would hold too many files."""
     plan = dataset.plan
-    number, count = (n * dataset.max_objects // plan.poses for n in (sample.index, plan.frames))
+    number, count = (n * dataset.max_objects // max(plan.poses, 1) for n in (sample.index, plan.frames))
     return f"{number // _FOLDER_SIZE:04d}/" if count > _FOLDER_SIZE else ""
 
 

@@ -6,7 +6,7 @@
 
 Large data sets have numbered sub-folders. Image and annotation ids count from 1 and come from the plan:
 they do not depend on what is finished. Segmentations are polygons that pycocotools rasterises to the
-identical mask.
+identical mask. Imported annotations stay as they were, but for their ids.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.errors import UserError
+from viewsphere.formats.coco.reading import read as read
 from viewsphere.geometry.image_files import encode_png
 from viewsphere.geometry.mask import mask_polygons
 from viewsphere.model.paper_json import faces, json_bytes, transformation_matrix, vehicles
@@ -61,9 +62,17 @@ _FIRST_FREE_ID = 91
 _FOLDER_SIZE = 10_000
 
 
-def category_ids(categories: tuple[Category, ...]) -> dict[int, int]:
-    """COCO id of each category of the data set: COCO's own for its 80 names, however spelled, else a free
-    one above 90.
+def category_ids(dataset: Dataset) -> dict[int, int]:
+    """COCO id of each category of the data set. With imported pictures in it, the ids they came with, and free ones for the
+    others; else COCO's own for its 80 names, however spelled, and free ones above 90.
+    """
+    if any(part.frames and not part.rows for part in dataset.plan.parts):
+        return {category.id: category.id for category in dataset.categories}
+    return official_ids(dataset.categories)
+
+
+def official_ids(categories: tuple[Category, ...]) -> dict[int, int]:
+    """COCO's id of each category, or a free one.
 
     Of two categories with one name of COCO's, the first has it. Free ids follow the recipe's order.
     """
@@ -93,25 +102,25 @@ def export(dataset: Dataset, folder: Path) -> None:
 
 def image_file(dataset: Dataset, sample: Sample) -> str:
     """Name of a frame's image in its split's folder."""
-    return f"{_stem(dataset, sample)}.png"
+    return f"{_stem(dataset, sample)}{Path(sample.files.get('rgb', '.png')).suffix}"
 
 
 def mask_file(dataset: Dataset, sample: Sample, annotation: ObjectAnnotation) -> str:
     """Name of an object's mask in its split's folder."""
-    several = f"_{annotation.id:03d}" if dataset.max_objects > 1 else ""
+    several = f"_{annotation.id:03d}" if dataset.plan.most_objects(sample.index) > 1 else ""
     return f"MASK/{_stem(dataset, sample)}{several}.png"
 
 
 def _stem(dataset: Dataset, sample: Sample) -> str:
-    per_folder = max(1, _FOLDER_SIZE // dataset.max_objects)
-    inside = f"{sample.index // per_folder:04d}/" if dataset.plan.frames > per_folder else ""
+    number = dataset.plan.folder_of(sample.index, _FOLDER_SIZE)
+    inside = "" if number is None else f"{number:04d}/"
     return f"{inside}{sample.index + 1:012d}"
 
 
 def write_annotations(dataset: Dataset, folder: Path, *, pictures: bool = False) -> None:
     """Write `annotations/instances_<split>.json` of every split, frame by frame, and if asked the images and masks."""
     (folder / "annotations").mkdir(parents=True, exist_ok=True)
-    ids = category_ids(dataset.categories)
+    ids = category_ids(dataset)
     head = _head(dataset, ids)
     with ExitStack() as stack:
         files = {
@@ -120,13 +129,19 @@ def write_annotations(dataset: Dataset, folder: Path, *, pictures: bool = False)
         }
         for sample in dataset:
             masks = {o.id: o.mask for o in sample.objects if o.area}
-            seen = [o for o in sample.objects if o.id in masks]
-            annotations = [_annotation(dataset, sample, o, ids, masks[o.id]) for o in seen]
+            annotations = [
+                _foreign_annotation(dataset, sample, o, ids)
+                if o.source is not None
+                else _annotation(dataset, sample, o, ids, masks[o.id])
+                for o in sample.objects
+                if o.area or (o.source is not None and o.box2d is not None)
+            ]
             files[sample.split].add(_image(dataset, sample), annotations)
-            if pictures:
+            if pictures and "rgb" in sample.files:
                 dataset.link(sample.files["rgb"], folder / sample.split / image_file(dataset, sample))
-                for o in seen:
-                    _write_mask(folder / sample.split / mask_file(dataset, sample, o), masks[o.id])
+                for o in sample.objects:
+                    if o.source is None and o.area:
+                        _write_mask(folder / sample.split / mask_file(dataset, sample, o), masks[o.id])
 
 
 def _write_mask(file: Path, mask: NDArray[np.bool_]) -> None:
@@ -177,6 +192,9 @@ def _head(dataset: Dataset, ids: Mapping[int, int]) -> dict[str, Any]:
 
 
 def _image(dataset: Dataset, sample: Sample) -> dict[str, Any]:
+    if sample.known_camera is None:
+        size = {"width": sample.width, "height": sample.height}
+        return {"id": sample.index + 1, "file_name": image_file(dataset, sample), **size}
     camera, pose = sample.camera, sample.pose
     keys = [o.key for o in sample.objects]
     lens = camera.distortion
@@ -199,11 +217,22 @@ def _image(dataset: Dataset, sample: Sample) -> dict[str, Any]:
     }
 
 
+def _foreign_annotation(dataset: Dataset, sample: Sample, o: ObjectAnnotation, ids: Mapping[int, int]) -> dict[str, Any]:
+    """An imported object's annotation as it was, but for its ids, and without the file of a mask that did not come with it."""
+    source = {k: v for k, v in (o.source or {}).items() if k != "path_mask"}
+    own = {
+        "id": dataset.plan.annotation_id(sample.index, o.id),
+        "image_id": sample.index + 1,
+        "category_id": ids[o.category_id],
+    }
+    return {"iscrowd": 0, "area": o.area, **source, **own}
+
+
 def _annotation(
     dataset: Dataset, sample: Sample, o: ObjectAnnotation, ids: Mapping[int, int], mask: NDArray[np.bool_]
 ) -> dict[str, Any]:
     return {
-        "id": sample.index * dataset.max_objects + o.id,
+        "id": dataset.plan.annotation_id(sample.index, o.id),
         "image_id": sample.index + 1,
         "category_id": ids[o.category_id],
         "iscrowd": 0,

@@ -1,0 +1,82 @@
+"""What the Tab key offers; nothing heavy is imported for it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, MutableMapping
+from contextlib import redirect_stdout
+from importlib.resources import files
+from io import StringIO
+from pathlib import Path
+
+import typer
+
+from viewsphere import plugins
+
+ZOO = "zoo:"
+BASH = "complete_bash"
+
+
+def models(incomplete: str) -> list[str]:
+    """Zoo families, beside the files here; none where it can be no family: then the shell completes files."""
+    if not ZOO.startswith(incomplete[: len(ZOO)]):
+        return []
+    here = () if incomplete.startswith(ZOO) else Path().glob(f"{incomplete}[!.]*")
+    return [ZOO + name for name in plugins.families()] + sorted(f"{p}/" if p.is_dir() else str(p) for p in here)
+
+
+def formats(incomplete: str) -> list[str]:
+    """Names of formats, behind those that are given and a comma."""
+    given, comma, _ = incomplete.rpartition(",")
+    return [given + comma + name for name in plugins.names("formats") if name not in given.split(",")]
+
+
+def axes() -> list[str]:
+    """Signed axes."""
+    return [sign + axis for axis in "xyz" for sign in "+-"]
+
+
+def changes(incomplete: str) -> list[str]:
+    """Fields that the recipe to start from shows, and the engines for `engine=`."""
+    if incomplete.startswith("engine="):
+        return [f"engine={name}" for name in plugins.names("engines")]
+    return [f"{field}=" for field in _fields()]
+
+
+def _fields() -> Iterable[str]:
+    text = files("viewsphere").joinpath("model/template.yaml").read_text("utf-8")
+    inside = ""
+    for indent, dash, name, value in re.findall(r"^( *)(- )?(?:# )?([a-z_]+):(?: +([^ #])| *#|$)", text, re.MULTILINE):
+        if not indent:
+            inside = "" if value else name
+        if dash:
+            inside += "[0]"
+        if value:
+            yield f"{inside}.{name}" if indent else name
+
+
+def in_bash(run: Callable[[], object], environ: MutableMapping[str, str]) -> None:
+    """Answer bash, which takes `zoo:car` and `engine=raster` for three words: it gets what stands behind the last of them."""
+    words, at = environ["COMP_WORDS"].split("\n"), int(environ["COMP_CWORD"])
+    whole: list[str] = []
+    place = 0
+    for i, word in enumerate(words):
+        if i and (_parts(word) or _parts(words[i - 1])):
+            whole[-1] += word
+        else:
+            whole.append(word)
+        if i == at:
+            place = len(whole) - 1
+    environ["COMP_WORDS"], environ["COMP_CWORD"] = "\n".join(whole), str(place)
+    given = re.match(r".*[:=]", whole[place]) if at < len(words) else None
+    answer = StringIO()
+    try:
+        with redirect_stdout(answer):
+            run()
+    finally:
+        for line in answer.getvalue().splitlines():
+            typer.echo(line.removeprefix(given[0] if given else ""))
+
+
+def _parts(word: str) -> bool:
+    return set(word) <= set(":=") and bool(word)

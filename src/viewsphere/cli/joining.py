@@ -1,0 +1,85 @@
+"""Commands that make a data set of others."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from viewsphere.cli import completion
+from viewsphere.cli.arguments import AsJson, Formats, split
+from viewsphere.cli.terminal import MOST_FINDINGS, ProgressBar, print_json
+from viewsphere.errors import UserError
+
+NewFolder = Annotated[Path | None, typer.Option("-o", "--output", help="Folder of the new data set.", show_default=False)]
+
+
+def merge(
+    folders: Annotated[list[Path], typer.Argument(help="Data sets to join, two or more.", show_default=False)],
+    output: NewFolder = None,
+    mixed: Annotated[bool, typer.Option(help="Join data sets of different cameras or channels.")] = False,
+    keep_going: Annotated[bool, typer.Option(help="Take what unfinished data sets hold.")] = False,
+    format_: Formats = None,
+    json_: AsJson = False,
+) -> None:
+    """Join data sets into a new one: categories by name, models by content. The pictures are linked, the sources only read."""
+    from viewsphere.run.merging import merge as join
+
+    target = _needed(output)
+    with ProgressBar(quiet=json_) as bar:
+        dataset = join(folders, target, mixed=mixed, keep_going=keep_going, listener=bar.show)
+    notes = _exported(target, format_)
+    counts = {"root": str(target), "frames": len(dataset), "models": len(dataset.plan.models)}
+    if json_:
+        print_json({**counts, "categories": [c.name for c in dataset.categories], "notes": notes})
+        return
+    for note in notes:
+        typer.echo(note)
+    names = ", ".join(c.name for c in dataset.categories)
+    typer.echo(f"{target}: {len(dataset):,} frames, {len(dataset.plan.models):,} models; {names}")
+
+
+def import_(
+    kind: Annotated[
+        str,
+        typer.Argument(
+            metavar="FORMAT", help="What it is: coco or native.", show_default=False, autocompletion=completion.formats
+        ),
+    ],
+    source: Annotated[Path, typer.Argument(help="Folder of the data set, or COCO's JSON file.", show_default=False)],
+    output: NewFolder = None,
+    keep_going: Annotated[bool, typer.Option(help="Leave out what is broken.")] = False,
+    format_: Formats = None,
+    json_: AsJson = False,
+) -> None:
+    """Open a data set that was made elsewhere, to merge it with others, look at it and export it. The pictures are linked."""
+    from viewsphere.run.importing import import_dataset
+
+    target = _needed(output)
+    with ProgressBar(quiet=json_) as bar:
+        foreign = import_dataset(kind, source, target, keep_going=keep_going, listener=bar.show)
+    notes = _exported(target, format_)
+    if json_:
+        print_json({"root": str(target), "frames": foreign.count, "left_out": list(foreign.left_out), "notes": notes})
+        return
+    for problem in foreign.left_out[:MOST_FINDINGS]:
+        typer.echo(f"left out {problem}", err=True)
+    if len(foreign.left_out) > MOST_FINDINGS:
+        typer.echo(f"and {len(foreign.left_out) - MOST_FINDINGS:,} more; --json lists all", err=True)
+    for note in notes:
+        typer.echo(note)
+    typer.echo(f"{target}: {foreign.count:,} frames; {', '.join(c.name for c in foreign.categories)}")
+
+
+def _needed(output: Path | None) -> Path:
+    if output is None:
+        raise UserError("-o: expected a folder for the new data set; found none")
+    return output
+
+
+def _exported(folder: Path, formats: str | None) -> list[str]:
+    from viewsphere.run.generate import export
+
+    names = split(formats)
+    return list(export(folder, names)) if names else []

@@ -1,0 +1,73 @@
+"""What to write when a command is given nothing, with what lies in this folder."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import typer
+from typer.core import TyperCommand
+
+from viewsphere.errors import UserError
+
+RECIPES = ("[!.]*.yaml", "[!.]*.yml", "[!.]*/recipe.yaml", "recipes/*.yaml")
+MODELS = tuple(f"{folder}[!.]*.{suffix}" for folder in ("", "[!.]*/") for suffix in ("glb", "gltf", "obj", "ply", "stl"))
+
+
+class Command(TyperCommand):
+    """A command that says what to write next when it is given nothing and needs something."""
+
+    def parse_args(self, ctx: typer.Context, args: list[str]) -> list[str]:  # pyright: ignore[reportIncompatibleMethodOverride]
+        """The arguments, as typer takes them; raises UserError when there are none and some are needed."""
+        if not args and not ctx.resilient_parsing and any(p.required for p in self.params):
+            raise UserError(for_command(ctx.info_name or ""))
+        return super().parse_args(ctx, args)  # pyright: ignore[reportArgumentType]
+
+
+def for_command(name: str) -> str:
+    """What a command expects, and an example with what is found here."""
+    data = _near("*/store/plan.json", "store/plan.json")
+    folder = data[0].parent.parent if data else Path("cars-ds")
+    found = f"found {folder} here" if data else "no data set yet? `viewsphere render` makes one"
+    match name:
+        case "new":
+            return "new: expected a folder for the recipe; found none\nit need not exist; next: viewsphere new cars"
+        case "inspect":
+            model = next(iter(_near(*MODELS)), "zoo:car")
+            here = "no model at hand? the zoo has some" if model == "zoo:car" else f"found {model} here"
+            return f"inspect: expected a model; found none\n{here}; next: viewsphere inspect {model}"
+        case "plan" | "preview":
+            return f"{name}: expected a recipe; found none\n{_recipe_here()}; next: viewsphere {name} {recipe()}"
+        case "merge":
+            two = " ".join(str(p.parent.parent) for p in data[:2]) if len(data) > 1 else "cars-ds chairs-ds"
+            return f"merge: expected two data sets or more; found none\nnext: viewsphere merge {two} -o both"
+        case "import":
+            return "import: expected a format and a folder; found none\nnext: viewsphere import coco my-photos -o photos-ds"
+        case "export":
+            return f"export: expected a data set and --format; found none\n{found}; next: viewsphere export {folder} -f coco"
+        case _:
+            return f"{name}: expected a data set; found none\n{found}; next: viewsphere {name} {folder}"
+
+
+def for_render(given: Path | None, output: Path | None) -> str:
+    """The same for `render`, which may lack its recipe, its folder or both."""
+    if given is None:
+        first = _recipe_here()
+        found = "found nothing" if output is None else "found no recipe"
+    else:
+        first, found = "the folder need not exist", f"found no folder for {given}"
+    source = given or recipe()
+    folder = output or Path(f"{source.parent.name or source.stem}-ds")
+    return f"render: expected a recipe and -o FOLDER; {found}\n{first}; next: viewsphere render {source} -o {folder}"
+
+
+def recipe() -> Path:
+    """A recipe that lies here, or the one that `viewsphere new cars` would write."""
+    return next(iter(_near(*RECIPES)), Path("cars/recipe.yaml"))
+
+
+def _recipe_here() -> str:
+    return f"found {recipe()} here" if _near(*RECIPES) else "no recipe yet? `viewsphere new cars` writes one"
+
+
+def _near(*patterns: str) -> list[Path]:
+    return [file for pattern in patterns for file in sorted(Path().glob(pattern))]

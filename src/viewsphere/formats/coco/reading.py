@@ -1,0 +1,260 @@
+"""A COCO data set made elsewhere: instances files and their images (https://cocodataset.org/#format-data)."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.errors import StoreError
+from viewsphere.geometry.mask import decode_rle
+from viewsphere.model.sample import Box, Sample
+from viewsphere.store import Category
+from viewsphere.store.foreign import ForeignDataset, ForeignFrame, foreign_object
+
+MOST_SHOWN = 10
+LARGEST_ID = 2**31
+MOST_IMAGES_BESIDE = 10
+"""How many image sizes away a polygon's corner may lie."""
+
+
+def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
+    """All images and annotations of a folder with instances files, or of one such file.
+
+    Every file is a split, named as the file without `instances_`. Images are looked for where COCO and its relatives keep
+    them: in `<split>/`, `images/<split>/`, `images/` and beside. Ids of categories stay what they are. Raises StoreError
+    with every mistake: dangling and repeated ids, missing images, boxes and segmentations that are none; with `keep_going`
+    what is broken is left out and told.
+    """
+    files = _instances_files(path)
+    parts = [_read_split(file, path if path.is_dir() else path.parent) for file in files]
+    problems = [problem for part in parts for problem in part.problems]
+    problems += _clashes(parts)
+    if problems and not keep_going:
+        more = f"\nand {len(problems) - MOST_SHOWN} more" if len(problems) > MOST_SHOWN else ""
+        raise StoreError("\n".join(problems[:MOST_SHOWN]) + more + "\nmend them, or leave them out with --keep-going")
+    count = sum(len(part.images) for part in parts)
+    if not count:
+        raise StoreError(f"{path}: expected images that can be used; found none")
+    categories = {c.id: c for part in parts for c in part.categories.values()}
+    return ForeignDataset(
+        name=path.resolve().stem,
+        digest=_digest(files),
+        categories=tuple(categories[i] for i in sorted(categories)),
+        splits=tuple(part.split for part in parts),
+        channels=("rgb",),
+        count=count,
+        poses=0,
+        max_objects=max(1, *(len(found) for part in parts for found in part.annotations.values()), 1),
+        frames=partial(_frames, parts),
+        left_out=tuple(problems),
+    )
+
+
+def _digest(files: Sequence[Path]) -> str:
+    digest = hashlib.sha256()
+    for file in files:
+        digest.update(f"{file.name}\0{hashlib.sha256(file.read_bytes()).hexdigest()}".encode())
+    return digest.hexdigest()
+
+
+@dataclass(frozen=True)
+class _Split:
+    """One instances file, what can be used of it, and what cannot."""
+
+    split: str
+    file: Path
+    categories: dict[int, Category]
+    images: tuple[tuple[dict[str, Any], Path], ...]
+    annotations: dict[int, list[dict[str, Any]]]
+    problems: tuple[str, ...]
+
+
+def _instances_files(path: Path) -> list[Path]:
+    if path.is_file():
+        return [path]
+    for folder in (path / "annotations", path):
+        found = sorted(folder.glob("instances_*.json")) or sorted(folder.glob("*.json"))
+        if found:
+            return found
+    raise StoreError(f"{path}: expected a COCO data set (annotations/instances_<split>.json); found no such file")
+
+
+def _read_split(file: Path, root: Path) -> _Split:
+    try:
+        data = json.loads(file.read_text("utf-8"))
+    except (OSError, ValueError, RecursionError) as error:
+        raise StoreError(f"{file}: expected COCO's JSON; found: {error}") from None
+    if not isinstance(data, dict) or not all(isinstance(data.get(k), list) for k in ("images", "annotations", "categories")):
+        raise StoreError(f"{file}: expected lists of images, annotations and categories; found something else")
+    lists = cast(dict[str, list[Any]], data)
+    split = file.stem.removeprefix("instances_")
+    problems: list[str] = []
+    categories = {
+        c["id"]: Category(c["id"], str(c["name"]), str(c.get("supercategory") or ""))
+        for c in _with_ids(lists["categories"], "category", file, problems)
+        if isinstance(c.get("name"), str) or problems.append(f"{file}: category {c['id']}: expected a name; found none")
+    }
+    images: list[tuple[dict[str, Any], Path]] = []
+    for image in _with_ids(lists["images"], "image", file, problems):
+        place = _image_file(image, root, split, file.parent)
+        problem = _image_problem(image, place)
+        if problem or place is None:
+            problems.append(f"{file}: image {image['id']}: {problem}")
+        else:
+            images.append((image, place))
+    sizes = {image["id"]: (image["width"], image["height"]) for image, _ in images}
+    known = {image["id"] for image in lists["images"] if isinstance(image, dict) and _is_id(image.get("id"))}
+    annotations: defaultdict[int, list[dict[str, Any]]] = defaultdict(list)
+    for annotation in _with_ids(lists["annotations"], "annotation", file, problems):
+        problem = _annotation_problem(annotation, categories, known, sizes)
+        if problem:
+            problems.append(f"{file}: annotation {annotation['id']}: {problem}")
+        elif annotation["image_id"] in sizes:
+            annotations[annotation["image_id"]].append(annotation)
+    return _Split(split, file, categories, tuple(images), annotations, tuple(problems))
+
+
+def _is_id(value: object) -> bool:
+    return isinstance(value, int) and not isinstance(value, bool) and 0 <= value < LARGEST_ID
+
+
+def _with_ids(values: Sequence[Any], what: str, file: Path, problems: list[str]) -> Iterator[dict[str, Any]]:
+    """Those that are mappings with an id of their own."""
+    seen: set[int] = set()
+    for i, value in enumerate(values):
+        number = value.get("id") if isinstance(value, dict) else None
+        if not _is_id(number):
+            problems.append(f"{file}: {what} number {i}: expected a whole number as id; found {number!r}")
+        elif number in seen:
+            problems.append(f"{file}: {what} {number}: expected every id once; found it again")
+        else:
+            seen.add(cast(int, number))
+            yield cast(dict[str, Any], value)
+
+
+def _image_file(image: dict[str, Any], root: Path, split: str, beside: Path) -> Path | None:
+    name = image.get("file_name")
+    if not isinstance(name, str) or not name:
+        return None
+    for folder in (root / split, root / "images" / split, root / "images", root, beside):
+        place = folder / name
+        if place.is_file() and place.resolve().is_relative_to(root.resolve()):
+            return place
+    return None
+
+
+def _image_problem(image: dict[str, Any], place: Path | None) -> str | None:
+    from PIL import Image
+
+    if place is None:
+        return f"expected its file below the folder; found no {image.get('file_name')!r}"
+    try:
+        with Image.open(place) as picture:
+            size = picture.size
+    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
+        return f"expected a readable image; found: {error}"
+    said = image.get("width"), image.get("height")
+    return None if size == said else f"expected {place.name} of {said[0]} x {said[1]} pixels; found {size[0]} x {size[1]}"
+
+
+def _annotation_problem(
+    annotation: dict[str, Any], categories: dict[int, Category], images: set[int], sizes: dict[int, tuple[int, int]]
+) -> str | None:
+    if annotation.get("image_id") not in images:
+        return f"expected the id of an image; found {annotation.get('image_id')!r}"
+    if annotation.get("category_id") not in categories:
+        return f"expected the id of a category; found {annotation.get('category_id')!r}"
+    box, outline = annotation.get("bbox"), annotation.get("segmentation")
+    if box is not None and not _are_numbers(box, 4):
+        return f"expected bbox [x, y, width, height]; found {box!r:.60}"
+    if not box and not outline:
+        return "expected a bbox or a segmentation; found neither"
+    size = sizes.get(annotation["image_id"])
+    if outline and size:
+        try:
+            _mask(outline, size)
+        except Exception as error:  # the reader of run lengths and polygons is C code with errors of its own
+            return f"expected a segmentation of COCO; found {outline!r:.60} ({error})"
+    return None
+
+
+def _are_numbers(value: Any, count: int | None) -> bool:
+    values = cast(list[Any], value) if isinstance(value, list) else []
+    return len(values) == (count or len(values)) and all(isinstance(v, (int, float)) and math.isfinite(v) for v in values)
+
+
+def _mask(outline: Any, size: tuple[int, int]) -> NDArray[np.bool_] | None:
+    """Mask (H, W) of polygons or run lengths, as pycocotools makes it; None where there is none.
+
+    Raises ValueError for what pycocotools, which trusts its input, would run wild on.
+    """
+    from pycocotools import mask as coco
+
+    width, height = size
+    if not outline:
+        return None
+    if isinstance(outline, list):
+        polygons = cast(list[Any], outline)
+        reach = MOST_IMAGES_BESIDE * max(size)
+        if not all(_are_numbers(p, None) and len(p) >= 6 and max(map(abs, p)) <= reach for p in polygons):
+            raise ValueError("expected polygons of three corners or more, near the image")
+        return coco.decode(coco.merge(coco.frPyObjects([p[: len(p) // 2 * 2] for p in polygons], height, width))).astype(
+            np.bool_
+        )
+    if outline["size"] != [height, width]:
+        raise ValueError(f"expected run lengths of size {[height, width]}")
+    counts = outline["counts"]
+    if isinstance(counts, str):
+        return decode_rle(height, width, counts)
+    if not all(_is_id(c) for c in counts) or sum(counts) != width * height:
+        raise ValueError("expected run lengths that fill the image")
+    values = np.arange(len(counts)) % 2 == 1
+    return np.repeat(values, counts).reshape(width, height).T.copy()
+
+
+def _clashes(parts: Sequence[_Split]) -> Iterator[str]:
+    """Categories of one id that differ from file to file."""
+    first: dict[int, tuple[Category, Path]] = {}
+    for part in parts:
+        for category in part.categories.values():
+            other, file = first.setdefault(category.id, (category, part.file))
+            if other != category:
+                yield f"{part.file}: category {category.id}: expected {other.name!r}, as in {file}; found {category.name!r}"
+
+
+def _frames(parts: Sequence[_Split]) -> Iterator[ForeignFrame]:
+    index = 0
+    for part in parts:
+        for image, file in part.images:
+            yield ForeignFrame(_sample(part, image, index), {"rgb": file})
+            index += 1
+
+
+def _sample(part: _Split, image: dict[str, Any], index: int) -> Sample:
+    size = image["width"], image["height"]
+    objects = tuple(
+        foreign_object(
+            number,
+            part.categories[source["category_id"]],
+            size,
+            source,
+            _mask(source.get("segmentation"), size),
+            _corners(source.get("bbox")),
+        )
+        for number, source in enumerate(part.annotations.get(image["id"], ()), 1)
+    )
+    return Sample(index, part.split, None, None, objects, {}, {}, size)
+
+
+def _corners(box: list[float] | None) -> Box | None:
+    return None if box is None else (box[0], box[1], box[0] + box[2], box[1] + box[3])

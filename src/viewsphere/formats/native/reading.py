@@ -1,0 +1,253 @@
+"""A data set in the layout of Ruiz et al. 2019, of their tool or of this one."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.errors import StoreError
+from viewsphere.geometry.box import box_size
+from viewsphere.geometry.image_files import decode_tiff
+from viewsphere.geometry.mask import mask_box, mask_polygons
+from viewsphere.model.camera import Camera, Intrinsics
+from viewsphere.model.sample import ObjectAnnotation, Sample
+from viewsphere.model.shot import Pose
+from viewsphere.store import Category, ModelInfo
+from viewsphere.store.foreign import ForeignDataset, ForeignFrame, ForeignModel, foreign_object
+
+MOST_SHOWN = 10
+RIGHT_ANGLES = 1e-3
+
+
+def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
+    """All frames of a folder with `dataset1.json`, with cameras and poses; of the objects what the JSON says, their masks and
+    their 3D boxes in pixels.
+
+    A frame without a split is in `train`, an object's category is its vehicle's. Raises StoreError with every entry that
+    lacks a vehicle, a picture or a mask, or has no camera; with `keep_going` these are left out and told.
+    """
+    file = path / "dataset1.json" if path.is_dir() else path
+    vehicles, poses, digest = _load(file)
+    categories = _categories(vehicles)
+    problems: list[str] = []
+    frames = tuple(_frames(file.parent, vehicles, poses, problems))
+    if problems and not keep_going:
+        more = f"\nand {len(problems) - MOST_SHOWN} more" if len(problems) > MOST_SHOWN else ""
+        raise StoreError("\n".join(problems[:MOST_SHOWN]) + more + "\nmend them, or leave them out with --keep-going")
+    if not frames:
+        raise StoreError(f"{file}: expected frames that can be used; found none")
+    return ForeignDataset(
+        name=file.parent.resolve().name,
+        digest=digest,
+        categories=tuple(categories.values()),
+        splits=tuple(dict.fromkeys(frame.split for frame in frames)),
+        channels=("rgb", "depth") if all(frame.depth for frame in frames) else ("rgb",),
+        count=len(frames),
+        poses=1 + max(frame.pose.index for frame in frames),
+        max_objects=max(len(frame.objects) for frame in frames),
+        frames=partial(_samples, frames, categories),
+        models=tuple(_models(file.parent, vehicles, categories)),
+        left_out=tuple(problems),
+    )
+
+
+@dataclass(frozen=True)
+class _Frame:
+    """What one picture of the data set shows; every object is (model key, category, mask file, entry)."""
+
+    split: str
+    pose: Pose
+    camera: Camera
+    rgb: Path
+    depth: Path | None
+    objects: tuple[tuple[str, str, Path, dict[str, Any]], ...]
+
+
+def _load(file: Path) -> tuple[dict[str, Any], dict[str, Any], str]:
+    try:
+        text = file.read_bytes()
+        data = json.loads(text)
+    except (OSError, ValueError, RecursionError) as error:
+        raise StoreError(f"{file}: expected the native format's JSON; found: {error}") from None
+    if not isinstance(data, dict) or not all(isinstance(data.get(k), dict) for k in ("vehicles", "poses")):
+        raise StoreError(f"{file}: expected mappings of vehicles and poses; found something else")
+    lists = cast(dict[str, dict[str, Any]], data)
+    return lists["vehicles"], lists["poses"], hashlib.sha256(text).hexdigest()
+
+
+def _categories(vehicles: Mapping[str, Any]) -> dict[str, Category]:
+    categories: dict[str, Category] = {}
+    for vehicle in vehicles.values():
+        name = str(vehicle.get("category") or "object")
+        categories.setdefault(name, Category(len(categories) + 1, name, str(vehicle.get("supercategory") or "")))
+    return categories
+
+
+def _models(root: Path, vehicles: dict[str, Any], categories: Mapping[str, Category]) -> Iterator[ForeignModel]:
+    """The models whose files are there."""
+    for key, vehicle in vehicles.items():
+        file = root / str(vehicle.get("model_file"))
+        if not file.is_file() or not file.resolve().is_relative_to(root.resolve()):
+            continue
+        category = categories[str(vehicle.get("category") or "object")]
+        box = _vertices(vehicle.get("bbox3D_model"), 3)
+        glb = file.with_suffix(".glb")
+        real = vehicle.get("real_size") or {}
+        width, height, length = (real.get(side) for side in ("width", "height", "length"))
+        info = ModelInfo(
+            key=key,
+            category=category.name,
+            supercategory=category.supercategory,
+            category_id=category.id,
+            obj=file.name,
+            glb=glb.name if glb.is_file() else file.name,
+            box3d_object=box,
+            size=box_size(box),
+            real_size=(width, height, length) if width and height and length else None,
+            parts=(),
+            triangles=0,
+            digest=hashlib.sha256(file.read_bytes()).hexdigest(),
+        )
+        yield ForeignModel(info, file.parent)
+
+
+def _frames(root: Path, vehicles: dict[str, Any], poses: dict[str, Any], problems: list[str]) -> Iterator[_Frame]:
+    """Objects that share a picture make a frame; the rest of a broken one is left out with it."""
+    for number, pose in poses.items():
+        pictures: dict[str, list[tuple[str, dict[str, Any]]]] = {}
+        for name, entry in pose.get("vehicles_rendered", {}).items():
+            pictures.setdefault(str(entry.get("path_rgb")), []).append((name, entry))
+        for entries in pictures.values():
+            try:
+                yield _frame(root / pose.get("folder", f"Pose-{number}"), number, pose, entries, vehicles)
+            except (LookupError, TypeError, ValueError, OSError) as error:
+                problem = f"found no {error}" if isinstance(error, KeyError) else error
+                problems.append(f"{root}: pose {number}, {entries[0][0]}: expected a frame that can be read; {problem}")
+
+
+def _frame(
+    folder: Path, number: str, pose: dict[str, Any], entries: list[tuple[str, dict[str, Any]]], vehicles: dict[str, Any]
+) -> _Frame:
+    first = entries[0][1]
+    objects: list[tuple[str, str, Path, dict[str, Any]]] = []
+    for name, entry in entries:
+        key = str(entry.get("id_model", name))
+        category = str(vehicles[key].get("category") or "object")
+        objects.append((key, category, _there(folder / "MASK" / entry["path_mask"]), entry))
+    depth = folder / "DEPTH" / str(first.get("path_depth"))
+    camera = _camera(first.get("transformation_matrix") or pose["transformation_matrix"], first["render_resolution"])
+    return _Frame(
+        split=str(first.get("split") or "train"),
+        pose=Pose(
+            index=int(number),
+            azimuth_deg=pose["azimuth"],
+            elevation_deg=pose["elevation"],
+            distance=abs(pose["distance"]),
+            tilt_deg=pose.get("tilt", 0.0),
+            category=pose.get("pose_category", ""),
+        ),
+        camera=camera,
+        rgb=_there(folder / "RGB" / first["path_rgb"]),
+        depth=depth if _is_depth(depth, camera) else None,
+        objects=tuple(objects),
+    )
+
+
+def _there(file: Path) -> Path:
+    if not file.is_file():
+        raise FileNotFoundError(f"found no {file}")
+    return file
+
+
+def _is_depth(file: Path, camera: Camera) -> bool:
+    """Whether this is depth as this package keeps it: float32, metres along z."""
+    try:
+        array = decode_tiff(file.read_bytes())
+    except (OSError, ValueError):
+        return False
+    return array.dtype == np.float32 and array.shape == (camera.height, camera.width)
+
+
+def _camera(matrix: Mapping[str, Any], resolution: list[int]) -> Camera:
+    k, motion = np.array(matrix["K"], np.float64), np.array(matrix["RT"], np.float64)
+    if k.shape != (3, 3) or motion.shape != (3, 4) or not (np.isfinite(k).all() and np.isfinite(motion).all()):
+        raise ValueError("found no K (3, 3) and RT (3, 4) of numbers")
+    rotation = motion[:, :3]
+    if np.abs(rotation @ rotation.T - np.eye(3)).max() > RIGHT_ANGLES or np.linalg.det(rotation) < 0:
+        raise ValueError("found an RT without a rotation")
+    width, height = resolution
+    lens = Intrinsics(width=width, height=height, fx=k[0, 0], fy=k[1, 1], cx=k[0, 2], cy=k[1, 2], skew=k[0, 1])
+    return Camera(lens, rotation, motion[:, 3])
+
+
+def _samples(frames: tuple[_Frame, ...], categories: Mapping[str, Category]) -> Iterator[ForeignFrame]:
+    for index, frame in enumerate(frames):
+        size = frame.camera.width, frame.camera.height
+        objects = tuple(
+            _object(number, categories[category], key, _mask(mask, size), entry)
+            for number, (key, category, mask, entry) in enumerate(frame.objects, 1)
+        )
+        files = {"rgb": frame.rgb, **({"depth": frame.depth} if frame.depth else {})}
+        yield ForeignFrame(Sample(index, frame.split, frame.camera, frame.pose, objects, {}, {}), files)
+
+
+def _object(number: int, category: Category, key: str, mask: NDArray[np.bool_], entry: dict[str, Any]) -> ObjectAnnotation:
+    """An object, and what COCO would say of it."""
+    pixels = _vertices(entry.get("bbox_3D_pxs"), 2)
+    visibility, truncation = entry.get("visibility"), entry.get("truncation")
+    tight = mask_box(mask) or (0, 0, 0, 0)
+    source = {
+        "iscrowd": 0,
+        "area": int(mask.sum()),
+        "bbox": [tight[0], tight[1], tight[2] - tight[0], tight[3] - tight[1]],
+        "segmentation": mask_polygons(mask),
+        "bbox_3D_pxs": entry.get("bbox_3D_pxs"),
+        "visibility": visibility,
+        "truncation": truncation,
+        "id_model": key,
+    }
+    return foreign_object(
+        number,
+        category,
+        (mask.shape[1], mask.shape[0]),
+        source,
+        mask,
+        None,
+        key=key,
+        box3d_pixels=pixels,
+        box3d_in_front=~np.isnan(pixels[:, 0]),
+        visibility=math.nan if visibility is None else float(visibility),
+        truncation=math.nan if truncation is None else float(truncation),
+    )
+
+
+def _mask(file: Path, size: tuple[int, int]) -> NDArray[np.bool_]:
+    from PIL import Image
+
+    try:
+        with Image.open(file) as image:
+            mask = np.asarray(image.convert("L")) > 127
+    except (OSError, ValueError, SyntaxError) as error:
+        raise StoreError(f"{file}: expected a mask; found: {error}") from None
+    if mask.shape != (size[1], size[0]):
+        raise StoreError(f"{file}: expected {size[0]} x {size[1]} pixels; found {mask.shape[1]} x {mask.shape[0]}")
+    return mask
+
+
+def _vertices(named: Mapping[str, Mapping[str, list[float] | None]] | None, size: int) -> NDArray[np.float64]:
+    """A box's vertices (8, size) from {face: {vertex: [coordinates]}}, NaN where a vertex has none."""
+    points = np.full((8, size), np.nan)
+    for face in (named or {}).values():
+        for vertex, point in face.items():
+            if point is not None:
+                points[int(vertex)] = point
+    return points

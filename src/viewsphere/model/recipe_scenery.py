@@ -1,0 +1,150 @@
+"""What stands around the targets of a recipe: a place, company, flat planes with pictures."""
+
+from __future__ import annotations
+
+import re
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
+
+from viewsphere.model.frozen import Frozen
+from viewsphere.model.mistakes import shown
+from viewsphere.model.recipe_models import ZOO, Unit
+from viewsphere.model.recipe_values import Count, Interval, Number, OrShort, Point, Positive, shape_of
+from viewsphere.model.shot import Axis
+
+Draw = Literal["fixed", "per_model", "per_frame"]
+Labels = Literal["background", "own"]
+Spot = tuple[Number, Number, Number]
+
+DRAWS = "one for the whole data set (fixed), one a model (per_model) or one a frame (per_frame)"
+LABELS = "background, or own: every piece is an object with a category, boxes and a mask"
+OF_FILES = ("origin", "up", "forward", "unit", "category")
+
+
+class PlaceEntry(Frozen):
+    """Where the targets stand."""
+
+    source: str = Field(min_length=1, description="zoo:<place>, such as zoo:neighbourhood, or a model file")
+    draw: Draw = Field(default="fixed", description=f"of a zoo's place: {DRAWS}")
+    labels: Labels = Field(default="background", description=LABELS)
+    turn: Number = Field(default=0.0, description="degrees the place is turned about the vertical through the targets")
+    origin: Point = Field(default=(0.0, 0.0, 0.0), description="of a file: the point where the targets stand, metres")
+    up: Axis | None = Field(default=None, description="of a file: its axis that points up; by default what its format says")
+    forward: Axis | None = Field(default=None, description="of a file: its axis that becomes -Y")
+    unit: Unit | None = Field(default=None, description="of a file: m, cm, mm, in, ft or the metres in one unit")
+    category: str = Field(default="", max_length=200, description="of a file with labels: own")
+
+    @property
+    def name(self) -> str:
+        """Name of the zoo's place; empty for a file."""
+        return self.source.removeprefix(ZOO) if self.source.startswith(ZOO) else ""
+
+    @model_validator(mode="after")
+    def _check(self) -> PlaceEntry:
+        if self.source.startswith(ZOO):
+            if not re.fullmatch(r"[a-z][a-z0-9_]*", self.name):
+                raise ValueError(f"expected zoo:<place>, such as zoo:neighbourhood; found {self.source!r}")
+            given = [name for name in OF_FILES if getattr(self, name) != type(self).model_fields[name].default]
+            if given:
+                raise ValueError(f"expected a file beside {given[0]}; found {self.source!r}")
+            if (self.labels, self.draw) == ("own", "per_frame"):
+                raise ValueError(
+                    "expected draw: fixed or per_model beside labels: own, for which every piece is kept as a model; "
+                    "found per_frame"
+                )
+        elif self.draw != "fixed":
+            raise ValueError(f"expected draw: fixed for a file, which is always the same; found {self.draw}")
+        elif (self.labels == "own") != bool(self.category):
+            raise ValueError("expected category and labels: own together, for a file; found one of them")
+        return self
+
+
+class CompanyEntry(Frozen):
+    """Other models of the recipe, of the same split, beside the one each frame is about."""
+
+    count: Count | None = Field(default=None, description="how many; not needed where layout is a list")
+    layout: Annotated[
+        Annotated[Literal["random", "row"], Tag("text")] | Annotated[tuple[Spot, ...], Field(min_length=1), Tag("list")],
+        Discriminator(
+            shape_of, custom_error_type="layout", custom_error_message="expected random, row or a list of [x, y, azimuth]"
+        ),
+    ] = Field(
+        default="random",
+        description="random: close by, turned at random; row: side by side; or where each stands: [x, y, azimuth in degrees]",
+    )
+    gap: Annotated[Number, Field(ge=0)] = Field(default=0.3, description="metres that are free between two of them, at least")
+    draw: Draw = Field(default="per_model", description=f"who and where: {DRAWS}")
+
+    @model_validator(mode="after")
+    def _check(self) -> CompanyEntry:
+        listed = None if isinstance(self.layout, str) else len(self.layout)
+        if self.count is None and listed is None:
+            raise ValueError("expected count, or a layout that lists where each stands; found neither")
+        if self.count is not None and listed is not None and self.count != listed:
+            raise ValueError(f"expected count {listed}, as many as the layout lists; found {self.count}")
+        return self
+
+    @property
+    def number(self) -> int:
+        """How many there are."""
+        return self.count or len(self.layout)
+
+
+class Around(Frozen):
+    """Where a plane may stand: at random around the origin, its picture turned to it."""
+
+    distance: Interval = Field(description="metres from the origin")
+    azimuth: Interval = Field(
+        default=(0.0, 360.0), description="degrees: the direction it stands in, as for cameras; 180 is behind the model"
+    )
+
+    @model_validator(mode="after")
+    def _check(self) -> Around:
+        if self.distance[0] <= 0:
+            raise ValueError(f"expected distances above 0; found {shown(self.distance)}")
+        return self
+
+
+class PlaneEntry(Frozen):
+    """Upright planes with pictures."""
+
+    image: str | None = Field(default=None, min_length=1, description="path of a picture")
+    images: str | None = Field(default=None, min_length=1, description="folder of pictures to draw from")
+    height: Positive = Field(description="metres; the width follows from the picture")
+    at: Spot | None = Field(default=None, description="[x, y, azimuth in degrees that the picture faces]")
+    around: Around | None = Field(default=None, description="or anywhere around the origin: {distance, azimuth}")
+    count: Count = Field(default=1, description="how many planes")
+    share: Annotated[Number, Field(ge=0, le=1)] = Field(default=1.0, description="chance of each to be there")
+    draw: Draw = Field(default="fixed", description=f"which picture, whether and where: {DRAWS}")
+    labels: Labels = Field(default="background", description=LABELS)
+    category: str = Field(default="", max_length=200, description="with labels: own")
+
+    @model_validator(mode="after")
+    def _check(self) -> PlaneEntry:
+        if (self.image is None) == (self.images is None):
+            raise ValueError(f"expected one of image, images; found {'none' if self.image is None else 'both'}")
+        if (self.at is None) == (self.around is None):
+            raise ValueError(f"expected one of at, around; found {'none' if self.at is None else 'both'}")
+        if self.at is not None and self.count > 1:
+            raise ValueError(f"expected around beside count {self.count}: planes cannot all stand at one spot")
+        if (self.labels == "own") != bool(self.category):
+            raise ValueError("expected category and labels: own together; found one of them")
+        return self
+
+
+def _place(value: Any) -> Any:
+    return {"source": value} if isinstance(value, str) else value
+
+
+def _company(value: Any) -> Any:
+    return {"count": value} if isinstance(value, (int, float)) and not isinstance(value, bool) else value
+
+
+def _planes(value: Any) -> Any:
+    return [value] if isinstance(value, (dict, PlaneEntry)) else value
+
+
+PlaceField = Annotated[PlaceEntry | None, BeforeValidator(_place), OrShort({"type": "string"})]
+CompanyField = Annotated[CompanyEntry | None, BeforeValidator(_company), OrShort({"type": "integer", "minimum": 1})]
+PlanesField = Annotated[tuple[PlaneEntry, ...], BeforeValidator(_planes)]

@@ -1,0 +1,90 @@
+"""Data sets made elsewhere become data sets of ours."""
+
+from __future__ import annotations
+
+from base64 import b64encode
+from collections.abc import Iterator
+from importlib.metadata import version
+from itertools import islice
+from pathlib import Path
+
+from viewsphere import plugins
+from viewsphere.errors import UserError
+from viewsphere.run.generate import Listener, Progress
+from viewsphere.store import Part, PlanRecord, Store
+from viewsphere.store.foreign import ForeignDataset
+from viewsphere.store.linking import link_model, link_shot
+
+SHOT_FRAMES = 1000
+"""Frames that are kept in one folder and written at once."""
+
+
+NAME_BYTES = 8
+"""A pose's name in `PlanRecord.pose_names`; zeros are that of no pose a recipe can mean."""
+
+
+def readable_formats() -> tuple[str, ...]:
+    """Names of the formats that can be read, sorted."""
+    return tuple(name for name in plugins.names("formats") if hasattr(plugins.load("formats", name), "read"))
+
+
+def import_dataset(
+    kind: str, source: Path | str, out: Path | str, *, keep_going: bool = False, listener: Listener | None = None
+) -> ForeignDataset:
+    """Open a data set of another tool as one of ours, in `out`; its pictures are linked, not copied, where that is possible.
+
+    Gives what was read; `left_out` tells what `keep_going` left out. Raises UserError for a format that cannot be read,
+    StoreError for a data set that is broken (before anything is written) and for an `out` that holds other data.
+    """
+    known = readable_formats()
+    if kind not in known:
+        raise UserError(f"import: expected one of {', '.join(known)}; found {kind!r}")
+    foreign: ForeignDataset = plugins.load("formats", kind).read(Path(source), keep_going=keep_going)
+    store = Store(Path(out))
+    record = _plan_record(foreign)
+    store.open_for(record)
+    with store.occupied():
+        for model in foreign.models:
+            link_model(store, model.info, sorted(f for f in model.folder.iterdir() if f.is_file()))
+        _link_frames(foreign, store, record, listener)
+    return foreign
+
+
+def _link_frames(foreign: ForeignDataset, store: Store, record: PlanRecord, listener: Listener | None) -> None:
+    frames = foreign.frames()
+    for key, first, count in record.shots:
+        chunk = islice(frames, count)
+        if store.has_shot(key):
+            for _ in chunk:
+                pass
+        else:
+            link_shot(store, key, chunk)
+        if listener:
+            listener(Progress("frames", first + count, record.frames))
+
+
+def _plan_record(foreign: ForeignDataset) -> PlanRecord:
+    made = version("viewsphere")
+    recipe = {"name": foreign.name}
+    part = Part(foreign.digest, made, foreign.name, recipe, foreign.channels, 0, foreign.count, foreign.max_objects)
+    return PlanRecord(
+        version=made,
+        digest=foreign.digest,
+        name=foreign.name,
+        recipe=recipe,
+        categories=foreign.categories,
+        splits=foreign.splits,
+        channels=foreign.channels,
+        models=tuple(model.info.key for model in foreign.models),
+        poses=foreign.poses,
+        frames=foreign.count,
+        max_objects=foreign.max_objects,
+        shots=tuple(_shots(foreign.count)),
+        parts=(part,),
+        pose_names=b64encode(bytes(NAME_BYTES * foreign.poses)).decode(),
+    )
+
+
+def _shots(count: int) -> Iterator[tuple[str, int, int]]:
+    for first in range(0, count, SHOT_FRAMES):
+        yield f"import-{first:06d}", first, min(SHOT_FRAMES, count - first)

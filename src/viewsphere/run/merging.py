@@ -1,0 +1,270 @@
+"""Several data sets become one: categories by name, models by content, everything renumbered."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from base64 import b64decode, b64encode
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from importlib.metadata import version
+from pathlib import Path
+
+import numpy as np
+
+from viewsphere.errors import StoreError, UserError
+from viewsphere.model.camera import Intrinsics
+from viewsphere.model.channel import CHANNELS
+from viewsphere.model.sample import ObjectAnnotation, Sample
+from viewsphere.run.generate import Listener, Progress
+from viewsphere.store import Category, Dataset, ModelInfo, Part, PlanRecord, Row, Store, encode
+from viewsphere.store.foreign import ForeignFrame
+from viewsphere.store.linking import link_model, link_shot
+
+
+@dataclass(frozen=True, eq=False)
+class _Source:
+    """A data set, and what its numbers and names become in the merged one."""
+
+    dataset: Dataset
+    number: int
+    first_frame: int
+    first_pose: int
+    category_ids: Mapping[int, int]
+    model_keys: Mapping[str, str]
+
+    @property
+    def keeps_categories(self) -> bool:
+        """Whether every category id stays what it is."""
+        return all(old == new for old, new in self.category_ids.items())
+
+    @cached_property
+    def shots(self) -> tuple[tuple[str, int, int], ...]:
+        """Key, first frame and number of frames, in the merged data set, of its finished shots."""
+        rows: list[tuple[str, int, int]] = []
+        first = self.first_frame
+        for key, _, count in self.dataset.plan.shots:
+            if self.dataset.store.has_shot(key):
+                rows.append((f"{self.number}~{key}", first, count))
+                first += count
+        return tuple(rows)
+
+
+def merge(
+    sources: Sequence[Path | str],
+    out: Path | str,
+    *,
+    mixed: bool = False,
+    keep_going: bool = False,
+    listener: Listener | None = None,
+) -> Dataset:
+    """Join data sets into a new one in `out`, in their order; their pictures are linked, not copied, where that is possible.
+
+    Categories of one name become one, and keep the first's id. Models of one key stay one where their content is the same;
+    else the later one gets another key. Splits are united by name. The sources are only read. Raises UserError for data sets
+    of different cameras or channels, unless they are to be `mixed`; StoreError for unfinished ones, unless `keep_going` takes
+    what is there, and for an `out` that holds other data.
+    """
+    datasets = [Dataset(source) for source in sources]
+    _check_sources(datasets, Path(out))
+    if not keep_going:
+        _check_whole(datasets)
+    if not mixed:
+        _check_alike(datasets)
+    categories, models, parts = _reconciled(datasets)
+    record = _plan_record(parts, categories, models)
+    store = Store(Path(out))
+    store.open_for(record)
+    with store.occupied():
+        for part in parts:
+            _link_models(part, store)
+        for part in parts:
+            _link_frames(part, store, record, listener)
+    return Dataset(out)
+
+
+def _check_sources(datasets: Sequence[Dataset], out: Path) -> None:
+    roots = [dataset.root.resolve() for dataset in datasets]
+    if len(roots) < 2:
+        raise UserError(f"merge: expected two data sets or more; found {len(roots)}")
+    for i, root in enumerate(roots):
+        if root in roots[:i]:
+            raise UserError(f"merge: expected every data set once; found {datasets[i].root} again")
+        if root == out.resolve():
+            raise UserError(f"merge: expected a new folder for the merged data set; found one of its sources, {out}")
+    for dataset in datasets:
+        if not len(dataset):
+            raise StoreError(f"{dataset.root}: expected finished frames, found none: render first")
+
+
+def _check_whole(datasets: Sequence[Dataset]) -> None:
+    for dataset in datasets:
+        if len(dataset) != dataset.plan.frames:
+            raise StoreError(
+                f"{dataset.root}: expected {dataset.plan.frames:,} frames, found {len(dataset):,}: render it to the end, or "
+                "merge what is there with --keep-going"
+            )
+
+
+def _check_alike(datasets: Sequence[Dataset]) -> None:
+    first = datasets[0]
+    for other in datasets[1:]:
+        if set(other.plan.channels) != set(first.plan.channels):
+            raise UserError(
+                f"{other.root}: expected the channels of {first.root}, {', '.join(first.plan.channels)}; found "
+                f"{', '.join(other.plan.channels)}: join them all the same with --mixed"
+            )
+        if _lenses(other) != _lenses(first):
+            raise UserError(
+                f"{other.root}: expected the camera of {first.root}, {_shown(first)}; found {_shown(other)}: "
+                "join them all the same with --mixed"
+            )
+
+
+def _lenses(dataset: Dataset) -> set[Intrinsics | None]:
+    """The lenses of a data set's parts, None for pictures of unknown ones; frames of a part have one."""
+    firsts = {part.first for part in dataset.plan.parts if part.frames and part.first < len(dataset)} or {0}
+    cameras = (dataset[first].known_camera for first in firsts)
+    return set(None if camera is None else camera.intrinsics for camera in cameras)
+
+
+def _shown(dataset: Dataset) -> str:
+    lenses = [lens for lens in _lenses(dataset) if lens]
+    if len(lenses) != 1:
+        return "an unknown one" if not lenses else "several"
+    i = lenses[0]
+    bent = f", {i.distortion.model}" if i.distortion else ""
+    return f"{i.width}x{i.height} fx {i.fx:.6g} fy {i.fy:.6g} cx {i.cx:.6g} cy {i.cy:.6g}{bent}"
+
+
+def _reconciled(datasets: Sequence[Dataset]) -> tuple[tuple[Category, ...], tuple[str, ...], tuple[_Source, ...]]:
+    """All categories, all models' keys, and what the numbers and names of every source become."""
+    categories: dict[str, Category] = {}
+    digests: dict[str, str] = {}
+    sources: list[_Source] = []
+    frames = poses = 0
+    for number, dataset in enumerate(datasets):
+        category_ids = {c.id: _joined(categories, c).id for c in dataset.categories}
+        model_keys = {info.key: _key_for(digests, info) for info in dataset.models}
+        sources.append(_Source(dataset, number, frames, poses, category_ids, model_keys))
+        frames += len(dataset)
+        poses += dataset.plan.poses
+    return tuple(sorted(categories.values(), key=lambda c: c.id)), tuple(digests), tuple(sources)
+
+
+def _joined(categories: dict[str, Category], category: Category) -> Category:
+    """The category of this name, put there with its own id, or a free one, if there is none."""
+    name = category.name.casefold()
+    if name not in categories:
+        taken = {c.id for c in categories.values()}
+        free = category.id if category.id not in taken else max(taken) + 1
+        categories[name] = replace(category, id=free)
+    return categories[name]
+
+
+def _key_for(digests: dict[str, str], info: ModelInfo) -> str:
+    """The model's key, or one with a number where another model has it; `digests` gets it."""
+    number, key = 1, info.key
+    while digests.get(key, info.digest) != info.digest:
+        number += 1
+        key = f"{info.key}-{number}"
+    digests[key] = info.digest
+    return key
+
+
+def _plan_record(sources: Sequence[_Source], categories: tuple[Category, ...], models: tuple[str, ...]) -> PlanRecord:
+    plans = [source.dataset.plan for source in sources]
+    made = version("viewsphere")
+    name = " + ".join(dict.fromkeys(plan.name for plan in plans))
+    parts = tuple(part for source in sources for part in _parts(source))
+    last = sources[-1].dataset
+    whole = [[plan.digest, len(source.dataset)] for plan, source in zip(plans, sources, strict=True)]
+    return PlanRecord(
+        version=made,
+        digest=hashlib.sha256(json.dumps(whole).encode()).hexdigest(),
+        name=name,
+        recipe=last.plan.recipe,
+        categories=categories,
+        splits=tuple(dict.fromkeys(split for plan in plans for split in plan.splits)),
+        channels=tuple(name for name in CHANNELS if any(name in plan.channels for plan in plans)),
+        models=models,
+        poses=sum(plan.poses for plan in plans),
+        frames=sum(len(source.dataset) for source in sources),
+        max_objects=max(plan.max_objects for plan in plans),
+        shots=tuple(row for source in sources for row in source.shots),
+        parts=parts,
+        pose_names=b64encode(b"".join(b64decode(plan.pose_names) for plan in plans)).decode(),
+    )
+
+
+def _parts(source: _Source) -> Iterator[Part]:
+    """The source's parts, renumbered; channels that one supplied to others now lie with the rest."""
+    plan = source.dataset.plan
+    whole = len(source.dataset) == plan.frames
+    if not whole:
+        one = plan.parts[-1]
+        yield replace(
+            one, first=source.first_frame, frames=len(source.dataset), max_objects=plan.max_objects, rows=(), supplies=()
+        )
+        return
+    for number, part in enumerate(plan.parts):
+        if part.frames:
+            yield replace(
+                part,
+                first=source.first_frame + part.first,
+                channels=plan.channels_of(number),
+                rows=tuple(_moved(source, row) for row in part.rows),
+                supplies=(),
+            )
+
+
+def _moved(source: _Source, row: Row) -> Row:
+    poses = ((a + source.first_pose, b + source.first_pose) for a, b in row.poses)
+    return Row(tuple(source.model_keys.get(key, key) for key in row.models), tuple(poses))
+
+
+def _link_models(source: _Source, store: Store) -> None:
+    for info in source.dataset.models:
+        moved = replace(info, key=source.model_keys[info.key], category_id=source.category_ids[info.category_id])
+        link_model(store, moved, sorted(source.dataset.path(info.obj).parent.iterdir()))
+
+
+def _link_frames(source: _Source, store: Store, record: PlanRecord, listener: Listener | None) -> None:
+    for key, first, count in source.shots:
+        start = first - source.first_frame
+        if not store.has_shot(key):
+            link_shot(store, key, (_renumbered(source, source.dataset[start + i], first + i) for i in range(count)))
+        if listener:
+            listener(Progress("frames", first + count, record.frames))
+
+
+def _renumbered(source: _Source, sample: Sample, index: int) -> ForeignFrame:
+    pose = sample.known_pose
+    moved = replace(
+        sample,
+        index=index,
+        known_pose=pose and pose.model_copy(update={"index": pose.index + source.first_pose}),
+        objects=tuple(_moved_object(source, o) for o in sample.objects),
+    )
+    files: dict[str, Path | bytes] = {name: source.dataset.path(file) for name, file in sample.files.items()}
+    if "categories" in files and not source.keeps_categories:
+        files["categories"] = _with_category_ids(source, sample)
+    return ForeignFrame(moved, files)
+
+
+def _moved_object(source: _Source, o: ObjectAnnotation) -> ObjectAnnotation:
+    key = source.model_keys.get(o.key, o.key)
+    folder, _, name = o.model.rpartition("/")
+    model = f"{folder.rpartition('/')[0]}/{key}/{name}" if o.model else ""
+    return replace(o, key=key, model=model, category_id=source.category_ids[o.category_id])
+
+
+def _with_category_ids(source: _Source, sample: Sample) -> bytes:
+    """The `categories` channel with the ids of the merged data set, encoded."""
+    array = sample.channels["categories"]
+    table = np.arange(int(array.max(initial=0)) + 1, dtype=array.dtype)
+    for old, new in source.category_ids.items():
+        if old < len(table):
+            table[old] = new
+    return encode(CHANNELS["categories"], table[array])

@@ -1,0 +1,73 @@
+"""From a recipe's plan and an output folder to the part of the data set that is to be rendered."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from importlib.metadata import version
+
+from viewsphere.errors import StoreError
+from viewsphere.sampling.extension import Portion, extend, whole
+from viewsphere.sampling.plan import Plan
+from viewsphere.store import PlanRecord, Store
+
+
+def to_render(planned: Plan, store: Store) -> Portion:
+    """The part of the data set that this plan began before, else the whole of a new data set. Nothing is written.
+
+    Raises StoreError for a data set that another version made.
+    """
+    found = None
+    with suppress(StoreError):  # whether another plan may be replaced, the store decides
+        found = store.plan()
+    number = found and found.part_with(planned.digest)
+    if found is None or number is None or len(found.parts) == 1:
+        return whole(planned)
+    return _resumed(planned, store, found, number)
+
+
+def to_append(planned: Plan, store: Store) -> Portion:
+    """What a plan adds to the data set, or what is left of it: a part that was begun goes on. Nothing is written.
+
+    Raises StoreError for a folder that is no data set, for one that is not finished and for one that another version made,
+    RecipeError for a recipe that does not fit.
+    """
+    found = store.plan()
+    number = found.part_with(planned.digest)
+    if number is not None:
+        return _resumed(planned, store, found, number)
+    _check_versions(store, found)
+    if found.frames and not found.parts:
+        raise StoreError(f"{store.root}: expected a data set whose plan names its parts, found an older one: render it anew")
+    left = store.missing(found)
+    if left:
+        frames = sum(count for _, _, count in left)
+        raise StoreError(
+            f"{store.root}: expected a finished data set to append to, found {frames:,} frames missing (first shot "
+            f"{left[0][0]}): first render the recipe that they are of to the end (the last was {found.name!r})"
+        )
+    return extend(planned, found)
+
+
+def commit(portion: Portion, store: Store) -> None:
+    """Make the portion a part of the data set; raises StoreError if another run appended something else meanwhile."""
+    parts, there = portion.record.parts, store.plan().parts
+    if there == parts:
+        return
+    if there != parts[:-1]:
+        raise StoreError(f"{store.root}: expected nobody else to append meanwhile, found a part of another run: run this again")
+    store.save(portion.record)
+
+
+def _resumed(planned: Plan, store: Store, found: PlanRecord, number: int) -> Portion:
+    _check_versions(store, found)
+    return Portion(planned, found, number)
+
+
+def _check_versions(store: Store, found: PlanRecord) -> None:
+    installed = version("viewsphere")
+    for part in found.parts:
+        if part.rows and part.version != installed:
+            raise StoreError(
+                f"{store.root}: expected data made by viewsphere {installed}, found {part.version}: "
+                "install that version to go on, or choose another output folder"
+            )

@@ -1,0 +1,192 @@
+"""A recipe's scenes made concrete: targets on the floor, and what stands around them."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.errors import RecipeError
+from viewsphere.geometry.rotation import transform
+from viewsphere.model.recipe import Recipe
+from viewsphere.model.recipe_scenery import Labels
+from viewsphere.model.shot import ModelSpec, Placement, Vector
+from viewsphere.sampling.company import Names, companions, footprint, layout, standing
+from viewsphere.sampling.scenery import (
+    Piece,
+    draw_names,
+    draw_place,
+    free_floor,
+    place_pieces,
+    plane_images,
+    plane_pieces,
+    plane_spec,
+)
+from viewsphere.store import Category
+
+BoxOf = Callable[[ModelSpec], NDArray[np.float64]]
+"""A normalised model's 3D box (8, 3) in its own axes, metres."""
+
+
+@dataclass(frozen=True, eq=False)
+class Composition:
+    """What a recipe with a place, company or planes puts into its frames; no mesh is touched before `placements`.
+
+    `groups` are the models that may meet: those of one split where splits are by model.
+    """
+
+    recipe: Recipe
+    specs: tuple[ModelSpec, ...]
+    groups: dict[str, tuple[ModelSpec, ...]]  # model key -> those of its split
+    images: tuple[tuple[str, ...], ...]
+    recipe_categories: tuple[Category, ...]
+
+    @cached_property
+    def categories(self) -> tuple[Category, ...]:
+        """The recipe's categories, then those of labelled scenery in order of appearance."""
+        known = {c.name: c for c in self.recipe_categories}
+        for name in self._labelled_categories():
+            known.setdefault(name, Category(len(known) + 1, name, ""))
+        return tuple(known.values())
+
+    def _labelled_categories(self) -> Iterator[str]:
+        place = self.recipe.scene.place
+        if place is not None and place.labels == "own":
+            for names in self._place_draws:
+                laid = draw_place(self.recipe.seed, place.name, names).pieces if place.name else ()
+                yield from (piece.category for piece in laid)
+            if not place.name:
+                yield place.category
+        yield from (entry.category for entry in self.recipe.scene.planes if entry.labels == "own")
+
+    @cached_property
+    def _place_draws(self) -> tuple[tuple[str, ...], ...]:
+        place = self.recipe.scene.place
+        return tuple(dict.fromkeys(draw_names(place.draw, s.key, None) for s in self.specs)) if place else ()
+
+    def _category_id(self, category: str, labels: Labels, /) -> int:
+        return self._ids[category] if labels == "own" else 0
+
+    @cached_property
+    def _ids(self) -> dict[str, int]:
+        return {c.name: c.id for c in self.categories}
+
+    @cached_property
+    def models(self) -> tuple[ModelSpec, ...]:
+        """The labelled scenery's models, each once: they are kept in the data set as the recipe's own are."""
+        return tuple({spec.key: spec for spec in self._labelled_models()}.values())
+
+    def _labelled_models(self) -> Iterator[ModelSpec]:
+        place = self.recipe.scene.place
+        if place is not None and place.labels == "own":
+            for names in self._place_draws:
+                yield from (piece.model for piece in self._place(names))
+        for entry, files in zip(self.recipe.scene.planes, self.images, strict=True):
+            if entry.labels == "own":
+                yield from (plane_spec(self.recipe, entry, file, self._category_id) for file in files)
+
+    @cached_property
+    def max_objects(self) -> int:
+        """Most objects in one frame: targets and labelled scenery."""
+        scene = self.recipe.scene
+        count = 1 + (scene.company.number if scene.company else 0)
+        count += sum(entry.count for entry in scene.planes if entry.labels == "own")
+        if scene.place is not None and scene.place.labels == "own":
+            seed, name = self.recipe.seed, scene.place.name
+            count += max(len(draw_place(seed, name, n).pieces) if name else 1 for n in self._place_draws)
+        return count
+
+    def cast(self, spec: ModelSpec, pose: str | None) -> tuple[ModelSpec, ...]:
+        """The targets of a frame: its model, and those drawn to stand beside it.
+
+        `pose` is the pose's name; None where nothing is drawn for each frame.
+        """
+        entry = self.recipe.scene.company
+        if entry is None:
+            return (spec,)
+        names = draw_names(entry.draw, spec.key, pose)
+        return (spec, *companions(self.recipe.seed, spec, self.groups[spec.key], entry.number, names))
+
+    def targets(self, spec: ModelSpec, pose: str | None, box_of: BoxOf) -> tuple[Placement, ...]:
+        """The targets where they stand, the frame's model at the origin; raises RecipeError where there is no room."""
+        cast = self.cast(spec, pose)
+        boxes = [box_of(member) for member in cast]
+        entry, place = self.recipe.scene.company, self.recipe.scene.place
+        moves = (standing(boxes[0]),)
+        if entry is not None:
+            names = draw_names(entry.draw, spec.key, pose)
+            free = free_floor(self.recipe, place, draw_names(place.draw, spec.key, pose)) if place else None
+            moves = layout(entry, self.recipe.seed, cast, boxes, names, free)
+        return tuple(Placement(id=i, model=m, world_from_object=w) for i, (m, w) in enumerate(zip(cast, moves, strict=True), 1))
+
+    def placements(self, spec: ModelSpec, pose: str | None, box_of: BoxOf) -> tuple[Placement, ...]:
+        """All that is placed: targets, labelled scenery, then the scenery that is background."""
+        targets = self.targets(spec, pose, box_of)
+        pieces = self._pieces(targets, pose, box_of)
+        labelled = [p for p in pieces if p.labels == "own"]
+        rest = [p for p in pieces if p.labels != "own"]
+        ids = [*range(len(targets) + 1, len(targets) + len(labelled) + 1), *[0] * len(rest)]
+        return targets + tuple(
+            Placement(id=i, model=p.model, world_from_object=p.world_from_piece, scenery=True)
+            for i, p in zip(ids, labelled + rest, strict=True)
+        )
+
+    def _pieces(self, targets: Sequence[Placement], pose: str | None, box_of: BoxOf) -> list[Piece]:
+        spec, place = targets[0].model, self.recipe.scene.place
+        pieces: list[Piece] = []
+        if place is not None:
+            pieces += self._place(draw_names(place.draw, spec.key, pose))
+        prints = [footprint(box_of(t.model), t.world_from_object) for t in targets]
+        return pieces + list(plane_pieces(self.recipe, self.images, spec.key, pose, prints, self._category_id))
+
+    @cached_property
+    def _place(self) -> Callable[[Names], tuple[Piece, ...]]:
+        """The place's pieces for a draw; the last draws are kept, because many shots share one."""
+        entry = self.recipe.scene.place
+        assert entry is not None
+
+        @lru_cache(maxsize=4)
+        def pieces(names: Names) -> tuple[Piece, ...]:
+            return place_pieces(self.recipe, entry, names, self._category_id)
+
+        return pieces
+
+    def center(self, targets: Sequence[Placement], box_of: BoxOf) -> Vector | None:
+        """What the camera looks at: the centre of the box around all targets; None, which says the same, for one."""
+        if len(targets) == 1:
+            return None
+        corners = np.concatenate([transform(t.world_from_object, box_of(t.model)) for t in targets])
+        x, y, z = ((corners.min(axis=0) + corners.max(axis=0)) / 2).tolist()
+        return x, y, z
+
+
+def compose(recipe: Recipe, specs: tuple[ModelSpec, ...], own: tuple[Category, ...], splits: Sequence[str]) -> Composition:
+    """The composition of a recipe; `splits[i]` is what keeps `specs[i]` from the others: its split, or one name for all.
+
+    Raises RecipeError for pictures and places that are not there, and where there are too few models for company.
+    """
+    members: defaultdict[str, list[ModelSpec]] = defaultdict(list)
+    for spec, split in zip(specs, splits, strict=True):
+        members[split].append(spec)
+    entry, place = recipe.scene.company, recipe.scene.place
+    for split, found in members.items() if entry else ():
+        if entry and len(found) <= entry.number:
+            of = f" of split {split!r}" if split else ""
+            raise RecipeError(
+                f"scene.company.count: expected at most {len(found) - 1}, as there are {len(found)} models{of}; "
+                f"found {entry.number}: add models, or ask for less company"
+            )
+    made = Composition(
+        recipe,
+        specs,
+        {spec.key: tuple(members[split]) for spec, split in zip(specs, splits, strict=True)},
+        plane_images(recipe),
+        own,
+    )
+    if place is not None:
+        place_pieces(recipe, place, draw_names(place.draw, specs[0].key, ""), lambda category, labels: 1)
+    return made

@@ -1,0 +1,241 @@
+"""What stands around the targets: the pieces of a place, and flat planes with pictures."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere import plugins
+from viewsphere.errors import RecipeError, UserError
+from viewsphere.geometry.box import box_vertices
+from viewsphere.geometry.rotation import compose
+from viewsphere.model.mistakes import one_of
+from viewsphere.model.recipe import Recipe
+from viewsphere.model.recipe_models import ZOO, unit_metres
+from viewsphere.model.recipe_scenery import Labels, PlaceEntry, PlaneEntry
+from viewsphere.model.shot import Matrix4, ModelSpec
+from viewsphere.sampling.company import Footprint, Names, footprint, standing
+from viewsphere.sampling.seeds import generator, share
+
+IMAGE_SUFFIXES = frozenset({".jpg", ".jpeg", ".png", ".webp", ".bmp", ".tif", ".tiff"})
+
+TRIES = 200
+"""Spots that are tried for one plane."""
+
+UPRIGHT: Matrix4 = ((1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1))
+
+
+class Naming(Protocol):
+    """What gives a piece of scenery its category's id: 0 for the background's."""
+
+    def __call__(self, category: str, labels: Labels, /) -> int:
+        """The id."""
+        ...
+
+
+@dataclass(frozen=True)
+class Piece:
+    """A model and where it stands; `labels` says whether it is an object of its own."""
+
+    model: ModelSpec
+    world_from_piece: Matrix4
+    labels: Labels
+
+
+def draw_names(draw: str, model: str, pose: str | None) -> Names:
+    """What a draw is for; `pose` is only needed for one a frame."""
+    if draw == "fixed":
+        return ()
+    return (model,) if draw == "per_model" or pose is None else (model, pose)
+
+
+def place_pieces(recipe: Recipe, entry: PlaceEntry, names: Names, category_id: Naming) -> tuple[Piece, ...]:
+    """The place's pieces, turned as the entry says; of a file there is one.
+
+    Raises RecipeError for an unknown place and for a file that is not there.
+    """
+    world_from_place = standing(np.zeros((8, 3)), azimuth_deg=entry.turn)
+    if not entry.name:
+        return (_place_file(recipe, entry, world_from_place, category_id),)
+    laid = draw_place(recipe.seed, entry.name, names)
+    pieces: list[Piece] = []
+    for piece in laid.pieces:
+        spec = ModelSpec(
+            key=scenery_key(piece.family, f"{piece.seed}"),
+            source=ZOO + piece.family,
+            seed=piece.seed,
+            category=piece.category,
+            category_id=category_id(piece.category, entry.labels),
+            centring="as_is",
+        )
+        pieces.append(Piece(spec, _composed(world_from_place, piece.world_from_piece), entry.labels))
+    return tuple(pieces)
+
+
+@lru_cache(maxsize=16)
+def draw_place(seed: int, name: str, names: Names) -> Any:
+    """The layout (a `zoo.places.Place`) that a recipe's seed and these names draw; raises RecipeError for an unknown place."""
+    try:
+        module = plugins.place(name)
+    except UserError:
+        raise RecipeError(f"scene.place: {one_of(ZOO + name, [ZOO + known for known in plugins.places()])}") from None
+    return getattr(module, f"{name}_random")(generator(seed, "place", name, *names))
+
+
+def free_floor(recipe: Recipe, entry: PlaceEntry | None, names: Names) -> NDArray[np.float64] | None:
+    """Lowest and highest x and y (2, 2) of the floor that a place leaves to its targets, None if it does not say.
+
+    A place that is turned by anything but quarters gives the largest square in it.
+    """
+    rectangle = getattr(draw_place(recipe.seed, entry.name, names), "free", None) if entry and entry.name else None
+    if entry is None or rectangle is None:
+        return None
+    low, high = np.array(rectangle, np.float64).reshape(2, 2)
+    if entry.turn % 90:
+        half = min(-low.max(), high.min()) / math.sqrt(2)
+        return np.array([[-half, -half], [half, half]])
+    turned = np.array([low, high]) @ np.array(standing(np.zeros((8, 3)), azimuth_deg=entry.turn))[:2, :2].T
+    return np.sort(turned, axis=0)
+
+
+def _composed(a: Matrix4, b: Matrix4) -> Matrix4:
+    rows: Any = tuple(tuple(row) for row in compose(np.array(a), np.array(b)).tolist())
+    return rows
+
+
+def _place_file(recipe: Recipe, entry: PlaceEntry, world_from_place: Matrix4, category_id: Naming) -> Piece:
+    path = recipe.folder / Path(entry.source).expanduser()
+    if not path.is_file():
+        raise RecipeError(f"scene.place: expected zoo:<place> or a model file; found none at {path}")
+    spec = ModelSpec(
+        key=scenery_key(path.stem, path.name),
+        source=str(path),
+        category=entry.category,
+        category_id=category_id(entry.category, entry.labels),
+        up=entry.up,
+        forward=entry.forward,
+        unit=None if entry.unit is None else unit_metres(entry.unit),
+        centring="as_is",
+    )
+    x, y, z = entry.origin
+    moved = ((1.0, 0.0, 0.0, -x), (0.0, 1.0, 0.0, -y), (0.0, 0.0, 1.0, -z), (0.0, 0.0, 0.0, 1.0))
+    return Piece(spec, _composed(world_from_place, moved), entry.labels)
+
+
+def scenery_key(name: str, rest: str) -> str:
+    """A key that says what it is of and differs for other scenery."""
+    safe = "".join(c if c.isalnum() or c in "-_" else "_" for c in name)[:60]
+    return f"scenery-{safe}-{hashlib.sha256(f'{name}/{rest}'.encode()).hexdigest()[:10]}"
+
+
+def plane_images(recipe: Recipe) -> tuple[tuple[str, ...], ...]:
+    """Absolute paths of the pictures of each entry of planes, sorted; raises RecipeError where there are none."""
+    found: list[tuple[str, ...]] = []
+    for i, entry in enumerate(recipe.scene.planes):
+        if entry.image is not None:
+            path = recipe.folder / Path(entry.image).expanduser()
+            files = (str(path),) if path.is_file() else ()
+            problem = f"scene.planes[{i}].image: expected an image file; found none at {path}"
+        else:
+            folder = recipe.folder / Path(entry.images or "").expanduser()
+            files = images_in(folder)
+            endings = ", ".join(sorted(IMAGE_SUFFIXES))
+            problem = f"scene.planes[{i}].images: expected a folder with images ({endings}); found none in {folder}"
+        if not files:
+            raise RecipeError(problem)
+        found.append(files)
+    return tuple(found)
+
+
+def images_in(folder: Path) -> tuple[str, ...]:
+    """Absolute paths of the images in a folder and below, sorted."""
+    return tuple(sorted(str(f) for f in folder.rglob("*") if f.suffix.lower() in IMAGE_SUFFIXES and f.is_file()))
+
+
+def plane_spec(recipe: Recipe, entry: PlaneEntry, path: str, category_id: Naming) -> ModelSpec:
+    """The model of a plane with this picture."""
+    file = Path(path)
+    inside = file.relative_to(recipe.folder) if file.is_relative_to(recipe.folder) else file.name
+    return ModelSpec(
+        key=scenery_key(file.stem, f"{inside} {entry.height!r}"),
+        source=path,
+        category=entry.category,
+        category_id=category_id(entry.category, entry.labels),
+        unit=entry.height,
+        centring="floor",
+    )
+
+
+@lru_cache(maxsize=4096)
+def proportions(path: str) -> float:
+    """Width over height of a picture as it is shown; raises RecipeError when it cannot be read."""
+    from PIL import Image, UnidentifiedImageError
+
+    try:
+        with Image.open(path) as image:
+            width, height = image.size
+            sideways = image.getexif().get(0x0112, 1) >= 5
+    except (OSError, ValueError, UnidentifiedImageError, Image.DecompressionBombError) as error:
+        problem = "no image" if isinstance(error, UnidentifiedImageError) else error
+        raise RecipeError(f"scene.planes: expected readable images; found {problem} in {path}: mend or remove it") from None
+    return height / width if sideways else width / height
+
+
+def plane_pieces(
+    recipe: Recipe,
+    images: Sequence[Sequence[str]],
+    model: str,
+    pose: str | None,
+    targets: Sequence[Footprint],
+    category_id: Naming,
+) -> Iterator[Piece]:
+    """The planes of one model, or of one frame, clear of the targets and of one another.
+
+    Raises RecipeError where that cannot be.
+    """
+    standing_there = list(targets)
+    for i, entry in enumerate(recipe.scene.planes):
+        names = draw_names(entry.draw, model, pose)
+        for j in range(entry.count):
+            purpose = (*names, str(i), str(j))
+            if share(recipe.seed, "plane shown", *purpose) >= entry.share:
+                continue
+            rng = generator(recipe.seed, "plane", *purpose)
+            path = images[i][int(rng.integers(len(images[i])))]
+            half = entry.height * proportions(path) / 2
+            box = box_vertices((-half, 0.0, 0.0), (half, 0.0, entry.height))
+            move = _plane_spot(f"scene.planes[{i}]", entry, rng, box, standing_there)
+            standing_there.append(footprint(box, move))
+            yield Piece(plane_spec(recipe, entry, path, category_id), move, entry.labels)
+
+
+def _plane_spot(
+    where: str, entry: PlaneEntry, rng: np.random.Generator, box: NDArray[np.float64], others: Sequence[Footprint]
+) -> Matrix4:
+    if entry.at is not None:
+        move = standing(box, *entry.at)
+        if not all(footprint(box, move).apart(other, 0.0) for other in others):
+            raise RecipeError(
+                f"{where}.at: expected the plane clear of the models and of other planes; found it in one: move it"
+            )
+        return move
+    assert entry.around is not None
+    (near, far), (low, high) = entry.around.distance, entry.around.azimuth
+    for _ in range(TRIES):
+        distance, azimuth = near + rng.random() * (far - near), low + rng.random() * (high - low)
+        x, y = distance * math.sin(math.radians(azimuth)), -distance * math.cos(math.radians(azimuth))
+        move = standing(box, x, y, azimuth + 180.0)
+        if all(footprint(box, move).apart(other, 0.0) for other in others):
+            return move
+    raise RecipeError(
+        f"{where}.around: expected room for the plane clear of the models and of other planes; found none: "
+        "ask for fewer, or for a larger distance"
+    )

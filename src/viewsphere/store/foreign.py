@@ -1,0 +1,102 @@
+"""Data sets made elsewhere, on their way into a store."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.geometry.mask import encode_rle, mask_box
+from viewsphere.model.sample import Box, ObjectAnnotation, Rle, Sample, View
+from viewsphere.store.records import Category, ModelInfo
+
+
+@dataclass(frozen=True)
+class ForeignFrame:
+    """A frame whose channels lie in files of another data set, or are given as the bytes of such a file."""
+
+    sample: Sample
+    files: Mapping[str, Path | bytes]
+
+
+@dataclass(frozen=True)
+class ForeignModel:
+    """A model whose files, of the names that `info` gives its OBJ and GLB, lie in a folder of another data set."""
+
+    info: ModelInfo
+    folder: Path
+
+
+@dataclass(frozen=True)
+class ForeignDataset:
+    """What a format's `read` gives: all there is to know at once, and the frames one by one, in order.
+
+    Frames are numbered from 0 and `frames` can be called again. `left_out` says what was broken, and is not there.
+    """
+
+    name: str
+    digest: str  # SHA-256 of the annotations
+    categories: tuple[Category, ...]
+    splits: tuple[str, ...]
+    channels: tuple[str, ...]
+    count: int
+    poses: int  # their indices are below this
+    max_objects: int
+    frames: Callable[[], Iterator[ForeignFrame]]
+    models: tuple[ForeignModel, ...] = ()
+    left_out: tuple[str, ...] = ()
+
+
+def foreign_object(
+    number: int,
+    category: Category,
+    size: tuple[int, int],
+    source: Mapping[str, Any],
+    mask: NDArray[np.bool_] | None,
+    box: Box | None,
+    **known: Any,
+) -> ObjectAnnotation:
+    """An object of which only `mask` (H, W), or only `box`, is known, besides what `known` says; the rest is NaN.
+
+    `size` is the image's (width, height), `source` the annotation as it stood in the other data set.
+    """
+    width, height = size
+    tight = None if mask is None else mask_box(mask)
+    seen = np.zeros((height, width), np.bool_) if mask is None else mask
+    area = round(float(source.get("area") or 0)) if mask is None else int(np.count_nonzero(mask))
+    values: dict[str, Any] = {
+        "key": "",
+        "model": "",
+        "box2d": box if tight is None else tuple(map(float, tight)),
+        "box2d_projected": None,
+        "box2d_unclipped": None,
+        "box3d_object": np.full((8, 3), np.nan),
+        "box3d": np.full((8, 3), np.nan),
+        "box3d_camera": np.full((8, 3), np.nan),
+        "box3d_pixels": np.full((8, 2), np.nan),
+        "box3d_in_front": np.zeros(8, np.bool_),
+        "world_from_object": np.full((4, 4), np.nan),
+        "camera_from_object": np.full((4, 4), np.nan),
+        "quaternion": (math.nan,) * 4,
+        "view": View(math.nan, math.nan, math.nan, math.nan),
+        "pose_category": "",
+        "size": (math.nan,) * 3,
+        "real_size": None,
+        "visibility": math.nan,
+        "truncation": math.nan,
+    }
+    return ObjectAnnotation(
+        id=number,
+        category=category.name,
+        supercategory=category.supercategory,
+        category_id=category.id,
+        rle=Rle(height, width, encode_rle(seen)),
+        area=area,
+        source=dict(source),
+        **{**values, **known},
+    )

@@ -1,0 +1,69 @@
+"""Files of one data set in another: hard links where the file system has them."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+from collections.abc import Iterable
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+
+from viewsphere.model.channel import CHANNELS
+from viewsphere.model.record import sample_to_record
+from viewsphere.store.folder import Store
+from viewsphere.store.foreign import ForeignFrame
+from viewsphere.store.records import ModelInfo
+
+
+def link_file(source: Path, destination: Path) -> str:
+    """Put a file at `destination`, which must not exist: as a `hard link`, else a `reflink`, else a `copy`; gives which."""
+    with suppress(OSError):
+        os.link(source, destination)
+        return "hard link"
+    try:
+        import fcntl
+
+        with source.open("rb") as read, destination.open("wb") as write:
+            fcntl.ioctl(write.fileno(), 0x40049409, read.fileno())  # FICLONE of linux/fs.h
+        return "reflink"
+    except (ImportError, OSError):
+        shutil.copyfile(source, destination)
+        return "copy"
+
+
+def link_model(store: Store, info: ModelInfo, files: Iterable[Path]) -> None:
+    """Write a model of these files, two of which are the OBJ and GLB of `info`, unless there is one of its key."""
+    if store.model_info(info.key) is not None:
+        return
+    prefix = store.model_folder(info.key).relative_to(store.root).as_posix()
+    placed = replace(info, obj=f"{prefix}/{Path(info.obj).name}", glb=f"{prefix}/{Path(info.glb).name}")
+    with store.aside(store.model_folder(info.key)) as folder:
+        for file in files:
+            if file.name != "model.json":
+                link_file(file.resolve(), folder / file.name)
+        store.write_model_info(folder, placed)
+
+
+def link_shot(store: Store, key: str, frames: Iterable[ForeignFrame]) -> int:
+    """Write a shot whose channels are files that exist already; gives the number of its frames."""
+    target = store.shot_folder(key)
+    prefix = target.relative_to(store.root).as_posix()
+    records: list[str] = []
+    with store.aside(target) as folder:
+        for frame in frames:
+            files: dict[str, str] = {}
+            for name, source in frame.files.items():
+                suffix = CHANNELS[name].suffix if isinstance(source, bytes) else source.suffix.lower()
+                inside = f"{name}/{frame.sample.index:06d}{suffix}"
+                (folder / name).mkdir(exist_ok=True)
+                if isinstance(source, bytes):
+                    (folder / inside).write_bytes(source)
+                else:
+                    link_file(source.resolve(), folder / inside)
+                files[name] = f"{prefix}/{inside}"
+            record = sample_to_record(replace(frame.sample, files=files))
+            records.append(json.dumps(record, separators=(",", ":"), allow_nan=False))
+        (folder / "frames.json").write_text("[\n" + ",\n".join(records) + "\n]\n", "utf-8")
+    return len(records)

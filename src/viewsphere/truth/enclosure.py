@@ -1,0 +1,33 @@
+"""Whether one stands inside of something."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+Float = NDArray[np.float64]
+
+DIRECTIONS = 64
+
+
+def sky_hidden(vertices: Float, triangles: NDArray[np.int32], point: Float) -> float:
+    """The share of the upper half of all directions in which a mesh lies, seen from a point (3,) in its axes (+Z up).
+
+    1 inside a house, whether it has a floor or walls of any thickness; 0 where the mesh is not overhead, in a street or among
+    hills; in between beside a wall or below a tree.
+    """
+    from viewsphere.truth.kernels_enclosure import hits_any
+
+    if not hits_any(vertices, triangles, point, np.array([0.0, 0.0, 1.0])):
+        return 0.0
+    return sum(hits_any(vertices, triangles, point, d) for d in _upward()) / DIRECTIONS
+
+
+def _upward() -> Float:
+    """Directions spread evenly over the upper half of a sphere, on a Fibonacci spiral."""
+    z = (np.arange(DIRECTIONS) + 0.5) / DIRECTIONS
+    turn = np.arange(DIRECTIONS) * math.pi * (3 - math.sqrt(5))
+    level = np.sqrt(1 - z * z)
+    return np.stack([level * np.cos(turn), level * np.sin(turn), z], axis=1)

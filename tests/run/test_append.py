@@ -1,0 +1,569 @@
+"""Appending adds to a data set what it lacks, as if all had been rendered at once, and touches nothing that is there."""
+
+import json
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from base64 import b64decode, b64encode
+from collections import Counter
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import viewsphere as vs
+from small import small_recipe, tree_hash
+from viewsphere import Dataset, generate
+from viewsphere.check import check
+from viewsphere.cli import main
+from viewsphere.errors import ModelError, RecipeError, StoreError, UserError
+from viewsphere.sampling.extension import extend, whole
+from viewsphere.store import PlanRecord, Store
+
+DRIER = {"source": "zoo:hair_drier", "category": "hair drier", "scale": {"length": 0.3}}
+POSES = {"azimuth": [0, 120, 240], "elevation": [15, 50], "distance": 1.0}
+DENSER = {"azimuth": [0, 60, 120, 240], "elevation": [15, 50], "distance": 1.0}
+CHANNELS = ["rgb", "depth", "instances", "categories"]
+
+
+def recipe(**changes):
+    """Two models from six sides; `models`, `viewpoints` and `channels` are what appending may change."""
+    return small_recipe(**{"channels": CHANNELS, "scene": {"ground": True}, **changes})
+
+
+def models(count, first=None):
+    return [*([first] if first else []), {**DRIER, "count": count}]
+
+
+NEW_FIRST = {**DRIER, "category": "blower", "name": "a"}
+BIGGER = {"models": models(3, NEW_FIRST), "viewpoints": DENSER}
+
+
+@pytest.fixture(scope="module")
+def base(tmp_path_factory):
+    out = tmp_path_factory.mktemp("append") / "out"
+    generate(recipe(), out)
+    return out
+
+
+@pytest.fixture(scope="module")
+def bigger(base, tmp_path_factory):
+    """The data set with more models and poses appended; do not change it."""
+    out = shutil.copytree(base, tmp_path_factory.mktemp("bigger") / "out")
+    generate(recipe(**BIGGER), out, append=True)
+    return out
+
+
+@pytest.fixture
+def out(base, tmp_path):
+    return shutil.copytree(base, tmp_path / "out")
+
+
+def state(folder: Path, *parts: str):
+    """Bytes, times and places on disk of all files below some parts of a folder."""
+    files = [f for part in parts or (".",) for f in (folder / part).rglob("*") if f.is_file()]
+    return {f: (f.read_bytes(), f.stat().st_mtime_ns, f.stat().st_ino) for f in files}
+
+
+def images(folder: Path):
+    """COCO's images and annotations by id, with their split."""
+    found = {}
+    for file in (folder / "coco" / "annotations").glob("*.json"):
+        value = json.loads(file.read_text())
+        for kind in ("images", "annotations", "categories"):
+            for entry in value[kind]:
+                found[kind, "" if kind == "categories" else file.stem, entry["id"]] = entry
+    return found
+
+
+def known_by(sample):
+    p = sample.pose
+    return sample.objects[0].key, p.azimuth_deg, p.elevation_deg, p.distance, p.tilt_deg
+
+
+def assert_same_frame(a, b):
+    """Everything but numbers is equal."""
+    assert (a.split, a.pose.category, len(a.objects)) == (b.split, b.pose.category, len(b.objects))
+    assert set(a.files or a.channels) == set(b.files or b.channels)
+    for name in a.channels:
+        x, y = a.channels[name], b.channels[name]
+        if name == "categories":
+            x, y = x > 0, y > 0
+        assert np.array_equal(x, y, equal_nan=x.dtype.kind == "f"), name
+    for name in ("K", "R", "t"):
+        assert np.array_equal(getattr(a.camera, name), getattr(b.camera, name))
+    for o, p in zip(a.objects, b.objects, strict=True):
+        assert {**o.__dict__, "category_id": 0}.keys() == p.__dict__.keys()
+        for name, value in o.__dict__.items():
+            if name != "category_id":
+                np.testing.assert_equal(p.__dict__[name], value, err_msg=name)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        pytest.param({"models": models(3)}, marks=pytest.mark.slow),
+        {"models": models(1, NEW_FIRST)},
+        pytest.param({"viewpoints": DENSER}, marks=pytest.mark.slow),
+        {"viewpoints": {"azimuth": 30, "elevation": 15, "distance": 1.0}},
+        {"channels": [*CHANNELS, "normals"]},
+        pytest.param(BIGGER, marks=pytest.mark.slow),
+        {**BIGGER, "channels": ["rgb", "parts", "normals"]},
+        {"name": "other", "formats": ["coco"], "shot_frames": 5, "models": models(3), "max_frames": 100},
+    ],
+    ids=["models", "a new category first", "poses", "only new poses", "channels", "models and poses", "all", "the rest"],
+)
+def test_nothing_is_touched_and_all_is_as_if_rendered_at_once(changes, out):
+    before, coco = state(out, "store/shots", "store/models"), images(out)
+    old = {known_by(s): s for s in Dataset(out)}
+    summary = generate(recipe(**changes), out, append=True)
+    after = state(out, "store/shots", "store/models")
+    assert {file: after[file] for file in before} == before
+    dataset = Dataset(out)
+    assert [s.index for s in dataset] == list(range(len(dataset)))
+    assert [known_by(s) for s in dataset[: len(old)]] == list(old)
+    found = images(out)
+    assert {key: found[key] for key in coco} == coco
+    for (kind, file, _), entry in found.items():
+        assert kind != "images" or (out / "coco" / file.removeprefix("instances_") / entry["file_name"]).is_file()
+    channels = [*CHANNELS, *(c for c in changes.get("channels", []) if c not in CHANNELS)]
+    fresh = {known_by(s): s for s in vs.render(recipe(**{**changes, "channels": channels}))}
+    there = {known_by(s): s for s in dataset}
+    assert there.keys() == fresh.keys() | old.keys()
+    assert len(there) == len(dataset) == summary.frames
+    for key, sample in fresh.items():
+        assert_same_frame(sample, there[key])
+    for number, part in enumerate(dataset.plan.parts):
+        wanted = set(dataset.plan.channels_of(number))
+        assert all(s.files.keys() == wanted for s in dataset[part.first : part.first + part.frames])
+    poses = {known_by(s)[1:]: s.pose.index for s in dataset}
+    assert sorted(poses.values()) == list(range(dataset.plan.poses))
+    assert {s.pose.index for s in dataset} == set(poses.values())
+    report = check(dataset)
+    assert report.ok, report.findings
+
+
+def test_categories_are_numbered_on(bigger):
+    dataset = Dataset(bigger)
+    assert [(c.id, c.name) for c in dataset.categories] == [(1, "hair drier"), (2, "blower")]
+    for sample in dataset:
+        o = sample.objects[0]
+        assert o.category_id == {"hair drier": 1, "blower": 2}[o.category]
+        assert set(np.unique(sample.channels["categories"])) == {0, o.category_id}
+
+
+@pytest.mark.slow
+def test_several_appends_follow_one_another(out):
+    steps = [
+        {"models": models(3)},
+        {"models": models(3), "channels": [*CHANNELS, "normals"]},
+        {"models": models(1, NEW_FIRST), "viewpoints": DENSER},
+        {"models": models(3, NEW_FIRST), "viewpoints": DENSER, "channels": [*CHANNELS, "normals", "parts"]},
+    ]
+    before = state(out, "store/shots", "store/models")
+    for step in steps:
+        generate(recipe(**step), out, append=True)
+        after = state(out, "store/shots", "store/models")
+        assert {file: after[file] for file in before} == before
+        before = after
+        report = check(Dataset(out), rays=False)
+        assert report.ok, report.findings
+    dataset = Dataset(out)
+    fresh = {known_by(s): s for s in vs.render(recipe(**steps[-1]))}
+    assert fresh.keys() == {known_by(s) for s in dataset}
+    for sample in dataset:
+        assert_same_frame(fresh[known_by(sample)], sample)
+    assert [(p.first, p.frames) for p in dataset.plan.parts] == [(0, 12), (12, 6), (18, 0), (18, 10), (28, 4)]
+    assert PlanRecord.from_json(dataset.plan.to_json()) == dataset.plan
+    unchanged = tree_hash(out)
+    for step in [{}, *steps]:
+        summary = generate(recipe(**step), out, append=True)
+        assert (summary.rendered, summary.frames) == (0, 32)
+        assert "nothing to add" in summary.notes[-1]
+    assert tree_hash(out) == unchanged
+
+
+def test_appending_nothing_new_says_so(out):
+    before = tree_hash(out)
+    part = recipe(models=models(1), viewpoints={"azimuth": [120], "elevation": [50], "distance": 1.0})
+    summary = generate(part, out, append=True)
+    assert (summary.rendered, summary.frames) == (0, 12)
+    assert "nothing to add" in summary.notes[-1]
+    assert tree_hash(out) == before
+    assert len(Dataset(out).plan.parts) == 1
+
+
+@pytest.mark.slow
+def test_random_viewpoints_go_on(tmp_path):
+    sphere = {"kind": "sphere", "count": 3, "distance": 1.0}
+    generate(recipe(viewpoints=sphere), tmp_path / "out", formats=[])
+    summary = generate(recipe(viewpoints={**sphere, "count": 5}), tmp_path / "out", append=True, formats=[])
+    assert (summary.rendered, summary.frames) == (4, 10)
+    summary = generate(recipe(viewpoints={**sphere, "distance": 2.0}), tmp_path / "out", append=True, formats=[])
+    assert summary.rendered == 6  # of the same names, but elsewhere
+
+
+@pytest.mark.slow
+def test_backgrounds_and_splits_by_frame_do_not_change(tmp_path):
+    from PIL import Image
+
+    pictures = tmp_path / "pictures"
+    pictures.mkdir()
+    for i in range(5):
+        Image.new("RGB", (8, 6), (50 * i, 0, 0)).save(pictures / f"{i}.png")
+    fixed = {"scene": {"background": {"images": str(pictures)}}, "splits": {"by": "frame", "train": 0.5, "val": 0.5}}
+    generate(recipe(**fixed), tmp_path / "out", formats=[])
+    grown = recipe(**fixed, **BIGGER)
+    generate(grown, tmp_path / "out", append=True, formats=[])
+    there = {known_by(s): s for s in Dataset(tmp_path / "out")}
+    for sample in vs.render(grown):
+        assert_same_frame(sample, there[known_by(sample)])
+    Image.new("RGB", (8, 6)).save(pictures / "6.png")
+    with pytest.raises(RecipeError, match="scene's images: expected what the data set has"):
+        generate(recipe(**fixed, models=models(4)), tmp_path / "out", append=True)
+
+
+def test_company_stands_in_appended_frames(tmp_path):
+    scene = {"scene": {"ground": True, "company": {"count": 1, "layout": [[1.0, 0, 30]]}}, "splits": {"by": "frame"}}
+    far = {"azimuth": [0, 120], "elevation": [30], "distance": 3.0}
+    generate(recipe(**scene, viewpoints=far), tmp_path / "out", formats=[])
+    before = state(tmp_path / "out", "store/shots")
+    grown = recipe(**scene, viewpoints={**far, "azimuth": [0, 60, 120]}, models=models(2, NEW_FIRST))
+    generate(grown, tmp_path / "out", append=True, formats=["coco"])
+    assert state(tmp_path / "out", "store/shots").items() >= before.items()
+    dataset = Dataset(tmp_path / "out")
+    fresh = {known_by(s): s for s in vs.render(grown)}
+    assert len(dataset) == len(fresh) == 9
+    for sample in dataset[4:]:
+        assert_same_frame(fresh[known_by(sample)], sample)
+    report = check(dataset)
+    assert report.ok, report.findings
+    with pytest.raises(RecipeError, match=r"channels: .* found company drawn from other models"):
+        generate(
+            recipe(**scene, viewpoints=far, channels=[*CHANNELS, "normals"], models=models(3)), tmp_path / "out", append=True
+        )
+
+
+def command(file, out, *options):
+    return [sys.executable, "-m", "viewsphere", "render", str(file), "-o", str(out), *options]
+
+
+@pytest.fixture
+def bigger_file(tmp_path):
+    file = tmp_path / "bigger.yaml"
+    file.write_text(recipe(**BIGGER).to_yaml())
+    return file
+
+
+@pytest.mark.parametrize("workers", [2, *(pytest.param(n, marks=pytest.mark.slow) for n in (1, 4))])
+def test_any_number_of_workers_gives_the_same_bytes(workers, bigger_file, bigger, out):
+    run = command(bigger_file, out, "--append", "--workers", str(workers))
+    said = subprocess.run(run, check=True, timeout=110, capture_output=True, text=True).stdout
+    assert "adds 20 frames (4 models x 8 poses less 12 that are there)" in said
+    assert tree_hash(out) == tree_hash(bigger)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kills", [2, pytest.param(8, marks=[pytest.mark.slow, pytest.mark.timeout(600)])])
+def test_a_killed_run_goes_on_to_the_same_bytes(kills, bigger_file, bigger, out):
+    rng, before = random.Random(kills), state(out, "store/shots", "store/models")
+    for _ in range(kills):
+        run = subprocess.Popen(
+            command(bigger_file, out, "--append", "--workers", "2"),
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            start_new_session=True,
+        )
+        time.sleep(rng.uniform(0.5, 6.0))
+        os.killpg(run.pid, signal.SIGKILL)
+        run.wait(timeout=30)
+    subprocess.run(command(bigger_file, out, "--append", "--workers", "2"), check=True, timeout=110, capture_output=True)
+    assert tree_hash(out) == tree_hash(bigger)
+    after = state(out, "store/shots", "store/models")
+    assert {file: after[file] for file in before} == before
+
+
+class Stopped(Exception):
+    """Ctrl-C, as far as a run can tell."""
+
+
+def stop_in(phase, done):
+    def listen(progress):
+        if (progress.phase, progress.done) == (phase, done):
+            raise Stopped
+
+    return listen
+
+
+@pytest.mark.parametrize("append", [pytest.param(True, marks=pytest.mark.slow), False])
+def test_an_interrupted_append_goes_on_with_and_without_the_option(append, bigger, out):
+    with pytest.raises(Stopped):
+        generate(recipe(**BIGGER), out, append=True, listener=stop_in("frames", 18))
+    assert 12 < len(Dataset(out)) < 32
+    with pytest.raises(StoreError, match=r"expected a finished data set to append to, found \d+ frames missing"):
+        generate(recipe(models=models(4)), out, append=True)
+    assert generate(recipe(**BIGGER), out, append=append).rendered < 20
+    assert tree_hash(out) == tree_hash(bigger)
+
+
+@pytest.mark.slow
+def test_an_append_that_ended_among_its_models_leaves_no_trace(bigger, out):
+    with pytest.raises(Stopped):
+        generate(recipe(models=models(4)), out, append=True, listener=stop_in("models", 4))
+    generate(recipe(**BIGGER), out, append=True)
+    assert tree_hash(out) == tree_hash(bigger)
+
+
+@pytest.mark.slow
+def test_missing_shots_of_any_part_are_found_and_made_again(bigger, tmp_path):
+    copy = shutil.copytree(bigger, tmp_path / "out")
+    generate(recipe(**BIGGER, channels=[*CHANNELS, "normals"]), copy, append=True)
+    whole_set, store = tree_hash(copy), Store(copy)
+    lost = ["hair_drier_000-000002", "hair_drier_002-000004", "hair_drier_001-000000+2"]
+    for key in lost:
+        shutil.rmtree(store.shot_folder(key))
+    messages = [f.message for f in check(Dataset(copy), rays=False).findings if f.check == "counts"]
+    assert [m.split(":")[0] for m in messages] == [
+        "expected 12 frames (part 1, recipe 'small'), found 10",
+        "expected 20 frames (part 2, recipe 'small'), found 18",
+        "expected 32 frames (normals of older frames, part 3, recipe 'small'), found 30",
+    ]
+    for key, message in zip(lost, messages, strict=True):
+        assert f"shot {key} is the first of 1 missing" in message
+    assert generate(recipe(), copy).rendered == 2
+    assert generate(recipe(**BIGGER), copy).rendered == 2
+    assert generate(recipe(**BIGGER, channels=[*CHANNELS, "normals"]), copy).rendered == 2
+    assert tree_hash(copy) == whole_set
+
+
+REFUSED = {
+    "seed": ({"seed": 1}, "seed: expected 0, as the data set has; found 1"),
+    "camera": ({"camera": {"size": [96, 72], "fov_deg": 36}}, "camera: expected"),
+    "scene": ({"scene": {"ground": False}}, "scene: expected"),
+    "engine": ({"engine": {"name": "raster", "antialias": 4}}, "engine: expected"),
+    "engine option": ({"engine": {"name": "raster", "antialiased": 4}}, "did you mean 'antialias'"),
+    "label_alpha": ({"label_alpha": 0.5}, "label_alpha: expected 0.01, as the data set has; found 0.5"),
+    "bins": ({"viewpoints": {**POSES, "bins": 90}}, "viewpoints.bins: expected 45.0, as the data set has; found 90.0"),
+    "target": ({"viewpoints": {**POSES, "target": [0, 0, 1]}}, "viewpoints.target: expected 'center'"),
+    "shares": ({"splits": {"train": 0.5, "val": 0.5}}, "splits: expected train 0.7, val 0.3 by model, as the data set has"),
+    "by": ({"splits": {"by": "pose"}}, "splits: expected .* by model, .* found .* by pose"),
+    "supercategory": (
+        {"models": [{**NEW_FIRST, "category": "hair drier", "supercategory": "x"}]},
+        "expected supercategory '' for category 'hair drier', as the data set has; found 'x'",
+    ),
+    "capitals": ({"models": [{**NEW_FIRST, "name": "Hair_Drier"}]}, "more than capitals"),
+    "other size": ({"models": [{**DRIER, "count": 3, "scale": {"length": 0.4}}]}, "'hair_drier_000'.*changed"),
+    "other category": ({"models": [{**DRIER, "count": 3, "category": "drier"}]}, "expected category 'hair drier' of model"),
+    "a channel for some": ({"models": models(1), "channels": ["rgb", "normals"]}, "channels: .* no model 'hair_drier_001'"),
+    "a channel for less": (
+        {"viewpoints": {**POSES, "elevation": 15}, "channels": ["rgb", "normals"]},
+        "channels: .* only 3 of 6 poses",
+    ),
+    "inside the model": (
+        {"viewpoints": {"azimuth": 0, "elevation": 0, "distance": 0.05}, "models": models(3)},
+        "camera outside the model",
+    ),
+}
+
+
+QUICK = {"seed", "camera", "shares", "other size", "a channel for less", "inside the model"}
+
+
+@pytest.mark.parametrize("name", [n if n in QUICK else pytest.param(n, marks=pytest.mark.slow) for n in REFUSED])
+def test_what_does_not_fit_is_refused_and_nothing_changes(name, out):
+    changes, message = REFUSED[name]
+    before = state(out)
+    with pytest.raises(UserError, match=message) as caught:
+        generate(recipe(**changes), out, append=True)
+    assert len(set(str(caught.value).splitlines())) <= 3  # a line for each model
+    assert state(out) == before
+    assert sorted(p.name for p in (out / "store" / "models").iterdir()) == ["hair_drier_000", "hair_drier_001"]
+
+
+def test_old_models_may_not_change_splits(tmp_path):
+    lists = {"splits": {"train": ["hair_drier_000"], "val": ["hair_drier_001"]}}
+    generate(recipe(**lists), tmp_path / "out", formats=[])
+    moved = {"splits": {"train": ["hair_drier_001", "hair_drier_002"], "val": ["hair_drier_000"]}}
+    with pytest.raises(RecipeError, match="splits: expected model 'hair_drier_000' in 'train', where the data set has it"):
+        generate(recipe(**moved, models=models(3)), tmp_path / "out", append=True)
+    longer = {"splits": {"train": ["hair_drier_000"], "val": ["hair_drier_001", "hair_drier_002"]}}
+    generate(recipe(**longer, models=models(3)), tmp_path / "out", append=True, formats=[])
+    splits = {s.objects[0].key: s.split for s in Dataset(tmp_path / "out")}
+    assert splits == {"hair_drier_000": "train", "hair_drier_001": "val", "hair_drier_002": "val"}
+
+
+def test_a_zoo_model_whose_code_changed_is_refused(out, monkeypatch):
+    from viewsphere.zoo import hair_drier
+
+    drawn = hair_drier.hair_drier_random
+    monkeypatch.setattr(hair_drier, "hair_drier_random", lambda rng: drawn(np.random.default_rng(int(rng.integers(9)))))
+    before = state(out)
+    with pytest.raises(StoreError, match=r"model 'hair_drier_000' \(zoo:hair_drier\) changed"):
+        generate(recipe(models=models(3)), out, append=True)
+    assert state(out) == before
+
+
+TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+
+
+@pytest.fixture
+def of_files(tmp_path):
+    """A data set of a model file, and a function from file names to recipes."""
+    (tmp_path / "good.obj").write_text(TETRAHEDRON)
+    (tmp_path / "new.obj").write_text(TETRAHEDRON.replace("v 0 0 1", "v 0 0 2"))
+
+    def of(*names, **changes):
+        sources = [str(tmp_path / name) for name in names]
+        views = {"azimuth": [0, 90], "elevation": [15], "distance": 5.0}
+        return recipe(**{"models": [{"source": sources, "category": "thing"}], "viewpoints": views, **changes})
+
+    generate(of("good.obj"), tmp_path / "out", formats=[])
+    return tmp_path / "out", of
+
+
+def test_a_changed_model_file_is_refused(of_files, tmp_path):
+    out, of = of_files
+    before = state(out)
+    (tmp_path / "good.obj").write_text(TETRAHEDRON.replace("v 1 0 0", "v 2 0 0"))
+    with pytest.raises(StoreError, match=r"model 'good' .* changed since this data set was begun"):
+        generate(of("good.obj", "new.obj"), out, append=True)
+    assert state(out) == before
+    assert generate(of("new.obj"), out, append=True, formats=[]).rendered == 2  # the old one need not be there
+
+
+def test_a_new_model_that_cannot_be_read_is_refused_or_left_out(of_files, tmp_path):
+    out, of = of_files
+    (tmp_path / "bad.obj").write_text("not a model\n")
+    before = state(out)
+    with pytest.raises(ModelError, match=r"bad\.obj"):
+        generate(of("good.obj", "new.obj", "bad.obj"), out, append=True)
+    assert state(out) == before
+    assert not (out / "store" / "models" / "new").exists()
+    summary = generate(of("good.obj", "new.obj", "bad.obj"), out, append=True, keep_going=True, formats=[])
+    assert (summary.rendered, list(summary.skipped)) == (2, ["bad"])
+    more = {"name": "more", "viewpoints": {"azimuth": 45, "distance": 5}}
+    summary = generate(of("good.obj", "new.obj", **more), out, append=True)
+    assert summary.rendered == 2  # what was left out does not count as missing
+    report = check(Dataset(out))
+    assert report.ok, report.findings
+    assert any(note.startswith("bad was left out") for note in report.notes)
+
+
+def test_another_version_s_data_are_refused(out):
+    file = out / "store" / "plan.json"
+    text = file.read_text()
+    file.unlink()
+    file.write_text(text.replace(f'"version":"{json.loads(text)["version"]}"', '"version":"0.0.1"'))
+    before = state(out)
+    with pytest.raises(StoreError, match=r"expected data made by viewsphere .*, found 0\.0\.1"):
+        generate(recipe(models=models(3)), out, append=True)
+    assert state(out) == before
+
+
+def test_appending_to_what_is_no_data_set(tmp_path, capsys, monkeypatch, bigger_file):
+    (tmp_path / "thesis.tex").write_text("x")
+    for folder in (tmp_path / "new", tmp_path):
+        monkeypatch.setattr(sys, "argv", ["viewsphere", *command(bigger_file, folder, "--append")[3:]])
+        with pytest.raises(SystemExit) as caught:
+            main()
+        assert caught.value.code == 2
+        said = capsys.readouterr()
+        assert said.err == f"viewsphere: {folder}: expected a data set (store/plan.json), found none: render one first\n"
+        assert not said.out
+    assert not (tmp_path / "new").exists()
+
+
+def test_without_the_option_another_recipe_is_refused_with_a_hint(out):
+    before = state(out)
+    with pytest.raises(StoreError, match="--append"):
+        generate(recipe(**BIGGER), out)
+    assert state(out) == before
+
+
+def test_two_appends_at_once_do_not_mix(out):
+    other = recipe(models=models(4))
+
+    def meanwhile(progress):
+        if progress.phase == "models" and progress.done == progress.total == 3:
+            generate(other, out, append=True, formats=[])
+
+    with pytest.raises(StoreError, match="another run"):
+        generate(recipe(models=models(3)), out, append=True, listener=meanwhile)
+    assert [p.frames for p in Dataset(out).plan.parts] == [12, 12]
+    assert {m.key for m in Dataset(out).models} == {f"hair_drier_00{i}" for i in range(4)}
+    report = check(Dataset(out), rays=False)
+    assert report.ok, report.findings
+
+
+def test_large_data_sets_are_planned_fast_and_kept_small():
+    views = {"azimuth": {"start": 0, "stop": 359, "step": 1}, "elevation": list(range(0, 80, 4)), "distance": 3.0}
+    large = vs.plan(recipe(models=[{"source": "zoo:car", "count": 38}], viewpoints=views, shot_frames=None))
+    more = {**views, "azimuth": {"start": 0, "stop": 359.5, "step": 0.5}}
+    larger = vs.plan(recipe(models=[{"source": "zoo:car", "count": 40}], viewpoints=more, shot_frames=None))
+    begun = time.perf_counter()
+    there = PlanRecord.from_json(whole(large).record.to_json())
+    portion = extend(larger, there)
+    text = portion.record.to_json()
+    assert time.perf_counter() - begun < 5
+    assert (there.frames, portion.part.frames, portion.record.frames) == (273_600, 302_400, 576_000)
+    assert len(text) < 2_500_000
+    assert [len(row.models) for row in portion.part.rows] == [38, 2]
+    assert all(len(row.poses) == 1 for row in portion.part.rows)
+    last = list(portion.shot_table())[-1]
+    shot = portion.shot(last)
+    assert shot.frames[-1].index == 575_999
+    assert [f.index for f in shot.frames] == list(range(last[1], last[1] + last[2]))
+    assert shot.frames[-1].pose.azimuth_deg % 1 == 0.5
+
+
+def test_poses_that_a_merged_data_set_has_twice_are_there():
+    once = whole(vs.plan(recipe())).record
+    first = once.parts[0]
+    twice = replace(once, poses=12, frames=18, pose_names=b64encode(b64decode(once.pose_names) * 2).decode())
+    row = replace(first.rows[0], models=("hair_drier_002",), poses=((6, 12),))
+    twice = replace(twice, parts=(first, replace(first, first=12, frames=6, rows=(row,))))
+    assert extend(vs.plan(recipe(models=models(3))), twice).adds_nothing
+    more = extend(vs.plan(recipe(models=models(4), viewpoints=DENSER)), twice)
+    assert [(r.models, r.poses) for r in more.part.rows] == [
+        (("hair_drier_000", "hair_drier_001", "hair_drier_002"), ((12, 14),)),
+        (("hair_drier_003",), ((0, 6), (12, 14))),
+    ]
+    supplied = extend(vs.plan(recipe(models=models(3), channels=[*CHANNELS, "normals"])), twice)
+    rows = [row for row, _ in supplied.record.supplements]
+    assert [supplied.shot(row).frames[0].index for row in rows] == [row[1] for row in rows] == list(range(0, 18, 2))
+    last = supplied.shot(rows[-1])
+    assert (last.placements[0].model.key, last.channels) == ("hair_drier_002", ("normals",))
+    assert [(f.pose.index, f.pose.azimuth_deg, f.pose.elevation_deg) for f in last.frames] == [(10, 120, 50), (11, 240, 50)]
+
+
+@given(st.lists(st.tuples(st.integers(0, 40), st.integers(1, 7)), min_size=1, max_size=5), st.integers(8, 20))
+def test_folders_never_overflow_and_what_is_there_stays(spans, size):
+    record, firsts = whole(vs.plan(recipe())).record, [0]
+    for frames, _ in spans:
+        firsts.append(firsts[-1] + frames)
+    parts = tuple(
+        replace(record.parts[0], first=first, frames=frames, max_objects=most)
+        for first, (frames, most) in zip(firsts, spans, strict=False)
+    )
+    grown = [replace(record, parts=parts[:n], frames=firsts[n]) for n in range(1, len(parts) + 1)]
+    objects, annotations = Counter(), set()
+    for frame in range(firsts[-1]):
+        last = grown[-1]
+        assert {r.folder_of(frame, size) for r in grown if frame < r.frames} == {last.folder_of(frame, size)}
+        objects[last.folder_of(frame, size)] += last.most_objects(frame)
+        numbers = {last.annotation_id(frame, i) for i in range(1, last.most_objects(frame) + 1)}
+        for r in grown:
+            assert frame >= r.frames or {r.annotation_id(frame, i) for i in range(1, r.most_objects(frame) + 1)} == numbers
+        assert not numbers & annotations
+        annotations |= numbers
+    assert not annotations or (min(annotations), max(annotations)) == (1, len(annotations))
+    assert max(objects.values(), default=0) <= size
+    if grown[0].frames * spans[0][1] > size + spans[0][1]:
+        assert None not in objects
