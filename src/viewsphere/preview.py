@@ -119,7 +119,7 @@ def _caption(sample: Sample) -> str:
     if pose is None:
         return ", ".join(dict.fromkeys(o.category for o in seen)) or "nothing labelled"
     key = f"{seen[0].key}  " if seen else ""
-    return f"{key}az {pose.azimuth_deg:g}  el {pose.elevation_deg:g}  d {pose.distance:g}"
+    return f"{key}az {pose.azimuth_deg:.4g}  el {pose.elevation_deg:.4g}  d {pose.distance:.4g}"
 
 
 def draw_sample(sample: Sample, draw: Sequence[Drawing] = (), width: int | None = None) -> Picture:

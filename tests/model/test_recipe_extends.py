@@ -139,8 +139,8 @@ def test_circles_are_refused(write):
         ("models[7].count=3", r"--set models\[7\].count: expected an index below 2; found 7"),
         ("name.x=3", r"--set name.x: expected a mapping to set x in; found 'base'"),
         ("viewpoints.elevation=[1,", r"--set viewpoints.elevation:1: expected YAML"),
-        ("viewpoints.elevation=[100]", r"--set viewpoints.elevation: viewpoints.elevation: expected elevations of -90 to 90"),
-        ("viewpoints.elevatoin=3", r"--set viewpoints.elevatoin: viewpoints.elevatoin: .*did you mean 'elevation'"),
+        ("viewpoints.elevation=[100]", r"--set viewpoints.elevation: expected elevations of -90 to 90"),
+        ("viewpoints.elevatoin=3", r"--set viewpoints.elevatoin: .*did you mean 'elevation'"),
     ],
 )
 def test_a_change_that_is_wrong_says_so(write, change, message):

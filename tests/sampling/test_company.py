@@ -114,17 +114,18 @@ def test_a_listed_layout_is_taken_as_it_is_and_refused_where_two_meet():
 
 
 def test_all_stay_on_the_free_floor_or_it_is_said():
-    free = np.array([[-3.0, -50], [3, 50]])
+    free = footprint(box_vertices((-3.0, -50.0, 0.0), (3.0, 50.0, 0.0)), standing(np.zeros((8, 3))))
+    square = footprint(box_vertices((-2.5, -2.5, 0.0), (2.5, 2.5, 0.0)), standing(np.zeros((8, 3))))
     boxes, specs = [box(1.8, 4.4)] * 5, [spec(f"m{i}") for i in range(5)]
     for seed in range(20):
         moves = layout(CompanyEntry(count=4), seed, specs, boxes, (), free)
         for move in moves:
             corners = polygon(boxes[0], move)
-            assert (corners >= free[0] - 1e-9).all() and (corners <= free[1] + 1e-9).all()
+            assert (np.abs(corners) <= [3 + 1e-9, 50 + 1e-9]).all()
     with pytest.raises(RecipeError, match="expected room for 5 models; found none for m"):
-        layout(CompanyEntry(count=4), 0, specs, boxes, (), np.array([[-2.5, -2.5], [2.5, 2.5]]))
+        layout(CompanyEntry(count=4), 0, specs, boxes, (), square)
     with pytest.raises(RecipeError, match="free part of the place; found m1 beyond"):
-        layout(CompanyEntry(count=4, layout="row"), 0, specs, boxes, (), np.array([[-2.5, -2.5], [2.5, 2.5]]))
+        layout(CompanyEntry(count=4, layout="row"), 0, specs, boxes, (), square)
 
 
 def test_a_model_more_takes_only_the_places_it_wins():

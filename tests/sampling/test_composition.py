@@ -128,6 +128,18 @@ def test_a_place_turned_turns_all_of_it_and_its_free_floor(tiny):
         assert abs(target.world_from_object[1][3]) < 3  # the road runs along X now
 
 
+def test_on_a_road_that_runs_aslant_there_is_as_much_room(tiny):
+    along = np.array([np.sin(np.radians(33)), -np.cos(np.radians(33))])  # where -Y, along the road, is turned to
+    place = {"source": tiny, "turn": 33}
+    spots = [[*(far * along), 33 if far > 0 else 213] for far in (20.0, -20.0)]
+    shot = plan(recipe(scene={"place": place, "company": {"layout": [[float(v) for v in s] for s in spots]}})).shot(0, box_of)
+    for placement, spot in zip(shot.placements[1:3], spots, strict=True):
+        np.testing.assert_allclose(np.array(placement.world_from_object)[:2, 3], spot[:2])
+    across = [[float(v) for v in (4 * np.array([along[1], -along[0]])).tolist() + [0.0]]]
+    with pytest.raises(RecipeError, match="free part of the place"):
+        plan(recipe(scene={"place": place, "company": {"layout": across}})).shot(0, box_of)
+
+
 def test_the_orbit_s_centre_is_that_of_all_targets():
     planned = plan(recipe(scene={"company": {"layout": [[4, 0, 0]], "gap": 0}}))
     shot = planned.shot(0, box_of)

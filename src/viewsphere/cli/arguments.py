@@ -20,7 +20,7 @@ Changes = Annotated[
     typer.Option(
         "--set",
         metavar="FIELD=VALUE",
-        help="Set a field: viewpoints.elevation=[10,20]; several times for several.",
+        help="Set a field: 'viewpoints.elevation=[10,20]'; several times for several.",
         autocompletion=completion.changes,
     ),
 ]

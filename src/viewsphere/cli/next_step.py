@@ -36,7 +36,7 @@ def for_command(name: str) -> str:
             here = "no model at hand? the zoo has some" if model == "zoo:car" else f"found {model} here"
             return f"inspect: expected a model; found none\n{here}; next: viewsphere inspect {model}"
         case "plan" | "preview":
-            return f"{name}: expected a recipe; found none\n{_recipe_here()}; next: viewsphere {name} {recipe()}"
+            return f"{name}: expected a recipe; found none\n{_recipe_here()}; next: viewsphere {name} {_recipe()}"
         case "merge":
             two = " ".join(str(p.parent.parent) for p in data[:2]) if len(data) > 1 else "cars-ds chairs-ds"
             return f"merge: expected two data sets or more; found none\nnext: viewsphere merge {two} -o both"
@@ -55,18 +55,18 @@ def for_render(given: Path | None, output: Path | None) -> str:
         found = "found nothing" if output is None else "found no recipe"
     else:
         first, found = "the folder need not exist", f"found no folder for {given}"
-    source = given or recipe()
+    source = given or _recipe()
     folder = output or Path(f"{source.parent.name or source.stem}-ds")
     return f"render: expected a recipe and -o FOLDER; {found}\n{first}; next: viewsphere render {source} -o {folder}"
 
 
-def recipe() -> Path:
+def _recipe() -> Path:
     """A recipe that lies here, or the one that `viewsphere new cars` would write."""
     return next(iter(_near(*RECIPES)), Path("cars/recipe.yaml"))
 
 
 def _recipe_here() -> str:
-    return f"found {recipe()} here" if _near(*RECIPES) else "no recipe yet? `viewsphere new cars` writes one"
+    return f"found {_recipe()} here" if _near(*RECIPES) else "no recipe yet? `viewsphere new cars` writes one"
 
 
 def _near(*patterns: str) -> list[Path]:

@@ -138,7 +138,6 @@ class ProgressBar:
                 TextColumn("{task.fields[rate]}"),
                 TimeRemainingColumn(),
             )
-            self._rich.start()
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -146,7 +145,7 @@ class ProgressBar:
 
     def stop(self) -> None:
         """Leave the terminal as it was."""
-        if self._rich is not None:
+        if self._bars:
             self._rich.stop()
 
     @property
@@ -159,6 +158,7 @@ class ProgressBar:
             if self._rich is None:
                 return
             if progress.phase not in self._bars:
+                self._rich.start()
                 self._bars[progress.phase] = self._rich.add_task(progress.phase, total=progress.total, rate="")
             bar = self._bars[progress.phase]
             elapsed = self._rich.tasks[bar].elapsed or 0.0

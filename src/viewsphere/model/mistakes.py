@@ -16,13 +16,13 @@ EXPLAINED = "explained"
 
 
 class Place(NamedTuple):
-    """Where a value stands: a file and a line, counted from 1; or what else the user wrote, and 0."""
+    """Where a value stands: a file and a line, counted from 1; or the option that sets it, and 0."""
 
     file: str
     line: int
 
     def __str__(self) -> str:
-        return f"{self.file}:{self.line}" if self.line else self.file
+        return f"{self.file}:{self.line}:" if self.line else self.file
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class Marks:
         if not self.file or field_ is None:
             return message
         steps = re.findall(r"\[(\d+)\]|(\w+)", field_[0])
-        return f"{self.place(tuple(int(i) if i else name for i, name in steps))}: {message}"
+        return f"{self.place(tuple(int(i) if i else name for i, name in steps))} {message}"
 
 
 def nearest(name: object, known: Iterable[str]) -> str:
@@ -99,7 +99,7 @@ def report(error: ValidationError, data: object, marks: Marks | None = None) -> 
     for e in error.errors(include_url=False):
         path = _path_in(data, e["loc"]) + _below(e)
         place = marks.place(path) if marks else Place("", 0)
-        where = f"{place}: " if marks else ""
+        where = f"{place} " if marks else ""
         found.append((place, f"{where}{dotted(path)}: {_words(e, ())}"))
     return "\n".join(dict.fromkeys(text for _, text in sorted(found, key=lambda f: f[0])))
 

@@ -73,12 +73,12 @@ def _extended(path: Path, above: tuple[Path, ...]) -> _Layer:
     whole = _Layer({}, {})
     for name in cast(list[Any], names) if isinstance(names, list) else (names,) if names else ():
         if not isinstance(name, str):
-            raise RecipeError(f"{where}: extends: expected the path of a recipe, or a list of them; found {shown(name)}")
+            raise RecipeError(f"{where} extends: expected the path of a recipe, or a list of them; found {shown(name)}")
         base = path.parent / Path(name).expanduser()
         if base.resolve() in chain:
-            raise RecipeError(f"{where}: extends: expected recipes that do not extend one another; found {name} again")
+            raise RecipeError(f"{where} extends: expected recipes that do not extend one another; found {name} again")
         if not base.is_file():
-            raise RecipeError(f"{where}: extends: expected a recipe file; found none at {base}")
+            raise RecipeError(f"{where} extends: expected a recipe file; found none at {base}")
         found = _extended(base, chain)
         _rebase(found.data, os.path.relpath(base.parent, path.parent))
         whole = _merged(whole, found)
@@ -121,7 +121,7 @@ def _set(layer: _Layer, name: str, value: Any) -> _Layer:
     steps = _steps(name, where)
     places = dict(layer.places)
     _forget(places, steps)
-    places[steps] = Place(where, 0)
+    places[steps] = Place("--set", 0)
     return _Layer(cast(dict[str, Any], _replaced(layer.data, steps, value, where)), places)
 
 

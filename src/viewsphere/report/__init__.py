@@ -1,0 +1,129 @@
+"""A data set as one HTML page to look at: pictures with their labels, viewpoints, distributions, models and proofs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from viewsphere.errors import StoreError, UserError, ViewsphereError
+from viewsphere.geometry.box import EDGES, FACES, VERTEX_SIGNS
+from viewsphere.report.choice import chosen_frames
+from viewsphere.report.facts import facts
+from viewsphere.report.frames import frame_data
+from viewsphere.report.meshes import mesh_data, read_small, spread
+from viewsphere.report.page import page, script_json
+from viewsphere.report.pictures import layers_within
+from viewsphere.report.summary import summary
+from viewsphere.report.table import FrameTable, read_table
+from viewsphere.report.unknown import numbers
+from viewsphere.store import Dataset, ModelInfo
+
+LIMIT = 20_000_000
+"""Bytes that the page may have."""
+
+MODELS = 48
+"""Models with a mesh in the page, at most."""
+
+TRIANGLES = 240_000
+"""Triangles of all meshes together, and of one at most."""
+
+MOST_TRIANGLES = 14_000
+
+CAMERAS = 600
+"""Cameras that are shown around a model, at most."""
+
+Listener = Callable[[str, int, int], None]
+
+
+@dataclass(frozen=True)
+class Proof:
+    """What `viewsphere check` found, for the page: frames behind each check, findings and notes in words."""
+
+    ok: bool
+    checked: dict[str, int]
+    findings: tuple[str, ...]
+    notes: tuple[str, ...]
+
+
+def write_report(
+    dataset: Dataset,
+    file: Path,
+    *,
+    frames: int = 240,
+    proof: Proof | None = None,
+    workers: int = 0,
+    listener: Listener | None = None,
+) -> int:
+    """Write the page of a data set, finished or half finished; gives its size in bytes, at most `LIMIT`.
+
+    All frames are counted (by `workers` processes; 0: in this one, more need a `__main__` guard in the calling script), and
+    `frames` of them are shown, the same ones every time. `listener` hears phase, done and total. Raises StoreError where no
+    frame is finished or a record or picture cannot be read, UserError where the page would grow too large or cannot be written.
+    """
+    tell = listener or _unheard
+    if not len(dataset):
+        raise StoreError(f"{dataset.root}: expected finished frames, found none: render first")
+    table = read_table(dataset, workers=workers, listener=lambda done, total: tell("records", done, total))
+    positions = chosen_frames(table, frames)
+    data = report_data(dataset, table, positions, proof, tell)
+    room = LIMIT - len(page(dataset.name, data).encode())
+    pictures = layers_within(dataset, positions, room, lambda done: tell("pictures", done, len(positions)))
+    data["shown"] = [{**frame, "layers": found} for frame, found in zip(data["shown"], pictures, strict=True)]
+    text = page(dataset.name, data).encode()
+    try:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_bytes(text)
+    except OSError as error:
+        raise UserError(f"{file}: expected a place to write, found: {error.strerror or error}") from None
+    return len(text)
+
+
+def report_data(
+    dataset: Dataset, table: FrameTable, positions: Sequence[int], proof: Proof | None, tell: Listener
+) -> dict[str, Any]:
+    """All that the page shows but the pictures, as plain data."""
+    return {
+        "facts": facts(dataset),
+        "summary": summary(dataset, table),
+        "shown": [{**frame_data(sample), "layers": {}} for sample in map(dataset.__getitem__, positions)],
+        "models": _models(dataset, table, tell),
+        "box": {"faces": FACES, "edges": EDGES, "signs": VERTEX_SIGNS},
+        "proof": None if proof is None else asdict(proof),
+    }
+
+
+def _models(dataset: Dataset, table: FrameTable, tell: Listener) -> list[dict[str, Any]]:
+    """Meshes of models spread over the data set, with the cameras that saw them, or why there is none."""
+    chosen = [dataset.models[i] for i in spread(len(dataset.models), MODELS)]
+    most = min(MOST_TRIANGLES, TRIANGLES // max(1, len(chosen)))
+    found: list[dict[str, Any]] = []
+    for done, info in enumerate(chosen, 1):
+        try:
+            shape = {"mesh": mesh_data(read_small(dataset.path(info.glb), most)), "problem": None}
+        except ViewsphereError as error:
+            shape = {"mesh": None, "problem": str(error)}
+        found.append({"key": info.key, **shape, **_cameras(info, table)})
+        tell("models", done, len(chosen))
+    return found
+
+
+def _cameras(info: ModelInfo, table: FrameTable) -> dict[str, Any]:
+    """How many views there are of a model, and azimuth, elevation (degrees) and distance of up to `CAMERAS` of them, around
+    its box's centre.
+    """
+    objects = table.objects
+    if info.key not in table.models:
+        return {"views": 0, "cameras": [], "center": numbers(info.box3d_object.mean(axis=0))}
+    own = objects[objects["model"] == table.models.index(info.key)]
+    picks = own[list(spread(len(own), CAMERAS))]
+    cameras = [numbers(row) for row in zip(picks["azimuth"], picks["elevation"], picks["distance"], strict=True)]
+    return {"views": len(own), "cameras": cameras, "center": numbers(info.box3d_object.mean(axis=0))}
+
+
+def _unheard(phase: str, done: int, total: int) -> None:
+    """Nobody listens."""
+
+
+__all__ = ["Proof", "report_data", "script_json", "write_report"]

@@ -1,0 +1,86 @@
+"""Where a data set comes from: its recipe, versions, and when its frames were made."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+
+from viewsphere.store import Dataset, Part
+
+PAUSE = 600.0
+"""Seconds without a finished shot that count as a break between two runs."""
+
+
+@dataclass(frozen=True)
+class Timing:
+    """When frames were finished, from the times of their files: first and last as ISO 8601 (UTC), seconds of work between them
+    without breaks, frames finished in these seconds, runs.
+    """
+
+    first: str
+    last: str
+    seconds: float
+    frames: int
+    runs: int
+
+
+def timing(dataset: Dataset) -> Timing | None:
+    """When the finished shots were written; None where there are none."""
+    found: list[tuple[float, int]] = []
+    for key, _, count in dataset.plan.shots:
+        try:
+            found.append(((dataset.store.shot_folder(key) / "frames.json").stat().st_mtime, count))
+        except OSError:
+            continue
+    if not found:
+        return None
+    found.sort()
+    times, counts = np.array([t for t, _ in found]), np.array([n for _, n in found])
+    gaps = np.diff(times)
+    working = gaps < PAUSE
+    return Timing(
+        first=_iso(times[0]),
+        last=_iso(times[-1]),
+        seconds=round(float(gaps[working].sum()), 3),
+        frames=int(counts[1:][working].sum()),
+        runs=int((~working).sum()) + 1,
+    )
+
+
+def facts(dataset: Dataset) -> dict[str, Any]:
+    """Recipe (YAML), plan, versions, timing and folder, as plain data."""
+    plan = dataset.plan
+    made = timing(dataset)
+    return {
+        "name": dataset.name,
+        "folder": str(dataset.root.resolve()),
+        "recipe": "\n".join(_recipe(part) for part in plan.parts),
+        "digest": plan.digest,
+        "madeBy": plan.version,
+        "reportBy": version("viewsphere"),
+        "reported": _iso(datetime.now(UTC).timestamp()),
+        "channels": list(plan.channels),
+        "poses": plan.poses,
+        "plannedModels": len(plan.models),
+        "leftOut": dataset.store.skipped(),
+        "warnings": {info.key: list(info.warnings) for info in dataset.models if info.warnings},
+        "exports": sorted(p.name for p in dataset.root.iterdir() if p.is_dir() and p.name != "store"),
+        "timing": None if made is None else made.__dict__,
+    }
+
+
+def _recipe(part: Part) -> str:
+    """The recipe of a part as YAML, under a line that says which frames it brought."""
+    import yaml
+
+    frames = f"{part.frames:,} frames from {part.first:,}" if part.frames else "no frames of its own"
+    text = yaml.safe_dump(part.recipe, sort_keys=False, allow_unicode=True, width=100)
+    return f"# {part.name}: {frames}, made by viewsphere {part.version}\n{text}"
+
+
+def _iso(seconds: float) -> str:
+    return datetime.fromtimestamp(float(seconds), UTC).isoformat(timespec="seconds")

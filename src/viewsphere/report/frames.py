@@ -1,0 +1,78 @@
+"""A shown frame's numbers as plain data: what the page draws over its picture and writes beside it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from viewsphere.geometry.box import FACES
+from viewsphere.model.camera import Camera
+from viewsphere.model.sample import ObjectAnnotation, Sample
+from viewsphere.model.shot import Pose
+from viewsphere.report.unknown import camera_of, number, numbers, placed, pose_of, size_of
+
+
+def frame_data(sample: Sample) -> dict[str, Any]:
+    """Frame index, split, picture's path, pose, camera and objects; what is not known is null."""
+    pose, camera = pose_of(sample), camera_of(sample)
+    return {
+        "index": sample.index,
+        "split": sample.split,
+        "file": sample.files.get("rgb"),
+        "size": list(size_of(sample)),
+        "pose": None if pose is None else _pose_data(pose),
+        "camera": None if camera is None else _camera_data(camera),
+        "objects": [_object_data(o) for o in sample.objects],
+    }
+
+
+def _pose_data(pose: Pose) -> dict[str, Any]:
+    return {
+        "azimuth": number(pose.azimuth_deg),
+        "elevation": number(pose.elevation_deg),
+        "distance": number(pose.distance),
+        "tilt": number(pose.tilt_deg),
+        "name": pose.category,
+    }
+
+
+def _camera_data(camera: Camera) -> dict[str, Any]:
+    return {
+        "K": [numbers(row) for row in camera.K],
+        "distortion": None if camera.distortion is None else camera.distortion.model,
+        "center": numbers(camera.center),
+    }
+
+
+def _object_data(o: ObjectAnnotation) -> dict[str, Any]:
+    known = placed(o)
+    view = o.view
+    return {
+        "id": o.id,
+        "category": o.category_id,
+        "model": o.key,
+        "rle": [o.rle.height, o.rle.width, o.rle.counts],
+        "area": o.area,
+        "box": None if o.box2d is None else numbers(o.box2d),
+        "corners": _corners(o) if known else None,
+        "faces": _faces_seen(o) if known else None,
+        "visibility": number(o.visibility),
+        "truncation": number(o.truncation),
+        "pose": o.pose_category,
+        "view": numbers((view.azimuth_deg, view.elevation_deg, view.distance, view.tilt_deg)) if known else None,
+        "size": numbers(o.size) if known else None,
+        "cameraFromObject": numbers(o.camera_from_object[:3].ravel()) if known else None,
+    }
+
+
+def _corners(o: ObjectAnnotation) -> list[list[float | None] | None]:
+    """The box's vertices in the image to a tenth of a pixel; null behind the camera."""
+    return [numbers(np.round(p, 1)) if np.isfinite(p).all() else None for p in o.box3d_pixels]
+
+
+def _faces_seen(o: ObjectAnnotation) -> list[str]:
+    """Names of the box's faces that are turned to the camera."""
+    middle = o.box3d_camera.mean(axis=0)
+    centers = {name: o.box3d_camera[list(corners)].mean(axis=0) for name, corners in FACES.items()}
+    return [name for name, center in centers.items() if float((center - middle) @ center) < 0]

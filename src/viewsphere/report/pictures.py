@@ -1,0 +1,198 @@
+"""Pictures for the page: a frame's colours and its channels in colour, small, as WebP."""
+
+from __future__ import annotations
+
+import base64
+import io
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from viewsphere.errors import UserError
+from viewsphere.model.sample import ObjectAnnotation, Sample
+from viewsphere.report.unknown import number, placed
+
+Picture = NDArray[np.uint8]
+
+VIRIDIS = np.array(
+    [
+        (68, 1, 84),
+        (71, 44, 122),
+        (59, 81, 139),
+        (44, 113, 142),
+        (33, 144, 141),
+        (39, 173, 129),
+        (92, 200, 99),
+        (170, 220, 50),
+        (253, 231, 37),
+    ],
+    np.float64,
+)
+"""Nine even steps of matplotlib's viridis (CC0): equal steps in lightness, the same to colour-blind eyes; near is light."""
+
+PART_COLORS = np.array(
+    [(68, 119, 170), (238, 102, 119), (34, 136, 51), (204, 187, 68), (102, 204, 238), (170, 51, 119), (221, 170, 119)], np.uint8
+)
+
+
+@dataclass(frozen=True)
+class Scale:
+    """How large pictures are: width in pixels and WebP quality of the colours, width of the other layers."""
+
+    width: int
+    quality: int
+    layer_width: int
+
+
+SCALES = (
+    Scale(640, 82, 400),
+    Scale(560, 80, 320),
+    Scale(480, 78, 280),
+    Scale(400, 75, 240),
+    Scale(320, 70, 200),
+    Scale(240, 65, 160),
+    Scale(160, 55, 120),
+    Scale(112, 45, 96),
+)
+PROBES = 8
+THREADS = 4
+
+Layers = dict[str, Any]
+
+
+def layers_within(
+    dataset: Sequence[Sample], positions: Sequence[int], budget: int, progress: Callable[[int], None] | None = None
+) -> list[Layers]:
+    """The layers of the samples at these positions, as large as together fit into `budget` bytes of text.
+
+    A sample is read when it is its turn and let go, for its arrays are many times larger than its pictures. The
+    scale is tried on a few frames first. Raises UserError if the smallest does not fit.
+    """
+    probes = [positions[i] for i in np.unique(np.linspace(0, len(positions) - 1, PROBES).astype(int))] if positions else []
+    for scale in SCALES:
+        probed = [_weight(layers(dataset[i], scale)) for i in probes]
+        if sum(probed) / max(1, len(probed)) * len(positions) > 0.97 * budget:
+            continue
+        found = list(_all(dataset, positions, scale, progress))
+        if sum(map(_weight, found)) <= budget:
+            return found
+    raise UserError(
+        f"report: expected pictures of at most {budget / 1e6:.1f} MB, found {len(positions):,} frames that need more: "
+        "ask for fewer with --frames"
+    )
+
+
+def _all(
+    dataset: Sequence[Sample], positions: Sequence[int], scale: Scale, progress: Callable[[int], None] | None
+) -> Iterator[Layers]:
+    with ThreadPoolExecutor(THREADS) as pool:
+        for done, found in enumerate(pool.map(partial(_at, dataset, scale), positions), 1):
+            if progress is not None:
+                progress(done)
+            yield found
+
+
+def _at(dataset: Sequence[Sample], scale: Scale, position: int) -> Layers:
+    return layers(dataset[position], scale)
+
+
+def _weight(found: Mapping[str, Any]) -> int:
+    return sum(len(value) for value in found.values() if isinstance(value, str))
+
+
+def layers(sample: Sample, scale: Scale) -> Layers:
+    """The frame's pictures as data URLs, by name, those whose channels are there, and the range of depth in metres.
+
+    `rgb` is the picture; `depth`, `normals`, `coordinates` and `parts` are transparent where they say nothing.
+    """
+    found: Layers = {}
+    channels = sample.channels
+    if "rgb" in channels:
+        found["rgb"] = webp(_shrunk(np.asarray(channels["rgb"], np.uint8), scale.width), scale.quality)
+    if "depth" in channels:
+        near, far, picture = depth_colors(_thinned(channels["depth"], scale.layer_width))
+        found["depth"], found["depthRange"] = webp(picture, 75), [number(near), number(far)]
+    if "normals" in channels:
+        found["normals"] = webp(normal_colors(_thinned(channels["normals"], scale.layer_width)), 75)
+    if "coordinates" in channels and "instances" in channels:
+        coordinates, instances = (_thinned(channels[name], scale.layer_width) for name in ("coordinates", "instances"))
+        found["coordinates"] = webp(coordinate_colors(coordinates, instances, sample.objects), 75)
+    if "parts" in channels:
+        found["parts"] = webp(part_colors(_thinned(channels["parts"], scale.layer_width)), 60)
+    return found
+
+
+def webp(picture: Picture, quality: int) -> str:
+    """The data URL of a picture (H, W, 3 or 4) uint8 as lossy WebP."""
+    file = io.BytesIO()
+    Image.fromarray(picture).save(file, "WEBP", quality=quality, method=4, alpha_quality=90)
+    return "data:image/webp;base64," + base64.b64encode(file.getvalue()).decode("ascii")
+
+
+def depth_colors(depth: NDArray[np.float32]) -> tuple[float, float, Picture]:
+    """Near and far metres, and the depth between them in viridis, near light, (H, W, 4); clear where nothing is hit.
+
+    Far is the 98th percentile, so that a ground plane that runs to the horizon leaves colours for the objects.
+    """
+    hit = np.isfinite(depth)
+    near, far = (float(v) for v in np.percentile(depth[hit], (0, 98))) if hit.any() else (0.0, 0.0)
+    share = np.clip((np.where(hit, depth, far) - near) / max(far - near, 1e-9), 0, 1)
+    return near, far, _rgba(viridis(1 - share), hit)
+
+
+def viridis(share: NDArray[np.floating]) -> Picture:
+    """Colours (..., 3) of shares from 0 (dark) to 1 (light)."""
+    steps = np.arange(len(VIRIDIS)) / (len(VIRIDIS) - 1)
+    return np.stack([np.interp(share, steps, VIRIDIS[:, c]) for c in range(3)], axis=-1).round().astype(np.uint8)
+
+
+def normal_colors(normals: NDArray[np.float32]) -> Picture:
+    """Normals as colours, (H, W, 4): red is right, green up, blue towards the camera."""
+    colors = (normals * np.array([1, -1, -1]) * 0.5 + 0.5) * 255
+    return _rgba(np.clip(colors, 0, 255).round().astype(np.uint8), np.any(normals != 0, axis=-1))
+
+
+def coordinate_colors(
+    coordinates: NDArray[np.float32], instances: NDArray[np.int32], objects: Sequence[ObjectAnnotation]
+) -> Picture:
+    """Points as colours within their object's box, (H, W, 4): red left, green back, blue up."""
+    colors = np.zeros((*coordinates.shape[:2], 3), np.uint8)
+    known = np.zeros(coordinates.shape[:2], bool)
+    for o in objects:
+        if not placed(o):
+            continue
+        seen = (instances == o.id) & np.isfinite(coordinates).all(axis=-1)
+        low, high = o.box3d_object.min(axis=0), o.box3d_object.max(axis=0)
+        share = (coordinates[seen] - low) / np.maximum(high - low, 1e-9)
+        colors[seen] = (np.clip(share, 0, 1) * 255).round().astype(np.uint8)
+        known |= seen
+    return _rgba(colors, known)
+
+
+def part_colors(parts: NDArray[np.int32]) -> Picture:
+    """A colour a part id, (H, W, 4); neighbouring ids differ."""
+    return _rgba(PART_COLORS[(parts - 1) % len(PART_COLORS)], parts > 0)
+
+
+def _rgba(colors: Picture, shown: NDArray[np.bool_]) -> Picture:
+    return np.dstack([np.where(shown[..., None], colors, 0).astype(np.uint8), shown.astype(np.uint8) * 255])
+
+
+def _thinned(array: NDArray[Any], width: int) -> NDArray[Any]:
+    """Pixels on an even grid, at most `width` in a row; values are never mixed."""
+    step = max(1.0, array.shape[1] / width)
+    rows, columns = (((np.arange(int(n / step)) + 0.5) * step).astype(int) for n in array.shape[:2])
+    return array[rows[:, None], columns]
+
+
+def _shrunk(picture: Picture, width: int) -> Picture:
+    height = max(1, round(picture.shape[0] * width / picture.shape[1]))
+    if width >= picture.shape[1]:
+        return picture
+    return np.asarray(Image.fromarray(picture).resize((width, height), Image.Resampling.LANCZOS))

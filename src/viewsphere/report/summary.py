@@ -1,0 +1,156 @@
+"""What a report says in numbers, counted over all frames, as plain data."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.report.cells import sphere_cells
+from viewsphere.report.table import FrameTable
+from viewsphere.report.unknown import number, numbers
+from viewsphere.store import Dataset
+
+BINS = 24
+"""Bins that a histogram aims at."""
+
+HUES = 6
+"""Categories with a colour of their own; further ones share a grey."""
+
+UNNAMED = "unknown"
+
+
+def summary(dataset: Dataset, table: FrameTable) -> dict[str, Any]:
+    """Counts, categories, splits, models, pose bins, sphere cells and distributions of all finished frames."""
+    frames, objects = table.frames, table.objects
+    categories = _categories(dataset, table)
+    sizes = Counter(zip(frames["width"].tolist(), frames["height"].tolist(), strict=True)) - Counter({(0, 0): len(frames)})
+    return {
+        "frames": len(frames),
+        "planned": dataset.plan.frames,
+        "objects": len(objects),
+        "seen": int(objects["seen"].sum()),
+        "empty": int((frames["seen"] == 0).sum()),
+        "sizes": [[w, h, n] for (w, h), n in sizes.most_common(3)],
+        "categories": categories,
+        "splits": _splits(dataset, table),
+        "models": _models(dataset, table),
+        "poses": _pose_bins(table),
+        "cameras": asdict(sphere_cells(frames["azimuth"], frames["elevation"])),
+        "views": asdict(sphere_cells(objects["azimuth"], objects["elevation"])),
+        "distances": _distances(frames["distance"]),
+        "distributions": _distributions(table, [c["id"] for c in categories]),
+    }
+
+
+def hues(counts: Sequence[tuple[int, int]]) -> dict[int, int]:
+    """The colour's number of each category id of (id, objects): the most frequent get 0 to 5 in order of ids, others -1."""
+    ranked = sorted(counts, key=lambda c: (-c[1], c[0]))[:HUES]
+    colored = sorted(identifier for identifier, _ in ranked)
+    return {identifier: colored.index(identifier) if identifier in colored else -1 for identifier, _ in counts}
+
+
+def _categories(dataset: Dataset, table: FrameTable) -> list[dict[str, Any]]:
+    objects = table.objects
+    placed = Counter(objects["category"].tolist())
+    seen = Counter(objects["category"][objects["seen"]].tolist())
+    in_frames = Counter(np.unique(objects[["frame", "category"]])["category"].tolist())
+    colors = hues([(c.id, placed[c.id]) for c in dataset.categories])
+    return [
+        {
+            "id": c.id,
+            "name": c.name,
+            "supercategory": c.supercategory,
+            "objects": placed[c.id],
+            "seen": seen[c.id],
+            "frames": in_frames[c.id],
+            "hue": colors[c.id],
+        }
+        for c in dataset.categories
+    ]
+
+
+def _splits(dataset: Dataset, table: FrameTable) -> list[dict[str, Any]]:
+    counts = np.bincount(table.frames["split"], minlength=len(table.splits)).tolist()
+    found = dict(zip(table.splits, counts, strict=True))
+    names = dict.fromkeys((*dataset.splits, *table.splits))
+    return [{"name": name, "frames": found.get(name, 0)} for name in names]
+
+
+def _models(dataset: Dataset, table: FrameTable) -> list[dict[str, Any]]:
+    counts = np.bincount(table.objects["model"], minlength=len(table.models)).tolist()
+    found = dict(zip(table.models, counts, strict=True))
+    return [
+        {
+            "key": info.key,
+            "category": info.category_id,
+            "objects": found.get(info.key, 0),
+            "triangles": info.triangles,
+            "size": numbers(info.size),
+            "parts": len(info.parts),
+        }
+        for info in dataset.models
+    ]
+
+
+def _pose_bins(table: FrameTable) -> list[dict[str, Any]]:
+    counts = np.bincount(table.objects["pose"], minlength=len(table.poses)).tolist()
+    rows = [{"name": name or UNNAMED, "objects": count} for name, count in zip(table.poses, counts, strict=True)]
+    return sorted(rows, key=lambda row: (-row["objects"], row["name"]))
+
+
+def _distances(distance: NDArray[np.float32]) -> dict[str, Any]:
+    known = distance[np.isfinite(distance)]
+    edges = nice_edges(known)
+    return {"edges": numbers(edges), "counts": _histogram(known, edges)}
+
+
+def _distributions(table: FrameTable, categories: Sequence[int]) -> list[dict[str, Any]]:
+    objects = table.objects
+    share = np.linspace(0, 1, 21)
+    rows = (
+        ("side", "Size of the 2D box", "px, side of a square of its area", None),
+        ("visibility", "Visible share", "of the object's own pixels", share),
+        ("truncation", "Truncated share", "outside the image", share),
+        ("distance", "Distance", "m, camera to box centre", None),
+    )
+    found: list[dict[str, Any]] = []
+    for name, title, unit, fixed in rows:
+        values = objects[name]
+        known = np.isfinite(values)
+        edges = nice_edges(values[known]) if fixed is None else fixed
+        series = [_histogram(values[known & (objects["category"] == c)], edges) for c in categories]
+        found.append(
+            {
+                "name": name,
+                "title": title,
+                "unit": unit,
+                "share": fixed is not None,
+                "edges": numbers(edges),
+                "series": series,
+                "known": int(known.sum()),
+                "median": number(float(np.median(values[known]))) if known.any() else None,
+            }
+        )
+    return found
+
+
+def _histogram(values: NDArray[np.float32], edges: NDArray[np.float64]) -> list[int]:
+    return np.histogram(values.astype(np.float64).round(5), edges)[0].tolist() if len(edges) > 1 else []
+
+
+def nice_edges(values: NDArray[np.floating], bins: int = BINS) -> NDArray[np.float64]:
+    """Edges of about `bins` equal bins at round numbers that hold all the values; empty for none."""
+    if not len(values):
+        return np.zeros(0)
+    low, high = round(float(values.min()), 5), round(float(values.max()), 5)
+    spread = max(high - low, 0.02 * abs(high), 1e-6)
+    power = 10.0 ** math.floor(math.log10(spread / bins))
+    step = next(power * k for k in (1, 2, 2.5, 5, 10) if power * k >= spread / bins * (1 - 1e-9))
+    first, last = math.floor(low / step + 1e-6), math.floor(high / step + 1e-6) + 1
+    return np.round(np.arange(first, last + 1, dtype=np.float64) * step, 12).astype(np.float64)

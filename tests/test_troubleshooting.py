@@ -1,0 +1,299 @@
+"""Troubleshooting shows messages as they are: each is provoked where that is cheap, else found in the source."""
+
+import ast
+import contextlib
+import errno
+import io
+import json
+import os
+import re
+import shlex
+import shutil
+import sys
+from pathlib import Path
+
+import pytest
+from PIL import Image
+
+from small import ROOT
+from viewsphere import cli
+
+PAGE = (ROOT / "docs" / "troubleshooting.md").read_text("utf-8")
+HEADINGS = re.findall(r"^### `(.+)`$", PAGE, re.MULTILINE)
+
+RECIPE = """\
+models: [{source: zoo:hair_drier, count: 2, scale: {length: 0.3}}]
+viewpoints: {azimuth: [0, 180], distance: 1}
+camera: {size: [32, 24], fov_deg: 35}
+channels: [rgb, instances]
+formats: []
+splits: {by: frame, train: 0.5, val: 0.5}
+"""
+LIGHT = """\
+models: [{source: here/ok.obj, category: thing}]
+viewpoints: {azimuth: [0, 180], distance: 4}
+camera: {size: [32, 24], fov_deg: 35}
+channels: [rgb, instances]
+formats: []
+"""
+TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 1\nf 1 2 3\n"
+FILES = {
+    "r.yaml": RECIPE,
+    "t.yaml": LIGHT,
+    "tab.yaml": "models:\n\t- source: zoo:car\n",
+    "star.yaml": "models:\n  - source: *.obj\n",
+    "walk.csv": "azimuth,elevation,distance\n0,10,nan\n",
+    "short.csv": "azimuth,height\n0,1\n",
+    "here/ok.obj": TRIANGLE,
+    "here/huge.obj": TRIANGLE.replace("1", "900000", 2),
+    "here/wide.obj": "v 0 0 0\nv 300 0 0\nv 0 100 40\nf 1 2 3\n",
+    "here/points.obj": "v 0 0 0\nv 1 0 0\n",
+    "here/thin.obj": TRIANGLE + "f 1 1 2\n",
+    "here/empty.glb": "",
+    "here/a.fbx": "Kaydara",
+    "here/a.txt": "no model",
+    "here/plain.obj": "mtllib lost.mtl\nusemtl red\n" + TRIANGLE,
+    "here/lost.obj": "mtllib lost.mtl\nusemtl a\n" + TRIANGLE,
+    "here/away.obj": "mtllib away.mtl\nusemtl a\n" + TRIANGLE,
+    "here/lost.mtl": "newmtl a\nmap_Kd wood.png\n",
+    "here/away.mtl": "newmtl a\nmap_Kd ../wood.png\n",
+    "here/draco.gltf": json.dumps({"asset": {"version": "2.0"}, "extensionsRequired": ["KHR_draco_mesh_compression"]}),
+    "here/line.obj": "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n",
+    "photos/annotations/instances_train.json": json.dumps(
+        {"images": [], "categories": [{"id": 1, "name": "x"}], "annotations": [{"id": 1, "image_id": 9, "category_id": 1}]}
+    ),
+    "folder/a.txt": "somebody's",
+}  # fmt: skip
+
+
+@pytest.fixture
+def said(tmp_path, monkeypatch):
+    """Runs a viewsphere command in a folder of hard cases and gives all that it prints."""
+    for name, text in FILES.items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(text)
+    Image.new("RGB", (4, 4)).save(tmp_path / "wood.png")
+    monkeypatch.chdir(tmp_path)
+
+    def run(line):
+        monkeypatch.setattr(sys, "argv", ["viewsphere", *shlex.split(line)])
+        text = io.StringIO()
+        with contextlib.redirect_stdout(text), contextlib.redirect_stderr(text), contextlib.suppress(SystemExit):
+            cli.main()
+        return text.getvalue()
+
+    return run
+
+
+COMMANDS = {
+    "found a tab": "plan tab.yaml",
+    "found a mistake": "plan star.yaml",
+    "did you mean": "plan r.yaml --set scene.grond=on",
+    "expected a readable recipe file": "plan gone.yaml",
+    "expected field=value": "plan r.yaml --set scene.ground",
+    "found no <name> in": "plan r.yaml --set 'models=[{source: gone.glb, category: x}]'",
+    "gives none in": "plan r.yaml --set 'models=[{source: \"*.glb\", category: x}]'",
+    "only zoo families have one": "plan r.yaml --set 'models=[{source: here/ok.obj}]'",
+    "shares that add up to 1": "plan r.yaml --set splits.train=0.7",
+    "split <name> is empty": "plan r.yaml --set splits.by=model --set splits.train=0.999 --set splits.val=0.001",
+    "the ground hides the models": "plan r.yaml --set viewpoints.elevation=-10 --set scene.ground=on",
+    "set max_frames": "plan r.yaml --set max_frames=3",
+    "which format <format> needs": "render r.yaml -o out --workers 0 --set channels=[instances] --format coco",
+    "format: expected one of": "render r.yaml -o out --workers 0 --format kitti",
+    "the camera outside the model": "render r.yaml -o out --workers 0 --set viewpoints.distance=0.1",
+    "scene.company.count": "plan r.yaml --set scene.company=5",
+    "expected columns": "plan r.yaml --set 'viewpoints={kind: file, path: short.csv}'",
+    "expected a finite number": "plan r.yaml --set 'viewpoints={kind: file, path: walk.csv}'",
+    "files are not read": "inspect here/a.fbx",
+    "expected a model file with suffix": "inspect here/a.txt",
+    "no such file": "inspect here/gone.obj",
+    "the file is empty": "inspect here/empty.glb",
+    "no triangles found": "inspect here/points.obj",
+    "every triangle has zero area": "inspect here/line.obj",
+    "requires the extension": "inspect here/draco.gltf",
+    "triangles without area dropped": "inspect here/thin.obj",
+    "does not exist": "inspect here/lost.obj",
+    "is outside the model's folder": "inspect here/away.obj",
+    "is in no material library": "inspect here/plain.obj",
+    "(limit MAX_SIZE) across": "inspect here/huge.obj",
+    "m across: set unit": "inspect here/wide.obj",
+    "wider than long": "inspect here/wide.obj",
+    "zoo family": "inspect zoo:spaceship",
+    "axes at right angles": "inspect here/ok.obj --up +z --forward -z",
+    "(store/plan.json)": "check folder",
+    "expected an empty or new folder": "render r.yaml -o folder --workers 0",
+    "expected a writable output folder": "render r.yaml -o r.yaml/out --workers 0",
+    "expected a place to write": "inspect here/ok.obj -o r.yaml/a.png",
+    "render: expected a recipe": "render",
+    "expected the id of an image": "import coco photos -o photos-ds",
+}
+"""Words of a heading, and a command that prints such a message."""
+
+ON_DATA = {
+    "choose another output folder, add to it": "render r.yaml -o small --workers 0",
+    "expected the channels of": "merge small other -o both",
+}
+"""The same, with a data set at hand."""
+
+IN_THE_SOURCE = {
+    "expected room for",
+    "scaled to its real length",
+    "expected finished frames",
+    "expected nobody else to append",
+    "stopped; <what is kept>",
+    "its worker died",
+    "a worker failed",
+    "expected embreex",
+}
+"""Words of the headings whose messages cost much to provoke, or need another machine."""
+
+TRIED = {
+    "limit MAX_READ_SECONDS",
+    "reading it takes more",
+    "reading it crashed",
+    "(limit MAX_TRIANGLES)",
+    "what is finished is kept",
+    "expected a finished data set to append to",
+    "changed since this data set was begun",
+    "expected the frames of a finished shot",
+    "data made by viewsphere",
+    "hard links do not work here",
+    "compiling kernels",
+}
+"""Words of the headings that have a test of their own."""
+
+
+def heading_with(words):
+    (found,) = [h for h in HEADINGS if words in h]
+    return found
+
+
+def pattern(heading):
+    """A regular expression: what stands in <angle brackets> is anything; zoo:<family> is itself."""
+    return ".*".join(map(re.escape, re.split(r"(?<!zoo:)<[^>]+>", heading)))
+
+
+def assert_shown(words, text):
+    expected = re.compile(pattern(heading_with(words)))
+    lines = [re.sub(r"^(viewsphere: |warning: |note: |  (hint|warning) +)", "", line) for line in text.splitlines()]
+    lines += [line.replace("--set ", "recipe.yaml:1: ", 1) for line in lines if line.startswith("--set ")]
+    assert any(expected.fullmatch(line) for line in lines), f"{expected.pattern}\nis none of\n{text}"
+
+
+def test_every_heading_is_tested_and_there_are_enough():
+    known = [*COMMANDS, *ON_DATA, *IN_THE_SOURCE, *TRIED]
+    assert sorted(map(heading_with, known)) == sorted(HEADINGS)
+    assert len(HEADINGS) >= 50
+    assert len(COMMANDS) + len(ON_DATA) + len(TRIED) >= 45
+
+
+@pytest.mark.parametrize("words", COMMANDS)
+def test_a_command_s_message(said, words):
+    assert_shown(words, said(COMMANDS[words]))
+
+
+@pytest.mark.parametrize("words", ON_DATA)
+def test_a_data_set_s_message(said, small_run, words):
+    shutil.copytree(small_run, "small")
+    if words == "expected the channels of":
+        said("render t.yaml -o other --workers 0")
+    assert_shown(words, said(ON_DATA[words]))
+
+
+@pytest.mark.parametrize("words", sorted(IN_THE_SOURCE))
+def test_a_message_of_the_source(words, templates):
+    expected = re.compile(pattern(heading_with(words)))
+    assert any(expected.search(template) for template in templates)
+
+
+@pytest.fixture(scope="module")
+def templates():
+    """All texts of the source; what is filled in is an ellipsis."""
+    return list(texts())
+
+
+def texts():
+    for file in (ROOT / "src" / "viewsphere").rglob("*.py"):
+        for node in ast.walk(ast.parse(file.read_text("utf-8"))):
+            if isinstance(node, ast.JoinedStr):
+                yield "".join(str(v.value) if isinstance(v, ast.Constant) else "..." for v in node.values)
+            elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+                yield node.value
+
+
+def test_reading_takes_too_long(said, monkeypatch, tmp_path):
+    monkeypatch.setenv("VIEWSPHERE_CACHE", str(tmp_path / "cache"))
+    monkeypatch.setenv("VIEWSPHERE_MAX_READ_SECONDS", "0.01")
+    assert_shown("limit MAX_READ_SECONDS", said("inspect here/ok.obj"))
+
+
+def test_reading_takes_too_much(said, monkeypatch, tmp_path):
+    def flood(*_, **__):
+        raise MemoryError
+
+    monkeypatch.setenv("VIEWSPHERE_CACHE", str(tmp_path / "cache"))
+    monkeypatch.setenv("VIEWSPHERE_READ_HERE", "1")
+    monkeypatch.setattr("viewsphere.assets.limits.MAX_TRIANGLES", 0)
+    assert_shown("(limit MAX_TRIANGLES)", said("inspect here/ok.obj"))
+    monkeypatch.setattr("viewsphere.assets.load.load_model", flood)
+    assert_shown("reading it takes more", said("inspect here/ok.obj"))
+
+
+def test_reading_crashes(said, monkeypatch, tmp_path):
+    program = tmp_path / "crash"
+    program.write_text("#!/bin/sh\nkill -SEGV $$\n")
+    program.chmod(0o755)
+    monkeypatch.setenv("VIEWSPHERE_CACHE", str(tmp_path / "cache"))
+    monkeypatch.setattr(sys, "executable", str(program))
+    assert_shown("reading it crashed", said("inspect here/ok.obj"))
+
+
+def test_a_full_disk(said, monkeypatch):
+    def full(*_):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(Path, "write_bytes", full)
+    text = said("render t.yaml -o out --workers 0")
+    assert "No space left on device" in text
+    assert_shown("what is finished is kept", text)
+
+
+def test_an_unfinished_or_damaged_data_set_and_a_changed_model(said):
+    said("render t.yaml -o out --workers 0")
+    append = "render t.yaml -o out --workers 0 --append"
+    frames = next(Path("out/store/shots").glob("*/*/frames.json"))
+    whole = frames.read_bytes()
+    frames.write_bytes(b"[")
+    assert_shown("expected the frames of a finished shot", said("export out --format coco"))
+    frames.write_bytes(whole)
+    Path("here/ok.obj").write_text(TRIANGLE.replace("1 0 0", "2 0 0"))
+    text = said(f"{append} --set viewpoints.distance=5")
+    assert_shown("changed since this data set was begun", text)
+    shutil.rmtree(frames.parent)
+    assert_shown("expected a finished data set to append to", said(f"{append} --set viewpoints.distance=6"))
+
+
+def test_another_version_s_data_set(said, monkeypatch):
+    said("render t.yaml -o out --workers 0")
+    plan = Path("out/store/plan.json")
+    record = json.loads(plan.read_text())
+    plan.write_text(json.dumps({**record, "version": "0.0.1"}))
+    assert_shown("data made by viewsphere", said("render t.yaml -o out --workers 0"))
+
+
+def test_no_hard_links(said, monkeypatch):
+    said("render t.yaml -o out --workers 0")
+
+    def refuse(*_):
+        raise OSError(errno.EPERM, "no")
+
+    monkeypatch.setattr(os, "link", refuse)
+    assert_shown("hard links do not work here", said("export out --format native"))
+
+
+def test_the_first_run_says_why_it_takes_longer(monkeypatch, tmp_path, capsys):
+    from viewsphere.cli.making import _announce_compilation
+
+    monkeypatch.setenv("VIEWSPHERE_CACHE", str(tmp_path))
+    _announce_compilation()
+    assert_shown("compiling kernels", capsys.readouterr().err)
