@@ -1,14 +1,163 @@
-"""The paper's data sets, rendered: they pass their own check, and the object is framed as promised."""
+"""The paper's data sets, rendered: they pass their own check, and the object is framed as promised. And the page about them:
+its numbers are those of the plans, its fields are in the exports, its pictures are there.
+"""
 
+import json
+import os
+import re
+
+import numpy as np
 import pytest
 import yaml
+from PIL import Image
 
 import viewsphere as vs
-from small import ROOT
+from small import ROOT, small_recipe
 from viewsphere.check import check
+from viewsphere.cli.arguments import load_recipe
 from viewsphere.model.recipe_file import read
+from viewsphere.model.sample import ObjectAnnotation
 
-pytestmark = [pytest.mark.slow, pytest.mark.timeout(400)]
+PAGE = (ROOT / "docs" / "paper.md").read_text("utf-8")
+SETS = ("car_poses", "bike_poses", "chair_poses", "boat_poses", "hairdryer_poses")
+
+
+def table(page, head):
+    """Rows of the table that begins with this head, as lists of cells."""
+    lines = page[page.index(head) :].split("\n\n")[0].splitlines()[2:]
+    return [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
+
+
+def number(text):
+    return int(text.replace(",", ""))
+
+
+@pytest.fixture(scope="module")
+def planned():
+    return {name: vs.plan(vs.Recipe.load(ROOT / "recipes" / f"{name}.yaml")) for name in SETS}
+
+
+def test_table_2_holds_what_the_plans_say(planned):
+    rows = table(PAGE, "| recipe | models | azimuth")
+    assert [row[0].strip("`") for row in rows] == [f"{name}.yaml" for name in SETS]
+    for row, plan in zip(rows, planned.values(), strict=True):
+        views = [plan.pose_list[i] for i in range(plan.poses)]
+        assert [number(row[i]) for i in (1, 5, 6)] == [plan.models, plan.poses, plan.frames]
+        for cell, name in ((row[2], "azimuth_deg"), (row[3], "elevation_deg")):
+            values = np.unique([getattr(v, name) for v in views])
+            assert int(cell.rpartition(":")[2]) == len(values)
+            stated = [float(v) for v in re.findall(r"\d+", cell.rpartition(":")[0])]
+            if "by" in cell:
+                first, last, step = stated
+                assert values.tolist() == list(np.arange(first, min(last + 1, 360), step))
+            else:
+                assert values.tolist() == stated
+        assert {v.distance for v in views} == {float(v) for v in re.findall(r"\d+", row[4])}
+        assert [number(v) for v in row[7].split("/")] == list(plan.split_counts.values())
+
+
+def test_the_paper_s_own_numbers_are_met(planned):
+    """Ruiz et al. 2019, table 2: poses, models, images."""
+    table_2 = {"car": (2736, 100, 273_600), "bike": (108, 6, 648), "chair": (324, 6, 1944), "boat": (651, 10, 6510)}
+    table_2["hairdryer"] = (60, 6, 360)
+    assert {n: (p.poses, p.models, p.frames) for n, p in planned.items()} == {f"{n}_poses": v for n, v in table_2.items()}
+
+
+def test_the_recipes_page_holds_the_same_numbers(planned):
+    rows = table((ROOT / "recipes" / "README.md").read_text("utf-8"), "| recipe |")
+    stated = {row[0].strip("`").removesuffix(".yaml"): [number(v) for v in row[1:]] for row in rows}
+    assert stated == {n: [p.models, p.poses, p.frames] for n, p in planned.items()}
+
+
+def test_the_measured_runs_are_of_what_the_plans_say(planned):
+    rows = table(PAGE, "| data set | frames | of |")
+    assert [row[0] for row in rows] == list(SETS)
+    for row, plan in zip(rows, planned.values(), strict=True):
+        assert number(row[2]) == plan.frames >= number(row[1])
+        frames, seconds, rate = number(row[1]), number(row[3].removesuffix(" s")), float(row[4])
+        assert rate == pytest.approx(frames / seconds, rel=0.02)
+        assert row[-1] == "all proofs hold"
+
+
+def test_table_1_has_the_paper_s_ticks():
+    """Sums of the columns of the paper's table 1: 2D box, 3D box, mask, depth, model, categories, matrices, flow, size."""
+    rows = table(PAGE, "| data set or tool | frames | 2D box")
+    assert len(rows) == 19 + 2
+    ticks = np.array([[cell == "✓" for cell in row[2:]] for row in rows])
+    assert ticks[:20].sum(axis=0).tolist() == [13, 8, 14, 14, 14, 15, 8, 6, 3]
+    assert (ticks[19] == ticks[20]).all() and ticks[20].sum() == 8
+
+
+@pytest.fixture(scope="module")
+def exported(tmp_path_factory):
+    out = tmp_path_factory.mktemp("page") / "OUT"
+    vs.generate(small_recipe(), out)
+    return out
+
+
+def found(values, path):
+    """What a path such as `poses.*.azimuth` leads to."""
+    for step in path:
+        inside = values if step == "*" else [v for v in values if step in v]
+        assert inside, f"nothing at {step}"
+        values = (
+            [x for v in inside for x in (v.values() if isinstance(v, dict) else v)]
+            if step == "*"
+            else [v[step] for v in inside]
+        )
+    return values
+
+
+def test_every_field_that_the_page_names_is_in_the_exports(exported):
+    native = json.loads((exported / "native" / "dataset1.json").read_text())
+    coco = json.loads((exported / "coco" / "annotations" / "instances_train.json").read_text())
+    spans = set(re.findall(r"`([^`\n]+)`", "\n".join(map(str, table(PAGE, "| annotation | native")))))
+    fields = [span.split(".") for span in spans if re.match(r"(poses|vehicles|images|annotations|models)\.\*\.", span)]
+    assert len(fields) >= 24
+    for path in fields:
+        home = native if path[0] in native else coco
+        assert path[0] in home
+        assert found([home], path), path
+    globs = [span for span in spans if re.match(r"(native|coco)/", span)]
+    assert len(globs) >= 7
+    for pattern in globs:
+        assert any(exported.glob(pattern)), pattern
+    sample = vs.open(exported)[0]
+    names = [span.split(".")[1] for span in spans if re.fullmatch(r"o\.\w+", span)]
+    assert len(names) >= 15 and isinstance(sample.objects[0], ObjectAnnotation)
+    for name in names:
+        getattr(sample.objects[0], name)
+    for name in ("depth", "camera"):
+        assert f"sample.{name}" in spans and getattr(sample, name) is not None
+    coded = set(re.findall(r"`([^`\n]+)`", PAGE))
+    assert {"o.visibility", "o.truncation"} <= coded
+
+
+@pytest.mark.parametrize(("page", "least"), [("docs/paper.md", 2), ("recipes/README.md", 6)])
+def test_commands_on_the_pages_name_recipes_that_plan(page, least):
+    text = (ROOT / page).read_text("utf-8").replace("\\\n", " ")
+    commands = re.findall(r"^viewsphere (?:plan|render) (recipes/\S+)(.*?)(?:#.*)?$", text, re.MULTILINE)
+    assert len(commands) >= least
+    for file, options in commands:
+        changes = re.findall(r"--set (\S+)", options)
+        assert options.count("--set") == len(changes)
+        assert vs.plan(load_recipe(ROOT / file, changes)).frames > 0
+
+
+def test_the_page_s_pictures_are_there_and_not_too_large():
+    for page in ("paper.md", "gallery.md"):
+        names = re.findall(r"!\[[^\]]+\]\(([^)]+)\)", (ROOT / "docs" / page).read_text("utf-8"))
+        assert len(names) >= 6
+        for name in names:
+            file = ROOT / "docs" / name
+            with Image.open(file) as picture:
+                assert picture.width <= 1600
+            if file.name.startswith("paper_"):
+                assert picture.width <= 1400 and file.stat().st_size < 250_000, name
+    assert os.access(ROOT / "scripts" / "paper", os.X_OK)
+    known = re.findall(r"^def (\w+)\(\) -> None:", (ROOT / "scripts" / "paper.py").read_text("utf-8"), re.MULTILINE)
+    made = {name.removeprefix("images/paper_").removesuffix(".jpg") for name in re.findall(r"images/paper_\w+\.jpg", PAGE)}
+    assert made and made <= set(known)
 
 
 def framing(dataset):
@@ -22,6 +171,8 @@ def framing(dataset):
     return min(spans), max(spans), cut
 
 
+@pytest.mark.slow
+@pytest.mark.timeout(400)
 def test_hairdryer_poses_whole(tmp_path):
     recipe = vs.Recipe.load(ROOT / "recipes" / "hairdryer_poses.yaml")
     summary = vs.generate(recipe, tmp_path / "out")
@@ -35,6 +186,8 @@ def test_hairdryer_poses_whole(tmp_path):
     assert cut == 0
 
 
+@pytest.mark.slow
+@pytest.mark.timeout(400)
 def test_two_hundred_frames_of_car_poses(tmp_path):
     data, _ = read(ROOT / "recipes" / "car_poses.yaml")
     data["models"][0]["count"] = 10

@@ -1,0 +1,158 @@
+"""What a recipe's data set will cost: a few of its frames are made in a folder that goes away, and counted up.
+
+    seconds = (models x model + scenes x scene + frames x frame) / workers + frames x export
+    bytes   = models x model + frames x frame
+
+A scene is built once for each model (by every worker, if there are fewer models), or for each frame where the recipe draws
+scenes for each. Exports are written by one process. Not counted: starting the workers, and compiling kernels the first time.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from viewsphere import plugins
+from viewsphere.model.recipe import Recipe
+from viewsphere.model.shot import ModelSpec
+from viewsphere.run.opening import to_render
+from viewsphere.run.stages import prepare
+from viewsphere.run.tasks import Task, Worker
+from viewsphere.run.warm import compile_kernels
+from viewsphere.sampling.plan import Plan
+from viewsphere.store import Dataset, Store
+
+MODELS = 3
+SHOTS_PER_MODEL = 4
+SHOT_FRAMES = 2
+BLOCK = 4096
+"""Bytes that a file system gives out at once, on most."""
+
+GOLDEN = 0.6180339887498949
+
+
+@dataclass(frozen=True)
+class Rates:
+    """Seconds of one process and bytes on disk: for a model, a scene, a frame, the exports of a frame."""
+
+    model: float
+    scene: float
+    frame: float
+    export: float
+    model_bytes: float
+    frame_bytes: float  # exports included
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Seconds and bytes that rendering a recipe into an empty folder takes with so many worker processes."""
+
+    seconds: float
+    bytes: float
+    workers: int
+
+
+def estimate(recipe: Recipe, workers: int = 1, clock: Callable[[], float] = time.perf_counter) -> Estimate:
+    """Time and disk space for a whole data set, from at most 24 frames of three of its models, spread over the poses.
+
+    Takes some seconds. Raises UserError for what `generate` would also refuse: a model that cannot be used, for one.
+    """
+    return extrapolate(prepare(recipe), measure(recipe, clock), workers)
+
+
+def extrapolate(planned: Plan, rates: Rates, workers: int) -> Estimate:
+    """The cost of a whole plan; no workers count as one, for then the calling process works."""
+    crew, models = max(workers, 1), len(planned.kept_specs)
+    scenes = planned.frames if planned.recipe.scene.is_new_each_frame else max(planned.models, min(crew, planned.shot_count))
+    shared = models * rates.model + scenes * rates.scene + planned.frames * rates.frame
+    seconds = shared / crew + planned.frames * rates.export
+    return Estimate(seconds, models * rates.model_bytes + planned.frames * rates.frame_bytes, crew)
+
+
+def measure(recipe: Recipe, clock: Callable[[], float] = time.perf_counter) -> Rates:
+    """Make a few frames as a run would, exports included, in a temporary folder; `clock` gives seconds."""
+    planned = prepare(recipe.model_copy(update={"shot_frames": SHOT_FRAMES}))
+    with TemporaryDirectory(prefix="viewsphere-estimate-") as folder, recipe.located():
+        return _measure_in(planned, Store(Path(folder) / "out"), _Stopwatch(clock))
+
+
+def _measure_in(planned: Plan, store: Store, stopwatch: _Stopwatch) -> Rates:
+    store.open_for(to_render(planned, store).record)
+    chosen = _spread(planned)
+    specs = [planned.model_specs[model] for model in chosen]
+    model = stopwatch.mean([_model_work(store, spec) for spec in specs])
+    worker = Worker(store.root)  # one that did not make the models: in a run that is seldom the one that renders them
+    shots = [planned.shot(index, worker.stages.box) for indices in chosen.values() for index in indices]
+    compile_kernels(shots[0])
+    begun = frame = 0.0
+    for shot in shots:
+        begun += stopwatch(lambda shot=shot: next(worker.stages.render(shot)))
+        task = Task("shot", shot.key, shot.key, shot.model_dump_json())
+        frame += stopwatch(lambda task=task: worker.do(task))
+    frames = sum(len(shot.frames) for shot in shots)
+    frame /= frames
+    scenes = len({shot.stage_key for shot in shots})
+    scene = max(begun - len(shots) * frame, 0.0) / scenes  # what a first frame takes beyond others
+    export = _export(store, planned.recipe.formats, stopwatch)
+    model_bytes = disk_bytes([store.folder / "models"])
+    outputs = [store.folder / "models", store.folder / "shots", *(store.root / name for name in planned.recipe.formats)]
+    frame_bytes = (disk_bytes(outputs) - model_bytes) / frames
+    return Rates(model, scene, frame, export / frames, model_bytes / len(specs), frame_bytes)
+
+
+def _model_work(store: Store, spec: ModelSpec) -> Callable[[], object]:
+    return lambda: Worker(store.root).make_model(spec)
+
+
+def _export(store: Store, formats: Sequence[str], stopwatch: _Stopwatch) -> float:
+    """Write the formats; gives the seconds, less those for looking through the whole plan for frames."""
+    dataset = Dataset(store.root)
+    assert len(dataset) > 0
+    seconds = 0.0
+    for name in formats:
+        writer: plugins.Format = plugins.load("formats", name)
+        folder = store.root / name
+        folder.mkdir()
+        seconds += stopwatch(lambda writer=writer, folder=folder: writer.export(dataset, folder))
+    return seconds
+
+
+def _spread(planned: Plan) -> dict[int, list[int]]:
+    """Models, evenly over the plan, and the indices of some shots of each: together evenly over the poses."""
+    models = min(MODELS, planned.models)
+    each = planned.shot_count // planned.models
+    chosen: dict[int, list[int]] = {}
+    for i in range(models):
+        model = i * (planned.models - 1) // max(models - 1, 1)
+        parts = {int((i * SHOTS_PER_MODEL + k + 1) * GOLDEN % 1 * each) for k in range(SHOTS_PER_MODEL)}
+        chosen[model] = [model * each + part for part in sorted(parts)]
+    return chosen
+
+
+def disk_bytes(folders: Sequence[Path]) -> int:
+    """What the files in these folders take on disk, in whole blocks; what is hard-linked counts once."""
+    sizes = {(s.st_dev, s.st_ino): s.st_size for s in _stats(folders)}
+    return sum(-(-size // BLOCK) * BLOCK for size in sizes.values())
+
+
+def _stats(folders: Sequence[Path]) -> Iterator[os.stat_result]:
+    return (path.stat() for folder in folders for path in folder.rglob("*") if path.is_file())
+
+
+@dataclass(frozen=True)
+class _Stopwatch:
+    """Seconds that something takes."""
+
+    clock: Callable[[], float]
+
+    def __call__(self, work: Callable[[], object]) -> float:
+        begun = self.clock()
+        work()
+        return self.clock() - begun
+
+    def mean(self, works: Sequence[Callable[[], object]]) -> float:
+        return sum(map(self, works)) / len(works)
