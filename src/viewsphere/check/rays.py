@@ -54,7 +54,8 @@ class RayCaster:
         self._files = {info.key: dataset.path(info.glb) for info in dataset.models}
         self._shots = [(first, key) for key, first, _ in dataset.plan.shots]
         self._stages = Stages()
-        self._known: dict[str, _Soup | None] = {}
+        self._known: dict[str, _Soup] = {}
+        self._scenery_known: dict[str, _Soup | None] = {}
         self._key: object = None
         self._all: Any = None
         self._solid: Any = None
@@ -141,20 +142,22 @@ class RayCaster:
         return soup
 
     def _remade(self, record: SceneryRecord, key: str) -> _Soup | None:
-        """A piece of scenery, None where it is not what it was."""
-        if key not in self._known:
+        """A piece of scenery, None where it is not what it was. Merged data sets have several of one key."""
+        digest = record.digests[key]
+        if digest not in self._scenery_known:
             spec = next(p.model for p in record.placements if p.model.key == key)
-            self._known[key] = None
+            self._scenery_known[digest] = None
             try:
                 mesh = self._stages.model(spec)
-                if mesh_digest(mesh) == record.digests[key]:
+                if mesh_digest(mesh) == digest:
                     solid = np.array([m.alpha_mode == "OPAQUE" for m in mesh.materials])
-                    self._known[key] = _Soup(mesh.vertices[mesh.triangles].astype(np.float64), solid[mesh.triangle_material])
+                    corners = mesh.vertices[mesh.triangles].astype(np.float64)
+                    self._scenery_known[digest] = _Soup(corners, solid[mesh.triangle_material])
                 else:
                     self.notes.append(f"surface: background not checked where {key} stands: it is not what it was")
             except ViewsphereError as error:
                 self.notes.append(f"surface: background not checked where {key} stands: {error}")
-        return self._known[key]
+        return self._scenery_known[digest]
 
 
 def _scene(corners: Float) -> Any:

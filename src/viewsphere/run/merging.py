@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -31,13 +32,13 @@ class _Source:
     number: int
     first_frame: int
     first_pose: int
-    category_ids: Mapping[int, int]
+    categories: Mapping[int, Category]
     model_keys: Mapping[str, str]
 
     @property
     def keeps_categories(self) -> bool:
         """Whether every category id stays what it is."""
-        return all(old == new for old, new in self.category_ids.items())
+        return all(old == new.id for old, new in self.categories.items())
 
     @cached_property
     def shots(self) -> tuple[tuple[str, int, int], ...]:
@@ -100,6 +101,12 @@ def _check_sources(datasets: Sequence[Dataset], out: Path) -> None:
 
 def _check_whole(datasets: Sequence[Dataset]) -> None:
     for dataset in datasets:
+        left = sum(count for (key, _, count), _ in dataset.plan.supplements if not dataset.store.has_shot(key))
+        if left and len(dataset) == dataset.plan.frames:
+            raise StoreError(
+                f"{dataset.root}: expected all channels, found {left:,} frames that lack those that were added last: render it "
+                "to the end, or merge what is there with --keep-going"
+            )
         if len(dataset) != dataset.plan.frames:
             raise StoreError(
                 f"{dataset.root}: expected {dataset.plan.frames:,} frames, found {len(dataset):,}: render it to the end, or "
@@ -140,36 +147,42 @@ def _shown(dataset: Dataset) -> str:
 
 def _reconciled(datasets: Sequence[Dataset]) -> tuple[tuple[Category, ...], tuple[str, ...], tuple[_Source, ...]]:
     """All categories, all models' keys, and what the numbers and names of every source become."""
-    categories: dict[str, Category] = {}
-    digests: dict[str, str] = {}
+    categories: dict[int, Category] = {}
+    contents: dict[str, tuple[object, ...]] = {}
     sources: list[_Source] = []
     frames = poses = 0
     for number, dataset in enumerate(datasets):
-        category_ids = {c.id: _joined(categories, c).id for c in dataset.categories}
-        model_keys = {info.key: _key_for(digests, info) for info in dataset.models}
-        sources.append(_Source(dataset, number, frames, poses, category_ids, model_keys))
+        joined: dict[int, Category] = {}
+        for category in dataset.categories:
+            joined[category.id] = _joined(categories, category, {c.id for c in joined.values()})
+        model_keys = {info.key: _key_for(contents, info, joined[info.category_id]) for info in dataset.models}
+        sources.append(_Source(dataset, number, frames, poses, joined, model_keys))
         frames += len(dataset)
         poses += dataset.plan.poses
-    return tuple(sorted(categories.values(), key=lambda c: c.id)), tuple(digests), tuple(sources)
+    return tuple(sorted(categories.values(), key=lambda c: c.id)), tuple(contents), tuple(sources)
 
 
-def _joined(categories: dict[str, Category], category: Category) -> Category:
-    """The category of this name, put there with its own id, or a free one, if there is none."""
+def _joined(categories: dict[int, Category], category: Category, others: set[int]) -> Category:
+    """The category of this name, put there with its own id, or a free one, if there is none.
+
+    `others` are ids of this data set's other categories: what it tells apart stays apart.
+    """
     name = category.name.casefold()
-    if name not in categories:
-        taken = {c.id for c in categories.values()}
-        free = category.id if category.id not in taken else max(taken) + 1
-        categories[name] = replace(category, id=free)
-    return categories[name]
+    same = [c for c in categories.values() if c.name.casefold() == name and c.id not in others]
+    if same:
+        return next((c for c in same if c.name == category.name), same[0])
+    free = category.id if category.id not in categories else max(categories) + 1
+    categories[free] = replace(category, id=free)
+    return categories[free]
 
 
-def _key_for(digests: dict[str, str], info: ModelInfo) -> str:
-    """The model's key, or one with a number where another model has it; `digests` gets it."""
-    number, key = 1, info.key
-    while digests.get(key, info.digest) != info.digest:
+def _key_for(contents: dict[str, tuple[object, ...]], info: ModelInfo, category: Category) -> str:
+    """The model's key, or one with a number where another model has it; `contents` gets it."""
+    number, key, content = 1, info.key, (info.digest, info.real_size, category.id)
+    while contents.get(key, content) != content:
         number += 1
         key = f"{info.key}-{number}"
-    digests[key] = info.digest
+    contents[key] = content
     return key
 
 
@@ -179,7 +192,7 @@ def _plan_record(sources: Sequence[_Source], categories: tuple[Category, ...], m
     name = " + ".join(dict.fromkeys(plan.name for plan in plans))
     parts = tuple(part for source in sources for part in _parts(source))
     last = sources[-1].dataset
-    whole = [[plan.digest, len(source.dataset)] for plan, source in zip(plans, sources, strict=True)]
+    whole = [[source.dataset.plan.digest, [key for key, _, _ in source.shots]] for source in sources]
     return PlanRecord(
         version=made,
         digest=hashlib.sha256(json.dumps(whole).encode()).hexdigest(),
@@ -199,24 +212,40 @@ def _plan_record(sources: Sequence[_Source], categories: tuple[Category, ...], m
 
 
 def _parts(source: _Source) -> Iterator[Part]:
-    """The source's parts, renumbered; channels that one supplied to others now lie with the rest."""
+    """What is finished of the source's parts, renumbered; channels that one supplied to others now lie with the rest.
+
+    Of an unfinished part no recipe renders the rest, so it has no digest by which to find it.
+    """
     plan = source.dataset.plan
-    whole = len(source.dataset) == plan.frames
-    if not whole:
-        one = plan.parts[-1]
-        yield replace(
-            one, first=source.first_frame, frames=len(source.dataset), max_objects=plan.max_objects, rows=(), supplies=()
-        )
-        return
+    first = source.first_frame
     for number, part in enumerate(plan.parts):
-        if part.frames:
+        shots = [row for row in plan.shots_of(number) if source.dataset.store.has_shot(row[0])]
+        frames = sum(count for _, _, count in shots)
+        whole = frames == part.frames
+        rows = part.rows if whole else tuple(_row_of(part, begin, count) for _, begin, count in shots if part.rows)
+        if frames:
             yield replace(
                 part,
-                first=source.first_frame + part.first,
+                digest=part.digest if whole else "",
+                first=first,
+                frames=frames,
                 channels=plan.channels_of(number),
-                rows=tuple(_moved(source, row) for row in part.rows),
+                rows=tuple(_moved(source, row) for row in rows),
                 supplies=(),
             )
+        first += frames
+
+
+def _row_of(part: Part, first: int, count: int) -> Row:
+    """Model and poses of a shot's frames, which are of one model."""
+    start = part.first
+    for row in part.rows:
+        if first < start + row.frames:
+            break
+        start += row.frames
+    model, pose = divmod(first - start, row.count)
+    poses = [number for begin, stop in row.poses for number in range(begin, stop)][pose : pose + count]
+    return Row((row.models[model],), tuple((number, number + 1) for number in poses))
 
 
 def _moved(source: _Source, row: Row) -> Row:
@@ -226,7 +255,7 @@ def _moved(source: _Source, row: Row) -> Row:
 
 def _link_models(source: _Source, store: Store) -> None:
     for info in source.dataset.models:
-        moved = replace(info, key=source.model_keys[info.key], category_id=source.category_ids[info.category_id])
+        moved = replace(info, key=source.model_keys[info.key], **_of(source.categories[info.category_id]))
         link_model(store, moved, sorted(source.dataset.path(info.obj).parent.iterdir()))
 
 
@@ -234,7 +263,8 @@ def _link_frames(source: _Source, store: Store, record: PlanRecord, listener: Li
     for key, first, count in source.shots:
         start = first - source.first_frame
         if not store.has_shot(key):
-            link_shot(store, key, (_renumbered(source, source.dataset[start + i], first + i) for i in range(count)))
+            scenery = source.dataset.store.scenery(key.partition("~")[2])
+            link_shot(store, key, (_renumbered(source, source.dataset[start + i], first + i) for i in range(count)), scenery)
         if listener:
             listener(Progress("frames", first + count, record.frames))
 
@@ -257,14 +287,19 @@ def _moved_object(source: _Source, o: ObjectAnnotation) -> ObjectAnnotation:
     key = source.model_keys.get(o.key, o.key)
     folder, _, name = o.model.rpartition("/")
     model = f"{folder.rpartition('/')[0]}/{key}/{name}" if o.model else ""
-    return replace(o, key=key, model=model, category_id=source.category_ids[o.category_id])
+    return replace(o, key=key, model=model, **_of(source.categories[o.category_id]))
+
+
+def _of(category: Category) -> dict[str, Any]:
+    """What models and objects say of their category."""
+    return {"category": category.name, "supercategory": category.supercategory, "category_id": category.id}
 
 
 def _with_category_ids(source: _Source, sample: Sample) -> bytes:
     """The `categories` channel with the ids of the merged data set, encoded."""
     array = sample.channels["categories"]
     table = np.arange(int(array.max(initial=0)) + 1, dtype=array.dtype)
-    for old, new in source.category_ids.items():
+    for old, new in source.categories.items():
         if old < len(table):
-            table[old] = new
+            table[old] = new.id
     return encode(CHANNELS["categories"], table[array])

@@ -172,7 +172,7 @@ class Stages:
         stage = self.stage(shot)
         boxes = [self.box(p.model) for p in shot.objects]
         sizes = [self.real_size(p.model) for p in shot.objects]
-        if any(p.scenery for p in shot.placements):
+        if len(shot.placements) > 1:
             cameras = [camera_for(shot.intrinsics, f.pose, _target(shot, boxes)).center for f in shot.frames]
             self._check_cameras(shot.placements, np.array(cameras))
         for frame in shot.frames:

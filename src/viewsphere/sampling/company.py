@@ -42,6 +42,10 @@ class Footprint:
                 return True
         return False
 
+    def contains(self, other: Footprint) -> bool:
+        """Whether all of the other lies in this one."""
+        return bool((np.abs((other.corners - self.center) @ self.axes.T) <= self.half + 1e-9).all())
+
     @property
     def corners(self) -> Float:
         """The four corners, (4, 2)."""
@@ -83,12 +87,12 @@ def companions(seed: int, spec: ModelSpec, others: Iterable[ModelSpec], count: i
 
 
 def layout(
-    entry: CompanyEntry, seed: int, specs: Sequence[ModelSpec], boxes: Sequence[Float], names: Names, free: Float | None = None
+    entry: CompanyEntry, seed: int, specs: Sequence[ModelSpec], boxes: Sequence[Float], names: Names, free: Footprint | None = None
 ) -> tuple[Matrix4, ...]:
     """Where each of `specs` stands, the first one at the origin, facing -Y; all on the floor.
 
-    `boxes[i]` (8, 3) is theirs; `free` (2, 2) the lowest and highest x and y there is room in. Raises RecipeError where two
-    would stand in one another, or where there is no room.
+    `boxes[i]` (8, 3) is theirs; `free` what there is room in. Raises RecipeError where two would stand in one
+    another, or where there is no room.
     """
     if isinstance(entry.layout, tuple):
         spots = ((0.0, 0.0, 0.0), *entry.layout)
@@ -101,7 +105,7 @@ def layout(
     return placed
 
 
-def _check(entry: CompanyEntry, specs: Sequence[ModelSpec], prints: Sequence[Footprint], free: Float | None) -> None:
+def _check(entry: CompanyEntry, specs: Sequence[ModelSpec], prints: Sequence[Footprint], free: Footprint | None) -> None:
     for i, own in enumerate(prints):
         for j in range(i):
             if not own.apart(prints[j], entry.gap):
@@ -109,14 +113,10 @@ def _check(entry: CompanyEntry, specs: Sequence[ModelSpec], prints: Sequence[Foo
                     f"scene.company.layout: expected {entry.gap:g} m between all models; found {specs[j].key} and "
                     f"{specs[i].key} nearer or in one another: move them, or use layout: random"
                 )
-        if i and not _inside(own, free):
+        if i and free and not free.contains(own):
             raise RecipeError(
                 f"scene.company.layout: expected all models in the free part of the place; found {specs[i].key} beyond it"
             )
-
-
-def _inside(own: Footprint, free: Float | None) -> bool:
-    return free is None or bool((own.corners >= free[0]).all() and (own.corners <= free[1]).all())
 
 
 def _row(boxes: Sequence[Float], gap: float) -> tuple[Matrix4, ...]:
@@ -135,12 +135,12 @@ def _row(boxes: Sequence[Float], gap: float) -> tuple[Matrix4, ...]:
 
 
 def _random(
-    entry: CompanyEntry, seed: int, specs: Sequence[ModelSpec], boxes: Sequence[Float], names: Names, free: Float | None
+    entry: CompanyEntry, seed: int, specs: Sequence[ModelSpec], boxes: Sequence[Float], names: Names, free: Footprint | None
 ) -> tuple[Matrix4, ...]:
     """One after another: uniform in a circle that grows until there is room."""
     placed = [standing(boxes[0])]
     prints = [footprint(boxes[0], placed[0])]
-    widest = math.inf if free is None else float(np.linalg.norm(free, axis=1).max())
+    widest = math.inf if free is None else float(np.linalg.norm(free.corners, axis=1).max())
     for slot, (spec, box) in enumerate(zip(specs[1:], boxes[1:], strict=True)):
         rng = generator(seed, "layout", *names, str(slot), spec.key)
         radius = float(prints[0].half.min() + (box[4] - box[2])[:2].min() / 2) + entry.gap  # nearer there is no room
@@ -149,7 +149,7 @@ def _random(
             x, y = (radius * math.sqrt(far) * f(2 * math.pi * turn) for f in (math.cos, math.sin))
             move = standing(box, x, y, 360.0 * float(azimuth))
             own = footprint(box, move)
-            if _inside(own, free) and all(own.apart(other, entry.gap) for other in prints):
+            if (free is None or free.contains(own)) and all(own.apart(other, entry.gap) for other in prints):
                 break
             radius = min((1 + GROWTH) * radius, widest)
         else:

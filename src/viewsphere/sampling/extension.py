@@ -132,7 +132,7 @@ class Portion:
 
     @cached_property
     def _category_ids(self) -> dict[str, int]:
-        return {category.name: category.id for category in self.record.categories}
+        return {category.name: category.id for category in reversed(self.record.categories)}
 
     def _numbered(self, spec: ModelSpec) -> ModelSpec:
         if not spec.category_id:
@@ -300,19 +300,21 @@ def _check_models(planned: Plan, there: PlanRecord) -> None:
 
 def _categories(planned: Plan, there: PlanRecord) -> tuple[Category, ...]:
     """The data set's, then the recipe's new ones, numbered on; a category is known by its name."""
-    found = {category.name: category for category in there.categories}
+    found = {category.name: category for category in reversed(there.categories)}  # imported ones may share a name
+    added: list[Category] = []
     number = max((category.id for category in there.categories), default=0)
     for category in planned.categories:
         known = found.get(category.name)
         if known is None:
             number += 1
             found[category.name] = replace(category, id=number)
+            added.append(found[category.name])
         elif known.supercategory != category.supercategory:
             raise RecipeError(
                 f"models: expected supercategory {known.supercategory!r} for category {category.name!r}, as the data set has; "
                 f"found {category.supercategory!r}"
             )
-    return tuple(found.values())
+    return (*there.categories, *added)
 
 
 def _missing(planned: Plan, there: PlanRecord, numbers: Indices) -> Iterator[Row]:

@@ -90,20 +90,13 @@ def draw_place(seed: int, name: str, names: Names) -> Any:
     return getattr(module, f"{name}_random")(generator(seed, "place", name, *names))
 
 
-def free_floor(recipe: Recipe, entry: PlaceEntry | None, names: Names) -> NDArray[np.float64] | None:
-    """Lowest and highest x and y (2, 2) of the floor that a place leaves to its targets, None if it does not say.
-
-    A place that is turned by anything but quarters gives the largest square in it.
-    """
+def free_floor(recipe: Recipe, entry: PlaceEntry | None, names: Names) -> Footprint | None:
+    """The floor that a place leaves to its targets, None if it does not say."""
     rectangle = getattr(draw_place(recipe.seed, entry.name, names), "free", None) if entry and entry.name else None
     if entry is None or rectangle is None:
         return None
-    low, high = np.array(rectangle, np.float64).reshape(2, 2)
-    if entry.turn % 90:
-        half = min(-low.max(), high.min()) / math.sqrt(2)
-        return np.array([[-half, -half], [half, half]])
-    turned = np.array([low, high]) @ np.array(standing(np.zeros((8, 3)), azimuth_deg=entry.turn))[:2, :2].T
-    return np.sort(turned, axis=0)
+    x0, y0, x1, y1 = rectangle
+    return footprint(box_vertices((x0, y0, 0.0), (x1, y1, 0.0)), standing(np.zeros((8, 3)), azimuth_deg=entry.turn))
 
 
 def _composed(a: Matrix4, b: Matrix4) -> Matrix4:

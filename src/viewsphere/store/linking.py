@@ -46,8 +46,11 @@ def link_model(store: Store, info: ModelInfo, files: Iterable[Path]) -> None:
         store.write_model_info(folder, placed)
 
 
-def link_shot(store: Store, key: str, frames: Iterable[ForeignFrame]) -> int:
-    """Write a shot whose channels are files that exist already; gives the number of its frames."""
+def link_shot(store: Store, key: str, frames: Iterable[ForeignFrame], scenery: str = "") -> int:
+    """Write a shot whose channels are files that exist already; gives the number of its frames.
+
+    `scenery` as for `Store.write_shot`.
+    """
     target = store.shot_folder(key)
     prefix = target.relative_to(store.root).as_posix()
     records: list[str] = []
@@ -66,4 +69,6 @@ def link_shot(store: Store, key: str, frames: Iterable[ForeignFrame]) -> int:
             record = sample_to_record(replace(frame.sample, files=files))
             records.append(json.dumps(record, separators=(",", ":"), allow_nan=False))
         (folder / "frames.json").write_text("[\n" + ",\n".join(records) + "\n]\n", "utf-8")
+        if scenery:
+            (folder / "scenery.json").write_text(scenery, "utf-8")
     return len(records)

@@ -66,7 +66,7 @@ def category_ids(dataset: Dataset) -> dict[int, int]:
     """COCO id of each category of the data set. With imported pictures in it, the ids they came with, and free ones for the
     others; else COCO's own for its 80 names, however spelled, and free ones above 90.
     """
-    if any(part.frames and not part.rows for part in dataset.plan.parts):
+    if any(part.frames and not part.settings for part in dataset.plan.parts):
         return {category.id: category.id for category in dataset.categories}
     return official_ids(dataset.categories)
 

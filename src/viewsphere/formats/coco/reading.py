@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import hashlib
 import json
-import math
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -22,7 +22,11 @@ from viewsphere.store import Category
 from viewsphere.store.foreign import ForeignDataset, ForeignFrame, foreign_object
 
 MOST_SHOWN = 10
-LARGEST_ID = 2**31
+LARGEST_ID = 2**63
+LARGEST_CATEGORY = 2**31
+"""Ids are below these; COCO's own crowds have annotation ids of twelve digits."""
+
+LARGEST_NUMBER = 2**53
 MOST_IMAGES_BESIDE = 10
 """How many image sizes away a polygon's corner may lie."""
 
@@ -36,7 +40,10 @@ def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
     what is broken is left out and told.
     """
     files = _instances_files(path)
-    parts = [_read_split(file, path if path.is_dir() else path.parent) for file in files]
+    root = path if path.is_dir() else path.parent
+    if path.is_file() and root.resolve().name == "annotations":
+        root = root.resolve().parent
+    parts = [_read_split(file, root) for file in files]
     problems = [problem for part in parts for problem in part.problems]
     problems += _clashes(parts)
     if problems and not keep_going:
@@ -48,7 +55,7 @@ def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
     categories = {c.id: c for part in parts for c in part.categories.values()}
     return ForeignDataset(
         name=path.resolve().stem,
-        digest=_digest(files),
+        digest=_digest(files, problems),
         categories=tuple(categories[i] for i in sorted(categories)),
         splits=tuple(part.split for part in parts),
         channels=("rgb",),
@@ -60,10 +67,13 @@ def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
     )
 
 
-def _digest(files: Sequence[Path]) -> str:
+def _digest(files: Sequence[Path], left_out: Sequence[str]) -> str:
+    """Of the files, and of what of them is not used."""
     digest = hashlib.sha256()
     for file in files:
         digest.update(f"{file.name}\0{hashlib.sha256(file.read_bytes()).hexdigest()}".encode())
+    for problem in left_out:
+        digest.update(problem.encode(errors="backslashreplace"))
     return digest.hexdigest()
 
 
@@ -91,7 +101,7 @@ def _instances_files(path: Path) -> list[Path]:
 
 def _read_split(file: Path, root: Path) -> _Split:
     try:
-        data = json.loads(file.read_text("utf-8"))
+        data = json.loads(file.read_text("utf-8-sig"))
     except (OSError, ValueError, RecursionError) as error:
         raise StoreError(f"{file}: expected COCO's JSON; found: {error}") from None
     if not isinstance(data, dict) or not all(isinstance(data.get(k), list) for k in ("images", "annotations", "categories")):
@@ -101,7 +111,7 @@ def _read_split(file: Path, root: Path) -> _Split:
     problems: list[str] = []
     categories = {
         c["id"]: Category(c["id"], str(c["name"]), str(c.get("supercategory") or ""))
-        for c in _with_ids(lists["categories"], "category", file, problems)
+        for c in _with_ids(lists["categories"], "category", file, problems, LARGEST_CATEGORY)
         if isinstance(c.get("name"), str) or problems.append(f"{file}: category {c['id']}: expected a name; found none")
     }
     images: list[tuple[dict[str, Any], Path]] = []
@@ -111,7 +121,7 @@ def _read_split(file: Path, root: Path) -> _Split:
         if problem or place is None:
             problems.append(f"{file}: image {image['id']}: {problem}")
         else:
-            images.append((image, place))
+            images.append(({**image, "width": int(image["width"]), "height": int(image["height"])}, place))
     sizes = {image["id"]: (image["width"], image["height"]) for image, _ in images}
     known = {image["id"] for image in lists["images"] if isinstance(image, dict) and _is_id(image.get("id"))}
     annotations: defaultdict[int, list[dict[str, Any]]] = defaultdict(list)
@@ -124,16 +134,18 @@ def _read_split(file: Path, root: Path) -> _Split:
     return _Split(split, file, categories, tuple(images), annotations, tuple(problems))
 
 
-def _is_id(value: object) -> bool:
-    return isinstance(value, int) and not isinstance(value, bool) and 0 <= value < LARGEST_ID
+def _is_id(value: object, largest: int = LARGEST_ID) -> bool:
+    return isinstance(value, int) and not isinstance(value, bool) and 0 <= value < largest
 
 
-def _with_ids(values: Sequence[Any], what: str, file: Path, problems: list[str]) -> Iterator[dict[str, Any]]:
+def _with_ids(
+    values: Sequence[Any], what: str, file: Path, problems: list[str], largest: int = LARGEST_ID
+) -> Iterator[dict[str, Any]]:
     """Those that are mappings with an id of their own."""
     seen: set[int] = set()
     for i, value in enumerate(values):
         number = value.get("id") if isinstance(value, dict) else None
-        if not _is_id(number):
+        if not _is_id(number, largest):
             problems.append(f"{file}: {what} number {i}: expected a whole number as id; found {number!r}")
         elif number in seen:
             problems.append(f"{file}: {what} {number}: expected every id once; found it again")
@@ -148,8 +160,9 @@ def _image_file(image: dict[str, Any], root: Path, split: str, beside: Path) -> 
         return None
     for folder in (root / split, root / "images" / split, root / "images", root, beside):
         place = folder / name
-        if place.is_file() and place.resolve().is_relative_to(root.resolve()):
-            return place
+        with suppress(OSError):  # no file system has a name that long
+            if place.is_file() and place.resolve().is_relative_to(root.resolve()):
+                return place
     return None
 
 
@@ -170,15 +183,21 @@ def _image_problem(image: dict[str, Any], place: Path | None) -> str | None:
 def _annotation_problem(
     annotation: dict[str, Any], categories: dict[int, Category], images: set[int], sizes: dict[int, tuple[int, int]]
 ) -> str | None:
-    if annotation.get("image_id") not in images:
+    if not _is_id(annotation.get("image_id")) or annotation["image_id"] not in images:
         return f"expected the id of an image; found {annotation.get('image_id')!r}"
-    if annotation.get("category_id") not in categories:
+    if not _is_id(annotation.get("category_id")) or annotation["category_id"] not in categories:
         return f"expected the id of a category; found {annotation.get('category_id')!r}"
     box, outline = annotation.get("bbox"), annotation.get("segmentation")
-    if box is not None and not _are_numbers(box, 4):
+    if box is not None and not (_are_numbers(box, 4) and box[2] >= 0 <= box[3]):
         return f"expected bbox [x, y, width, height]; found {box!r:.60}"
     if not box and not outline:
         return "expected a bbox or a segmentation; found neither"
+    if annotation.get("area") is not None and not _are_numbers([annotation["area"]], 1):
+        return f"expected a number as area; found {annotation['area']!r:.60}"
+    try:
+        json.dumps(annotation, allow_nan=False)
+    except ValueError:
+        return "expected finite numbers; found NaN or infinity"
     size = sizes.get(annotation["image_id"])
     if outline and size:
         try:
@@ -190,7 +209,9 @@ def _annotation_problem(
 
 def _are_numbers(value: Any, count: int | None) -> bool:
     values = cast(list[Any], value) if isinstance(value, list) else []
-    return len(values) == (count or len(values)) and all(isinstance(v, (int, float)) and math.isfinite(v) for v in values)
+    return len(values) == (count or len(values)) and all(
+        isinstance(v, (int, float)) and abs(v) < LARGEST_NUMBER for v in values
+    )
 
 
 def _mask(outline: Any, size: tuple[int, int]) -> NDArray[np.bool_] | None:
@@ -249,12 +270,19 @@ def _sample(part: _Split, image: dict[str, Any], index: int) -> Sample:
             size,
             source,
             _mask(source.get("segmentation"), size),
-            _corners(source.get("bbox")),
+            _corners(source),
         )
         for number, source in enumerate(part.annotations.get(image["id"], ()), 1)
     )
     return Sample(index, part.split, None, None, objects, {}, {}, size)
 
 
-def _corners(box: list[float] | None) -> Box | None:
-    return None if box is None else (box[0], box[1], box[0] + box[2], box[1] + box[3])
+def _corners(source: dict[str, Any]) -> Box | None:
+    """The box that is given, else that around the polygons; None if neither is."""
+    if box := source.get("bbox"):
+        return box[0], box[1], box[0] + box[2], box[1] + box[3]
+    outline = source.get("segmentation")
+    if not isinstance(outline, list):
+        return None
+    numbers = [float(v) for polygon in cast(list[list[float]], outline) for v in polygon[: len(polygon) // 2 * 2]]
+    return min(numbers[::2]), min(numbers[1::2]), max(numbers[::2]), max(numbers[1::2])

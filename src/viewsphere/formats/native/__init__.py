@@ -121,6 +121,7 @@ def _pose(dataset: Dataset, sample: Sample) -> dict[str, Any]:
 
 def _rendered(sample: Sample, o: ObjectAnnotation, mask: str, files: Mapping[str, str]) -> dict[str, Any]:
     """An object's entry; all objects of a frame share the files of its first one, but for the mask."""
+    lens = sample.camera.distortion
     return {
         "path_rgb": files.get("rgb"),
         "path_mask": mask,
@@ -134,4 +135,5 @@ def _rendered(sample: Sample, o: ObjectAnnotation, mask: str, files: Mapping[str
         "id_model": o.key,
         "split": sample.split,
         "transformation_matrix": transformation_matrix(sample.camera),
+        **({"distortion": lens.model_dump(mode="json")} if lens else {}),
     }

@@ -18,7 +18,7 @@ from viewsphere.errors import StoreError
 from viewsphere.geometry.box import box_size
 from viewsphere.geometry.image_files import decode_tiff
 from viewsphere.geometry.mask import mask_box, mask_polygons
-from viewsphere.model.camera import Camera, Intrinsics
+from viewsphere.model.camera import Camera, Distortion, Intrinsics
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.model.shot import Pose
 from viewsphere.store import Category, ModelInfo
@@ -26,6 +26,10 @@ from viewsphere.store.foreign import ForeignDataset, ForeignFrame, ForeignModel,
 
 MOST_SHOWN = 10
 RIGHT_ANGLES = 1e-3
+LONGEST_NAME = 150
+LARGEST_POSE = 10_000_000
+MISTAKES = (LookupError, TypeError, ValueError, AttributeError, OSError)
+"""What reading a JSON that is not as it should be raises."""
 
 
 def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
@@ -40,6 +44,7 @@ def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
     categories = _categories(vehicles)
     problems: list[str] = []
     frames = tuple(_frames(file.parent, vehicles, poses, problems))
+    models = tuple(_models(file.parent, vehicles, categories, problems))
     if problems and not keep_going:
         more = f"\nand {len(problems) - MOST_SHOWN} more" if len(problems) > MOST_SHOWN else ""
         raise StoreError("\n".join(problems[:MOST_SHOWN]) + more + "\nmend them, or leave them out with --keep-going")
@@ -47,7 +52,7 @@ def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
         raise StoreError(f"{file}: expected frames that can be used; found none")
     return ForeignDataset(
         name=file.parent.resolve().name,
-        digest=digest,
+        digest=hashlib.sha256("\n".join([digest, *problems]).encode()).hexdigest() if problems else digest,
         categories=tuple(categories.values()),
         splits=tuple(dict.fromkeys(frame.split for frame in frames)),
         channels=("rgb", "depth") if all(frame.depth for frame in frames) else ("rgb",),
@@ -55,7 +60,7 @@ def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
         poses=1 + max(frame.pose.index for frame in frames),
         max_objects=max(len(frame.objects) for frame in frames),
         frames=partial(_samples, frames, categories),
-        models=tuple(_models(file.parent, vehicles, categories)),
+        models=models,
         left_out=tuple(problems),
     )
 
@@ -75,13 +80,21 @@ class _Frame:
 def _load(file: Path) -> tuple[dict[str, Any], dict[str, Any], str]:
     try:
         text = file.read_bytes()
-        data = json.loads(text)
+        data = json.loads(text, parse_constant=lambda _: None)  # NaN is what is not known
     except (OSError, ValueError, RecursionError) as error:
         raise StoreError(f"{file}: expected the native format's JSON; found: {error}") from None
     if not isinstance(data, dict) or not all(isinstance(data.get(k), dict) for k in ("vehicles", "poses")):
         raise StoreError(f"{file}: expected mappings of vehicles and poses; found something else")
     lists = cast(dict[str, dict[str, Any]], data)
+    for key, vehicle in lists["vehicles"].items():
+        if not isinstance(vehicle, dict) or not _is_name(key):
+            raise StoreError(f"{file}: expected vehicles by names that a folder can have; found {key!r:.60}")
     return lists["vehicles"], lists["poses"], hashlib.sha256(text).hexdigest()
+
+
+def _is_name(text: str) -> bool:
+    """Whether this names one folder, and leads nowhere else."""
+    return bool(text.strip(". ")) and not set(text) & set("/\\\0") and len(text.encode()) <= LONGEST_NAME
 
 
 def _categories(vehicles: Mapping[str, Any]) -> dict[str, Category]:
@@ -92,61 +105,81 @@ def _categories(vehicles: Mapping[str, Any]) -> dict[str, Category]:
     return categories
 
 
-def _models(root: Path, vehicles: dict[str, Any], categories: Mapping[str, Category]) -> Iterator[ForeignModel]:
+def _models(
+    root: Path, vehicles: dict[str, Any], categories: Mapping[str, Category], problems: list[str]
+) -> Iterator[ForeignModel]:
     """The models whose files are there."""
     for key, vehicle in vehicles.items():
         file = root / str(vehicle.get("model_file"))
         if not file.is_file() or not file.resolve().is_relative_to(root.resolve()):
             continue
-        category = categories[str(vehicle.get("category") or "object")]
-        box = _vertices(vehicle.get("bbox3D_model"), 3)
-        glb = file.with_suffix(".glb")
-        real = vehicle.get("real_size") or {}
-        width, height, length = (real.get(side) for side in ("width", "height", "length"))
-        info = ModelInfo(
-            key=key,
-            category=category.name,
-            supercategory=category.supercategory,
-            category_id=category.id,
-            obj=file.name,
-            glb=glb.name if glb.is_file() else file.name,
-            box3d_object=box,
-            size=box_size(box),
-            real_size=(width, height, length) if width and height and length else None,
-            parts=(),
-            triangles=0,
-            digest=hashlib.sha256(file.read_bytes()).hexdigest(),
-        )
-        yield ForeignModel(info, file.parent)
+        try:
+            yield _model(key, file, vehicle, categories[str(vehicle.get("category") or "object")])
+        except MISTAKES as error:
+            problems.append(f"{root}: vehicle {key}: expected its bbox3D_model and real_size; found {error}")
+
+
+def _model(key: str, file: Path, vehicle: dict[str, Any], category: Category) -> ForeignModel:
+    box = _vertices(vehicle["bbox3D_model"], 3)
+    if np.isnan(box).any():
+        raise ValueError("a box that lacks vertices")
+    glb = file.with_suffix(".glb")
+    real = vehicle.get("real_size") or {}
+    width, height, length = (real.get(side) for side in ("width", "height", "length"))
+    info = ModelInfo(
+        key=key,
+        category=category.name,
+        supercategory=category.supercategory,
+        category_id=category.id,
+        obj=file.name,
+        glb=glb.name if glb.is_file() else file.name,
+        box3d_object=box,
+        size=box_size(box),
+        real_size=(float(width), float(height), float(length)) if width and height and length else None,
+        parts=(),
+        triangles=0,
+        digest=hashlib.sha256(file.read_bytes()).hexdigest(),
+    )
+    return ForeignModel(info, file.parent)
 
 
 def _frames(root: Path, vehicles: dict[str, Any], poses: dict[str, Any], problems: list[str]) -> Iterator[_Frame]:
     """Objects that share a picture make a frame; the rest of a broken one is left out with it."""
     for number, pose in poses.items():
         pictures: dict[str, list[tuple[str, dict[str, Any]]]] = {}
-        for name, entry in pose.get("vehicles_rendered", {}).items():
-            pictures.setdefault(str(entry.get("path_rgb")), []).append((name, entry))
+        try:
+            for name, entry in pose.get("vehicles_rendered", {}).items():
+                pictures.setdefault(str(entry.get("path_rgb")), []).append((name, entry))
+        except AttributeError:
+            problems.append(f"{root}: pose {number}: expected mappings of what was rendered; found something else")
+            continue
         for entries in pictures.values():
             try:
-                yield _frame(root / pose.get("folder", f"Pose-{number}"), number, pose, entries, vehicles)
-            except (LookupError, TypeError, ValueError, OSError) as error:
+                yield _frame(root, number, pose, entries, vehicles)
+            except MISTAKES as error:
                 problem = f"found no {error}" if isinstance(error, KeyError) else error
                 problems.append(f"{root}: pose {number}, {entries[0][0]}: expected a frame that can be read; {problem}")
 
 
 def _frame(
-    folder: Path, number: str, pose: dict[str, Any], entries: list[tuple[str, dict[str, Any]]], vehicles: dict[str, Any]
+    root: Path, number: str, pose: dict[str, Any], entries: list[tuple[str, dict[str, Any]]], vehicles: dict[str, Any]
 ) -> _Frame:
     first = entries[0][1]
+    folder = root / pose.get("folder", f"Pose-{number}")
+    matrix = first.get("transformation_matrix") or pose["transformation_matrix"]
+    camera = _camera(matrix, first["render_resolution"], first.get("distortion"))
+    split = str(first.get("split") or "train")
+    if not _is_name(split) or not 0 <= int(number) < LARGEST_POSE:
+        raise ValueError(f"found pose {number} of split {split!r}")
     objects: list[tuple[str, str, Path, dict[str, Any]]] = []
     for name, entry in entries:
         key = str(entry.get("id_model", name))
         category = str(vehicles[key].get("category") or "object")
-        objects.append((key, category, _there(folder / "MASK" / entry["path_mask"]), entry))
+        objects.append((key, category, _picture(root, folder / "MASK" / entry["path_mask"], camera), entry))
+        _known(entry)
     depth = folder / "DEPTH" / str(first.get("path_depth"))
-    camera = _camera(first.get("transformation_matrix") or pose["transformation_matrix"], first["render_resolution"])
     return _Frame(
-        split=str(first.get("split") or "train"),
+        split=split,
         pose=Pose(
             index=int(number),
             azimuth_deg=pose["azimuth"],
@@ -156,15 +189,25 @@ def _frame(
             category=pose.get("pose_category", ""),
         ),
         camera=camera,
-        rgb=_there(folder / "RGB" / first["path_rgb"]),
-        depth=depth if _is_depth(depth, camera) else None,
+        rgb=_picture(root, folder / "RGB" / first["path_rgb"], camera),
+        depth=depth if _is_below(depth, root) and _is_depth(depth, camera) else None,
         objects=tuple(objects),
     )
 
 
-def _there(file: Path) -> Path:
-    if not file.is_file():
+def _is_below(file: Path, root: Path) -> bool:
+    return file.resolve().is_relative_to(root.resolve())
+
+
+def _picture(root: Path, file: Path, camera: Camera) -> Path:
+    """The file, if it is an image of the camera's size below `root`."""
+    from PIL import Image
+
+    if not file.is_file() or not _is_below(file, root):
         raise FileNotFoundError(f"found no {file}")
+    with Image.open(file) as image:
+        if image.size != (camera.width, camera.height):
+            raise ValueError(f"found {file} of {image.size[0]} x {image.size[1]} pixels, not {camera.width} x {camera.height}")
     return file
 
 
@@ -177,7 +220,7 @@ def _is_depth(file: Path, camera: Camera) -> bool:
     return array.dtype == np.float32 and array.shape == (camera.height, camera.width)
 
 
-def _camera(matrix: Mapping[str, Any], resolution: list[int]) -> Camera:
+def _camera(matrix: Mapping[str, Any], resolution: list[int], distortion: dict[str, Any] | None) -> Camera:
     k, motion = np.array(matrix["K"], np.float64), np.array(matrix["RT"], np.float64)
     if k.shape != (3, 3) or motion.shape != (3, 4) or not (np.isfinite(k).all() and np.isfinite(motion).all()):
         raise ValueError("found no K (3, 3) and RT (3, 4) of numbers")
@@ -185,7 +228,9 @@ def _camera(matrix: Mapping[str, Any], resolution: list[int]) -> Camera:
     if np.abs(rotation @ rotation.T - np.eye(3)).max() > RIGHT_ANGLES or np.linalg.det(rotation) < 0:
         raise ValueError("found an RT without a rotation")
     width, height = resolution
-    lens = Intrinsics(width=width, height=height, fx=k[0, 0], fy=k[1, 1], cx=k[0, 2], cy=k[1, 2], skew=k[0, 1])
+    bent = Distortion.model_validate(distortion) if distortion else None
+    size = {"width": width, "height": height}
+    lens = Intrinsics(**size, fx=k[0, 0], fy=k[1, 1], cx=k[0, 2], cy=k[1, 2], skew=k[0, 1], distortion=bent)
     return Camera(lens, rotation, motion[:, 3])
 
 
@@ -202,8 +247,7 @@ def _samples(frames: tuple[_Frame, ...], categories: Mapping[str, Category]) -> 
 
 def _object(number: int, category: Category, key: str, mask: NDArray[np.bool_], entry: dict[str, Any]) -> ObjectAnnotation:
     """An object, and what COCO would say of it."""
-    pixels = _vertices(entry.get("bbox_3D_pxs"), 2)
-    visibility, truncation = entry.get("visibility"), entry.get("truncation")
+    pixels, visibility, truncation = _known(entry)
     tight = mask_box(mask) or (0, 0, 0, 0)
     source = {
         "iscrowd": 0,
@@ -225,9 +269,16 @@ def _object(number: int, category: Category, key: str, mask: NDArray[np.bool_], 
         key=key,
         box3d_pixels=pixels,
         box3d_in_front=~np.isnan(pixels[:, 0]),
-        visibility=math.nan if visibility is None else float(visibility),
-        truncation=math.nan if truncation is None else float(truncation),
+        visibility=math.nan if visibility is None else visibility,
+        truncation=math.nan if truncation is None else truncation,
     )
+
+
+def _known(entry: dict[str, Any]) -> tuple[NDArray[np.float64], float | None, float | None]:
+    """3D box in pixels (8, 2), visibility and truncation, as far as they are given; raises for what is none."""
+    shares = entry.get("visibility"), entry.get("truncation")
+    visibility, truncation = (None if share is None else float(share) for share in shares)
+    return _vertices(entry.get("bbox_3D_pxs"), 2), visibility, truncation
 
 
 def _mask(file: Path, size: tuple[int, int]) -> NDArray[np.bool_]:
@@ -250,4 +301,6 @@ def _vertices(named: Mapping[str, Mapping[str, list[float] | None]] | None, size
         for vertex, point in face.items():
             if point is not None:
                 points[int(vertex)] = point
+    if np.isinf(points).any():
+        raise ValueError("found an infinite vertex")
     return points
