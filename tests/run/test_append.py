@@ -190,6 +190,13 @@ def test_several_appends_follow_one_another(out):
     assert tree_hash(out) == unchanged
 
 
+def test_a_model_that_is_something_else_is_refused_though_nothing_is_new(out):
+    before = tree_hash(out)
+    with pytest.raises(StoreError, match=r"expected category 'hair drier' of model 'hair_drier_000'.* found 'blower'"):
+        generate(recipe(models=[{**DRIER, "category": "blower"}]), out, append=True)
+    assert tree_hash(out) == before
+
+
 def test_appending_nothing_new_says_so(out):
     before = tree_hash(out)
     part = recipe(models=models(1), viewpoints={"azimuth": [120], "elevation": [50], "distance": 1.0})

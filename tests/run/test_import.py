@@ -13,6 +13,8 @@ from viewsphere.errors import StoreError, UserError
 from viewsphere.run.generate import export
 from viewsphere.run.importing import import_dataset
 from viewsphere.run.merging import merge
+from viewsphere.sampling.extension import extend
+from viewsphere.sampling.plan import plan
 
 SIZE = (40, 30)
 
@@ -162,6 +164,14 @@ BROKEN = [
     (("annotations", 1, "segmentation", "counts"), "zzzz", r"annotation 51: expected a segmentation of COCO"),
     (("annotations", 1, "segmentation"), 3, r"annotation 51: expected a segmentation of COCO"),
     (("categories", 0, "name"), None, r"category 17: expected a name; found none"),
+    (("categories", 0, "id"), 2**31, r"category number 0: expected a whole number as id; found 2147483648"),
+    (("annotations", 0, "image_id"), [7], r"annotation 50: expected the id of an image; found \[7\]"),
+    (("annotations", 0, "category_id"), {}, r"annotation 50: expected the id of a category; found {}"),
+    (("annotations", 0, "bbox"), [9, 9, -2, 3], r"annotation 50: expected bbox"),
+    (("annotations", 0, "bbox"), [10**400, 9, 2, 3], r"annotation 50: expected bbox"),
+    (("annotations", 0, "area"), "big", r"annotation 50: expected a number as area; found 'big'"),
+    (("annotations", 0, "score"), float("nan"), r"annotation 50: expected finite numbers; found NaN"),
+    (("images", 0, "file_name"), "a" * 5000, r"image 7: expected its file below the folder"),
 ]
 
 
@@ -175,6 +185,64 @@ def test_what_is_broken_is_named_and_can_be_left_out(tmp_path, path, value, mess
     assert foreign.left_out
     report = check(Dataset(tmp_path / "out"))
     assert report.ok, report.findings
+
+
+def test_ids_of_twelve_digits_and_sizes_with_a_point_are_legal(tmp_path):
+    """COCO's own crowds have ids like 900100448263."""
+
+    def change(data):
+        data["images"][0] |= {"id": 900100448263, "width": 40.0}
+        for annotation in data["annotations"][:2]:
+            annotation |= {"id": annotation["id"] + 900100000000, "image_id": 900100448263}
+
+    import_dataset("coco", coco(tmp_path / "real", change), tmp_path / "out")
+    assert [len(sample.objects) for sample in Dataset(tmp_path / "out")] == [2, 0, 1]
+
+
+def test_a_tiny_polygon_without_a_box_goes_out_again(tmp_path):
+    def change(data):
+        data["annotations"] = [{"id": 1, "image_id": 7, "category_id": 3, "segmentation": [[5.1, 5, 5.3, 5, 5.3, 5.2]]}]
+
+    import_dataset("coco", coco(tmp_path / "real", change), tmp_path / "out")
+    export(tmp_path / "out", ["coco"])
+    assert Dataset(tmp_path / "out")[0].objects[0].box2d == (5.1, 5, 5.3, 5.2)
+    written = json.loads((tmp_path / "out" / "coco" / "annotations" / "instances_train.json").read_text())
+    assert [a["segmentation"] for a in written["annotations"]] == [[[5.1, 5, 5.3, 5, 5.3, 5.2]]]
+
+
+def test_sixteen_bits_of_grey_are_not_white(tmp_path):
+    source = coco(tmp_path / "real", lambda data: data["images"][0].update(file_name="deep.png"))
+    deep = np.arange(1200, dtype=np.uint16).reshape(30, 40) * 54
+    Image.fromarray(deep).save(source / "train" / "deep.png")
+    import_dataset("coco", source, tmp_path / "out")
+    assert np.array_equal(Dataset(tmp_path / "out")[0].rgb, np.repeat((deep >> 8)[..., None], 3, axis=2))
+
+
+def test_one_file_of_the_annotations_folder_finds_its_images(tmp_path):
+    source = coco(tmp_path / "real") / "annotations" / "instances_train.json"
+    assert import_dataset("coco", source, tmp_path / "out").count == 3
+
+
+def test_what_was_left_out_and_mended_is_another_data_set(tmp_path):
+    source = coco(tmp_path / "real")
+    photo = source / "train" / "photo 12.jpg"
+    photo.rename(tmp_path / "aside.jpg")
+    assert import_dataset("coco", source, tmp_path / "out", keep_going=True).count == 2
+    (tmp_path / "aside.jpg").rename(photo)
+    with pytest.raises(StoreError, match="choose another output folder"):
+        import_dataset("coco", source, tmp_path / "out")
+
+
+def test_imported_categories_of_one_name_stay_two_when_others_are_added(tmp_path):
+    def change(data):
+        data["categories"][0]["name"] = "car"
+
+    import_dataset("coco", coco(tmp_path / "real", change), tmp_path / "out")
+    models = [{"source": "zoo:hair_drier", "category": name} for name in ("drier", "car")]
+    planned = plan(small_recipe(models=[models[0], {**models[1], "supercategory": "vehicle", "name": "a"}]))
+    portion = extend(planned, Dataset(tmp_path / "out").plan)
+    assert [(c.id, c.name) for c in portion.record.categories] == [(3, "car"), (17, "car"), (18, "drier")]
+    assert [spec.category_id for spec in portion.model_specs] == [18, 3]
 
 
 def test_what_is_no_data_set_says_so(tmp_path):
@@ -204,6 +272,55 @@ def test_a_native_frame_without_its_mask_is_named(small_run, tmp_path):
         import_dataset("native", source, tmp_path / "out")
     foreign = import_dataset("native", source, tmp_path / "out", keep_going=True)
     assert (foreign.count, len(foreign.left_out)) == (11, 1)
+
+
+def elsewhere(data):
+    data["vehicles"]["../../../../evil"] = data["vehicles"].pop("hair_drier_000")
+
+
+def entry(name, value):
+    def change(data):
+        next(iter(data["poses"]["2"]["vehicles_rendered"].values()))[name] = value
+
+    return change
+
+
+HOSTILE = [
+    (elsewhere, r"expected vehicles by names that a folder can have; found '../../../../evil'"),
+    (entry("split", "../../evil"), r"pose 2, .*found pose 2 of split '../../evil'"),
+    (entry("path_rgb", "../../../secret.png"), r"pose 2, .*found no .*secret.png"),
+    (entry("path_mask", "../../../secret.png"), r"pose 2, .*found no .*secret.png"),
+    (entry("render_resolution", [9, 9]), r"pose 2, .*96 x 72 pixels, not 9 x 9"),
+    (entry("visibility", "x"), r"pose 2, .*could not convert"),
+    (entry("bbox_3D_pxs", {"front": {"99": [1, 2]}}), r"pose 2, .*out of bounds"),
+    (lambda data: data["poses"].update({"8": [1]}), r"pose 8: expected mappings of what was rendered"),
+    (lambda data: data["poses"].update({"999999999999": data["poses"].pop("2")}), r"found pose 999999999999"),
+    (lambda data: data["vehicles"]["hair_drier_000"].update(bbox3D_model=3), r"vehicle hair_drier_000: expected its bbox3D"),
+]
+
+
+@pytest.mark.parametrize(("change", "message"), HOSTILE)
+def test_a_hostile_native_data_set_is_refused_before_anything_is_written(small_run, tmp_path, change, message):
+    import os
+    import shutil
+
+    source = shutil.copytree(small_run / "native", tmp_path / "native", copy_function=os.link)
+    Image.new("RGB", (96, 72)).save(tmp_path / "secret.png")
+    data = json.loads((source / "dataset1.json").read_text())
+    change(data)
+    (source / "dataset1.json").unlink()
+    (source / "dataset1.json").write_text(json.dumps(data))
+    with pytest.raises(StoreError, match=message):
+        import_dataset("native", source, tmp_path / "out")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["native", "secret.png"]
+
+
+def test_a_native_data_set_keeps_the_lens_that_bends(tmp_path):
+    bent = {"size": [96, 72], "fov_deg": 35, "distortion": {"model": "brown_conrady", "coefficients": [-0.2, 0.05, 0, 0]}}
+    one = {"azimuth": 30, "elevation": 15, "distance": 1.0}
+    generate(small_recipe(camera=bent, viewpoints=one, formats=["native"]), tmp_path / "bent")
+    import_dataset("native", tmp_path / "bent" / "native", tmp_path / "out")
+    assert Dataset(tmp_path / "out")[0].camera.intrinsics == Dataset(tmp_path / "bent")[0].camera.intrinsics
 
 
 def test_the_recipe_can_be_appended_to_an_imported_set_only_by_merging(small_run, tmp_path):

@@ -4,11 +4,13 @@ import json
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from small import small_recipe, tree_hash
 from viewsphere import Dataset, generate
 from viewsphere.check import check
 from viewsphere.errors import StoreError, UserError
+from viewsphere.formats.coco import category_ids
 from viewsphere.run.generate import export
 from viewsphere.run.merging import merge
 
@@ -148,3 +150,52 @@ def test_an_unfinished_data_set_is_refused_unless_asked_for(sources, small_datas
     joined = merge([sources[0], small_dataset.root], tmp_path / "e", mixed=True, keep_going=True)
     assert len(joined) == joined.plan.frames == 22
     assert [s.index for s in joined] == list(range(22))
+    known = [
+        (key, pose) for row in joined.plan.parts[1].rows for key in row.models for a, b in row.poses for pose in range(a, b)
+    ]
+    assert known == [(s.objects[0].key, s.pose.index) for s in joined][12:]
+    assert joined.plan.parts[1].digest == ""  # else its recipe would take it for whole
+    assert category_ids(joined) == category_ids(small_dataset) != {1: 1}
+
+
+def test_channels_that_were_not_added_to_the_end_are_an_unfinished_data_set(sources, tmp_path):
+    import shutil
+
+    one = {"azimuth": 30, "elevation": 15, "distance": 1.0}
+    generate(recipe(viewpoints=one), tmp_path / "a")
+    more = ["rgb", "depth", "instances", "categories", "normals"]
+    generate(recipe(viewpoints=one, channels=more), tmp_path / "a", append=True)
+    grown = Dataset(tmp_path / "a")
+    shutil.rmtree(grown.store.shot_folder(next(row for row, _ in grown.plan.supplements)[0]))
+    with pytest.raises(StoreError, match=r"expected all channels, found 1 frames that lack those that were added last"):
+        merge([sources[0], tmp_path / "a"], tmp_path / "e", mixed=True)
+    assert not (tmp_path / "e").exists()
+
+
+def test_one_model_in_two_categories_is_two_models(sources, tmp_path):
+    blower = {"source": "zoo:hair_drier", "category": "blower", "count": 1, "scale": {"length": 0.3}}
+    viewpoints = {"azimuth": 30, "elevation": 15, "distance": 1.0}
+    generate(recipe(name="other category", models=[blower], viewpoints=viewpoints), tmp_path / "d")
+    generate(recipe(name="capitals", models=[{**blower, "category": "Hair Drier"}], viewpoints=viewpoints), tmp_path / "f")
+    joined = merge([sources[0], tmp_path / "d", tmp_path / "f"], tmp_path / "e")
+    assert [(info.key, info.category) for info in joined.models] == [
+        ("hair_drier_000", "hair drier"),
+        ("hair_drier_001", "hair drier"),
+        ("hair_drier_000-2", "blower"),
+    ]
+    assert [o.category for s in joined for o in s.objects][12:] == ["blower", "hair drier"]
+    report = check(joined)
+    assert report.ok, report.findings
+
+
+def test_scenery_goes_along(tmp_path):
+    """Both have a plane of one name, of different heights; rays are cast at the right one."""
+    Image.new("RGB", (8, 8), (200, 0, 0)).save(tmp_path / "red.png")
+    one = {"azimuth": 30, "elevation": 15, "distance": 1.0}
+    for name, height in (("a", 0.3), ("b", 0.6)):
+        planes = [{"image": str(tmp_path / "red.png"), "height": height, "at": [0, 0.5, 0]}]
+        generate(recipe(name=name, viewpoints=one, scene={"ground": True, "planes": planes}), tmp_path / name)
+    report = check(merge([tmp_path / "a", tmp_path / "b"], tmp_path / "e"))
+    assert report.ok, report.findings
+    assert report.checked["surface"] == 4
+    assert not any("surface" in note for note in report.notes)

@@ -156,7 +156,7 @@ def test_what_cannot_stand_there_is_refused_in_one_line(files, tmp_path):
     picture = str(files / "pictures" / "a.png")
     assert "planes[0].at" in problem({"planes": {"image": picture, "height": 1, "at": [0, 0, 0]}})
     assert "inside its box" in problem({"company": {"layout": [[2, 0, 0]]}}, {"azimuth": 90, "elevation": 0, "distance": 1})
-    around = {"azimuth": {"start": 0, "stop": 360, "step": 10}, "elevation": 0, "distance": 0.9}
+    around = {"azimuth": {"start": 0, "stop": 360, "step": 10}, "elevation": 0, "distance": 0.3}
     company = {"count": 1, "gap": 0.1, "draw": "per_frame"}
     assert "outside of all that is placed; found it at (" in problem({"company": company}, around)
     (tmp_path / "bad.glb").write_text("no model")

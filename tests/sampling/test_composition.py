@@ -135,7 +135,7 @@ def test_on_a_road_that_runs_aslant_there_is_as_much_room(tiny):
     shot = plan(recipe(scene={"place": place, "company": {"layout": [[float(v) for v in s] for s in spots]}})).shot(0, box_of)
     for placement, spot in zip(shot.placements[1:3], spots, strict=True):
         np.testing.assert_allclose(np.array(placement.world_from_object)[:2, 3], spot[:2])
-    across = [[float(v) for v in (4 * np.array([along[1], -along[0]])).tolist() + [0.0]]]
+    across = [[4 * float(along[1]), -4 * float(along[0]), 0.0]]
     with pytest.raises(RecipeError, match="free part of the place"):
         plan(recipe(scene={"place": place, "company": {"layout": across}})).shot(0, box_of)
 

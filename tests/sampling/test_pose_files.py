@@ -145,6 +145,12 @@ def test_nerfstudio_is_opengl_camera_to_world_and_brings_its_lens(tmp_path):
     assert planned.intrinsics == expected
     file.write_text(json.dumps({"camera_angle_x": 0.8, "w": 800, "h": 800, "frames": frames}))
     assert make(file, camera={"of_viewpoints": True}).intrinsics.fx == pytest.approx(400 / math.tan(0.4))
+    file.write_text(json.dumps({"w": 640, "h": 480, "fl_x": 500, "k1": 0.1, "k4": 0.2, "is_fisheye": True, "frames": frames}))
+    fisheye = make(file, camera={"of_viewpoints": True}).intrinsics.distortion
+    assert fisheye == Distortion(model="fisheye", coefficients=(0.1, 0, 0, 0.2))
+    file.write_text(json.dumps({"w": 640, "h": 480, "fl_x": 500, "k4": 0.2, "frames": frames}))
+    with pytest.raises(RecipeError, match=r"frames\[0\]: k4: expected 0, .*; found 0.2"):
+        make(file)
 
 
 def colmap(folder, matrices, camera="1 OPENCV 640 480 500 510 321 239 0.1 0.02 0.003 0.004"):

@@ -139,6 +139,21 @@ def test_sails_fill_to_leeward_and_are_closed(lee: float) -> None:
     assert 0.3 < (sides > 0).mean() < 0.7
 
 
+def test_the_tiller_stands_on_something() -> None:
+    tillers = 0
+    for seed in range(30):
+        mesh = zoo.build("boat", np.random.default_rng(seed))
+        if "rudder_stock" in mesh.parts:
+            stock, *bases = (
+                mesh.vertices[np.unique(mesh.triangles[mesh.triangle_part == mesh.parts.index(name)])]
+                for name in ("rudder_stock", "cockpit", "deck")
+            )
+            aft, floor = bases[0][:, 1].max(), bases[0][:, 2].min()
+            assert stock[:, 2].min() < (floor if stock[:, 1].mean() < aft else bases[1][:, 2].max())
+            tillers += 1
+    assert tillers > 5
+
+
 def test_one_seed_gives_one_boat() -> None:
     a, b, other = (zoo.build("boat", np.random.default_rng(seed)) for seed in (5, 5, 6))
     for name in ("vertices", "triangles", "normals", "triangle_material", "triangle_part"):

@@ -89,6 +89,8 @@ def generate(
     else:
         store.open_for(portion.record)
     with recipe.located(), store.occupied():
+        if portion.adds_nothing:
+            _compare_models(portion, store, workers)
         rendered, skipped = (0, {}) if portion.adds_nothing else _render_part(portion, store, workers, keep_going, tell)
         notes = export(store.root, wanted, listener=tell)
     if append and not rendered:
@@ -148,6 +150,15 @@ def _prepare_models(portion: Portion, store: Store, workers: int, keep_going: bo
     if stops or own <= failed.keys():
         raise _joined(stops or list(failed.values()))
     return {key: str(error) for key, error in failed.items()}
+
+
+def _compare_models(portion: Portion, store: Store, workers: int) -> None:
+    """Raises StoreError where a model is no longer the one that the data set shows."""
+    specs = [spec for spec in portion.model_specs if store.model_info(spec.key) is not None]
+    jobs = [Job(m.key, m.key, lambda m=m: Task("same model", m.key, m.key, m.model_dump_json())) for m in specs]
+    errors = [outcome.error for outcome in run_jobs(jobs, store.root, min(workers, len(jobs))) if outcome.error]
+    if errors:
+        raise _joined(errors)
 
 
 def _distance_problems(planned: Plan, store: Store, failed: Container[str]) -> Iterator[tuple[str, ViewsphereError]]:

@@ -238,11 +238,10 @@ def _parts(source: _Source) -> Iterator[Part]:
 
 def _row_of(part: Part, first: int, count: int) -> Row:
     """Model and poses of a shot's frames, which are of one model."""
-    start = part.first
-    for row in part.rows:
-        if first < start + row.frames:
-            break
-        start += row.frames
+    rows = iter(part.rows)
+    start, row = part.first, next(rows)
+    while first >= start + row.frames:
+        start, row = start + row.frames, next(rows)
     model, pose = divmod(first - start, row.count)
     poses = [number for begin, stop in row.poses for number in range(begin, stop)][pose : pose + count]
     return Row((row.models[model],), tuple((number, number + 1) for number in poses))

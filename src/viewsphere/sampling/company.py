@@ -87,7 +87,12 @@ def companions(seed: int, spec: ModelSpec, others: Iterable[ModelSpec], count: i
 
 
 def layout(
-    entry: CompanyEntry, seed: int, specs: Sequence[ModelSpec], boxes: Sequence[Float], names: Names, free: Footprint | None = None
+    entry: CompanyEntry,
+    seed: int,
+    specs: Sequence[ModelSpec],
+    boxes: Sequence[Float],
+    names: Names,
+    free: Footprint | None = None,
 ) -> tuple[Matrix4, ...]:
     """Where each of `specs` stands, the first one at the origin, facing -Y; all on the floor.
 

@@ -69,4 +69,7 @@ def _rgb(data: bytes) -> NDArray[np.uint8]:
         with suppress(UserError):
             return image_files.decode_png(data)
     with Image.open(BytesIO(data)) as image:
+        if image.mode.startswith("I"):  # 16 bits of grey, which Pillow would cut off above 255
+            grey = (np.asarray(image) >> 8).astype(np.uint8)
+            return np.repeat(grey[..., None], 3, axis=2)
         return np.asarray(image.convert("RGB"))

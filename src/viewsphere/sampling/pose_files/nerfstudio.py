@@ -18,7 +18,8 @@ from viewsphere.sampling.pose_files.lens import one_lens
 from viewsphere.sampling.pose_files.lines import number, read_text
 from viewsphere.sampling.pose_files.motions import motion
 
-LENS_KEYS = ("w", "h", "fl_x", "fl_y", "cx", "cy", "k1", "k2", "k3", "k4", "p1", "p2", "camera_angle_x", "camera_model")
+NUMBERS = ("w", "h", "fl_x", "fl_y", "cx", "cy", "k1", "k2", "k3", "k4", "p1", "p2", "camera_angle_x")
+LENS_KEYS = (*NUMBERS, "camera_model", "is_fisheye")
 MODELS = ("OPENCV", "OPENCV_FISHEYE", "PINHOLE", "SIMPLE_PINHOLE")
 
 
@@ -60,7 +61,7 @@ def _lens(given: Mapping[str, Any], where: str) -> Intrinsics | None:
     width, height = given["w"], given["h"]
     if width is None or height is None:
         return None
-    values = {k: number(v, f"{where}: {k}") for k, v in given.items() if v is not None and k != "camera_model"}
+    values = {k: number(given[k], f"{where}: {k}") for k in NUMBERS if given[k] is not None}
     angle = values.get("camera_angle_x")
     fx = values.get("fl_x") or (focal_from_fov(angle, values["w"]) if angle and 0 < angle < math.pi else None)
     if fx is None or fx <= 0 or values["w"] < 1 or values["h"] < 1:
@@ -72,7 +73,7 @@ def _lens(given: Mapping[str, Any], where: str) -> Intrinsics | None:
         fy=values.get("fl_y") or fx,
         cx=values.get("cx", values["w"] / 2),
         cy=values.get("cy", values["h"] / 2),
-        distortion=_distortion(given["camera_model"], values, where),
+        distortion=_distortion("OPENCV_FISHEYE" if given["is_fisheye"] else given["camera_model"], values, where),
     )
 
 
@@ -82,6 +83,8 @@ def _distortion(model: object, values: Mapping[str, float], where: str) -> Disto
     k1, k2, k3, k4, p1, p2 = (values.get(k, 0.0) for k in ("k1", "k2", "k3", "k4", "p1", "p2"))
     if model == "OPENCV_FISHEYE":
         return Distortion(model="fisheye", coefficients=(k1, k2, k3, k4))
+    if k4:
+        raise RecipeError(f"{where}: k4: expected 0, OpenCV's lens has no such term; found {k4:g}: undistort the images first")
     if not any((k1, k2, k3, p1, p2)):
         return None
     return Distortion(model="brown_conrady", coefficients=(k1, k2, p1, p2, k3))

@@ -241,7 +241,10 @@ def _cockpit(p: SailingBoat, deck: Deck, well: Opening, c: Coats) -> list[Piece]
     middle = (0.03 - head[0], 0.5 * (y1 + end - 0.2) - head[1], 0.24)
     grip = head + np.array([(0, 0.05, 0.13), (0, -0.25, 0.2), middle, (0.05 - head[0], y1 - head[1], 0.2)])
     tiller = tube(smooth(grip, 5), np.linspace(0.03, 0.018, 16), 10)
-    stock = rod(head - np.array((0, -0.04, 0.1)), head + np.array((0, 0.04, 0.17)), 0.035, 12)
+    foot = head + np.array((0, 0.04, -0.1))
+    if foot[1] < end:  # in the cockpit, the stock comes up through its floor
+        foot[2] = well.floor - 0.01
+    stock = rod(foot, head + np.array((0, 0.04, 0.17)), 0.035, 12)
     return [*pieces, Piece("tiller", c.wood, tiller), Piece("rudder_stock", c.steel, stock)]
 
 
