@@ -73,6 +73,8 @@ def test_a_coco_data_set_comes_in_and_goes_out_as_it_was(tmp_path):
     assert {(c["id"], c["name"]) for c in now["categories"]} == {(17, "cat"), (3, "car")}
     by_old = {image["id"]: image for image in was["images"]}
     pictures = {new["id"]: old for new, old in zip(now["images"], by_old.values(), strict=True)}
+    for image in now["images"]:
+        assert (image["imported_file_name"], image["license"]) == (pictures[image["id"]]["file_name"], 3)
     for a, b in zip(now["annotations"], was["annotations"], strict=True):
         assert pictures[a["image_id"]]["id"] == b["image_id"]
     for image in now["images"]:

@@ -42,6 +42,7 @@ def sample_to_record(sample: Sample) -> dict[str, Any]:
             "t": camera.t.tolist(),
         },
         **({"size": sample.image_size} if sample.image_size else {}),
+        **({"source": dict(sample.source)} if sample.source is not None else {}),
         "objects": [_object_to_record(o) for o in sample.objects],
         "files": dict(sample.files),
     }
@@ -61,6 +62,7 @@ def sample_from_record(record: Mapping[str, Any], channels: Mapping[str, NDArray
         ),
         known_pose=pose and Pose.model_validate(pose),
         image_size=size and (int(size[0]), int(size[1])),
+        source=record.get("source"),
         objects=tuple(_object_from_record(o) for o in record["objects"]),
         channels=channels,
         files=files,

@@ -122,6 +122,7 @@ class Sample:
     channels: Mapping[str, NDArray[Any]]
     files: Mapping[str, str]  # channel -> path relative to the data set's root; empty in memory
     image_size: tuple[int, int] | None = None  # (width, height) where there is no camera to say it
+    source: Mapping[str, Any] | None = None  # what the imported data set says of the picture
 
     @property
     def camera(self) -> Camera:

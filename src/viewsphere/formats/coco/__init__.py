@@ -193,8 +193,10 @@ def _head(dataset: Dataset, ids: Mapping[int, int]) -> dict[str, Any]:
 
 def _image(dataset: Dataset, sample: Sample) -> dict[str, Any]:
     if sample.known_camera is None:
+        source = dict(sample.source or {})
+        named = {"imported_file_name": source["file_name"]} if "file_name" in source else {}
         size = {"width": sample.width, "height": sample.height}
-        return {"id": sample.index + 1, "file_name": image_file(dataset, sample), **size}
+        return {**source, **named, "id": sample.index + 1, "file_name": image_file(dataset, sample), **size}
     camera, pose = sample.camera, sample.pose
     keys = [o.key for o in sample.objects]
     lens = camera.distortion

@@ -156,12 +156,12 @@ def _with_ids(
 
 def _image_file(image: dict[str, Any], root: Path, split: str, beside: Path) -> Path | None:
     name = image.get("file_name")
-    if not isinstance(name, str) or not name:
+    if not isinstance(name, str) or not name or Path(name).is_absolute() or ".." in Path(name).parts:
         return None
     for folder in (root / split, root / "images" / split, root / "images", root, beside):
         place = folder / name
         with suppress(OSError):  # no file system has a name that long
-            if place.is_file() and place.resolve().is_relative_to(root.resolve()):
+            if place.is_file():
                 return place
     return None
 
@@ -177,6 +177,10 @@ def _image_problem(image: dict[str, Any], place: Path | None) -> str | None:
     except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
         return f"expected a readable image; found: {error}"
     said = image.get("width"), image.get("height")
+    try:
+        json.dumps(image, allow_nan=False)
+    except ValueError:
+        return "expected finite numbers; found NaN or infinity"
     return None if size == said else f"expected {place.name} of {said[0]} x {said[1]} pixels; found {size[0]} x {size[1]}"
 
 
@@ -274,7 +278,8 @@ def _sample(part: _Split, image: dict[str, Any], index: int) -> Sample:
         )
         for number, source in enumerate(part.annotations.get(image["id"], ()), 1)
     )
-    return Sample(index, part.split, None, None, objects, {}, {}, size)
+    said = {name: value for name, value in image.items() if name not in {"id", "width", "height"}}
+    return Sample(index, part.split, None, None, objects, {}, {}, size, said)
 
 
 def _corners(source: dict[str, Any]) -> Box | None:
