@@ -97,3 +97,16 @@ def test_what_shows_nothing_is_refused(write, data, said):
         load_model(write("bad.png", data))
     assert str(error.value).count("bad.png") == 1
     assert "\n" not in str(error.value)
+
+
+def test_a_large_picture_is_reduced_and_keeps_its_proportions(write, monkeypatch):
+    from viewsphere.assets import picture
+
+    monkeypatch.setattr(picture, "SHARPEST", 16)
+    shades = np.repeat(np.arange(40, dtype=np.uint8) * 6, 20).reshape(40, 20)
+    mesh, _ = load_model(write("tall.png", encoded(np.dstack([shades] * 3))))
+    (image,) = mesh.images
+    assert image.pixels.shape == (14, 7, 4)
+    np.testing.assert_array_equal(mesh.bounds, [[-0.25, 0, 0], [0.25, 0, 1]])
+    means = np.arange(40, dtype=float)[:39].reshape(13, 3).mean(axis=1) * 6
+    assert np.abs(image.pixels[:13, 0, 0] - means).max() <= 1

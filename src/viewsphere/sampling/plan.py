@@ -152,10 +152,6 @@ class Plan:
         model, chunk = divmod(index, len(self._chunks) - 1)
         return f"{self.model_specs[model].key}-{self._chunks[chunk]:06d}"
 
-    def shot_model(self, key: str) -> str:
-        """Key of the model in the shot of this key."""
-        return key.rpartition("-")[0]
-
     def shot_table(self) -> Iterator[tuple[str, int, int]]:
         """Key, first frame and number of frames of every shot, in order."""
         parts = len(self._chunks) - 1
@@ -202,11 +198,6 @@ class Plan:
     def _scene_pose(self, pose: int) -> str | None:
         """Name of the pose, where scenes are drawn for each frame."""
         return self.pose_list.name(pose) if self.recipe.scene.is_new_each_frame else None
-
-    def shot_cast(self, index: int) -> tuple[ModelSpec, ...]:
-        """The recipe's models in a shot, the one it is about first."""
-        model, chunk = divmod(index, len(self._chunks) - 1)
-        return self.cast(self.model_specs[model], self._chunks[chunk])
 
     def cast(self, spec: ModelSpec, pose: int | None = None) -> tuple[ModelSpec, ...]:
         """A model and those that stand beside it, in a pose (its index) where they are drawn for each frame.
