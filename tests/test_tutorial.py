@@ -104,8 +104,8 @@ def test_the_page_has_what_it_promises():
 
 
 def test_from_top_to_bottom(empty_folder, monkeypatch):
-    monkeypatch.setattr("viewsphere.cli.making._cores", lambda: 0)
-    monkeypatch.setattr("viewsphere.cli.datasets._cores", lambda: 1)
+    monkeypatch.setattr("viewsphere.cli.making.cores", lambda: 0)
+    monkeypatch.setattr("viewsphere.cli.datasets.cores", lambda: 1)
     for block in blocks():
         if block.file:
             (empty_folder / block.file).write_text(block.text, "utf-8")

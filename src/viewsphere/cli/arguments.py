@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -42,3 +43,8 @@ def load_recipe(file: Path, changes: Sequence[str] | None = None) -> Recipe:
 def split(formats: str | None) -> tuple[str, ...] | None:
     """Names with commas between them, None for None."""
     return None if formats is None else tuple(f.strip() for f in formats.split(",") if f.strip())
+
+
+def cores() -> int:
+    """How many processes may run at once."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

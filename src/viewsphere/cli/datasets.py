@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from viewsphere.cli import completion
-from viewsphere.cli.arguments import AsJson, DataFolder, split
+from viewsphere.cli.arguments import AsJson, DataFolder, cores, split
 from viewsphere.cli.terminal import print_json, print_report
 from viewsphere.errors import UserError
 
@@ -84,7 +83,7 @@ def report(
             typer.echo(f"{phase}: {total:,}", err=True)
 
     proof = _proof(dataset, check_frames) if proofs and len(dataset) else None
-    size = write_report(dataset, page, frames=frames, proof=proof, workers=_cores(), listener=tell)
+    size = write_report(dataset, page, frames=frames, proof=proof, workers=cores(), listener=tell)
     if json_:
         print_json({"page": str(page), "bytes": size, "frames": len(dataset), "ok": None if proof is None else proof.ok})
         return
@@ -98,7 +97,3 @@ def _proof(dataset: Dataset, frames: int) -> Proof:
 
     found = prove(dataset, frames=frames)
     return Proof(found.ok, found.checked, tuple(map(str, found.findings)), found.notes)
-
-
-def _cores() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import asdict
 from enum import StrEnum
 from pathlib import Path
@@ -11,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from viewsphere.cli import completion
-from viewsphere.cli.arguments import AsJson, Changes, Formats, RecipeFile, load_recipe, split
+from viewsphere.cli.arguments import AsJson, Changes, Formats, RecipeFile, cores, load_recipe, split
 from viewsphere.cli.next_step import for_render
 from viewsphere.cli.terminal import ProgressBar, print_estimate, print_json, print_plan, print_summary, write, write_picture
 from viewsphere.errors import StoreError, UserError
@@ -181,7 +180,7 @@ def render(
         print_plan(planned)
         if addition is not None and Store(output).missing(addition.record):
             typer.echo(f"{output}: {addition}")
-    crew = _cores() if workers is None else workers
+    crew = cores() if workers is None else workers
     with ProgressBar(quiet=json_) as bar:
         try:
             summary = generate(
@@ -204,7 +203,7 @@ def _estimate(recipe: Recipe, workers: int | None) -> Estimate:
     from viewsphere.run.estimate import estimate
 
     _announce_compilation()
-    return estimate(recipe, _cores() if workers is None else workers)
+    return estimate(recipe, cores() if workers is None else workers)
 
 
 def _announce_compilation() -> None:
@@ -213,7 +212,3 @@ def _announce_compilation() -> None:
 
     if not kernel_folder().is_dir():
         typer.echo("compiling kernels, once on this machine: about 20 seconds", err=True)
-
-
-def _cores() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

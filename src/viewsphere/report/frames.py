@@ -10,17 +10,17 @@ from viewsphere.geometry.box import FACES
 from viewsphere.model.camera import Camera
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.model.shot import Pose
-from viewsphere.report.unknown import camera_of, number, numbers, placed, pose_of, size_of
+from viewsphere.report.unknown import number, numbers
 
 
 def frame_data(sample: Sample) -> dict[str, Any]:
     """Frame index, split, picture's path, pose, camera and objects; what is not known is null."""
-    pose, camera = pose_of(sample), camera_of(sample)
+    pose, camera = sample.known_pose, sample.known_camera
     return {
         "index": sample.index,
         "split": sample.split,
         "file": sample.files.get("rgb"),
-        "size": list(size_of(sample)),
+        "size": [sample.width, sample.height],
         "pose": None if pose is None else _pose_data(pose),
         "camera": None if camera is None else _camera_data(camera),
         "objects": [_object_data(o) for o in sample.objects],
@@ -46,7 +46,7 @@ def _camera_data(camera: Camera) -> dict[str, Any]:
 
 
 def _object_data(o: ObjectAnnotation) -> dict[str, Any]:
-    known = placed(o)
+    known = o.is_placed
     view = o.view
     return {
         "id": o.id,

@@ -16,7 +16,7 @@ from PIL import Image
 
 from viewsphere.errors import UserError
 from viewsphere.model.sample import ObjectAnnotation, Sample
-from viewsphere.report.unknown import number, placed
+from viewsphere.report.unknown import number
 
 Picture = NDArray[np.uint8]
 
@@ -165,7 +165,7 @@ def coordinate_colors(
     colors = np.zeros((*coordinates.shape[:2], 3), np.uint8)
     known = np.zeros(coordinates.shape[:2], bool)
     for o in objects:
-        if not placed(o):
+        if not o.is_placed:
             continue
         seen = (instances == o.id) & np.isfinite(coordinates).all(axis=-1)
         low, high = o.box3d_object.min(axis=0), o.box3d_object.max(axis=0)

@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.model.sample import ObjectAnnotation, Sample
-from viewsphere.report.unknown import camera_of, pose_of
 from viewsphere.store import Dataset
 
 FRAME = np.dtype(
@@ -133,7 +132,7 @@ def _subject(sample: Sample) -> str:
 
 
 def _camera_columns(sample: Sample, seen: int) -> tuple[float, ...]:
-    pose, camera = pose_of(sample), camera_of(sample)
+    pose, camera = sample.known_pose, sample.known_camera
     orbit = (math.nan,) * 3 if pose is None else (pose.azimuth_deg % 360, pose.elevation_deg, pose.distance)
     size = (0, 0) if camera is None else (camera.width, camera.height)
     return (*orbit, len(sample.objects), seen, *size)

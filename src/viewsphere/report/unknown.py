@@ -1,4 +1,4 @@
-"""What may not be known of a frame: the one place that decides it for the report."""
+"""Numbers as JSON takes them, null for what is not known."""
 
 from __future__ import annotations
 
@@ -8,31 +8,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from viewsphere.model.camera import Camera
-from viewsphere.model.sample import ObjectAnnotation, Sample
-from viewsphere.model.shot import Pose
-
 DIGITS = 6
-
-
-def camera_of(sample: Sample) -> Camera | None:
-    """The frame's camera; None for a picture of which nobody knows it."""
-    return sample.known_camera
-
-
-def pose_of(sample: Sample) -> Pose | None:
-    """The frame's pose; None for a picture of which nobody knows it."""
-    return sample.known_pose
-
-
-def size_of(sample: Sample) -> tuple[int, int]:
-    """Width and height of the picture in pixels."""
-    return sample.width, sample.height
-
-
-def placed(annotation: ObjectAnnotation) -> bool:
-    """Whether the object's place in space is known, so that its 3D fields are numbers."""
-    return annotation.is_placed
 
 
 def number(value: float) -> float | None:

@@ -319,19 +319,10 @@ def plan(recipe: Recipe, shot_frames: int | None = None) -> Plan:
 
 def check_images(planned: Plan) -> None:
     """See that the background's images, and those of planes, are images; raises RecipeError for the first that is not."""
-    from PIL import Image, UnidentifiedImageError
-
     field = "image" if planned.recipe.scene.background.image is not None else "images"
-    for path in planned.images:
-        try:
-            Image.open(path).close()
-        except (OSError, ValueError, UnidentifiedImageError, Image.DecompressionBombError) as error:
-            problem = "no image" if isinstance(error, UnidentifiedImageError) else error
-            with planned.recipe.located():
-                raise RecipeError(
-                    f"scene.background.{field}: expected a readable image; found {problem} in {path}: mend or remove it"
-                ) from None
     with planned.recipe.located():
+        for path in planned.images:
+            proportions(path, f"scene.background.{field}")
         for path in () if planned.composition is None else [p for files in planned.composition.images for p in files]:
             proportions(path)
 

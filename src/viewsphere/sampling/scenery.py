@@ -168,8 +168,8 @@ def plane_spec(recipe: Recipe, entry: PlaneEntry, path: str, category_id: Naming
 
 
 @lru_cache(maxsize=4096)
-def proportions(path: str) -> float:
-    """Width over height of a picture as it is shown; raises RecipeError when it cannot be read."""
+def proportions(path: str, field: str = "scene.planes") -> float:
+    """Width over height of a picture as it is shown; raises RecipeError about the recipe's field when it cannot be read."""
     from PIL import Image, UnidentifiedImageError
 
     try:
@@ -178,7 +178,7 @@ def proportions(path: str) -> float:
             sideways = image.getexif().get(0x0112, 1) >= 5
     except (OSError, ValueError, UnidentifiedImageError, Image.DecompressionBombError) as error:
         problem = "no image" if isinstance(error, UnidentifiedImageError) else error
-        raise RecipeError(f"scene.planes: expected readable images; found {problem} in {path}: mend or remove it") from None
+        raise RecipeError(f"{field}: expected a readable image; found {problem} in {path}: mend or remove it") from None
     return height / width if sideways else width / height
 
 

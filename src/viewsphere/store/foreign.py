@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,9 +11,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from viewsphere.errors import StoreError
 from viewsphere.geometry.mask import encode_rle, mask_box
 from viewsphere.model.sample import Box, ObjectAnnotation, Rle, Sample, View
 from viewsphere.store.records import Category, ModelInfo
+
+MOST_SHOWN = 10
+"""Problems that are named when all are refused."""
 
 
 @dataclass(frozen=True)
@@ -50,6 +54,13 @@ class ForeignDataset:
     frames: Callable[[], Iterator[ForeignFrame]]
     models: tuple[ForeignModel, ...] = ()
     left_out: tuple[str, ...] = ()
+
+
+def refuse_broken(problems: Sequence[str]) -> None:
+    """Raise StoreError with the first of the problems, if there are any."""
+    if problems:
+        more = [f"and {len(problems) - MOST_SHOWN} more"] if len(problems) > MOST_SHOWN else []
+        raise StoreError("\n".join([*problems[:MOST_SHOWN], *more, "mend them, or leave them out with --keep-going"]))
 
 
 def foreign_object(

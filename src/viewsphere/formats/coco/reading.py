@@ -19,9 +19,8 @@ from viewsphere.errors import StoreError
 from viewsphere.geometry.mask import decode_rle
 from viewsphere.model.sample import Box, Sample
 from viewsphere.store import Category
-from viewsphere.store.foreign import ForeignDataset, ForeignFrame, foreign_object
+from viewsphere.store.foreign import ForeignDataset, ForeignFrame, foreign_object, refuse_broken
 
-MOST_SHOWN = 10
 LARGEST_ID = 2**63
 LARGEST_CATEGORY = 2**31
 """Ids are below these; COCO's own crowds have annotation ids of twelve digits."""
@@ -46,9 +45,8 @@ def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
     parts = [_read_split(file, root) for file in files]
     problems = [problem for part in parts for problem in part.problems]
     problems += _clashes(parts)
-    if problems and not keep_going:
-        more = f"\nand {len(problems) - MOST_SHOWN} more" if len(problems) > MOST_SHOWN else ""
-        raise StoreError("\n".join(problems[:MOST_SHOWN]) + more + "\nmend them, or leave them out with --keep-going")
+    if not keep_going:
+        refuse_broken(problems)
     count = sum(len(part.images) for part in parts)
     if not count:
         raise StoreError(f"{path}: expected images that can be used; found none")

@@ -22,9 +22,8 @@ from viewsphere.model.camera import Camera, Distortion, Intrinsics
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.model.shot import Pose
 from viewsphere.store import Category, ModelInfo
-from viewsphere.store.foreign import ForeignDataset, ForeignFrame, ForeignModel, foreign_object
+from viewsphere.store.foreign import ForeignDataset, ForeignFrame, ForeignModel, foreign_object, refuse_broken
 
-MOST_SHOWN = 10
 RIGHT_ANGLES = 1e-3
 LONGEST_NAME = 150
 LARGEST_POSE = 10_000_000
@@ -45,9 +44,8 @@ def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
     problems: list[str] = []
     frames = tuple(_frames(file.parent, vehicles, poses, problems))
     models = tuple(_models(file.parent, vehicles, categories, problems))
-    if problems and not keep_going:
-        more = f"\nand {len(problems) - MOST_SHOWN} more" if len(problems) > MOST_SHOWN else ""
-        raise StoreError("\n".join(problems[:MOST_SHOWN]) + more + "\nmend them, or leave them out with --keep-going")
+    if not keep_going:
+        refuse_broken(problems)
     if not frames:
         raise StoreError(f"{file}: expected frames that can be used; found none")
     return ForeignDataset(
