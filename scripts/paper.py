@@ -16,7 +16,8 @@ from viewsphere import Recipe
 from viewsphere.geometry.box import EDGES, FACES
 from viewsphere.model.camera import Camera, Intrinsics
 from viewsphere.model.sample import ObjectAnnotation, Sample
-from viewsphere.model.shot import Background, Frame, Placement, Pose, Scene, Shot
+from viewsphere.model.scene import Background, Scene
+from viewsphere.model.shot import Frame, Placement, Pose, Shot
 from viewsphere.preview import INK, PALETTE, PAPER, draw_sample
 from viewsphere.run.stages import Stages, prepare
 

@@ -13,7 +13,8 @@ from viewsphere.geometry.pose_category import pose_category
 from viewsphere.model.camera import Camera, Intrinsics
 from viewsphere.model.channel import CHANNELS
 from viewsphere.model.sample import Sample
-from viewsphere.model.shot import Frame, Ground, ModelSpec, Placement, Pose, Scene, Shot
+from viewsphere.model.scene import Ground, Scene
+from viewsphere.model.shot import Frame, ModelSpec, Placement, Pose, Shot
 from viewsphere.store import Category, Dataset, ModelInfo, PlanRecord, Store
 from viewsphere.truth.channels import observe
 from viewsphere.truth.geometry import build_geometry

@@ -14,7 +14,8 @@ from viewsphere.geometry.box import EDGES, FACES
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.recipe import Recipe
 from viewsphere.model.sample import ObjectAnnotation, Sample
-from viewsphere.model.shot import Frame, Ground, ModelSpec, Placement, Pose, Scene, Shot
+from viewsphere.model.scene import Ground, Scene
+from viewsphere.model.shot import Frame, ModelSpec, Placement, Pose, Shot
 from viewsphere.run.stages import Stages, prepare
 from viewsphere.sampling.plan import Plan
 from viewsphere.store import Dataset

@@ -13,7 +13,8 @@ from viewsphere.geometry.rotation import matrix_from_quaternion, rigid
 from viewsphere.model.camera import Camera, Distortion, Intrinsics
 from viewsphere.model.record import sample_from_record, sample_to_record
 from viewsphere.model.sample import Sample
-from viewsphere.model.shot import Frame, ModelSpec, Placement, Pose, Scene, Shot
+from viewsphere.model.scene import Scene
+from viewsphere.model.shot import Frame, ModelSpec, Placement, Pose, Shot
 from viewsphere.truth.geometry import build_geometry
 from viewsphere.truth.visibility import rasterize, silhouette
 

@@ -16,13 +16,14 @@ from viewsphere.engines.raster.tone import EXPOSURE, KNEE
 from viewsphere.errors import UserError
 from viewsphere.geometry.camera import orbit_center, orbit_rotation
 from viewsphere.model.camera import Camera, Distortion, Intrinsics
-from viewsphere.model.shot import Background, Frame, Ground, ModelSpec, Placement, Pose, Scene, Shot, Sky, Sun
+from viewsphere.model.scene import Background, Finish, Ground, Scene, Sky, Sun
+from viewsphere.model.shot import Frame, ModelSpec, Placement, Pose, Shot
 from viewsphere.truth.visibility import rasterize
 
 DARK = Sky(strength=0.0)
 BLACK = Background(color=(0, 0, 0))
 SPEC = ModelSpec(key="model", source="memory", category="thing", category_id=1)
-FRAME = Frame(index=0, pose=Pose(index=0, azimuth_deg=0, elevation_deg=0, distance=1), split="train", background=None)
+FRAME = Frame(index=0, pose=Pose(index=0, azimuth_deg=0, elevation_deg=0, distance=1), split="train")
 
 
 def mesh_of(triangles: np.ndarray, material: Material | None = None, **fields) -> Mesh:
@@ -133,7 +134,7 @@ def test_unlit_texture_seen_head_on_is_the_texture(antialias, nearest):
     image = texture_image(12, 16)
     mesh = mesh_of(card(1.6, 1.2), unlit(Texture(0, nearest=nearest)), uv0=CARD_UV, images=(image,))
     view = camera(16, 12, 10.0)
-    seen = picture(mesh, Scene(background=BLACK), view, antialias=antialias)
+    seen = picture(mesh, Scene(finish=Finish(background=BLACK)), view, antialias=antialias)
     np.testing.assert_array_equal(seen, image.pixels[..., :3])
 
 
@@ -141,7 +142,7 @@ def test_second_uv_set_and_texture_transform():
     image = texture_image(12, 16)
     turned = Texture(0, texcoord=1, offset=(0.0, 1.0), rotation=math.pi / 2, scale=(1.0, 1.0))
     mesh = mesh_of(card(1.2, 1.6), unlit(turned), uv0=CARD_UV * 0, uv1=CARD_UV, images=(image,))
-    seen = picture(mesh, Scene(background=BLACK), camera(12, 16, 10.0))
+    seen = picture(mesh, Scene(finish=Finish(background=BLACK)), camera(12, 16, 10.0))
     # u' = v and v' = 1 - u: the picture's column runs up the texture's rows, its row along the texture's columns.
     np.testing.assert_array_equal(seen, image.pixels[::-1, :, :3].transpose(1, 0, 2))
 
@@ -162,7 +163,7 @@ def test_wrap_modes(wrap, columns):
         uv0=CARD_UV * np.float32(3) - np.float32(1),
         images=(image,),
     )
-    seen = picture(mesh, Scene(background=BLACK), camera(12, 12, 1.0))
+    seen = picture(mesh, Scene(finish=Finish(background=BLACK)), camera(12, 12, 1.0))
     np.testing.assert_array_equal(seen, image.pixels[columns][:, columns, :3])
 
 
@@ -171,14 +172,14 @@ def test_minified_texture_is_averaged_in_linear_light():
     pixels = np.repeat(checks[..., None], 4, axis=2).astype(np.uint8)
     pixels[..., 3] = 255
     mesh = mesh_of(card(1, 1), unlit(Texture(0)), uv0=CARD_UV, images=(Image("checks", pixels),))
-    seen = picture(mesh, Scene(background=BLACK), camera(16, 16, 16.0))
+    seen = picture(mesh, Scene(finish=Finish(background=BLACK)), camera(16, 16, 16.0))
     assert np.abs(seen.astype(int) - int(as_bytes(0.5))).max() <= 1
 
 
 def test_unlit_factor_and_vertex_colour_are_exact():
     color = (0.25, 0.5, 1.0, 1.0)
     mesh = mesh_of(card(4, 4), unlit(color=color), colors=np.tile(np.float32([1.0, 0.5, 0.1, 1.0]), (6, 1)))
-    seen = picture(mesh, Scene(background=BLACK), camera(8, 8, 8.0))
+    seen = picture(mesh, Scene(finish=Finish(background=BLACK)), camera(8, 8, 8.0))
     assert np.unique(seen.reshape(-1, 3), axis=0).tolist() == [as_bytes([0.25, 0.25, 0.1]).tolist()]
 
 
@@ -187,7 +188,7 @@ def test_lambert_plane(sun_elevation):
     """A white rough plane from above: irradiance times cosine over pi."""
     mesh = mesh_of(rectangle((-1, -1, 0), (2, 0, 0), (0, 2, 0)), Material(roughness=1.0, ior=1.0))
     sun = Sun(azimuth_deg=200, elevation_deg=sun_elevation, strength=2.0, color=(1.0, 0.5, 0.25))
-    seen = picture(mesh, Scene(sun=sun, sky=DARK, background=BLACK), camera(8, 8, 10.0, elevation=90))
+    seen = picture(mesh, Scene(sun=sun, sky=DARK, finish=Finish(background=BLACK)), camera(8, 8, 10.0, elevation=90))
     cosine = math.sin(math.radians(sun_elevation))
     expected = as_bytes([displayed(2.0 * c * cosine / math.pi) for c in sun.color])
     assert np.abs(seen.astype(int) - expected.astype(int)).max() <= 1
@@ -196,7 +197,7 @@ def test_lambert_plane(sun_elevation):
 def test_uniform_sky_lights_a_white_plane_as_itself():
     """Under a sky of equal radiance, a white Lambert surface that looks up shows that radiance, one that stands sees half."""
     sky = Sky(zenith=(0.5, 0.5, 0.5), horizon=(0.5, 0.5, 0.5))
-    scene = Scene(sun=None, sky=sky, background=BLACK)
+    scene = Scene(sun=None, sky=sky, finish=Finish(background=BLACK))
     white = Material(roughness=1.0, ior=1.0)
     up = picture(mesh_of(rectangle((-1, -1, 0), (2, 0, 0), (0, 2, 0)), white), scene, camera(8, 8, 10.0, elevation=90))
     assert np.abs(up.astype(int) - int(as_bytes(displayed(0.5)))).max() <= 1
@@ -210,13 +211,13 @@ def test_white_plane_in_the_default_light_does_not_clip():
     toward, right = orbit_center(azimuth, elevation, 1.0), orbit_rotation(azimuth, elevation)[0]
     up = np.cross(toward, right)
     plane = mesh_of(rectangle(-right - up, 2 * right, 2 * up), Material(roughness=1.0))
-    seen = picture(plane, Scene(background=BLACK), camera(8, 8, 10.0, sun.azimuth_deg, sun.elevation_deg))
+    seen = picture(plane, Scene(finish=Finish(background=BLACK)), camera(8, 8, 10.0, sun.azimuth_deg, sun.elevation_deg))
     assert 200 < seen.min() <= seen.max() < 250
 
 
 def test_exposure_is_in_stops():
     mesh = mesh_of(rectangle((-1, -1, 0), (2, 0, 0), (0, 2, 0)), Material(roughness=1.0, ior=1.0))
-    scene = Scene(sun=Sun(elevation_deg=90, strength=0.5, color=(1, 1, 1)), sky=DARK, background=BLACK)
+    scene = Scene(sun=Sun(elevation_deg=90, strength=0.5, color=(1, 1, 1)), sky=DARK, finish=Finish(background=BLACK))
     view = camera(8, 8, 10.0, elevation=90)
     plain, brighter = (picture(mesh, scene, view, exposure=e) for e in (0, 1))
     ratio = linear_light(brighter[0, 0] / 255) / linear_light(plain[0, 0] / 255)
@@ -225,7 +226,7 @@ def test_exposure_is_in_stops():
 
 @pytest.mark.parametrize("color", [(0.0, 0.0, 0.0), (1.0, 1.0, 1.0), (0.2, 0.5, 0.8), (1 / 255, 2 / 255, 3 / 255)])
 def test_plain_background_is_exact(color):
-    seen = picture(mesh_of(card(0.1, 0.1)), Scene(background=Background(color=color)), camera(16, 16, 8.0))
+    seen = picture(mesh_of(card(0.1, 0.1)), Scene(finish=Finish(background=Background(color=color))), camera(16, 16, 8.0))
     assert (seen[0] == np.round(np.array(color) * 255)).all()
 
 
@@ -235,8 +236,8 @@ def test_image_background_covers_the_frame(tmp_path):
     pixels = np.random.default_rng(3).integers(0, 256, (24, 40, 3), np.uint8)
     path = tmp_path / "photo.png"
     PillowImage.fromarray(pixels).save(path)
-    scene = Scene(background=Background(color=(1, 0, 0)))
-    frame = FRAME.model_copy(update={"background": Background(image=str(path))})
+    scene = Scene(finish=Finish(background=Background(color=(1, 0, 0))))
+    frame = FRAME.model_copy(update={"finish": Finish(background=Background(image=str(path)))})
     far = mesh_of(card(0.001, 0.001, y=-100.0))
     seen = picture(far, scene, camera(24, 24, 8.0), frame)
     np.testing.assert_array_equal(seen, pixels[:, 8:32])
@@ -255,7 +256,7 @@ def test_sky_is_brighter_low_and_near_the_sun():
 
 BOX = box((-0.5, -0.5, 0.0), (0.5, 0.5, 1.0))
 GROUND_SCENE = Scene(
-    sun=Sun(azimuth_deg=90, elevation_deg=45, strength=3.0), sky=DARK, ground=Ground(color=(0.8, 0.8, 0.8)), background=BLACK
+    sun=Sun(azimuth_deg=90, elevation_deg=45, strength=3.0), sky=DARK, ground=Ground(color=(0.8, 0.8, 0.8)), finish=Finish(background=BLACK)
 )
 
 
@@ -325,7 +326,7 @@ def test_edge_coverage_and_no_fringe(angle):
     u, v = np.array([math.cos(a), 0, math.sin(a)]), np.array([-math.sin(a), 0, math.cos(a)])
     mesh = mesh_of(rectangle(-20 * u + 0.013 * v, 40 * u, 20 * v), unlit(color=(0.5, 0.5, 0.5, 1.0)))
     size, fine = 32, 16
-    seen = picture(mesh, Scene(background=BLACK), camera(size, size, 32.0))
+    seen = picture(mesh, Scene(finish=Finish(background=BLACK)), camera(size, size, 32.0))
     value = linear_light(seen[..., 0] / 255) / linear_light(as_bytes(0.5) / 255)
     p = (np.arange(size * fine) + 0.5) / fine - size / 2
     x, z = np.meshgrid(p / 32, -p / 32)
@@ -361,7 +362,7 @@ def test_ground_without_objects_and_nothing_at_all():
         key="shot",
         placements=(),
         intrinsics=Intrinsics(width=16, height=16, fx=16, fy=16, cx=8, cy=8),
-        scene=Scene(ground=Ground(), background=Background(color=(0, 0, 1))),
+        scene=Scene(ground=Ground(), finish=Finish(background=Background(color=(0, 0, 1)))),
         frames=(FRAME,),
         channels=("rgb",),
     )
@@ -390,7 +391,7 @@ def test_two_runs_are_equal_byte_for_byte():
 def test_distorted_colour_follows_the_labels(lens):
     mesh = mesh_of(card(1.0, 0.6), unlit(color=(1.0, 0.0, 0.0, 1.0)))
     view = camera(64, 64, 50.0, 25, 30, 1.2, distortion=lens)
-    stage = stage_of(mesh, Scene(background=Background(color=(0, 0, 1))), antialias=1)
+    stage = stage_of(mesh, Scene(finish=Finish(background=Background(color=(0, 0, 1)))), antialias=1)
     visible = rasterize(stage.geometry, view)
     seen = stage.color(view, FRAME, visible)
     expected = np.where((visible.triangle >= 0)[..., None], np.uint8([255, 0, 0]), np.uint8([0, 0, 255]))
@@ -410,7 +411,7 @@ def test_distorted_texture_is_sampled_along_the_same_rays():
 
     rays = pixel_rays(view.intrinsics)
     u, v = (rays[..., 0] + 1) / 2, (rays[..., 1] + 1) / 2
-    seen = picture(mesh, Scene(background=BLACK), view)
+    seen = picture(mesh, Scene(finish=Finish(background=BLACK)), view)
     assert np.abs(seen[..., 0] - (u * 256 - 0.5)).max() < 1.0
     assert np.abs(seen[..., 1] - (v * 256 - 0.5)).max() < 1.0
 
@@ -428,7 +429,7 @@ def test_blended_surface_shows_what_is_behind():
         triangle_part=np.zeros(4, np.int32),
         materials=(glass, solid),
     )
-    seen = picture(both, Scene(background=Background(color=(0, 0, 1))), camera(16, 16, 16.0, distance=2.0))
+    seen = picture(both, Scene(finish=Finish(background=Background(color=(0, 0, 1)))), camera(16, 16, 16.0, distance=2.0))
     assert seen[8, 3].tolist() == as_bytes([0.25, 0.75, 0.0]).tolist()
     assert seen[8, 12].tolist() == as_bytes([0.25, 0.0, 0.75]).tolist()
 
@@ -437,7 +438,7 @@ def test_metal_mirrors_the_sky_and_is_not_dead():
     """Chrome looked at from the side shows the bright horizon above and the darker earth below."""
     chrome = Material(metallic=1.0, roughness=0.1)
     tilted = [mesh_of(rectangle((-2, -s * 2, -2), (4, 0, 0), (0, s * 4, 4)), chrome) for s in (0.6, -0.6)]
-    scene = Scene(sun=None, background=BLACK)
+    scene = Scene(sun=None, finish=Finish(background=BLACK))
     up, down = (picture(m, scene, camera(8, 8, 20.0, distance=5.0))[4, 4].astype(int).sum() for m in tilted)
     assert up > down + 60
     assert up > 300

@@ -9,11 +9,12 @@ from test_raster import BLACK, DARK, FRAME, SPEC, box, camera, mesh_of, rectangl
 from viewsphere.assets.mesh import Material
 from viewsphere.engines import raster
 from viewsphere.model.camera import Intrinsics
-from viewsphere.model.shot import ModelSpec, Placement, Scene, Shot, Sky, Sun
+from viewsphere.model.scene import Scene, Sky, Sun
+from viewsphere.model.shot import ModelSpec, Placement, Shot
 from viewsphere.truth.visibility import rasterize
 
 SUN = Sun(azimuth_deg=90, elevation_deg=45, strength=3.0)
-SCENE = Scene(sun=SUN, sky=DARK, background=BLACK)
+SCENE = Scene(sun=SUN, sky=DARK, finish=Finish(background=BLACK))
 FLOOR = Material("floor", (0.5, 0.5, 0.5, 1.0), roughness=1.0, specular=0.0)
 SIDE = 400.0
 
@@ -111,7 +112,7 @@ def test_no_acne_on_the_floor_and_on_walls():
 
 def test_a_target_darkens_the_scenery_it_stands_on_as_it_does_the_ground():
     """Under the sky alone: as dark beside its foot on a road as on the ground, and not on a roof above."""
-    scene = Scene(sun=None, sky=Sky(), background=BLACK)
+    scene = Scene(sun=None, sky=Sky(), finish=Finish(background=BLACK))
     stage = stage_of(BOX, [(floor(), moved(0, 0))], scene)
     seen, x, y = from_above(stage, 0, 0, 40)
     foot = (np.abs(x) < 0.56) & (np.abs(x) > 0.54) & (np.abs(y) < 0.3)

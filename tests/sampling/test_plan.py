@@ -80,7 +80,7 @@ def test_a_shot_is_plain_json_and_comes_back_the_same():
     assert shot.category_deg == 90
     assert shot.intrinsics.width == 640
     assert shot.scene.ground is not None
-    assert shot.scene.background.color is None
+    assert shot.scene.finish.background.color is None
     assert shot.placements[0].id == 1
 
 
@@ -188,7 +188,9 @@ def backgrounds(folder, models, azimuths=(0, 10, 20), **background):
         "scene": {"background": background},
     }
     planned = plan(Recipe.model_validate(data, context={"folder": folder}))
-    return planned, {(s.placements[0].model.key, f.pose.azimuth_deg): f.background for s in planned.shots() for f in s.frames}
+    return planned, {
+        (s.placements[0].model.key, f.pose.azimuth_deg): f.finish.background for s in planned.shots() for f in s.frames
+    }
 
 
 def test_backgrounds_drawn_per_frame_follow_from_names(photos):
@@ -205,9 +207,9 @@ def test_backgrounds_drawn_per_frame_follow_from_names(photos):
 def test_a_fixed_background_is_one_for_all_frames(photos):
     planned, frames = backgrounds(photos, [{"source": "zoo:car", "count": 9}], images="photos", draw="fixed")
     assert set(frames.values()) == {None}
-    assert len({s.scene.background.image for s in planned.shots()}) == 1
+    assert len({s.scene.finish.background.image for s in planned.shots()}) == 1
     planned, _ = backgrounds(photos, [{"source": "zoo:car"}], image="photos/0/04.jpg")
-    assert planned.shot(0).scene.background.image == str(photos / "photos/0/04.jpg")
+    assert planned.shot(0).scene.finish.background.image == str(photos / "photos/0/04.jpg")
 
 
 def test_missing_backgrounds_are_named(photos):

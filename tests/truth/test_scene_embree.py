@@ -10,7 +10,8 @@ from truth_scenes import LENSES, cube, lens, mesh_of, orbit_camera, placed, sphe
 from viewsphere.annotate import annotate
 from viewsphere.geometry.box import box_vertices
 from viewsphere.model.camera import Camera
-from viewsphere.model.shot import Frame, ModelSpec, Placement, Pose, Scene, Shot
+from viewsphere.model.scene import Scene
+from viewsphere.model.shot import Frame, ModelSpec, Placement, Pose, Shot
 from viewsphere.truth.channels import observe
 from viewsphere.truth.geometry import build_geometry
 from viewsphere.truth.visibility import rasterize

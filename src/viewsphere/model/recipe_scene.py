@@ -34,7 +34,7 @@ from viewsphere.model.recipe_values import (
     shape_of,
     switch,
 )
-from viewsphere.model.shot import Ground, Sky, Sun
+from viewsphere.model.scene import Ground, Sky, Sun
 
 LARGEST_IMAGE = 16384
 LENSES = ("fov_deg", "focal_px", "focal_mm", "K", "of_viewpoints")

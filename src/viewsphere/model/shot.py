@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Literal
 
 from pydantic import Field, JsonValue
 
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.frozen import Frozen
+from viewsphere.model.scene import Color, Finish, Scene, Vector
 
-Vector = tuple[float, float, float]
-Component = Annotated[float, Field(ge=0)]
-Color = tuple[Component, Component, Component]
 Axis = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
 Size = tuple[float, float, float]  # width along X, height along Z, length along Y, metres
 Matrix4 = tuple[
@@ -44,6 +42,17 @@ class ModelSpec(Frozen):
     confined: bool = True  # texture and buffer paths may not leave the model's folder
 
 
+class Repaint(Frozen):
+    """A change to the materials whose names match `material`, a pattern of fnmatch: `tint` (linear) multiplies the base colour,
+    the others replace what the file says and its textures say.
+    """
+
+    material: str = "*"
+    tint: Color | None = None
+    metallic: float | None = Field(default=None, ge=0, le=1)
+    roughness: float | None = Field(default=None, ge=0, le=1)
+
+
 class Placement(Frozen):
     """One thing of a scene: an object with an id of 1..N, or with id 0 scenery that is background to every label.
 
@@ -55,45 +64,7 @@ class Placement(Frozen):
     model: ModelSpec
     world_from_object: Matrix4 = ((1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1))
     scenery: bool = False
-
-
-class Sun(Frozen):
-    """A distant light. Azimuth and elevation are those of the direction it stands in, as for cameras."""
-
-    azimuth_deg: float = Field(default=40.0, description="direction the sun stands in, degrees, as for cameras")
-    elevation_deg: float = Field(default=50.0, gt=0, le=90, description="degrees above the horizon")
-    strength: float = Field(default=3.0, ge=0, description="irradiance on a plane that faces the sun, in the sky's units")
-    color: Color = Field(default=(1.0, 0.96, 0.9), description="linear red, green, blue")
-
-
-class Sky(Frozen):
-    """Ambient light from above: a vertical gradient, linear colours."""
-
-    zenith: Color = Field(default=(0.55, 0.7, 1.0), description="linear red, green, blue overhead")
-    horizon: Color = Field(default=(0.9, 0.92, 0.95), description="linear red, green, blue at the horizon")
-    strength: float = Field(default=1.0, ge=0, description="factor of both colours")
-
-
-class Ground(Frozen):
-    """A horizontal plane at the lowest point of all that is placed."""
-
-    color: Color = (0.42, 0.41, 0.39)  # sRGB 0..1
-
-
-class Background(Frozen):
-    """What is seen where nothing else is: a plain colour, an image (covering the frame, centred), else the sky."""
-
-    color: Color | None = None  # sRGB 0..1
-    image: str | None = None  # absolute path
-
-
-class Scene(Frozen):
-    """Light, ground and background; None for `sun` or `ground` means there is none."""
-
-    sun: Sun | None = Sun()
-    sky: Sky = Sky()
-    ground: Ground | None = None
-    background: Background = Background()
+    repaints: tuple[Repaint, ...] = ()  # the last that matches a material counts
 
 
 class Pose(Frozen):
@@ -109,12 +80,12 @@ class Pose(Frozen):
 
 
 class Frame(Frozen):
-    """One picture of a shot. `index` counts all frames of the data set from 0; `background` replaces the scene's."""
+    """One picture of a shot. `index` counts all frames of the data set from 0; `finish` replaces the scene's."""
 
     index: int
     pose: Pose
     split: str
-    background: Background | None = None
+    finish: Finish | None = None
 
 
 class Shot(Frozen):

@@ -14,7 +14,8 @@ from viewsphere.errors import RecipeError
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.recipe import Recipe
 from viewsphere.model.recipe_scenery import Labels
-from viewsphere.model.shot import ModelSpec, Placement, Vector
+from viewsphere.model.scene import Vector
+from viewsphere.model.shot import ModelSpec, Placement
 from viewsphere.sampling.company import Names, companions, footprint, layout, standing
 from viewsphere.sampling.scenery import (
     Piece,

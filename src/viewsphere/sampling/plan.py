@@ -22,7 +22,8 @@ from viewsphere.geometry.rotation import transform
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.mistakes import nearest, one_of
 from viewsphere.model.recipe import Recipe
-from viewsphere.model.shot import Background, Frame, ModelSpec, Placement, Scene, Shot, Vector
+from viewsphere.model.scene import Background, Finish, Scene, Vector
+from viewsphere.model.shot import Frame, ModelSpec, Placement, Shot
 from viewsphere.sampling.composition import BoxOf, Composition, compose
 from viewsphere.sampling.models import categories, count_models, model_specs
 from viewsphere.sampling.scenery import IMAGE_SUFFIXES, images_in, proportions
@@ -215,14 +216,14 @@ class Plan:
     def frame(self, model: int, pose: int, target: Vector | None = None) -> Frame:
         """The frame of a model (its index) and a pose, which looks at `target` unless it has a target of its own."""
         spec, view = self.model_specs[model], self.pose_list[pose]
-        background = None
+        finish = None
         if self.recipe.scene.background.images is not None and self.recipe.scene.background.draw == "per_frame":
-            background = self._drawn(spec.key, self.pose_list.name(pose))
+            finish = Finish(background=self._drawn(spec.key, self.pose_list.name(pose)))
         return Frame(
             index=model * self.poses + pose,
             pose=view if target is None or view.target is not None else view.model_copy(update={"target": target}),
             split=self.split(spec, pose),
-            background=background,
+            finish=finish,
         )
 
     def _drawn(self, *names: str) -> Background:
@@ -237,7 +238,7 @@ class Plan:
             background = Background(image=self.images[0])
         elif entry.background.images is not None and entry.background.draw == "fixed":
             background = self._drawn()
-        return Scene(sun=entry.light, sky=entry.sky, ground=entry.floor, background=background)
+        return Scene(sun=entry.light, sky=entry.sky, ground=entry.floor, finish=Finish(background=background))
 
     def distance_problem(self, spec: ModelSpec, box_of: BoxOf) -> RecipeError | None:
         """The first pose whose camera would stand inside a target's box, in words; None if there is none.

@@ -22,7 +22,8 @@ from viewsphere.geometry.rotation import transform
 from viewsphere.model.camera import Camera, Intrinsics
 from viewsphere.model.recipe_values import Range
 from viewsphere.model.recipe_viewpoints import Grid, Jitter, Normal, PoseList, Sphere, Viewpoints, axis_value
-from viewsphere.model.shot import Pose, Vector
+from viewsphere.model.scene import Vector
+from viewsphere.model.shot import Pose
 from viewsphere.sampling.pose_files import Motion, PoseFile, read_poses
 from viewsphere.sampling.seeds import generator
 

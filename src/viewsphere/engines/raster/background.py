@@ -9,7 +9,7 @@ import numpy as np
 from viewsphere.engines.raster.records import Float32
 from viewsphere.engines.raster.tone import linear_words
 from viewsphere.errors import UserError
-from viewsphere.model.shot import Background
+from viewsphere.model.scene import Background
 
 
 def plain_background(background: Background, width: int, height: int) -> Float32 | None:

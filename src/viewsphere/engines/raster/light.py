@@ -15,7 +15,7 @@ from viewsphere.engines.raster import kernels_shadow as kernels
 from viewsphere.engines.raster.records import Float32, Light, Surfaces, Textures
 from viewsphere.engines.raster.surface import CASTS_FROM
 from viewsphere.geometry.camera import orbit_center
-from viewsphere.model.shot import Scene
+from viewsphere.model.scene import Scene
 
 Float = NDArray[np.float64]
 

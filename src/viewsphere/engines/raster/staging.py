@@ -19,7 +19,8 @@ from viewsphere.engines.raster.surface import BLENDED, TRANSMISSION, pack_surfac
 from viewsphere.engines.raster.tone import EXPOSURE, KNEE, srgb_bytes
 from viewsphere.geometry.camera import inverse_camera_matrix, pixel_rays
 from viewsphere.model.camera import Camera, Intrinsics
-from viewsphere.model.shot import Background, Frame, ModelSpec, Placement, Scene, Shot
+from viewsphere.model.scene import Background, Scene
+from viewsphere.model.shot import Frame, ModelSpec, Placement, Shot
 from viewsphere.truth.geometry import Geometry, build_geometry
 from viewsphere.truth.visibility import Visibility, rasterize
 
@@ -51,7 +52,7 @@ class RasterStage:
         Edge pixels are the mean of their four quarters in linear light. Raises UserError for an unreadable
         background image.
         """
-        background = self._background(camera, frame.background or self.scene.background)
+        background = self._background(camera, (frame.finish or self.scene.finish).background)
         color = background.copy()
         triangle, depth = visibility.triangle.reshape(-1), visibility.inverse_depth.reshape(-1)
         self._paint(camera, 1, _NO_INDEX, triangle, depth, color)

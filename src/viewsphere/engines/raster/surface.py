@@ -11,7 +11,7 @@ from viewsphere.assets.mesh import Material, Mesh
 from viewsphere.assets.srgb import linear
 from viewsphere.engines.raster.records import Float32, Surfaces, Textures
 from viewsphere.engines.raster.textures import TexturePacker
-from viewsphere.model.shot import Ground
+from viewsphere.model.scene import Ground
 from viewsphere.truth.geometry import Geometry
 
 # Columns of Surfaces.materials: base colour and alpha (4), roughness, metallic, emission (3), reflectance at normal
