@@ -9,7 +9,7 @@ from test_raster import BLACK, DARK, FRAME, SPEC, box, camera, mesh_of, rectangl
 from viewsphere.assets.mesh import Material
 from viewsphere.engines import raster
 from viewsphere.model.camera import Intrinsics
-from viewsphere.model.scene import Scene, Sky, Sun
+from viewsphere.model.scene import Finish, Scene, Sky, Sun
 from viewsphere.model.shot import ModelSpec, Placement, Shot
 from viewsphere.truth.visibility import rasterize
 
