@@ -1,0 +1,28 @@
+"""Rows of a block of samples: one flat float32 array, so that the compiler knows that rows do not overlap.
+
+Lengths are in the stage's unit. All normals are unit vectors on the viewer's side.
+"""
+
+from __future__ import annotations
+
+BLOCK = 128
+
+# Where the sample is: position, unit direction to the viewer, geometric normal, size of a pixel there.
+PX, PY, PZ, VX, VY, VZ, GX, GY, GZ, PIXEL = range(0, 10 * BLOCK, BLOCK)
+# What it is made of: shading normal, clear coat's normal, base colour (linear) and alpha.
+NX, NY, NZ, CX, CY, CZ, RED, GREEN, BLUE, ALPHA = range(10 * BLOCK, 20 * BLOCK, BLOCK)
+# Perceptual roughness, metallic, reflectance at normal incidence of its dielectric part, clear coat, transmission, emission,
+# flags (0 or 1), share of light that its occlusion texture leaves.
+ROUGH, METAL, F0R, F0G, F0B, COAT, COAT_ROUGH, TRANSMISSION = range(20 * BLOCK, 28 * BLOCK, BLOCK)
+ER, EG, EB, UNLIT, GROUND, CATCHER, BLENDED, AO = range(28 * BLOCK, 36 * BLOCK, BLOCK)
+# Interpolated: both uv sets; barycentrics of the second and third corner.
+U0, V0, U1, V1, BARY1, BARY2 = range(36 * BLOCK, 42 * BLOCK, BLOCK)
+# What reaches it: share of the ambient light from above and of the ground's, the mean direction that is open (0: unknown).
+OPEN, BOUNCE, OPENX, OPENY, OPENZ = range(42 * BLOCK, 47 * BLOCK, BLOCK)
+# One light: unit direction to it, irradiance on a plane that faces it, the share its shadows leave, its angular radius.
+LX, LY, LZ, IR, IG, IB, SHARE, WIDTH = range(47 * BLOCK, 55 * BLOCK, BLOCK)
+# Radiance towards the viewer: diffuse, specular (coat included); share of the background's ground that fades into the sky.
+DR, DG, DB, SR, SG, SB, FADE = range(55 * BLOCK, 62 * BLOCK, BLOCK)
+# Scratch, free between stages.
+T0, T1, T2, T3, T4, T5, T6, T7 = range(62 * BLOCK, 70 * BLOCK, BLOCK)
+ROWS = 70
