@@ -1,7 +1,9 @@
 """The benchmark behind every speed claim: ratios inside one run, CPU time over all threads, medians over frames.
 
-Reference scene: a zoo car subdivided to at least 75,000 triangles on a ground plane, sun shadow, sky, 640x480,
-4x edge anti-aliasing; files: RGB PNG, instance PNG, float32 depth and normals TIFF, annotations.
+Reference scene (bench_scene.py): a zoo car cut to about 75,000 triangles with 1,024 x 1,024 textures (base colour,
+occlusion-roughness-metallic, normals) on every material, the ground, an environment with a sun, 640x480; files: RGB PNG,
+instance PNG, float32 depth and normals, annotations. `--scaling` measures how cost grows instead and draws
+docs/images/scaling.svg.
 """
 
 from __future__ import annotations
@@ -12,16 +14,18 @@ import os
 import platform
 import tempfile
 import time
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from bench_scene import reference_recipe, write_reference
 
-from viewsphere import Recipe, generate, plan, plugins
+from viewsphere import generate, plan, plugins
 from viewsphere.annotate import annotate
 from viewsphere.assets.mesh import Mesh
+from viewsphere.engines.raster import staging
 from viewsphere.geometry.box import box_vertices
 from viewsphere.model.sample import Sample
 from viewsphere.model.shot import Frame, Shot
@@ -32,73 +36,6 @@ from viewsphere.truth.channels import observe
 from viewsphere.truth.visibility import rasterize
 
 ROOT = Path(__file__).parent.parent
-TRIANGLES = 75_000
-VERTEX_FIELDS = ("vertices", "normals", "uv0", "uv1", "colors")
-
-
-def reference_recipe(frames: int, antialias: int) -> Recipe:
-    return Recipe(
-        name="bench",
-        models=[{"source": "zoo:car", "category": "car", "count": 1, "scale": {"length": 4.3}}],
-        viewpoints={
-            "azimuth": [360 * i / frames for i in range(frames)],
-            "elevation": [20],
-            "distance": 9.0,
-        },
-        camera={"size": [640, 480], "fov_deg": 40},
-        scene={"ground": True},
-        engine={"name": "raster", "antialias": antialias},
-        channels=["rgb", "depth", "instances", "normals"],
-        formats=[],
-    )
-
-
-def subdivide(mesh: Mesh) -> Mesh:
-    """Halve the longest edges, of both triangles that share them, until there are about enough triangles.
-
-    Vertices are numbered in order of use, as in any file.
-    """
-    while len(mesh.triangles) < TRIANGLES:
-        edges = np.sort(mesh.triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-        ends = mesh.vertices[edges]
-        lengths = np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1)
-        lacking = TRIANGLES - len(mesh.triangles)
-        longest = np.sort(lengths)[-min(max(lacking, 1), len(lengths) // 4)]
-        pairs, inverse = np.unique(edges[lengths >= longest], axis=0, return_inverse=True)
-        middles = np.full(len(edges), -1)
-        middles[lengths >= longest] = len(mesh.vertices) + inverse.reshape(-1)
-        triangles, source = split_triangles(mesh.triangles, middles.reshape(-1, 3))
-        mesh = replace(
-            mesh,
-            triangles=triangles,
-            triangle_material=mesh.triangle_material[source],
-            triangle_part=mesh.triangle_part[source],
-            **{name: with_means(getattr(mesh, name), pairs) for name in VERTEX_FIELDS},
-        )
-    used, first, inverse = np.unique(mesh.triangles, return_index=True, return_inverse=True)
-    order = np.argsort(first)
-    rank = np.argsort(order).astype(np.int32)
-    fields = {name: getattr(mesh, name) for name in VERTEX_FIELDS}
-    moved = {name: None if values is None else values[used[order]] for name, values in fields.items()}
-    return replace(mesh, triangles=rank[inverse].reshape(-1, 3), **moved)
-
-
-def split_triangles(triangles: Any, middles: Any) -> tuple[Any, Any]:
-    """Triangles cut at the middles (T, 3) of their edges 01, 12, 20 (-1: not cut), and the triangle each came from."""
-    corners, sources = [], []
-    for t, (corner, middle) in enumerate(zip(triangles.tolist(), middles.tolist(), strict=True)):
-        ring = [v for pair in zip(corner, middle, strict=True) for v in pair if v >= 0]
-        start = ring.index(next((m for m in middle if m >= 0), ring[0]))
-        fan = ring[start:] + ring[:start]
-        pieces = [(fan[0], fan[k], fan[k + 1]) for k in range(1, len(fan) - 1)]
-        corners += pieces
-        sources += [t] * len(pieces)
-    return np.array(corners, np.int32), np.array(sources)
-
-
-def with_means(values: Any, pairs: Any) -> Any:
-    """Per-vertex values and, behind them, the means of these pairs of vertices."""
-    return None if values is None else np.concatenate([values, values[pairs].mean(axis=1, dtype=np.float32)])
 
 
 class Clock:
@@ -115,6 +52,15 @@ class Clock:
 
     def median(self, name: str) -> float:
         return float(np.median(self.times[name]))
+
+
+def processor() -> str:
+    """The processor's name."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+        return next(line.split(":", 1)[1].strip() for line in lines if line.startswith("model name"))
+    except (OSError, StopIteration):
+        return platform.processor() or platform.machine()
 
 
 def embree_scene(geometry: Any) -> Any:
@@ -136,26 +82,40 @@ def embree_frame(scene: Any, camera: Any) -> Any:
     return scene.run(origins, directions, output=True)
 
 
-def measure(frames: int, antialias: int, folder: Path) -> Clock:
+@contextmanager
+def timed(clock: Clock, module: Any, names: dict[str, str]) -> Iterator[None]:
+    """Time these functions of a module by their own labels while the context lasts."""
+    kept = {name: getattr(module, name) for name in names}
+    for name, label in names.items():
+        inner = kept[name]
+        setattr(module, name, lambda *a, inner=inner, label=label, **k: clock(label, lambda: inner(*a, **k)))
+    try:
+        yield
+    finally:
+        for name, inner in kept.items():
+            setattr(module, name, inner)
+
+
+def measure(frames: int, antialias: int, folder: Path) -> tuple[Clock, int]:
+    """The reference frame stage by stage; also how many triangles it has."""
     clock = Clock()
-    planned = clock("plan (273,600 frames)", lambda: plan(Recipe.load(ROOT / "recipes" / "car_poses.yaml")))
-    clock("plan, all of its shots", lambda: sum(1 for _ in planned.shots()))
-    shot = next(iter(plan(reference_recipe(frames, antialias), shot_frames=frames).shots()))
-    mesh = subdivide(Stages().model(shot.placements[0].model))
+    shot = next(iter(plan(reference_recipe(frames, antialias, folder), shot_frames=frames).shots()))
+    mesh = Stages().model(shot.placements[0].model)
     engine: plugins.Engine = plugins.load("engines", "raster")
-    store = Store(folder)
-    (folder / "store" / "writing").mkdir(parents=True)
+    store = Store(folder / f"store{antialias}")
+    (store.root / "store" / "writing").mkdir(parents=True)
     warm_up = engine.stage(shot, lambda spec: mesh)  # compiles, or reads the cache
-    one_frame(Clock(), shot, shot.frames[0], warm_up, mesh, store, None)
-    stage = clock("stage (once a shot)", lambda: engine.stage(shot, lambda spec: mesh))
+    for frame in shot.frames[:2]:
+        one_frame(Clock(), shot, frame, warm_up, mesh, store, None)
+    stage = clock("stage: baked already", lambda: engine.stage(shot, lambda spec: mesh))
     try:
         scene = embree_scene(stage.geometry)
     except ImportError:
         scene = None
-    for frame in shot.frames:
-        one_frame(clock, shot, frame, stage, mesh, store, scene)
-    print(f"scene: {len(mesh.triangles):,} triangles + ground, 640x480, antialias {antialias}")
-    return clock
+    with timed(clock, staging, staging.PROFILE):
+        for frame in shot.frames:
+            one_frame(clock, shot, frame, stage, mesh, store, scene)
+    return clock, len(stage.geometry.triangles)
 
 
 def one_frame(clock: Clock, shot: Shot, frame: Frame, stage: plugins.Stage, mesh: Mesh, store: Store, scene: Any) -> None:
@@ -175,36 +135,53 @@ def one_frame(clock: Clock, shot: Shot, frame: Frame, stage: plugins.Stage, mesh
         clock("Embree, one ray a pixel", lambda: embree_frame(scene, camera))
 
 
-def throughput(folder: Path, frames: int, workers: int) -> float:
-    """Frames a second on the wall clock of a whole run with files, start of the workers included."""
-    begun = time.monotonic()
-    generate(reference_recipe(frames, 4), folder, workers=workers)
-    return frames / (time.monotonic() - begun)
+def rate(folder: Path, frames: int, workers: int) -> float:
+    """Frames a second on the wall clock once workers are warm: what twice as many frames more take longer."""
+    seconds: list[float] = []
+    for part in (1, 3):
+        begun = time.monotonic()
+        generate(reference_recipe(part * frames, 4, folder), folder / f"run{workers}x{part}", workers=workers)
+        seconds.append(time.monotonic() - begun)
+    return 2 * frames / (seconds[1] - seconds[0])
+
+
+def table(rows: dict[str, float], embree: float | None) -> list[str]:
+    lines = ["| stage | CPU ms | of Embree |", "|---|---:|---:|"]
+    for name, value in rows.items():
+        lines.append(f"| {name} | {value:.2f} | {'' if embree is None else f'{value / embree:.2f}'} |")
+    return lines
 
 
 def main() -> None:
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     options.add_argument("--frames", type=int, default=36)
-    options.add_argument("--antialias", type=int, default=4, choices=(1, 4))
+    options.add_argument("--workers", action="store_true", help="measure frames a second with one and two workers, too")
+    options.add_argument("--scaling", action="store_true", help="measure how cost grows, and draw it")
     options.add_argument("--json", type=Path, help="write the figures here too")
     args = options.parse_args()
-    print(f"{platform.processor() or platform.machine()}, {os.cpu_count()} cores, Python {platform.python_version()}")
-    with tempfile.TemporaryDirectory() as folder:
-        clock = measure(args.frames, args.antialias, Path(folder))
-        rates = {n: throughput(Path(folder) / f"run{n}", 8 * args.frames, n) for n in (1, 2)}
-    rows = {name: clock.median(name) for name in clock.times}
-    for name, value in rows.items():
-        print(f"{name:28}{value:10.2f} CPU ms")
-    if "Embree, one ray a pixel" in rows:
-        embree = rows["Embree, one ray a pixel"]
-        rows["truth / Embree"] = (rows["truth: raster"] + rows["truth: channels"]) / embree
-        rows["whole frame / Embree"] = rows["whole frame"] / embree
-        print(f"{'truth / Embree':28}{rows['truth / Embree']:10.2f} x")
-        print(f"{'whole frame / Embree':28}{rows['whole frame / Embree']:10.2f} x")
-    for n, rate in rates.items():
-        print(f"{f'{n} worker(s), whole run':28}{rate:10.1f} frames/s")
+    print(f"{processor()}, {os.cpu_count()} cores, Python {platform.python_version()}")
+    if args.scaling:
+        from bench_scaling import scaling
+
+        scaling(ROOT / "docs" / "images")
+        return
+    figures: dict[str, Any] = {}
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        write_reference(folder)
+        for antialias in (1, 4):
+            clock, triangles = measure(args.frames, antialias, folder)
+            rows = {name: clock.median(name) for name in clock.times}
+            rows["truth"] = rows["truth: raster"] + rows["truth: channels"]
+            print(f"\n{triangles:,} triangles, {'4x edge anti-aliasing' if antialias == 4 else 'no anti-aliasing'}")
+            print("\n".join(table(rows, rows.get("Embree, one ray a pixel"))))
+            figures[f"antialias {antialias}"] = rows
+        if args.workers:
+            rates = {n: rate(folder, 8 * args.frames, n) for n in (1, 2)}
+            print(f"\n{rates[1]:.1f} frames/s with one worker, {rates[2]:.1f} with two: {rates[2] / rates[1]:.2f} times")
+            figures["frames a second"] = rates
     if args.json:
-        args.json.write_text(json.dumps({**rows, **{f"frames/s, {n} workers": r for n, r in rates.items()}}, indent=1))
+        args.json.write_text(json.dumps(figures, indent=1))
 
 
 if __name__ == "__main__":

@@ -65,7 +65,8 @@ def default(value: Any) -> str:
 def channels_page() -> str:
     text = NOTE + (
         "# Channels\n\nA recipe's `channels` name what is kept of each frame. Arrays have the image's height and width; "
-        "channels of several components have them last. PNG files are lossless; TIFF files hold the exact values (deflate).\n\n"
+        "channels of several components have them last. The files are the default ones, and lossless; a recipe's `files` "
+        "choose others, see [formats.md](formats.md#files).\n\n"
         "| channel | type | components | unit | empty | file | what it is |\n|---|---|---|---|---|---|---|\n"
     )
     for c in CHANNELS.values():

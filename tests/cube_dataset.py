@@ -11,7 +11,7 @@ from viewsphere.geometry.box import FACES, box_vertices
 from viewsphere.geometry.camera import orbit_center, orbit_rotation
 from viewsphere.geometry.pose_category import pose_category
 from viewsphere.model.camera import Camera, Intrinsics
-from viewsphere.model.channel import CHANNELS
+from viewsphere.model.channel import CHANNELS, PICTURES
 from viewsphere.model.sample import Sample
 from viewsphere.model.scene import Ground, Scene
 from viewsphere.model.shot import Frame, ModelSpec, Placement, Pose, Shot
@@ -68,9 +68,10 @@ def render(shot: Shot):
         rotation = orbit_rotation(*angles)
         camera = Camera(shot.intrinsics, rotation, -rotation @ orbit_center(*angles[:2], frame.pose.distance))
         visibility = rasterize(geometry, camera)
-        channels = dict(observe(geometry, camera, visibility, {"instances", *shot.channels} - {"rgb"}))
-        if "rgb" in shot.channels:
-            channels["rgb"] = (channels["instances"][..., None] * np.array([90, 60, 30])).astype(np.uint8)
+        channels = dict(observe(geometry, camera, visibility, {"instances", *shot.channels} - set(PICTURES)))
+        colors = (channels["instances"][..., None] * np.array([90, 60, 30])).astype(np.uint8)
+        alpha = np.where(channels["instances"] > 0, 255, 0).astype(np.uint8)
+        channels |= {"rgb": colors, "rgba": np.dstack([colors, alpha])}
         channels = {name: channels[name] for name in shot.channels}
         objects = annotate(shot, frame, camera, geometry, visibility, boxes, files)
         yield Sample(frame.index, frame.split, camera, frame.pose, objects, channels, {})

@@ -36,7 +36,11 @@ class Stage(Protocol):
     geometry: Geometry
 
     def color(self, camera: Camera, frame: Frame, visibility: Visibility) -> NDArray[np.uint8]:
-        """The picture, (H, W, 3) uint8 sRGB; `visibility` is truth's buffer for this camera."""
+        """The picture, (H, W, 3) uint8 sRGB; `visibility` is truth's buffer for this camera.
+
+        Where the frame's finish (or else the scene's) has a transparent background, (H, W, 4) with straight alpha: black where
+        nothing is seen. Over any plain background it gives the picture with that background.
+        """
         ...
 
 

@@ -12,6 +12,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 from viewsphere.geometry.box import EDGES, FACES
 from viewsphere.model.camera import Intrinsics
+from viewsphere.model.channel import picture_of
 from viewsphere.model.recipe import Recipe
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.model.scene import Ground, Scene
@@ -40,7 +41,7 @@ def preview_samples(recipe: Recipe, count: int = 12, width: int = 320) -> Iterat
         groups = [[pose] for pose in poses] if recipe.scene.is_new_each_frame else [poses]
         for group in groups:
             shot = planned.take(model, group, stages.box)
-            channels = tuple(dict.fromkeys((*shot.channels, "rgb", "depth", "instances")))
+            channels = tuple(dict.fromkeys((*shot.channels, picture_of(shot.channels) or "rgb", "depth", "instances")))
             small = shot.model_copy(update={"intrinsics": _scaled(shot.intrinsics, width), "channels": channels})
             yield from stages.render(small)
 
@@ -125,7 +126,7 @@ def _caption(sample: Sample) -> str:
 
 def draw_sample(sample: Sample, draw: Sequence[Drawing] = (), width: int | None = None) -> Picture:
     """One frame with 2D boxes, 3D boxes (front face filled), masks or depth (beside the picture) drawn."""
-    rgb = np.asarray(sample.rgb)
+    rgb = _on_paper(sample.picture)
     if "masks" in draw:
         rgb = _tint(rgb, sample.objects)
     scale = 1.0 if width is None else min(1.0, width / rgb.shape[1])
@@ -153,6 +154,15 @@ def depth_picture(depth: NDArray[np.float32]) -> Picture:
         near, far = np.percentile(depth[seen], (0, 98))
         grey[seen] = 1.0 - 0.85 * np.clip((depth[seen] - near) / max(far - near, 1e-9), 0, 1)
     return np.repeat((grey * 255).astype(np.uint8)[..., None], 3, axis=2)
+
+
+def _on_paper(picture: Picture) -> Picture:
+    """The picture; one without background on paper."""
+    if picture.shape[2] == 3:
+        return picture
+    sheet, clear = Image.new("RGB", picture.shape[1::-1], PAPER), Image.fromarray(picture)
+    sheet.paste(clear, mask=clear)
+    return np.asarray(sheet)
 
 
 def _tint(rgb: Picture, objects: Sequence[ObjectAnnotation]) -> Picture:

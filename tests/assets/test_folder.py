@@ -1,6 +1,8 @@
 """Which files a model may name, and what an unusable one costs."""
 
 import io
+import struct
+import zlib
 
 import numpy as np
 import pytest
@@ -59,6 +61,84 @@ def test_16_bit_and_palette_images(folder):
     palette = Image.new("P", (1, 1), 1)
     palette.putpalette([0, 0, 0, 9, 8, 7])
     assert decode_image(png(palette), "t")[0, 0].tolist() == [9, 8, 7, 255]
+
+
+def saved(image, kind):
+    file = io.BytesIO()
+    image.save(file, kind)
+    return file.getvalue()
+
+
+GREY = np.linspace(0, 255, 16).astype(np.uint8).reshape(4, 4)
+
+
+@pytest.mark.parametrize("mode", ["L", "LA", "1", "RGB", "RGBA", "CMYK", "YCbCr", "P", "F", "I;16"])
+def test_every_kind_of_pixel_shows_its_picture(mode):
+    """TIFF holds them all: a grey ramp stays one, and nothing becomes black."""
+    grey = Image.fromarray(GREY)
+    image = {
+        "F": lambda: Image.fromarray(GREY.astype(np.float32) / 255),
+        "I;16": lambda: Image.fromarray(GREY.astype(np.uint16) * 257),
+        "1": lambda: grey.point(lambda value: 255 * (value > 127), "1"),
+        "P": lambda: grey.convert("RGB").quantize(256),
+    }.get(mode, lambda: grey.convert("RGB").convert(mode))()
+    pixels = decode_image(saved(image, "TIFF"), "t")
+    expected = np.where(GREY > 127, 255, 0) if mode == "1" else GREY
+    assert np.abs(pixels[..., :3] - expected[..., None].astype(int)).max() <= 1
+    assert (pixels[..., 3] == 255).all()
+
+
+def test_floats_that_are_no_numbers_are_black_or_white():
+    image = Image.fromarray(np.array([[np.nan, np.inf, -np.inf, 0.5, 7]], np.float32))
+    assert decode_image(saved(image, "TIFF"), "t")[0, :, 0].tolist() == [0, 255, 0, 128, 255]
+
+
+def test_jpegs_for_print_are_not_inverted():
+    pixels = decode_image(saved(Image.fromarray(GREY).resize((32, 32)).convert("RGB").convert("CMYK"), "JPEG"), "t")
+    assert pixels[0, 0, 0] < 20
+    assert pixels[-1, -1, 0] > 235
+
+
+def test_a_wrong_suffix_does_not_matter(folder, write):
+    write("model/really.png", saved(Image.fromarray(GREY), "JPEG"))
+    assert folder.image("really.png", "really.png") == 0
+    assert folder.warnings == []
+
+
+def png_without_pixels(width, height):
+    def chunk(kind, data):
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+    head = chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0))
+    return b"\x89PNG\r\n\x1a\n" + head + chunk(b"IDAT", zlib.compress(b"")) + chunk(b"IEND", b"")
+
+
+EMPTY = {
+    "png": png_without_pixels(0, 0),
+    "one side": png_without_pixels(0, 5),
+    "ppm": b"P6 0 3 255\n",
+    "tga": b"\0\0\2" + b"\0" * 13 + b"\x18\0",
+    "gif": b"GIF89a" + b"\0" * 7 + b";",
+}
+
+
+@pytest.mark.parametrize("kind", EMPTY)
+def test_a_picture_without_pixels_is_a_warning(folder, kind):
+    assert folder.image("#a", "empty", EMPTY[kind]) is None
+    assert "has no pixels; the material's plain factor is used" in folder.warnings[0]
+
+
+def test_a_very_large_texture_is_reduced_with_a_word(folder, monkeypatch):
+    from viewsphere.assets import folder as module
+
+    monkeypatch.setattr(module, "SHARPEST", 16)
+    pixels = np.zeros((30, 50, 4), np.uint8)
+    pixels[:, ::2] = (200, 100, 50, 255)
+    pixels[:, 1::2] = (9, 9, 9, 0)
+    assert folder.image("#a", "big", png(Image.fromarray(pixels))) == 0
+    assert folder.warnings == ["car.obj: texture 'big': 50 x 30 pixels are reduced to 13 x 8 (at most 16 a side)"]
+    assert folder.images[0].pixels.shape == (8, 13, 4)
+    np.testing.assert_allclose(folder.images[0].pixels[2, 3], [200, 100, 50, 128], atol=1)
 
 
 @pytest.mark.parametrize("data", [b"", b"not an image", png(Image.new("RGB", (64, 64), "red"))[:100]])

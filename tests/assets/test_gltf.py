@@ -3,6 +3,7 @@
 import base64
 import io
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -295,6 +296,30 @@ def test_buffers_and_images_as_files_and_data_uris(gltf, cube, write):
         assert len(mesh.triangles) == 12
         assert [tuple(image.pixels[0, 0]) for image in mesh.images] == [(255, 0, 0, 255), (0, 255, 0, 255)]
         assert {"cube.gltf", "a red.png"} <= {file.name for file in facts.files}
+
+
+def test_textures_without_coordinates_leave_the_factors(gltf, cube):
+    """Of two meshes of one material, one has no coordinates: it is plain, the other textured."""
+    gltf.node(mesh=gltf.mesh(*cube, material=0, TEXCOORD_0=cube[0][:, :2].copy()))
+    gltf.node(mesh=gltf.mesh(*cube, material=0))
+    gltf.root["materials"] = [{"name": "skin", "pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}]
+    gltf.root["textures"] = [{"source": 0}]
+    gltf.root["images"] = [{"bufferView": gltf.view(png()), "mimeType": "image/png"}]
+    mesh = load(gltf)
+    first, second = (mesh.materials[i] for i in mesh.triangle_material[[0, -1]])
+    assert first.base_color_texture is not None
+    assert second == replace(first, base_color_texture=None)
+    assert mesh.warnings == (
+        "hand.glb: material 'skin' has textures, but some of its triangles have no coordinates: plain there",
+    )
+
+
+@pytest.mark.parametrize("name", ["KHR_texture_basisu", "ADOBE_materials_clearcoat_tint"])
+def test_a_required_extension_that_is_not_read_is_named(gltf, cube, name):
+    gltf.node(mesh=gltf.mesh(*cube))
+    gltf.root["extensionsRequired"] = ["KHR_texture_transform", name, "KHR_materials_volume"]
+    with pytest.raises(ModelError, match=f"requires the extension {name}, not read here"):
+        load(gltf)
 
 
 def test_a_dead_texture_is_a_warning(gltf, cube):

@@ -141,7 +141,7 @@ def test_materials(write):
     assert (shiny.base_color, shiny.alpha_mode) == ((0.1, 0.2, 0.3, 0.25), "BLEND")
     assert (shiny.roughness, shiny.metallic, shiny.emissive) == (0.4, 0.6, (1, 2, 3))
     assert (shiny.clearcoat, shiny.clearcoat_roughness, shiny.double_sided) == (0.5, 0.2, True)
-    assert (old.roughness, old.specular, old.alpha_mode) == (0.2, 0, "OPAQUE")
+    assert (old.roughness**2, old.specular, old.alpha_mode) == (pytest.approx(0.2), 0, "OPAQUE")
     assert unknown.name == "default"
     assert mesh.triangle_material.tolist() == [0, 1, 2]
     assert any("'gone'" in warning for warning in mesh.warnings)
@@ -212,12 +212,35 @@ def test_alpha_of_a_texture(write, alpha, mode):
     assert mesh.materials[0].alpha_mode == mode
 
 
-def test_a_height_map_is_not_taken_for_normals(write):
-    write("h.png", png(np.full((2, 2), 90)))
-    write("m.mtl", "newmtl m\nmap_bump h.png\n")
-    mesh, _ = load_model(write("a.obj", "mtllib m.mtl\nusemtl m\n" + SQUARE + "f 1 2 3\n"))
-    assert mesh.materials[0].normal_texture is None
-    assert "height map" in mesh.warnings[0]
+def bumpy(write, heights, options=""):
+    """The material of a triangle with this height map, and its images."""
+    write("h.png", png(heights))
+    write("m.mtl", f"newmtl m\nmap_bump {options} h.png\n")
+    mesh, _ = load_model(write("a.obj", "mtllib m.mtl\nusemtl m\nvt 0 0\n" + SQUARE + "f 1/1 2/1 3/1\n"))
+    assert mesh.warnings == ()
+    return mesh.materials[0], mesh.images
+
+
+def test_heights_become_normals(write):
+    """A slope that rises to the right and to the image's top leans left and down, by its gradient."""
+    x, y = np.meshgrid(np.arange(64), np.arange(64))
+    heights = 100 + 2 * x - 1 * y
+    material, images = bumpy(write, heights, "-bm 2 -clamp on")
+    assert material.normal_scale == 2
+    expected = np.array([-2.0, -1.0, 255 / 0.64])  # 0.01 of 64 texels high
+    expected /= np.linalg.norm(expected)
+    normal = images[material.normal_texture.image].pixels[20, 30, :3] / 127.5 - 1
+    np.testing.assert_allclose(normal, expected, atol=1 / 127)
+    steep = np.where(np.arange(256) % 2, 255, 0)[None] * np.ones((4, 1), int)
+    material, images = bumpy(write, np.repeat(steep, 2, axis=1))
+    red = images[material.normal_texture.image].pixels[1, 1:9, 0].astype(int)
+    assert (np.sign(red - 128) == [-1, -1, 1, 1, -1, -1, 1, 1]).all()
+
+
+def test_an_even_height_map_is_none(write):
+    material, images = bumpy(write, np.full((2, 2), 90))
+    assert material.normal_texture is None
+    assert images == ()
 
 
 @settings(max_examples=60, deadline=None)

@@ -12,11 +12,11 @@ from viewsphere.assets.mesh import Image, Material, Mesh, Texture
 from viewsphere.assets.srgb import encoded
 from viewsphere.assets.srgb import linear as linear_light
 from viewsphere.engines import raster
-from viewsphere.engines.raster.tone import EXPOSURE, KNEE
 from viewsphere.errors import UserError
 from viewsphere.geometry.camera import orbit_center, orbit_rotation
+from viewsphere.imaging.view import EXPOSURE, KNEE
 from viewsphere.model.camera import Camera, Distortion, Intrinsics
-from viewsphere.model.scene import Background, Finish, Ground, Scene, Sky, Sun
+from viewsphere.model.scene import Background, Finish, Ground, Scene, Sky, Sun, View
 from viewsphere.model.shot import Frame, ModelSpec, Placement, Pose, Shot
 from viewsphere.truth.visibility import rasterize
 
@@ -102,6 +102,10 @@ def stage_of(mesh: Mesh, scene: Scene, **options):
     return raster.stage(shot, lambda _: mesh)
 
 
+AS_IT_IS = Finish(background=BLACK, view=View(transform="raw"))
+"""Unlit colours are shown as they are, also those above the shoulder of the standard view."""
+
+
 def picture(mesh: Mesh, scene: Scene, view: Camera, frame: Frame = FRAME, **options) -> np.ndarray:
     stage = stage_of(mesh, scene, **options)
     return stage.color(view, frame, rasterize(stage.geometry, view))
@@ -134,7 +138,7 @@ def test_unlit_texture_seen_head_on_is_the_texture(antialias, nearest):
     image = texture_image(12, 16)
     mesh = mesh_of(card(1.6, 1.2), unlit(Texture(0, nearest=nearest)), uv0=CARD_UV, images=(image,))
     view = camera(16, 12, 10.0)
-    seen = picture(mesh, Scene(finish=Finish(background=BLACK)), view, antialias=antialias)
+    seen = picture(mesh, Scene(finish=AS_IT_IS), view, antialias=antialias)
     np.testing.assert_array_equal(seen, image.pixels[..., :3])
 
 
@@ -142,7 +146,7 @@ def test_second_uv_set_and_texture_transform():
     image = texture_image(12, 16)
     turned = Texture(0, texcoord=1, offset=(0.0, 1.0), rotation=math.pi / 2, scale=(1.0, 1.0))
     mesh = mesh_of(card(1.2, 1.6), unlit(turned), uv0=CARD_UV * 0, uv1=CARD_UV, images=(image,))
-    seen = picture(mesh, Scene(finish=Finish(background=BLACK)), camera(12, 16, 10.0))
+    seen = picture(mesh, Scene(finish=AS_IT_IS), camera(12, 16, 10.0))
     # u' = v and v' = 1 - u: the picture's column runs up the texture's rows, its row along the texture's columns.
     np.testing.assert_array_equal(seen, image.pixels[::-1, :, :3].transpose(1, 0, 2))
 
@@ -163,7 +167,7 @@ def test_wrap_modes(wrap, columns):
         uv0=CARD_UV * np.float32(3) - np.float32(1),
         images=(image,),
     )
-    seen = picture(mesh, Scene(finish=Finish(background=BLACK)), camera(12, 12, 1.0))
+    seen = picture(mesh, Scene(finish=AS_IT_IS), camera(12, 12, 1.0))
     np.testing.assert_array_equal(seen, image.pixels[columns][:, columns, :3])
 
 
@@ -172,14 +176,14 @@ def test_minified_texture_is_averaged_in_linear_light():
     pixels = np.repeat(checks[..., None], 4, axis=2).astype(np.uint8)
     pixels[..., 3] = 255
     mesh = mesh_of(card(1, 1), unlit(Texture(0)), uv0=CARD_UV, images=(Image("checks", pixels),))
-    seen = picture(mesh, Scene(finish=Finish(background=BLACK)), camera(16, 16, 16.0))
+    seen = picture(mesh, Scene(finish=AS_IT_IS), camera(16, 16, 16.0))
     assert np.abs(seen.astype(int) - int(as_bytes(0.5))).max() <= 1
 
 
 def test_unlit_factor_and_vertex_colour_are_exact():
     color = (0.25, 0.5, 1.0, 1.0)
     mesh = mesh_of(card(4, 4), unlit(color=color), colors=np.tile(np.float32([1.0, 0.5, 0.1, 1.0]), (6, 1)))
-    seen = picture(mesh, Scene(finish=Finish(background=BLACK)), camera(8, 8, 8.0))
+    seen = picture(mesh, Scene(finish=AS_IT_IS), camera(8, 8, 8.0))
     assert np.unique(seen.reshape(-1, 3), axis=0).tolist() == [as_bytes([0.25, 0.25, 0.1]).tolist()]
 
 
@@ -219,7 +223,8 @@ def test_exposure_is_in_stops():
     mesh = mesh_of(rectangle((-1, -1, 0), (2, 0, 0), (0, 2, 0)), Material(roughness=1.0, ior=1.0))
     scene = Scene(sun=Sun(elevation_deg=90, strength=0.5, color=(1, 1, 1)), sky=DARK, finish=Finish(background=BLACK))
     view = camera(8, 8, 10.0, elevation=90)
-    plain, brighter = (picture(mesh, scene, view, exposure=e) for e in (0, 1))
+    finishes = (Finish(background=BLACK, view=View(exposure=e)) for e in (0, 1))
+    plain, brighter = (picture(mesh, scene.model_copy(update={"finish": f}), view) for f in finishes)
     ratio = linear_light(brighter[0, 0] / 255) / linear_light(plain[0, 0] / 255)
     np.testing.assert_allclose(ratio, 2.0, rtol=0.03)
 
@@ -256,7 +261,10 @@ def test_sky_is_brighter_low_and_near_the_sun():
 
 BOX = box((-0.5, -0.5, 0.0), (0.5, 0.5, 1.0))
 GROUND_SCENE = Scene(
-    sun=Sun(azimuth_deg=90, elevation_deg=45, strength=3.0), sky=DARK, ground=Ground(color=(0.8, 0.8, 0.8)), finish=Finish(background=BLACK)
+    sun=Sun(azimuth_deg=90, elevation_deg=45, strength=3.0),
+    sky=DARK,
+    ground=Ground(color=(0.8, 0.8, 0.8)),
+    finish=Finish(background=BLACK),
 )
 
 
@@ -391,7 +399,9 @@ def test_two_runs_are_equal_byte_for_byte():
 def test_distorted_colour_follows_the_labels(lens):
     mesh = mesh_of(card(1.0, 0.6), unlit(color=(1.0, 0.0, 0.0, 1.0)))
     view = camera(64, 64, 50.0, 25, 30, 1.2, distortion=lens)
-    stage = stage_of(mesh, Scene(finish=Finish(background=Background(color=(0, 0, 1)))), antialias=1)
+    stage = stage_of(
+        mesh, Scene(finish=Finish(background=Background(color=(0, 0, 1)), view=View(transform="raw"))), antialias=1
+    )
     visible = rasterize(stage.geometry, view)
     seen = stage.color(view, FRAME, visible)
     expected = np.where((visible.triangle >= 0)[..., None], np.uint8([255, 0, 0]), np.uint8([0, 0, 255]))
@@ -411,7 +421,7 @@ def test_distorted_texture_is_sampled_along_the_same_rays():
 
     rays = pixel_rays(view.intrinsics)
     u, v = (rays[..., 0] + 1) / 2, (rays[..., 1] + 1) / 2
-    seen = picture(mesh, Scene(finish=Finish(background=BLACK)), view)
+    seen = picture(mesh, Scene(finish=AS_IT_IS), view)
     assert np.abs(seen[..., 0] - (u * 256 - 0.5)).max() < 1.0
     assert np.abs(seen[..., 1] - (v * 256 - 0.5)).max() < 1.0
 
@@ -429,7 +439,11 @@ def test_blended_surface_shows_what_is_behind():
         triangle_part=np.zeros(4, np.int32),
         materials=(glass, solid),
     )
-    seen = picture(both, Scene(finish=Finish(background=Background(color=(0, 0, 1)))), camera(16, 16, 16.0, distance=2.0))
+    seen = picture(
+        both,
+        Scene(finish=Finish(background=Background(color=(0, 0, 1)), view=View(transform="raw"))),
+        camera(16, 16, 16.0, distance=2.0),
+    )
     assert seen[8, 3].tolist() == as_bytes([0.25, 0.75, 0.0]).tolist()
     assert seen[8, 12].tolist() == as_bytes([0.25, 0.0, 0.75]).tolist()
 
@@ -450,7 +464,8 @@ def test_metal_mirrors_the_sky_and_is_not_dead():
         ({"antialais": 4}, "did you mean 'antialias'"),
         ({"antialias": 3}, "expected 1 or 4, found 3"),
         ({"antialias": True}, "expected 1 or 4"),
-        ({"exposure": "bright"}, "exposure: expected stops"),
+        ({"exposure": 1.0}, "expected it as scene.view.exposure"),
+        ({"ambient_occlusion": "soft"}, "ambient_occlusion: expected off, fast or fine"),
         ({"shadow_resolution": 10}, "shadow_resolution: expected an integer"),
         ({"shadow_resolution": 512.5}, "shadow_resolution: expected an integer"),
     ],

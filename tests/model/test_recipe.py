@@ -2,6 +2,7 @@
 
 import math
 import pickle
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,34 @@ from pydantic import ValidationError
 
 from viewsphere.errors import RecipeError
 from viewsphere.model.recipe import Recipe
+from viewsphere.model.recipe_finish import BackgroundEntry, EffectsEntry, SmootherEntry, ViewEntry
+from viewsphere.model.recipe_light import (
+    AreaEntry,
+    DaylightEntry,
+    GradientEntry,
+    HdriSky,
+    HemisphereEntry,
+    PointEntry,
+    SpotEntry,
+    SunEntry,
+)
+from viewsphere.model.recipe_surface import GroundEntry, MaterialEntry
+from viewsphere.model.scene import (
+    AreaLight,
+    Background,
+    Daylight,
+    Effects,
+    Environment,
+    Ground,
+    HemisphereLight,
+    PointLight,
+    Sky,
+    Smoother,
+    SpotLight,
+    Sun,
+    View,
+)
+from viewsphere.model.shot import Repaint
 
 MODELS = [{"source": "zoo:car", "count": 3}]
 VIEWS = {"distance": 5}
@@ -35,8 +64,7 @@ def test_the_least_recipe_has_the_documented_defaults():
     assert r.camera.size == (640, 480)
     assert r.engine.name == "raster"
     assert r.scene.background.is_sky
-    assert r.scene.floor is not None
-    assert r.scene.light is not None
+    assert (r.scene.automatic_ground, r.scene.sun, r.scene.draw) == ("on", "auto", "per_model")
 
 
 def test_a_recipe_is_frozen_and_pickles():
@@ -94,13 +122,18 @@ def test_colours_have_names_codes_and_numbers():
 
 
 def test_the_ground_is_there_under_the_sky_unless_said_otherwise():
-    assert recipe(scene={"background": "white"}).scene.floor is None
-    assert recipe(scene={"background": "white", "ground": True}).scene.floor is not None
-    assert recipe(scene={"ground": "off"}).scene.floor is None
-    assert recipe(scene={"ground": "#336699"}).scene.floor.color == (0.2, 0.4, 0.6)
-    assert recipe(scene={"sun": "off"}).scene.light is None
-    assert recipe(scene={"sun": "on"}).scene.light.elevation_deg == 50
+    assert recipe(scene={"background": "white"}).scene.automatic_ground == "off"
+    assert recipe(scene={"background": "environment"}).scene.automatic_ground == "catcher"
+    assert not recipe(scene={"background": "white"}).scene.has_ground
+    assert recipe(scene={"background": "white", "ground": True}).scene.has_ground
+    assert not recipe(scene={"ground": "off"}).scene.has_ground
+    assert recipe(scene={"ground": "#336699"}).scene.ground.color == (0.2, 0.4, 0.6)
+    assert recipe(scene={"sun": False}).scene.sun == "off"
+    assert recipe(scene={"sun": "on"}).scene.sun == "on"
 
+
+NOON = {"date": "2026-06-21", "time": "12:30Z", "latitude": 41, "longitude": -8}
+LAMP = {"position": [0, 0, 3], "strength": 1}
 
 MISTAKES = [
     ({"nam": "x"}, "nam: expected one of name, seed, ", "; found 'nam'; did you mean 'name'?"),
@@ -144,16 +177,39 @@ MISTAKES = [
     ({"camera": {"focal_mm": 35, "sensor_mm": -1}}, "camera.sensor_mm: expected millimetres above 0", ""),
     ({"camera": {"fov_deg": 180}}, "camera.fov_deg: expected a number less than 180", ""),
     ({"camera": {"K": [[1, 0, 0], [0, 1, 0], [0, 0, 2]]}}, "camera.K: expected [[fx, skew, cx]", ""),
-    ({"scene": {"background": "whit"}}, "scene.background: expected sky, a mapping", "; did you mean 'white'?"),
+    ({"scene": {"background": "whit"}}, "scene.background: expected sky, environment, tr", "; did you mean 'white'?"),
     ({"scene": {"background": None}}, "scene.background: expected sky", "; put a '#' colour in quotes"),
     ({"scene": {"background": [255, 255, 255]}}, "scene.background: expected sky", "; found [255, 255, 255]"),
     ({"scene": {"background": {"image": "a.png", "images": "b"}}}, "scene.background: expected one of color, ", ""),
     ({"scene": {"background": {"image": "a.png", "draw": "fixed"}}}, "scene.background: expected images beside", ""),
-    ({"scene": {"ground": "of"}}, "scene.ground: expected on, off, auto, a colour name", "; found 'of'"),
+    ({"scene": {"ground": "of"}}, "scene.ground: expected on, off, auto, catcher, a mapping, a colour name", "; found 'of'"),
     ({"scene": {"sun": {"elevation": 3}}}, "scene.sun.elevation: expected one of azimuth_deg", "'elevation_deg'?"),
-    ({"scene": {"sun": 3}}, "scene.sun: expected on, off or a mapping; found 3", ""),
+    ({"scene": {"sun": 3}}, "scene.sun: expected auto, on, off or a mapping; found 3", ""),
+    ({"scene": {"sun": {"date": "2026-06-21"}}}, "scene.sun: expected date, time, latitude, longitude together", "found date"),
+    ({"scene": {"sun": {**NOON, "time": "12:30"}}}, "scene.sun.time: expected a time and its distance from UTC", "'12:30'"),
+    ({"scene": {"sun": {**NOON, "date": "21.6.2026"}}}, "scene.sun.date: expected a date such as '2026-06-21'", ""),
+    ({"scene": {"sun": {**NOON, "elevation_deg": 4}}}, "scene.sun: expected angles or date, time and place, not both", ""),
+    ({"scene": {"sky": {"hdri": "a.exr", "zenith": [1, 1, 1]}}}, "scene.sky.zenith: expected one of hdri, stre", "'zenith'"),
+    ({"scene": {"sky": {"daylight": {"clouds": 2}}}}, "scene.sky.daylight.clouds: expected a number less than", "found 2"),
+    ({"scene": {"lights": {"strength": 1}}}, "scene.lights: expected one of position, at; found none", ""),
+    ({"scene": {"lights": [{**LAMP, "at": {"distance": 2}}]}}, "scene.lights[0]: expected one of position, at; found both", ""),
+    ({"scene": {"lights": [{**LAMP, "kind": "sopt"}]}}, "scene.lights[0].kind: expected one of point, spot", "'spot'?"),
+    ({"scene": {"lights": [{**LAMP, "blend": 1}]}}, "scene.lights[0].blend: expected one of count, strength, color", ""),
+    ({"scene": {"lights": [{"position": [0, 0, 3]}]}}, "scene.lights[0].strength: expected a value; found nothing", ""),
+    ({"scene": {"ground": {"roughnes": 1}}}, "scene.ground.roughnes: expected one of color, image, ro", "'roughness'?"),
+    ({"scene": {"materials": [{"models": "car_*"}]}}, "scene.materials[0]: expected tint, metallic or roughness", ""),
+    ({"scene": {"background": {"blur": 0.1}}}, "scene.background: expected image or images beside blur", ""),
+    ({"scene": {"background": {"image": "a", "zoom": 2}}}, "scene.background: expected fit: crop beside zoom and pl", ""),
+    ({"scene": {"background": {"color": "red", "transparent": True}}}, "scene.background: expected one of color, ", ""),
+    ({"scene": {"background": {"choice": ["sky", "transparent"]}}}, "scene: expected a transparent background in all", ""),
+    ({"scene": {"background": {"choice": ["sky", {"images": "a", "draw": "fixed"}]}}}, "scene: expected no draw inside", ""),
+    ({"scene": {"smoother": "gausian"}}, "scene.smoother: expected one of none, box", "; did you mean 'gaussian'?"),
+    ({"scene": {"view": {"transform": "filmc"}}}, "scene.view.transform: expected one of standard", "mean 'filmic'?"),
+    ({"scene": {"effects": {"noise": 1}}}, "scene.effects.noise: expected one of draw, blur", "mean 'shot_noise'?"),
+    ({"scene": {"jitter": {"distance": [-1, 0]}}}, "scene.jitter.distance[0]: expected a number greater than or", "-1"),
+    ({"scene": {"draw": "per_shot"}}, "scene.draw: expected one of fixed, per_model, per_frame", ""),
     ({"engine": 3}, "engine: expected a mapping; found 3", ""),
-    ({"channels": ["rgb", "dept"]}, "channels[1]: expected one of rgb, depth", "; did you mean 'depth'?"),
+    ({"channels": ["rgb", "dept"]}, "channels[1]: expected one of rgb, rgba, depth", "; did you mean 'depth'?"),
     ({"channels": ["rgb", "rgb"]}, "channels: expected distinct names; found 'rgb' twice", ""),
     ({"channels": "rgb"}, "channels: expected a list; found 'rgb'", ""),
     ({"splits": {"by": "mdel"}}, "splits.by: expected one of model, pose, frame", "; did you mean 'model'?"),
@@ -217,3 +273,53 @@ def test_engine_options_stand_beside_its_name():
     engine = recipe(engine={"name": "raster", "samples": 4}).engine
     assert (engine.name, engine.options) == ("raster", {"samples": 4})
     assert recipe(engine="blender").engine.name == "blender"
+
+
+ENTRIES = [
+    (SunEntry, Sun(), {"azimuth_deg", "elevation_deg"}),
+    (GradientEntry, Sky(), {"kind"}),
+    (DaylightEntry, Daylight(), {"kind"}),
+    (HdriSky, Environment(file="a"), {"kind", "file"}),
+    (PointEntry, PointLight(position=(0, 0, 0), strength=1), {"position", "strength"}),
+    (SpotEntry, SpotLight(position=(0, 0, 0), strength=1), {"kind", "position", "strength"}),
+    (AreaEntry, AreaLight(position=(0, 0, 0), strength=1), {"kind", "position", "strength"}),
+    (HemisphereEntry, HemisphereLight(strength=1), {"kind", "strength"}),
+    (GroundEntry, Ground(), {"color"}),
+    (BackgroundEntry, Background(), set()),
+    (SmootherEntry, Smoother(), set()),
+    (ViewEntry, View(), set()),
+    (EffectsEntry, Effects(), {"seed"}),
+    (MaterialEntry, Repaint(), set()),
+]
+
+
+@pytest.mark.parametrize(("entry", "concrete", "others"), ENTRIES)
+def test_entries_have_the_defaults_of_the_scene_they_become(entry, concrete, others):
+    for name in type(concrete).model_fields.keys() - others:
+        assert entry.model_fields[name].default == getattr(concrete, name), name
+
+
+LIMITS = [
+    (SunEntry, Sun, "elevation_deg", (0, 90.1)),
+    (SunEntry, Sun, "angle_deg", (-1, 61)),
+    (DaylightEntry, Daylight, "turbidity", (1.7, 10.1)),
+    (GroundEntry, Ground, "tile", (0,)),
+    (BackgroundEntry, Background, "zoom", (0.9,)),
+    (SmootherEntry, Smoother, "size", (0, 51)),
+    (ViewEntry, View, "exposure", (-17, 17)),
+    (ViewEntry, View, "temperature_k", (1499, 20001)),
+    (ViewEntry, View, "tint", (-1.1, 1.1)),
+    *(
+        (EffectsEntry, Effects, name, (-1.1, 1.1))
+        for name in Effects.model_fields
+        if name not in {"seed", "motion_angle_deg", "focus"}
+    ),
+    (EffectsEntry, Effects, "focus", (0,)),
+]
+
+
+@pytest.mark.parametrize(("entry", "concrete", "field", "beyond"), LIMITS)
+def test_entries_refuse_what_the_scene_would(entry, concrete, field, beyond):
+    for kind, value in product((entry, concrete), beyond):
+        with pytest.raises(ValidationError):
+            kind(**{field: value})

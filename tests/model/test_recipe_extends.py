@@ -64,7 +64,7 @@ def test_later_recipes_hold_over_earlier_and_chains_are_followed(write):
         own="extends: [middle.yaml, night.yaml]\n",
     )  # fmt: skip
     recipe = Recipe.load(file)
-    assert (recipe.name, recipe.seed, recipe.scene.light) == ("middle", 4, None)
+    assert (recipe.name, recipe.seed, recipe.scene.sun) == ("middle", 4, "off")
 
 
 def test_paths_start_from_the_file_they_are_written_in(write, tmp_path):
@@ -92,8 +92,8 @@ def test_changes_set_fields_deep_in_the_recipe(write):
     recipe = Recipe.load(write(base=BASE), changes)
     assert recipe.models[0].count == 2
     assert recipe.viewpoints.elevation == (1, 2, 3)
-    assert (recipe.scene.light, recipe.shot_frames) == (None, 9)
-    assert Recipe.load(write(base=BASE), {"models": [{"source": "zoo:car"}], "scene.sun": None}).scene.light is not None
+    assert (recipe.scene.sun, recipe.shot_frames) == ("off", 9)
+    assert Recipe.load(write(base=BASE), {"models": [{"source": "zoo:car"}], "scene.sun": None}).scene.sun == "auto"
 
 
 def test_a_change_follows_yamls_rules():

@@ -296,3 +296,10 @@ def test_the_digest_follows_the_pictures_on_the_planes(tmp_path):
         return plan(recipe(scene={"planes": planes})).digest
 
     assert digest("a.png") == digest("a.png") != digest("b.png")
+
+
+@pytest.mark.parametrize(("draw", "turns"), [("fixed", 1), ("per_model", 6), ("per_frame", 18)])
+def test_a_place_may_be_turned_at_random(tiny, draw, turns):
+    shots = list(plan(recipe(scene={"place": {"source": tiny, "turn": [0, 360], "draw": draw}})).shots(box_of))
+    streets = {p.world_from_object for s in shots for p in s.placements if p.model.category == "street"}
+    assert len(streets) == turns

@@ -189,7 +189,9 @@ def backgrounds(folder, models, azimuths=(0, 10, 20), **background):
     }
     planned = plan(Recipe.model_validate(data, context={"folder": folder}))
     return planned, {
-        (s.placements[0].model.key, f.pose.azimuth_deg): f.finish.background for s in planned.shots() for f in s.frames
+        (s.placements[0].model.key, f.pose.azimuth_deg): f.finish and f.finish.background
+        for s in planned.shots()
+        for f in s.frames
     }
 
 

@@ -5,11 +5,11 @@ import pytest
 from truth_scenes import FISHEYE, LENSES, cube, lens, mesh_of, orbit_camera, placed, random_soup, sphere
 
 from viewsphere.geometry.camera import pixel_rays
-from viewsphere.model.channel import CHANNELS
+from viewsphere.model.channel import CHANNELS, PICTURES
 from viewsphere.truth.channels import observe
 from viewsphere.truth.visibility import rasterize
 
-ALL = tuple(name for name in CHANNELS if name != "rgb")
+ALL = tuple(name for name in CHANNELS if name not in PICTURES)
 
 
 def scene(name, seed=0):

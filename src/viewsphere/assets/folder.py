@@ -21,6 +21,9 @@ from viewsphere.assets import limits
 from viewsphere.assets.mesh import Image
 from viewsphere.errors import ModelError
 
+SHARPEST = 4096
+"""Longest side, in texels, of what is kept of a texture: five of 8,192 would take a worker more than a gigabyte."""
+
 IMAGE_FORMATS = ("PNG", "JPEG", "WEBP", "BMP", "GIF", "TIFF", "TGA", "DDS", "PPM")
 
 
@@ -151,11 +154,22 @@ class ModelFolder:
             index = None
             try:
                 data = self.read(key, "texture") if data is None else data
-                index = self.add_image(Image(name, decode_image(data, f"texture {_short(name)}")))
+                pixels = decode_image(data, f"texture {_short(name)}")
+                index = self.add_image(Image(name, self._bounded(pixels, name)))
             except UnreadableError as error:
                 self.warn(f"{error}; the material's plain factor is used")
             self._indices[key] = index
         return self._indices[key]
+
+    def _bounded(self, pixels: NDArray[np.uint8], name: str) -> NDArray[np.uint8]:
+        small = reduced(pixels, SHARPEST)
+        if small is not pixels:
+            height, width = pixels.shape[:2]
+            kept = f"{small.shape[1]:,} x {small.shape[0]:,}"
+            self.warn(
+                f"texture {_short(name)}: {width:,} x {height:,} pixels are reduced to {kept} (at most {SHARPEST:,} a side)"
+            )
+        return small
 
     def derived(self, key: str, make: Callable[[], Image]) -> int:
         """Index in `images` of an image made from others, made once for each key."""
@@ -191,7 +205,7 @@ def decode_image(data: bytes, where: str, *, upright: bool = False) -> NDArray[n
                 return image_pixels(ImageOps.exif_transpose(picture) if upright else picture)
             found = f"{width} x {height}"
     except UnidentifiedImageError:
-        raise UnreadableError(f"{where} is not an image in one of {', '.join(IMAGE_FORMATS)}") from None
+        raise UnreadableError(f"{where} is not an image in one of {', '.join(IMAGE_FORMATS)}, or has no pixels") from None
     except Pillow.DecompressionBombError:
         found = "many more"
     except MemoryError:
@@ -206,13 +220,27 @@ def decode_image(data: bytes, where: str, *, upright: bool = False) -> NDArray[n
 
 
 def image_pixels(picture: Any) -> NDArray[np.uint8]:
-    """Pixels (H, W, 4) uint8 RGBA of a Pillow image; 16-bit channels keep their upper byte."""
+    """Pixels (H, W, 4) uint8 RGBA of a Pillow image; 16-bit channels keep their upper byte, floats run from 0 to 1."""
     from PIL import Image as Pillow
 
-    if picture.mode.startswith("I"):
+    if picture.mode == "F":
+        grey = np.nan_to_num(np.asarray(picture), posinf=1.0).clip(0.0, 1.0)
+        picture = Pillow.fromarray(np.rint(grey * 255).astype(np.uint8))
+    elif picture.mode.startswith("I"):
         grey = (np.asarray(picture).astype(np.int64) >> 8).clip(0, 255).astype(np.uint8)
         picture = Pillow.fromarray(grey)
     return np.array(picture.convert("RGBA"), dtype=np.uint8)
+
+
+def reduced(pixels: NDArray[np.uint8], sharpest: int) -> NDArray[np.uint8]:
+    """The picture (H, W, 4) reduced by the whole factor that leaves neither side longer than `sharpest`.
+
+    Colours are averaged by their alpha.
+    """
+    from PIL import Image as Pillow
+
+    factor = -(-max(pixels.shape[:2]) // sharpest)
+    return pixels if factor == 1 else np.array(Pillow.fromarray(pixels).reduce(factor))
 
 
 def _resolved(path: Path) -> Path:

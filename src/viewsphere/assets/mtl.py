@@ -20,6 +20,9 @@ SCALAR_OPTIONS = ("-blendu", "-blendv", "-bm", "-boost", "-cc", "-clamp", "-imfc
 OPTION_ARGUMENTS = {"-mm": 2, **dict.fromkeys(SCALAR_OPTIONS, 1)}
 VECTOR_OPTIONS = ("-o", "-s", "-t")
 
+HEIGHT = 0.01
+"""Of a height map from black to white, in widths of its picture."""
+
 Pixels = NDArray[np.uint8]
 
 
@@ -44,8 +47,9 @@ def read_materials(folder: ModelFolder, texts: Sequence[str], wanted: set[str]) 
     """The wanted materials of these libraries by name; the first definition of a name counts.
 
     `Kd` multiplies `map_Kd`, except a black one, which many exporters write beside a texture. `Ns` becomes a
-    roughness of sqrt(2 / (Ns + 2)) unless `Pr` gives one. A `map_bump` is read if it is a normal map, not if
-    it holds heights. `d < 1` blends, all others are opaque: whether a texture's alpha or `map_d` cuts out or
+    roughness whose square is sqrt(2 / (Ns + 2)), the width of a lobe like Blinn and Phong's (Walter et al. 2007), unless `Pr`
+    gives one. A `map_bump` that holds heights becomes a normal map: from black to white it rises by `-bm` hundredths of the
+    picture's width. `d < 1` blends, all others are opaque: whether a texture's alpha or `map_d` cuts out or
     blends, `alpha.with_alpha_modes` says. All are double-sided, as OBJ has no other.
     """
     blocks: dict[str, dict[str, str]] = {}
@@ -125,7 +129,7 @@ class _Builder:
             return min(max(self.number("pr", 1.0), 0.0), 1.0)
         if "ns" not in self.block:
             return Material().roughness
-        return float(np.sqrt(2.0 / (max(self.number("ns", 0.0), 0.0) + 2.0)))
+        return float((2.0 / (max(self.number("ns", 0.0), 0.0) + 2.0)) ** 0.25)
 
     def specular(self) -> float:
         """Ks of 0.5 is taken as a dielectric's 4 %: it is what exporters of PBR materials write."""
@@ -202,15 +206,17 @@ class _Builder:
         return Image(f"{self.name} roughness and metallic", pixels)
 
     def bump(self, source: _Map | None) -> Texture | None:
-        """A bump map if it is a normal map."""
+        """A bump map, heights turned into normals; none where all heights are one."""
         image = self.image(source)
         if source is None or image is None:
             return None
         pixels = self.folder.images[image].pixels
         mean = pixels[..., :3].reshape(-1, 3).mean(axis=0)
         if mean[2] < 1.3 * max(mean[0], mean[1]):
-            self.folder.warn(f"height map {source.file!r} is not read; bake it to a normal map (norm) to use it")
-            return None
+            if np.ptp(pixels[..., :3]) == 0:
+                return None
+            name = f"{source.file} as normals"
+            image = self.folder.derived(f"#{name}", lambda: Image(name, _normals(_grey(pixels), source.clamp)))
         return source.texture(image)
 
 
@@ -226,6 +232,21 @@ def _pair(words: Sequence[str], default: float) -> tuple[float, float]:
     values = [float(word) if _is_number(word) else default for word in words]
     padded = [*values, default, default]
     return padded[0], padded[1]
+
+
+def _normals(heights: Pixels, clamp: bool) -> Pixels:
+    """A normal map (H, W, 4) of heights (H, W), green up, by Sobel's operator."""
+    depth = heights.shape[1] * HEIGHT / 255
+    padded = np.pad(heights.astype(np.float32) * np.float32(depth), 1, mode="edge" if clamp else "wrap")
+    smooth_rows = (padded[:-2] + 2 * padded[1:-1] + padded[2:]) / 8
+    smooth_columns = (padded[:, :-2] + 2 * padded[:, 1:-1] + padded[:, 2:]) / 8
+    across = smooth_rows[:, 2:] - smooth_rows[:, :-2]
+    down = smooth_columns[2:] - smooth_columns[:-2]
+    normal = np.stack([-across, down, np.ones_like(across)], axis=-1)
+    normal /= np.sqrt((normal * normal).sum(axis=-1, keepdims=True))
+    pixels = np.full((*heights.shape, 4), 255, np.uint8)
+    pixels[..., :3] = np.rint(normal * 127.5 + 127.5)
+    return pixels
 
 
 def _grey(pixels: Pixels) -> Pixels:

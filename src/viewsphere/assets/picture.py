@@ -3,15 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from viewsphere.assets.alpha import with_alpha_modes
-from viewsphere.assets.folder import ModelFolder, UnreadableError, decode_image
+from viewsphere.assets.folder import SHARPEST, ModelFolder, UnreadableError, decode_image, reduced
 from viewsphere.assets.mesh import Image, Material, Mesh, Texture
 from viewsphere.assets.piece import FileFacts, Piece, assemble
-
-SHARPEST = 4096
-"""Longest side, in texels, of what is kept of a picture: a photograph of 20 megapixels would take a worker a gigabyte."""
 
 
 def read_picture(folder: ModelFolder) -> tuple[Mesh, FileFacts]:
@@ -40,15 +36,7 @@ def read_picture(folder: ModelFolder) -> tuple[Mesh, FileFacts]:
         normals=np.tile([0.0, -1.0, 0.0], (4, 1)),
         uv0=np.array([[0.0, 1.0], [1.0, 1.0], [1.0, 0.0], [0.0, 0.0]]),
     )
-    texture = Texture(folder.add_image(Image(name, _reduced(pixels))), wrap_s="clamp", wrap_t="clamp")
+    texture = Texture(folder.add_image(Image(name, reduced(pixels, SHARPEST))), wrap_s="clamp", wrap_t="clamp")
     materials = with_alpha_modes([plane], [Material(name=name, base_color_texture=texture)], folder.images)
     facts = FileFacts(folder.model, folder.model.suffix[1:].lower(), "+z", "-y", 1.0)
     return assemble(folder, [plane], materials, facts)
-
-
-def _reduced(pixels: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """The picture with neither side longer than `SHARPEST`; colours are averaged by their alpha."""
-    from PIL import Image as Pillow
-
-    factor = -(-max(pixels.shape[:2]) // SHARPEST)
-    return pixels if factor == 1 else np.array(Pillow.fromarray(pixels).reduce(factor))

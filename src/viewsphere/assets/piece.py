@@ -93,6 +93,7 @@ def assemble(
     unknown or not a direction becomes its face's. Raises ModelError when no triangle is left or there are too
     many.
     """
+    pieces, materials = _without_lost_textures(folder, pieces, materials)
     count = sum(len(piece.triangles) for piece in pieces)
     if count == 0:
         raise folder.error("no triangles found; export the model as a mesh of faces")
@@ -136,6 +137,26 @@ def assemble(
         warnings=tuple(folder.warnings),
     )
     return mesh, replace(facts, origin=(origin[0], origin[1], origin[2]), size=extents(mesh), files=tuple(folder.files))
+
+
+def _without_lost_textures(
+    folder: ModelFolder, pieces: Sequence[Piece], materials: Sequence[Material]
+) -> tuple[list[Piece], list[Material]]:
+    """The pieces with materials of which they have the texture coordinates; else the factors stand alone, with a warning."""
+    kept, all_materials = list(pieces), list(materials)
+    known: dict[tuple[int, tuple[str, ...]], int] = {}
+    for i, piece in enumerate(pieces):
+        material = materials[piece.material]
+        uses: list[tuple[str, Texture | None]] = [(name, getattr(material, name)) for name in TEXTURE_FIELDS]
+        lost = tuple(n for n, t in uses if t is not None and (piece.uv0, piece.uv1)[t.texcoord] is None)
+        if not lost:
+            continue
+        if (piece.material, lost) not in known:
+            known[piece.material, lost] = len(all_materials)
+            all_materials.append(replace(material, **dict.fromkeys(lost)))  # pyright: ignore[reportArgumentType]
+            folder.warn(f"material {material.name!r} has textures, but some of its triangles have no coordinates: plain there")
+        kept[i] = replace(piece, material=known[piece.material, lost])
+    return kept, all_materials
 
 
 def extents(mesh: Mesh) -> tuple[float, float, float]:

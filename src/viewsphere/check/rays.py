@@ -17,7 +17,8 @@ from viewsphere.geometry.rotation import transform
 from viewsphere.model.sample import Sample
 from viewsphere.run.stages import Stages
 from viewsphere.run.tasks import SceneryRecord, mesh_digest
-from viewsphere.store import Dataset
+from viewsphere.store import Dataset, depth_step
+from viewsphere.store.channel_files import MOST_STEPS
 
 Float = NDArray[np.float64]
 
@@ -75,15 +76,17 @@ class RayCaster:
         self._build(sample)
         instances, depth = sample.channels["instances"], sample.channels["depth"]
         rays = pixel_rays(sample.camera.intrinsics)
-        castable = np.abs(rays[..., 2]) > 1e-3
+        step = depth_step(self._dataset.path(sample.files["depth"])) / 2
+        castable = (np.abs(rays[..., 2]) > 1e-3) & ((step == 0) | np.isinf(depth) | (depth < (MOST_STEPS - 0.5) * 2 * step))
         yield from self._off(
-            sample, rays, castable & (instances > 0) & np.isfinite(depth), "points are not on the exported model"
+            sample, rays, step, castable & (instances > 0) & np.isfinite(depth), "points are not on the exported model"
         )
         if self._complete:
             rest = castable & (instances == 0)
-            yield from self._off(sample, rays, rest, "points of the background are not where scenery and ground are")
+            yield from self._off(sample, rays, step, rest, "points of the background are not where scenery and ground are")
 
-    def _off(self, sample: Sample, rays: Float, asked: NDArray[np.bool_], what: str) -> Iterator[str]:
+    def _off(self, sample: Sample, rays: Float, rounded: float, asked: NDArray[np.bool_], what: str) -> Iterator[str]:
+        """Findings at the pixels asked for, whose depth was rounded by so many metres at most."""
         rows, columns = np.nonzero(asked)
         if not len(rows):
             return
@@ -92,7 +95,7 @@ class RayCaster:
         ids, depth = sample.channels["instances"][rows, columns], sample.channels["depth"][rows, columns]
         directions = rays[rows, columns] @ sample.camera.R
         s = depth / rays[rows, columns, 2]
-        slack = TOLERANCE * np.abs(np.where(np.isfinite(s), s, 0.0))
+        slack = TOLERANCE * np.abs(np.where(np.isfinite(s), s, 0.0)) + rounded / np.abs(rays[rows, columns, 2])
         eye = sample.camera.center - self._middle
         start = np.where(np.isfinite(s), s - slack, 0.0)
         found, owner = _cast(self._all, eye + start[:, None] * directions, directions)

@@ -9,6 +9,7 @@ https://www.loc.gov/preservation/digital/formats/fdd/fdd000022.shtml.
 from __future__ import annotations
 
 import struct
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -16,10 +17,11 @@ from isal import isal_zlib
 from numpy.typing import NDArray
 
 from viewsphere.errors import UserError
+from viewsphere.geometry.deflate import LEVEL, deflate
 
 _SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _COLOR_TYPES = {1: 0, 3: 2, 4: 6}  # components -> PNG colour type
-_LEVEL = 1
+_INDEXED = 3
 _SUB = 1
 _FOREIGN_PNG = "PNG: expected viewsphere's own, found another program's: read it with an image library"
 _FOREIGN_TIFF = "TIFF: expected viewsphere's own, found a damaged file or another program's"
@@ -29,8 +31,11 @@ _SAMPLES, _ROWS, _BYTES, _PLANAR, _EXTRA, _FORMAT = 277, 278, 279, 284, 338, 339
 _SAMPLE_FORMATS = {np.dtype(np.int32): 2, np.dtype(np.float32): 3}
 
 
-def encode_png(array: NDArray[Any]) -> bytes:
-    """A PNG file of a picture: (H, W) bool (1 bit), uint8 or uint16, or (H, W, 3 or 4) uint8, not empty."""
+def encode_png(array: NDArray[Any], *, palette: NDArray[np.uint8] | None = None, unit: float | None = None) -> bytes:
+    """A PNG file of a picture: (H, W) bool (1 bit), uint8 or uint16, or (H, W, 3 or 4) uint8, not empty.
+
+    With a `palette` (n, 3), (H, W) uint8 are numbers of its colours. `unit` says how many metres a step of (H, W) is (pCAL).
+    """
     components = 1 if array.ndim == 2 else array.shape[-1]
     dtypes = (np.bool_, np.uint8, np.uint16) if array.ndim == 2 else (np.uint8,)
     if array.ndim not in (2, 3) or array.size == 0 or components not in _COLOR_TYPES or array.dtype not in dtypes:
@@ -39,9 +44,13 @@ def encode_png(array: NDArray[Any]) -> bytes:
         )
     height, width = array.shape[:2]
     depth = 1 if array.dtype == np.bool_ else 8 * array.dtype.itemsize
-    header = struct.pack(">IIBBBBB", width, height, depth, _COLOR_TYPES[components], 0, 0, 0)
-    body = isal_zlib.compress(_filtered(array, components), _LEVEL)
-    return _SIGNATURE + _chunk(b"IHDR", header) + _chunk(b"IDAT", body) + _chunk(b"IEND", b"")
+    color = _COLOR_TYPES[components] if palette is None else _INDEXED
+    header = struct.pack(">IIBBBBB", width, height, depth, color, 0, 0, 0)
+    more = b"" if palette is None else _chunk(b"PLTE", palette.tobytes())
+    if unit is not None:
+        more += _chunk(b"pCAL", struct.pack(">6siiBB2s", b"depth", 0, 65535, 0, 2, b"m") + f"0\0{65535 * unit!r}".encode())
+    body = isal_zlib.compress(_filtered(array, components), LEVEL)
+    return b"".join((_SIGNATURE, _chunk(b"IHDR", header), more, _chunk(b"IDAT", body), _chunk(b"IEND", b"")))
 
 
 def _filtered(array: NDArray[Any], components: int) -> NDArray[np.uint8]:
@@ -64,7 +73,7 @@ def _filtered(array: NDArray[Any], components: int) -> NDArray[np.uint8]:
 
 
 def _chunk(kind: bytes, body: bytes) -> bytes:
-    return struct.pack(">I", len(body)) + kind + body + struct.pack(">I", isal_zlib.crc32(kind + body))
+    return b"".join((struct.pack(">I", len(body)), kind, body, struct.pack(">I", isal_zlib.crc32(body, isal_zlib.crc32(kind)))))
 
 
 def decode_png(data: bytes) -> NDArray[Any]:
@@ -72,26 +81,51 @@ def decode_png(data: bytes) -> NDArray[Any]:
 
     Raises UserError when the file is damaged or was written by another program.
     """
-    if not data.startswith(_SIGNATURE):
-        raise UserError("PNG: expected a PNG file's first 8 bytes, found others: the file is damaged or no PNG")
-    header, body, position = b"", b"", len(_SIGNATURE)
-    while position + 12 <= len(data):
-        (length,) = struct.unpack_from(">I", data, position)
-        kind, content = data[position + 4 : position + 8], data[position + 8 : position + 8 + length]
-        check = data[position + 8 + length : position + 12 + length]
-        if check != struct.pack(">I", isal_zlib.crc32(kind + content)):
-            raise UserError(f"PNG: expected a whole {kind!r} chunk, its checksum is wrong: the file is damaged")
+    header, body, ended = b"", b"", False
+    for kind, content in _chunks(data):
         header = content if kind == b"IHDR" else header
         body += content if kind == b"IDAT" else b""
-        position += 12 + length
-    if len(header) != 13 or position != len(data) or not body:
+        ended = kind == b"IEND"
+    if len(header) != 13 or not ended or not body:
         raise UserError("PNG: expected a header and pixels, found the file's end: it is cut off")
     return _png_pixels(header, body)
 
 
+def png_unit(data: bytes) -> float | None:
+    """Metres in a step of a PNG file's numbers, None where `encode_png` was not told; raises UserError as `decode_png` does."""
+    for kind, content in _chunks(data):
+        if kind == b"pCAL":
+            name, _, rest = content.partition(b"\0")
+            try:
+                low, high, equation, count = struct.unpack_from(">iiBB", rest)
+                unit, zero, span = rest[10:].split(b"\0")
+                if (name, equation, count, unit, float(zero)) == (b"depth", 0, 2, b"m", 0.0):
+                    return float(span) / (high - low)
+            except (struct.error, ValueError, ZeroDivisionError):
+                return None
+    return None
+
+
+def _chunks(data: bytes) -> Iterator[tuple[bytes, bytes]]:
+    """Kind and content of every chunk; raises UserError where the file is damaged."""
+    if not data.startswith(_SIGNATURE):
+        raise UserError("PNG: expected a PNG file's first 8 bytes, found others: the file is damaged or no PNG")
+    position = len(_SIGNATURE)
+    while position < len(data):
+        length, kind = struct.unpack_from(">I4s", data, position) if position + 12 <= len(data) else (len(data), b"")
+        content = data[position + 8 : position + 8 + length]
+        check = data[position + 8 + length : position + 12 + length]
+        if len(check) < 4:
+            raise UserError("PNG: expected another chunk, found the file's end: it is cut off")
+        if check != struct.pack(">I", isal_zlib.crc32(content, isal_zlib.crc32(kind))):
+            raise UserError(f"PNG: expected a whole {kind!r} chunk, its checksum is wrong: the file is damaged")
+        yield kind, content
+        position += 12 + length
+
+
 def _png_pixels(header: bytes, body: bytes) -> NDArray[Any]:
     width, height, depth, color, *_ = struct.unpack(">IIBBBBB", header)
-    components = {color: count for count, color in _COLOR_TYPES.items()}.get(color, 0)
+    components = {_INDEXED: 1, **{color: count for count, color in _COLOR_TYPES.items()}}.get(color, 0)
     stride = (width * depth * components + 7) // 8
     if not components or depth not in (1, 8, 16):
         raise UserError(_FOREIGN_PNG)
@@ -127,7 +161,7 @@ def encode_tiff(array: NDArray[Any]) -> bytes:
         raise ValueError(f"encode_tiff: expected (H, W) or (H, W, 1..3) float32 or int32, got {array.shape} {array.dtype}")
     height, width = array.shape[:2]
     little = np.ascontiguousarray(array, array.dtype.newbyteorder("<"))
-    strip = isal_zlib.compress(little, _LEVEL)
+    strip = (b"\x78\x01", deflate(little), struct.pack(">I", isal_zlib.adler32(little)))
     tags = {
         _WIDTH: ("I", [width]),
         _HEIGHT: ("I", [height]),
@@ -137,14 +171,14 @@ def encode_tiff(array: NDArray[Any]) -> bytes:
         _OFFSET: ("I", [0]),
         _SAMPLES: ("H", [components]),
         _ROWS: ("I", [height]),
-        _BYTES: ("I", [len(strip)]),
+        _BYTES: ("I", [sum(map(len, strip))]),
         _PLANAR: ("H", [1]),
         _FORMAT: ("H", [_SAMPLE_FORMATS[array.dtype]] * components),
     }
     if components == 2:
         tags[_EXTRA] = ("H", [0])
     tags[_OFFSET] = ("I", [8 + len(_directory(tags))])
-    return struct.pack("<2sHI", b"II", 42, 8) + _directory(tags) + strip
+    return b"".join((struct.pack("<2sHI", b"II", 42, 8), _directory(tags), *strip))
 
 
 def _directory(tags: dict[int, tuple[str, list[int]]]) -> bytes:

@@ -1,14 +1,16 @@
 """Compile kernels once, whatever the number of processes: numba with a cache that is never stale.
 
 numba's own cache misses changes in functions that a kernel calls from another file, so each kernel is cached in a
-folder keyed by a digest of its source file, of the files of all kernels it can call, of numba's version and of the
-processor's name.
+folder keyed by a digest of its source file, of the files of all kernels it can call and of the constants they use, of
+numba's version and of the processor's name.
 """
 
 from __future__ import annotations
 
 import hashlib
 import os
+import re
+import sys
 import tempfile
 from collections.abc import Callable
 from functools import cache, partial
@@ -19,8 +21,8 @@ import llvmlite.binding
 import numba
 import platformdirs
 from numba.core import config
-from numba.core.dispatcher import Dispatcher
 
+_IMPORT = re.compile(r"^from (viewsphere[\w.]*) import", re.MULTILINE)
 _BUILD = (numba.__version__, llvmlite.binding.get_host_cpu_name(), os.environ.get("NUMBA_BOUNDSCHECK"))
 
 
@@ -29,7 +31,8 @@ def njit(function: Callable[..., Any] | None = None, **options: Any) -> Any:
     if function is None:
         return partial(njit, **options)
     if not os.environ.get("NUMBA_CACHE_DIR"):
-        setattr(config, "CACHE_DIR", _cache_folder(frozenset(_sources(function, set()))))  # noqa: B010, not in its stubs
+        folder = _cache_folder(_sources(function.__code__.co_filename))
+        setattr(config, "CACHE_DIR", folder)  # noqa: B010, not in its stubs
     return numba.njit(nogil=True, cache=True, error_model="numpy", **options)(function)
 
 
@@ -38,15 +41,18 @@ def kernel_folder() -> Path:
     return Path(os.environ.get("VIEWSPHERE_CACHE") or platformdirs.user_cache_dir("viewsphere")) / "kernels"
 
 
-def _sources(function: Callable[..., Any], seen: set[str]) -> set[str]:
-    """Files of a function and of all kernels within its reach."""
-    file = function.__code__.co_filename
-    if file not in seen:
-        seen.add(file)
-        for value in list(function.__globals__.values()):
-            if isinstance(value, Dispatcher):
-                _sources(value.py_func, seen)
-    return seen
+@cache
+def _sources(file: str) -> frozenset[str]:
+    """A kernel's file, the kernels' files within its reach, and the files that those import from here for their constants."""
+    found, waiting = {file}, [file]
+    while waiting:
+        for name in _IMPORT.findall(Path(waiting.pop()).read_text(encoding="utf-8")):
+            source = getattr(sys.modules.get(name), "__file__", None)
+            if source is not None and source not in found:
+                found.add(source)
+                if name.rpartition(".")[2].startswith("kernels"):
+                    waiting.append(source)
+    return frozenset(found)
 
 
 @cache

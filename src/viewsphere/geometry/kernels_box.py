@@ -16,7 +16,7 @@ def projected_bounds(vertices, triangles, first, last, base, stop, k, r, t, near
     inf, -inf, -inf) where nothing is in front of it.
     """
     u0, v0, u1, v1 = np.inf, np.inf, -np.inf, -np.inf
-    whole = True
+    whole, front = True, True
     q = np.empty((stop - base, 3))
     uv = np.empty((stop - base, 2))
     for i in range(base, stop):
@@ -30,13 +30,13 @@ def projected_bounds(vertices, triangles, first, last, base, stop, k, r, t, near
         q[j, 2] = w
         uv[j, 0] = q[j, 0] / w
         uv[j, 1] = q[j, 1] / w
+        front &= w >= near
+    used = np.zeros(stop - base, np.bool_)
     for f in range(first, last):
         for c in range(3):
             j = triangles[f, c] - base
-            if q[j, 2] >= near:
-                u, v = uv[j, 0], uv[j, 1]
-                u0, v0, u1, v1 = min(u0, u), min(v0, v), max(u1, u), max(v1, v)
-            else:
+            used[np.uintp(j)] = True
+            if not front and q[j, 2] < near:
                 whole = False
                 for other in range(1, 3):
                     o = triangles[f, (c + other) % 3] - base
@@ -45,6 +45,10 @@ def projected_bounds(vertices, triangles, first, last, base, stop, k, r, t, near
                         u = (q[j, 0] + s * (q[o, 0] - q[j, 0])) / near
                         v = (q[j, 1] + s * (q[o, 1] - q[j, 1])) / near
                         u0, v0, u1, v1 = min(u0, u), min(v0, v), max(u1, u), max(v1, v)
+    for j in range(stop - base):
+        if used[j] and q[j, 2] >= near:
+            u, v = uv[j, 0], uv[j, 1]
+            u0, v0, u1, v1 = min(u0, u), min(v0, v), max(u1, u), max(v1, v)
     return u0, v0, u1, v1, whole
 
 

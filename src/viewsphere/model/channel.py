@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Container, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -39,6 +39,7 @@ CHANNELS: dict[str, Channel] = {
     c.name: c
     for c in (
         Channel("rgb", np.uint8, 3, "sRGB", 0, "png", "colour picture"),
+        Channel("rgba", np.uint8, 4, "sRGB", 0, "png", "colour picture without its background; straight alpha"),
         Channel("depth", np.float32, 1, "m", np.inf, "tiff", "distance along the camera's z axis"),
         Channel("instances", np.int32, 1, "object id", 0, "png16", "which object is seen; 0 is background"),
         Channel("categories", np.int32, 1, "category id", 0, "png16", "category of the object seen; 0 is background"),
@@ -51,4 +52,17 @@ CHANNELS: dict[str, Channel] = {
     )
 }
 
+PICTURES = ("rgb", "rgba")
+"""Channels that an engine paints; all others are computed. Of those that are kept, the first is a frame's picture."""
+
 DEFAULT_CHANNELS = ("rgb", "depth", "instances", "normals")
+
+
+def picture_of(kept: Container[str]) -> str | None:
+    """The channel to show where one picture is wanted, None if there is none."""
+    return next((name for name in PICTURES if name in kept), None)
+
+
+def missing(needed: Iterable[str], kept: Container[str]) -> tuple[str, ...]:
+    """Those of the needed channels that are not kept; a picture without background does for one that has it."""
+    return tuple(name for name in needed if name not in kept and not (name == "rgb" and picture_of(kept)))

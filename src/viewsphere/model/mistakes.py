@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Generator, Iterable, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from typing import Any, NamedTuple, cast
@@ -71,19 +72,31 @@ def shown(value: object) -> str:
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 
-def explained(error: ValidationError, fields: Sequence[str]) -> ValidationError:
-    """The same mistakes in their final words; `fields` are those of the model that found them."""
+def explained(error: ValidationError, fields: Sequence[str], steps: Path = ()) -> ValidationError:
+    """The same mistakes in their final words; `fields` are those of the model that found them, `steps` lead to it."""
     errors = error.errors(include_url=False)
     details = [
         InitErrorDetails(
             type=PydanticCustomError(EXPLAINED, "{text}", {"text": _words(e, fields), "below": _below(e)}),
-            loc=e["loc"],
+            loc=(*steps, *e["loc"]),
             input=e["input"],
         )
         for e in errors
         if not _follows(e, errors)
     ]
     return ValidationError.from_exception_data(error.title, details)
+
+
+@contextmanager
+def at(*steps: str | int) -> Generator[None]:
+    """Say of a mistake in one part of a value, a ValueError, where that part stands."""
+    try:
+        yield
+    except ValidationError as error:
+        raise explained(error, (), steps) from None
+    except ValueError as error:
+        final = PydanticCustomError(EXPLAINED, "{text}", {"text": str(error), "below": ()})
+        raise ValidationError.from_exception_data("", [InitErrorDetails(type=final, loc=steps, input=None)]) from None
 
 
 def _follows(error: ErrorDetails, errors: Sequence[ErrorDetails]) -> bool:

@@ -28,6 +28,7 @@ from pydantic import (
 
 from viewsphere.errors import RecipeError
 from viewsphere.model.channel import CHANNELS, DEFAULT_CHANNELS
+from viewsphere.model.files import Files
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.mistakes import Marks, one_of, report, shown
 from viewsphere.model.recipe_models import ModelEntry
@@ -110,14 +111,15 @@ class Recipe(Frozen):
     models: tuple[ModelEntry, ...] = Field(min_length=1, description="the models to place, each entry of one category")
     viewpoints: Viewpoints = Field(description="where the camera stands; kind: grid (default), sphere, normal or jitter")
     camera: CameraEntry = Field(default=CameraEntry(fov_deg=40.0), description="image size and lens")
-    scene: SceneEntry = Field(default=SceneEntry(), description="background, ground, sun and sky")
+    scene: SceneEntry = Field(default=SceneEntry(), description="light, ground, background, effects, what stands around")
     engine: Annotated[EngineEntry, BeforeValidator(engine_entry), OrShort({"type": "string"})] = Field(
         default=EngineEntry(),
         description="what paints the pictures: a name, or a mapping of name and the engine's options",
     )
     channels: Annotated[tuple[ChannelName, ...], AfterValidator(_distinct)] = Field(
-        default=DEFAULT_CHANNELS, min_length=1, description="what to keep of every frame"
+        default=DEFAULT_CHANNELS, min_length=1, validate_default=True, description="what to keep of every frame"
     )
+    files: Files = Field(default=Files(), description="how each channel is written: lossless PNG and TIFF by default")
     formats: Annotated[tuple[str, ...], AfterValidator(_distinct)] = Field(
         default=("native", "coco"), description="formats to write when all is rendered"
     )
@@ -147,6 +149,14 @@ class Recipe(Frozen):
             return handler(data)
         except ValidationError as error:
             raise RecipeError(report(error, data, marks)) from None
+
+    @field_validator("channels")
+    @classmethod
+    def _with_alpha(cls, value: tuple[str, ...], info: ValidationInfo) -> tuple[str, ...]:
+        scene: SceneEntry | None = info.data.get("scene")
+        if scene is None or not any(entry.transparent for entry in scene.backgrounds):
+            return value
+        return tuple(dict.fromkeys("rgba" if name == "rgb" else name for name in value))
 
     @field_validator("name")
     @classmethod

@@ -6,12 +6,14 @@ import os
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import reduce
 from pathlib import Path
 from typing import Any, cast
 
 from viewsphere.errors import RecipeError
 from viewsphere.model.mistakes import Marks, Place, dotted, shown
 from viewsphere.model.mistakes import Path as Steps
+from viewsphere.model.recipe_draws import KINDS
 from viewsphere.model.recipe_file import parse, read
 from viewsphere.model.recipe_models import ZOO
 
@@ -23,6 +25,11 @@ PATHS: tuple[tuple[str, ...], ...] = (
     ("viewpoints", "path"),
     ("scene", "background", "image"),
     ("scene", "background", "images"),
+    ("scene", "sky"),
+    ("scene", "sky", "hdri"),
+    ("scene", "ground", "image"),
+    ("scene", "ground", "roughness_image"),
+    ("scene", "ground", "normal_image"),
     ("scene", "place"),
     ("scene", "place", "source"),
     ("scene", "planes", "*", "image"),
@@ -30,7 +37,7 @@ PATHS: tuple[tuple[str, ...], ...] = (
 )
 """Fields that hold a path, which is relative to the file it is written in."""
 
-WORDS = {"file"}
+WORDS = {"file", "daylight"}
 """What stands in these fields besides paths and the zoo's names."""
 
 _STEP = re.compile(r"(?:^|\.)([A-Za-z_][\w-]*)|\[(\d+)\]")
@@ -80,8 +87,9 @@ def _extended(path: Path, above: tuple[Path, ...]) -> _Layer:
         if not base.is_file():
             raise RecipeError(f"{where} extends: expected a recipe file; found none at {base}")
         found = _extended(base, chain)
-        _rebase(found.data, os.path.relpath(base.parent, path.parent))
-        whole = _merged(whole, found)
+        folder = os.path.relpath(base.parent, path.parent)
+        data = found.data if folder == "." else reduce(lambda data, to: _rebased(data, to, folder), PATHS, found.data)
+        whole = _merged(whole, _Layer(data, found.places))
     return _merged(whole, layer)
 
 
@@ -107,6 +115,8 @@ def _merge(under: dict[str, Any], over: dict[str, Any], steps: Steps, forget: Ca
 
 
 def _of_other_kind(old: Any, new: Any) -> bool:
+    if not {*KINDS}.isdisjoint({*old, *new}):
+        return True  # a distribution
     return "kind" in new and new["kind"] != old.get("kind", "grid")
 
 
@@ -159,22 +169,17 @@ def _replaced(data: Any, steps: Steps, value: Any, where: str) -> Any:
     return fields
 
 
-def _rebase(data: Any, folder: str) -> None:
-    """Make the relative paths of a recipe start from another folder, in place."""
-    if folder != ".":
-        for pattern in PATHS:
-            _rebase_at(data, pattern, folder)
-
-
-def _rebase_at(data: Any, pattern: tuple[str, ...], folder: str) -> None:
+def _rebased(data: Any, pattern: tuple[str, ...], folder: str) -> Any:
+    """The data with the relative paths that a pattern leads to starting from another folder."""
+    if isinstance(data, dict) and isinstance(data.get("choice"), list):
+        return {**data, "choice": [_rebased(option, pattern, folder) for option in data["choice"]]}
+    if not pattern:
+        if not isinstance(data, str) or data in WORDS or data.startswith((ZOO, "~")):
+            return data
+        return Path(folder, data).as_posix()
     step, rest = pattern[0], pattern[1:]
-    if step == "*":
-        keys: list[Any] = list(range(len(cast(list[Any], data)))) if isinstance(data, list) else []
-    else:
-        keys = [step] if isinstance(data, dict) and step in data else []
-    for key in keys:
-        value = data[key]
-        if rest:
-            _rebase_at(value, rest, folder)
-        elif isinstance(value, str) and value not in WORDS and not value.startswith((ZOO, "~")):
-            data[key] = Path(folder, value).as_posix()
+    if step == "*" and isinstance(data, list):
+        return [_rebased(item, rest, folder) for item in cast(list[Any], data)]
+    if isinstance(data, dict) and step in data:
+        return {**data, step: _rebased(data[step], rest, folder)}
+    return data

@@ -5,36 +5,27 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, Literal, cast
 
-from pydantic import (
-    BeforeValidator,
-    ConfigDict,
-    Discriminator,
-    Field,
-    JsonValue,
-    Tag,
-    WithJsonSchema,
-    field_validator,
-    model_validator,
-)
+from pydantic import BeforeValidator, ConfigDict, Field, JsonValue, field_validator, model_validator
 
 from viewsphere.geometry.camera import focal_from_fov, focal_from_sensor
 from viewsphere.model.camera import Distortion, Intrinsics
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.mistakes import shown
-from viewsphere.model.recipe_scenery import CompanyField, PlaceField, PlanesField
-from viewsphere.model.recipe_values import (
-    COLOR_FORMS,
-    Count,
-    Number,
-    OrShort,
-    Positive,
-    SrgbColor,
-    pair,
-    parse_color,
-    shape_of,
-    switch,
+from viewsphere.model.recipe_draws import Drawn, alternatives, is_random
+from viewsphere.model.recipe_finish import (
+    BackgroundEntry,
+    BackgroundField,
+    EffectsEntry,
+    JitterEntry,
+    SmootherEntry,
+    SmootherField,
+    ViewEntry,
+    ViewField,
 )
-from viewsphere.model.scene import Ground, Sky, Sun
+from viewsphere.model.recipe_light import SKY_SUFFIXES, GradientEntry, HdriSky, LightsField, SkyField, SunField
+from viewsphere.model.recipe_scenery import CompanyField, Draw, PlaceField, PlanesField
+from viewsphere.model.recipe_surface import GroundEntry, GroundField, MaterialEntry
+from viewsphere.model.recipe_values import Count, Number, OrShort, Positive, pair
 
 LARGEST_IMAGE = 16384
 LENSES = ("fov_deg", "focal_px", "focal_mm", "K", "of_viewpoints")
@@ -121,55 +112,14 @@ class CameraEntry(Frozen):
         return Intrinsics(width=width, height=height, fx=fx, fy=fy, cx=cx, cy=cy, skew=skew, distortion=self.distortion)
 
 
-class BackgroundEntry(Frozen):
-    """What is seen where nothing else is; the sky when nothing is given."""
-
-    color: SrgbColor | None = Field(default=None, description="a plain colour")
-    image: str | None = Field(default=None, min_length=1, description="path of an image that covers the frame")
-    images: str | None = Field(default=None, min_length=1, description="folder of images to draw from")
-    draw: Literal["fixed", "per_frame"] = Field(
-        default="per_frame", description="for images: one for the whole data set, or one for every frame"
-    )
-
-    @model_validator(mode="after")
-    def _one(self) -> BackgroundEntry:
-        given = [name for name in ("color", "image", "images") if getattr(self, name) is not None]
-        if len(given) > 1:
-            raise ValueError(f"expected one of color, image, images; found {' and '.join(given)}")
-        if self.draw == "fixed" and self.images is None:
-            raise ValueError("expected images beside draw: fixed; found none")
-        return self
-
-    @property
-    def is_sky(self) -> bool:
-        """Whether the sky is the background."""
-        return self.color is None and self.image is None and self.images is None
-
-
-def _background(value: Any) -> Any:
-    if isinstance(value, (dict, BackgroundEntry)):
-        return value
-    return {} if value == "sky" else {"color": parse_color(value, "sky, a mapping of image or images, ")}
-
-
-def _ground(value: Any) -> Any:
-    on = switch(value)
-    if on is not None:
-        return "on" if on else "off"
-    return value if value == "auto" else parse_color(value, "on, off, auto, ")
-
-
-def _sun(value: Any) -> Any:
-    on = switch(value)
-    return value if on is None else ({} if on else "off")
-
-
-SWITCH: list[Any] = [True, False, "on", "off"]
-
-
 class SceneEntry(Frozen):
-    """Light, ground and background, and what stands around the targets."""
+    """Light, ground and background, and what stands around the targets. All of it may be drawn."""
 
+    draw: Draw = Field(
+        default="per_model",
+        description="when sun, sky, lights, ground and materials are drawn, as far as there is something to draw: once for the "
+        "whole data set (fixed), once a model (per_model) or a frame (per_frame, which builds the scene anew for each)",
+    )
     place: PlaceField = Field(
         default=None, description="where the targets stand: zoo:neighbourhood, a model file, or a mapping of source and more"
     )
@@ -177,22 +127,62 @@ class SceneEntry(Frozen):
         default=None, description="how many other models of the same split stand beside each, or a mapping of count and layout"
     )
     planes: PlanesField = Field(default=(), description="upright planes with pictures")
-    background: Annotated[BackgroundEntry, BeforeValidator(_background), OrShort({"const": "sky"}, *COLOR_FORMS)] = Field(
-        default=BackgroundEntry(),
-        description="sky, a colour, {image: path}, or {images: folder, draw: fixed or per_frame}",
+    sun: Drawn[SunField] = Field(
+        default="auto",
+        description="on, off, auto (on, but off under an hdri), or where it stands and how it shines: azimuth_deg, "
+        "elevation_deg, strength, color, angle_deg",
     )
-    ground: Annotated[
-        Literal["on", "off", "auto"] | tuple[float, float, float],
-        BeforeValidator(_ground),
-        WithJsonSchema({"anyOf": [{"enum": [*SWITCH, "auto"]}, *COLOR_FORMS]}),
-    ] = Field(default="auto", description="on, off, a colour, or auto: on under the sky, off before a colour or an image")
-    sun: Annotated[
-        Annotated[Sun, Tag("mapping")] | Annotated[Literal["off"], Tag("text")],
-        Discriminator(shape_of, custom_error_type="sun", custom_error_message="expected on, off or a mapping"),
-        BeforeValidator(_sun),
-        OrShort({"enum": SWITCH}),
-    ] = Field(default=Sun(), description="off, or azimuth_deg, elevation_deg, strength, color (linear RGB)")
-    sky: Sky = Field(default=Sky(), description="ambient light: zenith, horizon (linear RGB), strength")
+    sky: Drawn[SkyField] = Field(
+        default=GradientEntry(),
+        description="light from all around: zenith, horizon and strength of a gradient, daylight, or an EXR or HDR file",
+    )
+    lights: LightsField = Field(default=(), description="lamps: point, spot, area, hemisphere")
+    ground: Drawn[GroundField] = Field(
+        default="auto",
+        description="on, off, catcher, a colour, a mapping of color, image, roughness and more, or auto: on under the sky, a "
+        "catcher before the environment, else off",
+    )
+    materials: tuple[MaterialEntry, ...] = Field(default=(), description="changes to the models' materials")
+    background: Drawn[BackgroundField] = Field(
+        default=BackgroundEntry(),
+        description="sky, environment, transparent, a colour, {image: path}, or {images: folder, draw: per_frame}",
+    )
+    smoother: SmootherField = Field(
+        default=SmootherEntry(), description="none, box, gaussian or poisson, or a mapping: what softens the models' border"
+    )
+    view: ViewField = Field(
+        default=ViewEntry(), description="exposure, temperature_k, tint and transform; or the transform alone"
+    )
+    effects: EffectsEntry = Field(default=EffectsEntry(), description="blur, noise and more of what cameras do to pictures")
+    jitter: JitterEntry = Field(default=JitterEntry(), description="what is added to every viewpoint's numbers")
+
+    @model_validator(mode="after")
+    def _check(self) -> SceneEntry:
+        backgrounds = self.backgrounds
+        if len({entry.transparent for entry in backgrounds}) > 1:
+            raise ValueError("expected a transparent background in all frames or in none; found it among others")
+        if len(backgrounds) > 1 and any(entry.draw != "per_frame" for entry in backgrounds):
+            raise ValueError("expected no draw inside of a choice of backgrounds, which is made per_frame; found one")
+        return self
+
+    @property
+    def backgrounds(self) -> tuple[BackgroundEntry, ...]:
+        """All that the background may be."""
+        return tuple(alternatives(self.background))
+
+    @property
+    def automatic_ground(self) -> Literal["on", "off", "catcher"]:
+        """What `ground: auto` means."""
+        if any(entry.environment for entry in self.backgrounds):
+            return "catcher"
+        return "on" if all(entry.is_sky for entry in self.backgrounds) else "off"
+
+    @property
+    def has_ground(self) -> bool:
+        """Whether there may be a ground that hides what is behind it."""
+        grounds = tuple(alternatives(self.ground))
+        listed = any(not ground.catcher for ground in grounds if isinstance(ground, GroundEntry))
+        return listed or "on" in grounds or ("auto" in grounds and self.automatic_ground == "on")
 
     @property
     def is_composed(self) -> bool:
@@ -200,29 +190,27 @@ class SceneEntry(Frozen):
         return bool(self.place or self.company or self.planes)
 
     @property
-    def is_new_each_frame(self) -> bool:
-        """Whether anything but the background is drawn for every frame."""
+    def is_moved_each_frame(self) -> bool:
+        """Whether what stands around is drawn for every frame."""
         drawn = (self.place, self.company, *self.planes)
         return any(entry is not None and entry.draw == "per_frame" for entry in drawn)
+
+    @property
+    def is_new_each_frame(self) -> bool:
+        """Whether anything that a shot's frames share is drawn for every frame."""
+        lit = (self.sun, self.sky, self.lights, self.ground, self.materials)
+        return self.is_moved_each_frame or (self.draw == "per_frame" and (is_random(lit) or self._has_sky_folder))
+
+    @property
+    def _has_sky_folder(self) -> bool:
+        skies = [sky for sky in alternatives(self.sky) if isinstance(sky, HdriSky)]
+        return any(not path.lower().endswith(SKY_SUFFIXES) for sky in skies for path in alternatives(sky.hdri))
 
     @property
     def has_fixed_scenery(self) -> bool:
         """Whether there is a place or planes, the same for all models."""
         drawn = (self.place, *self.planes)
         return any(drawn) and not any(entry is not None and entry.draw != "fixed" for entry in drawn)
-
-    @property
-    def floor(self) -> Ground | None:
-        """The ground there will be."""
-        if isinstance(self.ground, tuple):
-            return Ground(color=self.ground)
-        on = self.background.is_sky if self.ground == "auto" else self.ground == "on"
-        return Ground() if on else None
-
-    @property
-    def light(self) -> Sun | None:
-        """The sun, if there is one."""
-        return self.sun if isinstance(self.sun, Sun) else None
 
 
 class EngineEntry(Frozen):

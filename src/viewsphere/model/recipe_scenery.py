@@ -9,6 +9,7 @@ from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
 
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.mistakes import shown
+from viewsphere.model.recipe_draws import Drawn, is_random
 from viewsphere.model.recipe_models import ZOO, Unit
 from viewsphere.model.recipe_values import Count, Interval, Number, OrShort, Point, Positive, shape_of
 from viewsphere.model.shot import Axis
@@ -26,9 +27,9 @@ class PlaceEntry(Frozen):
     """Where the targets stand."""
 
     source: str = Field(min_length=1, description="zoo:<place>, such as zoo:neighbourhood, or a model file")
-    draw: Draw = Field(default="fixed", description=f"of a zoo's place: {DRAWS}")
+    draw: Draw = Field(default="fixed", description=f"of a zoo's place and of the turn: {DRAWS}")
     labels: Labels = Field(default="background", description=LABELS)
-    turn: Number = Field(default=0.0, description="degrees the place is turned about the vertical through the targets")
+    turn: Drawn[Number] = Field(default=0.0, description="degrees the place is turned about the vertical through the targets")
     origin: Point = Field(default=(0.0, 0.0, 0.0), description="of a file: the point where the targets stand, metres")
     up: Axis | None = Field(default=None, description="of a file: its axis that points up; by default what its format says")
     forward: Axis | None = Field(default=None, description="of a file: its axis that becomes -Y")
@@ -53,7 +54,7 @@ class PlaceEntry(Frozen):
                     "expected draw: fixed or per_model beside labels: own, for which every piece is kept as a model; "
                     "found per_frame"
                 )
-        elif self.draw != "fixed":
+        elif self.draw != "fixed" and not is_random(self.turn):
             raise ValueError(f"expected draw: fixed for a file, which is always the same; found {self.draw}")
         elif (self.labels == "own") != bool(self.category):
             raise ValueError("expected category and labels: own together, for a file; found one of them")

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from viewsphere.errors import StoreError
 from viewsphere.model.camera import Camera
-from viewsphere.model.channel import CHANNELS
+from viewsphere.model.channel import CHANNELS, picture_of
 from viewsphere.model.shot import Pose, Size
 
 Float = NDArray[np.float64]
@@ -149,6 +149,19 @@ class Sample:
     def height(self) -> int:
         """Pixels."""
         return self.image_size[1] if self.known_camera is None and self.image_size else self.camera.height
+
+    @property
+    def picture(self) -> NDArray[np.uint8]:
+        """The colours, (H, W, 3), or (H, W, 4) where only the picture without its background is kept.
+
+        Raises AttributeError where neither is.
+        """
+        return getattr(self, picture_of(self.channels) or "rgb")
+
+    @property
+    def picture_file(self) -> str | None:
+        """The file of `picture`, None if there is none."""
+        return self.files.get(picture_of(self.files) or "")
 
     def __getattr__(self, name: str) -> NDArray[Any]:
         """Any channel by name: `sample.rgb`, `sample.depth`, `sample.instances`, ..."""

@@ -7,6 +7,7 @@ from typing import Literal
 from pydantic import Field, JsonValue
 
 from viewsphere.model.camera import Intrinsics
+from viewsphere.model.files import Files
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.scene import Color, Finish, Scene, Vector
 
@@ -99,6 +100,7 @@ class Shot(Frozen):
     engine: str = "raster"
     engine_options: dict[str, JsonValue] = Field(default_factory=dict)
     channels: tuple[str, ...]
+    files: Files = Files()
     label_alpha: float = 0.01
     category_deg: float = Field(default=45.0, gt=0)  # angular resolution of the pose categories
 

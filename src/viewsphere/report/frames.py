@@ -19,7 +19,7 @@ def frame_data(sample: Sample) -> dict[str, Any]:
     return {
         "index": sample.index,
         "split": sample.split,
-        "file": sample.files.get("rgb"),
+        "file": sample.picture_file,
         "size": [sample.width, sample.height],
         "pose": None if pose is None else _pose_data(pose),
         "camera": None if camera is None else _camera_data(camera),

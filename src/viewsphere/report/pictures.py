@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from viewsphere.errors import UserError
+from viewsphere.model.channel import picture_of
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.report.unknown import number
 
@@ -109,12 +110,13 @@ def _weight(found: Mapping[str, Any]) -> int:
 def layers(sample: Sample, scale: Scale) -> Layers:
     """The frame's pictures as data URLs, by name, those whose channels are there, and the range of depth in metres.
 
-    `rgb` is the picture; `depth`, `normals`, `coordinates` and `parts` are transparent where they say nothing.
+    `rgb` is the picture, with alpha where only that is kept; `depth`, `normals`, `coordinates` and `parts` are transparent
+    where they say nothing.
     """
     found: Layers = {}
     channels = sample.channels
-    if "rgb" in channels:
-        found["rgb"] = webp(_shrunk(np.asarray(channels["rgb"], np.uint8), scale.width), scale.quality)
+    if picture_of(channels):
+        found["rgb"] = webp(_shrunk(np.asarray(sample.picture, np.uint8), scale.width), scale.quality)
     if "depth" in channels:
         near, far, picture = depth_colors(_thinned(channels["depth"], scale.layer_width))
         found["depth"], found["depthRange"] = webp(picture, 75), [number(near), number(far)]

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from viewsphere import plugins
 from viewsphere.errors import ModelError, RecipeError, UserError, ViewsphereError
+from viewsphere.model.channel import missing
 from viewsphere.model.recipe import Recipe
 from viewsphere.run.opening import commit, to_append, to_render
 from viewsphere.run.pool import Job, Outcome, run_jobs
@@ -103,10 +104,10 @@ def generate(
 def _check_channels(name: str, channels: Sequence[str]) -> None:
     """Raises UserError for a format that is not known, or that needs a channel which is not kept."""
     needed: Sequence[str] = getattr(plugins.load("formats", name), "CHANNELS", ())
-    missing = [channel for channel in needed if channel not in channels]
-    if missing:
+    lacking = missing(needed, channels)
+    if lacking:
         raise RecipeError(
-            f"channels: expected {missing[0]}, which format {name} needs; found {', '.join(channels)}: "
+            f"channels: expected {lacking[0]}, which format {name} needs; found {', '.join(channels)}: "
             f"add it, or leave {name} out of formats"
         )
 

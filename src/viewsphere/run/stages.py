@@ -14,12 +14,13 @@ from viewsphere.assets.mesh import Mesh
 from viewsphere.errors import ModelError, RecipeError
 from viewsphere.geometry.box import box_size, box_vertices
 from viewsphere.geometry.rotation import transform
+from viewsphere.model.channel import PICTURES
 from viewsphere.model.recipe import Recipe
 from viewsphere.model.sample import Float, Sample
 from viewsphere.model.shot import Frame, ModelSpec, Placement, Shot, Size
 from viewsphere.sampling.plan import Plan, check_images, plan
 from viewsphere.sampling.viewpoints import camera_for, inside_box
-from viewsphere.store import Store
+from viewsphere.store import Store, check_codecs
 from viewsphere.truth.channels import observe
 from viewsphere.truth.enclosure import sky_hidden
 from viewsphere.truth.visibility import rasterize
@@ -50,6 +51,7 @@ def prepare(recipe: Recipe) -> Plan:
     with recipe.located():
         engine.check(recipe.engine.options)
     check_images(planned)
+    check_codecs(recipe.channels, recipe.files)
     return planned
 
 
@@ -194,14 +196,22 @@ def render_frame(
     """
     camera = camera_for(shot.intrinsics, frame.pose, _target(shot, boxes))
     visibility = rasterize(stage.geometry, camera)
-    names = [name for name in shot.channels if name != "rgb"]
+    names = [name for name in shot.channels if name not in PICTURES]
     observed = observe(stage.geometry, camera, visibility, names)
-    if "rgb" in shot.channels:
-        observed["rgb"] = stage.color(camera, frame, visibility)
+    for name in PICTURES:
+        if name in shot.channels:
+            observed[name] = stage.color(camera, _finished(shot, frame, name == "rgba"), visibility)
     files = [model_files(p.model.key)[0] for p in shot.objects]
     objects = annotate(shot, frame, camera, stage.geometry, visibility, boxes, files, sizes)
     channels = {name: observed[name] for name in shot.channels}
     return Sample(frame.index, frame.split, camera, frame.pose, objects, channels, {})
+
+
+def _finished(shot: Shot, frame: Frame, transparent: bool) -> Frame:
+    """The frame with its background, or without."""
+    finish = frame.finish or shot.scene.finish
+    background = finish.background.model_copy(update={"transparent": transparent})
+    return frame.model_copy(update={"finish": finish.model_copy(update={"background": background})})
 
 
 def _target(shot: Shot, boxes: Sequence[Float]) -> Float:

@@ -52,7 +52,7 @@ class Worker:
             self.make_model(ModelSpec.model_validate_json(task.payload), trusted=task.kind == "model")
             return 0
         shot = Shot.model_validate_json(task.payload)
-        return self.store.write_shot(shot.key, self.stages.render(shot), self._scenery(shot))
+        return self.store.write_shot(shot.key, self.stages.render(shot), self._scenery(shot), shot.files)
 
     def _scenery(self, shot: Shot) -> str:
         """What is background in a shot, and digests of its meshes, as `SceneryRecord` reads it; empty if nothing is."""

@@ -8,8 +8,10 @@ from viewsphere import plugins
 from viewsphere.assets.mesh import Image, Material, Mesh, Texture
 from viewsphere.geometry.box import box_vertices
 from viewsphere.model.camera import Intrinsics
+from viewsphere.model.channel import CHANNELS
 from viewsphere.model.shot import ModelSpec, Placement, Pose, Shot
 from viewsphere.run.stages import render_frame
+from viewsphere.store import encode
 
 SIZE = 16
 
@@ -33,7 +35,9 @@ def _render(shot: Shot) -> None:
     engine: plugins.Engine = plugins.load("engines", shot.engine)
     stage = engine.stage(shot, lambda spec: card)
     boxes = [box_vertices(*card.bounds)] * len(shot.placements)
-    render_frame(shot, shot.frames[0], stage, boxes, [None] * len(boxes))
+    sample = render_frame(shot, shot.frames[0], stage, boxes, [None] * len(boxes))
+    for name, array in sample.channels.items():
+        encode(CHANNELS[name], array, shot.files)
 
 
 def _card() -> Mesh:

@@ -9,6 +9,7 @@ from bisect import bisect_right
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from fnmatch import fnmatchcase
 from functools import cached_property
 from itertools import accumulate
 from pathlib import Path
@@ -18,16 +19,19 @@ from numpy.typing import NDArray
 
 from viewsphere import plugins
 from viewsphere.errors import RecipeError
+from viewsphere.geometry.camera import orbit_center
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.mistakes import nearest, one_of
 from viewsphere.model.recipe import Recipe
-from viewsphere.model.scene import Background, Finish, Scene, Vector
-from viewsphere.model.shot import Frame, ModelSpec, Placement, Shot
+from viewsphere.model.recipe_draws import alternatives
+from viewsphere.model.scene import Vector
+from viewsphere.model.shot import Frame, ModelSpec, Placement, Pose, Shot
 from viewsphere.sampling.composition import BoxOf, Composition, compose
 from viewsphere.sampling.models import categories, count_models, model_specs
-from viewsphere.sampling.scenery import IMAGE_SUFFIXES, images_in, proportions
-from viewsphere.sampling.seeds import generator, share
+from viewsphere.sampling.pictures import Pictures, check_pictures, proportions, scene_pictures
+from viewsphere.sampling.scenes import Scenes, is_night
+from viewsphere.sampling.seeds import share
 from viewsphere.sampling.viewpoints import Poses, distance_problem, inside_box, poses
 from viewsphere.store import Category
 
@@ -43,7 +47,7 @@ class Plan:
     model_specs: tuple[ModelSpec, ...]
     pose_list: Poses
     categories: tuple[Category, ...]
-    images: tuple[str, ...]  # absolute paths of the background's images, sorted
+    pictures: Pictures  # of the scene
     shot_frames: int
     composition: Composition | None = None  # of place, company and planes
 
@@ -51,6 +55,16 @@ class Plan:
     def intrinsics(self) -> Intrinsics:
         """The lens of all frames."""
         return _lens(self.recipe, self.pose_list)
+
+    @cached_property
+    def scenes(self) -> Scenes:
+        """Where light, ground, materials, finishes and jitter are drawn."""
+        return Scenes(self.recipe, self.pictures)
+
+    @property
+    def images(self) -> tuple[str, ...]:
+        """Absolute paths of the scene's picture files, by field; those of planes are the composition's."""
+        return tuple(file for files in self.pictures.values() for file in files)
 
     @property
     def models(self) -> int:
@@ -107,10 +121,12 @@ class Plan:
             if count == 0
         ]
         lowest = self.pose_list.lowest_elevation
-        if lowest < 0 and (self.recipe.scene.floor is not None or self.recipe.scene.place is not None):
+        if lowest < 0 and (self.recipe.scene.has_ground or self.recipe.scene.place is not None):
             found.append(
                 f"elevations go down to {lowest:g}: from below, the ground hides the models; set scene.ground: off to see them"
             )
+        if any(is_night(sun) for sun in alternatives(self.recipe.scene.sun)):
+            found.append("scene.sun: at this date, time and place the sun is below the horizon: there is none, and no daylight")
         return tuple(found)
 
     def split(self, spec: ModelSpec, pose: int) -> str:
@@ -164,7 +180,8 @@ class Plan:
     def shot(self, index: int, box_of: BoxOf | None = None) -> Shot:
         """One shot; raises IndexError past the end.
 
-        `box_of` is needed where the recipe has a place, company or planes: what stands on the floor depends on its size.
+        `box_of` is needed where the recipe has a place, company or planes, as what stands on the floor depends on its size, and
+        where what the camera looks at is moved.
         Raises RecipeError where there is no room for all that is to stand there, and what `box_of` raises.
         """
         if not 0 <= index < self.shot_count:
@@ -174,38 +191,45 @@ class Plan:
 
     def take(self, model: int, chosen: Sequence[int], box_of: BoxOf | None = None, key: str = "") -> Shot:
         """A shot of some poses of a model (their indices): of one pose where the recipe draws scenes for each frame."""
-        spec = self.model_specs[model]
+        spec, pose = self.model_specs[model], self.pose_list.name(chosen[0])
         placements, target = (Placement(id=1, model=spec),), None
         if self.composition is not None:
-            if box_of is None:
-                raise ValueError("expected box_of for a recipe with place, company or planes")
             with self.recipe.located():
-                placements = self.composition.placements(spec, self._scene_pose(chosen[0]), box_of)
+                placements = self.composition.placements(spec, self._scene_pose(chosen[0]), _known(box_of))
             company = self.recipe.scene.company
-            target = self.composition.center(placements[: 1 + (company.number if company else 0)], box_of)
+            target = self.composition.center(placements[: 1 + (company.number if company else 0)], _known(box_of))
+        if self.recipe.scene.materials:
+            placements = tuple(self._repainted(p, spec, pose) for p in placements)
+        if target is None and self.scenes.is_target_moved:
+            target = center(placements[0], _known(box_of))
         return Shot(
             key=key or spec.key,
             placements=placements,
             intrinsics=self.intrinsics,
-            scene=self._scene,
+            scene=self.scenes.scene(spec.key, pose),
             frames=tuple(self.frame(model, i, target) for i in chosen),
             engine=self.recipe.engine.name,
             engine_options=self.recipe.engine.options,
             channels=self.recipe.channels,
+            files=self.recipe.files,
             label_alpha=self.recipe.label_alpha,
             category_deg=self.recipe.viewpoints.bins,
         )
 
+    def _repainted(self, placement: Placement, spec: ModelSpec, pose: str) -> Placement:
+        repaints = () if placement.scenery else self.scenes.repaints(placement.model, spec.key, pose)
+        return placement.model_copy(update={"repaints": repaints}) if repaints else placement
+
     def _scene_pose(self, pose: int) -> str | None:
-        """Name of the pose, where scenes are drawn for each frame."""
-        return self.pose_list.name(pose) if self.recipe.scene.is_new_each_frame else None
+        """Name of the pose, where what stands around is drawn for each frame."""
+        return self.pose_list.name(pose) if self.recipe.scene.is_moved_each_frame else None
 
     def cast(self, spec: ModelSpec, pose: int | None = None) -> tuple[ModelSpec, ...]:
         """A model and those that stand beside it, in a pose (its index) where they are drawn for each frame.
 
         Without a pose, only the model itself then.
         """
-        if self.composition is None or (pose is None and self.recipe.scene.is_new_each_frame):
+        if self.composition is None or (pose is None and self.recipe.scene.is_moved_each_frame):
             return (spec,)
         return self.composition.cast(spec, None if pose is None else self._scene_pose(pose))
 
@@ -215,30 +239,22 @@ class Plan:
 
     def frame(self, model: int, pose: int, target: Vector | None = None) -> Frame:
         """The frame of a model (its index) and a pose, which looks at `target` unless it has a target of its own."""
-        spec, view = self.model_specs[model], self.pose_list[pose]
-        finish = None
-        if self.recipe.scene.background.images is not None and self.recipe.scene.background.draw == "per_frame":
-            finish = Finish(background=self._drawn(spec.key, self.pose_list.name(pose)))
+        spec, finish = self.model_specs[model], None
+        if self.scenes.has_finish_per_frame:
+            finish = self.scenes.finish(spec.key, self.pose_list.name(pose))
         return Frame(
             index=model * self.poses + pose,
-            pose=view if target is None or view.target is not None else view.model_copy(update={"target": target}),
+            pose=self._pose(spec, pose, target),
             split=self.split(spec, pose),
             finish=finish,
         )
 
-    def _drawn(self, *names: str) -> Background:
-        rng = generator(self.recipe.seed, "background", *names)
-        return Background(image=self.images[int(rng.integers(len(self.images)))])
-
-    @cached_property
-    def _scene(self) -> Scene:
-        entry = self.recipe.scene
-        background = Background(color=entry.background.color)
-        if entry.background.image is not None:
-            background = Background(image=self.images[0])
-        elif entry.background.images is not None and entry.background.draw == "fixed":
-            background = self._drawn()
-        return Scene(sun=entry.light, sky=entry.sky, ground=entry.floor, finish=Finish(background=background))
+    def _pose(self, spec: ModelSpec, index: int, target: Vector | None) -> Pose:
+        """The pose of a model's frame, which looks at `target` unless it has a target of its own."""
+        pose = self.pose_list[index]
+        if target is not None and pose.target is None:
+            pose = pose.model_copy(update={"target": target})
+        return self.scenes.jittered(pose, spec.key, self.pose_list.name(index)) if self.scenes.is_jittered else pose
 
     def distance_problem(self, spec: ModelSpec, box_of: BoxOf) -> RecipeError | None:
         """The first pose whose camera would stand inside a target's box, in words; None if there is none.
@@ -246,15 +262,17 @@ class Plan:
         Company that is drawn for each frame is not looked at: that is left to whoever renders the frame.
         """
         placements, target = (Placement(id=1, model=spec),), None
-        if self.composition is not None and not self.recipe.scene.is_new_each_frame:
+        if self.composition is not None and not self.recipe.scene.is_moved_each_frame:
             placements = self.composition.targets(spec, None, box_of)
             target = self.composition.center(placements, box_of)
+        if target is None and self.scenes.is_target_moved:
+            target = center(placements[0], box_of)
         cameras = self.cameras(placements, box_of)
         for placement in placements:
             box = transform(placement.world_from_object, box_of(placement.model))
             inside = inside_box(box, cameras)
             if inside.any():
-                pose = self.frame(0, int(np.flatnonzero(inside)[0]), target).pose
+                pose = self._pose(spec, int(np.flatnonzero(inside)[0]), target)
                 problem = distance_problem(pose, box)
                 return RecipeError(f"viewpoints.distance: {problem} (model {placement.model.key})")
         return None
@@ -264,7 +282,11 @@ class Plan:
         targets = [p for p in placements if p.id and not p.scenery]
         corners = np.concatenate([transform(t.world_from_object, box_of(t.model)) for t in targets])
         middle = corners.mean(axis=0) if len(targets) == 1 else (corners.min(axis=0) + corners.max(axis=0)) / 2
-        return self._offsets + np.where(np.isnan(self._targets), middle, self._targets)
+        if not self.scenes.is_jittered:
+            return self._offsets + np.where(np.isnan(self._targets), middle, self._targets)
+        x, y, z = middle.tolist()
+        moved = (self._pose(targets[0].model, i, (x, y, z)) for i in range(self.poses))
+        return np.array([_stand(pose) for pose in moved])
 
     @cached_property
     def _offsets(self) -> NDArray[np.float64]:
@@ -308,8 +330,9 @@ def plan(recipe: Recipe, shot_frames: int | None = None) -> Plan:
         _check_frames(recipe, views)
         specs = model_specs(recipe)
         _check_listed(recipe, specs)
+        _check_materials(recipe, specs)
         frames = 1 if recipe.scene.is_new_each_frame else recipe.shot_frames or shot_frames or SHOT_FRAMES
-        planned = Plan(recipe, specs, views, categories(recipe), _images(recipe), frames)
+        planned = Plan(recipe, specs, views, categories(recipe), scene_pictures(recipe), frames)
         if not recipe.scene.is_composed:
             return planned
         apart = recipe.splits.by == "model"
@@ -319,13 +342,29 @@ def plan(recipe: Recipe, shot_frames: int | None = None) -> Plan:
 
 
 def check_images(planned: Plan) -> None:
-    """See that the background's images, and those of planes, are images; raises RecipeError for the first that is not."""
-    field = "image" if planned.recipe.scene.background.image is not None else "images"
+    """See that the pictures of the scene and its planes are pictures; raises RecipeError for the first that is not."""
     with planned.recipe.located():
-        for path in planned.images:
-            proportions(path, f"scene.background.{field}")
+        check_pictures(planned.recipe, planned.pictures)
         for path in () if planned.composition is None else [p for files in planned.composition.images for p in files]:
             proportions(path)
+
+
+def center(placement: Placement, box_of: BoxOf) -> Vector:
+    """What a camera looks at that has no target of its own: the centre of the first object's box, world metres."""
+    x, y, z = transform(placement.world_from_object, box_of(placement.model).mean(axis=0)).tolist()
+    return x, y, z
+
+
+def _stand(pose: Pose) -> NDArray[np.float64]:
+    """Where the camera of a pose with a target stands, (3,) world metres."""
+    assert pose.target is not None
+    return np.array(pose.target) + orbit_center(math.radians(pose.azimuth_deg), math.radians(pose.elevation_deg), pose.distance)
+
+
+def _known(box_of: BoxOf | None) -> BoxOf:
+    if box_of is None:
+        raise ValueError("expected box_of for a recipe with place, company, planes or a jittered target")
+    return box_of
 
 
 def _check_names(recipe: Recipe) -> None:
@@ -372,18 +411,10 @@ def _check_listed(recipe: Recipe, specs: tuple[ModelSpec, ...]) -> None:
         raise RecipeError(f"splits: expected every model to be listed; found no split for {min(keys - seen.keys())!r}")
 
 
-def _images(recipe: Recipe) -> tuple[str, ...]:
-    background = recipe.scene.background
-    if background.image is not None:
-        path = recipe.folder / background.image
-        if not path.is_file():
-            raise RecipeError(f"scene.background.image: expected an image file; found none at {path}")
-        return (str(path),)
-    if background.images is None:
-        return ()
-    folder = recipe.folder / background.images
-    found = images_in(folder)
-    if not found:
-        endings = ", ".join(sorted(IMAGE_SUFFIXES))
-        raise RecipeError(f"scene.background.images: expected a folder with images ({endings}); found none in {folder}")
-    return found
+def _check_materials(recipe: Recipe, specs: tuple[ModelSpec, ...]) -> None:
+    for i, entry in enumerate(recipe.scene.materials):
+        if not any(fnmatchcase(spec.key, entry.models) for spec in specs):
+            raise RecipeError(
+                f"scene.materials[{i}].models: expected a pattern of models' keys, such as {specs[0].key}; "
+                f"found {entry.models!r}, which fits none"
+            )

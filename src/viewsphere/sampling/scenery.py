@@ -19,13 +19,13 @@ from viewsphere.geometry.box import box_vertices
 from viewsphere.geometry.rotation import compose
 from viewsphere.model.mistakes import one_of
 from viewsphere.model.recipe import Recipe
+from viewsphere.model.recipe_draws import drawn
 from viewsphere.model.recipe_models import ZOO, unit_metres
 from viewsphere.model.recipe_scenery import Labels, PlaceEntry, PlaneEntry
 from viewsphere.model.shot import Matrix4, ModelSpec
 from viewsphere.sampling.company import Footprint, Names, footprint, standing
-from viewsphere.sampling.seeds import generator, share
-
-IMAGE_SUFFIXES = frozenset({".jpg", ".jpeg", ".png", ".webp", ".bmp", ".tif", ".tiff"})
+from viewsphere.sampling.pictures import IMAGE_SUFFIXES, files_in, proportions
+from viewsphere.sampling.seeds import generator, scene_generators, share
 
 TRIES = 200
 """Spots that are tried for one plane."""
@@ -62,7 +62,7 @@ def place_pieces(recipe: Recipe, entry: PlaceEntry, names: Names, category_id: N
 
     Raises RecipeError for an unknown place and for a file that is not there.
     """
-    world_from_place = standing(np.zeros((8, 3)), azimuth_deg=entry.turn)
+    world_from_place = _turned(recipe, entry, names)
     if not entry.name:
         return (_place_file(recipe, entry, world_from_place, category_id),)
     laid = draw_place(recipe.seed, entry.name, names)
@@ -96,7 +96,13 @@ def free_floor(recipe: Recipe, entry: PlaceEntry | None, names: Names) -> Footpr
     if entry is None or rectangle is None:
         return None
     x0, y0, x1, y1 = rectangle
-    return footprint(box_vertices((x0, y0, 0.0), (x1, y1, 0.0)), standing(np.zeros((8, 3)), azimuth_deg=entry.turn))
+    return footprint(box_vertices((x0, y0, 0.0), (x1, y1, 0.0)), _turned(recipe, entry, names))
+
+
+def _turned(recipe: Recipe, entry: PlaceEntry, names: Names) -> Matrix4:
+    """World from place."""
+    turn = drawn(entry.turn, scene_generators(recipe.seed, names), ("place", "turn"))
+    return standing(np.zeros((8, 3)), azimuth_deg=turn)
 
 
 def _composed(a: Matrix4, b: Matrix4) -> Matrix4:
@@ -139,18 +145,13 @@ def plane_images(recipe: Recipe) -> tuple[tuple[str, ...], ...]:
             problem = f"scene.planes[{i}].image: expected an image file; found none at {path}"
         else:
             folder = recipe.folder / Path(entry.images or "").expanduser()
-            files = images_in(folder)
-            endings = ", ".join(sorted(IMAGE_SUFFIXES))
+            files = files_in(folder)
+            endings = ", ".join(IMAGE_SUFFIXES)
             problem = f"scene.planes[{i}].images: expected a folder with images ({endings}); found none in {folder}"
         if not files:
             raise RecipeError(problem)
         found.append(files)
     return tuple(found)
-
-
-def images_in(folder: Path) -> tuple[str, ...]:
-    """Absolute paths of the images in a folder and below, sorted."""
-    return tuple(sorted(str(f) for f in folder.rglob("*") if f.suffix.lower() in IMAGE_SUFFIXES and f.is_file()))
 
 
 def plane_spec(recipe: Recipe, entry: PlaneEntry, path: str, category_id: Naming) -> ModelSpec:
@@ -165,21 +166,6 @@ def plane_spec(recipe: Recipe, entry: PlaneEntry, path: str, category_id: Naming
         unit=entry.height,
         centring="floor",
     )
-
-
-@lru_cache(maxsize=4096)
-def proportions(path: str, field: str = "scene.planes") -> float:
-    """Width over height of a picture as it is shown; raises RecipeError about the recipe's field when it cannot be read."""
-    from PIL import Image, UnidentifiedImageError
-
-    try:
-        with Image.open(path) as image:
-            width, height = image.size
-            sideways = image.getexif().get(0x0112, 1) >= 5
-    except (OSError, ValueError, UnidentifiedImageError, Image.DecompressionBombError) as error:
-        problem = "no image" if isinstance(error, UnidentifiedImageError) else error
-        raise RecipeError(f"{field}: expected a readable image; found {problem} in {path}: mend or remove it") from None
-    return height / width if sideways else width / height
 
 
 def plane_pieces(

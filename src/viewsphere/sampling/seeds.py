@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Callable
 
 import numpy as np
 
@@ -22,6 +23,11 @@ def generator(seed: int, *names: str) -> np.random.Generator:
     """
     words = np.frombuffer(_digest(names, 16), "<u4")
     return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=tuple(int(w) for w in words)))
+
+
+def scene_generators(seed: int, names: tuple[str, ...]) -> Callable[[tuple[str, ...]], np.random.Generator]:
+    """A generator for every field of a recipe's scene, by its path, where the scene is drawn for `names`."""
+    return lambda path: generator(seed, "scene", ".".join(path), *names)
 
 
 def share(seed: int, *names: str) -> float:

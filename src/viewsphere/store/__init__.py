@@ -3,14 +3,14 @@
     OUT/store/plan.json                        what was asked for
     OUT/store/models/<key>/                    the normalised model (OBJ, GLB) and model.json
     OUT/store/shots/<hh>/<shot>/frames.json    records of the shot's frames
-    OUT/store/shots/<hh>/<shot>/<channel>/<pose>.png|.tiff
+    OUT/store/shots/<hh>/<shot>/<channel>/<pose>.png|.tiff|...
     OUT/store/writing/                         what is not whole yet
 
 `hh` are the first two hexadecimal digits of the shot key's SHA-256, so that no folder grows large. Workers never share
 a file.
 """
 
-from viewsphere.store.channel_files import decode, encode
+from viewsphere.store.channel_files import check_codecs, decode, depth_step, encode
 from viewsphere.store.dataset import Dataset
 from viewsphere.store.folder import Store
 from viewsphere.store.records import Category, ModelInfo, Part, PlanRecord, Row, ShotRow
@@ -24,6 +24,8 @@ __all__ = [
     "Row",
     "ShotRow",
     "Store",
+    "check_codecs",
     "decode",
+    "depth_step",
     "encode",
 ]

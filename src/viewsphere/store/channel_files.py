@@ -1,7 +1,8 @@
-"""Channels as files: PNG for colours and ids, TIFF for exact numbers."""
+"""Channels as files: which kind is the recipe's choice, and every file says itself what it is."""
 
 from __future__ import annotations
 
+from collections.abc import Container
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -9,67 +10,143 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.errors import StoreError, UserError
+from viewsphere.errors import MissingExtraError, StoreError, UserError
 from viewsphere.model.channel import Channel
+from viewsphere.model.files import Files
+
+MOST_STEPS = 65535
+MOST_COLORS = 256
 
 
-def encode(channel: Channel, array: NDArray[Any]) -> bytes:
-    """The bytes of a channel's file; raises ValueError for an array that is not as the channel's row says."""
-    from viewsphere.geometry import image_files
+def encode(channel: Channel, array: NDArray[Any], files: Files | None = None) -> bytes:
+    """The bytes of a channel's file of the kind that `files` choose.
 
+    Raises ValueError for an array that is not as the channel's row says, StoreError for ids above 65535, MissingExtraError
+    where a codec is not installed. Ids above 255 do not fit a palette: such a frame's masks are 16-bit.
+    """
+    from viewsphere.geometry import exr_files, image_files, npz_files, picture_files
+
+    files = files or Files()
     height, width = array.shape[:2]
     if array.dtype != channel.dtype or array.shape != channel.shape(height, width):
         raise ValueError(
             f"channel {channel.name}: expected {channel.shape(height, width)} {channel.dtype}, got {array.shape} {array.dtype}"
         )
-    if channel.encoding == "tiff":
-        return image_files.encode_tiff(array)
-    if channel.encoding == "png16":
-        if array.size and not 0 <= array.min() <= array.max() <= 65535:
-            raise StoreError(f"channel {channel.name}: expected ids in 0..65535, found {array.min()}..{array.max()}")
-        return image_files.encode_png(array.astype(np.uint16))
-    return image_files.encode_png(array)
+    match files.encoding(channel):
+        case "tiff":
+            return image_files.encode_tiff(array)
+        case "exr":
+            return exr_files.encode_exr(array)
+        case "npz":
+            return npz_files.encode_npz(array, channel.name)
+        case "png":
+            return image_files.encode_png(array)
+        case "png16" if channel.name == "depth":
+            return image_files.encode_png(_steps(array, files.step), unit=files.step)
+        case "png16" | "png8" as kind:
+            return _masks(channel, array, kind == "png8")
+        case kind:
+            return picture_files.encode_picture(array, kind, files.quality)
 
 
-def decode(channel: Channel, file: Path) -> NDArray[Any]:
-    """The array a channel's file holds, with the channel's dtype; raises StoreError if it is missing or broken.
+def _steps(depth: NDArray[np.float32], unit: float) -> NDArray[np.uint16]:
+    """Depth in whole steps: 0 where nothing is seen (or it lies behind the camera), else 1 to 65535, which holds all beyond."""
+    steps = np.clip(np.rint(depth.astype(np.float64) / unit), 1, MOST_STEPS)
+    return np.where(np.isfinite(depth) & (depth > 0), steps, 0).astype(np.uint16)
 
-    Pictures that were imported may be JPEG or anything else that Pillow reads.
-    """
+
+def depth_step(file: Path) -> float:
+    """Metres by which neighbouring numbers of a depth file differ; 0 where it is exact. Errors as for `decode`."""
     from viewsphere.geometry import image_files
 
     try:
         data = file.read_bytes()
-        if channel.name == "rgb":
-            return _rgb(data)
-        array = image_files.decode_tiff(data) if channel.encoding == "tiff" else image_files.decode_png(data)
+        return (image_files.png_unit(data) or 0.0) if data[:4] == b"\x89PNG" else 0.0
+    except (OSError, UserError) as error:
+        raise StoreError(f"{file}: expected a readable file, found: {error}") from None
+
+
+def check_codecs(channels: Container[str], files: Files) -> None:
+    """Raises MissingExtraError where a channel is to be written with a codec that is not installed."""
+    from viewsphere.geometry.picture_files import codecs
+
+    for name, kind in (("rgb", files.rgb), ("rgba", files.rgba)):
+        if name in channels and kind in {"qoi", "jxl"}:
+            codecs(f"files.{name}: {kind}")
+
+
+def _masks(channel: Channel, array: NDArray[np.int32], indexed: bool) -> bytes:
+    from viewsphere.geometry import image_files
+
+    most = int(array.view(np.uint32).max(initial=0))  # what is negative counts as large
+    if most > MOST_STEPS:
+        raise StoreError(f"channel {channel.name}: expected ids in 0..65535, found {array.min()}..{array.max()}")
+    if indexed and most < MOST_COLORS:
+        return image_files.encode_png(array.astype(np.uint8), palette=palette())
+    return image_files.encode_png(array.astype(np.uint16))
+
+
+def palette() -> NDArray[np.uint8]:
+    """The 256 distinct colours (256, 3) of PASCAL VOC, 0 black: bits of the id, the lowest three to the colours' highest."""
+    ids = np.arange(MOST_COLORS)
+    bits = ids[:, None] >> np.arange(8) & 1
+    colors = [sum(bits[:, 3 * k + c] << (7 - k) for k in range(3) if 3 * k + c < 8) for c in range(3)]
+    return np.stack(colors, axis=1).astype(np.uint8)
+
+
+def decode(channel: Channel, file: Path) -> NDArray[Any]:
+    """The array a channel's file holds, with the channel's dtype, whatever kind of file it is.
+
+    Pictures that were imported may be anything that Pillow reads. Raises StoreError if the file is missing or broken,
+    MissingExtraError where its codec is not installed.
+    """
+    try:
+        array = _decoded(channel, file.read_bytes())
+        if np.issubdtype(channel.dtype, np.floating) != np.issubdtype(array.dtype, np.floating):
+            raise UserError(f"expected {np.dtype(channel.dtype)}, found {array.dtype}")
+    except MissingExtraError as error:
+        raise MissingExtraError(f"{file}: {error}") from None
     except (OSError, ValueError, SyntaxError, UserError) as error:
         problem = (error.strerror if isinstance(error, OSError) else None) or error
         raise StoreError(
-            f"{file}: expected a readable {channel.encoding} file, found: {problem}: "
+            f"{file}: expected a readable {file.suffix.removeprefix('.')} file, found: {problem}: "
             f"delete {file.parent.parent} and render again"
         ) from None
     return array.astype(channel.dtype, copy=False)
 
 
-def _is_rgb_png(data: bytes) -> bool:
-    """Whether this is a PNG of 8-bit red, green and blue, as this package writes them (PNG specification, 11.2.1)."""
-    return data[:8] == b"\x89PNG\r\n\x1a\n" and data[24:26] == b"\x08\x02"
+def _decoded(channel: Channel, data: bytes) -> NDArray[Any]:
+    """The array in a file's bytes, whose first ones say what it is."""
+    from viewsphere.geometry import exr_files, image_files, npz_files, picture_files
+
+    if channel.name in {"rgb", "rgba"}:
+        if _is_own_png(data, channel.components):
+            with suppress(UserError):
+                return image_files.decode_png(data)
+        return picture_files.decode_picture(data, channel.components)
+    match data[:4]:
+        case b"\x76\x2f\x31\x01":
+            return exr_files.decode_exr(data)
+        case b"PK\x03\x04":
+            return npz_files.decode_npz(data, channel.name)
+        case b"\x89PNG" if channel.name == "depth":
+            return _metres(data)
+        case b"\x89PNG":
+            return image_files.decode_png(data)
+        case _:
+            return image_files.decode_tiff(data)
 
 
-def _rgb(data: bytes) -> NDArray[np.uint8]:
-    """The picture in a file of this package, else in one of any other program."""
-    from io import BytesIO
-
-    from PIL import Image
-
+def _metres(data: bytes) -> NDArray[np.float32]:
     from viewsphere.geometry import image_files
 
-    if _is_rgb_png(data):
-        with suppress(UserError):
-            return image_files.decode_png(data)
-    with Image.open(BytesIO(data)) as image:
-        if image.mode.startswith("I"):  # 16 bits of grey, which Pillow would cut off above 255
-            grey = (np.asarray(image) >> 8).astype(np.uint8)
-            return np.repeat(grey[..., None], 3, axis=2)
-        return np.asarray(image.convert("RGB"))
+    unit = image_files.png_unit(data)
+    if unit is None:
+        raise UserError("PNG: expected the metres in a step (chunk pCAL), found none")
+    steps = image_files.decode_png(data)
+    return np.where(steps == 0, np.inf, steps * unit).astype(np.float32)
+
+
+def _is_own_png(data: bytes, components: int) -> bool:
+    """Whether this is a PNG of 8-bit RGB or RGBA, as this package writes them (PNG specification, 11.2.1)."""
+    return data[:8] == b"\x89PNG\r\n\x1a\n" and data[24:26] == (b"\x08\x06" if components == 4 else b"\x08\x02")

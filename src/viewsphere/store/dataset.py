@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from viewsphere.errors import StoreError
 from viewsphere.model.channel import CHANNELS
+from viewsphere.model.files import Files
 from viewsphere.model.record import sample_from_record
 from viewsphere.model.sample import Sample
 from viewsphere.store.channel_files import decode
@@ -128,19 +129,22 @@ class Dataset(Sequence[Sample]):
     def _supplied(self, record: dict[str, Any]) -> dict[str, str]:
         """Files of channels that were added to a frame later."""
         files: dict[str, str] = {}
-        for firsts, rows in self._supplements:
+        for kinds, firsts, rows in self._supplements:
             at = bisect_right(firsts, record["index"]) - 1
             (key, first, count), channels = rows[at] if at >= 0 else (("", 0, 0), ())
             if record["index"] < first + count:
-                files |= {name: self.store.channel_file(key, name, record["pose"]["index"]) for name in channels}
+                files |= {name: self.store.channel_file(key, name, record["pose"]["index"], kinds) for name in channels}
         return files
 
     @cached_property
-    def _supplements(self) -> list[tuple[list[int], list[tuple[ShotRow, tuple[str, ...]]]]]:
-        """Finished shots of added channels, and their first frames, for each part that added some."""
-        parts = (list(self.plan.supplements_of(i)) for i, part in enumerate(self.plan.parts) if part.supplies)
-        finished = ([row for row in rows if self.store.has_shot(row[0][0])] for rows in parts)
-        return [([row[1] for row, _ in rows], rows) for rows in finished]
+    def _supplements(self) -> list[tuple[Files, list[int], list[tuple[ShotRow, tuple[str, ...]]]]]:
+        """For each part that added channels: how it wrote them, and its finished shots of them behind their first frames."""
+        found: list[tuple[Files, list[int], list[tuple[ShotRow, tuple[str, ...]]]]] = []
+        for number, part in enumerate(self.plan.parts):
+            if part.supplies:
+                rows = [row for row in self.plan.supplements_of(number) if self.store.has_shot(row[0][0])]
+                found.append((Files.model_validate(part.recipe.get("files", {})), [row[1] for row, _ in rows], rows))
+        return found
 
     def path(self, relative: str) -> Path:
         """A file of the data set."""

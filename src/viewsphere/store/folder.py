@@ -18,6 +18,7 @@ import numpy as np
 
 from viewsphere.errors import StoreError
 from viewsphere.model.channel import CHANNELS
+from viewsphere.model.files import Files
 from viewsphere.model.record import sample_to_record
 from viewsphere.model.sample import Sample
 from viewsphere.store.channel_files import encode
@@ -154,9 +155,9 @@ class Store:
         """Where a finished shot lies."""
         return self.folder / "shots" / hashlib.sha256(key.encode()).hexdigest()[:2] / key
 
-    def channel_file(self, key: str, channel: str, pose: int) -> str:
-        """Where a finished shot's channel of a pose lies, relative to the data set's root."""
-        return f"{self.shot_folder(key).relative_to(self.root).as_posix()}/{channel_path(channel, pose)}"
+    def channel_file(self, key: str, channel: str, pose: int, kinds: Files | None = None) -> str:
+        """Where a finished shot's channel of a pose, written as `kinds` say, lies; relative to the data set's root."""
+        return f"{self.shot_folder(key).relative_to(self.root).as_posix()}/{channel_path(channel, pose, kinds)}"
 
     def model_folder(self, key: str) -> Path:
         """Where a normalised model lies."""
@@ -217,22 +218,22 @@ class Store:
         except FileNotFoundError:
             return {}
 
-    def write_shot(self, key: str, samples: Iterable[Sample], scenery: str = "") -> int:
+    def write_shot(self, key: str, samples: Iterable[Sample], scenery: str = "", kinds: Files | None = None) -> int:
         """Write all frames of a shot, with the channels their samples hold; gives their number.
 
-        `scenery`, if any, is a text that says what stands there that is no object.
+        `scenery`, if any, is a text that says what stands there that is no object; `kinds` of files are the default ones.
         """
         target = self.shot_folder(key)
         prefix = target.relative_to(self.root).as_posix()
         records: list[dict[str, Any]] = []
+        kinds = kinds or Files()
         with self.aside(target) as folder:
             for sample in samples:
                 files: dict[str, str] = {}
                 for name, array in sample.channels.items():
-                    channel = CHANNELS[name]
-                    inside = channel_path(name, sample.pose.index)
+                    inside = channel_path(name, sample.pose.index, kinds)
                     (folder / name).mkdir(exist_ok=True)
-                    (folder / inside).write_bytes(encode(channel, array))
+                    (folder / inside).write_bytes(encode(CHANNELS[name], array, kinds))
                     files[name] = f"{prefix}/{inside}"
                 records.append(sample_to_record(replace(sample, files=files)))
             lines = (json.dumps(r, separators=(",", ":"), allow_nan=False) for r in records)
@@ -272,9 +273,9 @@ class Store:
             ) from None
 
 
-def channel_path(channel: str, pose: int) -> str:
-    """Where a channel of a pose lies in its shot's folder."""
-    return f"{channel}/{pose:06d}{CHANNELS[channel].suffix}"
+def channel_path(channel: str, pose: int, kinds: Files | None = None) -> str:
+    """Where a channel of a pose, written as `kinds` say, lies in its shot's folder."""
+    return f"{channel}/{pose:06d}{(kinds or Files()).suffix(CHANNELS[channel])}"
 
 
 def _writer() -> str:

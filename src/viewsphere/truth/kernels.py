@@ -195,7 +195,7 @@ def _draw_rows(t, e0, e1, e2, n, box, canvas, nearest, seen):
     xa, ya, xb, yb = box
     samples, x0, y0 = canvas
     step, first = 1.0 / samples, x0 + 0.5
-    k0, k1, k2 = _crossing(e0[0], samples), _crossing(e1[0], samples), _crossing(e2[0], samples)
+    k0, k1, k2 = crossing_at(e0[0], samples), crossing_at(e1[0], samples), crossing_at(e2[0], samples)
     for y in range(ya, yb + 1):
         py = (y + y0 + 0.5) * step
         f0, f1, f2 = e0[1] * py + e0[2], e1[1] * py + e1[2], e2[1] * py + e2[2]
@@ -225,7 +225,7 @@ def _draw_rows(t, e0, e1, e2, n, box, canvas, nearest, seen):
 
 
 @njit
-def _crossing(e, samples):
+def crossing_at(e, samples):
     """What f is multiplied by to give the sample at which e x + f is 0; 0 for an edge along the row."""
     return -samples / e if e != 0.0 else 0.0
 

@@ -98,7 +98,7 @@ def _cell(u, size):
 
 
 @njit
-def _box(cells, q0, q1, q2):
+def pixel_box(cells, q0, q1, q2):
     """Whether the triangle is small and on one face, and if so the box of pixels that may see it."""
     count, size = cells.shape[:2]
     ax, ay, az = abs(q0[0]), abs(q0[1]), abs(q0[2])
@@ -160,6 +160,14 @@ def _bounds(q0, q1, q2, unit):
 
 
 @njit
+def limits(q0, q1, q2, det, unit):
+    """Whether the triangle's facing is uncertain, and within what 1/s has to stay."""
+    sizes = _distance(q0, ORIGIN) * _distance(q1, ORIGIN) * _distance(q2, ORIGIN)
+    sliver = abs(det) < SLIVER * sizes
+    return sliver, _bounds(q0, q1, q2, unit) if sliver else (0.0, np.inf)
+
+
+@njit
 def _distance(a, b):
     x, y, z = a[0] - b[0], a[1] - b[1], a[2] - b[2]
     return math.sqrt(x * x + y * y + z * z)
@@ -175,13 +183,14 @@ def draw(q, triangles, span, table, origin, unit, cutout, cutouts, nearest, seen
     """
     rays, levels, boxes, cells = table
     first, last, base = span
-    stack = np.empty((256, 3), np.int64)
+    leaves = leaf_list(levels)
+    window = (origin[0], origin[1], origin[0] + nearest.shape[1], origin[1] + nearest.shape[0])
     for t in range(first, last):
         i0, i1, i2 = triangles[t, 0] - base, triangles[t, 1] - base, triangles[t, 2] - base
         q0, q1, q2 = (q[i0, 0], q[i0, 1], q[i0, 2]), (q[i1, 0], q[i1, 1], q[i1, 2]), (q[i2, 0], q[i2, 1], q[i2, 2])
         if cutout[t] == NEVER or (not unit and q0[2] <= 0.0 and q1[2] <= 0.0 and q2[2] <= 0.0):
             continue
-        small, box = _box(cells, q0, q1, q2)
+        small, box = pixel_box(cells, q0, q1, q2)
         if small and box[2] < 0:
             continue
         nx, ny, nz, det = plane(q0, q1, q2)
@@ -190,42 +199,51 @@ def draw(q, triangles, span, table, origin, unit, cutout, cutouts, nearest, seen
         e0, e1, e2 = edge(q1, q2), edge(q2, q0), edge(q0, q1)
         if det < 0.0:
             e0, e1, e2 = negated(e0), negated(e1), negated(e2)
-        sizes = _distance(q0, ORIGIN) * _distance(q1, ORIGIN) * _distance(q2, ORIGIN)
-        sliver = abs(det) < SLIVER * sizes
-        bounds = _bounds(q0, q1, q2, unit) if sliver else (0.0, np.inf)
+        sliver, bounds = limits(q0, q1, q2, det, unit)
         n = (nx / det, ny / det, nz / det)
         if small:
             _draw_box(t, e0, e1, e2, n, sliver, bounds, rays, box, origin, cutout[t], cutouts, nearest, seen)
-        else:
-            tree = (levels, boxes, stack)
-            _draw_tree(t, e0, e1, e2, n, sliver, bounds, rays, tree, origin, cutout[t], cutouts, nearest, seen)
+            continue
+        for i in range(touched(e0, e1, e2, sliver, levels, boxes, window, leaves)):
+            x, y = leaves[i, 0], leaves[i, 1]
+            box = (x, y, x + LEAF - 1, y + LEAF - 1)
+            _draw_box(t, e0, e1, e2, n, sliver, bounds, rays, box, origin, cutout[t], cutouts, nearest, seen)
 
 
 @njit
-def _draw_tree(t, e0, e1, e2, n, sliver, bounds, rays, tree, origin, cutout, cutouts, nearest, seen):
-    """Descend to the leaves the triangle may touch."""
-    levels, boxes, stack = tree
-    height, width = nearest.shape
-    stack[0] = (len(levels) - 1, 0, 0)
-    depth = 1
-    while depth > 0:
-        depth -= 1
-        level, row, column = stack[depth]
+def leaf_list(levels):
+    """Room for `touched` to list all leaves of a tree."""
+    return np.empty((levels[0, 1] * levels[0, 2] + 256, 3), np.int32)
+
+
+@njit
+def touched(e0, e1, e2, sliver, levels, boxes, window, leaves):
+    """Number of leaves in the window (x0, y0, x1, y1) that the triangle may touch; their first pixels (x, y) in `leaves`.
+
+    The list's end serves as the stack: a tree of L levels never has more than 3 L + 1 nodes waiting.
+    """
+    found, top = 0, leaves.shape[0]
+    leaves[top - 1] = (len(levels) - 1, 0, 0)
+    waiting = 1
+    while waiting > 0:
+        level, row, column = leaves[top - waiting]
+        waiting -= 1
         side = LEAF << level
         x, y = column * side, row * side
-        if y >= origin[1] + height or y + side <= origin[1] or x >= origin[0] + width or x + side <= origin[0]:
+        if y >= window[3] or y + side <= window[1] or x >= window[2] or x + side <= window[0]:
             continue
         if not _may_hit(e0, e1, e2, sliver, boxes[levels[level, 0] + row * levels[level, 2] + column]):
             continue
         if level == 0:
-            box = (x, y, x + LEAF - 1, y + LEAF - 1)
-            _draw_box(t, e0, e1, e2, n, sliver, bounds, rays, box, origin, cutout, cutouts, nearest, seen)
+            leaves[found, 0], leaves[found, 1] = x, y
+            found += 1
             continue
         below = level - 1
         for j in range(2 * row, min(2 * row + 2, levels[below, 1])):
             for i in range(2 * column, min(2 * column + 2, levels[below, 2])):
-                stack[depth] = (below, j, i)
-                depth += 1
+                waiting += 1
+                leaves[top - waiting, 0], leaves[top - waiting, 1], leaves[top - waiting, 2] = below, j, i
+    return found
 
 
 @njit

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -83,14 +84,24 @@ def lens_rays(camera: Camera) -> NDArray[np.float64] | None:
     return None if camera.distortion is None else _ray_table(camera.intrinsics.model_dump_json(), 1, image).rays
 
 
+def lens_table(camera: Camera) -> RayTable:
+    """`lens_rays` of a distorted lens, with the indices over them."""
+    return _ray_table(camera.intrinsics.model_dump_json(), 1, (0, 0, camera.width, camera.height))
+
+
 @dataclass(frozen=True, eq=False)
-class _RayTable:
+class RayTable:
     """Rays of a lens, and the indices over them that `kernels_rays` builds."""
 
     rays: NDArray[np.float64]
     levels: NDArray[np.int64]
     boxes: NDArray[np.float64]
     cells: NDArray[np.int32]
+
+    @property
+    def arrays(self) -> tuple[NDArray[Any], ...]:
+        """(rays, levels, boxes, cells), as the kernels take them."""
+        return self.rays, self.levels, self.boxes, self.cells
 
 
 def _canvas(camera: Camera, window: Window) -> Window:
@@ -107,18 +118,22 @@ def _within(a: Window, b: Window) -> bool:
 
 
 @lru_cache(maxsize=4)
-def _ray_table(lens: str, samples: int, canvas: Window) -> _RayTable:
+def _ray_table(lens: str, samples: int, canvas: Window) -> RayTable:
     """Of the intrinsics with this JSON."""
+    intrinsics = Intrinsics.model_validate_json(lens)
+    return index_rays(intrinsics, pixel_rays(intrinsics, samples, canvas), samples)
+
+
+def index_rays(intrinsics: Intrinsics, rays: NDArray[np.float64], samples: int) -> RayTable:
+    """The indices over rays (H, W, 3) of a distorted lens, `samples` x `samples` of them a pixel."""
     from viewsphere.truth import kernels_rays as kernels
 
-    intrinsics = Intrinsics.model_validate_json(lens)
-    rays = pixel_rays(intrinsics, samples, canvas)
     rays.setflags(write=False)
     levels = kernels.tree_levels(rays.shape[0], rays.shape[1])
     fisheye = intrinsics.distortion is not None and intrinsics.distortion.model == "fisheye"
     size = min(max(int(intrinsics.fx * samples), 16), 512)  # cells of about two pixels
     cells = kernels.build_faces(rays, 6 if fisheye else 1, size)
-    return _RayTable(rays, levels, kernels.build_tree(rays, levels), cells)
+    return RayTable(rays, levels, kernels.build_tree(rays, levels), cells)
 
 
 def _draw(
@@ -138,7 +153,7 @@ def _draw(
         canvas = _canvas(camera, window)
         t = _ray_table(camera.intrinsics.model_dump_json(), samples, canvas)
         origin = (x0 - samples * canvas[0], y0 - samples * canvas[1])
-        table, unit = (t.rays, t.levels, t.boxes, t.cells), camera.distortion.model == "fisheye"
+        table, unit = t.arrays, camera.distortion.model == "fisheye"
         kernels_rays.draw(q, geometry.triangles, span, table, origin, unit, *cut, nearest, seen)
         return nearest, seen, q
     cell = np.empty((stop - base, 4), np.int32)

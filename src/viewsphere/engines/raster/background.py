@@ -1,38 +1,274 @@
-"""What is seen where nothing else is: a colour or an image, display-linear."""
+"""What is seen where nothing else is: a plain colour or a picture, display-linear."""
 
 from __future__ import annotations
 
+import math
+import warnings
+from dataclasses import dataclass, field
+from functools import cache, lru_cache
 from pathlib import Path
+from typing import TYPE_CHECKING, NoReturn
 
 import numpy as np
 
+from viewsphere.assets.srgb import linear
 from viewsphere.engines.raster.records import Float32
-from viewsphere.engines.raster.tone import linear_words
 from viewsphere.errors import UserError
 from viewsphere.model.scene import Background
 
+if TYPE_CHECKING:
+    from PIL.Image import Image
 
-def plain_background(background: Background, width: int, height: int) -> Float32 | None:
-    """The background as (height * width, 3), exact in sRGB bytes; None for the sky.
+Box = tuple[float, float, float, float]
+Size = tuple[int, int]
+Rgb = tuple[int, int, int]
 
-    An image covers the frame, centred, its proportions kept. Raises UserError when it cannot be read.
+MOST_PIXELS = 100_000_000
+"""A picture of more is refused before it is decoded."""
+
+FORMATS = ("PNG", "JPEG", "WEBP", "BMP", "GIF", "TIFF", "TGA", "PPM")
+
+KEPT_BYTES = 128 << 20
+"""Of decoded pictures, the last ones used."""
+
+COARSE = 4.0
+"""Sigma, in pixels, above which a picture is blurred at a lower resolution."""
+
+SMALLEST = 48
+"""Pixels a side below which it is not lowered further."""
+
+_ORIENTATION = 0x0112  # EXIF's tag; from 5 on, width and height change places
+
+
+def display_background(background: Background, width: int, height: int) -> Float32 | None:
+    """The background as (height * width, 3) display-linear, exact in sRGB bytes; None for the sky, and for no background.
+
+    Where a picture is clear the background's colour is seen, else white. The array is kept for the next frame and not to be
+    written to. Raises UserError for a picture that cannot be read or has more than `MOST_PIXELS`.
     """
-    if background.image is not None:
-        pixels = _covering(background.image, width, height).reshape(-1, 3)
-    elif background.color is not None:
-        pixels = np.round(np.clip(background.color, 0, 1) * np.array(255.0)).astype(np.uint8)
-        pixels = np.broadcast_to(pixels, (width * height, 3))
-    else:
+    if background.transparent or (background.color is None and background.image is None):
         return None
-    return (linear_words()[pixels].astype(np.float32)) / np.float32(65535)
+    stamp = 0 if background.image is None else _stamp(background.image)
+    return _painted(background.model_dump_json(), stamp, width, height)
 
 
-def _covering(path: str, width: int, height: int) -> np.ndarray[tuple[int, ...], np.dtype[np.uint8]]:
-    from PIL import Image, ImageOps, UnidentifiedImageError
+@lru_cache(maxsize=1)
+def _painted(described: str, stamp: int, width: int, height: int) -> Float32:
+    from PIL.Image import Resampling
+
+    background = Background.model_validate_json(described)
+    r, g, b = (round(255 * min(c, 1.0)) for c in background.color or (1.0, 1.0, 1.0))
+    if background.image is None:
+        return np.tile(_display_linear()[[r, g, b]], (height * width, 1))
+    size, orientation = _head(background.image, stamp)
+    part = _part(background, size, width / height)
+    spare = min((part[2] - part[0]) / width, (part[3] - part[1]) / height)
+    step = 2 ** max(0, math.floor(math.log2(spare)))
+    picture = _shelf().picture(_Wanted(background.image, stamp, step, (r, g, b)))
+    reduced = _reduced(part, size, step, orientation, picture.size)
+    shown = np.asarray(picture.resize((width, height), Resampling.BICUBIC, reduced))
+    if background.flip:
+        shown = shown[:, ::-1]
+    return _blurred(_display_linear()[shown], background.blur * width).reshape(-1, 3)
+
+
+@cache
+def _display_linear() -> Float32:
+    """Linear values of the 256 sRGB bytes."""
+    return linear(np.arange(256) / 255).astype(np.float32)
+
+
+def _part(background: Background, size: Size, proportions: float) -> Box:
+    """What is shown of a picture: left, top, right, bottom in its pixels. `proportions`: the frame's width over its height."""
+    width, height = float(size[0]), float(size[1])
+    if background.fit == "stretch":
+        return 0.0, 0.0, width, height
+    zoom, (x, y) = (background.zoom, background.place) if background.fit == "crop" else (1.0, (0.5, 0.5))
+    across, down = min(width, height * proportions) / zoom, min(height, width / proportions) / zoom
+    left, top = x * (width - across), y * (height - down)
+    return left, top, min(left + across, width), min(top + down, height)
+
+
+def _reduced(part: Box, size: Size, step: int, orientation: int, found: Size) -> Box:
+    """A part of a picture of this size in pixels of the picture that was `found`, `step` times smaller.
+
+    Where the size is no multiple of `step`, the last pixels of the file's rows and columns are parts of one; turned, they may
+    come first.
+    """
+    before = [
+        found[axis] - size[axis] / step if orientation in turned else 0.0
+        for axis, turned in enumerate(((2, 3, 6, 7), (3, 4, 7, 8)))
+    ]
+    left, top, right, bottom = (min(max(edge / step + before[i % 2], 0.0), found[i % 2]) for i, edge in enumerate(part))
+    return left, top, right, bottom
+
+
+@dataclass(frozen=True)
+class _Wanted:
+    """A picture at a whole part `step` of its size, over a colour."""
+
+    path: str
+    stamp: int
+    step: int
+    under: Rgb
+
+
+@dataclass(eq=False)
+class _Shelf:
+    """Decoded pictures, as many as `KEPT_BYTES` allow: a run draws the same ones again and again."""
+
+    _pictures: dict[_Wanted, Image] = field(default_factory=dict["_Wanted", "Image"])
+
+    def picture(self, wanted: _Wanted) -> Image:
+        """The picture, upright, RGB; raises UserError when it cannot be read."""
+        found = self._pictures.pop(wanted, None) or _decoded(wanted)
+        self._pictures[wanted] = found  # the last used comes last
+        held = sum(4 * p.width * p.height for p in self._pictures.values())
+        while held > KEPT_BYTES and len(self._pictures) > 1:
+            first = self._pictures.pop(next(iter(self._pictures)))
+            held -= 4 * first.width * first.height
+        return found
+
+
+@cache
+def _shelf() -> _Shelf:
+    return _Shelf()
+
+
+def _stamp(path: str) -> int:
+    """Changes with the file."""
+    try:
+        return Path(path).stat().st_mtime_ns
+    except OSError as error:
+        _refuse(path, error.strerror or str(error))
+
+
+@lru_cache(maxsize=4096)
+def _head(path: str, stamp: int) -> tuple[Size, int]:
+    """Width and height as shown, and EXIF's orientation."""
+    with _opened(path) as picture:
+        width, height = picture.size
+        orientation = _orientation(picture)
+    if width * height > MOST_PIXELS:
+        _too_large(path, f"{width} x {height}")
+    return ((height, width) if orientation >= 5 else (width, height)), orientation
+
+
+def _opened(path: str) -> Image:
+    from PIL import Image, UnidentifiedImageError
 
     try:
-        with Image.open(Path(path)) as image:
-            upright = ImageOps.exif_transpose(image).convert("RGB")
-    except (OSError, UnidentifiedImageError, ValueError) as error:
-        raise UserError(f"background image {path}: expected a readable image, found {error}") from error
-    return np.asarray(ImageOps.fit(upright, (width, height), Image.Resampling.LANCZOS), np.uint8)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of large pictures, which MOST_PIXELS decides on
+            return Image.open(path, formats=FORMATS)
+    except UnidentifiedImageError:
+        _refuse(path, f"none of {', '.join(FORMATS)}")
+    except Image.DecompressionBombError:
+        _too_large(path, "many more")
+    except (OSError, ValueError, SyntaxError) as error:
+        _refuse(path, str(error))
+
+
+def _orientation(picture: Image) -> int:
+    """EXIF's orientation, 1 where it says nothing that can be read."""
+    try:
+        found = int(picture.getexif().get(_ORIENTATION, 1))
+    except Exception:  # the parser of a damaged block raises whatever it meets
+        return 1
+    return found if 1 <= found <= 8 else 1
+
+
+def _decoded(wanted: _Wanted) -> Image:
+    """The picture, upright, RGB; each side `step` times smaller, rounded up."""
+    from PIL.Image import Transpose
+
+    turns = {
+        2: [Transpose.FLIP_LEFT_RIGHT],
+        3: [Transpose.ROTATE_180],
+        4: [Transpose.FLIP_TOP_BOTTOM],
+        5: [Transpose.TRANSPOSE],
+        6: [Transpose.ROTATE_270],
+        7: [Transpose.TRANSVERSE],
+        8: [Transpose.ROTATE_90],
+    }
+    with _opened(wanted.path) as picture:
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                orientation, width = _orientation(picture), picture.width
+                picture.draft(None, (picture.width // wanted.step, picture.height // wanted.step))
+                plain = _opaque(picture, wanted.under)
+        except MemoryError:
+            raise
+        except Exception as error:  # decoders raise whatever their format's parser does
+            _refuse(wanted.path, str(error))
+    left = wanted.step * plain.width // width
+    upright = plain.reduce(left) if left > 1 else plain
+    for turn in turns.get(orientation, ()):
+        upright = upright.transpose(turn)
+    return upright
+
+
+def _opaque(picture: Image, under: Rgb) -> Image:
+    """The picture as RGB, over a colour where it is clear; 16-bit greys keep their upper byte, floats are 0 to 1."""
+    from PIL import Image
+
+    if picture.mode.startswith("I"):
+        grey = np.clip(np.asarray(picture).astype(np.int64) >> 8, 0, 255)
+        return Image.fromarray(grey.astype(np.uint8)).convert("RGB")
+    if picture.mode == "F":
+        grey = np.clip(np.nan_to_num(np.asarray(picture)), 0, 1) * 255
+        return Image.fromarray(np.round(grey).astype(np.uint8)).convert("RGB")
+    if not picture.has_transparency_data:
+        return picture.convert("RGB")
+    clear = picture.convert("RGBA")
+    plain = Image.new("RGB", clear.size, under)
+    plain.paste(clear, mask=clear)
+    return plain
+
+
+def _blurred(pixels: Float32, sigma: float) -> Float32:
+    """A picture (H, W, 3) under a Gaussian of `sigma` pixels, mirrored at its borders: no light is lost."""
+    from PIL import Image
+
+    height, width = pixels.shape[:2]
+    factor = max(1.0, min(sigma / COARSE, min(height, width) / SMALLEST))
+    if factor == 1:
+        return _convolved(_convolved(pixels, sigma**2, 0), sigma**2, 1)
+    small = max(1, round(width / factor)), max(1, round(height / factor))
+    coarse = np.stack([_scaled(pixels[..., c], small, Image.Resampling.BILINEAR) for c in range(3)], axis=-1)
+    for axis in (0, 1):
+        cell = pixels.shape[axis] / coarse.shape[axis]
+        coarse = _convolved(coarse, (sigma / cell) ** 2 - 1 / 6, axis)  # less what reducing it has spread
+    fine = [_scaled(coarse[..., c], (width, height), Image.Resampling.BICUBIC) for c in range(3)]
+    return np.clip(np.stack(fine, axis=-1), 0, 1)
+
+
+def _scaled(plane: Float32, size: tuple[int, int], filter: int) -> Float32:
+    from PIL import Image
+
+    return np.asarray(Image.fromarray(np.ascontiguousarray(plane)).resize(size, Image.Resampling(filter)))
+
+
+def _convolved(pixels: Float32, variance: float, axis: int) -> Float32:
+    """Along one axis, with a Gaussian of this variance."""
+    from viewsphere.imaging.spread import gaussian, spread
+
+    if variance < 1 / 12:
+        return pixels
+    profile = gaussian(math.sqrt(variance - 1 / 12))  # a pixel's own is 1/12
+    reach = len(profile) // 2
+    padded = np.pad(pixels, [(reach, reach) if a == axis else (0, 0) for a in range(3)], mode="symmetric")
+    inside = slice(reach, -reach)
+    if axis == 0:
+        return spread(padded, profile[:, None])[inside]
+    return spread(padded, profile[None, :])[:, inside]
+
+
+def _refuse(path: str, problem: str) -> NoReturn:
+    problem = " ".join(problem.split())[:120]
+    raise UserError(f"background image {path}: expected a readable image, found {problem}: mend or remove it") from None
+
+
+def _too_large(path: str, found: str) -> NoReturn:
+    raise UserError(f"background image {path}: expected at most {MOST_PIXELS:,} pixels, found {found}: make it smaller")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
+from typing import Literal
 
 from pydantic import JsonValue
 
@@ -13,27 +14,33 @@ from viewsphere.model.mistakes import one_of
 
 @dataclass(frozen=True)
 class Options:
-    """antialias: samples in an edge pixel, 1 or 4; exposure: stops; shadow_resolution: width of the shadow map in cells."""
+    """antialias: samples in an edge pixel, 1 or 4; shadow_resolution: width of the shadow maps in texels;
+    ambient_occlusion: off, fast or fine.
+    """
 
     antialias: int = 4
-    exposure: float = 0.0
     shadow_resolution: int = 2048
+    ambient_occlusion: Literal["off", "fast", "fine"] = "fast"
 
 
 def parse_options(given: Mapping[str, JsonValue]) -> Options:
     """Checked options. Raises UserError for an unknown name (with the nearest) or a value out of range."""
     known = [f.name for f in fields(Options)]
     for name in given:
+        if name == "exposure":
+            raise UserError("raster engine: exposure: expected it as scene.view.exposure, found it among the engine's options")
         if name not in known:
             raise UserError(f"raster engine: options: {one_of(name, known)}")
     default = Options()
     antialias = given.get("antialias", default.antialias)
     if isinstance(antialias, bool) or antialias not in (1, 4):
         raise UserError(f"raster engine: antialias: expected 1 or 4, found {antialias!r}")
-    exposure = given.get("exposure", default.exposure)
-    if isinstance(exposure, bool) or not isinstance(exposure, int | float) or not -16 <= exposure <= 16:
-        raise UserError(f"raster engine: exposure: expected stops from -16 to 16, found {exposure!r}")
     resolution = given.get("shadow_resolution", default.shadow_resolution)
     if isinstance(resolution, bool) or not isinstance(resolution, int) or not 64 <= resolution <= 8192:
         raise UserError(f"raster engine: shadow_resolution: expected an integer in 64..8192, found {resolution!r}")
-    return Options(4 if antialias == 4 else 1, float(exposure), resolution - resolution % 16)
+    occlusion = given.get("ambient_occlusion", default.ambient_occlusion)
+    if occlusion is False:  # YAML's off
+        occlusion = "off"
+    if occlusion not in ("off", "fast", "fine"):
+        raise UserError(f"raster engine: ambient_occlusion: expected off, fast or fine, found {occlusion!r}")
+    return Options(4 if antialias == 4 else 1, resolution - resolution % 16, occlusion)

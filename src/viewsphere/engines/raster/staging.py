@@ -4,28 +4,31 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.assets.mesh import Mesh
-from viewsphere.engines.raster import kernels_edge, kernels_shade
-from viewsphere.engines.raster.background import plain_background
-from viewsphere.engines.raster.light import Extent, bake_light
+from viewsphere.assets.srgb import linear
+from viewsphere.engines.raster import kernels_paint
+from viewsphere.engines.raster.background import display_background
+from viewsphere.engines.raster.environment import bake_surrounding, sky_lights
+from viewsphere.engines.raster.ground import ground_albedo, ground_frame, ground_material
+from viewsphere.engines.raster.kernels_material import L_BLENDED, L_METAL, L_METAL_TEXEL, L_TRANSMISSION
+from viewsphere.engines.raster.lights import Casters, Extent, bake_lights, even_light
+from viewsphere.engines.raster.occlusion import bake_occlusion, with_ground_light
 from viewsphere.engines.raster.options import Options, parse_options
-from viewsphere.engines.raster.records import Float32, Int32, Light, Surfaces, Textures, View
-from viewsphere.engines.raster.surface import BLENDED, TRANSMISSION, pack_surfaces
-from viewsphere.engines.raster.tone import EXPOSURE, KNEE, srgb_bytes
-from viewsphere.geometry.camera import inverse_camera_matrix, pixel_rays
-from viewsphere.model.camera import Camera, Intrinsics
-from viewsphere.model.scene import Background, Scene
+from viewsphere.engines.raster.painting import Baked, paint
+from viewsphere.engines.raster.records import Float32
+from viewsphere.engines.raster.surface import pack_surfaces
+from viewsphere.imaging.finish import finished
+from viewsphere.imaging.seen import Seen
+from viewsphere.model.camera import Camera
+from viewsphere.model.scene import Ground, Scene
 from viewsphere.model.shot import Frame, ModelSpec, Placement, Shot
 from viewsphere.truth.geometry import Geometry, build_geometry
-from viewsphere.truth.visibility import Visibility, rasterize
-
-_KNEE = np.float32(KNEE)
-_NO_INDEX = np.zeros(0, np.int32)
+from viewsphere.truth.visibility import Visibility
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,95 +38,38 @@ class RasterStage:
     geometry: Geometry
     scene: Scene
     options: Options
-    origin: NDArray[np.float64]
-    unit: float
-    surfaces: Surfaces
-    textures: Textures
-    light: Light
-    owner: Int32
-    seen: NDArray[np.bool_]
-    see_through: NDArray[np.bool_]
-    _backgrounds: dict[tuple[Background, int, int], Float32 | None] = field(default_factory=dict)
-    _rays: dict[tuple[Intrinsics, int], Float32] = field(default_factory=dict)
+    baked: Baked
+    middle: NDArray[np.float64]
+    _canvases: dict[int, Float32] = field(default_factory=dict[int, Float32])
 
     def color(self, camera: Camera, frame: Frame, visibility: Visibility) -> NDArray[np.uint8]:
-        """The picture, (H, W, 3) uint8 sRGB; `visibility` is truth's buffer for this camera.
+        """The picture, (H, W, 3) uint8 sRGB, or (H, W, 4) with straight alpha where the background is transparent.
 
-        Edge pixels are the mean of their four quarters in linear light. Raises UserError for an unreadable
-        background image.
+        `visibility` is truth's buffer for this camera. Raises UserError for an unreadable background image.
         """
-        background = self._background(camera, (frame.finish or self.scene.finish).background)
-        color = background.copy()
-        triangle, depth = visibility.triangle.reshape(-1), visibility.inverse_depth.reshape(-1)
-        self._paint(camera, 1, _NO_INDEX, triangle, depth, color)
-        if self.options.antialias == 4:
-            self._smooth_edges(camera, visibility, background, color)
-        shape = camera.height, camera.width, 3
-        return kernels_edge.encode(color, srgb_bytes()).reshape(shape)
+        finish = frame.finish or self.scene.finish
+        background = display_background(finish.background, camera.width, camera.height)
+        has_sky = background is None and not finish.background.transparent
+        radiance = self._canvas(camera.width * camera.height)
+        paint(self.baked, camera, visibility, self.options.antialias == 4, has_sky, radiance)
+        shape = camera.height, camera.width, 4
+        return finished(radiance.reshape(shape), background, finish, lambda: self._seen(camera, frame, visibility))
 
-    def _background(self, camera: Camera, background: Background) -> Float32:
-        """Display-linear colours behind everything, (H * W, 3)."""
-        key = (background, camera.width, camera.height)
-        if key not in self._backgrounds:
-            self._backgrounds.clear()
-            self._backgrounds[key] = plain_background(*key)
-        plain = self._backgrounds[key]
-        if plain is not None:
-            return plain
-        view = self._view(camera, 1)
-        return kernels_edge.sky_picture(view, self.light, _KNEE, camera.width * camera.height)
+    def _canvas(self, pixels: int) -> Float32:
+        """Room for the light of a picture, the same one every time: fresh memory costs as much as the sky."""
+        if pixels not in self._canvases:
+            self._canvases.clear()
+            self._canvases[pixels] = np.empty((pixels, 4), np.float32)
+        return self._canvases[pixels]
 
-    def _smooth_edges(self, camera: Camera, visibility: Visibility, background: Float32, color: Float32) -> None:
-        fine = rasterize(self.geometry, camera, subdivision=2)
-        pixels = kernels_edge.edge_pixels(
-            visibility.triangle, visibility.inverse_depth, fine.triangle, fine.inverse_depth,
-            self.owner, self.geometry.triangle_normals,
-        )  # fmt: skip
-        where, triangle, depth, samples = kernels_edge.quarters(
-            pixels, camera.width, fine.triangle, fine.inverse_depth, background
-        )
-        self._paint(camera, 2, where, triangle, depth, samples)
-        kernels_edge.average_quarters(pixels, samples, color)
-
-    def _paint(self, camera: Camera, subdivision: int, where: Int32, triangle: Int32, depth: Float32, color: Float32) -> None:
-        """Shade samples over `color`; see-through surfaces over the nearest solid one behind them."""
-        view = self._view(camera, subdivision)
-        front = kernels_edge.seen_samples(triangle, self.see_through)
-        if len(front):
-            solid = rasterize(self._solid(), camera, subdivision)
-            indices = where[front] if len(where) else front
-            behind, behind_depth = np.full_like(triangle, -1), np.zeros_like(depth)
-            behind[front] = solid.triangle.reshape(-1)[indices]
-            behind_depth[front] = solid.inverse_depth.reshape(-1)[indices]
-            self._shade(view, where, behind, behind_depth, color)
-        self._shade(view, where, triangle, depth, color)
-
-    def _shade(self, view: View, where: Int32, triangle: Int32, depth: Float32, color: Float32) -> None:
-        slots = kernels_edge.seen_samples(triangle, self.seen)
-        kernels_shade.shade(view, self.surfaces, self.textures, self.light, _KNEE, slots, where, triangle, depth, color)
-
-    def _solid(self) -> Geometry:
-        """The geometry without its see-through surfaces."""
-        hidden = np.where(self.see_through[:-1], np.int32(-2), self.geometry.triangle_cutout)
-        return replace(self.geometry, triangle_cutout=hidden.astype(np.int32))
-
-    def _view(self, camera: Camera, subdivision: int) -> View:
-        lens = inverse_camera_matrix(camera.intrinsics)[:2] / [subdivision, subdivision, 1.0]
-        rays = np.zeros((0, 3), np.float32)
-        if camera.distortion is not None:
-            key = camera.intrinsics, subdivision
-            if key not in self._rays:
-                table = pixel_rays(camera.intrinsics, subdivision)
-                self._rays[key] = table.astype(np.float32).reshape(-1, 3)
-            rays = self._rays[key]
-        return View(
-            ((camera.center - self.origin) / self.unit).astype(np.float32),
-            camera.R.astype(np.float32),
-            lens.astype(np.float32),
-            rays,
-            np.uint32(camera.width * subdivision),
-            np.float32(1 / np.sqrt(camera.intrinsics.fx * camera.intrinsics.fy)),
-            np.float32(1 / self.unit),
+    def _seen(self, camera: Camera, frame: Frame, visibility: Visibility) -> Seen:
+        is_target = np.append(self.geometry.triangle_object > 0, False)
+        target = self.middle if frame.pose.target is None else np.array(frame.pose.target)
+        return Seen(
+            visibility.inverse_depth,
+            is_target[visibility.triangle],
+            camera.intrinsics,
+            float(camera.R[2] @ (target - camera.center)),
         )
 
 
@@ -131,44 +77,93 @@ def build_stage(shot: Shot, load: Callable[[ModelSpec], Mesh]) -> RasterStage:
     """Build everything that the shot's frames share."""
     options = parse_options(shot.engine_options)
     loaded: dict[ModelSpec, Mesh] = {}
-    meshes: list[Mesh] = []
     for placement in shot.placements:
         if placement.model not in loaded:
             loaded[placement.model] = load(placement.model)
-        meshes.append(loaded[placement.model])
+    meshes = [loaded[placement.model] for placement in shot.placements]
     scene = shot.scene
     geometry = build_geometry(shot.placements, meshes, scene.ground is not None, shot.label_alpha)
     targets = sum(not p.scenery for p in shot.placements)
-    return _baked(geometry, meshes, shot.placements[targets:], scene, options)
+    low, high = _bounds(geometry, geometry.triangle_start[1] if len(geometry.triangle_start) > 1 else 0)
+    return RasterStage(
+        geometry, scene, options, _baked(geometry, meshes, shot.placements, targets, scene, options), (low + high) / 2
+    )
 
 
 def _baked(
-    geometry: Geometry, meshes: Sequence[Mesh], scenery: tuple[Placement, ...], scene: Scene, options: Options
-) -> RasterStage:
+    geometry: Geometry,
+    meshes: Sequence[Mesh],
+    placements: Sequence[Placement],
+    targets: int,
+    scene: Scene,
+    options: Options,
+) -> Baked:
     """Lengths are in units of all there is; where there is scenery, from the world's origin, so that they stay the same when
     the targets change.
     """
-    targets = len(meshes) - len(scenery)
+    scenery = tuple(placements[targets:])
     low, high = _bounds(geometry, geometry.triangle_start[-1])
     origin, unit = (low + high) / 2, float(np.linalg.norm(high - low)) / 2 or 1.0
-    exposure = EXPOSURE * 2.0**options.exposure
     ground_z = geometry.ground_z
     if scenery:
         origin, unit = np.zeros(3), 2.0 ** math.ceil(math.log2(unit))
-    surfaces, textures = pack_surfaces(geometry, meshes, scene.ground, origin, unit, exposure, targets)
+    surfaces, textures = pack_surfaces(geometry, meshes, scene.ground, origin, unit, targets, placements)
     reach = float(np.abs(np.stack([low, high]) - origin).max()) / unit
     if scenery:
         low, high = _bounds(geometry, geometry.triangle_start[targets])
         ground_z = float(low[2])
-    floor = None if ground_z is None else (ground_z - float(origin[2])) / unit
-    extent = Extent((low - origin) / unit, (high - origin) / unit, floor, geometry.triangle_start[targets], reach)
-    known = (scenery, tuple(meshes[targets:]), unit) if scenery else None
-    light = bake_light(scene, extent, surfaces, textures, exposure, options.shadow_resolution, known)
-    own = surfaces.materials[surfaces.material]
-    see_through = np.append((own[:, BLENDED] > 0) | (own[:, TRANSMISSION] > 0), False)
-    seen = np.append(np.ones(len(own), np.bool_), False)
-    owner = (geometry.triangle_object * len(surfaces.materials) + surfaces.material).astype(np.int32)
-    return RasterStage(geometry, scene, options, origin, unit, surfaces, textures, light, owner, seen, see_through)
+    floor_z = None if ground_z is None else (ground_z - float(origin[2])) / unit
+    has_ground = scene.ground is not None
+    extent = Extent((low - origin) / unit, (high - origin) / unit, floor_z, geometry.triangle_start[targets], reach)
+    casters = Casters(
+        surfaces,
+        textures,
+        extent,
+        (scenery, tuple(meshes[targets:]), unit) if scenery else None,
+        (tuple(placements[:targets]), tuple(meshes[:targets]), has_ground, unit),
+    )
+    distant = sky_lights(scene.sky, scene.sun, has_ground)
+    lights = bake_lights(distant, scene.lights, casters, unit, has_ground, options.shadow_resolution)
+    floor, albedo = _floor(scene.ground, origin, unit, len(surfaces.looks) - 1)
+    surrounding = bake_surrounding(scene.sky, scene.sun, albedo, distant, even_light(scene.lights))
+    occlusion = bake_occlusion(casters, has_ground, options.ambient_occlusion)
+    see_through = np.append(_is_see_through(surfaces.looks)[surfaces.material], False)
+    kind = np.where(see_through[:-1], kernels_paint.SEE_THROUGH, kernels_paint.SOLID).astype(np.uint8)
+    kind[geometry.triangle_start[-1] :] = kernels_paint.FLOOR
+    return Baked(
+        geometry=geometry,
+        origin=origin,
+        unit=unit,
+        surfaces=surfaces,
+        textures=textures,
+        floor=floor,
+        surrounding=surrounding,
+        lights=lights,
+        occlusion=with_ground_light(occlusion, lights, math.pi * float(surrounding.up.sum())),
+        kind=np.append(kind, np.uint8(kernels_paint.NOTHING)),
+        owner=(geometry.triangle_object * len(surfaces.looks) + surfaces.material).astype(np.int32),
+        see_through=see_through,
+    )
+
+
+def _is_see_through(looks: Float32) -> NDArray[np.bool_]:
+    """Of each material: whether anything behind it shows."""
+    metal = looks[:, L_METAL] + looks[:, L_METAL_TEXEL]
+    return (looks[:, L_BLENDED] > 0) | (looks[:, L_TRANSMISSION] * (1 - metal) > 0)
+
+
+def _floor(
+    ground: Ground | None, origin: NDArray[np.float64], unit: float, material: int
+) -> tuple[Float32, NDArray[np.float64] | None]:
+    """`Baked.floor`, and the ground's mean colour; zeros and None where there is none."""
+    if ground is None:
+        return np.zeros(8, np.float32), None
+    made, images = ground_material(ground)
+    only_scatters = ground.roughness == 1 and ground.metallic == 0 and not images
+    how = 2.0 if ground.catcher else float(only_scatters)
+    color = linear(ground.color).tolist()
+    frame = ground_frame(ground, made, origin, unit)
+    return np.array([*frame, material, how, *color], np.float32), ground_albedo(made, images)
 
 
 def _bounds(geometry: Geometry, triangles: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

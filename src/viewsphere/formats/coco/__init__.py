@@ -25,6 +25,7 @@ from viewsphere.errors import UserError
 from viewsphere.formats.coco.reading import read as read
 from viewsphere.geometry.image_files import encode_png
 from viewsphere.geometry.mask import mask_polygons
+from viewsphere.model.channel import missing
 from viewsphere.model.paper_json import faces, json_bytes, transformation_matrix, vehicles
 from viewsphere.model.sample import Box, ObjectAnnotation, Sample
 
@@ -92,9 +93,9 @@ def _plain(name: str) -> str:
 def export(dataset: Dataset, folder: Path) -> None:
     """Write the finished frames: instances JSON of each split, images, masks and models.
 
-    Raises UserError if the data set has no `rgb` channel.
+    Raises UserError if the data set has no picture: channel `rgb`, or else `rgba`.
     """
-    if not set(CHANNELS) <= set(dataset.plan.channels):
+    if missing(CHANNELS, dataset.plan.channels):
         raise UserError(f"{dataset.root}: format coco: expected channel rgb, found none: add it to the recipe's channels")
     write_annotations(dataset, folder, pictures=True)
     dataset.link_models(folder / "MODELS")
@@ -102,7 +103,7 @@ def export(dataset: Dataset, folder: Path) -> None:
 
 def image_file(dataset: Dataset, sample: Sample) -> str:
     """Name of a frame's image in its split's folder."""
-    return f"{_stem(dataset, sample)}{Path(sample.files.get('rgb', '.png')).suffix}"
+    return f"{_stem(dataset, sample)}{Path(sample.picture_file or '.png').suffix}"
 
 
 def mask_file(dataset: Dataset, sample: Sample, annotation: ObjectAnnotation) -> str:
@@ -137,8 +138,8 @@ def write_annotations(dataset: Dataset, folder: Path, *, pictures: bool = False)
                 if o.area or (o.source is not None and o.box2d is not None)
             ]
             files[sample.split].add(_image(dataset, sample), annotations)
-            if pictures and "rgb" in sample.files:
-                dataset.link(sample.files["rgb"], folder / sample.split / image_file(dataset, sample))
+            if pictures and sample.picture_file is not None:
+                dataset.link(sample.picture_file, folder / sample.split / image_file(dataset, sample))
                 for o in sample.objects:
                     if o.source is None and o.area:
                         _write_mask(folder / sample.split / mask_file(dataset, sample, o), masks[o.id])

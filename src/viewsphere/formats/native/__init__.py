@@ -20,6 +20,7 @@ from typing import IO, TYPE_CHECKING, Any
 
 from viewsphere.formats.native.reading import read as read
 from viewsphere.geometry.image_files import encode_png
+from viewsphere.model.channel import picture_of
 from viewsphere.model.paper_json import faces, json_bytes, transformation_matrix, vehicles
 from viewsphere.model.sample import ObjectAnnotation, Sample
 
@@ -80,7 +81,7 @@ def _write_frame(dataset: Dataset, sample: Sample, folder: Path, entries: IO[byt
         start = entries.tell()
         entries.write(json_bytes(name) + b":" + json_bytes(_rendered(sample, o, f"{stem}.png", files)))
         places.append((sample.pose.index, head, start, entries.tell()))
-    for channel, kind in (("rgb", "RGB"), ("depth", "DEPTH")):
+    for channel, kind in ((picture_of(files), "RGB"), ("depth", "DEPTH")):
         if channel in files:
             dataset.link(sample.files[channel], pose_folder / kind / files[channel])
     return places
@@ -123,7 +124,7 @@ def _rendered(sample: Sample, o: ObjectAnnotation, mask: str, files: Mapping[str
     """An object's entry; all objects of a frame share the files of its first one, but for the mask."""
     lens = sample.camera.distortion
     return {
-        "path_rgb": files.get("rgb"),
+        "path_rgb": files.get(picture_of(files) or ""),
         "path_mask": mask,
         "path_depth": files.get("depth"),
         "render_resolution": [sample.camera.width, sample.camera.height],

@@ -14,14 +14,14 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.errors import StoreError
+from viewsphere.errors import StoreError, UserError
 from viewsphere.geometry.box import box_size
-from viewsphere.geometry.image_files import decode_tiff
 from viewsphere.geometry.mask import mask_box, mask_polygons
 from viewsphere.model.camera import Camera, Distortion, Intrinsics
+from viewsphere.model.channel import CHANNELS
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.model.shot import Pose
-from viewsphere.store import Category, ModelInfo
+from viewsphere.store import Category, ModelInfo, decode
 from viewsphere.store.foreign import ForeignDataset, ForeignFrame, ForeignModel, foreign_object, refuse_broken
 
 RIGHT_ANGLES = 1e-3
@@ -210,12 +210,12 @@ def _picture(root: Path, file: Path, camera: Camera) -> Path:
 
 
 def _is_depth(file: Path, camera: Camera) -> bool:
-    """Whether this is depth as this package keeps it: float32, metres along z."""
+    """Whether this is depth as this package keeps it: metres along z, of whatever kind of file."""
     try:
-        array = decode_tiff(file.read_bytes())
-    except (OSError, ValueError):
+        array = decode(CHANNELS["depth"], file)
+    except UserError:
         return False
-    return array.dtype == np.float32 and array.shape == (camera.height, camera.width)
+    return array.shape == (camera.height, camera.width)
 
 
 def _camera(matrix: Mapping[str, Any], resolution: list[int], distortion: dict[str, Any] | None) -> Camera:

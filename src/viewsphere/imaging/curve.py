@@ -1,9 +1,4 @@
-"""Colour: the sRGB curve both ways, exposure and the highlight roll-off.
-
-Display-linear values lie in [0, 1] and go through the sRGB curve (IEC 61966-2-1) alone. Light becomes
-display-linear by `EXPOSURE` and, above `KNEE`, the roll-off k + (1 - k) y / (1 + y), y = (x - k) / (1 - k): smooth,
-never clipped.
-"""
+"""Tables of the sRGB curve (IEC 61966-2-1) between bytes and display-linear values in [0, 1]."""
 
 from __future__ import annotations
 
@@ -13,12 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.assets.srgb import encoded, linear
-
-EXPOSURE = 0.7
-"""Display value of unit radiance: level ground in the default sun and sky shows its own colour."""
-
-KNEE = 0.6
-"""Display values below are shown as they are."""
 
 
 @cache
@@ -31,3 +20,9 @@ def srgb_bytes() -> NDArray[np.uint8]:
 def linear_words() -> NDArray[np.uint16]:
     """Linear values, scaled to 65,535, of the 256 sRGB bytes."""
     return np.round(linear(np.arange(256) / 255) * 65535).astype(np.uint16)
+
+
+def display_linear(pixels: NDArray[np.uint8]) -> NDArray[np.float32]:
+    """Display-linear values of sRGB bytes, the same shape; the curve's table gives exactly these bytes back."""
+    table = linear_words().astype(np.float32) / np.float32(65535)
+    return table[pixels]

@@ -1,0 +1,110 @@
+"""The ground's material: its pictures repeat over the world, u along x and v against y, so that they lie as on a map.
+
+They need no rule for what is far away: a pixel there covers many repeats, and the last mip level, one texel, is their mean.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from viewsphere.assets.folder import UnreadableError, decode_image
+from viewsphere.assets.mesh import Image, Material, Texture
+from viewsphere.assets.srgb import linear
+from viewsphere.errors import UserError
+from viewsphere.model.scene import Ground
+
+SHARPEST = 4096
+"""Longest side, in texels, of what is kept of a picture."""
+
+IMAGES = ("image", "roughness_image", "normal_image")
+"""Fields of `Ground` that name pictures."""
+
+
+def ground_material(ground: Ground) -> tuple[Material, tuple[Image, ...]]:
+    """The ground as a glTF material and the images it names; equal grounds give the same objects while files do not change.
+
+    Textures are used with (x, -y) / tile of the world; a picture that is not square keeps the proportions of the first one
+    named. Where `image` is clear the ground's colour alone is seen; of `roughness_image` green counts, as in glTF. Raises
+    UserError, naming the field, for a picture that cannot be read.
+    """
+    return _material(ground.model_dump_json(), tuple(_stamp(ground, name) for name in IMAGES))
+
+
+def ground_frame(ground: Ground, material: Material, origin: ArrayLike, unit: float) -> tuple[float, float, float]:
+    """(per_length, u0, v0) with which a point (x, y) in units from `origin`, world metres, has the texture coordinates
+    u = u0 + per_length x, v = v0 - per_length y.
+
+    u0 and v0 are less than one repeat: far from the world's origin single precision would lose the texels.
+    """
+    x, y, _ = np.asarray(origin, np.float64)
+    used = material.base_color_texture or material.normal_texture or material.metallic_roughness_texture
+    _, down = used.scale if used else (1.0, 1.0)
+    return unit / ground.tile, math.fmod(x / ground.tile, 1.0), math.fmod(-y / ground.tile, 1.0 / down)
+
+
+def ground_albedo(material: Material, images: tuple[Image, ...]) -> NDArray[np.float64]:
+    """Mean linear colour (3,): what the ground throws back of the light."""
+    color = np.array(material.base_color[:3])
+    if material.base_color_texture is None:
+        return color
+    pixels = images[material.base_color_texture.image].pixels
+    table = linear(np.arange(256) / 255)
+    means = [table @ np.bincount(pixels[..., c].reshape(-1), minlength=256) for c in range(3)]
+    return color * np.array(means) / pixels[..., 0].size
+
+
+@lru_cache(maxsize=2)
+def _material(described: str, stamps: tuple[int, ...]) -> tuple[Material, tuple[Image, ...]]:
+    ground = Ground.model_validate_json(described)
+    images = [_image(name, path) for name in IMAGES if (path := getattr(ground, name))]
+    uses: dict[str, Texture] = {}
+    for i, image in enumerate(images):
+        height, width = images[0].pixels.shape[:2]
+        uses[image.name] = Texture(i, scale=(1.0, width / height))
+    r, g, b = linear(ground.color).tolist()
+    material = Material(
+        name="ground",
+        base_color=(r, g, b, 1.0),
+        base_color_texture=uses.get("image"),
+        metallic=ground.metallic,
+        roughness=ground.roughness,
+        metallic_roughness_texture=uses.get("roughness_image"),
+        normal_texture=uses.get("normal_image"),
+    )
+    return material, tuple(images)
+
+
+def _image(name: str, path: str) -> Image:
+    """A picture as glTF wants it for this use, opaque, at most `SHARPEST` texels a side."""
+    from PIL import Image as Pillow
+
+    try:
+        pixels = decode_image(Path(path).read_bytes(), f"scene.ground.{name}: {path}")
+    except UnreadableError as error:
+        raise UserError(f"{error}: mend or replace it") from None
+    except OSError as error:
+        raise UserError(f"scene.ground.{name}: expected a readable image, found {error.strerror}: {path}") from None
+    factor = -(-max(pixels.shape[:2]) // SHARPEST)
+    if factor > 1:
+        pixels = np.array(Pillow.fromarray(pixels).reduce(factor))
+    if name == "image" and pixels[..., 3].min() < 255:
+        alpha = pixels[..., 3:].astype(np.uint16)
+        pixels[..., :3] = (pixels[..., :3] * alpha + 255 * (255 - alpha) + 127) // 255
+    if name == "roughness_image":
+        pixels[..., 2] = 255
+    pixels[..., 3] = 255
+    return Image(name, pixels)
+
+
+def _stamp(ground: Ground, name: str) -> int:
+    """Changes with the file that a field names."""
+    path = getattr(ground, name)
+    try:
+        return Path(path).stat().st_mtime_ns if path else 0
+    except OSError as error:
+        raise UserError(f"scene.ground.{name}: expected an image file, found {error.strerror}: {path}") from None

@@ -1,0 +1,260 @@
+"""Samples of edge pixels through a pinhole, for colour: only triangles that can matter are drawn, at few pixels.
+
+A pixel is numbered (`grid`, -1 elsewhere) if its centre looks different from a neighbour's, or, while drawing, if a surface
+comes between the centres before what they show (a thin wire). A triangle can matter if it is seen around such a pixel, or has a
+corner there that is not hidden, or one anywhere that is before what is shown.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numba as nb
+import numpy as np
+
+from viewsphere.geometry.jit import njit
+from viewsphere.truth.kernels import EPSILON, NEVER, crossing_at, edge, hits_surface, negated, plane
+
+f4 = nb.float32
+U = nb.uintp
+SLACK = f4(0.01)  # relative difference of 1/z that still passes for the same surface
+NARROW = 8  # pixels: the size up to which every pixel of a box is looked at
+THIN = 2.0  # pixels: a triangle as wide as this is seen at some centre
+
+
+@njit
+def begin(marks, triangle, depth, wanted):
+    """Number the marked pixels, and mark in `wanted` (T,) the triangles that the centres around them show.
+
+    marks is flat and padded to whole words. Returns grid (H, W); limit (H, W): what a surface must be before to matter to a
+    pixel, as 1/z; pixels with room for those found later; starts (H + 1,), each row's first number; bound (K,): 1/z of the
+    farthest surface that may show at each, 0 where nothing may; nearest (n, 4) float32 1/z and seen (n, 4), -1 where nothing is
+    drawn yet, for each number.
+    """
+    height, width = triangle.shape
+    words = marks.view(np.uint64)
+    total = 0
+    for i in range(marks.shape[0]):
+        total += marks[i]
+    room = total + height * width // 8
+    pixels, starts = np.empty(room, np.int32), np.zeros(height + 1, np.int32)
+    k = 0
+    for w in range(words.shape[0]):
+        if words[w] != 0:
+            for p in range(8 * w, 8 * w + 8):
+                if marks[p]:
+                    pixels[k] = p
+                    starts[p // width + 1] = k + 1
+                    k += 1
+    for y in range(height):
+        starts[y + 1] = max(starts[y + 1], starts[y])
+    grid, limit = np.empty((height, width), np.int32), np.empty((height, width), np.float32)
+    for y in range(U(height)):
+        for x in range(U(width)):
+            grid[y, x] = np.int32(-1)
+            limit[y, x] = depth[y, x] * (f4(1) + SLACK)
+    bound, nearest, seen = np.empty(total, np.float32), np.empty((room, 4), np.float32), np.empty((room, 4), np.int32)
+    for k in range(U(total)):
+        y, x = pixels[k] // width, pixels[k] % width
+        least = depth[U(y), U(x)]
+        for j in range(U(max(y - 1, 0)), U(min(y + 2, height))):
+            for i in range(U(max(x - 1, 0)), U(min(x + 2, width))):
+                least = min(least, depth[j, i])
+                t = triangle[j, i]
+                if t >= 0:
+                    wanted[U(t)] = 1
+        least *= f4(1) - SLACK
+        grid[U(y), U(x)], limit[U(y), U(x)], bound[k] = k, least, least
+        for i in range(U(4)):
+            nearest[k, i], seen[k, i] = least, np.int32(-1)
+    return grid, limit, pixels, starts, bound, nearest, seen
+
+
+@njit
+def chosen(wanted):
+    """The wanted triangles' indices."""
+    order = np.empty(wanted.shape[0] + 1, np.int32)
+    n = U(0)
+    for t in range(U(wanted.shape[0])):
+        order[n] = t
+        n += U(wanted[t])
+    return order[:n]
+
+
+@njit
+def with_corners_in_reach(q, triangles, wanted, limit, pixels, count):
+    """The triangles but those wanted that have a vertex in some pixel, or beside a numbered one, before its limit."""
+    height, width = limit.shape
+    reach = limit.copy()
+    for k in range(count):
+        y, x = pixels[k] // width, pixels[k] % width
+        least = limit[U(y), U(x)]
+        for j in range(U(max(y - 1, 0)), U(min(y + 2, height))):
+            for i in range(U(max(x - 1, 0)), U(min(x + 2, width))):
+                reach[j, i] = min(reach[j, i], least)
+    near = np.zeros(q.shape[0], np.uint8)
+    a, b, c, d = U(0), U(1), U(2), U(3)
+    for i in range(U(q.shape[0])):
+        x, y = q[i, a] * q[i, d], q[i, b] * q[i, d]
+        if (q[i, c] > 0.0) & (x > -1.0) & (y > -1.0) & (x < width + 1.0) & (y < height + 1.0):
+            column, row = min(max(np.int64(x), 0), width - 1), min(max(np.int64(y), 0), height - 1)
+            near[i] = f4(q[i, d]) > reach[U(row), U(column)]
+    order = np.empty(triangles.shape[0] + 1, np.int32)
+    n = U(0)
+    for t in range(U(triangles.shape[0])):
+        order[n] = t
+        n += U(near[U(triangles[t, a])] | near[U(triangles[t, b])] | near[U(triangles[t, c])]) & U(wanted[t] ^ 1)
+    return order[:n]
+
+
+@njit
+def draw(order, q, triangles, cutout, cutouts, offsets, triangle, depth, grid, limit, pixels, starts, count, nearest, seen):
+    """Draw these triangles at the four samples (`offsets` (2, 4)) of the `count` numbered pixels; returns how many there are then.
+
+    See `begin` for the others; limit becomes 1/z of a numbered pixel's farthest sample.
+    """
+    height, width = triangle.shape
+    room = max(width, NARROW * NARROW) + 1
+    found, sx, sy = np.empty(room, np.uint32), np.empty(4 * room), np.empty(4 * room)
+    inside, inverse = np.empty(4 * room, np.uint8), np.empty(4 * room, np.float32)
+    words = inside.view(np.uint32)
+    a, b, c, d = U(0), U(1), U(2), U(3)
+    lowest, highest = offsets.min(), offsets.max()
+    for o in range(U(order.shape[0])):
+        t = U(order[o])
+        i0, i1, i2 = U(triangles[t, a]), U(triangles[t, b]), U(triangles[t, c])
+        q0, q1, q2 = (q[i0, a], q[i0, b], q[i0, c]), (q[i1, a], q[i1, b], q[i1, c]), (q[i2, a], q[i2, b], q[i2, c])
+        w0, w1, w2 = q[i0, d], q[i1, d], q[i2, d]
+        high, low = max(w0, w1, w2), min(w0, w1, w2)
+        before, crossing = f4(high), high == np.inf
+        xa, ya, xb, yb = 0, 0, width - 1, height - 1
+        if not crossing:
+            u0, u1, u2, v0, v1, v2 = q0[0] * w0, q1[0] * w1, q2[0] * w2, q0[1] * w0, q1[1] * w1, q2[1] * w2
+            xa = math.ceil(max(min(u0, u1, u2) - (highest + EPSILON), 0.0))
+            ya = math.ceil(max(min(v0, v1, v2) - (highest + EPSILON), 0.0))
+            xb = math.floor(min(max(u0, u1, u2) - (lowest - EPSILON), width - 1.0))
+            yb = math.floor(min(max(v0, v1, v2) - (lowest - EPSILON), height - 1.0))
+        elif q0[2] <= 0.0 and q1[2] <= 0.0 and q2[2] <= 0.0:
+            continue
+        if xa > xb or ya > yb or cutout[t] == NEVER:
+            continue
+        n, narrow = U(0), xb - xa < NARROW and yb - ya < NARROW
+        if narrow:
+            for y in range(U(ya), U(yb + 1)):
+                for x in range(U(xa), U(xb + 1)):
+                    found[n] = y << U(16) | x
+                    n += U(before > limit[y, x])
+            if n == 0:
+                continue
+        nx, ny, nz, det = plane(q0, q1, q2)
+        if det == 0.0:
+            continue
+        e0, e1, e2 = edge(q1, q2), edge(q2, q0), edge(q0, q1)
+        if det < 0.0:
+            e0, e1, e2 = negated(e0), negated(e1), negated(e2)
+        scale = 1.0 / det
+        nx, ny, nz = nx * scale, ny * scale, nz * scale
+        # twice the area in pixels over the longer side of the box is no less than the width
+        thin = not crossing and abs(det) * w0 * w1 * w2 < THIN * max(xb - xa, yb - ya)
+        for y in range(ya, ya + 1 if narrow else yb + 1):
+            if not narrow:
+                left, right = _span((e0, e1, e2), y, xa, xb, lowest, highest)
+                n, row = U(0), U(y)
+                if thin:
+                    for x in range(left, right + 1):
+                        found[n] = row << U(16) | U(x)
+                        n += U(before > limit[row, U(x)])
+                else:
+                    for k in range(U(starts[y]), U(starts[y + 1])):
+                        x = pixels[k] - y * width
+                        found[n] = row << U(16) | U(x)
+                        n += U((x >= left) & (x <= right))
+            for j in range(n):
+                x, v = float(found[j] & np.uint32(0xFFFF)), float(found[j] >> np.uint32(16))
+                for i in range(U(4)):
+                    sx[U(4) * j + i], sy[U(4) * j + i] = x + offsets[a, i], v + offsets[b, i]
+            for m in range(U(4) * n):
+                px, py = sx[m], sy[m]
+                f0, f1, f2 = e0[1] * py + e0[2], e1[1] * py + e1[2], e2[1] * py + e2[2]
+                inside[m] = (e0[0] * px + f0 >= 0.0) & (e1[0] * px + f1 >= 0.0) & (e2[0] * px + f2 >= 0.0)
+                inverse[m] = min(max(nx * px + (ny * py + nz), low), high)
+            if cutout[t] >= 0:
+                for m in range(U(4) * n):
+                    if inside[m]:
+                        px, py = sx[m], sy[m]
+                        f0, f1, f2 = e0[1] * py + e0[2], e1[1] * py + e1[2], e2[1] * py + e2[2]
+                        inside[m] = hits_surface(cutouts, cutout[t], e0[0] * px + f0, e1[0] * px + f1, e2[0] * px + f2)
+            for j in range(n):
+                if words[j] == 0:
+                    continue
+                row, column, m = U(found[j] >> np.uint32(16)), U(found[j] & np.uint32(0xFFFF)), U(4) * j
+                k = grid[row, column]
+                if k < 0:
+                    ahead = f4(0)
+                    for i in range(U(4)):
+                        ahead = max(ahead, inverse[m + i] if inside[m + i] else f4(0))
+                    if ahead <= limit[row, column] or count == pixels.shape[0]:
+                        continue
+                    k = np.int32(count)
+                    count += 1
+                    grid[row, column], pixels[k] = k, row * U(width) + column
+                    for i in range(U(4)):
+                        nearest[U(k), i], seen[U(k), i] = depth[row, column], triangle[row, column]
+                u = U(k)
+                for i in range(U(4)):
+                    old, new = nearest[u, i], inverse[m + i]
+                    better = (inside[m + i] != 0) & (new > old)
+                    nearest[u, i] = new if better else old
+                    seen[u, i] = np.int32(t) if better else seen[u, i]
+                limit[row, column] = min(nearest[u, a], nearest[u, b], nearest[u, c], nearest[u, d])
+    return count
+
+
+@njit
+def _span(edges, y, xa, xb, lowest, highest):
+    """First and last pixel of a row of which a sample may be covered."""
+    low, high = float(xa), float(xb)
+    for e in edges:
+        f = max(e[1] * (y + lowest), e[1] * (y + highest)) + e[2]
+        if e[0] > 0.0:
+            low = max(low, f * crossing_at(e[0], 1) - highest - EPSILON)
+        elif e[0] < 0.0:
+            high = min(high, f * crossing_at(e[0], 1) - lowest + EPSILON)
+        elif f < 0.0:
+            high = -1.0
+    return (0, -1) if low > high else (math.ceil(low), math.floor(high))
+
+
+@njit
+def finish(count, pixels, nearest, seen, bound, offsets, triangle, depth, owner, normals):
+    """Of the pixels whose samples do not all look like the centre: pixels, position, triangle, 1/z, as `samples.Samples`.
+
+    A sample at which nothing was drawn, though all centres around show something, shows what the centre does.
+    """
+    width = triangle.shape[1]
+    kept, position = np.empty(count, np.int32), np.empty((4 * count, 2), np.float32)
+    shown, inverses = np.empty(4 * count, np.int32), np.empty(4 * count, np.float32)
+    a, b, c = U(0), U(1), U(2)
+    n = U(0)
+    for k in range(U(count)):
+        p = pixels[k]
+        y, x = U(p // width), U(p % width)
+        centre, level = triangle[y, x], depth[y, x]
+        is_filled = k < U(bound.shape[0]) and bound[k] > f4(0)
+        differs = False
+        u = U(max(centre, np.int32(0)))
+        o, nx, ny, nz = owner[u] if centre >= 0 else np.int32(-1), normals[u, a], normals[u, b], normals[u, c]
+        for i in range(U(4)):
+            t, z, m = seen[k, i], nearest[k, i], U(4) * n + i
+            missing = (t < 0) & is_filled
+            t, z = centre if missing else t, level if missing else z
+            shown[m], inverses[m] = t, z
+            position[m, a], position[m, b] = float(x) + offsets[a, i], float(y) + offsets[b, i]
+            s = U(max(t, np.int32(0)))
+            bend = abs(nx * normals[s, a] + ny * normals[s, b] + nz * normals[s, c])
+            other = owner[s] if t >= 0 else np.int32(-1)
+            alike = (o == other) & (bend >= f4(0.94)) & (max(level, z) <= min(level, z) * f4(1.01))
+            differs |= (t != centre) & (not alike)
+        kept[n] = p
+        n += U(differs)
+    return kept[:n], position[: U(4) * n], shown[: U(4) * n], inverses[: U(4) * n]

@@ -1,0 +1,182 @@
+"""From samples to radiance: which samples show what, every visible sample shaded once, edge pixels averaged, the sky behind."""
+
+from __future__ import annotations
+
+import numba as nb
+import numpy as np
+
+from viewsphere.engines.raster.kernels_arrive import arrive
+from viewsphere.engines.raster.kernels_block import (
+    ALPHA,
+    AO,
+    BASE_B,
+    BASE_G,
+    BASE_R,
+    BLOCK,
+    BLUE,
+    DB,
+    DG,
+    DR,
+    FADE,
+    GREEN,
+    GROUND,
+    IB,
+    IG,
+    IR,
+    LX,
+    LY,
+    LZ,
+    NX,
+    NY,
+    NZ,
+    OPEN,
+    RED,
+    ROWS,
+    SHARE,
+)  # isort: skip  # fmt: skip
+from viewsphere.engines.raster.kernels_gather import gather, gather_ground, locate
+from viewsphere.engines.raster.kernels_light import (
+    add_light,
+    add_light_matte,
+    ambient,
+    ambient_matte,
+    compose,
+    weigh,
+)
+from viewsphere.engines.raster.kernels_material import material
+from viewsphere.engines.raster.kernels_occlusion import occlude
+from viewsphere.engines.raster.kernels_texture import FAST
+from viewsphere.geometry.jit import njit
+
+f4 = nb.float32
+U = nb.uintp
+NOTHING, SOLID, SEE_THROUGH, FLOOR = range(4)
+
+
+@njit
+def sorted_samples(triangle, kind):
+    """Indices (int32) of the samples that show solid surfaces, see-through ones and the ground.
+
+    kind (T + 1,) uint8: of each triangle; the last of triangle -1, NOTHING.
+    """
+    counts = np.zeros(4, np.int64)
+    for i in range(triangle.shape[0]):
+        counts[U(kind[triangle[i]])] += 1
+    solid, clear, ground = np.empty(counts[1], np.int32), np.empty(counts[2], np.int32), np.empty(counts[3], np.int32)
+    a, b, c = U(0), U(0), U(0)
+    for i in range(triangle.shape[0]):
+        k = kind[triangle[i]]
+        if k == SOLID:
+            solid[a] = i
+            a += U(1)
+        elif k == FLOOR:
+            ground[c] = i
+            c += U(1)
+        elif k == SEE_THROUGH:
+            clear[b] = i
+            b += U(1)
+    return solid, clear, ground
+
+
+@njit(fastmath=FAST)
+def _start_catcher(count, b):
+    """DR and DG collect the light that comes and the light that would come without what stands on the catcher."""
+    for i in range(count):
+        b[DR + i], b[DG + i], b[GROUND + i], b[AO + i] = f4(0), f4(0), f4(1), f4(1)
+
+
+@njit(fastmath=FAST)
+def _catch(count, b):
+    """One light on a shadow catcher."""
+    for i in range(count):
+        nl = max(b[NX + i] * b[LX + i] + b[NY + i] * b[LY + i] + b[NZ + i] * b[LZ + i], f4(0))
+        light = (b[IR + i] + b[IG + i] + b[IB + i]) * nl * f4(1 / (3 * np.pi))
+        b[DG + i] += light
+        b[DR + i] += light * b[SHARE + i]
+
+
+@njit(fastmath=FAST)
+def _finish_catcher(count, surrounding, b):
+    """Black, as opaque as there is light missing."""
+    even = (surrounding.up[0] + surrounding.up[1] + surrounding.up[2]) * f4(1 / 3)
+    for i in range(count):
+        all_light = b[DG + i] + even
+        left = (b[DR + i] + even * b[OPEN + i]) / max(all_light, f4(1e-9))
+        b[RED + i], b[GREEN + i], b[BLUE + i] = f4(0), f4(0), f4(0)
+        b[ALPHA + i] = max(f4(1) - left, f4(0)) if all_light > f4(0) else f4(0)
+
+
+@njit(fastmath=FAST)
+def _finish_matte(count, b):
+    for i in range(count):
+        b[RED + i], b[GREEN + i], b[BLUE + i], b[ALPHA + i] = b[DR + i], b[DG + i], b[DB + i], f4(1)
+
+
+@njit(fastmath=FAST)
+def _start_matte(count, floor, b):
+    for i in range(count):
+        b[BASE_R + i], b[BASE_G + i], b[BASE_B + i] = floor[5], floor[6], floor[7]
+        b[DR + i], b[DG + i], b[DB + i], b[GROUND + i], b[AO + i] = f4(0), f4(0), f4(0), f4(1), f4(1)
+
+
+@njit(fastmath=FAST)
+def shade(view, surfaces, textures, floor, surrounding, lights, occlusion, is_ground, slots, triangle, depth, radiance):
+    """Shade the samples in `slots` (N,) int32 over `radiance` (S, 4) float32, premultiplied, in place.
+
+    triangle (S,) int32 and depth (S,) float32 (inverse) are what is seen; all slots show the ground, or none does.
+    floor: see `painting.Baked`.
+    """
+    b = np.zeros(ROWS * BLOCK, np.float32)
+    seen, which = np.empty(BLOCK, np.int32), np.empty(BLOCK, np.int32)
+    is_catcher = is_ground and floor[4] == f4(2)
+    is_matte = is_ground and floor[4] == f4(1)
+    for start in range(0, slots.shape[0], BLOCK):
+        count = min(slots.shape[0] - start, BLOCK)
+        locate(view, start, count, slots, depth, b)
+        if is_ground:
+            gather_ground(floor, start, count, slots, triangle, b, seen, which)
+        else:
+            gather(surfaces, start, count, slots, triangle, b, seen, which)
+        if is_catcher:
+            _start_catcher(count, b)
+        elif is_matte:
+            _start_matte(count, floor, b)
+        else:
+            material(count, view, surfaces, textures, b, seen, which)
+            weigh(count, surrounding.albedo, b)
+        occlude(count, occlusion, b)
+        for k in range(lights.kind.shape[0]):
+            arrive(count, lights, k, b)
+            if is_catcher:
+                _catch(count, b)
+            elif is_matte:
+                add_light_matte(count, b)
+            else:
+                add_light(count, b)
+        if is_catcher:
+            _finish_catcher(count, surrounding, b)
+        elif is_matte:
+            ambient_matte(count, surrounding, b)
+            _finish_matte(count, b)
+        else:
+            ambient(count, surrounding, b)
+            compose(count, surrounding, b)
+        for i in range(count):
+            slot = U(slots[start + i])
+            shown = f4(1) - b[FADE + i]
+            under = f4(1) - b[ALPHA + i] * shown
+            pixel = radiance[slot]
+            pixel[0] = pixel[0] * under + b[RED + i] * shown
+            pixel[1] = pixel[1] * under + b[GREEN + i] * shown
+            pixel[2] = pixel[2] * under + b[BLUE + i] * shown
+            pixel[3] = pixel[3] * under + b[ALPHA + i] * shown
+
+
+@njit(fastmath=FAST)
+def average_samples(pixels, samples, radiance):
+    """Each pixel becomes the mean of its four samples (premultiplied)."""
+    for i in range(pixels.shape[0]):
+        p = U(pixels[i])
+        for c in range(4):
+            total = samples[4 * i, c] + samples[4 * i + 1, c] + samples[4 * i + 2, c] + samples[4 * i + 3, c]
+            radiance[p, c] = total * f4(0.25)

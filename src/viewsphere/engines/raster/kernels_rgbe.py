@@ -1,0 +1,76 @@
+"""Rows of a Radiance picture: plain, or run-length encoded the old way or the new."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from viewsphere.geometry.jit import njit
+
+
+@njit
+def decode_rows(data, rows, columns):
+    """Pixels (rows, columns, 3) float32 of a picture's bytes, and how many of its rows were whole."""
+    out = np.zeros((rows, columns, 3), np.float32)
+    row = np.zeros((columns, 4), np.uint8)
+    at = 0
+    for i in range(rows):
+        is_new = at + 4 <= data.shape[0] and data[at] == 2 and data[at + 1] == 2 and data[at + 2] < 128
+        if is_new and 8 <= columns < 32768:
+            at = _new_row(data, at, row) if (np.int64(data[at + 2]) << 8) + data[at + 3] == columns else -1
+        else:
+            at = _old_row(data, at, row)
+        if at < 0:
+            return out, i
+        for j in range(columns):
+            if row[j, 3] > 0:
+                scale = 2.0 ** (np.float64(row[j, 3]) - 136.0)
+                for c in range(3):
+                    out[i, j, c] = (np.float64(row[j, c]) + 0.5) * scale
+    return out, rows
+
+
+@njit
+def _new_row(data, at, row):
+    """Where the next row begins, -1 if this one is damaged."""
+    at += 4
+    for c in range(4):
+        j = 0
+        while j < row.shape[0]:
+            if at + 2 > data.shape[0]:
+                return -1
+            count = np.int64(data[at])
+            at += 1
+            is_run = count > 128
+            count = count - 128 if is_run else count
+            if count == 0 or j + count > row.shape[0] or at + (1 if is_run else count) > data.shape[0]:
+                return -1
+            for k in range(count):
+                row[j + k, c] = data[at if is_run else at + k]
+            at += 1 if is_run else count
+            j += count
+    return at
+
+
+@njit
+def _old_row(data, at, row):
+    """The same; (1, 1, 1, n) repeats the texel before it n times, in a row of such n times 256, and so on."""
+    j, shift = 0, 0
+    while j < row.shape[0]:
+        if at + 4 > data.shape[0]:
+            return -1
+        if data[at] == 1 and data[at + 1] == 1 and data[at + 2] == 1:
+            count = np.int64(data[at + 3]) << shift
+            if j == 0 or j + count > row.shape[0] or shift > 16:
+                return -1
+            for _ in range(count):
+                for c in range(4):
+                    row[j, c] = row[j - 1, c]
+                j += 1
+            shift += 8
+        else:
+            for c in range(4):
+                row[j, c] = data[at + c]
+            j += 1
+            shift = 0
+        at += 4
+    return at

@@ -1,0 +1,128 @@
+"""A picture of a stage: its visible samples, shaded once each, and the sky behind them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.engines.raster import kernels_paint
+from viewsphere.engines.raster.environment import Surrounding
+from viewsphere.engines.raster.kernels_environment import sky_behind
+from viewsphere.engines.raster.lights import Lights
+from viewsphere.engines.raster.occlusion import Occlusion
+from viewsphere.engines.raster.records import Float32, Int32, Surfaces, Textures, View
+from viewsphere.engines.raster.samples import Samples, edge_samples, layers
+from viewsphere.geometry.camera import inverse_camera_matrix, pixel_rays
+from viewsphere.model.camera import Camera
+from viewsphere.truth.geometry import Geometry
+from viewsphere.truth.visibility import Visibility
+
+_NO_RAYS = np.zeros((0, 3), np.float32)
+_NO_PLACES = np.zeros((0, 2), np.float32)
+
+
+@dataclass(frozen=True, eq=False)
+class Baked:
+    """All that a picture is painted from; lengths are in `unit`s from `origin`.
+
+    floor (8,): texture repeats per length of the ground, its texture coordinates at the origin, its material, 1 if it only
+    scatters, 2 if it is a shadow catcher, its colour. kind (T + 1,) uint8: of each triangle, see `kernels_paint`; owner (T,)
+    int32: equal where neighbouring triangles look alike; see_through (T + 1,).
+    """
+
+    geometry: Geometry
+    origin: NDArray[np.float64]
+    unit: float
+    surfaces: Surfaces
+    textures: Textures
+    floor: Float32
+    surrounding: Surrounding
+    lights: Lights
+    occlusion: Occlusion
+    kind: NDArray[np.uint8]
+    owner: Int32
+    see_through: NDArray[np.bool_]
+
+
+def paint(baked: Baked, camera: Camera, visibility: Visibility, antialias: bool, has_sky: bool, radiance: Float32) -> None:
+    """Fill `radiance` (H * W, 4) float32: scene-linear, premultiplied; alpha is the share that is covered.
+
+    Edge pixels are the mean of four samples. Where nothing is, the sky if `has_sky`, else 0.
+    """
+    radiance[:] = 0
+    triangle, depth = visibility.triangle.reshape(-1), visibility.inverse_depth.reshape(-1)
+    samples = edge_samples(baked.geometry, camera, visibility, baked.owner) if antialias else None
+    view = view_of(baked, camera)
+    if samples is not None:
+        triangle = triangle.copy()
+        triangle[samples.pixels] = -1
+        _smooth(baked, camera, samples, has_sky, radiance)
+    _shade(baked, camera, view, triangle, depth, radiance)
+    if has_sky:
+        sky_behind(view, baked.surrounding, radiance)
+
+
+def _smooth(baked: Baked, camera: Camera, samples: Samples, has_sky: bool, radiance: Float32) -> None:
+    """Edge pixels: every sample shaded, then their mean."""
+    view = view_of(baked, camera, samples)
+    colors = np.zeros((len(samples.triangle), 4), np.float32)
+    _shade(baked, camera, view, samples.triangle, samples.inverse_depth, colors, samples)
+    if has_sky:
+        sky_behind(view, baked.surrounding, colors)
+    kernels_paint.average_samples(samples.pixels, colors, radiance)
+
+
+def _shade(
+    baked: Baked,
+    camera: Camera,
+    view: View,
+    triangle: Int32,
+    depth: Float32,
+    radiance: Float32,
+    samples: Samples | None = None,
+) -> None:
+    """Shade samples over `radiance`; what is behind see-through surfaces first."""
+    solid, clear, ground = kernels_paint.sorted_samples(triangle, baked.kind)
+    _shade_some(baked, view, solid, False, triangle, depth, radiance)
+    _shade_some(baked, view, ground, True, triangle, depth, radiance)
+    if len(clear):
+        pixels = None if samples is None else samples.pixels
+        for layer in layers(baked.geometry, camera, triangle, depth, baked.see_through, pixels):
+            behind, behind_depth = triangle.copy(), depth.copy()
+            behind[layer.slot], behind_depth[layer.slot] = layer.triangle, layer.inverse_depth
+            is_ground = baked.kind[layer.triangle] == kernels_paint.FLOOR
+            for which in (False, True):
+                slots = layer.slot[is_ground == which]
+                _shade_some(baked, view, slots, which, behind, behind_depth, radiance)
+
+
+def _shade_some(
+    baked: Baked, view: View, slots: Int32, is_ground: bool, triangle: Int32, depth: Float32, radiance: Float32
+) -> None:
+    if len(slots):
+        kernels_paint.shade(
+            view, baked.surfaces, baked.textures, baked.floor, baked.surrounding, baked.lights, baked.occlusion,
+            is_ground, slots, triangle, depth, radiance,
+        )  # fmt: skip
+
+
+def view_of(baked: Baked, camera: Camera, samples: Samples | None = None) -> View:
+    """The rays of a camera's pixel centres, or of these samples."""
+    rays, places = _NO_RAYS, _NO_PLACES
+    if camera.distortion is not None:
+        table = pixel_rays(camera.intrinsics) if samples is None else samples.rays
+        rays = table.astype(np.float32).reshape(-1, 3)
+    elif samples is not None:
+        places = samples.position
+    return View(
+        ((camera.center - baked.origin) / baked.unit).astype(np.float32),
+        camera.R.astype(np.float32),
+        inverse_camera_matrix(camera.intrinsics)[:2].astype(np.float32),
+        rays,
+        np.uint32(camera.width),
+        np.float32(1 / np.sqrt(camera.intrinsics.fx * camera.intrinsics.fy)),
+        np.float32(1 / baked.unit),
+        places,
+    )

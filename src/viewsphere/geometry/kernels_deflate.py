@@ -1,0 +1,88 @@
+"""A compiled deflate for pixels of 32-bit numbers: runs of equal pixels are coded, all else is stored as it is.
+
+Rendered numbers are noise where a surface bends and constant elsewhere: searching for anything but runs costs four times as
+much and saves a tenth. The stream is plain deflate (RFC 1951), blocks of type 0 and 1 in turn.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+
+from viewsphere.geometry.jit import njit
+
+U = np.uintp
+SHORTEST = 64  # bytes of a run that is worth two blocks
+LONGEST = 258
+STORED = 65535
+
+
+@cache
+def match_codes(distance: int) -> tuple[np.ndarray, np.ndarray]:
+    """Bits of a match of each length (0 to 258) at a distance of 4 or 12 bytes in the order they are sent, and their number.
+
+    RFC 1951, 3.2.5 and 3.2.6.
+    """
+    codes, widths = np.zeros(LONGEST + 1, np.uint64), np.zeros(LONGEST + 1, np.int64)
+    far, far_width = {4: (0b11000, 5), 12: (0b1101100, 7)}[distance]  # code 3; code 6 and two bits that add 3 to its 9
+    for length in range(3, LONGEST + 1):
+        extra = max((length - 3).bit_length() - 3, 0)
+        symbol = 257 + 4 * extra + ((length - 3) >> extra) if length < LONGEST else 285
+        extra = extra if length < LONGEST else 0
+        code, width = (symbol - 256, 7) if symbol < 280 else (symbol - 88, 8)
+        turned = int(f"{code:0{width}b}"[::-1], 2) | ((length - 3) & ((1 << extra) - 1)) << width
+        codes[length], widths[length] = turned | far << (width + extra), width + extra + far_width
+    return codes, widths
+
+
+@njit
+def deflate_runs(words, step, codes, widths, data, out, at):
+    """Write the raw deflate stream of `data` (bytes, some) from out[at] on; gives its end.
+
+    `words` are the same bytes as 32-bit words, `step` (1 or 3) of which make a pixel; `codes` and `widths` its `match_codes`.
+    """
+    count, second, third = len(words), step // 3, 2 * (step // 3)
+    waiting, bits = np.uint64(0), 0
+    i, literal = 0, 0
+    while i < count:
+        a, b, c = words[i], words[i + second], words[i + third]
+        j = i + step
+        while j < count and words[j] == a and words[j + second] == b and words[j + third] == c:
+            j += step
+        left = 4 * (j - i - step)
+        is_run, is_last = left >= SHORTEST, j == count
+        if is_run or is_last:
+            end = 4 * (i + step) if is_run else 4 * count
+            while literal < end:  # blocks of type 0, each from a whole byte on
+                size = min(end - literal, STORED)
+                at, waiting, bits = _send(out, at, waiting, (bits + 10) // 8 * 8)
+                for k in range(2):
+                    byte = (size >> (8 * k)) & 255
+                    out[at + k], out[at + k + 2] = byte, byte ^ 255
+                at += 4
+                to, begin = U(at), U(literal)
+                for k in range(U(size)):
+                    out[to + k] = data[begin + k]
+                at, literal = at + size, literal + size
+            waiting |= np.uint64(0b011 if is_last else 0b010) << np.uint64(bits)  # a block of type 1: the last pixel again
+            bits += 3
+            while is_run and left > 0:
+                length = left if left <= LONGEST else min(left - 3, LONGEST)
+                left -= length
+                waiting |= codes[length] << np.uint64(bits)
+                at, waiting, bits = _send(out, at, waiting, bits + widths[length])
+            at, waiting, bits = _send(out, at, waiting, bits + 7)
+            literal = 4 * j
+        i = j
+    return _send(out, at, waiting, (bits + 7) // 8 * 8)[0]
+
+
+@njit
+def _send(out, at, waiting, bits):
+    """Write the whole bytes of what is waiting."""
+    while bits >= 8:
+        out[at] = np.uint8(waiting & np.uint64(255))
+        waiting >>= np.uint64(8)
+        at, bits = at + 1, bits - 8
+    return at, waiting, bits

@@ -1,0 +1,57 @@
+"""What a lens does to colours and light away from its axis."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.model.camera import Intrinsics
+
+Float32 = NDArray[np.float32]
+
+SPLIT = 0.01
+"""How much larger red is at strength 1, and how much smaller blue."""
+
+DARKEST = 0.1
+"""Share of its light that the farthest corner keeps at strength 1."""
+
+
+def chromatic_aberration(picture: Float32, strength: float, intrinsics: Intrinsics) -> Float32:
+    """Red and blue scaled about the principal point, against each other; alpha covers all three."""
+    if strength == 0:
+        return picture
+    out = picture.copy()
+    for channel, sign in ((0, 1), (2, -1)):
+        scale = 1 + sign * SPLIT * strength
+        out[..., channel] = _scaled(picture[..., channel], scale, intrinsics)
+        if picture.shape[2] == 4:
+            np.maximum(out[..., 3], _scaled(picture[..., 3], scale, intrinsics), out=out[..., 3])
+    return out
+
+
+def _scaled(plane: Float32, scale: float, intrinsics: Intrinsics) -> Float32:
+    """The plane (H, W) enlarged about the principal point, bilinear; its border goes on for ever."""
+    for axis, center in ((0, intrinsics.cy), (1, intrinsics.cx)):
+        size = plane.shape[axis]
+        at = np.clip((np.arange(size) + 0.5 - center) / scale + center - 0.5, 0, size - 1)
+        first = np.minimum(at.astype(np.int64), max(size - 2, 0))
+        weight = (at - first).astype(np.float32)
+        weight = weight[:, None] if axis == 0 else weight
+        low = plane.take(first, axis)
+        plane = low + (plane.take(np.minimum(first + 1, size - 1), axis) - low) * weight
+    return plane
+
+
+def vignetting(picture: Float32, strength: float, intrinsics: Intrinsics) -> Float32:
+    """Light that falls off as cos^4 of the angle to the axis, an angle chosen for the farthest corner's share; alpha stays."""
+    if strength == 0:
+        return picture
+    height, width = picture.shape[:2]
+    x = (np.arange(width, dtype=np.float32) + np.float32(0.5 - intrinsics.cx)) ** 2
+    y = (np.arange(height, dtype=np.float32) + np.float32(0.5 - intrinsics.cy)) ** 2
+    corner = max(intrinsics.cx, width - intrinsics.cx) ** 2 + max(intrinsics.cy, height - intrinsics.cy) ** 2
+    tangent = (1 - (1 - DARKEST) * strength) ** -0.5 - 1  # squared, at the corner: cos^4 is (1 + tan^2)^-2
+    share = 1 / np.square(1 + (y[:, None] + x) * np.float32(tangent / corner))
+    out = picture.copy()
+    out[..., :3] *= share[..., None]
+    return out

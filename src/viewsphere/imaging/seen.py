@@ -1,0 +1,24 @@
+"""What is known of a picture besides its colours."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.model.camera import Intrinsics
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """Truth of one frame, from pixel centres.
+
+    inverse_depth (H, W) float32: 1 / depth in metres along the camera's axis (along the ray for a fisheye), 0 where nothing
+    is; targets (H, W) bool: pixels that show an object; distance: metres to what the camera looks at.
+    """
+
+    inverse_depth: NDArray[np.float32]
+    targets: NDArray[np.bool_]
+    intrinsics: Intrinsics
+    distance: float

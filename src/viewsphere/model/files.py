@@ -1,0 +1,82 @@
+"""How the channels of a data set are written: a recipe's `files`."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from viewsphere.model.channel import Channel
+from viewsphere.model.frozen import Frozen
+from viewsphere.model.recipe_values import Count, Positive
+
+Encoding = Literal["png", "png8", "png16", "jpeg", "webp", "qoi", "jxl", "tiff", "exr", "npz"]
+
+SUFFIXES: dict[Encoding, str] = {
+    **{"png": ".png", "png8": ".png", "png16": ".png", "jpeg": ".jpg", "webp": ".webp", "qoi": ".qoi", "jxl": ".jxl"},
+    **{"tiff": ".tiff", "exr": ".exr", "npz": ".npz"},
+}
+"""File name endings, with their dots."""
+
+LOSSY = ("jpeg", "webp", "jxl")
+"""Encodings that take a quality; all but JPEG are lossless without one."""
+
+STEP = 0.001
+
+
+class Files(Frozen):
+    """How each channel is written; every file says itself what it is, so data sets may mix them.
+
+    Labels are exact whatever is chosen, but for `depth: png16`, which rounds.
+    """
+
+    rgb: Literal["png", "jpeg", "webp", "qoi", "jxl"] = Field(
+        default="png", description="file of the picture; qoi and jxl (JPEG XL) need the extra codecs"
+    )
+    rgba: Literal["png", "webp", "qoi", "jxl"] = Field(default="png", description="file of the picture with alpha")
+    quality: Annotated[Count, Field(le=100)] | None = Field(
+        default=None, description="1 to 100 for jpeg (default 95), webp and jxl, which are lossless without one"
+    )
+    depth: Literal["tiff", "exr", "npz", "png16"] = Field(
+        default="tiff", description="file of the depth: float32 metres, or whole steps of depth_unit in a 16-bit PNG"
+    )
+    depth_unit: Positive | None = Field(
+        default=None, description="metres in a step of a png16 depth; default 0.001; 0 is nothing, 65535 all beyond"
+    )
+    masks: Literal["png16", "png8"] = Field(
+        default="png16", description="file of instances, categories and parts: 16-bit grey, or a palette of distinct colours"
+    )
+    geometry: Literal["tiff", "exr", "npz"] = Field(
+        default="tiff", description="file of normals, coordinates, triangles and barycentrics"
+    )
+
+    @model_validator(mode="after")
+    def _check(self) -> Files:
+        if self.quality is not None and not {self.rgb, self.rgba} & set(LOSSY):
+            raise ValueError(f"expected quality only beside {', '.join(LOSSY)}; found rgb: {self.rgb}, rgba: {self.rgba}")
+        if self.depth_unit is not None and self.depth != "png16":
+            raise ValueError(f"expected depth_unit only beside depth: png16; found depth: {self.depth}")
+        return self
+
+    @property
+    def step(self) -> float:
+        """Metres in a step of a png16 depth."""
+        return self.depth_unit or STEP
+
+    def encoding(self, channel: Channel) -> Encoding:
+        """How this channel is written."""
+        match channel.name, channel.encoding:
+            case "rgb", _:
+                return self.rgb
+            case "rgba", _:
+                return self.rgba
+            case "depth", _:
+                return self.depth
+            case _, "png16":
+                return self.masks
+            case _:
+                return self.geometry
+
+    def suffix(self, channel: Channel) -> str:
+        """File name ending of this channel, with its dot."""
+        return SUFFIXES[self.encoding(channel)]

@@ -1,0 +1,366 @@
+"""Distributions: what may stand for any number, vector, colour or word of a recipe's scene, and for some entries as a whole.
+
+`Drawn[T]` is a field of type T that also takes a distribution over T. Every end, mean and choice of one is read as T is, so
+its short forms, limits and mistakes are those of T; T is convex, hence whatever is drawn between valid values is valid.
+`drawn` puts draws in their place.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from functools import partial
+from itertools import pairwise
+from statistics import NormalDist
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, TypeVar, cast
+
+from pydantic import (
+    BeforeValidator,
+    Field,
+    GetCoreSchemaHandler,
+    PrivateAttr,
+    SerializerFunctionWrapHandler,
+    TypeAdapter,
+    ValidatorFunctionWrapHandler,
+    model_serializer,
+    model_validator,
+)
+from pydantic_core import CoreSchema, core_schema
+
+from viewsphere.model.frozen import Frozen
+from viewsphere.model.mistakes import at, shown
+from viewsphere.model.recipe_values import COLOR_FORMS, Number, OrShort, parse_color
+
+if TYPE_CHECKING:
+    from numpy.random import Generator
+
+KINDS = ("uniform", "log_uniform", "normal", "choice")
+
+DEEPEST = 16
+
+Steps = tuple[str, ...]
+RngOf = Callable[[Steps], "Generator"]
+"""A generator for the path of a value: every distribution has its own, so that none depends on what else is drawn."""
+
+Of = Literal["number", "whole number", "vector", "word", "entry"]
+T = TypeVar("T")
+
+
+class _AsWritten(Frozen):
+    """Is written without the fields that were not given."""
+
+    @model_serializer(mode="wrap")
+    def _given(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        return {name: value for name, value in handler(self).items() if value is not None}
+
+
+class Gaussian(_AsWritten):
+    """A normal distribution. What lies beyond `min`, `max` or the field's own limits is never drawn."""
+
+    mean: Any = Field(description="mean")
+    deviation: Any = Field(description="standard deviation")
+    min: Any = Field(default=None, description="lowest value drawn")
+    max: Any = Field(default=None, description="highest value drawn")
+
+
+def _gaussian(value: Any) -> Any:
+    if isinstance(value, (list, tuple)):
+        pair = cast(list[Any], value)
+        if len(pair) != 2:
+            raise ValueError(f"expected [mean, deviation] or a mapping of them; found {shown(value)}")
+        return {"mean": pair[0], "deviation": pair[1]}
+    return value
+
+
+class Distribution(_AsWritten):
+    """One of uniform, log_uniform, normal and choice. Their arguments may be distributions themselves."""
+
+    uniform: tuple[Any, Any] | None = Field(default=None, description="[low, high]; of vectors, each component by itself")
+    log_uniform: tuple[Any, Any] | None = Field(
+        default=None, description="[low, high], above 0: as likely between 1 and 2 as between 2 and 4"
+    )
+    normal: Annotated[Gaussian, BeforeValidator(_gaussian), OrShort({"type": "array", "minItems": 2, "maxItems": 2})] | None = (
+        Field(default=None, description="[mean, deviation], or {mean, deviation, min, max}; kept within the field's limits")
+    )
+    choice: Annotated[tuple[Any, ...], Field(min_length=1)] | None = Field(default=None, description="one of these")
+    weights: tuple[Annotated[float, Field(strict=True, ge=0)], ...] | None = Field(
+        default=None, description="of choice: how likely each is, in any unit; by default all alike"
+    )
+
+    _limits: tuple[float, float] = PrivateAttr(default=(-math.inf, math.inf))
+
+    @model_validator(mode="after")
+    def _check(self) -> Distribution:
+        given = [name for name in KINDS if getattr(self, name) is not None]
+        if len(given) != 1:
+            raise ValueError(f"expected one of {', '.join(KINDS)}; found {' and '.join(given) or 'none'}")
+        if self.weights is not None:
+            if self.choice is None or len(self.weights) != len(self.choice):
+                raise ValueError("expected as many weights as there are choices; found another number")
+            if not sum(self.weights):
+                raise ValueError("expected a weight above 0; found none")
+        return self
+
+    @property
+    def kind(self) -> str:
+        """Which of the four it is."""
+        return next(name for name in KINDS if getattr(self, name) is not None)
+
+    def draw(self, rng_of: RngOf, path: Steps) -> Any:
+        """A concrete value; arguments that are distributions are drawn first, with paths of their own."""
+        rng = rng_of(path)
+        if self.choice is not None:
+            return drawn(self.choice[_pick(rng, len(self.choice), self.weights)], rng_of, (*path, "choice"))
+        if self.normal is not None:
+            args = (getattr(self.normal, name) for name in ("mean", "deviation", "min", "max"))
+            values = [drawn(value, rng_of, (*path, f"normal {i}")) for i, value in enumerate(args)]
+            return _each(partial(_normal, rng, self._limits), *values)
+        low, high = (drawn(end, rng_of, (*path, f"end {i}")) for i, end in enumerate(self.uniform or self.log_uniform or ()))
+        if isinstance(low, int):
+            return int(rng.integers(min(low, high), max(low, high), endpoint=True))
+        return _each(partial(_uniform if self.uniform is not None else _log_uniform, rng), low, high)
+
+
+def _pick(rng: Generator, count: int, weights: tuple[float, ...] | None) -> int:
+    if weights is None:
+        return int(rng.integers(count))
+    return int(rng.choice(count, p=[weight / sum(weights) for weight in weights]))
+
+
+def _each(draw: Callable[..., float], *args: Any) -> Any:
+    """Numbers as they are, vectors component by component; a number beside vectors counts for each component."""
+    size = next((len(arg) for arg in args if isinstance(arg, tuple)), None)
+    if size is None:
+        return draw(*args)
+    return tuple(draw(*(arg[i] if isinstance(arg, tuple) else arg for arg in args)) for i in range(size))
+
+
+def _uniform(rng: Generator, low: float, high: float) -> float:
+    return low + rng.random() * (high - low)
+
+
+def _log_uniform(rng: Generator, low: float, high: float) -> float:
+    return min(max(_portable(low * (high / low) ** rng.random()), low), high)
+
+
+def _portable(value: float) -> float:
+    """The value to twelve digits: the last ones of a power or a logarithm differ between processors."""
+    return float(f"{value:.12g}")
+
+
+def _normal(
+    rng: Generator, limits: tuple[float, float], mean: float, deviation: float, low: float | None, high: float | None
+) -> float:
+    """A truncated normal by inversion: one uniform number, whatever the limits."""
+    low, high = max(limits[0], limits[0] if low is None else low), min(limits[1], limits[1] if high is None else high)
+    u, value = float(rng.random()), mean
+    if deviation > 0:
+        curve = NormalDist(mean, deviation)
+        below = curve.cdf(low) if low > -math.inf else 0.0
+        above = curve.cdf(high) if high < math.inf else 1.0
+        level = below + u * (above - below)
+        value = _portable(curve.inv_cdf(level)) if 0 < level < 1 else mean
+    return min(max(value, low), high)
+
+
+class _Reader(NamedTuple):
+    """Reads values of a field, and distributions over them."""
+
+    plain: ValidatorFunctionWrapHandler
+    of: Of
+    limits: tuple[float, float]
+    depth: int = 0
+
+    def read(self, value: Any) -> Any:
+        """The value, valid; raises ValueError or ValidationError."""
+        if isinstance(value, Distribution):
+            value = value.model_dump()
+        if self.of == "number" and isinstance(value, (list, tuple)):
+            ends = cast(list[Any], value)
+            if len(ends) != 2:
+                raise ValueError(f"expected a number, [low, high] or a distribution; found {shown(value)}")
+            value = {"uniform": ends}
+        if not isinstance(value, Mapping) or (self.of == "entry" and "choice" not in value):
+            return self.plain(value)
+        if self.depth == DEEPEST:
+            raise ValueError(f"expected at most {DEEPEST} distributions in one another; found more")
+        raw = Distribution.model_validate(value)
+        if raw.kind != "choice" and self.of in ("word", "entry"):
+            raise ValueError(f"expected choice; found {raw.kind}, which is for numbers")
+        if raw.kind in ("normal", "log_uniform") and self.of == "whole number":
+            raise ValueError(f"expected uniform or choice; found {raw.kind}, which is not for whole numbers")
+        made = raw.model_copy(update=self._replace(depth=self.depth + 1)._arguments(raw))
+        made._limits = self.limits  # pyright: ignore[reportPrivateUsage]
+        return made
+
+    def _arguments(self, raw: Distribution) -> dict[str, Any]:
+        if raw.normal is not None:
+            return {"normal": self._gaussian(raw.normal)}
+        kind = raw.kind
+        values: list[Any] = []
+        for i, value in enumerate(getattr(raw, kind)):
+            with at(kind, i):
+                values.append(self.read(value))
+        if kind != "choice":
+            _check_ends(kind, values[0], values[1])
+        return {kind: tuple(values)}
+
+    def _gaussian(self, raw: Gaussian) -> Gaussian:
+        values: dict[str, Any] = {}
+        for name, value in raw:
+            if value is None and name in ("min", "max"):
+                continue
+            with at("normal", name):
+                values[name] = self._deviation(value) if name == "deviation" else self.read(value)
+        order = [values[name] for name in ("min", "mean", "max") if name in values]
+        if not all(_ordered(a, b) for a, b in pairwise(order)):
+            raise ValueError("expected a mean from min to max; found it outside")
+        mean, deviation = values["mean"], values["deviation"]
+        if isinstance(mean, tuple) and isinstance(deviation, tuple) and len(mean) != len(deviation):
+            raise ValueError("expected a deviation that is one number, or has the mean's components; found another number")
+        return raw.model_copy(update=values)
+
+    def _deviation(self, value: Any) -> Any:
+        """One number, also for vectors, or one for each component."""
+        if self.of == "number" or not isinstance(value, (list, tuple)):
+            return _DEVIATION.validate_python(value)
+        parts: list[Any] = []
+        for i, part in enumerate(cast(list[Any], value)):
+            with at(i):
+                parts.append(_DEVIATION.validate_python(part))
+        return tuple(parts)
+
+
+def _ordered(low: Any, high: Any) -> bool:
+    """Whether no component of `low` is above that of `high`; those that are drawn do not count."""
+    if isinstance(low, tuple) and isinstance(high, tuple):
+        return all(_ordered(a, b) for a, b in zip(cast(tuple[Any, ...], low), cast(tuple[Any, ...], high), strict=False))
+    return not isinstance(low, (int, float)) or not isinstance(high, (int, float)) or low <= high
+
+
+def _check_ends(kind: str, low: Any, high: Any) -> None:
+    if not _ordered(low, high):
+        raise ValueError(f"expected [low, high]; found {shown((low, high))}")
+    lowest = min(_lowest(low), _lowest(high))
+    if kind == "log_uniform" and lowest <= 0:
+        raise ValueError(f"expected ends above 0; found one that may be {lowest:g}")
+
+
+def _lowest(value: Any) -> float:
+    """The least number that can come of a value."""
+    if isinstance(value, Distribution):
+        if value.normal is not None:
+            low = value._limits[0]  # pyright: ignore[reportPrivateUsage]
+            return low if value.normal.min is None else max(low, _lowest(value.normal.min))
+        return min(map(_lowest, getattr(value, value.kind)))
+    return min(map(_lowest, cast(tuple[Any, ...], value))) if isinstance(value, tuple) else float(value)
+
+
+class OrDrawn:
+    """Marks a field that may be a distribution over its values."""
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        inner = handler(source)
+        of, limits = _of(inner)
+        pair = core_schema.list_schema(min_length=2, max_length=2)
+        forms: list[Any] = [inner, *([pair] if of == "number" else ()), handler.generate_schema(Distribution)]
+        return core_schema.no_info_wrap_validator_function(
+            lambda value, plain: _Reader(plain, of, limits).read(value),
+            inner,
+            serialization=core_schema.simple_ser_schema("any"),
+            json_schema_input_schema=core_schema.union_schema(forms),
+        )
+
+
+_WRAPPERS = {"function-before", "function-after", "function-wrap", "nullable", "default"}
+
+
+def _of(schema: Any) -> tuple[Of, tuple[float, float]]:
+    """What a field holds, and the lowest and highest number in it."""
+    while schema["type"] in _WRAPPERS:
+        schema = schema["schema"]
+    match schema["type"]:
+        case "float":
+            low = schema.get("ge", math.nextafter(schema["gt"], math.inf) if "gt" in schema else -math.inf)
+            high = schema.get("le", math.nextafter(schema["lt"], -math.inf) if "lt" in schema else math.inf)
+            return "number", (low, high)
+        case "int":
+            return "whole number", (-math.inf, math.inf)
+        case "tuple":
+            return "vector", _of(schema["items_schema"][0])[1]
+        case "str" | "literal" | "bool":
+            return "word", (-math.inf, math.inf)
+        case _:
+            return "entry", (-math.inf, math.inf)
+
+
+Drawn = Annotated[T, OrDrawn()]
+"""A T, or a distribution over T: what a recipe holds. What is drawn from it, and so what a scene is made of, is a T."""
+
+_DEVIATION: TypeAdapter[Any] = TypeAdapter(Drawn[Annotated[float, Field(strict=True, ge=0, allow_inf_nan=False)]])
+
+
+def drawn(value: T, rng_of: RngOf, path: Steps = ()) -> T:
+    """The value with a draw in the place of every distribution in it."""
+    if isinstance(value, Distribution):
+        return value.draw(rng_of, path)
+    if isinstance(value, tuple):
+        parts = enumerate(cast(tuple[Any, ...], value))
+        return cast(T, tuple(drawn(part, rng_of, (*path, str(i))) for i, part in parts))
+    if isinstance(value, Frozen):
+        random = {name: part for name, part in value if is_random(part)}
+        return value.model_copy(update={name: drawn(part, rng_of, (*path, name)) for name, part in random.items()})
+    return value
+
+
+def is_random(value: object) -> bool:
+    """Whether there is a distribution in a value."""
+    if isinstance(value, tuple):
+        return any(map(is_random, cast(tuple[Any, ...], value)))
+    return isinstance(value, Distribution) or (isinstance(value, Frozen) and any(is_random(part) for _, part in value))
+
+
+def alternatives(value: Any) -> Iterator[Any]:
+    """All that a word or an entry may be: the value itself, or what its choices may be."""
+    if isinstance(value, Distribution) and value.choice is not None:
+        for option in value.choice:
+            yield from alternatives(option)
+    else:
+        yield value
+
+
+Amount = Annotated[float, Field(strict=True, ge=0)]
+Portion = Annotated[float, Field(strict=True, ge=0, le=1)]
+Signed = Annotated[float, Field(strict=True, ge=-1, le=1)]
+Coordinate = Drawn[Number]
+PointDrawn = Drawn[tuple[Coordinate, Coordinate, Coordinate]]
+
+
+def is_drawn_color(value: Any) -> bool:
+    """Whether a value that may be more than a colour is one that is drawn: as a whole, or component by component."""
+    if isinstance(value, Mapping):
+        return not value.keys().isdisjoint(KINDS)
+    parts = cast(tuple[Any, ...], value) if isinstance(value, (list, tuple)) else ()
+    return any(isinstance(part, (list, tuple, Mapping, Distribution)) for part in parts)
+
+
+def _srgb(value: Any) -> Any:
+    return value if is_drawn_color(value) else parse_color(value)
+
+
+def _linear(value: Any) -> Any:
+    """A colour's name or code as linear light; numbers are linear already."""
+    if not isinstance(value, str):
+        return value
+    return tuple(round(c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4, 9) for c in parse_color(value))
+
+
+SrgbDrawn = Drawn[
+    Annotated[tuple[Drawn[Portion], Drawn[Portion], Drawn[Portion]], BeforeValidator(_srgb), OrShort(COLOR_FORMS[0])]
+]
+"""An sRGB colour: a name, '#rrggbb' or [r, g, b] of 0..1."""
+
+LinearDrawn = Drawn[
+    Annotated[tuple[Drawn[Amount], Drawn[Amount], Drawn[Amount]], BeforeValidator(_linear), OrShort(COLOR_FORMS[0])]
+]
+"""Linear light: [r, g, b] from 0 up, or the light that a name or '#rrggbb' stands for."""

@@ -1,0 +1,236 @@
+"""The light of a recipe's scene: the sun, the sky, and lamps. Its numbers, colours and words may be drawn."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from datetime import date, timedelta
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag, model_validator
+
+from viewsphere.model.frozen import Frozen
+from viewsphere.model.mistakes import shown
+from viewsphere.model.recipe_draws import Amount, Coordinate, Drawn, LinearDrawn, PointDrawn, Portion
+from viewsphere.model.recipe_values import Natural, OrShort, Positive, shape_of, switch
+from viewsphere.model.scene import WHITE, AreaLight, Daylight, PointLight, Sky, SpotLight, Sun
+
+SWITCH: list[Any] = [True, False, "on", "off"]
+_SUN, _SKY, _DAYLIGHT = Sun(), Sky(), Daylight()
+_POINT = PointLight(position=(0, 0, 0), strength=0)
+_SPOT = SpotLight(position=(0, 0, 0), strength=0)
+_AREA = AreaLight(position=(0, 0, 0), strength=0)
+SKY_SUFFIXES = (".exr", ".hdr")
+WHEN = ("date", "time", "latitude", "longitude")
+_TIME = re.compile(r"(\d\d?):(\d\d)(?::(\d\d))?(?:Z|([+-])(\d\d)(?::?(\d\d))?)\Z")
+
+
+def _day(value: str) -> str:
+    try:
+        return date.fromisoformat(value).isoformat()
+    except ValueError:
+        raise ValueError(f"expected a date such as '2026-06-21'; found {shown(value)}") from None
+
+
+def _hours(value: Any) -> Any:
+    """Hours of the day in UTC, below 0 or above 24 where that is another day; numbers as they are."""
+    if not isinstance(value, str):
+        return value
+    found = _TIME.match(value)
+    if found is None or int(found[1]) > 24 or int(found[2]) > 59:
+        raise ValueError(f"expected a time and its distance from UTC, such as '14:30+02:00' or '12:30Z'; found {shown(value)}")
+    hour, minute, second, sign, hours, minutes = found.groups(default="0")
+    east = timedelta(hours=int(hours), minutes=int(minutes)) * (-1 if sign == "-" else 1)
+    return (timedelta(hours=int(hour), minutes=int(minute), seconds=int(second)) - east) / timedelta(hours=1)
+
+
+Day = Annotated[str, AfterValidator(_day)]
+Hours = Annotated[float, Field(strict=True, ge=-24, le=48), BeforeValidator(_hours), OrShort({"type": "string"})]
+Height = Annotated[float, Field(strict=True, gt=0, le=90)]
+
+
+class SunEntry(Frozen):
+    """The sun: where it stands, by angles or by date, time and place, and how it shines."""
+
+    azimuth_deg: Coordinate | None = Field(
+        default=None, description=f"where it stands, degrees, as for cameras; default {_SUN.azimuth_deg:g}"
+    )
+    elevation_deg: Drawn[Height] | None = Field(
+        default=None, description=f"degrees above the horizon; default {_SUN.elevation_deg:g}"
+    )
+    date: Drawn[Day] | None = Field(default=None, description="or by the day, '2026-06-21'; north is +Y")
+    time: Drawn[Hours] | None = Field(
+        default=None, description="with date: '14:30+02:00', with the distance from UTC, or hours of the day in UTC"
+    )
+    latitude: Drawn[Annotated[float, Field(strict=True, ge=-90, le=90)]] | None = Field(
+        default=None, description="with date: degrees north"
+    )
+    longitude: Drawn[Annotated[float, Field(strict=True, ge=-180, le=180)]] | None = Field(
+        default=None, description="with date: degrees east"
+    )
+    strength: Drawn[Amount] = Field(default=_SUN.strength, description="irradiance of what faces it, in the sky's units")
+    color: LinearDrawn = Field(default=_SUN.color, description="[r, g, b] of linear light, a name or '#rrggbb'")
+    angle_deg: Drawn[Annotated[float, Field(strict=True, ge=0, le=60)]] = Field(
+        default=_SUN.angle_deg, description="how wide it is: wider means softer shadows"
+    )
+
+    @model_validator(mode="after")
+    def _check(self) -> SunEntry:
+        given = [name for name in WHEN if getattr(self, name) is not None]
+        if given and len(given) < len(WHEN):
+            raise ValueError(f"expected {', '.join(WHEN)} together; found {', '.join(given)}")
+        if given and not (self.azimuth_deg is None and self.elevation_deg is None):
+            raise ValueError("expected angles or date, time and place, not both; found both")
+        return self
+
+
+def _sun(value: Any) -> Any:
+    on = switch(value)
+    return value if on is None else ("on" if on else "off")
+
+
+SunField = Annotated[
+    Annotated[SunEntry, Tag("mapping")] | Annotated[Literal["auto", "on", "off"], Tag("text")],
+    Discriminator(shape_of, custom_error_type="sun", custom_error_message="expected auto, on, off or a mapping"),
+    BeforeValidator(_sun),
+    OrShort({"enum": SWITCH}),
+]
+
+
+class GradientEntry(Frozen):
+    """Ambient light from above: a vertical gradient."""
+
+    zenith: LinearDrawn = Field(default=_SKY.zenith, description="colour overhead: linear [r, g, b], a name or '#rrggbb'")
+    horizon: LinearDrawn = Field(default=_SKY.horizon, description="colour at the horizon")
+    strength: Drawn[Amount] = Field(default=_SKY.strength, description="factor of both colours")
+
+
+class DaylightEntry(Frozen):
+    """The sky that the sun's place makes."""
+
+    turbidity: Drawn[Annotated[float, Field(strict=True, ge=1.8, le=10)]] = Field(
+        default=_DAYLIGHT.turbidity, description="haze: 2 is very clear, 10 hazy"
+    )
+    clouds: Drawn[Portion] = Field(default=_DAYLIGHT.clouds, description="0 clear, 1 overcast: then there is no sun")
+    strength: Drawn[Amount] = Field(default=_DAYLIGHT.strength, description="factor of the sky's light")
+
+
+class DaylightSky(Frozen):
+    """A sky made by the sun's place."""
+
+    daylight: DaylightEntry = Field(description="a sky made by the sun's place: turbidity, clouds, strength")
+
+
+class HdriSky(Frozen):
+    """Light from a picture of the whole sphere."""
+
+    hdri: Drawn[Annotated[str, Field(min_length=1)]] = Field(
+        description="an EXR or HDR file of the whole sphere (equirectangular), or a folder of them to draw from"
+    )
+    strength: Drawn[Amount] = Field(default=1.0, description="factor of its light")
+    rotation_deg: Coordinate = Field(default=0.0, description="turns it about the vertical, counter-clockwise from above")
+
+
+def _sky(value: Any) -> Any:
+    if isinstance(value, str):
+        return {"daylight": {}} if value == "daylight" else {"hdri": value}
+    return value
+
+
+def _kind_of_sky(value: Any) -> str:
+    if isinstance(value, Mapping):
+        return "an hdri" if "hdri" in value else "a daylight" if "daylight" in value else "a gradient"
+    return {HdriSky: "an hdri", DaylightSky: "a daylight"}.get(type(value), "a gradient")
+
+
+SkyField = Annotated[
+    Annotated[GradientEntry, Tag("a gradient")]
+    | Annotated[DaylightSky, Tag("a daylight")]
+    | Annotated[HdriSky, Tag("an hdri")],
+    Discriminator(_kind_of_sky),
+    BeforeValidator(_sky),
+    OrShort({"type": "string"}),
+]
+
+
+class At(Frozen):
+    """A direction and a distance, as cameras stand."""
+
+    azimuth_deg: Coordinate = Field(default=0.0, description="degrees, as for cameras")
+    elevation_deg: Drawn[Annotated[float, Field(strict=True, ge=-90, le=90)]] = Field(
+        default=45.0, description="degrees above the horizon"
+    )
+    distance: Drawn[Positive] = Field(description="metres")
+
+
+class _Lamp(Frozen):
+    """What all lamps have."""
+
+    count: Drawn[Annotated[Natural, Field(le=64)]] = Field(default=1, description="how many of them, each drawn by itself")
+    strength: Drawn[Amount] = Field(description="irradiance at one metre, facing it; of a hemisphere its radiance")
+    color: LinearDrawn = Field(default=WHITE, description="[r, g, b] of linear light, a name or '#rrggbb'")
+
+
+class _Placed(_Lamp):
+    position: PointDrawn | None = Field(default=None, description="[x, y, z] in metres from the centre of the targets' box")
+    at: At | None = Field(default=None, description="or {azimuth_deg, elevation_deg, distance} from there, as for cameras")
+
+    @model_validator(mode="after")
+    def _placed(self) -> _Placed:
+        if (self.position is None) == (self.at is None):
+            raise ValueError(f"expected one of position, at; found {'none' if self.at is None else 'both'}")
+        return self
+
+
+class PointEntry(_Placed):
+    """Small balls that shine everywhere."""
+
+    kind: Literal["point"] = Field(default="point", description="a small ball that shines everywhere")
+    radius: Drawn[Amount] = Field(default=_POINT.radius, description="metres: larger means softer shadows")
+
+
+class SpotEntry(_Placed):
+    """Lamps that shine into a cone."""
+
+    kind: Literal["spot"] = Field(description="a cone of light")
+    radius: Drawn[Amount] = Field(default=_SPOT.radius, description="metres: larger means softer shadows")
+    toward: PointDrawn = Field(default=_SPOT.toward, description="what it points at, [x, y, z] as for position")
+    angle_deg: Drawn[Annotated[float, Field(strict=True, gt=0, le=160)]] = Field(
+        default=_SPOT.angle_deg, description="of the whole cone"
+    )
+    blend: Drawn[Portion] = Field(default=_SPOT.blend, description="share of the cone that fades")
+
+
+class AreaEntry(_Placed):
+    """Rectangles that shine to one side."""
+
+    kind: Literal["area"] = Field(description="a rectangle that shines to one side")
+    toward: PointDrawn = Field(default=_AREA.toward, description="what it faces, [x, y, z] as for position")
+    size: Drawn[tuple[Drawn[Positive], Drawn[Positive]]] = Field(default=_AREA.size, description="[width, height] in metres")
+
+
+class HemisphereEntry(_Lamp):
+    """Even light from above and from below, without shadows."""
+
+    kind: Literal["hemisphere"] = Field(description="even light from above, and other from below")
+    below: LinearDrawn = Field(default=(0.0, 0.0, 0.0), description="colour of what comes from below")
+
+
+def _kind_of_lamp(value: Any) -> Any:
+    return value.get("kind", "point") if isinstance(value, Mapping) else getattr(value, "kind", None)
+
+
+LampEntry = Annotated[
+    Annotated[PointEntry, Tag("point")]
+    | Annotated[SpotEntry, Tag("spot")]
+    | Annotated[AreaEntry, Tag("area")]
+    | Annotated[HemisphereEntry, Tag("hemisphere")],
+    Discriminator(_kind_of_lamp),
+]
+
+
+def _lights(value: Any) -> Any:
+    return [value] if isinstance(value, (Mapping, _Lamp)) else value
+
+
+LightsField = Annotated[tuple[LampEntry, ...], BeforeValidator(_lights)]

@@ -1,0 +1,271 @@
+"""A recipe's scene made concrete: light, ground, materials and finish of a shot, finish and camera of a frame.
+
+Every distribution draws from a generator of its own, named by its field, and by the model and the pose as far as it is drawn
+for them: one more field, model or pose changes nobody else's draw.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+from functools import cached_property, lru_cache
+from typing import Any, TypeVar
+
+from viewsphere.geometry.camera import orbit_center
+from viewsphere.geometry.pose_category import pose_category
+from viewsphere.model.frozen import Frozen
+from viewsphere.model.recipe import Recipe
+from viewsphere.model.recipe_draws import RngOf, drawn, is_random
+from viewsphere.model.recipe_finish import BackgroundEntry, JitterEntry, PerFrame
+from viewsphere.model.recipe_light import (
+    AreaEntry,
+    At,
+    DaylightSky,
+    HdriSky,
+    HemisphereEntry,
+    LampEntry,
+    PointEntry,
+    SpotEntry,
+    SunEntry,
+)
+from viewsphere.model.recipe_surface import GroundEntry
+from viewsphere.model.scene import (
+    WHITE,
+    AnyLight,
+    AnySky,
+    AreaLight,
+    Background,
+    Daylight,
+    Effects,
+    Environment,
+    Finish,
+    Ground,
+    HemisphereLight,
+    PointLight,
+    Scene,
+    Sky,
+    Smoother,
+    SpotLight,
+    Sun,
+    Vector,
+    View,
+)
+from viewsphere.model.shot import ModelSpec, Pose, Repaint
+from viewsphere.sampling.company import Names
+from viewsphere.sampling.pictures import Kind, Pictures
+from viewsphere.sampling.scenery import draw_names
+from viewsphere.sampling.seeds import scene_generators, share
+from viewsphere.sampling.sun import sun_position
+
+Concrete = TypeVar("Concrete", bound=Frozen)
+
+LIGHTS: Mapping[type[Frozen], type[PointLight | SpotLight | AreaLight | HemisphereLight]] = {
+    PointEntry: PointLight,
+    SpotEntry: SpotLight,
+    AreaEntry: AreaLight,
+    HemisphereEntry: HemisphereLight,
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Scenes:
+    """The scenes of a recipe. `model` is a model's key, `pose` a pose's name."""
+
+    recipe: Recipe
+    pictures: Pictures
+
+    @cached_property
+    def is_jittered(self) -> bool:
+        """Whether poses are moved."""
+        return self.recipe.scene.jitter != JitterEntry()
+
+    @cached_property
+    def is_target_moved(self) -> bool:
+        """Whether poses need to know what they look at, because it is moved."""
+        return self.recipe.scene.jitter.target != JitterEntry().target
+
+    @cached_property
+    def has_finish_per_frame(self) -> bool:
+        """Whether every frame has a finish of its own."""
+        scene = self.recipe.scene
+        parts = (scene.background, scene.smoother, scene.view, scene.effects)
+        return scene.effects.is_noisy or any(
+            _draw(part) == "per_frame" and (is_random(part) or getattr(part, "images", None) is not None) for part in parts
+        )
+
+    def scene(self, model: str, pose: str) -> Scene:
+        """Light and ground for a shot, and the finish that its frames share."""
+        return self._scene(draw_names(self.recipe.scene.draw, model, pose), self._names_of_finish(model, None))
+
+    def finish(self, model: str, pose: str) -> Finish:
+        """The finish of one frame."""
+        return self._finish(self._names_of_finish(model, pose), (model, pose))
+
+    def repaints(self, spec: ModelSpec, model: str, pose: str) -> tuple[Repaint, ...]:
+        """The changes to a target's materials, in a shot that is about `model`: a model looks alike beside any other."""
+        entry = self.recipe.scene
+        names = (spec.key, model, pose) if entry.draw == "per_frame" else draw_names(entry.draw, spec.key, None)
+        return tuple(
+            _concrete(Repaint, drawn(material, self._rng_of(names), ("materials", str(i))))
+            for i, material in enumerate(entry.materials)
+            if fnmatchcase(spec.key, material.models)
+        )
+
+    def jittered(self, pose: Pose, model: str, name: str) -> Pose:
+        """The pose moved at random; it keeps its index. One without a target of its own keeps to the models' centre."""
+        entry = self.recipe.scene.jitter
+        by = drawn(entry, self._rng_of(draw_names(entry.draw, model, name)), ("jitter",))
+        azimuth = pose.azimuth_deg + by.azimuth_deg
+        elevation = min(max(pose.elevation_deg + by.elevation_deg, -90.0), 90.0)
+        target = None if pose.target is None else tuple(a + b for a, b in zip(pose.target, by.target, strict=True))
+        return pose.model_copy(
+            update={
+                "azimuth_deg": azimuth,
+                "elevation_deg": elevation,
+                "distance": pose.distance * (1 + by.distance),
+                "tilt_deg": pose.tilt_deg + by.tilt_deg,
+                "target": target,
+                "category": pose_category(azimuth, elevation, self.recipe.viewpoints.bins),
+            }
+        )
+
+    def _rng_of(self, names: Names) -> RngOf:
+        return scene_generators(self.recipe.seed, names)
+
+    def _names_of_finish(self, model: str, pose: str | None) -> tuple[Names, ...]:
+        """What background, smoother, view and effects are drawn for; empty where every frame has a finish of its own."""
+        if pose is None and self.has_finish_per_frame:
+            return ()
+        scene = self.recipe.scene
+        parts = (scene.background, scene.smoother, scene.view, scene.effects)
+        return tuple(draw_names(_draw(part), model, pose) for part in parts)
+
+    @cached_property
+    def _scene(self) -> Callable[[Names, tuple[Names, ...]], Scene]:
+        """Scenes by what they are drawn for; the last are kept, because many shots share one."""
+
+        @lru_cache(maxsize=64)
+        def scene(names: Names, names_of_finish: tuple[Names, ...]) -> Scene:
+            entry, rng_of = self.recipe.scene, self._rng_of(names)
+            sun, sky = drawn(entry.sun, rng_of, ("sun",)), self._sky(drawn(entry.sky, rng_of, ("sky",)), names)
+            return Scene(
+                sun=_sun(sun, sky),
+                sky=sky.model_copy(update={"strength": 0.0}) if isinstance(sky, Daylight) and is_night(sun) else sky,
+                lights=_lights(entry.lights, rng_of),
+                ground=self._ground(drawn(entry.ground, rng_of, ("ground",))),
+                finish=self._finish(names_of_finish, ()) if names_of_finish else Finish(),
+            )
+
+        return scene
+
+    def _sky(self, entry: Any, names: Names) -> AnySky:
+        if isinstance(entry, HdriSky):
+            return _concrete(Environment, entry, file=self._file("hdri", entry.hdri, ("sky", "hdri"), names))
+        return _concrete(Daylight, entry.daylight) if isinstance(entry, DaylightSky) else _concrete(Sky, entry)
+
+    def _ground(self, entry: Any) -> Ground | None:
+        if entry == "auto":
+            entry = self.recipe.scene.automatic_ground
+        if not isinstance(entry, GroundEntry):
+            return None if entry == "off" else Ground(catcher=entry == "catcher")
+        images = ("image", "roughness_image", "normal_image")
+        files = {name: self.pictures["image", path][0] for name in images if (path := getattr(entry, name)) is not None}
+        color = {"color": WHITE} if entry.color is None and entry.image is not None else {}
+        return _concrete(Ground, entry, **files, **color)
+
+    def _file(self, kind: Kind, path: str, field: tuple[str, ...], names: Names) -> str:
+        """The file that a path of the recipe means, drawn where that is a folder."""
+        files = self.pictures[kind, path]
+        if len(files) == 1:
+            return files[0]
+        return files[int(self._rng_of(names)((*field, "file")).integers(len(files)))]
+
+    def _finish(self, names: tuple[Names, ...], frame: Names) -> Finish:
+        background, smoother, view, effects = names
+        made: Effects = self._part("effects", effects)
+        if self.recipe.scene.effects.is_noisy:
+            made = made.model_copy(update={"seed": int(share(self.recipe.seed, "noise", *frame) * 2**32)})
+        return Finish(
+            background=self._part("background", background),
+            smoother=self._part("smoother", smoother),
+            view=self._part("view", view),
+            effects=made,
+        )
+
+    @cached_property
+    def _part(self) -> Callable[[str, Names], Any]:
+        """One of the four parts of a finish by what it is drawn for; the last are kept."""
+        makers: dict[str, Callable[[Any, Names], Frozen]] = {
+            "background": self._background,
+            "smoother": lambda entry, names: _concrete(Smoother, entry),
+            "view": lambda entry, names: _concrete(View, entry),
+            "effects": lambda entry, names: _concrete(Effects, entry),
+        }
+
+        @lru_cache(maxsize=256)
+        def part(field: str, names: Names) -> Frozen:
+            entry = drawn(getattr(self.recipe.scene, field), self._rng_of(names), (field,))
+            return makers[field](entry, names)
+
+        return part
+
+    def _background(self, entry: BackgroundEntry, names: Names) -> Background:
+        image = None
+        if entry.images is not None:
+            image = self._file("images", entry.images, ("background", "images"), names)
+        elif entry.image is not None:
+            image = self.pictures["image", entry.image][0]
+        return _concrete(Background, entry, image=image)
+
+
+def _draw(entry: object) -> str:
+    """When a part of the finish is drawn; a choice between several is made for every frame."""
+    return entry.draw if isinstance(entry, PerFrame) else "per_frame"
+
+
+def _concrete(kind: type[Concrete], entry: Frozen, **others: Any) -> Concrete:
+    """What an entry says, once it is drawn, as a part of a scene; what is None there has the scene's default."""
+    own = {name: getattr(entry, name, None) for name in kind.model_fields} | others
+    return kind(**{name: value for name, value in own.items() if value is not None})
+
+
+def _sun(entry: Any, sky: AnySky) -> Sun | None:
+    if not isinstance(entry, SunEntry):
+        return None if entry == "off" or (entry == "auto" and isinstance(sky, Environment)) else Sun()
+    angles = _angles(entry)
+    if angles is None:
+        return _concrete(Sun, entry)
+    return _concrete(Sun, entry, azimuth_deg=angles[0], elevation_deg=angles[1]) if angles[1] > 0 else None
+
+
+def _angles(entry: SunEntry) -> tuple[float, float] | None:
+    """Azimuth, as for cameras, and elevation of a sun that is given by date, time and place. North is +Y."""
+    if entry.date is None or entry.time is None or entry.latitude is None or entry.longitude is None:
+        return None
+    compass, elevation = sun_position(entry.date, entry.time, entry.latitude, entry.longitude)
+    return (180 - compass) % 360, elevation
+
+
+def is_night(entry: object) -> bool:
+    """Whether a sun that is given by date, time and place, none of them drawn, is below the horizon."""
+    if not isinstance(entry, SunEntry) or is_random((entry.date, entry.time, entry.latitude, entry.longitude)):
+        return False
+    angles = _angles(entry)
+    return angles is not None and angles[1] <= 0
+
+
+def _lights(entries: tuple[LampEntry, ...], rng_of: RngOf) -> tuple[AnyLight, ...]:
+    lights: list[AnyLight] = []
+    for i, entry in enumerate(entries):
+        for j in range(drawn(entry.count, rng_of, ("lights", str(i), "count"))):
+            lamp = drawn(entry, rng_of, ("lights", str(i), str(j)))
+            at = getattr(lamp, "at", None)
+            lights.append(_concrete(LIGHTS[type(lamp)], lamp, **({} if at is None else {"position": _spot(at)})))
+    return tuple(lights)
+
+
+def _spot(at: At) -> Vector:
+    x, y, z = orbit_center(math.radians(at.azimuth_deg), math.radians(at.elevation_deg), at.distance).tolist()
+    return x, y, z

@@ -1,0 +1,247 @@
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from truth.truth_scenes import LENSES, cube, lens, mesh_of, orbit_camera, placed, random_soup
+from viewsphere.assets.mesh import Image, Material, Texture
+from viewsphere.engines.raster.kernels_chosen import distinct
+from viewsphere.engines.raster.kernels_samples import TIE
+from viewsphere.engines.raster.samples import OFFSETS, edge_samples, layers
+from viewsphere.geometry.camera import pixel_rays
+from viewsphere.model.camera import Camera
+from viewsphere.truth.visibility import rasterize
+
+
+def fine(geometry, camera):
+    """Truth's triangle and inverse depth at the four samples of every pixel, (H, W, 4): they are centres of sixteenths."""
+    seen = rasterize(geometry, camera, subdivision=4)
+    at = [(int(4 * y), int(4 * x)) for x, y in OFFSETS]
+    return tuple(np.stack([a[y::4, x::4] for y, x in at], axis=-1) for a in (seen.triangle, seen.inverse_depth))
+
+
+def owner_of(geometry):
+    return geometry.triangle_object.copy()
+
+
+def check_exact(geometry, camera, least=0):
+    """Samples equal truth's; returns them and which pixels have a sample that looks different from the centre."""
+    visibility, owner = rasterize(geometry, camera), owner_of(geometry)
+    samples = edge_samples(geometry, camera, visibility, owner)
+    triangle, inverse = fine(geometry, camera)
+    look = distinct(
+        np.arange(triangle.size // 4, dtype=np.int32), visibility.triangle.reshape(-1), visibility.inverse_depth.reshape(-1),
+        triangle.reshape(-1, 4), inverse.reshape(-1, 4).astype(np.float64), owner, geometry.triangle_normals,
+    )  # fmt: skip
+    if samples is None:
+        assert least == 0
+        return None, look
+    assert len(samples.pixels) >= least
+    assert (np.diff(samples.pixels) > 0).all()
+    flat = triangle.reshape(-1, 4)[samples.pixels]
+    assert np.array_equal(samples.triangle.reshape(-1, 4), flat)
+    assert np.array_equal(samples.inverse_depth.reshape(-1, 4), inverse.reshape(-1, 4)[samples.pixels])
+    assert look[samples.pixels].all()
+    corner = np.stack([samples.pixels % camera.width, samples.pixels // camera.width], axis=1)[:, None]
+    assert np.array_equal(samples.position.reshape(-1, 4, 2), (corner + np.array(OFFSETS)).astype(np.float32))
+    return samples, look
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_samples_are_truths(seed):
+    rng = np.random.default_rng(seed)
+    geometry = placed(random_soup(rng, 60), random_soup(rng, 200, size=0.1), ground=bool(seed % 2))
+    intrinsics = lens(60, 44, rng.uniform(0.4, 1.6), cx=rng.uniform(20, 40), cy=rng.uniform(10, 30), skew=rng.uniform(-2, 2))
+    camera = orbit_camera(intrinsics, *rng.uniform(-3, 3, 2), 10 ** rng.uniform(-0.5, 1), tilt=rng.uniform(-1, 1))
+    samples, look = check_exact(geometry, camera, least=20)
+    assert len(samples.pixels) >= 0.9 * look.sum()  # the rest are holes that no centre sees
+
+
+def test_inside_a_box_across_the_camera_plane():
+    geometry = placed(cube(2.0), cube(0.3), ground=True)
+    camera = orbit_camera(lens(64, 48, 1.8), 0.3, 0.2, 1.2, tilt=0.2)
+    samples, look = check_exact(geometry, camera, least=40)
+    assert set(np.flatnonzero(look)) == set(samples.pixels)
+
+
+def test_nothing_to_smooth():
+    geometry = placed(mesh_of([[-50, 3, -50], [50, 9, -50], [50, 9, 50], [-50, 3, 50]], [[0, 1, 2], [0, 2, 3]]))
+    camera = Camera(lens(64, 48, 0.9), orbit_camera(lens(), 0, 0).R, np.zeros(3))
+    assert check_exact(geometry, camera)[0] is None
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.02, 0.3, math.pi / 4, 1.5, math.pi / 2])
+@pytest.mark.parametrize("pieces", [1, 40])
+def test_thin_wires_are_unbroken(angle, pieces):
+    """A wire of a third of a pixel: whatever the centres miss, every pixel that has a sample on it is found."""
+    across, along = 0.004 * np.array([-math.sin(angle), 0, math.cos(angle)]), np.array([math.cos(angle), 0, math.sin(angle)])
+    ends = np.linspace(-1, 1, pieces + 1)
+    vertices = np.concatenate([[e * along - across, e * along + across] for e in ends])
+    quads = np.arange(pieces)[:, None] * 2
+    triangles = np.concatenate([quads + np.array([0, 2, 1]), quads + np.array([1, 2, 3])])
+    wire = mesh_of(vertices, triangles)
+    wall = mesh_of([[-9, 4, -9], [9, 4, -9], [9, 4, 9], [-9, 4, 9]], [[0, 1, 2], [0, 2, 3]])
+    for geometry in (placed(wire), placed(wire, wall), placed(wall, wire)):
+        camera = orbit_camera(lens(120, 120, 2 * math.atan(1 / 4)), 0.0, 0.0, 5.0, target=(0.003, 0, 0.005))
+        samples, look = check_exact(geometry, camera, least=60)
+        assert set(np.flatnonzero(look)) == set(samples.pixels)
+
+
+def test_cut_outs():
+    checks = np.zeros((8, 8, 4), np.uint8)
+    checks[..., 3] = 255 * (np.indices((8, 8)).sum(0) % 2)
+    leaf = mesh_of(
+        [[-1, 0, -1], [1, 0, -1], [1, 0, 1], [-1, 0, 1]], [[0, 1, 2], [0, 2, 3]],
+        uv0=np.array([[0, 0], [1, 0], [1, 1], [0, 1]], np.float32), images=(Image("checks", checks),),
+        materials=(Material(alpha_mode="MASK", base_color_texture=Texture(0)),),
+    )  # fmt: skip
+    camera = orbit_camera(lens(64, 48, 0.8), 0.4, 0.3, 4.0)
+    samples, look = check_exact(placed(leaf, cube(0.2), ground=True), camera, least=200)
+    assert len(samples.pixels) >= 0.98 * look.sum()  # the rest are holes that no centre sees
+
+
+def meets(geometry, camera, rays):
+    """All surfaces along rays (N, 3), brute force: lists of (1/s, triangle), and how sure each ray's list is."""
+    q = geometry.vertices[geometry.triangles] @ camera.R.T + camera.t
+    e = np.stack([np.cross(q[:, 1], q[:, 2]), np.cross(q[:, 2], q[:, 0]), np.cross(q[:, 0], q[:, 1])], axis=1)
+    det = np.einsum("ti,ti->t", e[:, 0], q[:, 0])
+    values = np.einsum("tki,ni->ntk", e / np.where(det == 0, 1, det)[:, None, None], rays)
+    inverse = values.sum(axis=-1)
+    hit = (values >= 0).all(axis=-1) & (inverse > 0) & (det != 0)
+    margin = np.abs(values / np.abs(values).max(axis=-1, keepdims=True)).min(axis=(1, 2))
+    return hit, inverse, margin
+
+
+def sample_rays(camera):
+    """(H * W * 4, 3)"""
+    w, h = camera.width, camera.height
+    pixels = pixel_rays(camera.intrinsics, 4).reshape(h, 4, w, 4, 3)
+    return np.stack([pixels[:, int(4 * y), :, int(4 * x)] for x, y in OFFSETS], axis=2).reshape(-1, 3)
+
+
+@pytest.mark.parametrize("name", LENSES)
+def test_layers_equal_brute_force(name):
+    deep = 0
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        geometry = placed(random_soup(rng, 50), random_soup(rng, 50), ground=bool(seed % 2))
+        fov = rng.uniform(0.5, 1.3) if name != "fisheye" else rng.uniform(2, 4)
+        camera = orbit_camera(lens(32, 24, fov, LENSES[name]), *rng.uniform(-3, 3, 2), rng.uniform(0.5, 5))
+        see_through = np.append(rng.uniform(size=len(geometry.triangles)) < 0.6, False)
+        visibility = rasterize(geometry, camera)
+        rays = pixel_rays(camera.intrinsics).reshape(-1, 3)
+        shown = visibility.triangle.reshape(-1), visibility.inverse_depth.reshape(-1)
+        deep += check_layers(geometry, camera, shown, see_through, rays, None)
+        samples = edge_samples(geometry, camera, visibility, owner_of(geometry))
+        if samples is None:
+            continue
+        rays = sample_rays(camera).reshape(-1, 4, 3)[samples.pixels].reshape(-1, 3)
+        deep += check_layers(geometry, camera, (samples.triangle, samples.inverse_depth), see_through, rays, samples.pixels)
+    assert deep > 1000
+
+
+def check_layers(geometry, camera, shown, see_through, rays, pixels):
+    """Compare with all surfaces along each ray; returns how many rays meet more than one that counts."""
+    found = layers(geometry, camera, *shown, see_through, pixels)
+    stacks = [[] for _ in rays]
+    for i, layer in enumerate(found):
+        assert layer.slot.dtype == layer.triangle.dtype == np.int32
+        assert layer.inverse_depth.dtype == np.float32
+        assert len(set(layer.slot)) == len(layer.slot)
+        assert (see_through[layer.triangle] == (i > 0)).all()
+        for slot, t, inverse in zip(layer.slot, layer.triangle, layer.inverse_depth, strict=True):
+            stacks[slot].append((t, inverse))
+    hit, inverse, margin = meets(geometry, camera, rays)
+    checked = 0
+    for i in np.flatnonzero(margin > 1e-9):
+        order = np.argsort(inverse[i])
+        order = [t for t in order if hit[i, t]]
+        solid = [k for k, t in enumerate(order) if not see_through[t]]
+        expected = order[solid[-1] :] if solid else order
+        if not expected or not see_through[expected[-1]]:
+            expected = []
+        assert [t for t, _ in stacks[i]] == expected[:1] * bool(solid and expected) + expected[bool(solid) :][-8:]
+        np.testing.assert_allclose([d for _, d in stacks[i]], [inverse[i, t] for t, _ in stacks[i]], rtol=2e-7)
+        checked += len(expected) > 1
+    return checked
+
+
+def test_decals_lie_on_what_they_stick_to():
+    """A decal in the very plane of a wall, cut into other triangles: it is on top, whichever comes first."""
+    wall = mesh_of([[-1, 0, -1], [1, 0, -1], [1, 0, 1], [-1, 0, 1]], [[0, 1, 2], [0, 2, 3]])
+    inner = [[-0.5, 0, -0.4], [0.6, 0, -0.5], [0.5, 0, 0.6], [-0.4, 0, 0.5]]
+    decal = mesh_of(inner, [[0, 1, 3], [1, 2, 3]])
+    camera = orbit_camera(lens(64, 64, 0.7), 0.5, 0.3, 4.0)
+    counts = []
+    for first in (0, 1):
+        geometry = placed(*(wall, decal)[:: 1 - 2 * first])
+        see_through = np.array([first == 0, first == 0, False, False, False])
+        see_through[:4] = [first == 1] * 2 + [first == 0] * 2
+        visibility = rasterize(geometry, camera)
+        stack = layers(geometry, camera, visibility.triangle.reshape(-1), visibility.inverse_depth.reshape(-1), see_through)
+        assert len(stack) == 2
+        alone = rasterize(placed(decal), camera).triangle.reshape(-1) >= 0
+        assert set(stack[1].slot) == set(np.flatnonzero(alone))
+        assert set(stack[0].slot) == set(stack[1].slot)
+        counts.append(len(stack[1].slot))
+    assert counts[0] == counts[1] > 200
+
+
+def test_two_decals_and_backs():
+    """The later of two decals is on top; a surface and its back, or two triangles on a common edge, are one."""
+    corners = [[-1, 0, -1], [1, 0, -1], [1, 0, 1], [-1, 0, 1]]
+    one = mesh_of(corners, [[0, 1, 2], [0, 2, 3]])
+    both = mesh_of(corners, [[0, 1, 2], [0, 2, 3], [2, 1, 0], [3, 2, 0]])
+    camera = orbit_camera(lens(64, 64, 0.7, cx=32.5, cy=32.5), 0.0, 0.0, 4.0)  # centres on the diagonal
+    for geometry, depth in ((placed(one), 1), (placed(both), 1), (placed(one, one), 1), (placed(one, replace(one)), 1)):
+        see_through = np.append(np.ones(len(geometry.triangles), bool), False)
+        visibility = rasterize(geometry, camera)
+        shown = visibility.triangle.reshape(-1), visibility.inverse_depth.reshape(-1)
+        stack = layers(geometry, camera, *shown, see_through)
+        assert len(stack) == depth + 1
+        assert len(stack[0].slot) == 0
+        assert set(stack[1].slot) == set(np.flatnonzero(shown[0] >= 0))
+    small = mesh_of([[-0.5, 0, -0.4], [0.6, 0, -0.5], [0.5, 0, 0.6], [-0.4, 0, 0.5]], [[0, 1, 3], [1, 2, 3]])
+    for pair, top in (((one, small), (2, 3)), ((small, one), (2, 3))):
+        geometry = placed(*pair)
+        visibility = rasterize(geometry, camera)
+        shown = visibility.triangle.reshape(-1), visibility.inverse_depth.reshape(-1)
+        stack = layers(geometry, camera, *shown, np.array([True] * 4 + [False]))
+        assert len(stack) == 3
+        assert set(stack[2].triangle) == set(top)
+        assert TIE < 1e-4
+
+
+def test_no_more_than_eight_layers():
+    panes = [mesh_of([[-1, y, -1], [1, y, -1], [0, y, 1]], [[0, 1, 2]]) for y in np.linspace(0, 1, 12)]
+    geometry = placed(*panes, ground=True)
+    camera = orbit_camera(lens(32, 32, 0.5), 0.0, 0.3, 5.0)
+    visibility = rasterize(geometry, camera)
+    shown = visibility.triangle.reshape(-1), visibility.inverse_depth.reshape(-1)
+    stack = layers(geometry, camera, *shown, np.array([True] * 12 + [False] * 3))
+    assert len(stack) == 9
+    middle = 16 * 32 + 16
+    assert [int(layer.triangle[layer.slot == middle][0]) for layer in stack[1:]] == list(range(7, -1, -1))
+    assert len(stack[0].slot[stack[0].slot == middle]) == 1
+    assert layers(geometry, camera, *shown, np.zeros(15, bool)) == []
+
+
+@pytest.mark.parametrize("name", [name for name in LENSES if name != "pinhole"])
+def test_distorted_lenses(name):
+    rng = np.random.default_rng(3)
+    geometry = placed(random_soup(rng, 80), random_soup(rng, 300, size=0.1), ground=True)
+    fov = 1.2 if name != "fisheye" else 3.6
+    camera = orbit_camera(lens(60, 44, fov, LENSES[name]), 0.3, 0.4, 4.0)
+    visibility = rasterize(geometry, camera)
+    samples = edge_samples(geometry, camera, visibility, owner_of(geometry))
+    rays = sample_rays(camera).reshape(-1, 4, 3)[samples.pixels].reshape(-1, 3)
+    np.testing.assert_allclose(samples.rays, rays, atol=2e-7)
+    hit, inverse, margin = meets(geometry, camera, rays)
+    inverse = np.where(hit, inverse, 0)
+    expected = np.where(hit.any(axis=1), inverse.argmax(axis=1), -1)
+    sure = margin > 1e-9
+    assert sure.mean() > 0.95
+    assert len(samples.pixels) > 200
+    assert np.array_equal(samples.triangle[sure], expected[sure])
+    np.testing.assert_allclose(samples.inverse_depth[sure], inverse.max(axis=1)[sure], rtol=1e-6)

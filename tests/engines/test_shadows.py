@@ -1,0 +1,329 @@
+"""What arrives of each light: shadows against Embree's rays, penumbrae and irradiance against closed forms."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from light_stage import LightStage, ball, cuboid, distances, flat, points, quad
+
+from viewsphere import zoo
+from viewsphere.assets.mesh import Image, Material, Texture
+from viewsphere.engines.raster.lights import Distant, distant_sun, even_light
+from viewsphere.geometry.camera import orbit_center, orbit_rotation
+from viewsphere.model.camera import Camera, Intrinsics
+from viewsphere.model.scene import AreaLight, HemisphereLight, PointLight, SpotLight, Sun
+
+SUN = Distant((0.48, 0.3, 0.82), (3.0, 2.0, 1.0), 0.53)
+OVERHEAD = Distant((0.0, 0.0, 1.0), (1.0, 1.0, 1.0), 0.53)
+
+
+def camera(azimuth, elevation, distance, target=(0, 0, 0), width=240, height=180, focal=260.0):
+    a, e = math.radians(azimuth), math.radians(elevation)
+    rotation = orbit_rotation(a, e)
+    center = np.asarray(target) + orbit_center(a, e, distance)
+    lens = Intrinsics(width=width, height=height, fx=focal, fy=focal, cx=width / 2, cy=height / 2)
+    return Camera(lens, rotation, -rotation @ center)
+
+
+@pytest.fixture(scope="module")
+def car():
+    return LightStage(zoo.build("car", np.random.default_rng(3)))
+
+
+@pytest.fixture(scope="module")
+def shapes():
+    pieces = (
+        flat(cuboid((-1.2, -0.4, 0), (-0.4, 0.4, 1.1))),
+        ball(0.4, (0.6, 0.1, 0.9)),
+        flat(cuboid((0.5, 0, 0), (0.7, 0.2, 0.6))),
+    )
+    return LightStage(*pieces)
+
+
+def level(axis):
+    right = np.array([axis[1], -axis[0], 0.0]) if np.hypot(axis[0], axis[1]) > 1e-6 else np.array([1.0, 0.0, 0.0])
+    right /= np.linalg.norm(right)
+    return right, np.cross(right, axis)
+
+
+def visible_share(stage, light, samples, count=16):
+    """Share of the light's surface that rays reach from each sample."""
+    scene, place, total = stage.rays(), samples.place + samples.normal * 2e-4, np.zeros(len(samples.place))
+    middle = stage.origin + (stage.casters.extent.low + stage.casters.extent.high) / 2 * stage.unit
+    for s in range(count):
+        r, phi = math.sqrt((s + 0.5) / count), s * 2.399963
+        x, y = r * math.cos(phi), r * math.sin(phi)
+        if isinstance(light, Distant):
+            axis = np.array(light.direction) / np.linalg.norm(light.direction)
+            right, up = level(axis)
+            toward = np.tile(axis + math.tan(math.radians(light.angle_deg) / 2) * (right * x + up * y), (len(place), 1))
+            total += np.isinf(distances(scene, place, toward))
+            continue
+        at = middle + np.array(light.position)
+        if isinstance(light, AreaLight):
+            right, up = level(
+                (np.array(light.toward) - light.position) / np.linalg.norm(np.subtract(light.toward, light.position))
+            )
+            at = at + right * light.size[0] * ((s % 4 + 0.5) / 4 - 0.5) + up * light.size[1] * ((s // 4 + 0.5) / 4 - 0.5)
+            toward = at - place
+        else:
+            toward = at - place
+            axis = toward / np.linalg.norm(toward, axis=1, keepdims=True)
+            right = np.cross(axis, [0.3, 0.5, 0.8])
+            right /= np.linalg.norm(right, axis=1, keepdims=True)
+            toward = toward + light.radius * (right * x + np.cross(axis, right) * y)
+        far = np.linalg.norm(toward, axis=1)
+        total += distances(scene, place, toward / far[:, None]) > far - 0.1
+    return total / count
+
+
+@pytest.mark.parametrize("which", ["car", "shapes"])
+@pytest.mark.parametrize(
+    "light",
+    [
+        SUN,
+        Distant((0.5, 0.3, 0.5), (1.0, 1.0, 1.0), 12.0),
+        PointLight(position=(2.5, -2.5, 2.2), strength=20),
+        SpotLight(position=(3.0, -2.0, 3.0), strength=30, angle_deg=120, radius=0.1),
+        AreaLight(position=(2.0, -3.0, 3.0), strength=30, size=(0.8, 0.5)),
+    ],
+    ids=["sun", "wide sun", "point", "spot", "area"],
+)
+def test_shadows_fall_where_rays_say(which, light, request):
+    """Outside penumbrae, where a surface is not seen at a flat angle by the light, 99.5 % agree."""
+    pytest.importorskip("embreex")
+    stage = request.getfixturevalue(which)
+    samples = stage.seen(camera(35, 28, 6.5 if which == "car" else 4.5, stage.origin))
+    is_distant = isinstance(light, Distant)
+    lights = stage.lights([light] if is_distant else [], [] if is_distant else [light])
+    found = stage.arrives(lights, 0, samples)
+    truth = visible_share(stage, light, samples)
+    facing = (samples.normal * found["toward"]).sum(axis=1)
+    sure = (facing > 0.1) & ((truth == 0) | (truth == 1))
+    assert ((found["share"] > 0.5) == (truth > 0.5))[sure].mean() > 0.995
+    assert (truth[sure] == 0).sum() > 100 < (truth[sure] == 1).sum()
+
+
+def edge_profile(stage, lights, x):
+    """Share along x on the ground, across the edge of what hangs above."""
+    samples = points(np.stack([x, np.zeros_like(x), np.zeros_like(x)], axis=1), (0, 0, 1), pixel=1e-4, is_ground=True)
+    return stage.arrives(lights, 0, samples)["share"].astype(float)
+
+
+def spread(x, share):
+    """Standard deviation of the blur that made this edge."""
+    density = np.abs(np.diff(share))
+    middle = (x[1:] + x[:-1]) / 2
+    mean = (density * middle).sum() / density.sum()
+    return math.sqrt((density * (middle - mean) ** 2).sum() / density.sum())
+
+
+def hanging(height, half=3.0):
+    """A card above x < 0, and a crumb under its far corner that lays the ground at z = 0."""
+    crumb = quad((-half, half, 0), (0.02, 0, 0), (0, -0.02, 0))
+    return LightStage(flat(np.concatenate([quad((-half, -half, height), (half, 0, 0), (0, 2 * half, 0)), crumb])))
+
+
+@pytest.mark.parametrize(("height", "angle"), [(1.0, 4.0), (0.5, 12.0), (1.5, 12.0), (1.0, 30.0)])
+def test_the_sun_s_penumbra_is_as_wide_as_its_angle_and_the_height_say(height, angle):
+    """A disc of radius r blurs an edge with a standard deviation of r / 2."""
+    stage = hanging(height)
+    x = np.linspace(-1.5, 1.5, 3001)
+    share = edge_profile(stage, stage.lights([Distant((0, 0, 1), (1, 1, 1), angle)]), x)
+    width = 2 * height * math.tan(math.radians(angle / 2))
+    assert 4 * spread(x, share) == pytest.approx(width, rel=0.15)
+    assert share[0] == 0 and share[-1] == 1 and np.abs(np.diff(share)).max() < 0.1
+    assert abs(x[np.searchsorted(share, 0.5)]) < 0.05 * width + 0.01
+
+
+def test_an_area_light_s_penumbra():
+    """The edge of a strip of light of width w at d above an edge at h: a ramp of w h / (d - h)."""
+    height, above, width = 0.5, 2.5, 0.8
+    stage = hanging(height, 1.2)
+    middle = (stage.casters.extent.low + stage.casters.extent.high) / 2 * stage.unit + stage.origin
+    position = tuple(np.array([0.0, 0.0, above]) - middle)
+    light = AreaLight(position=position, toward=(*position[:2], -9), strength=1, size=(width, width))
+    x = np.linspace(-0.6, 0.6, 2401)
+    share = edge_profile(stage, stage.lights([], [light]), x)
+    assert math.sqrt(12) * spread(x, share) == pytest.approx(width * height / (above - height), rel=0.15)
+
+
+@pytest.fixture(scope="module")
+def crumb():
+    """Hardly anything, so that the stage's unit is not a metre and nothing is in the way."""
+    return LightStage(flat(cuboid((-0.1, -0.1, -50.1), (0.1, 0.1, -49.9))), ground=False)
+
+
+def irradiance(stage, light, place):
+    middle = stage.origin + (stage.casters.extent.low + stage.casters.extent.high) / 2 * stage.unit
+    lights = stage.lights([], [light])
+    toward = np.asarray(light.position) - np.asarray(place)
+    toward = toward / np.linalg.norm(toward, axis=-1, keepdims=True)
+    return stage.arrives(lights, 0, points(np.asarray(place) + middle, toward))
+
+
+def test_inverse_square_and_cone(crumb):
+    place = np.array([[0.0, 0.0, 30 - d] for d in (0.5, 1.0, 3.0, 10.0)])
+    light = PointLight(position=(0, 0, 30), strength=5.0, color=(1.0, 0.5, 0.25))
+    found = irradiance(crumb, light, place)
+    expected = 5.0 / np.array([0.25, 1.0, 9.0, 100.0])[:, None] * [1.0, 0.5, 0.25]
+    np.testing.assert_allclose(found["irradiance"], expected, rtol=1e-3)
+    np.testing.assert_allclose(found["width"], 0.05 / np.array([0.5, 1, 3, 10]), rtol=1e-3)
+    tilt = np.radians([0.0, 10.0, 19.5, 25.0, 29.5, 30.5, 60.0])
+    place = np.stack([3 * np.sin(tilt), 0 * tilt, 30 - 3 * np.cos(tilt)], axis=1)
+    light = SpotLight(position=(0, 0, 30), toward=(0, 0, 20), strength=9.0, angle_deg=60, blend=1 / 3)
+    cone = irradiance(crumb, light, place)["irradiance"][:, 0]
+    np.testing.assert_allclose(cone[:3], 1.0, rtol=1e-3)
+    assert 1 > cone[3] > cone[4] > 0
+    assert (cone[5:] == 0).all()
+
+
+def test_a_rectangle_s_irradiance_near_and_far(crumb):
+    """Against the sum over its surface; one side only."""
+    light = AreaLight(position=(0, 0, 30), toward=(0, 0, 0), strength=4.0, size=(1.0, 0.6))
+    place = np.array([[0, 0, 29.8], [0.4, 0.3, 29.5], [1, 1, 29], [0, 2, 26], [5, 0, 20], [3, 0, -2], [0, 0, 31]], float)
+    found = irradiance(crumb, light, place)
+    u, v = np.meshgrid((np.arange(200) + 0.5) / 200 - 0.5, (np.arange(200) + 0.5) / 200 - 0.5)
+    # Its width lies level: along x or y alike.
+    best = []
+    for across in ((1, 0, 0), (0, 1, 0)):
+        along = (0, 1, 0) if across == (1, 0, 0) else (1, 0, 0)
+        at = np.array([0, 0, 30.0]) + u[..., None] * np.multiply(across, 1.0) + v[..., None] * np.multiply(along, 0.6)
+        away = at.reshape(1, -1, 3) - place[:-1, None]
+        far = np.linalg.norm(away, axis=2, keepdims=True)
+        vector = (4.0 * (away / far) * (away[..., 2:] / far) / far**2).mean(axis=1)
+        best.append(np.abs(np.linalg.norm(vector, axis=1) / found["irradiance"][:-1, 0] - 1).max())
+    assert min(best) < 0.02
+    assert (found["irradiance"][-1] == 0).all()
+
+
+def test_distant_lights_arrive_everywhere_alike(crumb):
+    sun = Sun(azimuth_deg=200, elevation_deg=30, strength=2.0, color=(1.0, 0.5, 0.25), angle_deg=2)
+    lights = crumb.lights([distant_sun(sun)])
+    found = crumb.arrives(lights, 0, points([[0, 0, 0], [40, -7, 2]], (0, 0, 1)))
+    toward = orbit_center(math.radians(200), math.radians(30), 1.0)
+    np.testing.assert_allclose(found["toward"], np.tile(toward, (2, 1)), atol=1e-6)
+    np.testing.assert_allclose(found["irradiance"], np.tile([2.0, 1.0, 0.5], (2, 1)), rtol=1e-5)
+    np.testing.assert_allclose(found["width"], math.radians(1), rtol=1e-5)
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.53, 10.0])
+@pytest.mark.parametrize("elevation", [4.0, 15.0, 50.0, 90.0])
+def test_no_acne(elevation, angle):
+    """A slab and a smooth ball are wholly lit on the side that looks at the light."""
+    x, y, z = orbit_center(math.radians(77), math.radians(elevation), 1.0).tolist()
+    light = Distant((x, y, z), (1, 1, 1), angle)
+    for stage, target in (
+        (LightStage(flat(cuboid((-2, -2, -0.1), (2, 2, 0)))), (0, 0, 0)),
+        (LightStage(ball(1.0, (0, 0, 1), 64)), (0, 0, 1)),
+    ):
+        samples = stage.seen(camera(60, 40, 5.0, target, 120, 90, 130))
+        found = stage.arrives(stage.lights([light]), 0, samples)
+        facing = (samples.normal * found["toward"]).sum(axis=1)
+        turned = (samples.smooth * found["toward"]).sum(axis=1)
+        lit = ~samples.is_ground & (np.minimum(facing, turned) > (0.06 if elevation < 10 else 0.2))
+        assert lit.sum() > 200
+        assert found["share"][lit].min() > 0.98
+
+
+def test_a_shadow_begins_at_the_foot():
+    """No gap between a box and its shadow."""
+    stage = LightStage(flat(cuboid((-0.5, -0.5, 0), (0.5, 0.5, 1))))
+    x = -0.5 - np.array([0.004, 0.01, 0.03, 0.2])
+    lights = stage.lights([Distant((1, 0, 1), (1, 1, 1), 0.53)])
+    np.testing.assert_array_equal(edge_profile(stage, lights, x), 0)
+
+
+@pytest.mark.parametrize(
+    "light",
+    [
+        PointLight(position=(0.0, 0.0, 0.2), strength=3.0),
+        SpotLight(position=(0.0, 0.0, 0.2), toward=(5, 1, 0), strength=3.0, angle_deg=150),
+        AreaLight(position=(0.0, 0.0, 0.2), toward=(5, 1, 0), strength=3.0),
+    ],
+    ids=["point", "spot", "area"],
+)
+def test_a_light_in_a_box_lights_its_walls_and_nothing_else(light):
+    stage = LightStage(flat(cuboid((-1, -1, 0), (1, 1, 2))))
+    lights = stage.lights([], [light])
+    inside = points([[0.999, y, z] for y in (-0.3, 0.1, 0.4) for z in (0.9, 1.2, 1.5)], (-1, 0, 0))
+    assert stage.arrives(lights, 0, inside)["share"].min() > 0.9
+    outside = points([[x, y, 0] for x in (1.2, 2.0, 5.0) for y in (-3.0, 0.1, 2.0)], (0, 0, 1), is_ground=True)
+    assert stage.arrives(lights, 0, outside)["irradiance"].max() == 0
+
+
+def test_lights_at_awkward_places_give_finite_light():
+    stage = LightStage(flat(cuboid((-1, -1, 0), (1, 1, 2))))
+    middle = np.array([0, 0, 1.0])
+    odd = [
+        PointLight(position=(1, 0, 0), strength=2, radius=0),
+        SpotLight(position=(0, 0, 1), toward=(0, 0, 1), strength=2, radius=0, blend=0),
+        SpotLight(position=(0, 0, 3), strength=2, angle_deg=160),
+        AreaLight(position=(0, 1, 0), toward=(0, 1, 0), strength=2),
+        AreaLight(position=(0, 3, 0), strength=2, size=(0, 0)),
+        AreaLight(position=(0, 3, 2), strength=2, size=(1, 0)),
+        PointLight(position=(0, 0, 0), strength=0),
+        PointLight(position=(0, 0, -3), strength=2),
+        PointLight(position=(0, 0, 900), strength=2),
+    ]
+    lights = stage.lights([Distant((0, 0, 1), (0, 0, 0), 1), Distant((0, 0, -1), (1, 1, 1), 1), OVERHEAD], odd)
+    assert len(lights.kind) == len(odd) - 2 + 1  # the dark ones and those under the ground are left out
+    places = np.concatenate([[middle + light.position for light in odd], np.random.default_rng(0).uniform(-2, 2, (200, 3))])
+    for normal in ((0, 0, 1), (1, 0, 0)):
+        for k in range(len(lights.kind)):
+            found = stage.arrives(lights, k, points(places, normal))
+            assert all(np.isfinite(v).all() for v in found.values())
+            assert found["irradiance"].min() >= 0
+
+
+def test_no_lights_and_no_casters():
+    stage = LightStage(flat(cuboid((-1, -1, 0), (1, 1, 2)), Material(transmission=1.0)))
+    assert len(stage.lights().kind) == 0
+    share = edge_profile(stage, stage.lights([SUN]), np.linspace(-3, 3, 50))
+    np.testing.assert_array_equal(share, 1)
+
+
+@pytest.mark.parametrize("light", [OVERHEAD, PointLight(position=(0, 0, 3), strength=2, radius=0.01)])
+def test_cutouts_cast_their_shape(light):
+    """A card with a hole lies in the air: light goes through the hole."""
+    pixels = np.full((8, 8, 4), 255, np.uint8)
+    pixels[2:6, 2:6, 3] = 0
+    holed = Material(base_color_texture=Texture(0, nearest=True), alpha_mode="MASK")
+    uv = np.array([(0, 1), (1, 1), (1, 0), (0, 1), (1, 0), (0, 0)], np.float32)
+    card = flat(quad((-1, -1, 1), (2, 0, 0), (0, 2, 0)), holed, uv0=uv, images=(Image("hole", pixels),))
+    foot = flat(quad((-0.01, -0.01, 0), (0.02, 0, 0), (0, 0.02, 0)))
+    stage = LightStage(card, foot)
+    lights = stage.lights([light] if isinstance(light, Distant) else [], [] if isinstance(light, Distant) else [light])
+    share = edge_profile(stage, lights, np.array([-0.8, -0.3, 0.3, 0.8, 4.0]))
+    np.testing.assert_array_equal(share, [0, 1, 1, 0, 1])
+
+
+def test_scenery_casts_shadows_near_and_far_and_targets_on_it():
+    """A box of 1 m and houses on a floor of 400 m; the wide maps do not change with the target."""
+    floor, house = quad((-200, -200, 0), (400, 0, 0), (0, 400, 0)), cuboid((-4, -5, 0), (4, 5, 6))
+    place = flat(np.concatenate([floor, np.add(house, (20, 0, 0)), np.add(house, (-80, 40, 0))]))
+    sun = Distant((1, 0, 1), (1, 1, 1), 0.53)
+
+    def share(target, x, y):
+        stage = LightStage(target, ground=False, scenery=place)
+        lights = stage.lights([sun])
+        xs = np.asarray(x, float)
+        where = points(np.stack([xs, np.full_like(xs, y), np.zeros_like(xs)], axis=1), (0, 0, 1))
+        return stage.arrives(lights, 0, where)["share"], lights
+
+    small = flat(cuboid((-0.5, -0.5, 0), (0.5, 0.5, 1)))
+    near, first = share(small, [-1.6, -1.45, -0.6, 0.6], 0.1)
+    np.testing.assert_array_equal(near, [1, 0, 0, 1])
+    far, _ = share(small, [9, 11, 15, 25, -91, -89, -85, -75], 2)
+    np.testing.assert_array_equal(far[:4], [1, 0, 0, 1])
+    assert share(small, [-92, -88.5, -85, -75], 41)[0].tolist() == [1, 0, 0, 1]
+    _, second = share(flat(cuboid((-0.4, -0.6, 0), (0.4, 0.6, 0.9))), [0], 0)
+    assert first.first[1] == second.first[1] > 2
+    np.testing.assert_array_equal(first.views.form[1:], second.views.form[1:])
+
+
+def test_hemisphere_lights_are_ambient():
+    two = (HemisphereLight(strength=2, color=(1, 0.5, 0)), HemisphereLight(strength=1, below=(0.1, 0.2, 0.3)))
+    np.testing.assert_allclose(even_light([*two, PointLight(position=(0, 0, 1), strength=1)]), [[3, 2, 1], [0.1, 0.2, 0.3]])
