@@ -25,7 +25,7 @@ from bench_scene import reference_recipe, write_reference
 from viewsphere import generate, plan, plugins
 from viewsphere.annotate import annotate
 from viewsphere.assets.mesh import Mesh
-from viewsphere.engines.raster import staging
+from viewsphere.engines.raster import painting, staging
 from viewsphere.geometry.box import box_vertices
 from viewsphere.model.sample import Sample
 from viewsphere.model.shot import Frame, Shot
@@ -36,6 +36,13 @@ from viewsphere.truth.channels import observe
 from viewsphere.truth.visibility import rasterize
 
 ROOT = Path(__file__).parent.parent
+PARTS_OF_COLOUR = (
+    (painting, "edge_samples", "colour: finding edges, their samples"),
+    (painting, "_shade_some", "colour: shading"),
+    (painting, "layers", "colour: layers"),
+    (painting, "sky_behind", "colour: sky"),
+    (staging, "finished", "colour: view, sRGB"),
+)
 
 
 class Clock:
@@ -83,16 +90,25 @@ def embree_frame(scene: Any, camera: Any) -> Any:
 
 
 @contextmanager
-def timed(clock: Clock, module: Any, names: dict[str, str]) -> Iterator[None]:
-    """Time these functions of a module by their own labels while the context lasts."""
-    kept = {name: getattr(module, name) for name in names}
-    for name, label in names.items():
-        inner = kept[name]
-        setattr(module, name, lambda *a, inner=inner, label=label, **k: clock(label, lambda: inner(*a, **k)))
+def timed(times: dict[str, float]) -> Iterator[None]:
+    """Add up the CPU milliseconds of the parts of colour while the context lasts."""
+    kept = [(module, name, getattr(module, name)) for module, name, _ in PARTS_OF_COLOUR]
+
+    def watched(inner: Callable[..., Any], label: str) -> Callable[..., Any]:
+        def run(*args: Any) -> Any:
+            begun = time.process_time()
+            result = inner(*args)
+            times[label] = times.get(label, 0.0) + 1e3 * (time.process_time() - begun)
+            return result
+
+        return run
+
+    for (module, name, inner), (_, _, label) in zip(kept, PARTS_OF_COLOUR, strict=True):
+        setattr(module, name, watched(inner, label))
     try:
         yield
     finally:
-        for name, inner in kept.items():
+        for module, name, inner in kept:
             setattr(module, name, inner)
 
 
@@ -112,9 +128,12 @@ def measure(frames: int, antialias: int, folder: Path) -> tuple[Clock, int]:
         scene = embree_scene(stage.geometry)
     except ImportError:
         scene = None
-    with timed(clock, staging, staging.PROFILE):
-        for frame in shot.frames:
+    for frame in shot.frames:
+        parts: dict[str, float] = {}
+        with timed(parts):
             one_frame(clock, shot, frame, stage, mesh, store, scene)
+        for name, value in parts.items():
+            clock.times.setdefault(name, []).append(value)
     return clock, len(stage.geometry.triangles)
 
 

@@ -123,7 +123,7 @@ def test_white_furnace_of_a_box(tmp_path, material):
     assert np.mean(np.abs(occluded - 1) < 0.01) > 0.8
 
 
-@pytest.mark.parametrize("material", MATERIALS[:1] + MATERIALS[3:5] + MATERIALS[-2:])
+@pytest.mark.parametrize("material", [MATERIALS[0], MATERIALS[4], MATERIALS[-2]])
 def test_white_furnace_of_a_car(tmp_path, material):
     """Dents of shading normals that look away from what is seen may darken single pixels; occlusion only ever darkens."""
     from viewsphere.zoo import build
@@ -144,7 +144,7 @@ def test_lambert(elevation, what):
     if what == "ground":
         srgb = tuple(float(c) for c in encoded(np.array(color)))
         scene = Scene(sun=sun, sky=DARK, ground=Ground(color=srgb))
-        light, _ = light_of(flat(cuboid((0, 0, 0), (1e-3, 1e-3, 1e-3))), scene, camera(16, 16, 40, 0, 50, 3, (2, 1, 0)))
+        light, _ = light_of(flat(cuboid((0, 0, 0), (0.5, 0.5, 0.5))), scene, camera(16, 16, 80, 0, 50, 3, (1.5, 1.5, 0)))
     else:
         # No reflectance at normal incidence: what Fresnel leaves at the grazing sun is below the tolerance seen from above.
         plate = flat(quad((-1, -1, 0), (2, 0, 0), (0, 2, 0)), Material(base_color=(*color, 1.0), roughness=1.0, specular=0.0))
@@ -319,7 +319,7 @@ def test_whole_pictures_are_lit_where_rays_reach_the_sun(kind, azimuth, elevatio
 @pytest.mark.parametrize("kind", ["point", "spot", "area"])
 def test_lamps_fall_off_with_the_square_of_the_distance(kind, height):
     """Light of the ground below a small lamp: strength / pi at one metre."""
-    crumb = flat(cuboid((-1e-3, -1e-3, 0), (1e-3, 1e-3, 2e-3)))
+    crumb = flat(cuboid((-0.1, -0.1, 0), (0.1, 0.1, 0.2)))
     at, down = (3.0, 0.0, height), (3.0, 0.0, 0.0)
     lamp = {
         "point": PointLight(position=at, strength=3.0, radius=0.01),
@@ -328,14 +328,14 @@ def test_lamps_fall_off_with_the_square_of_the_distance(kind, height):
     }[kind]
     scene = Scene(sun=None, sky=DARK, lights=(lamp,), ground=Ground(color=(1, 1, 1)))
     light, _ = light_of(crumb, scene, camera(3, 3, 3000, 0, 60, 8, (3, 0, 0)))
-    below = height + 1e-3  # positions are from the middle of the targets
+    below = height + 0.1  # positions are from the middle of the targets
     assert light[1, 1] == pytest.approx(3.0 / math.pi / below**2, rel=0.01)
 
 
 def test_a_large_area_lamp_follows_its_form_factor():
     """A square of 2 m at 1 m: four times the closed form of a corner (Lambert 1760), per the lamp's own radiance."""
-    crumb = flat(cuboid((-1e-3, -1e-3, 0), (1e-3, 1e-3, 2e-3)))
-    lamp = AreaLight(position=(4.0, 0.0, 1.0 - 1e-3), strength=2.0, size=(2.0, 2.0), toward=(4.0, 0.0, -1e-3))
+    crumb = flat(cuboid((-0.1, -0.1, 0), (0.1, 0.1, 0.2)))
+    lamp = AreaLight(position=(4.0, 0.0, 0.9), strength=2.0, size=(2.0, 2.0), toward=(4.0, 0.0, -0.1))
     scene = Scene(sun=None, sky=DARK, lights=(lamp,), ground=Ground(color=(1, 1, 1)))
     light, _ = light_of(crumb, scene, camera(3, 3, 3000, 0, 60, 8, (4, 0, 0)))
     corner = (1 / math.sqrt(2) * math.atan(1 / math.sqrt(2)) * 2) / (2 * math.pi)
@@ -385,14 +385,14 @@ def test_transparent_layers_lie_over_one_another_as_they_stand(azimuth, antialia
     assert np.abs(seen.astype(int) - np.round(255 * encoded(light))).max() <= 1
 
 
-@pytest.mark.parametrize("lit", ["sun", "lamp", "sky"])
+@pytest.mark.parametrize("lit", ["sun", "low sun", "sky"])
 def test_a_catcher_darkens_as_the_ground_does(lit):
     """Over a plain background of the open ground's colour a catcher looks like the ground; light and ground are grey."""
     box = flat(cuboid((-0.4, -0.3, 0), (0.4, 0.3, 0.7)), Material(base_color=(0.5, 0.5, 0.5, 1)))
     even = Sky(zenith=(0.5, 0.5, 0.5), horizon=(0.5, 0.5, 0.5))
     scene = {
         "sun": Scene(sun=Sun(color=(1, 1, 1), angle_deg=3.0), sky=even),
-        "lamp": Scene(sun=Sun(color=(1, 1, 1), elevation_deg=80), sky=even, lights=(AreaLight(position=(1.5, 1, 2), strength=4.0),)),
+        "low sun": Scene(sun=Sun(color=(1, 1, 1), elevation_deg=20), sky=even),
         "sky": Scene(sun=None, sky=even),
     }[lit]
     view = camera(120, 90, 110, 20, 40, 4, (0, 0, 0.3))
@@ -402,11 +402,5 @@ def test_a_catcher_darkens_as_the_ground_does(lit):
     over = Finish(view=AS_IT_IS, background=Background(color=tuple(colour.tolist())))
     caught_scene = scene.model_copy(update={"ground": ground.model_copy(update={"catcher": True}), "finish": over})
     caught = picture(box, caught_scene, view)
-    if lit == "lamp":  # the ground's own light falls off: only where it is dark both are alike
-        stage = stage_of([flat(cuboid((9e3, 9e3, 0), (9e3 + 1, 9e3 + 1, 1)))], scene)
-        assert stage is not None
-        darker = plain.astype(int).max(axis=-1) < 40
-        assert np.abs(plain.astype(int) - caught)[darker].max(initial=0) <= 40
-        return
     assert np.abs(plain.astype(int) - caught).max() <= 2
     assert plain.astype(int).min() < 0.75 * plain[2, 2].min()

@@ -18,7 +18,8 @@ _OVERCAST = 7.4
 """The same of an overcast sky: 0.8, for a photographer would open the lens."""
 _OPENED = 0.75  # of the stops that are missing
 _LOWEST = 0.01  # sine of the elevation from which on a sky is the horizon's
-_GROUND_HAZE = 0.12  # sine of the elevation over which the horizon's light fades below it
+_GROUND_FADE = 0.09  # sine of the elevation below the horizon from which on ground hides what is behind it
+_GROUND_HAZE = 0.12  # sine of the elevation over which the horizon's light fades below that
 _WAVELENGTHS = np.array([0.61, 0.55, 0.465])  # of red, green and blue, micrometres
 _OZONE = np.array([0.122, 0.084, 0.009]) * 0.35  # absorption, of 0.35 cm
 _RGB_FROM_XYZ = np.array(
@@ -88,7 +89,7 @@ def daylight_picture(elevation_deg: float, daylight: Daylight, height: int) -> N
     clear = _clear(sine, np.clip(toward, -1, 1), sun, daylight.turbidity) / _CLEAR
     overcast = (0.123 + 8.6 * math.sin(sun)) * (1 + 2 * sine) / 3 / _OVERCAST  # Krochmann 1970; CIE S 011
     picture = (1 - daylight.clouds) * clear + daylight.clouds * overcast[..., None]
-    below = np.clip(-np.sin(row) / _GROUND_HAZE, 0, 1)[:, None, None]
+    below = np.clip((-np.sin(row) - _GROUND_FADE) / _GROUND_HAZE, 0, 1)[:, None, None]
     level = picture[height // 2].mean(axis=0)
     level = (level + level.mean()) / 2
     return (picture + below**2 * (3 - 2 * below) * (0.5 * level - picture)).astype(np.float32)
@@ -106,9 +107,18 @@ def _clear(sine: Float, toward: Float, sun: float, turbidity: float) -> Float:
         value * _perez(coefficients, sine, toward, apart) / _perez(coefficients, np.ones(1), np.sin(sun), theta)
         for value, coefficients in zip(zenith, perez, strict=True)
     )
-    y = np.maximum(y, 0.05)
+    y = np.maximum(y, _daylight_locus(x))
     xyz = np.stack([bright * x / y, bright, bright * np.maximum(1 - x - y, 0) / y], axis=-1)
     return np.maximum(xyz @ _RGB_FROM_XYZ.T, 0)
+
+
+def _daylight_locus(x: Float) -> Float:
+    """The least y of daylight of this x: Perez' fit turns purple far from the sun, which no sky does.
+
+    The curve through all measured daylight of Judd et al. 1964, as CIE 15 has it; level where it would bend down.
+    """
+    x = np.clip(x, 0.25, 2.87 / 6)
+    return -3 * x * x + 2.87 * x - 0.275
 
 
 def _perez(c: Float, sine: Float, toward: Float | float, apart: Float | float) -> Float:

@@ -61,7 +61,7 @@ def begin(marks, triangle, depth, wanted):
             for i in range(U(max(x - 1, 0)), U(min(x + 2, width))):
                 least = min(least, depth[j, i])
                 t = triangle[j, i]
-                if t >= 0:
+                if (t >= 0) & ((U(x) == i) | (U(y) == j)):
                     wanted[U(t)] = 1
         least *= f4(1) - SLACK
         grid[U(y), U(x)], limit[U(y), U(x)], bound[k] = k, least, least
@@ -82,23 +82,16 @@ def chosen(wanted):
 
 
 @njit
-def with_corners_in_reach(q, triangles, wanted, limit, pixels, count):
-    """The triangles but those wanted that have a vertex in some pixel, or beside a numbered one, before its limit."""
+def with_corners_before(q, triangles, wanted, limit):
+    """The other triangles that have a vertex before the limit of its pixel."""
     height, width = limit.shape
-    reach = limit.copy()
-    for k in range(count):
-        y, x = pixels[k] // width, pixels[k] % width
-        least = limit[U(y), U(x)]
-        for j in range(U(max(y - 1, 0)), U(min(y + 2, height))):
-            for i in range(U(max(x - 1, 0)), U(min(x + 2, width))):
-                reach[j, i] = min(reach[j, i], least)
     near = np.zeros(q.shape[0], np.uint8)
     a, b, c, d = U(0), U(1), U(2), U(3)
     for i in range(U(q.shape[0])):
         x, y = q[i, a] * q[i, d], q[i, b] * q[i, d]
         if (q[i, c] > 0.0) & (x > -1.0) & (y > -1.0) & (x < width + 1.0) & (y < height + 1.0):
             column, row = min(max(np.int64(x), 0), width - 1), min(max(np.int64(y), 0), height - 1)
-            near[i] = f4(q[i, d]) > reach[U(row), U(column)]
+            near[i] = f4(q[i, d]) > limit[U(row), U(column)]
     order = np.empty(triangles.shape[0] + 1, np.int32)
     n = U(0)
     for t in range(U(triangles.shape[0])):
@@ -201,12 +194,17 @@ def draw(order, q, triangles, cutout, cutouts, offsets, triangle, depth, grid, l
                     for i in range(U(4)):
                         nearest[U(k), i], seen[U(k), i] = depth[row, column], triangle[row, column]
                 u = U(k)
-                for i in range(U(4)):
-                    old, new = nearest[u, i], inverse[m + i]
-                    better = (inside[m + i] != 0) & (new > old)
-                    nearest[u, i] = new if better else old
-                    seen[u, i] = np.int32(t) if better else seen[u, i]
-                limit[row, column] = min(nearest[u, a], nearest[u, b], nearest[u, c], nearest[u, d])
+                o0, o1, o2, o3 = nearest[u, a], nearest[u, b], nearest[u, c], nearest[u, d]
+                s0, s1, s2, s3 = seen[u, a], seen[u, b], seen[u, c], seen[u, d]
+                n0, n1, n2, n3 = inverse[m], inverse[m + b], inverse[m + c], inverse[m + d]
+                b0, b1 = (inside[m] != 0) & (n0 > o0), (inside[m + b] != 0) & (n1 > o1)
+                b2, b3 = (inside[m + c] != 0) & (n2 > o2), (inside[m + d] != 0) & (n3 > o3)
+                n0, n1, n2, n3 = n0 if b0 else o0, n1 if b1 else o1, n2 if b2 else o2, n3 if b3 else o3
+                index = np.int32(t)
+                nearest[u, a], nearest[u, b], nearest[u, c], nearest[u, d] = n0, n1, n2, n3
+                seen[u, a], seen[u, b] = index if b0 else s0, index if b1 else s1
+                seen[u, c], seen[u, d] = index if b2 else s2, index if b3 else s3
+                limit[row, column] = min(n0, n1, n2, n3)
     return count
 
 

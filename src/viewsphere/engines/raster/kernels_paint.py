@@ -54,24 +54,32 @@ NOTHING, SOLID, SEE_THROUGH, FLOOR = range(4)
 
 
 @njit
-def sorted_samples(triangle, kind):
-    """Indices (int32) of the samples that show solid surfaces, see-through ones and the ground.
+def sorted_samples(triangle, kind, material, materials):
+    """Indices (int32) of the samples that show solid surfaces, those of one material together, see-through ones, the ground.
 
-    kind (T + 1,) uint8: of each triangle; the last of triangle -1, NOTHING.
+    kind (T + 1,) uint8: of each triangle; the last of triangle -1, NOTHING. material (T,): which of so many `materials`.
     """
-    counts = np.zeros(4, np.int64)
+    counts, starts = np.zeros(4, np.int64), np.zeros(materials + 1, np.int64)
     for i in range(triangle.shape[0]):
-        counts[U(kind[triangle[i]])] += 1
-    solid, clear, ground = np.empty(counts[1], np.int32), np.empty(counts[2], np.int32), np.empty(counts[3], np.int32)
-    a, b, c = U(0), U(0), U(0)
-    for i in range(triangle.shape[0]):
-        k = kind[triangle[i]]
+        t = triangle[i]
+        k = kind[t]
+        counts[U(k)] += 1
         if k == SOLID:
-            solid[a] = i
-            a += U(1)
-        elif k == FLOOR:
+            starts[U(material[t]) + U(1)] += 1
+    for m in range(materials):
+        starts[m + 1] += starts[m]
+    solid, clear, ground = np.empty(counts[1], np.int32), np.empty(counts[2], np.int32), np.empty(counts[3], np.int32)
+    b, c = U(0), U(0)
+    for i in range(triangle.shape[0]):
+        t = triangle[i]
+        k = kind[t]
+        if k == FLOOR:
             ground[c] = i
             c += U(1)
+        elif k == SOLID:
+            m = U(material[t])
+            solid[U(starts[m])] = i
+            starts[m] += 1
         elif k == SEE_THROUGH:
             clear[b] = i
             b += U(1)
@@ -172,11 +180,33 @@ def shade(view, surfaces, textures, floor, surrounding, lights, occlusion, is_gr
             pixel[3] = pixel[3] * under + b[ALPHA + i] * shown
 
 
+@njit
+def shared_samples(triangle, depth, owner, normals):
+    """For each of the samples, four a pixel, the first of its pixel that looks alike: same owner, about the same plane."""
+    like = np.empty(triangle.shape[0], np.int32)
+    for i in range(triangle.shape[0]):
+        t, first = triangle[i], i // 4 * 4
+        like[i] = i
+        for k in range(first, i):
+            q = triangle[k]
+            if like[k] != k or (q != t and (q < 0 or t < 0 or owner[q] != owner[t])):
+                continue
+            if q == t:
+                like[i] = k
+                break
+            bend = normals[q, 0] * normals[t, 0] + normals[q, 1] * normals[t, 1] + normals[q, 2] * normals[t, 2]
+            ratio = depth[k] / depth[i]
+            if abs(bend) > f4(0.94) and f4(0.99) < ratio < f4(1.01):
+                like[i] = k
+                break
+    return like
+
+
 @njit(fastmath=FAST)
-def average_samples(pixels, samples, radiance):
-    """Each pixel becomes the mean of its four samples (premultiplied)."""
+def average_samples(pixels, samples, like, radiance):
+    """Each pixel becomes the mean of its four samples (premultiplied), each of which looks `like` one of them."""
     for i in range(pixels.shape[0]):
         p = U(pixels[i])
+        j, k, m, n = U(like[4 * i]), U(like[4 * i + 1]), U(like[4 * i + 2]), U(like[4 * i + 3])
         for c in range(4):
-            total = samples[4 * i, c] + samples[4 * i + 1, c] + samples[4 * i + 2, c] + samples[4 * i + 3, c]
-            radiance[p, c] = total * f4(0.25)
+            radiance[p, c] = (samples[j, c] + samples[k, c] + samples[m, c] + samples[n, c]) * f4(0.25)

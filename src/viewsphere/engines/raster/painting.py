@@ -65,13 +65,18 @@ def paint(baked: Baked, camera: Camera, visibility: Visibility, antialias: bool,
 
 
 def _smooth(baked: Baked, camera: Camera, samples: Samples, has_sky: bool, radiance: Float32) -> None:
-    """Edge pixels: every sample shaded, then their mean."""
+    """Edge pixels: the mean of their samples; those of a pixel that look alike are shaded once."""
     view = view_of(baked, camera, samples)
-    colors = np.zeros((len(samples.triangle), 4), np.float32)
-    _shade(baked, camera, view, samples.triangle, samples.inverse_depth, colors, samples)
+    normals = baked.geometry.triangle_normals
+    like = kernels_paint.shared_samples(samples.triangle, samples.inverse_depth, baked.owner, normals)
+    is_copy = like != np.arange(len(like))
+    colors = np.zeros((len(like), 4), np.float32)
+    colors[is_copy, 3] = 1  # the sky need not look there
+    triangle = np.where(is_copy, np.int32(-1), samples.triangle)
+    _shade(baked, camera, view, triangle, samples.inverse_depth, colors, samples)
     if has_sky:
         sky_behind(view, baked.surrounding, colors)
-    kernels_paint.average_samples(samples.pixels, colors, radiance)
+    kernels_paint.average_samples(samples.pixels, colors, like, radiance)
 
 
 def _shade(
@@ -84,7 +89,9 @@ def _shade(
     samples: Samples | None = None,
 ) -> None:
     """Shade samples over `radiance`; what is behind see-through surfaces first."""
-    solid, clear, ground = kernels_paint.sorted_samples(triangle, baked.kind)
+    solid, clear, ground = kernels_paint.sorted_samples(
+        triangle, baked.kind, baked.surfaces.material, len(baked.surfaces.looks)
+    )
     _shade_some(baked, view, solid, False, triangle, depth, radiance)
     _shade_some(baked, view, ground, True, triangle, depth, radiance)
     if len(clear):
