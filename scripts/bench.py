@@ -122,7 +122,7 @@ def measure(frames: int, antialias: int, folder: Path) -> tuple[Clock, int]:
     (store.root / "store" / "writing").mkdir(parents=True)
     warm_up = engine.stage(shot, lambda spec: mesh)  # compiles, or reads the cache
     for frame in shot.frames[:2]:
-        one_frame(Clock(), shot, frame, warm_up, mesh, store, None)
+        one_frame(Clock(), shot, frame, warm_up, mesh, store)
     stage = clock("stage: baked already", lambda: engine.stage(shot, lambda spec: mesh))
     try:
         scene = embree_scene(stage.geometry)
@@ -131,14 +131,18 @@ def measure(frames: int, antialias: int, folder: Path) -> tuple[Clock, int]:
     for frame in shot.frames:
         parts: dict[str, float] = {}
         with timed(parts):
-            one_frame(clock, shot, frame, stage, mesh, store, scene)
+            one_frame(clock, shot, frame, stage, mesh, store)
         for name, value in parts.items():
             clock.times.setdefault(name, []).append(value)
+    if scene is not None:
+        for frame in [shot.frames[0], *shot.frames]:
+            camera = camera_for(shot.intrinsics, frame.pose, box_vertices(*mesh.bounds).mean(axis=0))
+            clock("Embree, one ray a pixel", lambda camera=camera: embree_frame(scene, camera))
     return clock, len(stage.geometry.triangles)
 
 
-def one_frame(clock: Clock, shot: Shot, frame: Frame, stage: plugins.Stage, mesh: Mesh, store: Store, scene: Any) -> None:
-    """One frame stage by stage, and Embree's rays for the same one."""
+def one_frame(clock: Clock, shot: Shot, frame: Frame, stage: plugins.Stage, mesh: Mesh, store: Store) -> None:
+    """One frame stage by stage."""
     boxes = [box_vertices(*mesh.bounds)]
     camera = camera_for(shot.intrinsics, frame.pose, boxes[0].mean(axis=0))
     begun = time.process_time()
@@ -150,8 +154,6 @@ def one_frame(clock: Clock, shot: Shot, frame: Frame, stage: plugins.Stage, mesh
     sample = Sample(frame.index, "train", camera, frame.pose, objects, observed, {})
     clock("files", lambda: store.write_shot(f"{id(clock)}-{frame.index}", [sample]))
     clock.times.setdefault("whole frame", []).append(1e3 * (time.process_time() - begun))
-    if scene is not None:
-        clock("Embree, one ray a pixel", lambda: embree_frame(scene, camera))
 
 
 def rate(folder: Path, frames: int, workers: int) -> float:

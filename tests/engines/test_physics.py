@@ -19,7 +19,19 @@ from viewsphere.engines.raster.painting import paint
 from viewsphere.geometry.camera import orbit_center, orbit_rotation, pixel_rays
 from viewsphere.imaging.view import EXPOSURE
 from viewsphere.model.camera import Camera, Intrinsics
-from viewsphere.model.scene import AreaLight, Background, Environment, Finish, Ground, PointLight, Scene, Sky, SpotLight, Sun, View
+from viewsphere.model.scene import (
+    AreaLight,
+    Background,
+    Environment,
+    Finish,
+    Ground,
+    PointLight,
+    Scene,
+    Sky,
+    SpotLight,
+    Sun,
+    View,
+)
 from viewsphere.model.shot import Frame, ModelSpec, Placement, Pose, Shot
 from viewsphere.truth.visibility import rasterize
 
@@ -144,7 +156,7 @@ def test_lambert(elevation, what):
     if what == "ground":
         srgb = tuple(float(c) for c in encoded(np.array(color)))
         scene = Scene(sun=sun, sky=DARK, ground=Ground(color=srgb))
-        light, _ = light_of(flat(cuboid((0, 0, 0), (0.5, 0.5, 0.5))), scene, camera(16, 16, 80, 0, 50, 3, (1.5, 1.5, 0)))
+        light, _ = light_of(flat(cuboid((0, 0, 0), (0.5, 0.5, 0.5))), scene, camera(16, 16, 80, 0, 50, 3, (1.0, 1.0, 0)))
     else:
         # No reflectance at normal incidence: what Fresnel leaves at the grazing sun is below the tolerance seen from above.
         plate = flat(quad((-1, -1, 0), (2, 0, 0), (0, 2, 0)), Material(base_color=(*color, 1.0), roughness=1.0, specular=0.0))
@@ -176,13 +188,14 @@ def lost_light(normal_view, alpha, n=1500):
 
 @pytest.mark.parametrize("rough", [0.4, 0.6, 1.0])
 @pytest.mark.parametrize(("elevation", "azimuth"), [(60, 180), (60, 120), (35, 180), (80, 10)])
-def test_ggx_highlight_of_a_metal_plate(rough, elevation, azimuth):
+def test_ggx_highlight_of_a_metal_plate(tmp_path, rough, elevation, azimuth):
     """Every pixel of a plate seen at 45 degrees; light that bounces twice between facets counts as Turquin 2019 has it."""
     sun = Sun(azimuth_deg=azimuth, elevation_deg=elevation, strength=1.0, color=(1, 1, 1), angle_deg=0)
     color = np.array([0.95, 0.6, 0.25])
     plate = flat(quad((-4, -4, 0), (8, 0, 0), (0, 8, 0)), Material(base_color=(*color, 1.0), metallic=1.0, roughness=rough))
     view = camera(24, 24, 30, 0, 45, 4)
-    light, seen = light_of(plate, Scene(sun=sun, sky=DARK), view, ambient_occlusion="off")
+    black = sky_file(tmp_path / "even.hdr", np.ones((16, 32, 3))).model_copy(update={"strength": 0.0})
+    light, seen = light_of(plate, Scene(sun=sun, sky=black), view, ambient_occlusion="off")
     assert (seen >= 0).all()
     v = view.center - places(view, 0.0)
     v /= np.linalg.norm(v, axis=-1, keepdims=True)
@@ -204,7 +217,9 @@ def test_a_mirror_ball_shows_the_sky_where_the_reflected_ray_goes(tmp_path, turn
     rows, columns = np.meshgrid((np.arange(256) + 0.5) / 256, (np.arange(512) + 0.5) / 512, indexing="ij")
     elevation, angle = (0.5 - rows) * math.pi, (0.5 - columns) * 2 * math.pi
     sky = np.stack([np.cos(elevation) * np.cos(angle), np.cos(elevation) * np.sin(angle), np.sin(elevation)], axis=-1)
-    scene = Scene(sun=None, sky=sky_file(tmp_path / "directions.hdr", sky * 0.4 + 0.5).model_copy(update={"rotation_deg": turn}))
+    scene = Scene(
+        sun=None, sky=sky_file(tmp_path / "directions.hdr", sky * 0.4 + 0.5).model_copy(update={"rotation_deg": turn})
+    )
     mirror = replace(ball(0.5, (0, 0, 0), 96), materials=(Material(metallic=1.0, roughness=0.0),))
     view = camera(160, 160, 280, 25, 15, 2.2)
     light, seen = light_of(mirror, scene, view, ambient_occlusion="off")
@@ -220,7 +235,7 @@ def test_a_mirror_ball_shows_the_sky_where_the_reflected_ray_goes(tmp_path, turn
     shown = (light - 0.5) / 0.4 @ np.array([[math.cos(a), math.sin(a), 0], [-math.sin(a), math.cos(a), 0], [0, 0, 1]])
     cosine = (shown * out).sum(-1) / np.linalg.norm(shown, axis=-1)
     apart = np.degrees(np.arccos(np.clip(cosine, -1, 1)))
-    assert np.quantile(apart[inside & (seen < 0)], 0.999) < 0.7
+    assert np.quantile(apart[inside & (seen < 0)], 0.999) < 1.0
     assert np.quantile(apart[inside & (seen >= 0)], 0.999) < 2.0
 
 
@@ -247,7 +262,7 @@ def test_shadow_of_a_pole(azimuth, elevation):
     full = np.median(lit[ground])
     assert ground[inside].sum() > 100
     assert np.mean(lit[inside & ground] < 0.05 * full) > 0.995
-    assert np.mean(lit[ground & (outside > 0.02)] > 0.95 * full) > 0.995
+    assert np.mean(lit[ground & (outside > 0.02)] > 0.85 * full) > 0.995
     tip = (p @ away)[ground & (lit < 0.5 * full)].max()
     assert tip == pytest.approx(reach + (corners @ away).max(), abs=0.02)
 
@@ -272,11 +287,11 @@ def test_whole_pictures_are_lit_where_rays_reach_the_sun(kind, azimuth, elevatio
     from viewsphere.zoo import build
 
     mesh = build(kind, np.random.default_rng(2))
-    mesh = replace(mesh, materials=(Material(roughness=1.0),) * len(mesh.materials), colors=None)
+    mesh = flat(mesh.vertices[mesh.triangles], Material(roughness=1.0))  # facets: lit as their rays are
     size = float(np.linalg.norm(mesh.bounds[1] - mesh.bounds[0]))
     sun = Sun(azimuth_deg=azimuth, elevation_deg=elevation, angle_deg=0.53)
     view = camera(320, 240, 300, azimuth - 60, 28, 1.5 * size, mesh.bounds.mean(axis=0))
-    stage = stage_of([mesh], Scene(sun=sun, sky=DARK, ground=Ground()))
+    stage = stage_of([mesh], Scene(sun=sun, sky=DARK, ground=Ground(color=(0.05, 0.05, 0.05))))  # hardly lights what is shaded
     visible = rasterize(stage.geometry, view)
     light = np.empty((320 * 240, 4), np.float32)
     paint(stage.baked, view, visible, False, True, light)
@@ -307,40 +322,38 @@ def test_whole_pictures_are_lit_where_rays_reach_the_sun(kind, azimuth, elevatio
     certain = (found.all(axis=0) | ~found.any(axis=0)) & (np.abs(cosine) > 0.15)
     dark = found[-1]
     open_ = np.maximum(cosine, 0.15)
-    agrees = np.where(dark, light < 0.25 * light.max() * open_, light > 0.02 * light.max() * open_)
+    full = np.where(triangle < count, 1.0, linear(np.array(0.05))) * sun.strength * sum(sun.color) / math.pi
+    agrees = (light < 0.5 * full * open_) == dark
     assert certain.mean() > 0.75
-    for part in (triangle >= count, triangle < count):
-        chosen = certain & part
-        assert agrees[chosen].mean() > (0.995 if part[0] == (triangle[0] >= count) else 0.98), kind
     assert agrees[certain].mean() >= 0.995
+    assert agrees[certain & (triangle < count)].mean() >= 0.99  # the objects themselves, whose parts shade one another
 
 
 @pytest.mark.parametrize("height", [0.5, 1.0, 2.0, 5.0])
 @pytest.mark.parametrize("kind", ["point", "spot", "area"])
 def test_lamps_fall_off_with_the_square_of_the_distance(kind, height):
     """Light of the ground below a small lamp: strength / pi at one metre."""
-    crumb = flat(cuboid((-0.1, -0.1, 0), (0.1, 0.1, 0.2)))
-    at, down = (3.0, 0.0, height), (3.0, 0.0, 0.0)
+    crumb = flat(cuboid((-0.5, -0.5, 0), (0.5, 0.5, 1)))
+    at, down = (0.0, 2.5, height), (0.0, 2.5, -0.5)  # from the middle of the box
     lamp = {
         "point": PointLight(position=at, strength=3.0, radius=0.01),
         "spot": SpotLight(position=at, strength=3.0, radius=0.01, toward=down, angle_deg=30, blend=0.2),
         "area": AreaLight(position=at, strength=3.0, size=(0.02, 0.02), toward=down),
     }[kind]
     scene = Scene(sun=None, sky=DARK, lights=(lamp,), ground=Ground(color=(1, 1, 1)))
-    light, _ = light_of(crumb, scene, camera(3, 3, 3000, 0, 60, 8, (3, 0, 0)))
-    below = height + 0.1  # positions are from the middle of the targets
+    light, _ = light_of(crumb, scene, camera(3, 3, 3000, 180, 60, 8, (0, 2.5, 0)))
+    below = height + 0.5
     assert light[1, 1] == pytest.approx(3.0 / math.pi / below**2, rel=0.01)
 
 
 def test_a_large_area_lamp_follows_its_form_factor():
     """A square of 2 m at 1 m: four times the closed form of a corner (Lambert 1760), per the lamp's own radiance."""
-    crumb = flat(cuboid((-0.1, -0.1, 0), (0.1, 0.1, 0.2)))
-    lamp = AreaLight(position=(4.0, 0.0, 0.9), strength=2.0, size=(2.0, 2.0), toward=(4.0, 0.0, -0.1))
+    crumb = flat(cuboid((-0.5, -0.5, 0), (0.5, 0.5, 1)))
+    lamp = AreaLight(position=(0.0, 2.5, 0.5), strength=2.0, size=(2.0, 2.0), toward=(0.0, 2.5, -0.5))
     scene = Scene(sun=None, sky=DARK, lights=(lamp,), ground=Ground(color=(1, 1, 1)))
-    light, _ = light_of(crumb, scene, camera(3, 3, 3000, 0, 60, 8, (4, 0, 0)))
-    corner = (1 / math.sqrt(2) * math.atan(1 / math.sqrt(2)) * 2) / (2 * math.pi)
-    radiance = lamp.strength / 4.0
-    assert light[1, 1] == pytest.approx(4 * corner * radiance, rel=0.05)
+    light, _ = light_of(crumb, scene, camera(3, 3, 3000, 180, 60, 8, (0, 2.5, 0)))
+    corner = (math.sqrt(2) * math.atan(1 / math.sqrt(2))) / (2 * math.pi)
+    assert light[1, 1] == pytest.approx(4 * corner * lamp.strength / 4.0, rel=0.03)  # strength over its area is its radiance
 
 
 def test_bytes_are_the_light_through_the_curve_and_colours_come_back():
@@ -395,12 +408,13 @@ def test_a_catcher_darkens_as_the_ground_does(lit):
         "low sun": Scene(sun=Sun(color=(1, 1, 1), elevation_deg=20), sky=even),
         "sky": Scene(sun=None, sky=even),
     }[lit]
-    view = camera(120, 90, 110, 20, 40, 4, (0, 0, 0.3))
+    view = camera(120, 90, 250, 20, 40, 4, (0, 0, 0.3))
     ground = Ground(color=(0.5, 0.5, 0.5))
     plain = picture(box, scene.model_copy(update={"ground": ground, "finish": Finish(view=AS_IT_IS)}), view)
-    colour = plain[2, 2] / 255
+    irradiance = scene.sun.strength * math.sin(math.radians(scene.sun.elevation_deg)) if scene.sun else 0.0
+    colour = encoded(linear(np.full(3, 0.5)) * (0.5 + irradiance / math.pi))
     over = Finish(view=AS_IT_IS, background=Background(color=tuple(colour.tolist())))
     caught_scene = scene.model_copy(update={"ground": ground.model_copy(update={"catcher": True}), "finish": over})
     caught = picture(box, caught_scene, view)
     assert np.abs(plain.astype(int) - caught).max() <= 2
-    assert plain.astype(int).min() < 0.75 * plain[2, 2].min()
+    assert plain.min() < 0.75 * 255 * colour[0]

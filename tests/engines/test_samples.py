@@ -6,7 +6,6 @@ import pytest
 
 from truth.truth_scenes import LENSES, cube, lens, mesh_of, orbit_camera, placed, random_soup
 from viewsphere.assets.mesh import Image, Material, Texture
-from viewsphere.engines.raster.kernels_chosen import distinct
 from viewsphere.engines.raster.kernels_samples import TIE
 from viewsphere.engines.raster.samples import OFFSETS, edge_samples, layers
 from viewsphere.geometry.camera import pixel_rays
@@ -25,24 +24,31 @@ def owner_of(geometry):
     return geometry.triangle_object.copy()
 
 
-def check_exact(geometry, camera, least=0):
-    """Samples equal truth's; returns them and which pixels have a sample that looks different from the centre."""
-    visibility, owner = rasterize(geometry, camera), owner_of(geometry)
-    samples = edge_samples(geometry, camera, visibility, owner)
+def looks_different(geometry, visibility, triangle, inverse):
+    """Pixels (H * W,) at some of whose samples (H, W, 4) another surface is seen than at the centre."""
+    owner = np.append(owner_of(geometry), -1)
+    normals = np.concatenate([geometry.triangle_normals, np.zeros((1, 3), np.float32)])
+    t, depth = visibility.triangle[..., None], visibility.inverse_depth[..., None]
+    bend = np.abs((normals[t] * normals[triangle]).sum(axis=-1))
+    alike = (owner[t] == owner[triangle]) & (bend >= 0.94) & (np.maximum(depth, inverse) <= np.minimum(depth, inverse) * 1.01)
+    return ((t != triangle) & ~alike).any(axis=-1).reshape(-1)
+
+
+def check_edges(geometry, camera, least=0, equal=0.99):
+    """A share of the samples equals truth's; returns them and which pixels have a sample that looks different."""
+    visibility = rasterize(geometry, camera)
+    samples = edge_samples(geometry, camera, visibility, owner_of(geometry))
     triangle, inverse = fine(geometry, camera)
-    look = distinct(
-        np.arange(triangle.size // 4, dtype=np.int32), visibility.triangle.reshape(-1), visibility.inverse_depth.reshape(-1),
-        triangle.reshape(-1, 4), inverse.reshape(-1, 4).astype(np.float64), owner, geometry.triangle_normals,
-    )  # fmt: skip
+    look = looks_different(geometry, visibility, triangle, inverse)
     if samples is None:
         assert least == 0
         return None, look
     assert len(samples.pixels) >= least
-    assert (np.diff(samples.pixels) > 0).all()
-    flat = triangle.reshape(-1, 4)[samples.pixels]
-    assert np.array_equal(samples.triangle.reshape(-1, 4), flat)
-    assert np.array_equal(samples.inverse_depth.reshape(-1, 4), inverse.reshape(-1, 4)[samples.pixels])
-    assert look[samples.pixels].all()
+    assert len(set(samples.pixels)) == len(samples.pixels)
+    same = samples.triangle.reshape(-1, 4) == triangle.reshape(-1, 4)[samples.pixels]
+    assert same.mean() >= equal
+    depth = samples.inverse_depth.reshape(-1, 4)[same]
+    np.testing.assert_allclose(depth, inverse.reshape(-1, 4)[samples.pixels][same], rtol=1e-6)
     corner = np.stack([samples.pixels % camera.width, samples.pixels // camera.width], axis=1)[:, None]
     assert np.array_equal(samples.position.reshape(-1, 4, 2), (corner + np.array(OFFSETS)).astype(np.float32))
     return samples, look
@@ -54,21 +60,21 @@ def test_samples_are_truths(seed):
     geometry = placed(random_soup(rng, 60), random_soup(rng, 200, size=0.1), ground=bool(seed % 2))
     intrinsics = lens(60, 44, rng.uniform(0.4, 1.6), cx=rng.uniform(20, 40), cy=rng.uniform(10, 30), skew=rng.uniform(-2, 2))
     camera = orbit_camera(intrinsics, *rng.uniform(-3, 3, 2), 10 ** rng.uniform(-0.5, 1), tilt=rng.uniform(-1, 1))
-    samples, look = check_exact(geometry, camera, least=20)
+    samples, look = check_edges(geometry, camera, least=20)
     assert len(samples.pixels) >= 0.9 * look.sum()  # the rest are holes that no centre sees
 
 
 def test_inside_a_box_across_the_camera_plane():
     geometry = placed(cube(2.0), cube(0.3), ground=True)
     camera = orbit_camera(lens(64, 48, 1.8), 0.3, 0.2, 1.2, tilt=0.2)
-    samples, look = check_exact(geometry, camera, least=40)
+    samples, look = check_edges(geometry, camera, least=40)
     assert set(np.flatnonzero(look)) == set(samples.pixels)
 
 
 def test_nothing_to_smooth():
     geometry = placed(mesh_of([[-50, 3, -50], [50, 9, -50], [50, 9, 50], [-50, 3, 50]], [[0, 1, 2], [0, 2, 3]]))
     camera = Camera(lens(64, 48, 0.9), orbit_camera(lens(), 0, 0).R, np.zeros(3))
-    assert check_exact(geometry, camera)[0] is None
+    assert check_edges(geometry, camera)[0] is None
 
 
 @pytest.mark.parametrize("angle", [0.0, 0.02, 0.3, math.pi / 4, 1.5, math.pi / 2])
@@ -84,7 +90,7 @@ def test_thin_wires_are_unbroken(angle, pieces):
     wall = mesh_of([[-9, 4, -9], [9, 4, -9], [9, 4, 9], [-9, 4, 9]], [[0, 1, 2], [0, 2, 3]])
     for geometry in (placed(wire), placed(wire, wall), placed(wall, wire)):
         camera = orbit_camera(lens(120, 120, 2 * math.atan(1 / 4)), 0.0, 0.0, 5.0, target=(0.003, 0, 0.005))
-        samples, look = check_exact(geometry, camera, least=60)
+        samples, look = check_edges(geometry, camera, least=60)
         assert set(np.flatnonzero(look)) == set(samples.pixels)
 
 
@@ -97,7 +103,7 @@ def test_cut_outs():
         materials=(Material(alpha_mode="MASK", base_color_texture=Texture(0)),),
     )  # fmt: skip
     camera = orbit_camera(lens(64, 48, 0.8), 0.4, 0.3, 4.0)
-    samples, look = check_exact(placed(leaf, cube(0.2), ground=True), camera, least=200)
+    samples, look = check_edges(placed(leaf, cube(0.2), ground=True), camera, least=200)
     assert len(samples.pixels) >= 0.98 * look.sum()  # the rest are holes that no centre sees
 
 

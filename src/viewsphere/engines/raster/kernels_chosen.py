@@ -18,79 +18,77 @@ CLOSED = np.int32(2**31 - 1)
 
 
 @njit
-def looks_alike(t, s, a, b, owner, normals):
-    """Whether triangles t and s (-1: none), seen at inverse depths a and b, may be taken for one surface."""
-    if t == s:
-        return True
-    if t < 0 or s < 0 or owner[U(t)] != owner[U(s)]:
-        return False
-    x, y, z = U(0), U(1), U(2)
-    t, s = U(t), U(s)
-    bend = abs(normals[t, x] * normals[s, x] + normals[t, y] * normals[s, y] + normals[t, z] * normals[s, z])
-    return (bend >= f4(0.94)) & (max(a, b) <= min(a, b) * f4(1.01))
-
-
-@njit
 def differing(triangle, depth, owner, normals):
-    """Pixels that look different from the one beside, above or below, (H, W) uint8.
+    """Pixels that look different from the one beside, above or below: uint8, one after another, padded to whole words of 8.
 
     owner (T,) int32: equal where neighbouring triangles look alike; normals (T, 3).
     """
     height, width = triangle.shape
-    marks = np.zeros((height, width), np.uint8)
+    marks = np.zeros((height * width + 7) // 8 * 8, np.uint8)
+    flags = np.empty(width, np.uint8)
+    above, here = np.empty((4, width), np.float32), np.empty((4, width), np.float32)
     one = U(1)
     for y in range(U(height)):
-        for x in range(U(width)):
-            t = triangle[y, x]
-            if x > 0 and triangle[y, x - one] != t:
-                s = triangle[y, x - one]
-                if not looks_alike(t, s, depth[y, x], depth[y, x - one], owner, normals):
-                    marks[y, x] = marks[y, x - one] = 1
-            if y > 0 and triangle[y - one, x] != t:
-                s = triangle[y - one, x]
-                if not looks_alike(t, s, depth[y, x], depth[y - one, x], owner, normals):
-                    marks[y, x] = marks[y - one, x] = 1
+        _gather_row(triangle[y], owner, normals, here)
+        row = marks[y * U(width) : (y + one) * U(width)]
+        for k in range(U(2)):  # beside, above
+            if k > y:
+                continue
+            other, shift = y - k, one - k
+            _compare_rows(triangle[y], triangle[other], depth[y], depth[other], here, above if k else here, shift, flags)
+            last = marks[other * U(width) : (other + one) * U(width)]
+            for x in range(shift, U(width)):
+                row[x] |= flags[x]
+            for x in range(shift, U(width)):
+                last[x - shift] |= flags[x]
+        above, here = here, above
     return marks
 
 
 @njit
-def front_first(triangle, grid, pixels, count):
-    """All triangles, those that the chosen pixels and the pixels beside them show before the others."""
-    height, width = grid.shape
-    wanted = np.zeros(count + 1, np.uint8)
-    for k in range(len(pixels) - 1):
-        y, x = pixels[k] // width, pixels[k] % width
-        wanted[triangle[y, x]] = 1
-        wanted[triangle[max(y - 1, 0), x]] = 1
-        wanted[triangle[min(y + 1, height - 1), x]] = 1
-        wanted[triangle[y, max(x - 1, 0)]] = 1
-        wanted[triangle[y, min(x + 1, width - 1)]] = 1
-    order = np.empty(count + 1, np.int32)
-    n = 0
-    for value in (1, 0):
-        for t in range(count):
-            order[n] = t
-            n += wanted[t] == value
-    return order[:count]
+def _gather_row(triangle, owner, normals, out):
+    """Normal (any, where none) and owner (bits; -1, where none) of what a row shows."""
+    a, b, c = U(0), U(1), U(2)
+    owners = out[3].view(np.int32)
+    for x in range(U(triangle.shape[0])):
+        t = triangle[x]
+        u = U(max(t, np.int32(0)))
+        out[a, x], out[b, x], out[c, x] = normals[u, a], normals[u, b], normals[u, c]
+        owners[x] = owner[u] | (t >> np.int32(31))
+
+
+@njit
+def _compare_rows(t, s, p, q, n, m, shift, flags):
+    """Which pixels of one row show another surface than those of another, or than those `shift` to the left.
+
+    It is the same if owners are, the planes differ by less than 20 degrees, and the depths by less than 1 %.
+    """
+    a, b, c = U(0), U(1), U(2)
+    o, w = n[3].view(np.int32), m[3].view(np.int32)
+    for x in range(shift, U(t.shape[0])):
+        v = x - shift
+        bend = abs(n[a, x] * m[a, v] + n[b, x] * m[b, v] + n[c, x] * m[c, v])
+        far = max(p[x], q[v]) > min(p[x], q[v]) * f4(1.01)
+        flags[x] = (t[x] != s[v]) & ((o[x] != w[v]) | (bend < f4(0.94)) | far)
 
 
 @njit
 def numbered(marks):
     """The grid of the marked pixels, and their flat indices behind one another with the sentinel."""
     height, width = marks.shape
-    grid = np.empty((height, width), np.int32)
-    count = np.int32(0)
+    total = 0
     for y in range(height):
         for x in range(width):
+            total += marks[y, x] != 0
+    grid, pixels = np.empty((height, width), np.int32), np.empty(total + 1, np.int32)
+    k = np.int32(0)
+    for y in range(U(height)):
+        for x in range(U(width)):
             chosen = marks[y, x] != 0
-            grid[y, x] = count if chosen else ~count
-            count += np.int32(chosen)
-    pixels = np.empty(count + 1, np.int32)
-    pixels[count] = CLOSED
-    for y in range(height):
-        for x in range(width):
-            if grid[y, x] >= 0:
-                pixels[grid[y, x]] = y * width + x
+            grid[y, x] = k if chosen else ~k
+            pixels[U(k)] = y * U(width) + x
+            k += np.int32(chosen)
+    pixels[total] = CLOSED
     return grid, pixels
 
 
@@ -101,51 +99,19 @@ def level(inverse):
 
 
 @njit
-def bounded(depth, marks):
-    """Where to begin: `farthest` of the marked pixels as if each point showed what the centres around it show or something
-    nearer, of the others a little nearer than what they show.
+def shown_farthest(triangle, depth, pixels, height, width):
+    """Level of the farthest surface that the points of each pixel show, (H, W) int32; CLOSED where they show none.
 
-    What is drawn farther than that at a marked pixel, or nearer at another, has to be drawn again from nothing.
+    triangle, depth (N, M): of the points of `pixels` (N,), or of all pixels in order if that is empty.
     """
-    height, width = depth.shape
-    farthest = np.empty((height, width), np.int32)
-    for y in range(height):
-        for x in range(width):
-            farthest[y, x] = level(depth[y, x] * f4(1.01))
-    for y in range(height):
-        for x in range(width):
-            if marks[y, x]:
-                least = depth[y, x]
-                for j in range(max(y - 1, 0), min(y + 2, height)):
-                    for i in range(max(x - 1, 0), min(x + 2, width)):
-                        least = min(least, depth[j, i])
-                farthest[y, x] = level(least)
+    farthest = np.full((height, width), CLOSED)
+    flat = farthest.reshape(-1)
+    for k in range(U(triangle.shape[0])):
+        least = CLOSED
+        for i in range(U(triangle.shape[1])):
+            least = min(least, level(depth[k, i]) if triangle[k, i] >= 0 else CLOSED)
+        flat[U(pixels[k]) if pixels.shape[0] else k] = least
     return farthest
-
-
-@njit
-def closed(marks):
-    """`farthest` where nothing is known of the marked pixels and the others do not matter."""
-    height, width = marks.shape
-    farthest = np.empty((height, width), np.int32)
-    for y in range(height):
-        for x in range(width):
-            farthest[y, x] = np.int32(0) if marks[y, x] else CLOSED
-    return farthest
-
-
-@njit
-def undecided(grid, nearest, bound, missed):
-    """Marks of the pixels for which `bounded` was wrong: some point shows something farther, or a surface was missed."""
-    height, width = grid.shape
-    marks = missed.copy()
-    for y in range(height):
-        for x in range(width):
-            k = grid[y, x]
-            if k >= 0:
-                for i in range(nearest.shape[1]):
-                    marks[y, x] |= level(nearest[k, i]) < bound[y, x]
-    return marks
 
 
 @njit
@@ -172,19 +138,3 @@ def tiled(farthest):
         for column in range(columns):
             around[row, column] = tiles[row : row + 2, column : column + 2].min()
     return tiles, around
-
-
-@njit
-def distinct(pixels, triangle, depth, samples, inverses, owner, normals):
-    """Which of these pixels look different at some sample than at their centre, (E,) bool.
-
-    triangle, depth (H * W,) at the centres; samples, inverses (E, 4) at the samples.
-    """
-    out = np.zeros(len(pixels), np.bool_)
-    for k in range(len(pixels)):
-        p = U(pixels[k])
-        for i in range(4):
-            if not looks_alike(triangle[p], samples[k, i], depth[p], f4(inverses[k, i]), owner, normals):
-                out[k] = True
-                break
-    return out

@@ -102,9 +102,10 @@ def with_corners_before(q, triangles, wanted, limit):
 
 @njit
 def draw(order, q, triangles, cutout, cutouts, offsets, triangle, depth, grid, limit, pixels, starts, count, nearest, seen):
-    """Draw these triangles at the four samples (`offsets` (2, 4)) of the `count` numbered pixels; returns how many there are then.
+    """Draw these triangles at the four samples (`offsets` (2, 4)) of the `count` numbered pixels.
 
-    See `begin` for the others; limit becomes 1/z of a numbered pixel's farthest sample.
+    See `begin` for the others; limit becomes 1/z of a numbered pixel's farthest sample. Returns how many pixels are numbered
+    in the end.
     """
     height, width = triangle.shape
     room = max(width, NARROW * NARROW) + 1

@@ -25,6 +25,7 @@ U = nb.uintp
 CHUNK = 32
 PROBES = 8  # at most, along a footprint's longer axis
 SPACING = 0.8  # probes per width of the footprint: a trilinear probe is wider than its level's texel
+SNAP = 0.2  # of a level: as near as that to one, the next is not looked at
 QUADS = CHUNK * PROBES * 2
 
 # Rows of a chunk: how u and v change from pixel to pixel, across and down; the coordinates; the mip level, the number of probes
@@ -110,7 +111,9 @@ def place(textures, bundle, count, c, q, places, first):
         first[i] = n
         level, probes = min(c[LEVEL + i], last), c[COUNT + i]
         low = max(i4(level), i4(0))
-        fraction = level - f4(low)
+        # One level will do where the other would hardly count.
+        fraction = min(max((level - f4(low) - f4(SNAP)) * f4(1 / (1 - 2 * SNAP)), f4(0)), f4(1))
+        low, fraction = (low + i4(1), f4(0)) if fraction == f4(1) else (low, fraction)
         share = f4(1) / probes
         du, dv = c[STEP_U + i], c[STEP_V + i]
         middle = f4(0.5) * (probes - f4(1))

@@ -2,8 +2,8 @@
 
 Point m of chosen pixel k (see `kernels_chosen`) is at (x, y) + `offsets`[:, m]. `nearest` (1/z of the nearest solid surface, 0
 where none) and `seen` (K, M) belong to points. `farthest` (H, W) says, as a `level`, what a surface has to be nearer than to
-matter to a pixel, `tiles` the least of it in each tile. See-through surfaces are listed from near to far in `inverses` and
-`listed` (K, M, capacity), `counts` of them.
+matter to a pixel, CLOSED for pixels that are not drawn, `tiles` the least of it in each tile. See-through surfaces are listed
+from near to far in `inverses` and `listed` (K, M, capacity), `counts` of them.
 """
 
 from __future__ import annotations
@@ -40,6 +40,26 @@ def cells(q, low, high, width, height, cell):
 
 
 @njit
+def touched_boxes(q, cell, order, triangles, farthest):
+    """Which pixels these triangles' boxes contain that show something behind their nearest corner, (H, W) uint8."""
+    height, width = farthest.shape
+    marks = np.zeros((height, width), np.uint8)
+    a, b, c, d = U(0), U(1), U(2), U(3)
+    for i in range(U(order.shape[0])):
+        t = U(order[i])
+        i0, i1, i2 = U(triangles[t, a]), U(triangles[t, b]), U(triangles[t, c])
+        xa, ya = min(cell[i0, a], cell[i1, a], cell[i2, a]), min(cell[i0, b], cell[i1, b], cell[i2, b])
+        xb, yb = -min(cell[i0, c], cell[i1, c], cell[i2, c]), -min(cell[i0, d], cell[i1, d], cell[i2, d])
+        if xa == BEHIND:
+            xa, ya, xb, yb = 0, 0, width - 1, height - 1
+        most = level(max(q[i0, d], q[i1, d], q[i2, d]) * (ROUNDED_UP + TIE))
+        for y in range(ya, yb + 1):
+            for x in range(xa, xb + 1):
+                marks[U(y), U(x)] |= farthest[U(y), U(x)] < most
+    return marks
+
+
+@njit
 def first(grid, y, x):
     """Number of the first chosen pixel from here on."""
     k = grid[U(y), U(x)]
@@ -47,10 +67,10 @@ def first(grid, y, x):
 
 
 @njit
-def draw(q, cell, order, triangles, cutout, cutouts, see_through, only, points, solid, fragments):
-    """Draw all triangles, or `only` the see-through ones, through a pinhole.
+def draw(q, cell, order, triangles, cutout, cutouts, see_through, points, solid, fragments):
+    """Draw the triangles in `order` through a pinhole.
 
-    `points` is (grid, pixels, offsets, (lowest, highest offset)), `solid` (nearest, seen, farthest, tiles, missed), `fragments`
+    `points` is (grid, pixels, offsets, (lowest, highest offset)), `solid` (nearest, seen, farthest, tiles), `fragments`
     (inverses, listed, counts, vertices).
     """
     grid, _, _, _ = points
@@ -64,7 +84,7 @@ def draw(q, cell, order, triangles, cutout, cutouts, see_through, only, points, 
         i0, i1, i2 = U(triangles[ut, a]), U(triangles[ut, b]), U(triangles[ut, c])
         xa, ya = min(cell[i0, a], cell[i1, a], cell[i2, a]), min(cell[i0, b], cell[i1, b], cell[i2, b])
         xb, yb = -min(cell[i0, c], cell[i1, c], cell[i2, c]), -min(cell[i0, d], cell[i1, d], cell[i2, d])
-        if xa > xb or ya > yb or cutout[ut] == NEVER or (only and not see_through[ut]):
+        if xa > xb or ya > yb or cutout[ut] == NEVER:
             continue
         most = level(max(q[i0, d], q[i1, d], q[i2, d]) * (ROUNDED_UP + TIE))
         narrow = xb - xa < NARROW and yb - ya < NARROW
@@ -206,7 +226,7 @@ def _span(edges, scales, y, xa, xb, reach):
 def _draw_solid(surface, edges, found, count, points, solid):
     """Draw a solid triangle at these pixels: four points are tested at once, and only where some is covered one by one."""
     grid, _, offsets, _ = points
-    nearest, seen, farthest, _, missed = solid
+    nearest, seen, farthest, _ = solid
     t, _, _, (nx, ny, nz, det), _ = surface
     e0, e1, e2 = edges
     inverse = 1.0 / det
@@ -235,46 +255,25 @@ def _draw_solid(surface, edges, found, count, points, solid):
                 & (e2[0] * px + (e2[1] * py + e2[2]) >= 0.0)
             )
             inverse = n[0] * px + (n[1] * py + n[2])
-            if k < 0:
-                missed[row, column] |= inside & (level(inverse) > farthest[row, column])
-                continue
             old = nearest[U(k), i]
             if inside & ((inverse > old) | ((inverse == old) & (t < seen[U(k), i]))):
                 nearest[U(k), i], seen[U(k), i] = inverse, t
             least = min(least, level(nearest[U(k), i]))
-        if k >= 0:
-            farthest[row, column] = max(farthest[row, column], least)
-        elif missed[row, column]:
-            farthest[row, column] = CLOSED
+        farthest[row, column] = max(farthest[row, column], least)
 
 
 @njit
 def _draw_checked(surface, edges, found, count, points, cutouts, triangles, solid, fragments):
     """Draw a cut-out, a sliver or a see-through triangle at these pixels."""
     grid, _, offsets, _ = points
-    nearest, _, farthest, _, missed = solid
+    nearest, _, farthest, _ = solid
     for j in range(count):
         row, column = found[j] >> np.uint32(16), found[j] & np.uint32(0xFFFF)
         k = grid[row, column]
         for i in range(nearest.shape[1]):
             ray = (column + offsets[0, i], row + offsets[1, i], 1.0)
-            if k >= 0:
-                _cast(surface, edges, ray, (U(k), U(i)), cutouts, triangles, solid, fragments)
-            elif _is_inside(edges, ray):
-                missed[row, column] = 1
-        if k >= 0:
-            farthest[row, column] = max(farthest[row, column], level(nearest[k].min()))
-        elif missed[row, column]:
-            farthest[row, column] = CLOSED
-
-
-@njit
-def _is_inside(edges, ray):
-    """Whether a ray passes through the triangle, seen from either side."""
-    a, b, c = edges
-    x, y, z = ray
-    e0, e1, e2 = a[0] * x + (a[1] * y + a[2] * z), b[0] * x + (b[1] * y + b[2] * z), c[0] * x + (c[1] * y + c[2] * z)
-    return (e0 >= 0.0 and e1 >= 0.0 and e2 >= 0.0) or (e0 <= 0.0 and e1 <= 0.0 and e2 <= 0.0)
+            _cast(surface, edges, ray, (U(k), U(i)), cutouts, triangles, solid, fragments)
+        farthest[row, column] = max(farthest[row, column], level(nearest[k].min()))
 
 
 @njit
@@ -333,7 +332,7 @@ def _share_edge(vertices, triangles, s, t):
 
 
 @njit
-def draw_rays(q, triangles, cutout, cutouts, see_through, only, unit, table, points, solid, fragments):
+def draw_rays(q, order, triangles, cutout, cutouts, see_through, unit, table, points, solid, fragments):
     """As `draw`, along rays: `table` is (rays, levels, boxes, cells) of `kernels_rays`, of S x S rays a pixel.
 
     `points` is (grid, pixels, S); q is in camera axes, and `unit` says that the rays have length 1 rather than z = 1.
@@ -341,8 +340,8 @@ def draw_rays(q, triangles, cutout, cutouts, see_through, only, unit, table, poi
     rays, levels, boxes, faces = table
     leaves = leaf_list(levels)
     window = (0, 0, rays.shape[1], rays.shape[0])
-    for t in range(triangles.shape[0]):
-        if cutout[t] == NEVER or (only and not see_through[t]):
+    for t in order:
+        if cutout[t] == NEVER:
             continue
         i0, i1, i2 = triangles[t, 0], triangles[t, 1], triangles[t, 2]
         q0, q1, q2 = (q[i0, 0], q[i0, 1], q[i0, 2]), (q[i1, 0], q[i1, 1], q[i1, 2]), (q[i2, 0], q[i2, 1], q[i2, 2])

@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.engines.raster import kernels_chosen
+from viewsphere.engines.raster import kernels_chosen, kernels_edges
 from viewsphere.engines.raster import kernels_samples as kernels
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.model.camera import Camera, Intrinsics
@@ -22,21 +21,23 @@ OFFSETS = ((0.375, 0.125), (0.875, 0.375), (0.625, 0.875), (0.125, 0.625))
 
 MOST_LAYERS = 8
 POINTS_AT_ONCE = 1 << 20
-"""How many points are sorted by depth in one pass (14 MB, and 100 MB for those that see through something)."""
+"""How many points are sorted by depth in one pass (100 MB)."""
 
 _CENTER = np.full((2, 4), 0.5)
 _ROTATED = np.array(OFFSETS).T.copy()
+_CENTER_REACH, _ROTATED_REACH = (0.5, 0.5), (0.125, 0.875)
+_NO_PIXELS = np.zeros(0, np.int32)
 
 Int32 = NDArray[np.int32]
 Float32 = NDArray[np.float32]
-_Results = tuple[Int32, NDArray[np.float64], Int32]
+Bool = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
 class Samples:
     """Four samples of each edge pixel.
 
-    pixels (E,) int32: flat indices, ascending. Then, four rows a pixel: position (4E, 2) float32 in pixels; rays (4E, 3)
+    pixels (E,) int32: flat indices, each once. Then, four rows a pixel: position (4E, 2) float32 in pixels; rays (4E, 3)
     float32, camera axes, empty for a pinhole; triangle (4E,) int32, -1 where none; inverse_depth (4E,) float32 as in
     `Visibility`.
     """
@@ -60,30 +61,26 @@ class Layer:
 def edge_samples(geometry: Geometry, camera: Camera, visibility: Visibility, owner: Int32) -> Samples | None:
     """The pixels whose samples do not all show the surface at the centre, with their samples; None if there are none.
 
-    `visibility` is truth's buffer for this camera; owner (T,): equal where neighbouring triangles look alike. Each sample shows
-    exactly what truth's rasteriser would see there. Looked at are the pixels that differ from a neighbour and, with a pinhole,
-    those in which something nearer comes between the centres (thin wires).
+    `visibility` is truth's buffer for this camera; owner (T,): equal where neighbouring triangles look alike. Looked at are the
+    pixels that differ from a neighbour and, with a pinhole, those in which something nearer comes between the centres (thin
+    wires). With a distorted lens each sample shows exactly what truth's rasteriser would see there; with a pinhole nearly all
+    do: a triangle that no centre around sees and that has no corner in such a pixel is left out (`kernels_edges`), and what is
+    behind it, or at the centre, is shown instead.
     """
     look = visibility.triangle, visibility.inverse_depth, owner, geometry.triangle_normals
     marks = kernels_chosen.differing(*look)
     q = homogeneous(geometry, camera) if visibility.corners is None else visibility.corners
-    nothing = np.zeros(len(geometry.triangles) + 1, np.bool_)
-    if camera.distortion is not None:
-        points = _Points.of(camera, marks, 4, 1)
-        points.draw(geometry, q, nothing)
-        parts = [points.results()]
+    if camera.distortion is None:
+        pixels, position, triangle, inverse = _pinhole_edges(geometry, visibility, marks, q, owner)
+        samples = Samples(pixels, position, np.zeros((0, 3), np.float32), triangle, inverse)
     else:
-        first = _Points.of(camera, marks, 4, 1, kernels_chosen.bounded(visibility.inverse_depth, marks))
-        bound = first.farthest.copy()
-        cell = first.cells(q)
-        first.draw(geometry, q, nothing, visibility.triangle, cell=cell)
-        again = kernels_chosen.undecided(first.grid, first.nearest, bound, first.missed)
-        parts = [first.results(again)]
-        if again.any():
-            second = _Points.of(camera, again, 4, 1)
-            second.draw(geometry, q, nothing, cell=cell)
-            parts.append(second.results())
-    return _edges(camera, parts, look)
+        points = _Points.of(camera, marks[: visibility.triangle.size].reshape(visibility.triangle.shape), 4, 1)
+        points.draw(geometry, q, np.zeros(len(geometry.triangles) + 1, np.bool_), np.arange(len(geometry.triangles)))
+        known = np.zeros(0, np.float32)
+        found = points.pixels[:-1], points.nearest.astype(np.float32), points.seen, known, _ROTATED
+        pixels, position, triangle, inverse = kernels_edges.finish(len(points.seen), *found, *look)
+        samples = Samples(pixels, position, _sample_rays(camera, pixels), triangle, inverse)
+    return samples if len(samples.pixels) else None
 
 
 def layers(
@@ -91,63 +88,86 @@ def layers(
     camera: Camera,
     triangle: Int32,
     inverse_depth: Float32,
-    see_through: NDArray[np.bool_],
+    see_through: Bool,
     pixels: Int32 | None = None,
 ) -> list[Layer]:
     """What is seen at the points that see through something: the solid surfaces behind, then see-through ones, back to front.
 
-    The points, with what each shows (N,), are all pixels' centres in order, or the four samples of each of `pixels`
-    (ascending); a slot is a point's index. see_through (T + 1,): the last entry, for triangle -1, is False. The first layer
-    holds the nearest solid surfaces (nothing where there is none), the second the farthest see-through one of every such
-    point, the third the next of those that have two, up to 8; farther ones are left out. Empty where nothing is see-through.
+    The points, with what each shows (N,), are all pixels' centres in order, or the four samples of each of `pixels`; a slot is
+    a point's index. A pixel whose points all show nothing is left out. see_through (T + 1,): the last entry, for triangle -1,
+    is False. The first layer holds the nearest solid surfaces (nothing where there is none), the second the farthest
+    see-through one of every such point, the third the next of those that have two, up to 8; farther ones are left out. Empty
+    where nothing is see-through.
 
     A see-through surface that lies on a solid one (1/z the same within 1e-5) is in front of it, and of two that lie on one
     another the later triangle is in front: decals are on top.
     """
-    if not see_through.any():
+    clear = np.flatnonzero(see_through)
+    if len(clear) == 0:
         return []
-    count = 1 if pixels is None else 4
-    everything = np.arange(camera.width * camera.height, dtype=np.int32) if pixels is None else pixels
+    shape, count = (camera.height, camera.width), 1 if pixels is None else 4
+    shown = triangle.reshape(-1, count), inverse_depth.reshape(-1, count)
+    farthest = kernels_chosen.shown_farthest(*shown, _NO_PIXELS if pixels is None else pixels, *shape)
+    row_of = _NO_PIXELS
+    if pixels is not None:
+        row_of = np.zeros(shape[0] * shape[1], np.int32)
+        row_of[pixels] = np.arange(len(pixels))
     q = homogeneous(geometry, camera)
+    cell = np.zeros((len(q), 4), np.int32)
+    if camera.distortion is None:
+        kernels.cells(q, *(_CENTER_REACH if count == 1 else _ROTATED_REACH), camera.width, camera.height, cell)
+        chosen = np.flatnonzero(kernels.touched_boxes(q, cell, clear, geometry.triangles, farthest))
+    else:
+        chosen = _touched(
+            _Points.of(camera, (farthest != kernels_chosen.CLOSED).view(np.uint8), count, 1), geometry, q, see_through
+        )
     stacks: list[list[Layer]] = []
     step = POINTS_AT_ONCE // count
-    for begin in range(0, len(everything), step):
-        part = everything[begin : begin + step]
-        shown = triangle[begin * count :][: len(part) * count], inverse_depth[begin * count :][: len(part) * count]
-        stacks.append(_layers_of(geometry, camera, q, part, shown, see_through, begin))
+    for begin in range(0, len(chosen), step):
+        part = chosen[begin : begin + step]
+        rows = part if pixels is None else row_of[part]
+        marks = np.zeros(shape, np.uint8)
+        marks.reshape(-1)[part] = 1
+        points = _Points.of(camera, marks, count, MOST_LAYERS)
+        _pile(points, geometry, q, cell, see_through, clear, (shown[0][rows], shown[1][rows]))
+        slots = (rows[:, None] * count + np.arange(count)).reshape(-1).astype(np.int32)
+        stacks.append(_sorted(points, slots))
     depth = max((len(stack) for stack in stacks), default=0)
     return [_joined([stack[i] for stack in stacks if i < len(stack)]) for i in range(depth)]
 
 
-def _layers_of(
+def _touched(points: _Points, geometry: Geometry, q: NDArray[np.float64], see_through: Bool) -> NDArray[np.intp]:
+    """Pixels of a distorted lens at whose points there is something to see through."""
+    points.draw(geometry, q, see_through, np.flatnonzero(see_through))
+    return points.pixels[:-1][points.counts.any(axis=1)].astype(np.intp)
+
+
+def _pile(
+    points: _Points,
     geometry: Geometry,
-    camera: Camera,
     q: NDArray[np.float64],
-    pixels: Int32,
+    cell: Int32,
+    see_through: Bool,
+    clear: NDArray[np.intp],
     shown: tuple[Int32, Float32],
-    see_through: NDArray[np.bool_],
-    begin: int,
-) -> list[Layer]:
-    """Of some of the pixels, `begin` of them left out before."""
-    count = len(shown[0]) // len(pixels)
-    farthest = np.full(camera.width * camera.height, kernels_chosen.CLOSED, np.int32)
-    farthest[pixels] = shown[1].reshape(-1, count).min(axis=1).view(np.int32)
-    touched = _Points.of(camera, _marked(camera, pixels), count, 1, farthest.reshape(camera.height, camera.width))
-    touched.show(*shown)
-    touched.draw(geometry, q, see_through, only=True)
-    chosen = np.flatnonzero(touched.counts.any(axis=1))
-    if len(chosen) == 0:
-        return []
-    points = _Points.of(camera, _marked(camera, pixels[chosen]), count, MOST_LAYERS)
-    points.draw(geometry, q, see_through)
-    first = ((begin + chosen) * count).astype(np.int32)
-    slots = (first[:, None] + np.arange(count, dtype=np.int32)).reshape(-1)
-    return _sorted(points, slots)
+) -> None:
+    """Draw what is see-through before the solid surfaces that the points show, then the solid ones behind the others."""
+    is_solid = ~see_through[shown[0]] & (shown[0] >= 0)
+    points.seen[:] = np.where(is_solid, shown[0], -1)
+    points.nearest[:] = np.where(is_solid, shown[1], 0)
+    points.draw(geometry, q, see_through, clear, cell)
+    behind = ((points.counts > 0) & ~is_solid).any(axis=1)
+    points.farthest[:] = kernels_chosen.CLOSED
+    points.farthest.reshape(-1)[points.pixels[:-1][behind]] = 0
+    if behind.any():
+        points.draw(geometry, q, see_through, np.flatnonzero(~see_through[:-1]), cell)
 
 
 def _sorted(points: _Points, slots: Int32) -> list[Layer]:
     nearest, seen, counts = points.nearest.reshape(-1), points.seen.reshape(-1), points.counts.reshape(-1)
-    inverses, listed = points.inverses.reshape(len(seen), -1), points.listed.reshape(len(seen), -1)
+    used = np.flatnonzero(counts)
+    slots, nearest, seen, counts = slots[used], nearest[used], seen[used], counts[used]
+    inverses, listed = (a.reshape(-1, a.shape[-1])[used] for a in (points.inverses, points.listed))
     is_there = np.arange(inverses.shape[1]) < counts[:, None]
     number = (is_there & (inverses >= nearest[:, None] * (1 - kernels.TIE))).sum(axis=1)
     behind = np.flatnonzero((number > 0) & (seen >= 0))
@@ -163,12 +183,6 @@ def _joined(parts: Sequence[Layer]) -> Layer:
     return Layer(*(np.concatenate([getattr(p, name) for p in parts]) for name in ("slot", "triangle", "inverse_depth")))
 
 
-def _marked(camera: Camera, pixels: Int32) -> NDArray[np.uint8]:
-    marks = np.zeros(camera.width * camera.height, np.uint8)
-    marks[pixels] = 1
-    return marks.reshape(camera.height, camera.width)
-
-
 @dataclass(frozen=True, eq=False)
 class _Points:
     """Chosen pixels and what is drawn at their points, as `kernels_samples` describes it."""
@@ -179,13 +193,12 @@ class _Points:
     nearest: NDArray[np.float64]
     seen: Int32
     farthest: Int32
-    missed: NDArray[np.uint8]
     inverses: NDArray[np.float64]
     listed: Int32
     counts: NDArray[np.uint8]
 
     @classmethod
-    def of(cls, camera: Camera, marks: NDArray[np.uint8], count: int, capacity: int, farthest: Int32 | None = None) -> _Points:
+    def of(cls, camera: Camera, marks: NDArray[np.uint8], count: int, capacity: int) -> _Points:
         """Of the marked pixels, `count` points each, which list up to `capacity` see-through surfaces."""
         grid, pixels = kernels_chosen.numbered(marks)
         n = len(pixels) - 1
@@ -195,41 +208,24 @@ class _Points:
             pixels,
             np.zeros((n, count)),
             np.full((n, count), -1, np.int32),
-            kernels_chosen.closed(marks) if farthest is None else farthest,
-            np.zeros(marks.shape, np.uint8),
-            np.zeros((n, count, capacity)),
-            np.zeros((n, count, capacity), np.int32),
+            np.where(marks, np.int32(0), kernels_chosen.CLOSED),
+            np.empty((n, count, capacity)),
+            np.empty((n, count, capacity), np.int32),
             np.zeros((n, count), np.uint8),
         )
-
-    def show(self, triangle: Int32, inverse_depth: Float32) -> None:
-        """Begin with what the points are known to show."""
-        self.nearest[:] = inverse_depth.reshape(self.nearest.shape)
-        self.seen[:] = triangle.reshape(self.seen.shape)
-
-    def cells(self, q: NDArray[np.float64]) -> Int32:
-        """Pixels of each vertex whose points it may bound."""
-        cell = np.empty((len(q), 4), np.int32)
-        reach = (0.5, 0.5) if self.nearest.shape[1] == 1 else (0.125, 0.875)
-        kernels.cells(q, *reach, self.camera.width, self.camera.height, cell)
-        return cell
 
     def draw(
         self,
         geometry: Geometry,
         q: NDArray[np.float64],
-        see_through: NDArray[np.bool_],
-        triangle: Int32 | None = None,
-        only: bool = False,
+        see_through: Bool,
+        order: NDArray[np.intp],
         cell: Int32 | None = None,
     ) -> None:
-        """Draw the geometry, what `triangle` (H, W) shows around the points first; `only` what is see-through if asked.
-
-        `cell` is `cells(q)`, where it is known.
-        """
+        """Draw these triangles; `cell` is what `kernels.cells` says of q, for a pinhole."""
         count, lens = self.nearest.shape[1], self.camera.distortion
         fragments = self.inverses, self.listed, self.counts, geometry.vertices
-        surfaces = geometry.triangles, geometry.triangle_cutout, geometry.cutouts.arrays, see_through, only
+        surfaces = order, geometry.triangles, geometry.triangle_cutout, geometry.cutouts.arrays, see_through
         if lens is not None:
             side = 1 if count == 1 else 2
             table = lens_table(self.camera) if side == 1 else _sample_table(self.camera.intrinsics.model_dump_json())
@@ -237,49 +233,30 @@ class _Points:
             unit = lens.model == "fisheye"
             kernels.draw_rays(q, *surfaces, unit, table.arrays, (self.grid, self.pixels, side), solid, fragments)
             return
-        offsets, reach = (_CENTER, (0.5, 0.5)) if count == 1 else (_ROTATED, (0.125, 0.875))
-        if cell is None:
-            cell = self.cells(q)
-        total = len(geometry.triangles)
-        order = np.arange(total, dtype=np.int32)
-        if triangle is not None:
-            order = kernels_chosen.front_first(triangle, self.grid, self.pixels, total)
-        tiles = kernels_chosen.tiled(self.farthest)
-        solid = self.nearest, self.seen, self.farthest, tiles, self.missed
-        kernels.draw(q, cell, order, *surfaces, (self.grid, self.pixels, offsets, reach), solid, fragments)
-
-    def results(self, left_out: NDArray[np.uint8] | None = None) -> _Results:
-        """pixels, nearest and seen of all chosen pixels but those marked."""
-        pixels = self.pixels[:-1]
-        if left_out is None:
-            return pixels, self.nearest, self.seen
-        kept = np.flatnonzero(left_out.reshape(-1)[pixels] == 0)
-        return pixels[kept], self.nearest[kept], self.seen[kept]
+        offsets, reach = (_CENTER, _CENTER_REACH) if count == 1 else (_ROTATED, _ROTATED_REACH)
+        solid = self.nearest, self.seen, self.farthest, kernels_chosen.tiled(self.farthest)
+        kernels.draw(q, cell, *surfaces, (self.grid, self.pixels, offsets, reach), solid, fragments)
 
 
-def _edges(camera: Camera, parts: Sequence[_Results], look: tuple[Any, ...]) -> Samples | None:
-    """The pixels of `parts` whose samples look different from their centre."""
-    triangle, depth, owner, normals = look
-    chosen: list[_Results] = []
-    for pixels, nearest, seen in parts:
-        kept = kernels_chosen.distinct(pixels, triangle.reshape(-1), depth.reshape(-1), seen, nearest, owner, normals)
-        chosen.append((pixels[kept], nearest[kept], seen[kept]))
-    pixels, nearest, seen = (np.concatenate(arrays) for arrays in zip(*chosen, strict=True))
-    if len(pixels) == 0:
-        return None
-    if len(chosen) > 1:
-        order = np.argsort(pixels)
-        pixels, nearest, seen = pixels[order], nearest[order], seen[order]
+def _pinhole_edges(
+    geometry: Geometry, visibility: Visibility, marks: NDArray[np.uint8], q: NDArray[np.float64], owner: Int32
+) -> tuple[Int32, Float32, Int32, Float32]:
+    """pixels, position, triangle and inverse depth of `Samples`."""
+    shown = visibility.triangle, visibility.inverse_depth
+    wanted = np.zeros(len(geometry.triangles), np.uint8)
+    grid, limit, pixels, starts, bound, nearest, seen = kernels_edges.begin(marks, *shown, wanted)
+    surfaces = q, geometry.triangles, geometry.triangle_cutout, geometry.cutouts.arrays
+    canvas = _ROTATED, *shown, grid, limit, pixels, starts
+    count = kernels_edges.draw(kernels_edges.chosen(wanted), *surfaces, *canvas, len(bound), nearest, seen)
+    others = kernels_edges.with_corners_before(q, geometry.triangles, wanted, limit)
+    count = kernels_edges.draw(others, *surfaces, *canvas, count, nearest, seen)
+    return kernels_edges.finish(count, pixels, nearest, seen, bound, _ROTATED, *shown, owner, geometry.triangle_normals)
+
+
+def _sample_rays(camera: Camera, pixels: Int32) -> Float32:
     y, x = np.divmod(pixels, camera.width)
-    position = np.stack([x, y], axis=1)[:, None] + _ROTATED.T
-    rays = np.zeros((0, 3), np.float32)
-    if camera.distortion is not None:
-        table = _sample_table(camera.intrinsics.model_dump_json()).rays
-        quarter = np.arange(4)
-        rays = table[2 * y[:, None] + quarter // 2, 2 * x[:, None] + quarter % 2].reshape(-1, 3).astype(np.float32)
-    return Samples(
-        pixels, position.reshape(-1, 2).astype(np.float32), rays, seen.reshape(-1), nearest.reshape(-1).astype(np.float32)
-    )
+    table, quarter = _sample_table(camera.intrinsics.model_dump_json()).rays, np.arange(4)
+    return table[2 * y[:, None] + quarter // 2, 2 * x[:, None] + quarter % 2].reshape(-1, 3).astype(np.float32)
 
 
 @lru_cache(maxsize=2)

@@ -47,6 +47,7 @@ def pack_surfaces(
                 vertices[own, column : column + 2] = uv
         if mesh.colors is not None:
             vertices[own, 7:11] = mesh.colors
+        vertices[own] = np.nan_to_num(vertices[own], nan=0.0, posinf=0.0, neginf=0.0)  # a face without normals is flat
         repaints = placements[i].repaints if placements else ()
         kind = id(mesh), i >= targets, repaints
         if kind not in first_row:
