@@ -418,3 +418,20 @@ def test_a_catcher_darkens_as_the_ground_does(lit):
     caught = picture(box, caught_scene, view)
     assert np.abs(plain.astype(int) - caught).max() <= 2
     assert plain.min() < 0.75 * 255 * colour[0]
+
+
+@pytest.mark.parametrize("behind", [(0.9, 0.1, 0.1), (0.02, 0.02, 0.02), (0.8, 0.8, 0.8)])
+def test_coloured_glass_tints_what_is_behind_it(tmp_path, behind):
+    """One thin pane: what does not mirror lets each colour through by its tint, whatever the surroundings."""
+    tint = np.array([0.7, 0.9, 0.4])
+    glass = Material(base_color=(*tint, 1.0), roughness=0.0, transmission=1.0)
+    triangles = np.concatenate([quad((-1, 0, -1), (2, 0, 0), (0, 0, 2)), quad((-2, 1, -2), (4, 0, 0), (0, 0, 4))])
+    mesh = replace(
+        flat(triangles),
+        triangle_material=np.repeat([0, 1], 2).astype(np.int32),
+        materials=(glass, Material(unlit=True, base_color=(*behind, 1.0))),
+    )
+    dark = sky_file(tmp_path / "even.hdr", np.ones((16, 32, 3))).model_copy(update={"strength": 0.0})
+    light, seen = light_of(mesh, Scene(sun=None, sky=dark), camera(9, 9, 60, 0, 0, 4), ambient_occlusion="off")
+    assert (seen < 2).all()
+    assert light == pytest.approx(np.broadcast_to(0.96 * tint * behind / EXPOSURE, light.shape), rel=0.02)

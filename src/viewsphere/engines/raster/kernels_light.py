@@ -245,11 +245,14 @@ def _mirrored(count, texels, levels, b):
 
 
 @njit(fastmath=FAST)
-def _light(count, surrounding, b):
+def _light(count, surrounding, is_matte, b):
     """T3, T4, T5: radiance around the direction T0, T1, T2 over roughness T6 (-1: of a white matt surface that faces it).
 
-    The map's, the even light from above, the ground's as far as it reaches the sample.
+    The map's, the even light from above, the ground's as far as it reaches the sample. Lamps light the ground close by: a
+    mirrored ray that goes down but little sees none of it.
     """
+    zero, one = f4(0), f4(1)
+    lamp_r, lamp_g, lamp_b = surrounding.lamps[0], surrounding.lamps[1], surrounding.lamps[2]
     _place(count, surrounding.turn, b)
     _mirrored(count, surrounding.texels, surrounding.levels, b)
     scale, above, below = surrounding.scale, surrounding.above, surrounding.below
@@ -258,10 +261,12 @@ def _light(count, surrounding, b):
     below_r, below_g, below_b = below[0], below[1], below[2]
     for i in range(count):
         share = b[T6 + i]
-        sky, ground = f4(1) - share, share * b[BOUNCE + i]
-        b[T3 + i] = max(b[T3 + i] * scale_r + sky * above_r + ground * below_r, f4(0))
-        b[T4 + i] = max(b[T4 + i] * scale_g + sky * above_g + ground * below_g, f4(0))
-        b[T5 + i] = max(b[T5 + i] * scale_b + sky * above_b + ground * below_b, f4(0))
+        sky, ground = one - share, share * b[BOUNCE + i]
+        down = one if is_matte else min(max(f4(-1.6) * b[T2 + i], zero), one)
+        near = ground * down * down
+        b[T3 + i] = max(b[T3 + i] * scale_r + sky * above_r + ground * below_r + near * lamp_r, zero)
+        b[T4 + i] = max(b[T4 + i] * scale_g + sky * above_g + ground * below_g + near * lamp_g, zero)
+        b[T5 + i] = max(b[T5 + i] * scale_b + sky * above_b + ground * below_b + near * lamp_b, zero)
 
 
 @njit(fastmath=FAST)
@@ -297,7 +302,7 @@ def ambient(count, surrounding, b):
             else:
                 _coat_layer(count, b)
             _reflect(count, b)
-        _light(count, surrounding, b)
+        _light(count, surrounding, k == 0, b)
         if k == 0:
             for i in range(count):
                 open_ = b[OPEN + i]
@@ -329,28 +334,34 @@ def _sent(body, shine, base, alpha, shown, unlit):
 def compose(count, surrounding, b):
     """What the sample sends to the viewer, in place of the base colour: RED, GREEN, BLUE premultiplied, ALPHA its opacity.
 
-    Thin glass lets through what is behind it by the least of its three tints; what the other two let through more is taken
-    from the surroundings in the line of sight, so that glass has its colour before an average background, exactly where its
-    tint is grey. The rougher, the more of it comes from the surroundings. A mirrored image does not become transparent with
-    the surface (glass made by alpha), except where that is all but clear.
+    Thin glass lets through what is behind it by the least of its three tints; what the other two let through more, T0 to T2,
+    is taken from the surroundings in the line of sight, T3 to T5: `lay` puts what is known to be behind in their place. The
+    rougher, the more of it comes from the surroundings. A mirrored image does not become transparent with the surface (glass
+    made by alpha), except where that is all but clear.
     """
     zero, one = f4(0), f4(1)
     if _any(count, THROUGH, b):
         for i in range(count):
             b[T0 + i], b[T1 + i], b[T2 + i], b[T6 + i] = -b[VX + i], -b[VY + i], -b[VZ + i], b[ROUGH + i]
-        _light(count, surrounding, b)
+        _light(count, surrounding, False, b)
         for i in range(count):
             through, open_, rough = b[THROUGH + i], b[OPEN + i], b[ROUGH + i]
             least = min(max(min(b[RED + i], b[GREEN + i], b[BLUE + i]), zero), one)
             clear = through * least * (one - rough * rough)
             clear = clear if clear > zero else zero
             b[T7 + i] = clear
-            b[DR + i] += max(through * b[RED + i] - clear, zero) * b[T3 + i] * open_
-            b[DG + i] += max(through * b[GREEN + i] - clear, zero) * b[T4 + i] * open_
-            b[DB + i] += max(through * b[BLUE + i] - clear, zero) * b[T5 + i] * open_
+            b[T3 + i], b[T4 + i], b[T5 + i] = b[T3 + i] * open_, b[T4 + i] * open_, b[T5 + i] * open_
+            b[DR + i] += max(through * b[RED + i] - clear, zero) * b[T3 + i]
+            b[DG + i] += max(through * b[GREEN + i] - clear, zero) * b[T4 + i]
+            b[DB + i] += max(through * b[BLUE + i] - clear, zero) * b[T5 + i]
+            sharp = through * (one - rough * rough) * min(max(b[ALPHA + i], zero), one) * (one - b[UNLIT + i])
+            sharp = sharp if sharp > zero else zero
+            b[T0 + i], b[T1 + i] = sharp * max(b[RED + i] - least, zero), sharp * max(b[GREEN + i] - least, zero)
+            b[T2 + i] = sharp * max(b[BLUE + i] - least, zero)
     else:
         for i in range(count):
-            b[T7 + i] = zero
+            b[T7 + i], b[T0 + i], b[T1 + i], b[T2 + i] = zero, zero, zero, zero
+            b[T3 + i], b[T4 + i], b[T5 + i] = zero, zero, zero
     for i in range(count):
         alpha, unlit = min(max(b[ALPHA + i], zero), one), b[UNLIT + i]
         shown = min(alpha * f4(8), one)
@@ -358,6 +369,16 @@ def compose(count, surrounding, b):
         b[GREEN + i] = _sent(b[DG + i], b[SG + i] + b[EG + i], b[GREEN + i], alpha, shown, unlit)
         b[BLUE + i] = _sent(b[DB + i], b[SB + i] + b[EB + i], b[BLUE + i], alpha, shown, unlit)
         b[ALPHA + i] = alpha * (one - b[T7 + i] * (one - unlit))
+
+
+@njit(fastmath=FAST)
+def lay(pixel, i, b):
+    """Put a composed sample over what a pixel (4,) shows so far, premultiplied; coloured glass tints that."""
+    under, behind = f4(1) - b[ALPHA + i], pixel[3]
+    pixel[0] = max(pixel[0] * (under + b[T0 + i]) + b[RED + i] - behind * b[T0 + i] * b[T3 + i], f4(0))
+    pixel[1] = max(pixel[1] * (under + b[T1 + i]) + b[GREEN + i] - behind * b[T1 + i] * b[T4 + i], f4(0))
+    pixel[2] = max(pixel[2] * (under + b[T2 + i]) + b[BLUE + i] - behind * b[T2 + i] * b[T5 + i], f4(0))
+    pixel[3] = behind * under + b[ALPHA + i]
 
 
 @njit(fastmath=FAST)

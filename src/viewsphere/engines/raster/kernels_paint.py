@@ -41,6 +41,7 @@ from viewsphere.engines.raster.kernels_light import (
     ambient,
     ambient_matte,
     compose,
+    lay,
     weigh,
 )
 from viewsphere.engines.raster.kernels_material import material
@@ -142,7 +143,7 @@ def shade(view, surfaces, textures, floor, surrounding, lights, occlusion, is_gr
         count = min(slots.shape[0] - start, BLOCK)
         locate(view, start, count, slots, depth, b)
         if is_ground:
-            gather_ground(floor, start, count, slots, triangle, b, seen, which)
+            gather_ground(view, floor, start, count, slots, triangle, b, seen, which)
         else:
             gather(surfaces, start, count, slots, triangle, b, seen, which)
         if is_catcher:
@@ -169,6 +170,10 @@ def shade(view, surfaces, textures, floor, surrounding, lights, occlusion, is_gr
         else:
             ambient(count, surrounding, b)
             compose(count, surrounding, b)
+        if not is_ground:
+            for i in range(count):
+                lay(radiance[U(slots[start + i])], i, b)
+            continue
         for i in range(count):
             slot = U(slots[start + i])
             shown = f4(1) - b[FADE + i]

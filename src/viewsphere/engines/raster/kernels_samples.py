@@ -25,22 +25,43 @@ MEDIUM = 64  # likewise every tile; beyond it, rows
 
 
 @njit
-def cells(q, low, high, width, height, cell):
-    """As truth's `cells`, for points between `low` and `high` of a pixel rather than its centre."""
-    for i in range(q.shape[0]):
-        if q[i, 2] > 0.0:
-            x, y = q[i, 0] * q[i, 3], q[i, 1] * q[i, 3]
-            cell[i, 0] = math.ceil(min(max(x - (high + EPSILON), 0.0), float(width)))
-            cell[i, 1] = math.ceil(min(max(y - (high + EPSILON), 0.0), float(height)))
-            cell[i, 2] = -math.floor(min(max(x - (low - EPSILON), -1.0), width - 1.0))
-            cell[i, 3] = -math.floor(min(max(y - (low - EPSILON), -1.0), height - 1.0))
-        else:
-            for k in range(4):
-                cell[i, k] = BEHIND
+def _box(q, i0, i1, i2, reach, width, height):
+    """First and last pixel (x0, y0, x1, y1) of which points may be covered; x0 is BEHIND if a corner is behind the camera."""
+    c, d = U(2), U(3)
+    if min(q[i0, c], q[i1, c], q[i2, c]) <= 0.0:
+        return BEHIND, 0, 0, 0
+    low, high = reach[0] - EPSILON, reach[1] + EPSILON
+    x0, x1, x2 = q[i0, U(0)] * q[i0, d], q[i1, U(0)] * q[i1, d], q[i2, U(0)] * q[i2, d]
+    y0, y1, y2 = q[i0, U(1)] * q[i0, d], q[i1, U(1)] * q[i1, d], q[i2, U(1)] * q[i2, d]
+    return (
+        math.ceil(min(max(min(x0, x1, x2) - high, 0.0), float(width))),
+        math.ceil(min(max(min(y0, y1, y2) - high, 0.0), float(height))),
+        math.floor(max(min(max(x0, x1, x2) - low, width - 1.0), -1.0)),
+        math.floor(max(min(max(y0, y1, y2) - low, height - 1.0), -1.0)),
+    )
 
 
 @njit
-def touched_boxes(q, cell, order, triangles, farthest):
+def around(q, triangles, left_out, window):
+    """The triangles that may touch a window (x0, y0, x1, y1; pixels, both ends included) but those left out, int64."""
+    x0, y0, x1, y1 = window
+    side = np.zeros(q.shape[0], np.uint8)  # a bit for each side of the window that a vertex is beyond
+    a, b, c, d = U(0), U(1), U(2), U(3)
+    for i in range(U(q.shape[0])):
+        if q[i, c] > 0.0:
+            x, y = q[i, a] * q[i, d], q[i, b] * q[i, d]
+            side[i] = (x < x0) | ((x > x1 + 1.0) << 1) | ((y < y0) << 2) | ((y > y1 + 1.0) << 3)
+    order = np.empty(triangles.shape[0] + 1, np.int64)
+    n = U(0)
+    for t in range(U(triangles.shape[0])):
+        order[n] = t
+        beyond = side[U(triangles[t, a])] & side[U(triangles[t, b])] & side[U(triangles[t, c])]
+        n += U((beyond == 0) & (not left_out[t]))
+    return order[:n]
+
+
+@njit
+def touched_boxes(q, order, triangles, reach, farthest):
     """Which pixels these triangles' boxes contain that show something behind their nearest corner, (H, W) uint8."""
     height, width = farthest.shape
     marks = np.zeros((height, width), np.uint8)
@@ -48,8 +69,7 @@ def touched_boxes(q, cell, order, triangles, farthest):
     for i in range(U(order.shape[0])):
         t = U(order[i])
         i0, i1, i2 = U(triangles[t, a]), U(triangles[t, b]), U(triangles[t, c])
-        xa, ya = min(cell[i0, a], cell[i1, a], cell[i2, a]), min(cell[i0, b], cell[i1, b], cell[i2, b])
-        xb, yb = -min(cell[i0, c], cell[i1, c], cell[i2, c]), -min(cell[i0, d], cell[i1, d], cell[i2, d])
+        xa, ya, xb, yb = _box(q, i0, i1, i2, reach, width, height)
         if xa == BEHIND:
             xa, ya, xb, yb = 0, 0, width - 1, height - 1
         most = level(max(q[i0, d], q[i1, d], q[i2, d]) * (ROUNDED_UP + TIE))
@@ -67,7 +87,7 @@ def first(grid, y, x):
 
 
 @njit
-def draw(q, cell, order, triangles, cutout, cutouts, see_through, points, solid, fragments):
+def draw(q, order, triangles, cutout, cutouts, see_through, points, solid, fragments):
     """Draw the triangles in `order` through a pinhole.
 
     `points` is (grid, pixels, offsets, (lowest, highest offset)), `solid` (nearest, seen, farthest, tiles), `fragments`
@@ -82,8 +102,7 @@ def draw(q, cell, order, triangles, cutout, cutouts, see_through, points, solid,
         t = order[i]
         ut = U(t)
         i0, i1, i2 = U(triangles[ut, a]), U(triangles[ut, b]), U(triangles[ut, c])
-        xa, ya = min(cell[i0, a], cell[i1, a], cell[i2, a]), min(cell[i0, b], cell[i1, b], cell[i2, b])
-        xb, yb = -min(cell[i0, c], cell[i1, c], cell[i2, c]), -min(cell[i0, d], cell[i1, d], cell[i2, d])
+        xa, ya, xb, yb = _box(q, i0, i1, i2, points[3], width, height)
         if xa > xb or ya > yb or cutout[ut] == NEVER:
             continue
         most = level(max(q[i0, d], q[i1, d], q[i2, d]) * (ROUNDED_UP + TIE))

@@ -90,14 +90,15 @@ def layers(
     inverse_depth: Float32,
     see_through: Bool,
     pixels: Int32 | None = None,
+    corners: NDArray[np.float64] | None = None,
 ) -> list[Layer]:
     """What is seen at the points that see through something: the solid surfaces behind, then see-through ones, back to front.
 
     The points, with what each shows (N,), are all pixels' centres in order, or the four samples of each of `pixels`; a slot is
     a point's index. A pixel whose points all show nothing is left out. see_through (T + 1,): the last entry, for triangle -1,
-    is False. The first layer holds the nearest solid surfaces (nothing where there is none), the second the farthest
-    see-through one of every such point, the third the next of those that have two, up to 8; farther ones are left out. Empty
-    where nothing is see-through.
+    is False; `corners` is `Visibility.corners`, if known. The first layer holds the nearest solid surfaces (nothing where there
+    is none), the second the farthest see-through one of every such point, the third the next of those that have two, up to 8;
+    farther ones are left out. Empty where nothing is see-through.
 
     A see-through surface that lies on a solid one (1/z the same within 1e-5) is in front of it, and of two that lie on one
     another the later triangle is in front: decals are on top.
@@ -112,11 +113,10 @@ def layers(
     if pixels is not None:
         row_of = np.zeros(shape[0] * shape[1], np.int32)
         row_of[pixels] = np.arange(len(pixels))
-    q = homogeneous(geometry, camera)
-    cell = np.zeros((len(q), 4), np.int32)
+    q = homogeneous(geometry, camera) if corners is None else corners
     if camera.distortion is None:
-        kernels.cells(q, *(_CENTER_REACH if count == 1 else _ROTATED_REACH), camera.width, camera.height, cell)
-        chosen = np.flatnonzero(kernels.touched_boxes(q, cell, clear, geometry.triangles, farthest))
+        reach = _CENTER_REACH if count == 1 else _ROTATED_REACH
+        chosen = np.flatnonzero(kernels.touched_boxes(q, clear, geometry.triangles, reach, farthest))
     else:
         chosen = _touched(
             _Points.of(camera, (farthest != kernels_chosen.CLOSED).view(np.uint8), count, 1), geometry, q, see_through
@@ -129,7 +129,7 @@ def layers(
         marks = np.zeros(shape, np.uint8)
         marks.reshape(-1)[part] = 1
         points = _Points.of(camera, marks, count, MOST_LAYERS)
-        _pile(points, geometry, q, cell, see_through, clear, (shown[0][rows], shown[1][rows]))
+        _pile(points, geometry, q, see_through, clear, (shown[0][rows], shown[1][rows]))
         slots = (rows[:, None] * count + np.arange(count)).reshape(-1).astype(np.int32)
         stacks.append(_sorted(points, slots))
     depth = max((len(stack) for stack in stacks), default=0)
@@ -146,28 +146,34 @@ def _pile(
     points: _Points,
     geometry: Geometry,
     q: NDArray[np.float64],
-    cell: Int32,
     see_through: Bool,
-    clear: NDArray[np.intp],
+    clear: NDArray[np.int64],
     shown: tuple[Int32, Float32],
 ) -> None:
     """Draw what is see-through before the solid surfaces that the points show, then the solid ones behind the others."""
     is_solid = ~see_through[shown[0]] & (shown[0] >= 0)
     points.seen[:] = np.where(is_solid, shown[0], -1)
     points.nearest[:] = np.where(is_solid, shown[1], 0)
-    points.draw(geometry, q, see_through, clear, cell)
+    points.draw(geometry, q, see_through, clear)
     behind = ((points.counts > 0) & ~is_solid).any(axis=1)
     points.farthest[:] = kernels_chosen.CLOSED
     points.farthest.reshape(-1)[points.pixels[:-1][behind]] = 0
     if behind.any():
-        points.draw(geometry, q, see_through, np.flatnonzero(~see_through[:-1]), cell)
+        if points.camera.distortion is None:
+            y, x = np.divmod(points.pixels[:-1][behind], points.camera.width)
+            window = x.min(), y.min(), x.max(), y.max()
+            solid = kernels.around(q, geometry.triangles, see_through, tuple(map(float, window)))
+        else:
+            solid = np.flatnonzero(~see_through[:-1])
+        points.draw(geometry, q, see_through, solid)
 
 
 def _sorted(points: _Points, slots: Int32) -> list[Layer]:
     nearest, seen, counts = points.nearest.reshape(-1), points.seen.reshape(-1), points.counts.reshape(-1)
     used = np.flatnonzero(counts)
     slots, nearest, seen, counts = slots[used], nearest[used], seen[used], counts[used]
-    inverses, listed = (a.reshape(-1, a.shape[-1])[used] for a in (points.inverses, points.listed))
+    capacity = points.listed.shape[-1]
+    inverses, listed = points.inverses.reshape(-1, capacity)[used], points.listed.reshape(-1, capacity)[used]
     is_there = np.arange(inverses.shape[1]) < counts[:, None]
     number = (is_there & (inverses >= nearest[:, None] * (1 - kernels.TIE))).sum(axis=1)
     behind = np.flatnonzero((number > 0) & (seen >= 0))
@@ -214,15 +220,8 @@ class _Points:
             np.zeros((n, count), np.uint8),
         )
 
-    def draw(
-        self,
-        geometry: Geometry,
-        q: NDArray[np.float64],
-        see_through: Bool,
-        order: NDArray[np.intp],
-        cell: Int32 | None = None,
-    ) -> None:
-        """Draw these triangles; `cell` is what `kernels.cells` says of q, for a pinhole."""
+    def draw(self, geometry: Geometry, q: NDArray[np.float64], see_through: Bool, order: NDArray[np.int64]) -> None:
+        """Draw these triangles."""
         count, lens = self.nearest.shape[1], self.camera.distortion
         fragments = self.inverses, self.listed, self.counts, geometry.vertices
         surfaces = order, geometry.triangles, geometry.triangle_cutout, geometry.cutouts.arrays, see_through
@@ -235,7 +234,7 @@ class _Points:
             return
         offsets, reach = (_CENTER, _CENTER_REACH) if count == 1 else (_ROTATED, _ROTATED_REACH)
         solid = self.nearest, self.seen, self.farthest, kernels_chosen.tiled(self.farthest)
-        kernels.draw(q, cell, *surfaces, (self.grid, self.pixels, offsets, reach), solid, fragments)
+        kernels.draw(q, *surfaces, (self.grid, self.pixels, offsets, reach), solid, fragments)
 
 
 def _pinhole_edges(

@@ -13,7 +13,7 @@ from viewsphere.assets.mesh import Mesh
 from viewsphere.assets.srgb import linear
 from viewsphere.engines.raster import kernels_paint
 from viewsphere.engines.raster.background import display_background
-from viewsphere.engines.raster.environment import bake_surrounding, sky_lights
+from viewsphere.engines.raster.environment import bake_surrounding, lamps_on_ground, sky_lights
 from viewsphere.engines.raster.ground import ground_albedo, ground_frame, ground_material
 from viewsphere.engines.raster.kernels_material import L_BLENDED, L_METAL, L_METAL_TEXEL, L_TRANSMISSION
 from viewsphere.engines.raster.lights import Casters, Extent, bake_lights, even_light
@@ -125,7 +125,8 @@ def _baked(
     distant = sky_lights(scene.sky, scene.sun, has_ground)
     lights = bake_lights(distant, scene.lights, casters, unit, has_ground, options.shadow_resolution)
     floor, albedo = _floor(scene.ground, origin, unit, len(surfaces.looks) - 1)
-    surrounding = bake_surrounding(scene.sky, scene.sun, albedo, distant, even_light(scene.lights))
+    lamps = lamps_on_ground(scene.lights, low, high)
+    surrounding = bake_surrounding(scene.sky, scene.sun, albedo, distant, even_light(scene.lights), lamps)
     occlusion = bake_occlusion(casters, has_ground, options.ambient_occlusion)
     see_through = np.append(_is_see_through(surfaces.looks)[surfaces.material], False)
     kind = np.where(see_through[:-1], kernels_paint.SEE_THROUGH, kernels_paint.SOLID).astype(np.uint8)

@@ -55,7 +55,7 @@ def coats(color: Color, roof: Color, flakes: float, rims: Color, painted_claddin
         chrome=metal("chrome", (0.8, 0.81, 0.83), 0.12),
         black=Material("black_trim", linear((0.07, 0.07, 0.075)), roughness=0.4),
         seam=Material("seam", linear((0.04, 0.04, 0.04)), roughness=0.9),
-        rubber=Material("rubber", linear((0.11, 0.11, 0.115)), roughness=0.9),
+        rubber=Material("rubber", linear((0.17, 0.17, 0.175)), roughness=0.9),
         steel=metal("steel", (0.5, 0.5, 0.52), 0.45),
         under=Material("underbody", linear((0.09, 0.09, 0.09)), roughness=0.95),
         white_lamp=lamp("headlight_lens", (0.93, 0.95, 0.97), 0.25),

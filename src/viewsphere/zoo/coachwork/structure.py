@@ -111,9 +111,9 @@ def bed_pieces(shape: Shape, coats: Coats) -> list[Piece]:
         *hull_pieces(shape, hull, coats, ("cargo_bed", "bumper_rear")),
         Piece("underbody", coats.under, bridge),
         Piece("cargo_bed", coats.paint, both_sides(hull.deck_to(inner, 1))),
-        Piece("cargo_bed", coats.black, both_sides(grid(walls))),
-        Piece("cargo_bed", coats.black, both_sides(ground)),
-        Piece("cargo_bed", coats.black, both_sides(box)),
+        Piece("cargo_bed", coats.rubber, both_sides(grid(walls))),
+        Piece("cargo_bed", coats.rubber, both_sides(ground)),
+        Piece("cargo_bed", coats.rubber, both_sides(box)),
         *(Piece("cargo_bed", coats.under, rib) for rib in ribs),
     ]
 
