@@ -1,8 +1,8 @@
 """Contact sheets: every zoo family, or the model files named, under several lights; one row a model, one column a light.
 
-    .venv/bin/python scripts/sheets.py OUT.png [MODEL_FILE ...] [--hdri FILE] [--photo FILE] [--families NAME ...] [--azimuth DEG]
+    .venv/bin/python scripts/sheets.py OUT.png [MODEL_FILE ...] [--families NAME ...] [--hdri FILE] [--photo FILE]
 
-Lights: noon sun; a hazy daylight with the sun at 8 degrees; an overcast sky; a dark room with an area light and two lamps.
+Lights: noon sun; daylight with the sun at 8 degrees; an overcast sky; a dark room with an area light and two lamps.
 `--hdri` adds a column in that light, `--photo` one over that photograph, on a shadow catcher.
 """
 
@@ -40,8 +40,8 @@ from viewsphere.sampling.viewpoints import camera_for
 from viewsphere.truth.visibility import rasterize
 from viewsphere.zoo import build
 
-TILE = (400, 300)
-LENS = Intrinsics(width=TILE[0], height=TILE[1], fx=600, fy=600, cx=TILE[0] / 2, cy=TILE[1] / 2)
+TILE = (320, 240)
+LENS = Intrinsics(width=TILE[0], height=TILE[1], fx=480, fy=480, cx=TILE[0] / 2, cy=TILE[1] / 2)
 SPEC = ModelSpec(key="model", source="model", category="model", category_id=1)
 CONCRETE = Ground(color=(0.62, 0.61, 0.59))
 
@@ -59,7 +59,7 @@ def scenes(size: float) -> tuple[Scene, ...]:
     )
     return (
         Scene(sun=Sun(azimuth_deg=-20), ground=CONCRETE),
-        Scene(sun=Sun(azimuth_deg=-50, elevation_deg=8), sky=Daylight(turbidity=5), ground=CONCRETE),
+        Scene(sun=Sun(azimuth_deg=-50, elevation_deg=8), sky=Daylight(turbidity=2.5), ground=CONCRETE),
         Scene(sun=Sun(), sky=Daylight(clouds=1.0), ground=CONCRETE),
         Scene(sun=None, sky=dark, lights=lamps, ground=CONCRETE),
     )
@@ -125,7 +125,7 @@ def main() -> None:
     sheet = Image.new("RGB", (rows[0].width, TILE[1] * len(rows)))
     for i, row in enumerate(rows):
         sheet.paste(row, (0, i * TILE[1]))
-    sheet.save(args.output, quality=88)
+    sheet.save(args.output, quality=84)
 
 
 if __name__ == "__main__":

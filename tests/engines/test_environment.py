@@ -47,7 +47,7 @@ def seen(surrounding, normals, rough=None, bounce=1.0):
         b[row : row + N] = np.resize(normals[axis], N)
     b[rows.T6 : rows.T6 + N] = -1 if rough is None else rough
     b[rows.BOUNCE : rows.BOUNCE + N] = bounce
-    stages._light(N, surrounding, b)
+    stages._light(N, surrounding, False, b)
     return np.stack([b[row : row + N] for row in (rows.T3, rows.T4, rows.T5)], axis=-1)[: normals.shape[1]].astype(float)
 
 

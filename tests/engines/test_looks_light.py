@@ -115,7 +115,7 @@ def test_missing_normals_are_flat_not_black():
 
 def test_no_light_gets_out_of_a_closed_box():
     box = flat(cuboid((-0.6, -0.6, -0.6), (0.6, 0.6, 0.6)))
-    dark = Scene(sun=None, sky=Sky(strength=0.1), ground=Ground())
+    dark = Scene(sun=None, sky=Sky(strength=0.1), ground=Ground(color=(0, 0, 0)))
     lit = dark.model_copy(update={"lights": (PointLight(position=(0.1, 0, 0), strength=5, radius=0.02),)})
     more = np.abs(picture(box, lit) - picture(box, dark)).max(axis=2)
     assert np.percentile(more, 99) <= 2 and more.mean() < 0.5

@@ -175,7 +175,7 @@ def ggx_metal(normal_light, normal_view, normal_half, view_half, alpha, color):
     return d * fresnel / (4 * normal_light * normal_view * (1 + lam(normal_light) + lam(normal_view)))
 
 
-def lost_light(normal_view, alpha, n=1500):
+def lost_light(normal_view, alpha, n=500):
     """Share of a white facet's light that one bounce leaves out, by the midpoint rule over the hemisphere."""
     cosine, phi = (np.arange(n) + 0.5) / n, (np.arange(n) + 0.5) / n * math.pi
     nl, phi = np.meshgrid(cosine, phi)
@@ -203,7 +203,7 @@ def test_ggx_highlight_of_a_metal_plate(tmp_path, rough, elevation, azimuth):
     half = v + to
     half /= np.linalg.norm(half, axis=-1, keepdims=True)
     alpha, nv = rough**2, v[..., 2]
-    cosines = np.linspace(nv.min(), nv.max(), 9)
+    cosines = np.linspace(nv.min(), nv.max(), 5)
     lost = np.interp(nv, cosines, [lost_light(c, alpha) for c in cosines])[..., None]
     one_bounce = ggx_metal(to[2], nv, half[..., 2], (half * v).sum(-1), alpha, 1.0)[..., None] * to[2]
     fresnel = (ggx_metal(to[2], nv, half[..., 2], (half * v).sum(-1), alpha, 0.0)[..., None] * to[2]) / one_bounce
@@ -371,7 +371,7 @@ def test_bytes_are_the_light_through_the_curve_and_colours_come_back():
     stage = stage_of([card], Scene())
     away = camera(4, 4, 40, 180, 0, 1, (0, -50, 0))
     visible = rasterize(stage.geometry, away)
-    for value in range(256):
+    for value in range(0, 256, 3):
         finish = Finish(background=Background(color=(value / 255, 1 - value / 255, 0.5)))
         seen = stage.color(away, FRAME.model_copy(update={"finish": finish}), visible)
         assert (seen == [value, 255 - value, 128]).all()
@@ -435,3 +435,24 @@ def test_coloured_glass_tints_what_is_behind_it(tmp_path, behind):
     light, seen = light_of(mesh, Scene(sun=None, sky=dark), camera(9, 9, 60, 0, 0, 4), ambient_occlusion="off")
     assert (seen < 2).all()
     assert light == pytest.approx(np.broadcast_to(0.96 * tint * behind / EXPOSURE, light.shape), rel=0.02)
+
+
+@pytest.mark.parametrize("kind", ["point", "spot", "area"])
+def test_the_ground_throws_back_the_light_of_lamps(kind):
+    """The mean radiance of the ground as far around the targets as half their box is long."""
+    plate = flat(quad((-0.05, -0.05, 0.8), (0, 0.1, 0), (0.1, 0, 0)), Material(roughness=1.0, specular=0.0))
+    post = flat(cuboid((-0.01, -0.01, 0), (0.01, 0.01, 0.02)))
+    at, down = (0.0, 0.0, 0.35), (0.0, 0.0, -0.4)  # from the middle of both, which is 0.4 m high
+    lamp = {
+        "point": PointLight(position=at, strength=2.0, radius=0.0),
+        "spot": SpotLight(position=at, strength=2.0, radius=0.0, toward=down, angle_deg=160, blend=0.0),
+        "area": AreaLight(position=at, strength=2.0, size=(1e-3, 1e-3), toward=down),
+    }[kind]
+    ground = Ground(color=tuple(encoded(np.full(3, 0.5)).tolist()))
+    stage = stage_of([plate, post], Scene(sun=None, sky=DARK, lights=(lamp,), ground=ground), ambient_occlusion="off")
+    x = (np.arange(400) + 0.5) / 200 - 1
+    square = (0.41 * x[:, None]) ** 2 + (0.41 * x) ** 2
+    distance = 0.75**2 + square
+    share = 0.75 / np.sqrt(distance) / distance * (0.75 / np.sqrt(distance) if kind == "area" else 1)
+    expected = 0.5 * 2.0 * share[square <= 0.41**2].mean() / math.pi
+    assert stage.baked.surrounding.lamps == pytest.approx(np.full(3, expected), rel=0.03)

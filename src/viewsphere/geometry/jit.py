@@ -33,8 +33,7 @@ def njit(function: Callable[..., Any] | None = None, **options: Any) -> Any:
     if not os.environ.get("NUMBA_CACHE_DIR"):
         folder = _cache_folder(_sources(function.__code__.co_filename))
         setattr(config, "CACHE_DIR", folder)  # noqa: B010, not in its stubs
-    wrappers = {"no_cfunc_wrapper": True, "no_cpython_wrapper": function.__name__.startswith("_")}
-    return numba.njit(nogil=True, cache=True, error_model="numpy", **wrappers, **options)(function)
+    return numba.njit(nogil=True, cache=True, error_model="numpy", **options)(function)
 
 
 def kernel_folder() -> Path:

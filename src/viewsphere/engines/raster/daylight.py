@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,7 +42,6 @@ _ZENITH = np.array(
 )
 
 
-@lru_cache(maxsize=64)
 def opening(elevation_deg: float, daylight: Daylight) -> float:
     """Factor of all daylight, sun and sky alike: how far a photographer opens the lens, so that evenings and clouds are seen.
 

@@ -12,7 +12,7 @@ import math
 import numba as nb
 import numpy as np
 
-from viewsphere.engines.raster.kernels_arrive import arrive
+from viewsphere.engines.raster.kernels_arrive import FACING, arrive, look
 from viewsphere.engines.raster.kernels_block import (
     AO,
     BLOCK,
@@ -50,7 +50,6 @@ from viewsphere.engines.raster.kernels_block import (
     T6,
     T7,
 )  # fmt: skip
-from viewsphere.engines.raster.kernels_look import FACING, look
 from viewsphere.engines.raster.kernels_texture import FAST
 from viewsphere.geometry.jit import njit
 

@@ -17,19 +17,18 @@ U = nb.uintp
 # A view maps a homogeneous point to (u w, v w, q w, w): u and v in texels from the map's middle, q growing with
 # the distance to the light and linear in u and v on every plane: the distance itself from afar, -1 / distance from near.
 
-WIDE = 8  # cells in a row that are read at once
+SPAN = 8  # texels a side of the smallest cell that has bounds
 COARSEST = 16  # texels a side that a map's coarsest level has at least
-LEVELS = 14
-# Columns of Views.form: four rows of the matrix, then what `kernels_look.look` needs: texels per length (at distance 1), the
+LEVELS = 12
+# Columns of Views.form: four rows of the matrix, then what `kernels_arrive.look` needs: texels per length (at distance 1), the
 # bias in q from afar and in shares of q from near, the least q there is, how far from the middle the map is read, half its
-# size, tangents per texel (0 from afar), whether the light is round, half the light's sides along the view's axes in texels
-# per q (a round light: its radius twice, along the first two), whether wide penumbrae are filtered finely.
-TEXELS, BIAS_FAR, BIAS_NEAR, NEAREST, READ, MIDDLE, SLANT, ROUND = range(16, 24)
-A_U, A_V, A_W, B_U, B_V, B_W, FINE = range(24, 31)
-FORM = 31
-# Columns of Views.grid: size, where each level of the depths begins, where each level of the least and the greatest q begins.
-SIZE, DEPTH_AT, LOWS_AT, HIGHS_AT = 0, 1, 1 + LEVELS, 1 + 2 * LEVELS
-GRID = 1 + 3 * LEVELS
+# size, whether the light is round, half its size along two axes in texels per q, the matrix from texels to those axes, whether
+# wide penumbrae are filtered finely.
+TEXELS, BIAS_FAR, BIAS_NEAR, NEAREST, READ, MIDDLE, ROUND, HALF_A, HALF_B, TO_A0, TO_A1, TO_B0, TO_B1, FINE = range(16, 30)
+FORM = 30
+# Columns of Views.grid: size, where each level of the depths begins, where each level of the bounds begins.
+SIZE, DEPTH_AT, BOUNDS_AT = 0, 1, 1 + LEVELS
+GRID = 1 + 2 * LEVELS
 
 
 @njit
@@ -125,49 +124,44 @@ def draw_depth(corners, surfaces, textures, near, nearest, farthest):  # noqa: P
 
 
 @njit
-def _halve(source, at, size, wide, target, to, stride, is_least):
-    """Least or greatest of 2 x 2 numbers of `source`, (size, size) from `at` in rows of `wide`; what fills a row hides nothing."""
-    n = (size + 1) >> 1
-    for y in range(n):
-        first, second = at + 2 * y * wide, at + min(2 * y + 1, size - 1) * wide
-        for x in range(size >> 1):
-            a, b, c, d = U(first + 2 * x), U(first + 2 * x + 1), U(second + 2 * x), U(second + 2 * x + 1)
-            low = min(min(source[a], source[b]), min(source[c], source[d]))
-            high = max(max(source[a], source[b]), max(source[c], source[d]))
-            target[U(to + y * stride + x)] = low if is_least else high
-        if size & 1:
-            p, q = source[first + size - 1], source[second + size - 1]
-            target[to + y * stride + n - 1] = min(p, q) if is_least else max(p, q)
-        for x in range(n, stride):
-            target[to + y * stride + x] = np.inf if is_least else -np.inf
-
-
-@njit
-def finish_view(grid, depth, bounds):
+def finish_view(grid, depth, bounds):  # noqa: PLR0912, nested loops
     """Fill the coarser levels of a view's drawn map, and its bounds; returns its smallest q.
 
-    A level of the depths takes every second texel of the one before in both directions. A level of the bounds has the least or
-    the greatest q of 2 x 2 cells of the one before, the first of them of 2 x 2 texels, in rows of WIDE cells at least.
+    A level takes every second texel of the one before in both directions. Bounds are the least and the greatest q of a cell
+    of SPAN texels; each further level joins 2 x 2 cells.
     """
     size = grid[SIZE]
-    level, start = 1, grid[DEPTH_AT]
+    base = depth[grid[DEPTH_AT] : grid[DEPTH_AT] + size * size].reshape(size, size)
+    level = 1
     while level < LEVELS and size >> level >= COARSEST:
         n, middle, at = size >> level, 1 << (level - 1), grid[DEPTH_AT + level]
         for y in range(n):
-            row = start + ((y << level) + middle) * size + middle
+            row = base[(y << level) + middle]
             for x in range(n):
-                depth[U(at + y * n + x)] = depth[U(row + (x << level))]
+                depth[at + y * n + x] = row[(x << level) + middle]
         level += 1
-    for which in range(2):
-        first = grid[LOWS_AT if which == 0 else HIGHS_AT : (LOWS_AT if which == 0 else HIGHS_AT) + LEVELS]
-        n = (size + 1) >> 1
-        _halve(depth, start, size, size, bounds, first[1], max(n, WIDE), which == 0)
-        level = 1
-        while n > WIDE:
-            m = (n + 1) >> 1
-            _halve(bounds, first[level], n, n, bounds, first[level + 1], max(m, WIDE), which == 0)
-            level, n = level + 1, m
-    least = f4(np.inf)
-    for i in range(n * WIDE):
-        least = min(least, bounds[grid[LOWS_AT + level] + i])
-    return least
+    n = size // SPAN
+    at = grid[BOUNDS_AT]
+    for y in range(n):
+        for x in range(n):
+            low, high = f4(np.inf), f4(-np.inf)
+            for v in range(SPAN):
+                row = base[U(y * SPAN + v)]
+                for u in range(SPAN):
+                    z = row[U(x * SPAN + u)]
+                    low, high = min(low, z), max(high, z)
+            bounds[at + y * n + x, 0], bounds[at + y * n + x, 1] = low, high
+    for k in range(1, LEVELS):
+        if n == 1:
+            break
+        m, below = (n + 1) // 2, at
+        at = grid[BOUNDS_AT + k]
+        for y in range(m):
+            for x in range(m):
+                low, high = f4(np.inf), f4(-np.inf)
+                for v in range(2 * y, min(2 * y + 2, n)):
+                    for u in range(2 * x, min(2 * x + 2, n)):
+                        low, high = min(low, bounds[below + v * n + u, 0]), max(high, bounds[below + v * n + u, 1])
+                bounds[at + y * m + x, 0], bounds[at + y * m + x, 1] = low, high
+        n = m
+    return bounds[at, 0]

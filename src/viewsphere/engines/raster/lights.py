@@ -27,7 +27,6 @@ _MOST_WIDE = 3
 _FACE = 1.15  # half width of a cube's face at distance 1; only the middle 1.03 is read, so that filters have room
 _READ = 1.03
 _WIDEST = 2.5  # tangent from which one perspective is too coarse
-_THINNEST = 1e-3  # texels per q: half the side of a light without a size
 _MANY = 4  # fitted maps from which on all are half as wide
 
 
@@ -55,7 +54,7 @@ class Distant:
 
 class Views(NamedTuple):
     """What the lights see. form (V, FORM) float32 and grid (V, GRID) int64: columns named in `kernels_shadow`; depth (N,)
-    float32: all levels of all maps, row by row; bounds (M,) float32: least and greatest q of cells of all maps.
+    float32: all levels of all maps, row by row; bounds (M, 2) float32: least and greatest q of cells of all maps.
     """
 
     form: Float32
@@ -86,8 +85,8 @@ class Lights(NamedTuple):
 @dataclass(frozen=True)
 class View:
     """One map to draw: the (4, 4) matrix from the world, from which w on, texels per length (at distance 1), the least
-    distance from the border at which it is read, half the light's sides (2, 3) along the view's axes in texels per q; whether
-    the light is round, and whether wide penumbrae are filtered finely.
+    distance from the border at which it is read, half the light's size along two axes in texels per q, and the (2, 2) matrix
+    from texels to those axes; whether the light is round, and whether wide penumbrae are filtered finely.
     """
 
     matrix: Float
@@ -95,7 +94,8 @@ class View:
     texels: float
     size: int
     guard: float
-    sides: Float
+    half: tuple[float, float]
+    to_axes: Float
     is_round: bool
     is_fine: bool = True
 
@@ -274,7 +274,7 @@ def parallel_view(away: Float, middle: Float, span: float, tangent: float, size:
     matrix[:2, 3] = -matrix[:2, :3] @ middle
     matrix[3, 3] = 1.0
     half = max(texels * tangent, 1e-3)
-    return View(matrix, 0.5, texels, size, 1.0, half * np.eye(2, 3), True)
+    return View(matrix, 0.5, texels, size, 1.0, (half, half), np.eye(2), True)
 
 
 def _fitted_from_afar(source: _Source, points: Float, casters: Casters, size: int) -> View:
@@ -301,11 +301,13 @@ def _perspective(source: _Source, axes: Float, tangent: float, size: int, guard:
     matrix[:, 3] = -matrix[:, :3] @ source.place
     matrix[2, 3] = -1.0
     near = max(1e-3, (0.02 if source.kind == AREA else 1.0) * source.radius)
-    sides, least = max(texels * source.radius, _THINNEST) * np.eye(2, 3), _THINNEST / texels
+    half, to_axes, is_round = (texels * source.radius,) * 2, np.eye(2), True
     if source.kind == AREA:
-        ways = zip(_level_axes(source.axis), (source.right, source.up), strict=True)
-        sides = np.stack([texels * axes @ (way * max(float(np.linalg.norm(side)), least)) for way, side in ways])
-    return View(matrix, near, texels, size, guard, sides, source.kind != AREA)
+        sides = texels * np.stack([axes[:2] @ source.right, axes[:2] @ source.up], axis=1)
+        lengths = np.linalg.norm(sides, axis=0)
+        if lengths.min() > 0 and abs(np.linalg.det(sides / lengths)) > 0.3:
+            half, to_axes, is_round = (float(lengths[0]), float(lengths[1])), np.linalg.inv(sides / lengths), False
+    return View(matrix, near, texels, size, guard, (max(half[0], 1e-3), max(half[1], 1e-3)), to_axes, is_round)
 
 
 def _fitted_from_place(source: _Source, points: Float, casters: Casters, size: int) -> View | None:
@@ -358,7 +360,7 @@ def draw_views(views: Sequence[View], casters: Casters, opposite: bool = False) 
         view = views[i % len(views)]
         texels, cells = _lay_out(grid[i], view.size, texels, cells)
         form[i] = _form_row(view, i >= len(views))
-    result = Views(form, grid, np.empty(texels, np.float32), np.empty(cells, np.float32))
+    result = Views(form, grid, np.empty(texels, np.float32), np.empty((cells, 2), np.float32))
     points = np.ones((len(casters.surfaces.vertices), 4))
     points[:, :3] = casters.surfaces.vertices[:, 11:14]
     for i, view in enumerate(views):
@@ -382,8 +384,8 @@ def _joined(parts: Sequence[Views]) -> Views:
     cells = np.cumsum([0, *(len(p.bounds) for p in parts)])
     grids = [p.grid.copy() for p in parts]
     for i, grid in enumerate(grids):
-        grid[:, kernels.DEPTH_AT : kernels.LOWS_AT] += texels[i]
-        grid[:, kernels.LOWS_AT :] += cells[i]
+        grid[:, kernels.DEPTH_AT : kernels.BOUNDS_AT] += texels[i]
+        grid[:, kernels.BOUNDS_AT :] += cells[i]
     return Views(
         np.concatenate([p.form for p in parts]),
         np.concatenate(grids),
@@ -405,12 +407,13 @@ def _lay_out(row: NDArray[np.int64], size: int, texels: int, cells: int) -> tupl
             break
         row[kernels.DEPTH_AT + level] = texels
         texels += (size >> level) ** 2
-    for first in (kernels.LOWS_AT, kernels.HIGHS_AT):
-        level, side = 1, (size + 1) // 2
-        row[first + 1], cells = cells, cells + side * max(side, kernels.WIDE)
-        while side > kernels.WIDE:
-            level, side = level + 1, (side + 1) // 2
-            row[first + level], cells = cells, cells + side * max(side, kernels.WIDE)
+    side = size // kernels.SPAN
+    for level in range(kernels.LEVELS):
+        row[kernels.BOUNDS_AT + level] = cells
+        cells += side**2
+        if side == 1:
+            break
+        side = (side + 1) // 2
     return texels, cells
 
 
@@ -422,10 +425,9 @@ def _form_row(view: View, from_behind: bool) -> Float32:
     row[:16] = matrix.ravel()
     row[kernels.TEXELS], row[kernels.MIDDLE], row[kernels.READ] = view.texels, view.size / 2, view.size / 2 - view.guard
     row[kernels.ROUND], row[kernels.FINE] = view.is_round, view.is_fine
-    is_far = not matrix[3, :3].any()
-    row[kernels.BIAS_FAR if is_far else kernels.BIAS_NEAR] = 1.2 / view.texels
-    row[kernels.SLANT] = 0.0 if is_far else 1 / view.texels
-    row[kernels.A_U : kernels.B_W + 1] = view.sides.ravel()
+    row[kernels.BIAS_FAR if matrix[3, 3] == 1 and not matrix[3, :3].any() else kernels.BIAS_NEAR] = 1.2 / view.texels
+    row[kernels.HALF_A], row[kernels.HALF_B] = view.half
+    row[kernels.TO_A0 : kernels.TO_B1 + 1] = view.to_axes.ravel()
     return row
 
 

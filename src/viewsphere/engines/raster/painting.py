@@ -58,13 +58,13 @@ def paint(baked: Baked, camera: Camera, visibility: Visibility, antialias: bool,
     if samples is not None:
         triangle = triangle.copy()
         triangle[samples.pixels] = -1
-        _smooth(baked, camera, samples, has_sky, radiance)
-    _shade(baked, camera, view, triangle, depth, radiance)
+        _smooth(baked, camera, visibility, samples, has_sky, radiance)
+    _shade(baked, camera, view, visibility, triangle, depth, radiance)
     if has_sky:
         sky_behind(view, baked.surrounding, radiance)
 
 
-def _smooth(baked: Baked, camera: Camera, samples: Samples, has_sky: bool, radiance: Float32) -> None:
+def _smooth(baked: Baked, camera: Camera, visibility: Visibility, samples: Samples, has_sky: bool, radiance: Float32) -> None:
     """Edge pixels: the mean of their samples; those of a pixel that look alike are shaded once."""
     view = view_of(baked, camera, samples)
     normals = baked.geometry.triangle_normals
@@ -73,7 +73,7 @@ def _smooth(baked: Baked, camera: Camera, samples: Samples, has_sky: bool, radia
     colors = np.zeros((len(like), 4), np.float32)
     colors[is_copy, 3] = 1  # the sky need not look there
     triangle = np.where(is_copy, np.int32(-1), samples.triangle)
-    _shade(baked, camera, view, triangle, samples.inverse_depth, colors, samples)
+    _shade(baked, camera, view, visibility, triangle, samples.inverse_depth, colors, samples)
     if has_sky:
         sky_behind(view, baked.surrounding, colors)
     kernels_paint.average_samples(samples.pixels, colors, like, radiance)
@@ -83,6 +83,7 @@ def _shade(
     baked: Baked,
     camera: Camera,
     view: View,
+    visibility: Visibility,
     triangle: Int32,
     depth: Float32,
     radiance: Float32,
@@ -96,7 +97,7 @@ def _shade(
     _shade_some(baked, view, ground, True, triangle, depth, radiance)
     if len(clear):
         pixels = None if samples is None else samples.pixels
-        for layer in layers(baked.geometry, camera, triangle, depth, baked.see_through, pixels):
+        for layer in layers(baked.geometry, camera, triangle, depth, baked.see_through, pixels, visibility.corners):
             behind, behind_depth = triangle.copy(), depth.copy()
             behind[layer.slot], behind_depth[layer.slot] = layer.triangle, layer.inverse_depth
             is_ground = baked.kind[layer.triangle] == kernels_paint.FLOOR
