@@ -14,13 +14,17 @@ from viewsphere.model.mistakes import one_of
 
 @dataclass(frozen=True)
 class Options:
-    """antialias: samples in an edge pixel, 1 or 4; shadow_resolution: width of the shadow maps in texels;
-    ambient_occlusion: off, fast or fine.
+    """antialias: samples in an edge pixel, 1 or 4; shadow_resolution: width of the shadow maps in texels, 0 for what suits
+    the pictures; ambient_occlusion: off, fast or fine.
     """
 
     antialias: int = 4
-    shadow_resolution: int = 2048
+    shadow_resolution: int = 0
     ambient_occlusion: Literal["off", "fast", "fine"] = "fast"
+
+    def for_width(self, pixels: int) -> int:
+        """Width of the shadow maps for pictures whose longer side has so many pixels: the next power of two, 1,024 to 4,096."""
+        return self.shadow_resolution or min(max(1 << (pixels - 1).bit_length(), 1024), 4096)
 
 
 def parse_options(given: Mapping[str, JsonValue]) -> Options:
@@ -36,7 +40,7 @@ def parse_options(given: Mapping[str, JsonValue]) -> Options:
     if isinstance(antialias, bool) or antialias not in (1, 4):
         raise UserError(f"raster engine: antialias: expected 1 or 4, found {antialias!r}")
     resolution = given.get("shadow_resolution", default.shadow_resolution)
-    if isinstance(resolution, bool) or not isinstance(resolution, int) or not 64 <= resolution <= 8192:
+    if isinstance(resolution, bool) or not isinstance(resolution, int) or not (resolution == 0 or 64 <= resolution <= 8192):
         raise UserError(f"raster engine: shadow_resolution: expected an integer in 64..8192, found {resolution!r}")
     occlusion = given.get("ambient_occlusion", default.ambient_occlusion)
     if occlusion is False:  # YAML's off

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -76,6 +76,8 @@ class RasterStage:
 def build_stage(shot: Shot, load: Callable[[ModelSpec], Mesh]) -> RasterStage:
     """Build everything that the shot's frames share."""
     options = parse_options(shot.engine_options)
+    size = options.for_width(max(shot.intrinsics.width, shot.intrinsics.height))
+    options = replace(options, shadow_resolution=size)
     loaded: dict[ModelSpec, Mesh] = {}
     for placement in shot.placements:
         if placement.model not in loaded:
