@@ -15,7 +15,7 @@ import platform
 import tempfile
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -89,6 +89,32 @@ def embree_frame(scene: Any, camera: Any) -> Any:
     return scene.run(origins, directions, output=True)
 
 
+def open3d_scene(geometry: Any) -> Any:
+    import open3d
+
+    scene = open3d.t.geometry.RaycastingScene()
+    scene.add_triangles(geometry.vertices.astype(np.float32), geometry.triangles.astype(np.uint32))
+    return scene
+
+
+def open3d_frame(scene: Any, camera: Any) -> Any:
+    """The same rays through Open3D, which hands them to Embree in its own way."""
+    import open3d
+
+    extrinsics = np.eye(4)
+    extrinsics[:3, :3], extrinsics[:3, 3] = camera.R, camera.t
+    rays = scene.create_rays_pinhole(
+        intrinsic_matrix=open3d.core.Tensor(camera.K),
+        extrinsic_matrix=open3d.core.Tensor(extrinsics),
+        width_px=camera.width,
+        height_px=camera.height,
+    )
+    return scene.cast_rays(rays)
+
+
+RIVALS = {"Embree, one ray a pixel": (embree_scene, embree_frame), "Open3D, one ray a pixel": (open3d_scene, open3d_frame)}
+
+
 @contextmanager
 def timed(times: dict[str, float]) -> Iterator[None]:
     """Add up the CPU milliseconds of the parts of colour while the context lasts."""
@@ -124,20 +150,18 @@ def measure(frames: int, antialias: int, folder: Path) -> tuple[Clock, int]:
     for frame in shot.frames[:2]:
         one_frame(Clock(), shot, frame, warm_up, mesh, store)
     stage = clock("stage: baked already", lambda: engine.stage(shot, lambda spec: mesh))
-    try:
-        scene = embree_scene(stage.geometry)
-    except ImportError:
-        scene = None
     for frame in shot.frames:
         parts: dict[str, float] = {}
         with timed(parts):
             one_frame(clock, shot, frame, stage, mesh, store)
         for name, value in parts.items():
             clock.times.setdefault(name, []).append(value)
-    if scene is not None:
-        for frame in [shot.frames[0], *shot.frames]:
-            camera = camera_for(shot.intrinsics, frame.pose, box_vertices(*mesh.bounds).mean(axis=0))
-            clock("Embree, one ray a pixel", lambda camera=camera: embree_frame(scene, camera))
+    for name, (build, cast) in RIVALS.items():
+        with suppress(ImportError):
+            scene = build(stage.geometry)
+            for frame in [shot.frames[0], *shot.frames]:
+                camera = camera_for(shot.intrinsics, frame.pose, box_vertices(*mesh.bounds).mean(axis=0))
+                clock(name, lambda scene=scene, cast=cast, camera=camera: cast(scene, camera))
     return clock, len(stage.geometry.triangles)
 
 

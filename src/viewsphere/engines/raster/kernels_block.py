@@ -25,9 +25,9 @@ LX, LY, LZ, IR, IG, IB, SHARE, WIDTH = range(47 * BLOCK, 55 * BLOCK, BLOCK)
 DR, DG, DB, SR, SG, SB, FADE = range(55 * BLOCK, 62 * BLOCK, BLOCK)
 # Scratch, free between stages.
 T0, T1, T2, T3, T4, T5, T6, T7 = range(62 * BLOCK, 70 * BLOCK, BLOCK)
-# How a surface answers light (`kernels_light.weigh`): towards a light it mirrors FACE + EDGE times Schlick's power; LOBE and RIM
-# integrate the lobe and the lobe times that power; BASE is its diffuse reflectance, TAKEN what the coat reflects, THROUGH what
-# a transmissive surface lets through, before its tint.
+# How a surface answers light (`kernels_light.weigh`): towards a light it mirrors FACE + EDGE times Schlick's power; LOBE and
+# RIM integrate the lobe and the lobe times that power; BASE is its diffuse reflectance, TAKEN what the coat reflects, THROUGH
+# what a transmissive surface lets through, before its tint.
 FACE_R, FACE_G, FACE_B, EDGE_R, EDGE_G, EDGE_B, BASE_R, BASE_G, BASE_B = range(70 * BLOCK, 79 * BLOCK, BLOCK)
 LOBE, RIM, TAKEN, THROUGH = range(79 * BLOCK, 83 * BLOCK, BLOCK)
 # 1 on scenery, else 0.
