@@ -126,13 +126,13 @@ def test_white_furnace_of_a_ball(tmp_path, material, occlusion):
 
 @pytest.mark.parametrize("material", MATERIALS)
 def test_white_furnace_of_a_box(tmp_path, material):
-    """The shading loses nothing. Occlusion, which comes from depths on a grid, takes up to 5 % beside an edge."""
+    """The shading loses nothing, nor does occlusion, though it comes from depths on a grid; nothing is gained."""
     box = flat(cuboid((-0.5, -0.4, -0.3), (0.5, 0.4, 0.3)))
     assert np.abs(furnace(tmp_path, box, material, 1.8, ambient_occlusion="off") - 1).max() < 0.01
     occluded = furnace(tmp_path, box, material, 1.8)
     assert occluded.max() < 1.005
-    assert occluded.min() > 0.945
-    assert np.mean(np.abs(occluded - 1) < 0.01) > 0.8
+    assert occluded.min() > 0.985
+    assert np.mean(np.abs(occluded - 1) < 0.01) > 0.99
 
 
 @pytest.mark.parametrize("material", [MATERIALS[0], MATERIALS[4], MATERIALS[-2]])

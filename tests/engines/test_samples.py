@@ -1,11 +1,13 @@
 import math
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
 
 from truth.truth_scenes import LENSES, cube, lens, mesh_of, orbit_camera, placed, random_soup
 from viewsphere.assets.mesh import Image, Material, Texture
+from viewsphere.engines.raster.kernels_paint import GLINT, average_samples
 from viewsphere.engines.raster.kernels_samples import TIE
 from viewsphere.engines.raster.samples import OFFSETS, edge_samples, layers
 from viewsphere.geometry.camera import pixel_rays
@@ -119,6 +121,46 @@ def test_thin_wires_are_unbroken(angle, pieces):
         camera = orbit_camera(lens(120, 120, 2 * math.atan(1 / 4)), 0.0, 0.0, 5.0, target=(0.003, 0, 0.005))
         samples, look = check_edges(geometry, camera, least=60)
         assert set(np.flatnonzero(look)) == set(samples.pixels)
+
+
+def line_in_wall(angle, width, pieces, proud):
+    """A wall across the view with a line of 96 pixels' length, cut into it, or 0.1 mm proud of it: the wall first."""
+    turn = np.array([[math.cos(angle), 0, math.sin(angle)], [0, 1, 0], [-math.sin(angle), 0, math.cos(angle)]])
+    half, ends = width / 96, np.linspace(-1, 1, pieces + 1)
+
+    def plates(boxes, y):
+        corners = [[[a, y, b], [c, y, b], [c, y, d], [a, y, d]] for a, b, c, d in boxes]
+        quads = 4 * np.arange(len(boxes))[:, None]
+        return mesh_of(
+            np.concatenate(corners) @ turn, np.concatenate([quads + np.array([0, 1, 2]), quads + np.array([0, 2, 3])])
+        )
+
+    line = plates([(a, -half, b, half) for a, b in pairwise(ends)], -1e-4 * proud)
+    around = [(-1, half, 1, 9), (-1, -9, 1, -half), (-9, -9, -1, 9), (1, -9, 9, 9)]
+    return placed(plates([(-9, -9, 9, 9)] if proud else around, 0.0), line)
+
+
+@pytest.mark.parametrize("angle", [0.05, 0.3, 0.6, 0.9, 1.2, 1.53])
+@pytest.mark.parametrize("width", [0.2, 0.3, 0.4])
+def test_thin_lines_in_a_surface_are_unbroken(angle, width):
+    """A seam narrower than a pixel: as much of it is covered as it is large, all along it, wherever the centres are."""
+    camera = orbit_camera(lens(120, 120, 2 * math.atan(1 / 4)), 0.0, 0.0, 5.0, target=(0.003, 0, 0.005))
+    window = 4 if width < 0.25 else 2  # four samples may miss the line in one row, and the thinnest in three
+    for pieces, proud in ((1, False), (1, True), (40, False), (40, True)):
+        geometry = line_in_wall(angle, width, pieces, proud)
+        samples, look = check_edges(geometry, camera, least=20)
+        assert set(samples.pixels) <= set(np.flatnonzero(look))
+        assert len(samples.pixels) >= (0.97 if pieces > 1 else 1) * look.sum()
+        covered = (owner_at(geometry, rasterize(geometry, camera).triangle) == 2).astype(float).reshape(-1)
+        assert set(np.flatnonzero(covered)) <= set(samples.pixels)
+        covered[samples.pixels] = (owner_at(geometry, samples.triangle) == 2).reshape(-1, 4).mean(axis=1)
+        assert covered.sum() == pytest.approx(96 * width, rel=0.15)
+        steep = angle > math.pi / 4
+        along = covered.reshape(120, 120).sum(axis=1 if steep else 0)
+        reach = 48 * max(abs(math.cos(angle)), math.sin(angle)) - 3
+        inner = along[int(60 - reach) : int(60 + reach)]
+        share = np.convolve(inner, np.ones(window) / window, "valid") / inner.mean()
+        assert share.min() > 0.25
 
 
 def test_cut_outs():
@@ -289,3 +331,18 @@ def test_distorted_lenses(name):
     assert len(samples.pixels) > 200
     assert np.array_equal(samples.triangle[sure], expected[sure])
     np.testing.assert_allclose(samples.inverse_depth[sure], inverse.max(axis=1)[sure], rtol=1e-6)
+
+
+def test_one_glint_among_four_samples_is_no_white_dot():
+    """What one sample of a thin thing mirrors of a lamp is limited; light that all four show is not, nor is coverage."""
+    samples = np.full((12, 4), 0.1, np.float32)
+    samples[1] = 500, 250, 0, 1
+    samples[4:8] = 30, 20, 10, 1
+    samples[8:12, :3] = np.arange(12).reshape(4, 3) / 10
+    like = np.arange(12, dtype=np.int32)
+    found = np.zeros((5, 4), np.float32)
+    average_samples(np.array([3, 0, 4], np.int32), samples, like, found)
+    np.testing.assert_allclose(found[3], [0.3 / 4 + GLINT / 4, 0.3 / 4 + GLINT / 8, 0.3 / 4, 1.3 / 4], rtol=1e-5)
+    np.testing.assert_allclose(found[0], [30, 20, 10, 1], rtol=1e-5)
+    np.testing.assert_allclose(found[4], samples[8:12].mean(axis=0), rtol=1e-5)
+    assert not found[1:3].any()

@@ -228,6 +228,46 @@ def test_no_acne(elevation, angle):
         assert found["share"][lit].min() > 0.98
 
 
+@pytest.mark.parametrize(
+    "light",
+    [
+        Distant((1, 0, 0.2), (1, 1, 1), 0.53),
+        PointLight(position=(5, 0, 0.6), strength=20),
+        AreaLight(position=(5, 0, 0.6), strength=20, size=(2, 1)),
+    ],
+    ids=["sun", "point", "area"],
+)
+def test_the_facets_of_a_coarse_smooth_ball_do_not_show(light):
+    """Where its smooth normals turn away from the light there is no step from facet to facet, nor in any of them."""
+    stage = LightStage(ball(1.0, (0, 0, 1), 8))
+    samples = stage.seen(camera(90, 5, 6.0, (0, 0, 1), 120, 120, 300))
+    is_distant = isinstance(light, Distant)
+    lights = stage.lights([light] if is_distant else [], [] if is_distant else [light])
+    found = stage.arrives(lights, 0, samples)
+    turned = (samples.smooth * found["toward"]).sum(axis=1)
+    lit = ~samples.is_ground & (turned > 0)
+    missing = (turned * (1 - found["share"]))[lit]
+    assert lit.sum() > 3000
+    assert missing.max() < 0.03
+    assert (found["share"][~samples.is_ground & (turned < 0)] == 0).all()
+
+
+def test_a_plane_under_a_wide_light_is_lit_all_over():
+    """The plane's slope is that seen from the light's middle, though most light comes from nearer parts of it."""
+    stage = LightStage(flat(cuboid((-2, -2, -0.1), (2, 2, 0))))
+    light = AreaLight(position=(1.5, 0, 0.6), toward=(0, 0, 0), strength=1, size=(1.5, 0.8))
+    x, y = (a.ravel() for a in np.meshgrid(np.linspace(-1.9, 1.6, 60), np.linspace(-1.9, 1.9, 60)))
+    found = stage.arrives(stage.lights([], [light]), 0, points(np.stack([x, y, 0 * x], axis=1), (0, 0, 1)))
+    assert found["share"].min() > 0.99
+
+
+def test_a_rectangle_lights_nothing_in_its_own_plane(crumb):
+    light = AreaLight(position=(0, 0, 30), toward=(0, 0, 0), strength=4.0, size=(1.0, 0.6))
+    x, y = (a.ravel() for a in np.meshgrid(np.linspace(-2, 2, 40), np.linspace(-2, 2, 40)))
+    places = np.stack([x, y, 30 + np.random.default_rng(0).normal(0, 1e-5, x.size)], axis=1)
+    assert irradiance(crumb, light, places)["irradiance"].max() < 1e-4
+
+
 def test_a_shadow_begins_at_the_foot():
     """No gap between a box and its shadow."""
     stage = LightStage(flat(cuboid((-0.5, -0.5, 0), (0.5, 0.5, 1))))

@@ -182,6 +182,7 @@ REFUSED = [
     ),
     ({"number": {"normal": [3]}}, ("number", "normal"), "[mean, deviation] or a mapping of them; found [3]"),
     ({"number": {"uniform": [3, 2]}}, ("number",), "[low, high]; found [3.0, 2.0]"),
+    ({"color": {"uniform": ["#303030", "red"]}}, ("color",), "low first in every component (red, green and blue of a colour)"),
     ({"number": {"uniform": [3]}}, ("number", "uniform", 1), "a value; found nothing"),
     ({"number": {"unifrom": [1, 2]}}, ("number", "unifrom"), "did you mean 'uniform'?"),
     ({"number": {"uniform": [1, 2], "choice": [1]}}, ("number",), "found uniform and choice"),

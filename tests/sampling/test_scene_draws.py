@@ -188,6 +188,12 @@ def test_files_that_are_no_pictures_are_named_before_rendering(folder):
         check_images(planned({"ground": {"image": "fake.exr"}}, folder))
 
 
+def test_a_large_picture_is_no_reason_for_a_warning(tmp_path, recwarn):
+    Image.new("1", (12_000, 8_000)).save(tmp_path / "large.png")
+    check_images(planned({"background": {"image": "large.png"}}, tmp_path))
+    assert not recwarn.list
+
+
 RANDOM = {
     "sun": {"azimuth_deg": [0, 360], "elevation_deg": {"normal": [40, 20]}, "color": {"uniform": [[0.8, 0.8, 0.8], [1, 1, 1]]}},
     "sky": {"strength": {"log_uniform": [0.5, 2]}},

@@ -240,7 +240,8 @@ def _ordered(low: Any, high: Any) -> bool:
 
 def _check_ends(kind: str, low: Any, high: Any) -> None:
     if not _ordered(low, high):
-        raise ValueError(f"expected [low, high]; found {shown((low, high))}")
+        each = ", low first in every component (red, green and blue of a colour)" if isinstance(low, tuple) else ""
+        raise ValueError(f"expected [low, high]{each}; found {shown((low, high))}")
     lowest = min(_lowest(low), _lowest(high))
     if kind == "log_uniform" and lowest <= 0:
         raise ValueError(f"expected ends above 0; found one that may be {lowest:g}")

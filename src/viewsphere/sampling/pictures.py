@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator, Mapping
 from functools import lru_cache
 from pathlib import Path
@@ -81,7 +82,10 @@ def proportions(path: str, field: str = "scene.planes") -> float:
     from PIL import Image, UnidentifiedImageError
 
     try:
-        with Image.open(path) as image:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of large pictures, whose readers have limits of their own
+            image = Image.open(path)
+        with image:
             width, height = image.size
             sideways = image.getexif().get(0x0112, 1) >= 5
     except (OSError, ValueError, UnidentifiedImageError, Image.DecompressionBombError) as error:

@@ -11,12 +11,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from viewsphere.engines.raster import kernels_block as rows
 from viewsphere.engines.raster import kernels_environment as kernels
 from viewsphere.engines.raster.daylight import air, daylight_picture, opening
 from viewsphere.engines.raster.environment_file import read_environment
-from viewsphere.engines.raster.lights import Distant, distant_sun
+from viewsphere.engines.raster.kernels_arrive import DISTANT, arrive
+from viewsphere.engines.raster.lights import Distant, Extent, Lights, distant_sun
 from viewsphere.engines.raster.records import Float32, Int32
-from viewsphere.model.scene import AnyLight, AnySky, AreaLight, Daylight, Environment, HemisphereLight, PointLight, Sky, Sun
+from viewsphere.model.scene import AnySky, Daylight, Environment, Sky, Sun
 
 Float = NDArray[np.float64]
 
@@ -123,29 +125,28 @@ def environment_notes(sky: AnySky) -> tuple[str, ...]:
     return _photographed(_key(sky.file), True).notes if isinstance(sky, Environment) else ()
 
 
-def lamps_on_ground(lamps: Sequence[AnyLight], low: Float, high: Float) -> Float:
-    """Irradiance / pi, (3,), that lamps give the ground around targets in a box (metres), on the mean, shadows left out.
+def lamps_on_ground(lights: Lights, extent: Extent) -> Float:
+    """Irradiance / pi, (3,), that lamps give the ground around the targets on the mean, (3,), their shadows taken off.
 
-    The ground lies at the box' lowest point; lamps stand relative to its middle.
+    As far around as half the targets' box is long.
     """
-    size = high - low
-    n, reach = 9, 0.5 * float(np.linalg.norm(size))
-    x, y = (g.ravel() for g in np.meshgrid(*2 * [(np.arange(n) + 0.5) / n * 2 - 1]))
+    n, size = 11, extent.high - extent.low
+    reach = 0.5 * float(np.linalg.norm(size))
+    steps = (np.arange(n) + 0.5) / n * 2 - 1
+    x, y = np.repeat(steps, n), np.tile(steps, n)
     inside = x**2 + y**2 <= 1
-    places = np.stack([reach * x, reach * y, np.full(n * n, -0.5 * size[2])], axis=1)[inside]
-    total = np.zeros(3)
-    for lamp in lamps:
-        if isinstance(lamp, HemisphereLight):
-            continue
-        to = np.array(lamp.position) - places
-        square = (to**2).sum(axis=1)
-        share = np.maximum(to[:, 2], 0) / np.sqrt(square + 1e-12)
-        if not isinstance(lamp, PointLight):
-            axis = np.array(lamp.toward) - lamp.position
-            out = -(to @ axis) / (np.sqrt(square) * np.linalg.norm(axis) + 1e-12)
-            share *= np.maximum(out, 0) if isinstance(lamp, AreaLight) else out > math.cos(math.radians(lamp.angle_deg) / 2)
-        width = math.sqrt(lamp.size[0] * lamp.size[1] / math.pi) if isinstance(lamp, AreaLight) else lamp.radius
-        total += lamp.strength * np.array(lamp.color) * np.mean(share / (square + width**2 + 1e-12)) / math.pi
+    b = np.zeros((rows.ROWS, rows.BLOCK), np.float32)
+    count = int(inside.sum())
+    middle = (extent.low + extent.high) / 2
+    # A little below the ground, so that what lies on it hides the light from within.
+    place = middle[0] + reach * x[inside], middle[1] + reach * y[inside], extent.low[2] - 0.01 * reach
+    for row, values in zip((rows.PX, rows.PY, rows.PZ, rows.NZ, rows.GZ, rows.PIXEL), (*place, 1, 1, reach / n), strict=True):
+        b[row // rows.BLOCK, :count] = values
+    total, flat = np.zeros(3), b.reshape(-1)
+    for k in np.flatnonzero(lights.kind != DISTANT).tolist():
+        arrive(count, lights, k, flat)
+        lz, share, *light = (b[r // rows.BLOCK, :count] for r in (rows.LZ, rows.SHARE, rows.IR, rows.IG, rows.IB))
+        total += np.stack(light) @ (np.maximum(lz, 0) * share) / (count * math.pi)
     return total
 
 
@@ -194,7 +195,7 @@ def bake_surrounding(
         glow=glow.astype(np.float32),
         disc=disc.astype(np.float32),
         half_angle=np.float32(half_angle),
-        lamps=np.float32([0, 0, 0] if ground is None or lamps is None else np.asarray(ground) * lamps),
+        lamps=(np.zeros(3) if ground is None or lamps is None else np.asarray(ground) * lamps).astype(np.float32),
     )
 
 
@@ -283,7 +284,7 @@ def without_sun(pixels: Float32) -> tuple[Float32, Distant | None]:
     floor = 2 * float(np.median(part[(apart > _SPOT) & (apart <= _AROUND)]))
     taken = np.where(apart <= _SPOT, np.clip(1 - floor / np.maximum(part, 1e-9), 0, 1), 0)
     weight = taken * part * area[rows][:, None]
-    if weight.sum() < _OF_ALL * math.pi * mean:
+    if weight.sum() <= _OF_ALL * math.pi * mean:
         return pixels, None
     direction = np.array([(weight * v).sum() for v in (x, y, z)]) / weight.sum()
     direction /= np.linalg.norm(direction)

@@ -171,15 +171,18 @@ def _mended(path: Path, pixels: Float32, notes: list[str]) -> Float32:
     bad = int((~finite).any(axis=-1).sum())
     total = pixels.shape[0] * pixels.shape[1]
     if bad > _MOST_MENDED * total:
-        raise _error(path, f"found {bad:,} of {total:,} texels that are no finite numbers")
+        raise _error(path, f"found {bad:,} of {total:,} texels that are no numbers, or above {_BRIGHTEST:g}")
     if bad:
         greatest = np.where(finite, pixels, 0).max()
         pixels = np.where(finite, pixels, np.where(pixels > 0, greatest, 0)).astype(np.float32)
-        notes.append(f"{path}: mended {bad:,} texels that are no finite numbers")
+        notes.append(f"{path}: mended {bad:,} texels that are no numbers, or above {_BRIGHTEST:g}")
     negative = int((pixels < _ROUNDING).any(axis=-1).sum())
     if negative:
         notes.append(f"{path}: set {negative:,} texels with negative light to 0")
-    return np.maximum(pixels, 0)
+    pixels = np.maximum(pixels, 0)
+    if not pixels.any():
+        raise _error(path, "found no light in it: all texels are black")
+    return pixels
 
 
 def _reduced(pixels: Float32) -> Float32:

@@ -74,18 +74,30 @@ GRAZING = 0.02  # a plane's slope in a map is limited to that of a light this fa
 
 
 @njit(fastmath=FAST)
-def _blockers(window, rows, x, y, step, axes, q, near, du, dv, softest):
-    """Number of texels in rows of 8 that hide part of the light, and the sum of their distances in q.
+def _is_any_nearer(window, rows, log, x, y, step, near, du, dv):
+    """Whether any texel in rows of 2^log lies before the plane: on most surfaces none does, and that is quickly told."""
+    hits, mask = nb.int32(0), (nb.int32(1) << log) - nb.int32(1)
+    for i in range(rows << log):
+        k = nb.int32(i)
+        dx, dy = x + f4(k & mask) * step, y + f4(k >> log) * step
+        hits += nb.int32(1) if window[U(i)] < near + du * dx + dv * dy else nb.int32(0)
+    return hits > nb.int32(0)
+
+
+@njit(fastmath=FAST)
+def _blockers(window, rows, log, x, y, step, axes, q, near, du, dv, softest):
+    """Number of texels in rows of 2^log that hide part of the light, and the sum of their distances in q.
 
     (x, y) is the window's corner from the sample and `step` a texel's width, in the map's texels.
     """
     zero, one = f4(0), f4(1)
     half_a, half_b, is_round, a0, a1, b0, b1 = axes
+    mask = (nb.int32(1) << log) - nb.int32(1)
     softest += step * f4(0.75)
     count, total = zero, zero
-    for i in range(nb.int32(8) * rows):
+    for i in range(rows << log):
         k = nb.int32(i)
-        dx, dy = x + f4(k & nb.int32(7)) * step, y + f4(k >> nb.int32(3)) * step
+        dx, dy = x + f4(k & mask) * step, y + f4(k >> log) * step
         z = window[U(i)]
         gap = min(max(q - z, f4(-1e9)), f4(1e9))
         a, b = a0 * dx + a1 * dy, b0 * dx + b1 * dy
@@ -226,8 +238,8 @@ def _search(count, form, grid, depth, k, window, b):
         softest, radius = b[SOFT + i], b[RADIUS + i]
         share, radius_a, radius_b = one, softest, softest
         for filtering in range(2):
-            # Blockers are sought on 8 x 8 texels or 4 x 8, a wide penumbra is filtered on 16 x 16.
-            log = nb.int32(4) if filtering == 1 and fine and radius > f4(2.5) else nb.int32(3)
+            # Blockers are sought on 8 x 8 texels or 4 x 8, those of a wide light and a wide penumbra on 16 x 16.
+            log = nb.int32(4) if fine and radius > (f4(2.5) if filtering == 1 else f4(9)) else nb.int32(3)
             level = _level_for(radius, f4(2.25) if log == nb.int32(3) else f4(6.5), size)
             step, middle, n = f4(1 << level), half + f4(1 << level >> 1), size >> level
             x, y = (u - middle) / step, (v - middle) / step
@@ -244,7 +256,9 @@ def _search(count, form, grid, depth, k, window, b):
                 at += U(n)
             dx, dy = (f4(left) - x) * step, (f4(top) - y) * step
             if filtering == 0:
-                found, total = _blockers(window, rows, dx, dy, step, axes, q, near, du, dv, softest)
+                if not _is_any_nearer(window, rows, log, dx, dy, step, near, du, dv):
+                    break
+                found, total = _blockers(window, rows, log, dx, dy, step, axes, q, near, du, dv, softest)
                 if found == f4(0):
                     break
                 gap = total / found
@@ -325,7 +339,8 @@ def _from_area(count, lights, k, b):
         tx, ty, tz = _edge(gx, gy, gz, ax, ay, az)
         px, py, pz = (px + qx + sx + tx) * scale, (py + qy + sy + ty) * scale, (pz + qz + sz + tz) * scale
         s = f4(-1) if px * lx + py * ly + pz * lz < zero else one
-        s = s * close if front > zero else zero
+        # In the rectangle's own plane rounding would decide between all of its light and none.
+        s = s * close if front > size * inverse * f4(1e-3) else zero
         px, py, pz = px * s + lx * far * (one - close), py * s + ly * far * (one - close), pz * s + lz * far * (one - close)
         strength = np.sqrt(px * px + py * py + pz * pz)
         s = one / max(strength, f4(1e-20))
@@ -363,10 +378,10 @@ def _shadows(count, lights, k, b):
     cx, cy, cz = lights.place[k, 0], lights.place[k, 1], lights.place[k, 2]
     left = zero
     for i in range(count):
-        x, y, z = cx - b[PX + i], cy - b[PY + i], cz - b[PZ + i]
-        away = np.sqrt(x * x + y * y + z * z)
-        facing = max(b[GX + i] * b[LX + i] + b[GY + i] * b[LY + i] + b[GZ + i] * b[LZ + i], f4(GRAZING))
-        facing *= away + (one - away) * distant
+        # The views look from a rectangle's middle, which is not where most of its light comes from.
+        x, y, z = cx - b[PX + i] * (one - distant), cy - b[PY + i] * (one - distant), cz - b[PZ + i] * (one - distant)
+        facing = b[GX + i] * x + b[GY + i] * y + b[GZ + i] * z
+        facing = max(facing, f4(GRAZING) * np.sqrt(x * x + y * y + z * z))
         b[FACING + i] = facing if b[SHARE + i] > zero else zero
         left += b[FACING + i]
     views = lights.views
@@ -383,8 +398,8 @@ def _shadows(count, lights, k, b):
 def arrive(count, lights, k, b):
     """Fill LX..LZ, IR..IB, SHARE and WIDTH of a block for light k.
 
-    The irradiance faces the light and has no shadows in it; SHARE is the share they leave. Smooth normals on coarse triangles:
-    the light fades before the first facet turns away from it.
+    The irradiance faces the light and has no shadows in it; SHARE is the share they leave. Where normals are smooth a facet
+    that is turned away a little has light like its neighbours: far away from it, bumps have none.
     """
     zero, one = f4(0), f4(1)
     k = U(k)
@@ -400,8 +415,7 @@ def arrive(count, lights, k, b):
         lx, ly, lz = b[LX + i], b[LY + i], b[LZ + i]
         facing = b[GX + i] * lx + b[GY + i] * ly + b[GZ + i] * lz
         turned = b[NX + i] * lx + b[NY + i] * ly + b[NZ + i] * lz
-        fade = min(max(turned, zero) / (f4(3) * abs(turned - facing) + f4(1e-6)), one)
-        share = min(max(facing * f4(20), zero), one) * fade * fade * (f4(3) - fade - fade)
+        share = min(max(f4(1.6) + f4(4) * facing, zero), one) if turned > zero else zero
         b[SHARE + i] = share if b[T0 + i] > zero else zero
     if lights.first[k] < lights.first[k + U(1)]:
         _shadows(count, lights, k, b)

@@ -2,7 +2,7 @@
 
 A pixel is numbered (`grid`, -1 elsewhere) if its centre looks different from a neighbour's, or, while drawing, if a surface
 comes between the centres before what they show (a thin wire). A triangle can matter if it is seen around such a pixel, or has a
-corner there that is not hidden, or one anywhere that is before what is shown.
+corner there that is not hidden, or one anywhere that is before what is shown. `kernels_lines` marks more of both before.
 """
 
 from __future__ import annotations
@@ -19,13 +19,14 @@ f4 = nb.float32
 U = nb.uintp
 STEEPEST = f4(0.9)  # of 1/z: how much farther than the centres around it a sample may be
 SLACK = f4(0.01)  # relative difference of 1/z that still passes for the same surface
+FLUSH = f4(1.001)  # of 1/z: a vertex that lies in what is already drawn is not behind it
 NARROW = 8  # pixels: the size up to which every pixel of a box is looked at
 THIN = 2.0  # pixels: a triangle as wide as this is seen at some centre
 
 
 @njit
 def begin(marks, triangle, depth, wanted):  # noqa: PLR0912, one pass after another
-    """Number the marked pixels, and mark in `wanted` (T,) the triangles that the centres around them show.
+    """Number the marked pixels (not 0), and mark in `wanted` (T,) also the triangles that the centres around them show.
 
     marks is flat and padded to whole words. Returns grid (H, W); limit (H, W): what a surface must be before to matter to a
     pixel, as 1/z; pixels with room for those found later; starts (H + 1,), each row's first number; bound (K,): 1/z of the
@@ -36,7 +37,7 @@ def begin(marks, triangle, depth, wanted):  # noqa: PLR0912, one pass after anot
     words = marks.view(np.uint64)
     total = 0
     for i in range(marks.shape[0]):
-        total += marks[i]
+        total += marks[i] != 0
     room = total + height * width // 8
     pixels, starts = np.empty(room, np.int32), np.zeros(height + 1, np.int32)
     k = 0
@@ -92,7 +93,7 @@ def with_corners_before(q, triangles, wanted, limit):
         x, y = q[i, a] * q[i, d], q[i, b] * q[i, d]
         if (q[i, c] > 0.0) & (x > -1.0) & (y > -1.0) & (x < width + 1.0) & (y < height + 1.0):
             column, row = min(max(np.int64(x), 0), width - 1), min(max(np.int64(y), 0), height - 1)
-            near[i] = f4(q[i, d]) > limit[U(row), U(column)]
+            near[i] = f4(q[i, d]) * FLUSH > limit[U(row), U(column)]
     order = np.empty(triangles.shape[0] + 1, np.int32)
     n = U(0)
     for t in range(U(triangles.shape[0])):
@@ -155,7 +156,7 @@ def draw(  # noqa: PLR0912, PLR0915, one loop, whose state is not worth handing 
         thin = not crossing and abs(det) * w0 * w1 * w2 < THIN * max(xb - xa, yb - ya)
         for y in range(ya, ya + 1 if narrow else yb + 1):
             if not narrow:
-                left, right = _span((e0, e1, e2), y, xa, xb, lowest, highest)
+                left, right = span((e0, e1, e2), y, xa, xb, lowest, highest)
                 n, row = U(0), U(y)
                 if thin:
                     for x in range(left, right + 1):
@@ -213,7 +214,7 @@ def draw(  # noqa: PLR0912, PLR0915, one loop, whose state is not worth handing 
 
 
 @njit
-def _span(edges, y, xa, xb, lowest, highest):
+def span(edges, y, xa, xb, lowest, highest):
     """First and last pixel of a row of which a sample may be covered."""
     low, high = float(xa), float(xb)
     for e in edges:

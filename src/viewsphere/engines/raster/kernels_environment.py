@@ -303,7 +303,7 @@ def _is_covered(radiance, start, count):
 
 @njit(fastmath=FAST)
 def sky_behind(view, surrounding, radiance):
-    """Lay radiance (N, 4), scene-linear and premultiplied, over the sky, in place; there is no sky where the lens has no ray."""
+    """Lay radiance (N, 4), scene-linear and premultiplied, over the sky, in place; no sky where the lens has no ray."""
     zero, one = f4(0), f4(1)
     count = radiance.shape[0]
     w = np.empty(6 * CHUNK, np.float32)

@@ -12,7 +12,7 @@ import math
 import numba as nb
 import numpy as np
 
-from viewsphere.engines.raster.kernels_arrive import FACING, arrive, look
+from viewsphere.engines.raster.kernels_arrive import DISTANT, FACING, arrive, look
 from viewsphere.engines.raster.kernels_block import (
     AO,
     BLOCK,
@@ -145,11 +145,11 @@ def spread(volume, known):
 
 
 @njit
-def ground_light(lights, corner, step, z, ambient, floor):
+def ground_light(lights, corner, step, z, depth, ambient, floor):
     """Fill floor[..., 1], share of all light that reaches the ground, from floor[..., 0], its share of the sky's.
 
-    corner: x and y of the middle of the first cell, step: a cell's width; ambient: sum over the three colours of the
-    irradiance that the open ground has from the sky.
+    corner: x and y of the middle of the first cell, step: a cell's width; depth: how far below z lamps are looked for;
+    ambient: sum over the three colours of the irradiance that the open ground has from the sky.
     """
     b = np.zeros(ROWS * BLOCK, np.float32)
     n = floor.shape[0]
@@ -164,14 +164,19 @@ def ground_light(lights, corner, step, z, ambient, floor):
                 floor[row, start + i, 1] = ambient * floor[row, start + i, 0]
             total = np.full(BLOCK, ambient, np.float32)
             for k in range(lights.kind.shape[0]):
+                # What lamps give the ground around has their shadows taken off already; what lies on it keeps their light in.
+                is_lamp = lights.kind[k] != DISTANT
+                for i in range(count):
+                    b[PZ + i] = z - depth if is_lamp else z
                 arrive(count, lights, k, b)
                 for i in range(count):
                     got = (b[IR + i] + b[IG + i] + b[IB + i]) * max(b[LZ + i], f4(0))
-                    floor[row, start + i, 1] += got * b[SHARE + i]
-                    total[i] += got
+                    left = got * b[SHARE + i]
+                    floor[row, start + i, 1] += left
+                    total[i] += left if is_lamp else got
             for i in range(count):
-                whole = total[i]
-                floor[row, start + i, 1] = min(floor[row, start + i, 1] / whole, f4(1)) if whole > f4(0) else f4(1)
+                most = total[i]
+                floor[row, start + i, 1] = min(floor[row, start + i, 1] / most, f4(1)) if most > f4(0) else f4(1)
 
 
 @njit(fastmath=FAST)

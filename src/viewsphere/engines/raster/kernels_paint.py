@@ -52,6 +52,7 @@ from viewsphere.geometry.jit import njit
 f4 = nb.float32
 U = nb.uintp
 NOTHING, SOLID, SEE_THROUGH, FLOOR = range(4)
+GLINT = 2.0  # radiance, a little more than what is shown as white
 
 
 @njit
@@ -129,6 +130,33 @@ def _start_matte(count, floor, b):
 
 
 @njit(fastmath=FAST)
+def _take(count, is_catcher, is_matte, b):
+    """One light that has arrived."""
+    if is_catcher:
+        _catch(count, b)
+    elif is_matte:
+        add_light_matte(count, b)
+    else:
+        add_light(count, b)
+
+
+@njit(fastmath=FAST)
+def _lay_all(start, count, is_ground, slots, radiance, b):
+    """What the samples send and hide, over what is behind them; the ground as far as it has not faded."""
+    for i in range(count):
+        pixel = radiance[U(slots[start + i])]
+        if is_ground:
+            shown = f4(1) - b[FADE + i]
+            under = f4(1) - b[ALPHA + i] * shown
+            pixel[0] = pixel[0] * under + b[RED + i] * shown
+            pixel[1] = pixel[1] * under + b[GREEN + i] * shown
+            pixel[2] = pixel[2] * under + b[BLUE + i] * shown
+            pixel[3] = pixel[3] * under + b[ALPHA + i] * shown
+        else:
+            lay(pixel, i, b)
+
+
+@njit(fastmath=FAST)
 def shade(view, surfaces, textures, floor, surrounding, lights, occlusion, is_ground, slots, triangle, depth, radiance):
     """Shade the samples in `slots` (N,) int32 over `radiance` (S, 4) float32, premultiplied, in place.
 
@@ -156,12 +184,7 @@ def shade(view, surfaces, textures, floor, surrounding, lights, occlusion, is_gr
         occlude(count, occlusion, b)
         for k in range(lights.kind.shape[0]):
             arrive(count, lights, k, b)
-            if is_catcher:
-                _catch(count, b)
-            elif is_matte:
-                add_light_matte(count, b)
-            else:
-                add_light(count, b)
+            _take(count, is_catcher, is_matte, b)
         if is_catcher:
             _finish_catcher(count, surrounding, b)
         elif is_matte:
@@ -170,19 +193,7 @@ def shade(view, surfaces, textures, floor, surrounding, lights, occlusion, is_gr
         else:
             ambient(count, surrounding, b)
             compose(count, surrounding, b)
-        if not is_ground:
-            for i in range(count):
-                lay(radiance[U(slots[start + i])], i, b)
-            continue
-        for i in range(count):
-            slot = U(slots[start + i])
-            shown = f4(1) - b[FADE + i]
-            under = f4(1) - b[ALPHA + i] * shown
-            pixel = radiance[slot]
-            pixel[0] = pixel[0] * under + b[RED + i] * shown
-            pixel[1] = pixel[1] * under + b[GREEN + i] * shown
-            pixel[2] = pixel[2] * under + b[BLUE + i] * shown
-            pixel[3] = pixel[3] * under + b[ALPHA + i] * shown
+        _lay_all(start, count, is_ground, slots, radiance, b)
 
 
 @njit
@@ -209,9 +220,19 @@ def shared_samples(triangle, depth, owner, normals):
 
 @njit(fastmath=FAST)
 def average_samples(pixels, samples, like, radiance):
-    """Each pixel becomes the mean of its four samples (premultiplied), each of which looks `like` one of them."""
+    """Each pixel becomes the mean of its four samples (premultiplied), each of which looks `like` one of them.
+
+    A glint counts no more than GLINT, or than the least of them, else thin things would be dotted.
+    """
     for i in range(pixels.shape[0]):
-        p = U(pixels[i])
-        j, k, m, n = U(like[4 * i]), U(like[4 * i + 1]), U(like[4 * i + 2]), U(like[4 * i + 3])
-        for c in range(4):
-            radiance[p, c] = (samples[j, c] + samples[k, c] + samples[m, c] + samples[n, c]) * f4(0.25)
+        p, least = U(pixels[i]), f4(1e9)
+        for k in range(4):
+            own = samples[U(like[4 * i + k])]
+            least = min(least, max(own[0], own[1], own[2]))
+        most = max(least, f4(GLINT))
+        red, green, blue, alpha = f4(0), f4(0), f4(0), f4(0)
+        for k in range(4):
+            own = samples[U(like[4 * i + k])]
+            share = f4(0.25) * min(most / max(own[0], own[1], own[2], f4(1e-6)), f4(1))
+            red, green, blue, alpha = red + own[0] * share, green + own[1] * share, blue + own[2] * share, alpha + own[3]
+        radiance[p, 0], radiance[p, 1], radiance[p, 2], radiance[p, 3] = red, green, blue, alpha * f4(0.25)

@@ -27,7 +27,7 @@ _MAP = {"fast": 96, "fine": 128}
 _MOST_CELLS = {"fast": 60_000, "fine": 260_000}
 _MOST_OPEN_CELLS = 60_000  # where scenery may read any of them
 _PAD, _WIDE_PAD = 3, 6  # cells around the targets, without and with scenery
-_PUSH = 1.2  # cells between a surface and where it reads the volume
+_PUSH = 1.6  # cells between a surface and where it reads the volume
 _FLOOR = 128  # cells of the ground's map, each way
 _DEEPEST = 0.92  # the rest is light that objects and ground throw back and forth
 
@@ -91,10 +91,11 @@ def with_ground_light(occlusion: Occlusion, lights: Lights, ambient: float) -> O
     """
     if not occlusion.floor_frame[5]:
         return occlusion
-    cells, x, y, z = (float(v) for v in occlusion.floor_frame[:4])
+    cells, x, y, z, height = (float(v) for v in occlusion.floor_frame[:5])
     floor = occlusion.floor.copy()
     corner = np.array([x + 0.5 / cells, y + 0.5 / cells], np.float32)
-    kernels.ground_light(lights, corner, np.float32(1 / cells), np.float32(z), np.float32(ambient), floor)
+    depth = np.float32(0.02 * height if occlusion.frame[6] else 0.0)  # scenery may be the ground
+    kernels.ground_light(lights, corner, np.float32(1 / cells), np.float32(z), depth, np.float32(ambient), floor)
     floor[..., 1] = 1 - (1 - floor[..., 1]) * _window()
     return occlusion._replace(floor=floor)
 

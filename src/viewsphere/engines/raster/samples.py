@@ -9,7 +9,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.engines.raster import kernels_chosen, kernels_edges
+from viewsphere.engines.raster import kernels_chosen, kernels_edges, kernels_lines
 from viewsphere.engines.raster import kernels_samples as kernels
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.model.camera import Camera, Intrinsics
@@ -62,10 +62,10 @@ def edge_samples(geometry: Geometry, camera: Camera, visibility: Visibility, own
     """The pixels whose samples do not all show the surface at the centre, with their samples; None if there are none.
 
     `visibility` is truth's buffer for this camera; owner (T,): equal where neighbouring triangles look alike. Looked at are the
-    pixels that differ from a neighbour and, with a pinhole, those in which something nearer comes between the centres (thin
-    wires). With a distorted lens each sample shows exactly what truth's rasteriser would see there; with a pinhole nearly all
-    do: a triangle that no centre around sees and that has no corner in such a pixel is left out (`kernels_edges`), and what is
-    behind it, or at the centre, is shown instead.
+    pixels that differ from a neighbour and, with a pinhole, those in which something comes between the centres: nearer (thin
+    wires), or as far (thin lines on a surface, `kernels_lines`). With a distorted lens each sample shows exactly what truth's
+    rasteriser would see there; with a pinhole nearly all do: a triangle that no centre around sees and that has no corner in
+    such a pixel is left out (`kernels_edges`), and what is behind it, or at the centre, is shown instead.
     """
     look = visibility.triangle, visibility.inverse_depth, owner, geometry.triangle_normals
     marks = kernels_chosen.differing(*look)
@@ -243,6 +243,8 @@ def _pinhole_edges(
     """pixels, position, triangle and inverse depth of `Samples`."""
     shown = visibility.triangle, visibility.inverse_depth
     wanted = np.zeros(len(geometry.triangles), np.uint8)
+    lines = kernels_lines.on_others(q, geometry.triangles, geometry.triangle_cutout, owner, *shown)
+    kernels_lines.mark(lines, q, geometry.triangles, owner, _ROTATED, *shown, marks, wanted)
     grid, limit, pixels, starts, bound, nearest, seen = kernels_edges.begin(marks, *shown, wanted)
     surfaces = q, geometry.triangles, geometry.triangle_cutout, geometry.cutouts.arrays
     canvas = _ROTATED, *shown, grid, limit, pixels, starts

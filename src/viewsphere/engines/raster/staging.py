@@ -127,7 +127,7 @@ def _baked(
     distant = sky_lights(scene.sky, scene.sun, has_ground)
     lights = bake_lights(distant, scene.lights, casters, unit, has_ground, options.shadow_resolution)
     floor, albedo = _floor(scene.ground, origin, unit, len(surfaces.looks) - 1)
-    lamps = lamps_on_ground(scene.lights, low, high)
+    lamps = lamps_on_ground(lights, extent)
     surrounding = bake_surrounding(scene.sky, scene.sun, albedo, distant, even_light(scene.lights), lamps)
     occlusion = bake_occlusion(casters, has_ground, options.ambient_occlusion)
     see_through = np.append(_is_see_through(surfaces.looks)[surfaces.material], False)

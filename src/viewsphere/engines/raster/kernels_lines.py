@@ -1,0 +1,110 @@
+"""Pixels in which a thin line that lies in a surface, or just on it, passes between the centres, unseen by `kernels_edges`.
+
+A panel's seam is as far as the paint beside it, so nothing comes before what the centres show. Looked at are the narrow
+triangles of which a vertex is about as far as what its pixel shows there, and that look different from it.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numba as nb
+import numpy as np
+
+from viewsphere.engines.raster.kernels_edges import span
+from viewsphere.geometry.jit import njit
+from viewsphere.truth.kernels import NEVER, plane
+
+f4 = nb.float32
+U = nb.uintp
+BEFORE = f4(0.01)  # relative difference of 1/z of a vertex and the centre of its pixel: beyond it, `kernels_edges` looks
+BEHIND = f4(0.005)  # likewise: enough for steep surfaces, too
+FLUSH = 0.001  # of 1/z: how far behind the plane of what is seen a line may be
+WIDE = 8  # pixels: the width of a box beyond which a row's part of it is computed
+FOUND = 2  # in `marks`: a pixel marked here
+NARROW = 1.0  # pixels: a line as wide as this is seen at some centre
+
+
+@njit
+def on_others(q, triangles, cutout, owner, triangle, depth):
+    """The triangles that have a vertex at a surface of another owner, which hides it at most a little."""
+    height, width = triangle.shape
+    shown = np.full(q.shape[0], np.int32(-1))
+    a, b, c, d = U(0), U(1), U(2), U(3)
+    for i in range(U(q.shape[0])):
+        x, y = q[i, a] * q[i, d], q[i, b] * q[i, d]
+        if (q[i, c] > 0.0) & (x >= 0.0) & (y >= 0.0) & (x < width) & (y < height):
+            row, column = U(y), U(x)
+            level = depth[row, column]
+            here = f4(q[i, d])
+            if (here > level * (f4(1) - BEHIND)) & (here < level * (f4(1) + BEFORE)):
+                shown[i] = owner[U(triangle[row, column])]
+    order = np.empty(triangles.shape[0] + 1, np.int32)
+    n = U(0)
+    for t in range(U(triangles.shape[0])):
+        o = owner[t]
+        s0, s1, s2 = shown[U(triangles[t, a])], shown[U(triangles[t, b])], shown[U(triangles[t, c])]
+        is_on = ((s0 >= 0) & (s0 != o)) | ((s1 >= 0) & (s1 != o)) | ((s2 >= 0) & (s2 != o))
+        order[n] = t
+        n += U(is_on & (cutout[t] != NEVER))
+    return order[:n]
+
+
+@njit
+def mark(order, q, triangles, owner, offsets, triangle, depth, marks, wanted):
+    """Mark the pixels that have a sample on one of these triangles where it is narrow, and that triangle in `wanted` (T,)."""
+    height, width = triangle.shape
+    lowest, highest = offsets.min(), offsets.max()
+    a, b, c, d = U(0), U(1), U(2), U(3)
+    for k in range(U(order.shape[0])):
+        t = U(order[k])
+        i0, i1, i2 = U(triangles[t, a]), U(triangles[t, b]), U(triangles[t, c])
+        w0, w1, w2 = q[i0, d], q[i1, d], q[i2, d]
+        high = max(w0, w1, w2)
+        if high == np.inf:
+            continue
+        u0, u1, u2 = q[i0, a] * w0, q[i1, a] * w1, q[i2, a] * w2
+        v0, v1, v2 = q[i0, b] * w0, q[i1, b] * w1, q[i2, b] * w2
+        ax, ay, bx, by = u1 - u0, v1 - v0, u2 - u0, v2 - v0
+        longest = max(ax * ax + ay * ay, bx * bx + by * by, (ax - bx) * (ax - bx) + (ay - by) * (ay - by))
+        area = ax * by - ay * bx
+        if area * area >= NARROW * NARROW * longest or area == 0.0:
+            continue
+        xa = math.ceil(max(min(u0, u1, u2) - highest, 0.0))
+        ya = math.ceil(max(min(v0, v1, v2) - highest, 0.0))
+        xb = math.floor(min(max(u0, u1, u2) - lowest, width - 1.0))
+        yb = math.floor(min(max(v0, v1, v2) - lowest, height - 1.0))
+        # the shares of corners 1 and 2 at a point, from corner 0
+        scale = 1.0 / area
+        sx, sy, tx, ty = by * scale, -bx * scale, -ay * scale, ax * scale
+        s0, t0 = -(sx * u0 + sy * v0), -(tx * u0 + ty * v0)
+        is_wide, o = xb - xa > WIDE, owner[t]
+        for y in range(ya, yb + 1):
+            left, right = xa, xb
+            if is_wide:
+                edges = (sx, sy, s0), (tx, ty, t0), (-sx - tx, -sy - ty, 1.0 - s0 - t0)
+                left, right = span(edges, y, xa, xb, lowest, highest)
+            for x in range(left, right + 1):
+                row, column = U(y), U(x)
+                p = row * U(width) + column
+                if marks[p] == 1 or (marks[p] and wanted[t]):
+                    continue
+                shown = triangle[row, column]
+                if shown < 0 or f4(high) < depth[row, column] * (f4(1) - BEHIND) or owner[U(shown)] == o:
+                    continue
+                for i in range(U(4)):
+                    px, py = float(x) + offsets[a, i], float(y) + offsets[b, i]
+                    f1, f2 = sx * px + (sy * py + s0), tx * px + (ty * py + t0)
+                    if f1 >= 0.0 and f2 >= 0.0 and f1 + f2 <= 1.0:
+                        inverse = w0 + f1 * (w1 - w0) + f2 * (w2 - w0)
+                        if inverse >= depth[row, column] or _is_flush(inverse, px, py, U(shown), q, triangles):
+                            marks[p], wanted[t] = FOUND, 1
+                            break
+
+
+@njit
+def _is_flush(inverse, px, py, t, q, triangles):
+    """Whether 1/z is at (px, py) no more than a little behind a triangle's plane."""
+    i0, i1, i2 = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+    nx, ny, nz, det = plane((q[i0, 0], q[i0, 1], q[i0, 2]), (q[i1, 0], q[i1, 1], q[i1, 2]), (q[i2, 0], q[i2, 1], q[i2, 2]))
+    return det != 0.0 and inverse >= (1.0 - FLUSH) * (nx * px + (ny * py + nz)) / det
