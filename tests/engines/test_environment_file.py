@@ -212,3 +212,10 @@ def test_real_files():
         found = read_environment(path)
         assert found.pixels.shape == (512, 1024, 3) and found.notes == ()
         assert found.pixels.mean() > 0.05
+
+
+def test_a_picture_without_light_is_refused(tmp_path):
+    file = tmp_path / "black.exr"
+    exr(file, {"RGB": np.zeros((32, 64, 3), np.float32)})
+    with pytest.raises(UserError, match="black.exr.*no light in it"):
+        read_environment(file)

@@ -165,7 +165,7 @@ def _read_ordinary(path: Path) -> Float32:
 def _mended(path: Path, pixels: Float32, notes: list[str]) -> Float32:
     """Every texel a finite number of at least 0."""
     low, high = float(pixels.min()), float(pixels.max())
-    if low >= 0 and high <= _BRIGHTEST:
+    if low >= 0 and 0 < high <= _BRIGHTEST:
         return pixels
     finite = np.isfinite(pixels) & (pixels <= _BRIGHTEST)
     bad = int((~finite).any(axis=-1).sum())
