@@ -217,5 +217,5 @@ def test_real_files():
 def test_a_picture_without_light_is_refused(tmp_path):
     file = tmp_path / "black.exr"
     exr(file, {"RGB": np.zeros((32, 64, 3), np.float32)})
-    with pytest.raises(UserError, match="black.exr.*no light in it"):
+    with pytest.raises(UserError, match="no light in it"):
         read_environment(file)
