@@ -204,6 +204,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as name:
         folder = args.keep or Path(name)
         folder.mkdir(parents=True, exist_ok=True)
+        args.output.mkdir(parents=True, exist_ok=True)
         write_sky(folder)
         found = list(cases(folder))
         for case in found:
