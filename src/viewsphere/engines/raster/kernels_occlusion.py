@@ -125,21 +125,24 @@ def spread(volume, known):
     """Give unknown points beside known ones their mean, once; returns what is known then."""
     layers, rows, columns = known.shape
     after = known.copy()
+    total = np.empty(COEFFICIENTS, np.float32)
     for m in range(layers):
         for n in range(rows):
             for o in range(columns):
                 if known[m, n, o]:
                     continue
                 count = 0
-                total = np.zeros(COEFFICIENTS, np.float32)
+                total[:] = f4(0)
                 for k in range(6):
                     step = 1 if k % 2 else -1
                     p, q, r = m + (step if k < 2 else 0), n + (step if k // 2 == 1 else 0), o + (step if k > 3 else 0)
                     if 0 <= p < layers and 0 <= q < rows and 0 <= r < columns and known[p, q, r]:
                         count += 1
-                        total += volume[p, q, r]
+                        for c in range(COEFFICIENTS):
+                            total[c] += volume[p, q, r, c]
                 if count > 0:
-                    volume[m, n, o] = total / f4(count)
+                    for c in range(COEFFICIENTS):
+                        volume[m, n, o, c] = total[c] / f4(count)
                     after[m, n, o] = True
     return after
 
