@@ -448,6 +448,19 @@ def test_blended_surface_shows_what_is_behind():
     assert seen[8, 12].tolist() == as_bytes([0.25, 0.0, 0.75]).tolist()
 
 
+@pytest.mark.parametrize("antialias", [1, 4])
+def test_a_decal_lies_on_the_surface_it_shares_a_plane_with(antialias):
+    """Of equal depths truth sees the first triangle, the surface; the decal is seen all the same."""
+    board, decal = unlit(color=(0.0, 1.0, 0.0, 1.0)), unlit(color=(1.0, 0.0, 0.0, 0.25), alpha_mode="BLEND")
+    mesh = replace(
+        mesh_of(np.concatenate([card(4, 4), card(4, 4)])),
+        triangle_material=np.int32([0, 0, 1, 1]),
+        materials=(board, decal),
+    )
+    seen = picture(mesh, Scene(finish=AS_IT_IS), camera(16, 16, 16.0, distance=2.0), antialias=antialias)
+    assert seen[8, 8].tolist() == as_bytes([0.25, 0.75, 0.0]).tolist()
+
+
 def test_metal_mirrors_the_sky_and_is_not_dead():
     """Chrome looked at from the side shows the bright horizon above and the darker earth below."""
     chrome = Material(metallic=1.0, roughness=0.1)

@@ -57,7 +57,7 @@ GLINT = 2.0  # radiance, a little more than what is shown as white
 
 @njit
 def sorted_samples(triangle, kind, material, materials):
-    """Indices (int32) of the samples that show solid surfaces, those of one material together, see-through ones, the ground.
+    """Indices (int32) of the samples that show solid surfaces, those of one material together, and of those of the ground.
 
     kind (T + 1,) uint8: of each triangle; the last of triangle -1, NOTHING. material (T,): which of so many `materials`.
     """
@@ -70,8 +70,8 @@ def sorted_samples(triangle, kind, material, materials):
             starts[U(material[t]) + U(1)] += 1
     for m in range(materials):
         starts[m + 1] += starts[m]
-    solid, clear, ground = np.empty(counts[1], np.int32), np.empty(counts[2], np.int32), np.empty(counts[3], np.int32)
-    b, c = U(0), U(0)
+    solid, ground = np.empty(counts[SOLID], np.int32), np.empty(counts[FLOOR], np.int32)
+    c = U(0)
     for i in range(triangle.shape[0]):
         t = triangle[i]
         k = kind[t]
@@ -82,10 +82,7 @@ def sorted_samples(triangle, kind, material, materials):
             m = U(material[t])
             solid[U(starts[m])] = i
             starts[m] += 1
-        elif k == SEE_THROUGH:
-            clear[b] = i
-            b += U(1)
-    return solid, clear, ground
+    return solid, ground
 
 
 @njit(fastmath=FAST)

@@ -14,10 +14,10 @@ from viewsphere.engines.raster.lights import Lights
 from viewsphere.engines.raster.occlusion import Occlusion
 from viewsphere.engines.raster.records import Float32, Int32, Surfaces, Textures, View
 from viewsphere.engines.raster.samples import Samples, edge_samples, layers
-from viewsphere.geometry.camera import inverse_camera_matrix, pixel_rays
+from viewsphere.geometry.camera import inverse_camera_matrix
 from viewsphere.model.camera import Camera
 from viewsphere.truth.geometry import Geometry
-from viewsphere.truth.visibility import Visibility
+from viewsphere.truth.visibility import Visibility, lens_rays
 
 _NO_RAYS = np.zeros((0, 3), np.float32)
 _NO_PLACES = np.zeros((0, 2), np.float32)
@@ -90,20 +90,17 @@ def _shade(
     samples: Samples | None = None,
 ) -> None:
     """Shade samples over `radiance`; what is behind see-through surfaces first."""
-    solid, clear, ground = kernels_paint.sorted_samples(
-        triangle, baked.kind, baked.surfaces.material, len(baked.surfaces.looks)
-    )
+    solid, ground = kernels_paint.sorted_samples(triangle, baked.kind, baked.surfaces.material, len(baked.surfaces.looks))
     _shade_some(baked, view, solid, False, triangle, depth, radiance)
     _shade_some(baked, view, ground, True, triangle, depth, radiance)
-    if len(clear):
-        pixels = None if samples is None else samples.pixels
-        for layer in layers(baked.geometry, camera, triangle, depth, baked.see_through, pixels, visibility.corners):
-            behind, behind_depth = triangle.copy(), depth.copy()
-            behind[layer.slot], behind_depth[layer.slot] = layer.triangle, layer.inverse_depth
-            is_ground = baked.kind[layer.triangle] == kernels_paint.FLOOR
-            for which in (False, True):
-                slots = layer.slot[is_ground == which]
-                _shade_some(baked, view, slots, which, behind, behind_depth, radiance)
+    # Also where no see-through surface is in front: a decal may lie on what is.
+    pixels = None if samples is None else samples.pixels
+    for layer in layers(baked.geometry, camera, triangle, depth, baked.see_through, pixels, visibility.corners):
+        behind, behind_depth = triangle.copy(), depth.copy()
+        behind[layer.slot], behind_depth[layer.slot] = layer.triangle, layer.inverse_depth
+        is_ground = baked.kind[layer.triangle] == kernels_paint.FLOOR
+        for which in (False, True):
+            _shade_some(baked, view, layer.slot[is_ground == which], which, behind, behind_depth, radiance)
 
 
 def _shade_some(
@@ -119,9 +116,9 @@ def _shade_some(
 def view_of(baked: Baked, camera: Camera, samples: Samples | None = None) -> View:
     """The rays of a camera's pixel centres, or of these samples."""
     rays, places = _NO_RAYS, _NO_PLACES
-    if camera.distortion is not None:
-        table = pixel_rays(camera.intrinsics) if samples is None else samples.rays
-        rays = table.astype(np.float32).reshape(-1, 3)
+    table = lens_rays(camera)
+    if table is not None:
+        rays = (table if samples is None else samples.rays).astype(np.float32).reshape(-1, 3)
     elif samples is not None:
         places = samples.position
     return View(
