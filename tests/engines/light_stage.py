@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from test_raster import box, mesh_of, rectangle
 
 from viewsphere.assets.mesh import Material, Mesh
 from viewsphere.engines.raster import kernels_block as row
@@ -23,44 +24,7 @@ from viewsphere.truth.visibility import rasterize
 SPEC = ModelSpec(key="model", source="memory", category="thing", category_id=1)
 IDENTITY = ((1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1))
 
-
-def flat(triangles: np.ndarray, material: Material | None = None, **fields) -> Mesh:
-    """One material; triangles (T, 3, 3) with flat normals."""
-    corners = np.asarray(triangles, np.float32).reshape(-1, 3)
-    a, b, c = corners.reshape(-1, 3, 3).transpose(1, 0, 2)
-    normal = np.cross(b - a, c - a)
-    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    count = len(a)
-    return Mesh(
-        vertices=corners,
-        triangles=np.arange(3 * count, dtype=np.int32).reshape(-1, 3),
-        normals=np.repeat(normal, 3, axis=0).astype(np.float32),
-        triangle_material=np.zeros(count, np.int32),
-        triangle_part=np.zeros(count, np.int32),
-        materials=(material or Material(),),
-        **fields,
-    )
-
-
-def quad(corner, across, up) -> np.ndarray:
-    """Two triangles; corners in the order origin, across, both, up."""
-    o, a, b = (np.asarray(x, float) for x in (corner, across, up))
-    return np.array([[o, o + a, o + a + b], [o, o + a + b, o + b]])
-
-
-def cuboid(low, high) -> np.ndarray:
-    """Twelve triangles that look outwards."""
-    (x0, y0, z0), (x1, y1, z1) = low, high
-    x, y, z = x1 - x0, y1 - y0, z1 - z0
-    sides = [
-        quad(low, (0, y, 0), (x, 0, 0)),
-        quad((x0, y0, z1), (x, 0, 0), (0, y, 0)),
-        quad(low, (x, 0, 0), (0, 0, z)),
-        quad((x0, y1, z0), (0, 0, z), (x, 0, 0)),
-        quad(low, (0, 0, z), (0, y, 0)),
-        quad((x1, y0, z0), (0, y, 0), (0, 0, z)),
-    ]
-    return np.concatenate(sides)
+flat, quad, cuboid = mesh_of, rectangle, box
 
 
 def ball(radius: float, middle, rings: int = 24) -> Mesh:
