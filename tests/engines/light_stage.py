@@ -114,12 +114,12 @@ class LightStage:
         return {"toward": found[:, :3], "irradiance": found[:, 3:6] * found[:, 6:7], "share": found[:, 6], "width": found[:, 7]}
 
     def occlusion(self, baked: Occlusion, s: Samples) -> np.ndarray:
-        """OPEN, BOUNCE and the open direction, (n, 5)."""
-        result = np.zeros((len(s.place), 5))
+        """OPEN and BOUNCE, (n, 2)."""
+        result = np.zeros((len(s.place), 2))
         for ground in (False, True):
             part = s.is_ground == ground
             own = Samples(s.place[part], s.smooth[part], s.normal[part], s.pixel[part], s.is_ground[part])
-            result[part] = self._in_blocks(lambda n, b: occlude(n, baked, b), own, "OPEN BOUNCE OPENX OPENY OPENZ")
+            result[part] = self._in_blocks(lambda n, b: occlude(n, baked, b), own, "OPEN BOUNCE")
         return result
 
     def _in_blocks(self, kernel, s: Samples, rows: str) -> np.ndarray:

@@ -63,6 +63,16 @@ def view_of(rotation, rays=None) -> View:
 FRONT = view_of([[1, 0, 0], [0, 0, -1], [0, 1, 0]])  # looks along +Y, x to the right, image down is -Z
 
 
+def edges_of(surfaces, seen, normals) -> dict[str, np.ndarray]:
+    """The rows that tell the edges of the seen triangles, for smooth normals (N, 3) on the viewer's side."""
+    first, second, third = surfaces.vertices[surfaces.triangles[seen].T]
+    rows = {"SIDE": np.where((normals * first[:, :3]).sum(1) >= 0, 1, -1)}
+    for letter, way in (("A", second - first), ("B", third - first)):
+        rows |= {letter + axis: way[:, 11 + k] for k, axis in enumerate("XYZ")}
+        rows |= {f"{axis}{letter}{k}": way[:, 3 + 2 * k + "UV".index(axis)] for k in (0, 1) for axis in "UV"}
+    return rows
+
+
 def made(surfaces, textures, given, seen=0, which=0, view=FRONT) -> dict[str, np.ndarray]:
     """All rows of the samples after `material`; `given` are rows by name (V, G, N as (N, 3) by their letter), by default those
     of one sample in the card's middle, seen from straight in front.
@@ -79,6 +89,7 @@ def made(surfaces, textures, given, seen=0, which=0, view=FRONT) -> dict[str, np
     names = [name for name in names if name not in ("BLOCK", "ROWS")]
     rows = {name: np.broadcast_to(np.float32(value), count) for name, value in rows.items()}
     seen, which = (np.broadcast_to(np.asarray(index, np.int32), count) for index in (seen, which))
+    rows |= edges_of(surfaces, seen, np.stack([rows["N" + axis] for axis in "XYZ"], 1))
     found = {name: np.zeros(count, np.float32) for name in names}
     for start in range(0, count, block.BLOCK):
         part = slice(start, min(start + block.BLOCK, count))

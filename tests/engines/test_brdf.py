@@ -10,6 +10,7 @@ import pytest
 from viewsphere.engines.raster import kernels_block as rows
 from viewsphere.engines.raster import kernels_light as stages
 from viewsphere.engines.raster.environment import Surrounding, bake_surrounding, lobe_albedo
+from viewsphere.engines.raster.kernels_environment import BELOW
 from viewsphere.imaging.view import EXPOSURE
 from viewsphere.model.scene import Sky
 
@@ -46,7 +47,10 @@ def lit(b: np.ndarray) -> np.ndarray:
 
 def white_furnace() -> Surrounding:
     """Light 1 from everywhere."""
-    return bake_surrounding(WHITE, None, None, even=np.zeros((2, 3)))._replace(below=np.ones(3, np.float32))
+    surrounding = bake_surrounding(WHITE, None, None, even=np.zeros((2, 3)))
+    light = surrounding.light.copy()
+    light[BELOW] = 1
+    return surrounding._replace(light=light)
 
 
 def upward(rng):
@@ -143,7 +147,7 @@ def test_white_furnace():
                 b = block(view=view, ROUGH=rough, METAL=metal, COAT=coat, COAT_ROUGH=rng.uniform(0, 1, N))
                 stages.weigh(N, surrounding.albedo, b)
                 stages.ambient(N, surrounding, b)
-                stages.compose(N, surrounding, b)
+                stages.compose(N, b)
                 for name in ("RED", "GREEN", "BLUE"):
                     assert out(b, name) == pytest.approx(1, abs=0.01), (rough, metal, coat)
 
@@ -217,7 +221,7 @@ def test_glass_lets_through_by_its_tint():
     b = block(TRANSMISSION=1, ROUGH=0.0, RED=0.8, GREEN=0.5, BLUE=0.5)
     stages.weigh(N, surrounding.albedo, b)
     stages.ambient(N, surrounding, b)
-    stages.compose(N, surrounding, b)
+    stages.compose(N, b)
     shown = 1 - out(b, "ALPHA")
     assert shown == pytest.approx(0.96 * 0.5, abs=0.01)
     # Before something white as its surroundings: its reflection, and the rest tinted.
@@ -231,7 +235,7 @@ def test_unlit_shows_its_colour_alone():
     stages.weigh(N, surrounding.albedo, b)
     stages.add_light(N, b)
     stages.ambient(N, surrounding, b)
-    stages.compose(N, surrounding, b)
+    stages.compose(N, b)
     assert out(b, "RED") == pytest.approx(0.15 / EXPOSURE, abs=1e-6)
     assert out(b, "ALPHA") == pytest.approx(0.5)
 
@@ -266,7 +270,7 @@ def test_nothing_is_negative_or_not_a_number():
         stages.weigh(N, surrounding.albedo, b)
         stages.add_light(N, b)
         stages.ambient(N, surrounding, b)
-        stages.compose(N, surrounding, b)
+        stages.compose(N, b)
         for name in ("RED", "GREEN", "BLUE", "ALPHA"):
             values = out(b, name)
             assert np.isfinite(values).all() and (values >= 0).all(), name

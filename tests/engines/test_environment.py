@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from viewsphere.engines.raster import kernels_block as rows
-from viewsphere.engines.raster import kernels_environment as kernels
 from viewsphere.engines.raster import kernels_light as stages
-from viewsphere.engines.raster.daylight import air, daylight_picture
-from viewsphere.engines.raster.environment import bake_surrounding, sky_lights, sun_light, without_sun
+from viewsphere.engines.raster.environment import bake_surrounding, sky_behind, sky_lights, without_sun
 from viewsphere.engines.raster.records import View
 from viewsphere.errors import UserError
 from viewsphere.model.scene import Daylight, Environment, Sky, Sun
+from viewsphere.surroundings.daylight import air, daylight_picture
+from viewsphere.surroundings.sun import sun_light
 
 N = rows.BLOCK
 HDRI = Path(__file__).parents[3] / "shared" / "models" / "hdri"
@@ -47,7 +47,7 @@ def seen(surrounding, normals, rough=None, bounce=1.0):
         b[row : row + N] = np.resize(normals[axis], N)
     b[rows.T6 : rows.T6 + N] = -1 if rough is None else rough
     b[rows.BOUNCE : rows.BOUNCE + N] = bounce
-    stages._light(N, surrounding, False, b)
+    stages.light_around(N, surrounding, b)
     return np.stack([b[row : row + N] for row in (rows.T3, rows.T4, rows.T5)], axis=-1)[: normals.shape[1]].astype(float)
 
 
@@ -243,7 +243,7 @@ def look(width, height, focal, toward=(1.0, 0.0, 0.0)):
 
 def background(view, surrounding, width, height):
     out = np.zeros((width * height, 4), np.float32)
-    kernels.sky_behind(view, surrounding, out)
+    sky_behind(view, surrounding, out)
     return out.reshape(height, width, 4)
 
 
@@ -285,7 +285,7 @@ def test_background_of_rays_without_direction_of_covered_pixels_and_of_samples()
     half = np.tile(np.array([0.2, 0.1, 0.3, 0.5], np.float32), (256, 1))
     half[:128, 3] = 1
     before = half.copy()
-    kernels.sky_behind(view, surrounding, half)
+    sky_behind(view, surrounding, half)
     np.testing.assert_array_equal(half[:128], before[:128])
     np.testing.assert_allclose(half[128:], before[128:] + 0.5 * whole[128:], rtol=1e-6)
     x, y = np.meshgrid(np.arange(64) + 0.5, np.arange(4) + 0.5)
@@ -310,7 +310,7 @@ def test_missing_file_is_said(tmp_path):
 
 @pytest.mark.skipif(not HDRI.is_dir(), reason="no models")
 def test_real_skies_light_as_their_pictures():
-    from viewsphere.engines.raster.environment_file import read_environment
+    from viewsphere.surroundings.environment_file import read_environment
 
     for path in sorted(HDRI.iterdir()):
         sky = Environment(file=str(path))

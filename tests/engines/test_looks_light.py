@@ -10,12 +10,12 @@ import pytest
 from light_stage import cuboid, flat
 
 from viewsphere.engines import raster
-from viewsphere.engines.raster.daylight import air, daylight_picture, opening
 from viewsphere.engines.raster.environment import bake_surrounding, sky_lights
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.scene import AreaLight, Daylight, Ground, PointLight, Scene, Sky, SpotLight, Sun
 from viewsphere.model.shot import Frame, ModelSpec, Placement, Pose, Shot
 from viewsphere.sampling.viewpoints import camera_for
+from viewsphere.surroundings.daylight import air, daylight_picture, opening
 from viewsphere.truth.visibility import rasterize
 
 SPEC = ModelSpec(key="model", source="memory", category="thing", category_id=1)

@@ -10,10 +10,12 @@ from light_stage import LightStage, ball, cuboid, distances, flat, points, quad
 
 from viewsphere import zoo
 from viewsphere.assets.mesh import Image, Material, Texture
-from viewsphere.engines.raster.lights import Distant, distant_sun, even_light
+from viewsphere.engines.raster import kernels_shadow as shadow
 from viewsphere.geometry.camera import orbit_center, orbit_rotation
 from viewsphere.model.camera import Camera, Intrinsics
 from viewsphere.model.scene import AreaLight, HemisphereLight, PointLight, SpotLight, Sun
+from viewsphere.surroundings.sky import even_light
+from viewsphere.surroundings.sun import Distant, distant_sun
 
 SUN = Distant((0.48, 0.3, 0.82), (3.0, 2.0, 1.0), 0.53)
 OVERHEAD = Distant((0.0, 0.0, 1.0), (1.0, 1.0, 1.0), 0.53)
@@ -104,6 +106,31 @@ def test_shadows_fall_where_rays_say(which, light, request):
     sure = (facing > 0.1) & ((truth == 0) | (truth == 1))
     assert ((found["share"] > 0.5) == (truth > 0.5))[sure].mean() > 0.995
     assert (truth[sure] == 0).sum() > 100 < (truth[sure] == 1).sum()
+
+
+@pytest.mark.parametrize("light", [SUN, PointLight(position=(2.5, -2.5, 2.2), strength=20)], ids=["sun", "point"])
+@pytest.mark.parametrize("size", [208, 256])
+def test_the_planes_of_a_map_s_cells_enclose_all_that_is_in_them(shapes, light, size):
+    """Cells are two steps wide; level by level they are twice as large, to the one that holds the whole map."""
+    is_distant = isinstance(light, Distant)
+    views = shapes.lights([light] if is_distant else [], [] if is_distant else [light], size).views
+    side, start = views.grid[0, shadow.CELLS], views.grid[0, shadow.DEPTH_AT]
+    drawn = views.depth[start : start + size * (size + shadow.GAP)].reshape(size, -1)[:, :size]
+    cells = views.bounds[views.grid[0, shadow.BOUNDS_AT] :][: 2 * side * side].reshape(side, 2 * side, 4).astype(float)
+    assert np.isfinite(drawn).sum() > 1000
+    n, left, step = side, 0, shadow.STEP
+    while n > 0:
+        for j, i in np.ndindex(n, n):
+            z = drawn[j * step : (j + 2) * step, i * step : (i + 2) * step]
+            low, high, across, down = cells[j, left + i]
+            y, x = (np.arange(k) + 0.5 - step for k in z.shape)
+            z = (z - (across * x + down * y[:, None])).ravel()
+            if z.size:
+                tolerance = 1e-5 * (1 + abs(across) + abs(down)) * step
+                assert z.min() >= low - tolerance
+                assert z.max() <= high + tolerance
+        n, left, step = n // 2, left + n, step * 2
+    assert left == 2 * side - 1
 
 
 def edge_profile(stage, lights, x):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from material_blocks import card, made, packed, view_of
+from material_blocks import card, edges_of, made, packed, view_of
 
 from viewsphere.assets.mesh import Image, Material, Texture
 from viewsphere.assets.srgb import linear
@@ -12,6 +12,7 @@ from viewsphere.engines.raster import kernels_block as block
 from viewsphere.engines.raster import kernels_filter as kf
 from viewsphere.engines.raster import kernels_material as km
 from viewsphere.engines.raster.bundles import BundlePacker
+from viewsphere.geometry.jit import njit
 
 RNG = np.random.default_rng(4)
 NOISE = Image("noise", RNG.integers(0, 256, (16, 16, 4)).astype(np.uint8))
@@ -21,11 +22,22 @@ def textured(image, **options):
     return card(Material(base_color_texture=Texture(0, **options)), [image])
 
 
+@njit
+def footprints(count, width, height, c):
+    kf.footprints(count, width, height, c)
+
+
+@njit
+def gradients(rotation, transform, b, c):
+    km._barycentric_motion(1, rotation, np.float32(0), b, c)
+    km._coordinates(1, transform, np.uintp(0), b, c)
+
+
 def footprint(ux, uy, vx, vy, width=1.0, height=1.0):
     """Level, number of probes, and the whole way along the longer axis in u and v."""
     c = np.zeros(kf.ROWS * kf.CHUNK, np.float32)
     c[kf.UX], c[kf.UY], c[kf.VX], c[kf.VY] = ux, uy, vx, vy
-    kf.footprints(1, np.float32(width), np.float32(height), c)
+    footprints(1, np.float32(width), np.float32(height), c)
     count = c[kf.COUNT]
     return float(c[kf.LEVEL]), int(count), np.array([c[kf.STEP_U], c[kf.STEP_V]]) * count
 
@@ -249,15 +261,13 @@ def test_gradients_are_the_finite_differences_of_the_seen_place():
         ray = -point / np.linalg.norm(point)
         b = np.zeros(km.BLOCK * 99, np.float32)
         facing = normal * np.sign(normal @ ray)
-        for row, value in ((km.VX, ray), (km.GX, facing), (km.NX, facing)):
+        for row, value in ((block.VX, ray), (block.NX, facing)):
             b[[row, row + km.BLOCK, row + 2 * km.BLOCK]] = value
         b[km.PIXEL], b[km.U0], b[block.V0] = point[1] / focal, *place
-        e = np.zeros(km.EDGE_ROWS * kf.CHUNK, np.float32)
-        c = np.zeros(kf.ROWS * kf.CHUNK, np.float32)
-        chosen = np.zeros(128, np.int32)
-        km._edges(1, surfaces, np.uintp(0), b, 0, chosen, e)
-        km._barycentric_motion(1, view_of(rotation), b, 0, e)
-        km._coordinates(1, surfaces, textures, np.uintp(0), np.uintp(0), b, 0, chosen, e, c)
+        for name, values in edges_of(surfaces, np.array([0]), facing[None]).items():
+            b[getattr(block, name)] = values[0]
+        c = np.zeros(km.CHUNK_ROWS * kf.CHUNK, np.float32)
+        gradients(rotation.astype(np.float32), textures.transforms[0], b, c)
         across = (seen(x + 0.5, y)[0] - seen(x - 0.5, y)[0], seen(x, y + 0.5)[0] - seen(x, y - 0.5)[0])
         found = np.array([[c[kf.UX], c[kf.VX]], [c[kf.UY], c[kf.VY]]])
         np.testing.assert_allclose(found, across, rtol=5e-3, atol=1e-6)

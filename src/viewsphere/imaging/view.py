@@ -21,6 +21,7 @@ Grey stays grey, more light never looks darker, and the order of red, green and 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import cache
 from typing import Any
 
@@ -41,7 +42,7 @@ KNEE = 0.6
 """Display values up to this are shown as they are by `standard`."""
 
 TRANSFORMS = ("standard", "filmic", "agx", "raw")
-"""In the order of the kernels' numbers."""
+"""What there is to choose from."""
 
 AGX_STOPS = (-10.0, 6.5)
 """What AgX shows, in stops from middle grey, 0.18."""
@@ -55,8 +56,12 @@ def develop(radiance: Float32, background: Float32 | None, view: View, alpha: bo
     """
     from viewsphere.imaging import kernels_view as kernels
 
-    out = np.empty((*radiance.shape[:2], 4 if alpha else 3), np.uint8)
-    kernels.develop(radiance.reshape(-1, 4), _rows(background), *_how(view), srgb_bytes(), _rows(out))
+    out, curve = np.empty((*radiance.shape[:2], 4 if alpha else 3), np.uint8), srgb_bytes()
+    for p, part, under in _blocks(radiance, background, view):
+        if alpha:
+            kernels.straight_bytes(p, curve, _rows(out)[part])
+        else:
+            kernels.over_bytes(p, under, curve, _rows(out)[part])
     return out
 
 
@@ -65,7 +70,8 @@ def to_display_linear(radiance: Float32, background: Float32 | None, view: View,
     from viewsphere.imaging import kernels_view as kernels
 
     out = np.empty((*radiance.shape[:2], 4 if alpha else 3), np.float32)
-    kernels.display(radiance.reshape(-1, 4), _rows(background), *_how(view), _rows(out))
+    for p, part, under in _blocks(radiance, background, view):
+        kernels.over(p, under, _rows(out)[part])
     return out
 
 
@@ -109,14 +115,25 @@ def _agx_tables() -> tuple[Float32, Float32]:
     return sigmoid.astype(np.float32), decoded.astype(np.float32)
 
 
-@cache
-def _no_tables() -> tuple[Float32, Float32]:
-    return np.zeros(1, np.float32), np.zeros(1, np.float32)
+def _blocks(radiance: Float32, background: Float32 | None, view: View) -> Iterator[tuple[Float32, slice, Float32]]:
+    """Blocks of display-linear light, as `kernels_view` has them, which of the pixels they are, and their background."""
+    from viewsphere.imaging import kernels_view as kernels
 
-
-def _how(view: View) -> tuple[Any, ...]:
-    tables = _agx_tables() if view.transform == "agx" else _no_tables()
-    return exposure_matrix(view), np.int32(TRANSFORMS.index(view.transform)), *tables
+    rows, under, matrix = _rows(radiance), _rows(background), exposure_matrix(view)
+    p = np.zeros(4 * kernels.BLOCK, np.float32)
+    light = p[: 3 * kernels.BLOCK]
+    for first in range(0, len(rows), kernels.BLOCK):
+        part = slice(first, first + kernels.BLOCK)
+        kernels.expose(rows[part], matrix, p)
+        if view.transform == "standard":
+            kernels.standard(p)
+        elif view.transform == "filmic":
+            kernels.filmic(p)
+        elif view.transform == "agx":
+            kernels.agx(p, *_agx_tables())
+        else:
+            np.minimum(light, 1, out=light)
+        yield p, part, under if len(under) == 1 else under[part]
 
 
 def _rows(picture: NDArray[Any] | None) -> NDArray[Any]:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from viewsphere.assets.mesh import WRAPS, Image, Material, Texture
 from viewsphere.assets.srgb import linear
+from viewsphere.engines.raster.kernels_filter import PLANES
 from viewsphere.engines.raster.kernels_material import BASE, BUMP, COAT_BUMP, GLOW, ROUGHNESS, SPECULAR_COLOR
 from viewsphere.engines.raster.kernels_mips import ZERO_NORMAL, fill, fill_normals, halve
 from viewsphere.engines.raster.records import Int32, Textures
@@ -128,7 +129,7 @@ class BundlePacker:
             modes[slot, 6 : 6 + len(kinds)] = kinds
             modes[slot, 12:] = "normal_texture" in names, "clearcoat_normal_texture" in names
             transforms[slot] = texture.matrix.reshape(-1)
-        texels = np.concatenate([words for _, words, _ in built.values()]) if built else np.zeros(4, np.uint16)
+        texels = np.concatenate([*(words for _, words, _ in built.values()), np.zeros(4 * PLANES, np.uint16)])
         return Textures(texels, levels, modes, transforms)
 
 

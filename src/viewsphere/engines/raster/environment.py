@@ -11,19 +11,18 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.engines.raster import kernels_block as rows
 from viewsphere.engines.raster import kernels_environment as kernels
-from viewsphere.engines.raster.daylight import air, daylight_picture, opening
-from viewsphere.engines.raster.environment_file import read_environment
-from viewsphere.engines.raster.kernels_arrive import DISTANT, arrive
-from viewsphere.engines.raster.lights import Distant, Extent, Lights, distant_sun
-from viewsphere.engines.raster.records import Float32, Int32
+from viewsphere.engines.raster.arriving import arriving
+from viewsphere.engines.raster.kernels_arrive import DISTANT
+from viewsphere.engines.raster.lights import Extent, Lights
+from viewsphere.engines.raster.records import Float32, Int32, View
 from viewsphere.model.scene import AnySky, Daylight, Environment, Sky, Sun
+from viewsphere.surroundings.daylight import daylight_picture, opening
+from viewsphere.surroundings.environment_file import read_environment
+from viewsphere.surroundings.sky import HALO, SURROUNDINGS, gradient_share
+from viewsphere.surroundings.sun import Distant, sun_light
 
 Float = NDArray[np.float64]
-
-SURROUNDINGS = 0.3
-"""Reflectance of what lies below a made sky's horizon where there is no ground."""
 
 _LEVELS = 8  # roughness 0 to 1
 _WIDE = 3  # level from which on a lobe is so wide that it gathers all texels of a map no wider than _COARSE
@@ -33,7 +32,6 @@ _SKY_WIDTH = 256  # of the sharpest map of a sky that has no detail
 _PICTURE_WIDTH = 512  # and of a photographed one
 _SKY_HEIGHT = 256  # of the picture of a made sky
 _DISC = 60.0  # greatest radiance of the sun as seen: all of it is white
-_HALO = 0.32  # radiance around the sun before a gradient, in the sun's irradiance
 
 # A photographed sun: a bright spot this far from its middle at most, so much above the mean and of so much of all light.
 _SPOT = math.radians(5.0)
@@ -48,40 +46,47 @@ class Surrounding(NamedTuple):
     """Light from all around, as the shading kernels read it. float32 unless said.
 
     texels (N, 4): octahedral maps with a border, one after the other; colour, and the share that lies below the horizon;
-    levels (L, 2) int32: first texel and width of each, the first one for matt surfaces (radiance of a white one), then
-    equal steps of roughness from 0 to 1. Radiance is the map's times scale (3,) plus above (3,) and below (3,) times their
-    shares. turn (2,): cosine and sine of the maps' turn about z. up (3,): radiance of a white level floor without what is
-    below. albedo (A, A, 2): see `lobe_albedo`.
+    levels (L, 4): first texel and width of a map and of the next, the first map for matt surfaces (radiance of a white one),
+    then equal steps of roughness from 0 to 1. light (6, 3): rows of `kernels_environment`, SCALE to BEHIND. Radiance is the
+    map's times SCALE plus ABOVE and BELOW times their shares; LAMPS: radiance of the ground close by where lamps light it,
+    which is not in BELOW; TURN: cosine and sine of the maps' turn about z. up (3,): radiance of a white level floor without
+    what is below. albedo (A, A, 2): see `lobe_albedo`.
 
     What is seen: picture (P,) uint32, equirectangular, shared exponents; picture_levels (K, 3) int32: first texel, width and
-    height; times seen (3,) plus behind (3,); with glow (3,) around the direction sun (3,) and a disc (3,) of half_angle
-    radians. lamps (3,): radiance of the ground close by where lamps light it, which is not in below.
+    height; times SCALE plus BEHIND. sun (3, 3): its direction, a glow around it, a disc of half_angle radians.
     """
 
     texels: Float32
-    levels: Int32
-    scale: Float32
-    above: Float32
-    below: Float32
-    turn: Float32
+    levels: Float32
+    light: Float32
     up: Float32
     albedo: Float32
     picture: NDArray[np.uint32]
     picture_levels: Int32
-    seen: Float32
-    behind: Float32
     sun: Float32
-    glow: Float32
-    disc: Float32
     half_angle: np.float32
-    lamps: Float32
+
+    @property
+    def scale(self) -> Float32:
+        """Factor of the maps' colours, (3,)."""
+        return self.light[kernels.SCALE]
+
+    @property
+    def below(self) -> Float32:
+        """Radiance of what lies below the horizon but for the maps', (3,)."""
+        return self.light[kernels.BELOW]
+
+    @property
+    def lamps(self) -> Float32:
+        """Radiance of the ground close by where lamps light it, (3,)."""
+        return self.light[kernels.LAMPS]
 
 
 class _Maps(NamedTuple):
     """What of a sky does not depend on its strength, its turn and what is below."""
 
     texels: Float32
-    levels: Int32
+    levels: Float32
     up: Float32  # radiance of a white level floor, (4,)
     picture: NDArray[np.uint32]
     picture_levels: Int32
@@ -91,17 +96,6 @@ class _Photographed(NamedTuple):
     maps: _Maps
     sun: Distant | None
     notes: tuple[str, ...]
-
-
-def sun_light(sky: AnySky, sun: Sun | None) -> Distant | None:
-    """The sun as it arrives: daylight's air dims and reddens it; None if it does not shine."""
-    if sun is None or sun.strength <= 0:
-        return None
-    light = distant_sun(sun)
-    if isinstance(sky, Daylight):
-        left = opening(sun.elevation_deg, sky) * air(sun.elevation_deg, sky) * light.irradiance
-        light = Distant(light.direction, (float(left[0]), float(left[1]), float(left[2])), light.angle_deg)
-    return light if max(light.irradiance) > 1e-6 else None
 
 
 def sky_lights(sky: AnySky, sun: Sun | None, has_ground: bool) -> tuple[Distant, ...]:
@@ -135,19 +129,13 @@ def lamps_on_ground(lights: Lights, extent: Extent) -> Float:
     steps = (np.arange(n) + 0.5) / n * 2 - 1
     x, y = np.repeat(steps, n), np.tile(steps, n)
     inside = x**2 + y**2 <= 1
-    b = np.zeros((rows.ROWS, rows.BLOCK), np.float32)
-    count = int(inside.sum())
     middle = (extent.low + extent.high) / 2
     # A little below the ground, so that what lies on it hides the light from within.
-    place = middle[0] + reach * x[inside], middle[1] + reach * y[inside], extent.low[2] - 0.01 * reach
-    for row, values in zip((rows.PX, rows.PY, rows.PZ, rows.NZ, rows.GZ, rows.PIXEL), (*place, 1, 1, reach / n), strict=True):
-        b[row // rows.BLOCK, :count] = values
-    total, flat = np.zeros(3), b.reshape(-1)
-    for k in np.flatnonzero(lights.kind != DISTANT).tolist():
-        arrive(count, lights, k, flat)
-        lz, share, *light = (b[r // rows.BLOCK, :count] for r in (rows.LZ, rows.SHARE, rows.IR, rows.IG, rows.IB))
-        total += np.stack(light) @ (np.maximum(lz, 0) * share) / (count * math.pi)
-    return total
+    height = np.full(int(inside.sum()), extent.low[2] - 0.01 * reach)
+    places = np.stack([middle[0] + reach * x[inside], middle[1] + reach * y[inside], height], axis=1)
+    lamps = [arriving(lights, k, places, reach / n) for k in np.flatnonzero(lights.kind != DISTANT).tolist()]
+    total = sum((irradiance.T @ share for irradiance, share in lamps), np.zeros(3))
+    return np.asarray(total, np.float64) / (len(places) * math.pi)
 
 
 def bake_surrounding(
@@ -177,26 +165,39 @@ def bake_surrounding(
         below = even[1] + (0 if isinstance(sky, Environment) else SURROUNDINGS * received)
         if isinstance(sky, Environment):
             up = up + maps.up[3] * below
-    direction, glow, disc, half_angle = _visible_sun(sky, sun)
+    close = np.zeros(3) if ground is None or lamps is None else np.asarray(ground) * lamps
+    seen_sun, half_angle = _visible_sun(sky, sun)
     return Surrounding(
         texels=maps.texels,
         levels=maps.levels,
-        scale=scale.astype(np.float32),
-        above=above.astype(np.float32),
-        below=below.astype(np.float32),
-        turn=np.array(turn, np.float32),
+        light=np.array([scale, above, below, close, [*turn, 0.0], behind], np.float32),
         up=up.astype(np.float32),
         albedo=lobe_albedo(),
         picture=maps.picture,
         picture_levels=maps.picture_levels,
-        seen=scale.astype(np.float32),
-        behind=behind.astype(np.float32),
-        sun=direction.astype(np.float32),
-        glow=glow.astype(np.float32),
-        disc=disc.astype(np.float32),
+        sun=seen_sun.astype(np.float32),
         half_angle=np.float32(half_angle),
-        lamps=(np.zeros(3) if ground is None or lamps is None else np.asarray(ground) * lamps).astype(np.float32),
     )
+
+
+def sky_behind(view: View, surrounding: Surrounding, radiance: Float32) -> None:
+    """Lay radiance (N, 4), scene-linear and premultiplied, over the sky, in place; no sky where the lens has no ray."""
+    cosine, sine = surrounding.light[kernels.TURN, :2]
+    turn = np.array([[cosine, sine, 0], [-sine, cosine, 0], [0, 0, 1]], np.float64)
+    to_map = turn @ view.rotation.T
+    has_rays = len(view.rays) > 0
+    if not has_rays:
+        to_map = to_map @ np.vstack([view.lens, [0, 0, 1]])
+    # The level of the picture whose texels are about as large as a pixel.
+    texels = float(view.pixel) * float(surrounding.picture_levels[0, 1]) / (2 * math.pi)
+    level = min(math.floor(math.log2(max(texels, 1.0)) + 0.5), len(surrounding.picture_levels) - 1)
+    light, sun = surrounding.light[[kernels.SCALE, kernels.BEHIND]], surrounding.sun
+    disc = np.array([surrounding.half_angle, 1 / max(view.pixel, 1e-6), 0])
+    numbers = np.vstack([to_map, turn @ sun[0], light, sun[1:], disc]).astype(np.float32)
+    kernels.lay_over_sky(
+        view.rays if has_rays else view.places, np.int32(view.columns), numbers.ravel(), surrounding.picture,
+        *surrounding.picture_levels[level], np.empty(6 * kernels.CHUNK, np.float32), radiance,
+    )  # fmt: skip
 
 
 def _turn(degrees: float) -> tuple[float, float]:
@@ -217,17 +218,17 @@ def _sky_parts(sky: AnySky, sun: Sun | None, has_ground: bool) -> tuple[_Maps, F
     return _gradient_maps(), zenith - horizon, horizon, (1.0, 0.0)
 
 
-def _visible_sun(sky: AnySky, sun: Sun | None) -> tuple[Float, Float, Float, float]:
-    """The sun's direction, its glow before a gradient, its disc in daylight, half its angle in radians."""
+def _visible_sun(sky: AnySky, sun: Sun | None) -> tuple[Float, float]:
+    """The sun's direction, its glow before a gradient, its disc in daylight, (3, 3); half its angle in radians."""
     light = None if isinstance(sky, Environment) else sun_light(sky, sun)
     if light is None:
-        return np.array([0.0, 0.0, 1.0]), np.zeros(3), np.zeros(3), 0.0
-    direction, irradiance = np.array(light.direction), np.array(light.irradiance)
+        return np.array([[0.0, 0.0, 1.0], np.zeros(3), np.zeros(3)]), 0.0
+    irradiance = np.array(light.irradiance)
     if isinstance(sky, Sky):
-        return direction, _HALO * irradiance, np.zeros(3), 0.0
+        return np.array([light.direction, HALO * irradiance, np.zeros(3)]), 0.0
     half = math.radians(max(light.angle_deg, 0.3)) / 2
     radiance = irradiance / (math.pi * half * half)
-    return direction, np.zeros(3), radiance * min(1.0, _DISC / float(radiance.max())), half
+    return np.array([light.direction, np.zeros(3), radiance * min(1.0, _DISC / float(radiance.max()))]), half
 
 
 @lru_cache(maxsize=1)
@@ -235,7 +236,7 @@ def _gradient_maps() -> _Maps:
     """Of every gradient at once: how far each direction is from the horizon's colour towards the zenith's."""
     height = _SKY_HEIGHT
     sine = np.maximum(np.sin((0.5 - (np.arange(height) + 0.5) / height) * np.pi), 0)
-    share = (1 - (1 - sine) ** 3).astype(np.float32)
+    share = gradient_share(sine).astype(np.float32)
     return _maps(np.ascontiguousarray(np.broadcast_to(share[:, None, None], (height, 2 * height, 3))), _SKY_WIDTH, True)
 
 
@@ -308,30 +309,88 @@ def _maps(lighting: Float32, width: int, has_ground: bool, seen: Float32 | None 
     source = lighting
     while source.shape[1] > 4 * width:
         source = _half(source)
-    mirror: Float32 = kernels.octahedral(source, width, has_ground)
+    mirror = np.zeros((width, width, 4), np.float32)
+    kernels.octahedral(source, has_ground, mirror)
     chain = [mirror]
     while len(chain[-1]) > 8:
         chain.append(_halved(chain[-1]))
     texels, levels = _joined(chain)
     coarse = next(m for m in chain if len(m) <= _COARSE)
-    matt = kernels.gathered(coarse, _SMALLEST, 1.0)
+    matt = _gathered(coarse, _SMALLEST, 1.0)
     maps = [matt, mirror]
     for k in range(1, _LEVELS - 1):
         rough, size = k / (_LEVELS - 1), max(width >> (2 * k - 1), _SMALLEST)
         if k < _WIDE:
-            maps.append(kernels.blurred(texels, levels, _lobe_samples(rough, 8 * k * k, width, len(chain)), size))
+            blurred = np.empty((size, size, 4), np.float32)
+            samples = _lobe_samples(rough, 8 * k * k, width, len(chain))
+            kernels.blurred(texels, levels, samples, _frames(size), blurred.reshape(-1, 4))
+            maps.append(blurred)
         else:
-            maps.append(kernels.gathered(coarse, size, rough**4))
+            maps.append(_gathered(coarse, size, rough**4))
     maps.append(matt)
     sizes = np.array([p.shape[1::-1] for p in pictures])
     starts = np.concatenate([[0], np.cumsum(sizes.prod(axis=1))[:-1]])
     middle = _SMALLEST // 2
+    texels, levels = _joined(maps)
     return _Maps(
-        *_joined(maps),
+        texels,
+        np.hstack([levels[:-1], levels[1:]]).astype(np.float32),
         matt[middle - 1 : middle + 1, middle - 1 : middle + 1].mean(axis=(0, 1)),
-        np.concatenate([kernels.packed(p) for p in pictures]),
+        np.concatenate([_packed(p) for p in pictures]),
         np.column_stack([starts, sizes]).astype(np.int32),
     )
+
+
+def _directions(size: int) -> Float:
+    """Unit directions of the texels of an octahedral map, (size * size, 3)."""
+    v, u = (a.ravel() for a in np.meshgrid(*[(2 * np.arange(size) + 1) / size - 1] * 2, indexing="ij"))
+    z = 1 - abs(u) - abs(v)
+    x = np.where(z < 0, (1 - abs(v)) * np.sign(u), u)
+    y = np.where(z < 0, (1 - abs(u)) * np.sign(v), v)
+    return np.stack([x, y, z], axis=-1) / np.sqrt(x * x + y * y + z * z)[:, None]
+
+
+def _solid_angles(size: int) -> Float32:
+    """Solid angle of each texel of an octahedral map, (size, size)."""
+    side = np.abs((2 * np.arange(size, dtype=np.float32) + 1) / size - 1)
+    a, b = side[:, None], side
+    # On the octahedron's face the area is that of its projection times sqrt 3, at distance 1 / sqrt 3 from the middle.
+    square = np.where(a + b > 1, (1 - a) ** 2 + (1 - b) ** 2, a * a + b * b) + (1 - a - b) ** 2
+    return (4 / size**2 / (square * np.sqrt(square))).astype(np.float32)
+
+
+def _frames(size: int) -> Float32:
+    """Of each texel of an octahedral map two axes across and its direction, (size * size, 9); Duff et al. 2017."""
+    x, y, z = _directions(size).T
+    sign = np.where(z >= 0, 1.0, -1.0)
+    a = -1 / (sign + z)
+    b = x * y * a
+    frames = [1 + sign * x * x * a, sign * b, -sign * x, b, sign + y * y * a, -y, x, y, z]
+    return np.stack(frames, axis=-1).astype(np.float32)
+
+
+def _gathered(values: Float32, size: int, square: float) -> Float32:
+    """What a wide lobe sees of a map around each direction, (size, size, 4); square: of GGX's alpha, 1 for a matt surface."""
+    area = _solid_angles(len(values)).reshape(-1, 1)
+    source = np.hstack([_directions(len(values)), values.reshape(-1, 4) * area, area]).T.astype(np.float32, order="C")
+    out = np.empty((size, size, 4), np.float32)
+    half, targets = np.float32(0.5 * (square - 1)), _directions(size).astype(np.float32)
+    kernels.gathered(source, half, targets, out.reshape(-1, 4))
+    return out
+
+
+def _packed(picture: Float32) -> NDArray[np.uint32]:
+    """A picture (H, W, 3) as (H * W,) uint32, nine bits a colour and five for their exponent (as OpenGL's RGB9_E5): to 0.4 %
+    of its brightest colour.
+    """
+    colors = [np.clip(picture[..., c].ravel(), 0, np.float32(65408)) for c in range(3)]
+    most = np.maximum(np.maximum(colors[0], colors[1]), colors[2])
+    # float32's own exponent is 126 more than that of a mantissa below 1; 511.5 steps are no longer 511.
+    shared = np.maximum((most.view(np.int32) >> 23) - (126 - 15), 0)
+    shared += most >= np.float32(511.5) * kernels.STEP[shared]
+    scale = 1 / kernels.STEP[shared]
+    red, green, blue = ((c * scale + np.float32(0.5)).astype(np.int32) for c in colors)
+    return (red | green << 9 | blue << 18 | shared << 27).view(np.uint32)
 
 
 def _joined(maps: Sequence[Float32]) -> tuple[Float32, Int32]:
@@ -355,7 +414,7 @@ def _half(picture: Float32) -> Float32:
 
 def _halved(values: Float32) -> Float32:
     """An octahedral map at half its size; each texel counts as large as it is."""
-    area = kernels.solid_angles(len(values))[..., None]
+    area = _solid_angles(len(values))[..., None]
     return _quarters(values * area) / _quarters(area)
 
 

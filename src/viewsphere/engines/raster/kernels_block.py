@@ -19,6 +19,9 @@ ER, EG, EB, UNLIT, GROUND, CATCHER, BLENDED, AO = range(28 * BLOCK, 36 * BLOCK, 
 U0, V0, U1, V1, BARY1, BARY2 = range(36 * BLOCK, 42 * BLOCK, BLOCK)
 # What reaches it: share of the ambient light from above and of the ground's, the mean direction that is open (0: unknown).
 OPEN, BOUNCE, OPENX, OPENY, OPENZ = range(42 * BLOCK, 47 * BLOCK, BLOCK)
+# Until then, of textured triangles: edges from the first corner to the second and the third, how both uv sets change along
+# them; -1 where the back of the file's normals is seen.
+AX, AY, AZ, UA0, VA0, UA1, VA1, BX, BY, BZ, UB0, VB0, UB1, VB1, SIDE = range(42 * BLOCK, 57 * BLOCK, BLOCK)
 # One light: unit direction to it, irradiance on a plane that faces it, the share its shadows leave, its angular radius.
 LX, LY, LZ, IR, IG, IB, SHARE, WIDTH = range(47 * BLOCK, 55 * BLOCK, BLOCK)
 # Radiance towards the viewer: diffuse, specular (coat included); share of the background's ground that fades into the sky.
@@ -30,6 +33,6 @@ T0, T1, T2, T3, T4, T5, T6, T7 = range(62 * BLOCK, 70 * BLOCK, BLOCK)
 # what a transmissive surface lets through, before its tint.
 FACE_R, FACE_G, FACE_B, EDGE_R, EDGE_G, EDGE_B, BASE_R, BASE_G, BASE_B = range(70 * BLOCK, 79 * BLOCK, BLOCK)
 LOBE, RIM, TAKEN, THROUGH = range(79 * BLOCK, 83 * BLOCK, BLOCK)
-# 1 on scenery, else 0.
+# 1 on scenery, else 0. The last row is room for vectors that begin in the row before.
 SCENERY = 83 * BLOCK
-ROWS = 84
+ROWS = 85

@@ -25,37 +25,14 @@ THIN = 2.0  # pixels: a triangle as wide as this is seen at some centre
 
 
 @njit
-def begin(marks, triangle, depth, wanted):  # noqa: PLR0912, one pass after another
-    """Number the marked pixels (not 0), and mark in `wanted` (T,) also the triangles that the centres around them show.
+def begin(pixels, total, triangle, depth, grid, limit, bound, nearest, seen, wanted):
+    """Number the `total` marked pixels, and mark in `wanted` (T,) also the triangles that the centres around them show.
 
-    marks is flat and padded to whole words. Returns grid (H, W); limit (H, W): what a surface must be before to matter to a
-    pixel, as 1/z; pixels with room for those found later; starts (H + 1,), each row's first number; bound (K,): 1/z of the
-    farthest surface that may show at each, 0 where nothing may; nearest (n, 4) float32 1/z and seen (n, 4), -1 where nothing is
-    drawn yet, for each number.
+    Fills grid (H, W); limit (H, W): what a surface must be before to matter to a pixel, as 1/z; bound (n,): 1/z of the farthest
+    surface that may show at each, 0 where nothing may; nearest (n, 4) float32 1/z and seen (n, 4), -1 where nothing is drawn
+    yet, for each number.
     """
     height, width = triangle.shape
-    words = marks.view(np.uint64)
-    total = 0
-    for i in range(marks.shape[0]):
-        total += marks[i] != 0
-    room = total + height * width // 8
-    pixels, starts = np.empty(room, np.int32), np.zeros(height + 1, np.int32)
-    k = 0
-    for w in range(words.shape[0]):
-        if words[w] != 0:
-            for p in range(8 * w, 8 * w + 8):
-                if marks[p]:
-                    pixels[k] = p
-                    starts[p // width + 1] = k + 1
-                    k += 1
-    for y in range(height):
-        starts[y + 1] = max(starts[y + 1], starts[y])
-    grid, limit = np.empty((height, width), np.int32), np.empty((height, width), np.float32)
-    for y in range(U(height)):
-        for x in range(U(width)):
-            grid[y, x] = np.int32(-1)
-            limit[y, x] = depth[y, x] * (f4(1) + SLACK)
-    bound, nearest, seen = np.empty(total, np.float32), np.empty((room, 4), np.float32), np.empty((room, 4), np.int32)
     for k in range(U(total)):
         y, x = pixels[k] // width, pixels[k] % width
         least = depth[U(y), U(x)]
@@ -69,55 +46,37 @@ def begin(marks, triangle, depth, wanted):  # noqa: PLR0912, one pass after anot
         grid[U(y), U(x)], limit[U(y), U(x)], bound[k] = k, least, least
         for i in range(U(4)):
             nearest[k, i], seen[k, i] = least, np.int32(-1)
-    return grid, limit, pixels, starts, bound, nearest, seen
 
 
 @njit
-def chosen(wanted):
-    """The wanted triangles' indices."""
-    order = np.empty(wanted.shape[0] + 1, np.int32)
-    n = U(0)
-    for t in range(U(wanted.shape[0])):
-        order[n] = t
-        n += U(wanted[t])
-    return order[:n]
-
-
-@njit
-def with_corners_before(q, triangles, wanted, limit):
-    """The other triangles that have a vertex before the limit of its pixel."""
+def with_corners_before(q, triangles, wanted, limit, near, others):
+    """Mark in `others` (T,) what is not wanted and has a vertex before the limit of its pixel; `near` (V,) is room."""
     height, width = limit.shape
-    near = np.zeros(q.shape[0], np.uint8)
     a, b, c, d = U(0), U(1), U(2), U(3)
     for i in range(U(q.shape[0])):
         x, y = q[i, a] * q[i, d], q[i, b] * q[i, d]
+        near[i] = 0
         if (q[i, c] > 0.0) & (x > -1.0) & (y > -1.0) & (x < width + 1.0) & (y < height + 1.0):
             column, row = min(max(np.int64(x), 0), width - 1), min(max(np.int64(y), 0), height - 1)
             near[i] = f4(q[i, d]) * FLUSH > limit[U(row), U(column)]
-    order = np.empty(triangles.shape[0] + 1, np.int32)
-    n = U(0)
     for t in range(U(triangles.shape[0])):
-        order[n] = t
-        n += U(near[U(triangles[t, a])] | near[U(triangles[t, b])] | near[U(triangles[t, c])]) & U(wanted[t] ^ 1)
-    return order[:n]
+        others[t] = near[U(triangles[t, a])] | near[U(triangles[t, b])] | near[U(triangles[t, c])]
+        others[t] &= wanted[t] ^ 1
 
 
 @njit
 def draw(  # noqa: PLR0912, PLR0915, one loop, whose state is not worth handing around
-    order, q, triangles, cutout, cutouts, offsets, triangle, depth, grid, limit, pixels, starts, count, nearest, seen
+    order, q, triangles, cutout, cutouts, room, offsets, triangle, depth, grid, limit, pixels, starts, count, nearest, seen
 ):
     """Draw these triangles at the four samples (`offsets` (2, 4)) of the `count` numbered pixels.
 
-    See `begin` for the others; limit becomes 1/z of a numbered pixel's farthest sample. Returns how many pixels are numbered
-    in the end.
+    `room` is `samples._room`; starts (H + 1,): each row's first number; see `begin` for the others. limit becomes 1/z of a
+    numbered pixel's farthest sample. Returns how many pixels are numbered in the end.
     """
     height, width = triangle.shape
-    room = max(width, NARROW * NARROW) + 1
-    found, sx, sy = np.empty(room, np.uint32), np.empty(4 * room), np.empty(4 * room)
-    inside, inverse = np.empty(4 * room, np.uint8), np.empty(4 * room, np.float32)
-    words = inside.view(np.uint32)
+    found, sx, sy, inverse, inside, words = room
     a, b, c, d = U(0), U(1), U(2), U(3)
-    lowest, highest = offsets.min(), offsets.max()
+    lowest, highest = offsets[a, d], offsets[a, b]  # the outermost along either axis
     for o in range(U(order.shape[0])):
         t = U(order[o])
         i0, i1, i2 = U(triangles[t, a]), U(triangles[t, b]), U(triangles[t, c])
@@ -229,14 +188,13 @@ def span(edges, y, xa, xb, lowest, highest):
 
 
 @njit
-def finish(count, pixels, nearest, seen, bound, offsets, triangle, depth, owner, normals):
+def finish(count, pixels, nearest, seen, bound, offsets, triangle, depth, owner, normals, kept, position, shown, inverses):
     """Of the pixels whose samples do not all look like the centre: pixels, position, triangle, 1/z, as `samples.Samples`.
 
-    A sample at which nothing was drawn, though all centres around show something, shows what the centre does.
+    A sample at which nothing was drawn, though all centres around show something, shows what the centre does. The last four
+    arrays have room for all; returns how many pixels there are.
     """
     width = triangle.shape[1]
-    kept, position = np.empty(count, np.int32), np.empty((4 * count, 2), np.float32)
-    shown, inverses = np.empty(4 * count, np.int32), np.empty(4 * count, np.float32)
     a, b, c = U(0), U(1), U(2)
     n = U(0)
     for k in range(U(count)):
@@ -246,18 +204,22 @@ def finish(count, pixels, nearest, seen, bound, offsets, triangle, depth, owner,
         is_filled = k < U(bound.shape[0]) and bound[k] > f4(0)
         differs = False
         u = U(max(centre, np.int32(0)))
-        o, nx, ny, nz = owner[u] if centre >= 0 else np.int32(-1), normals[u, a], normals[u, b], normals[u, c]
+        o = owner[u] if centre >= 0 else np.int32(-1)
         for i in range(U(4)):
             t, z, m = seen[k, i], nearest[k, i], U(4) * n + i
             missing = (t < 0) & is_filled
             t, z = centre if missing else t, level if missing else z
             shown[m], inverses[m] = t, z
-            position[m, a], position[m, b] = float(x) + offsets[a, i], float(y) + offsets[b, i]
+            if t == centre:
+                continue
             s = U(max(t, np.int32(0)))
-            bend = abs(nx * normals[s, a] + ny * normals[s, b] + nz * normals[s, c])
+            bend = normals[u, a] * normals[s, a] + normals[u, b] * normals[s, b] + normals[u, c] * normals[s, c]
             other = owner[s] if t >= 0 else np.int32(-1)
-            alike = (o == other) & (bend >= f4(0.94)) & (max(level, z) <= min(level, z) * f4(1.01))
-            differs |= (t != centre) & (not alike)
-        kept[n] = p
-        n += U(differs)
-    return kept[:n], position[: U(4) * n], shown[: U(4) * n], inverses[: U(4) * n]
+            differs |= (o != other) | (abs(bend) < f4(0.94)) | (max(level, z) > min(level, z) * f4(1.01))
+        if differs:
+            kept[n] = p
+            for i in range(U(4)):
+                m = U(4) * n + i
+                position[m, a], position[m, b] = float(np.int32(x)) + offsets[a, i], float(np.int32(y)) + offsets[b, i]
+            n += U(1)
+    return n

@@ -19,13 +19,14 @@ i4 = nb.int32
 U = nb.uintp
 CHUNK = 128
 RX, RY, RZ, RU, RV, TOWARD = range(0, 6 * CHUNK, CHUNK)
+# Rows of `Surrounding.light`.
+SCALE, ABOVE, BELOW, LAMPS, TURN, BEHIND = range(6)
 SOFT_HORIZON = 0.025  # sine of the elevation within which the ground turns into sky, as mirrored
 # Shared exponents (as OpenGL's RGB9_E5): nine bits a colour, five for their exponent.
-_STEP = np.array([2.0 ** (k - 24) for k in range(32)], np.float32)
-_MOST = 65408.0
+STEP = np.array([2.0 ** (k - 24) for k in range(32)], np.float32)
 
 
-@njit(fastmath=FAST)
+@njit(fastmath=FAST, inline="always")
 def _direction(x, y):
     """The unit direction at octahedral coordinates in -1..1."""
     z = f4(1) - abs(x) - abs(y)
@@ -38,7 +39,7 @@ def _direction(x, y):
     return x * s, y * s, z * s
 
 
-@njit(fastmath=FAST)
+@njit(fastmath=FAST, inline="always")
 def _coordinates(x, y, z):
     """Octahedral coordinates in -1..1 of a direction of any length."""
     s = f4(1) / (abs(x) + abs(y) + abs(z) + f4(1e-20))
@@ -52,13 +53,14 @@ def _coordinates(x, y, z):
 
 
 @njit
-def octahedral(picture, size, has_ground):
-    """The (size, size, 4) map of an equirectangular picture (H, W, 3): colour, and the share that lies below the horizon.
+def octahedral(picture, has_ground, out):
+    """Add the octahedral map of an equirectangular picture (H, W, 3) to `out` (N, N, 4), which is 0.
+
+    Colour, and the share that lies below the horizon.
 
     With ground, that share shows no colour: the ground's light is added when the map is read.
     """
-    height, width = picture.shape[0], picture.shape[1]
-    out = np.zeros((size, size, 4), np.float32)
+    height, width, size = picture.shape[0], picture.shape[1], out.shape[0]
     for i in range(size):
         for j in range(size):
             for k in range(4):
@@ -83,127 +85,60 @@ def octahedral(picture, size, has_ground):
                     lower = picture[r1, c0, c] * (f4(1) - fx) + picture[r1, c1, c] * fx
                     out[i, j, c] += (upper * (f4(1) - fy) + lower * fy) * weight
                 out[i, j, 3] += share * f4(0.25)
-    return out
-
-
-@njit
-def solid_angles(size):
-    """Solid angle of each texel of an octahedral map, (size, size)."""
-    out = np.empty((size, size), np.float32)
-    step = 1.0 / size
-    for i in range(size):
-        for j in range(size):
-            u, v = (2 * j + 1) * step - 1, (2 * i + 1) * step - 1
-            # On the octahedron's face the area is that of its projection times sqrt 3, at distance 1 / sqrt 3 from the middle.
-            a, b = abs(u), abs(v)
-            if a + b > 1:
-                a, b = 1 - b, 1 - a
-            z = 1 - a - b
-            square = a * a + b * b + z * z
-            out[i, j] = 4 * step * step / (square * math.sqrt(square))
-    return out
 
 
 @njit(fastmath=FAST)
-def gathered(values, size, square):
-    """What a wide lobe sees around each direction, (size, size, 4): all texels of a map are counted.
+def gathered(source, half, targets, out):
+    """What a wide lobe sees around each of `targets` (M, 3), (M, 4): all texels of a map are counted.
 
-    square: of GGX's alpha; the lobe is that of a ray along the normal times the cosine, so 1 is a matt surface.
+    source (8, K): directions of texels, their four numbers times their solid angle, that angle. half: of the square of GGX's
+    alpha less 1; the lobe is that of a ray along the normal times the cosine, so that 0 is a matt surface.
     """
-    n = values.shape[0]
-    area = solid_angles(n)
-    source = np.empty((7, n * n), np.float32)
-    for i in range(n):
-        for j in range(n):
-            k = i * n + j
-            x, y, z = _direction(f4(2 * j + 1) / f4(n) - f4(1), f4(2 * i + 1) / f4(n) - f4(1))
-            source[0, k], source[1, k], source[2, k] = x, y, z
-            for c in range(4):
-                source[3 + c, k] = values[i, j, c] * area[i, j]
-    flat = area.reshape(-1)
-    half = f4(0.5) * (f4(square) - f4(1))
-    out = np.empty((size, size, 4), np.float32)
-    for i in range(size):
-        for j in range(size):
-            x, y, z = _direction(f4(2 * j + 1) / f4(size) - f4(1), f4(2 * i + 1) / f4(size) - f4(1))
-            r, g, b, a, total = f4(0), f4(0), f4(0), f4(0), f4(0)
-            for k in range(n * n):
-                cosine = max(x * source[0, k] + y * source[1, k] + z * source[2, k], f4(0))
-                d = (f4(1) + cosine) * half + f4(1)
-                weight = cosine / (d * d)
-                r += weight * source[3, k]
-                g += weight * source[4, k]
-                b += weight * source[5, k]
-                a += weight * source[6, k]
-                total += weight * flat[k]
-            s = f4(1) / total
-            out[i, j, 0], out[i, j, 1], out[i, j, 2], out[i, j, 3] = r * s, g * s, b * s, min(a * s, f4(1))
-    return out
+    for i in range(U(targets.shape[0])):
+        x, y, z = targets[i, 0], targets[i, 1], targets[i, 2]
+        r, g, b, a, total = f4(0), f4(0), f4(0), f4(0), f4(0)
+        for k in range(U(source.shape[1])):
+            cosine = max(x * source[0, k] + y * source[1, k] + z * source[2, k], f4(0))
+            d = (f4(1) + cosine) * half + f4(1)
+            weight = cosine / (d * d)
+            r += weight * source[3, k]
+            g += weight * source[4, k]
+            b += weight * source[5, k]
+            a += weight * source[6, k]
+            total += weight * source[7, k]
+        s = f4(1) / total
+        out[i, 0], out[i, 1], out[i, 2], out[i, 3] = r * s, g * s, b * s, min(a * s, f4(1))
 
 
-@njit(fastmath=FAST)
-def blurred(texels, levels, samples, size):
-    """What a lobe sees around each direction, (size, size, 4).
+@njit(fastmath={"contract", "nsz"})
+def blurred(texels, levels, samples, frames, out):
+    """What a lobe sees around each direction, (M, 4).
 
     texels, levels: bordered maps, each half the size of the one before; samples (S, 5): x, y, z around the lobe's middle,
-    weight (they add up to 1) and level.
+    weight (they add up to 1) and level; frames (M, 9): two axes across and the lobe's middle. Sums are kept in order, as the
+    compiler then works on four numbers at once.
     """
-    out = np.zeros((size, size, 4), np.float32)
-    for i in range(size):
-        for j in range(size):
-            x, y, z = _direction(f4(2 * j + 1) / f4(size) - f4(1), f4(2 * i + 1) / f4(size) - f4(1))
-            # Two axes across: Duff et al. 2017.
-            sign = f4(1) if z >= f4(0) else -f4(1)
-            a = -f4(1) / (sign + z)
-            b = x * y * a
-            ax, ay, az = f4(1) + sign * x * x * a, sign * b, -sign * x
-            bx, by, bz = b, sign + y * y * a, -y
-            p0, p1, p2, p3 = f4(0), f4(0), f4(0), f4(0)
-            for k in range(samples.shape[0]):
-                p, q, r, weight = samples[k, 0], samples[k, 1], samples[k, 2], samples[k, 3]
-                level = U(i4(samples[k, 4]))
-                start, n = levels[level, 0], levels[level, 1]
-                u, v = _coordinates(p * ax + q * bx + r * x, p * ay + q * by + r * y, p * az + q * bz + r * z)
-                u, v = (u + f4(1)) * f4(0.5) * f4(n) + f4(0.5), (v + f4(1)) * f4(0.5) * f4(n) + f4(0.5)
-                column, row = min(max(i4(u), i4(0)), n), min(max(i4(v), i4(0)), n)
-                fx, fy = u - f4(column), v - f4(row)
-                first = U(start + row * (n + i4(2)) + column)
-                below = first + U(n + i4(2))
-                s, t, m, o = texels[first], texels[first + U(1)], texels[below], texels[below + U(1)]
-                wo = fx * fy * weight
-                wm, wt = fy * weight - wo, fx * weight - wo
-                ws = weight - wm - wt - wo
-                p0 += s[0] * ws + t[0] * wt + m[0] * wm + o[0] * wo
-                p1 += s[1] * ws + t[1] * wt + m[1] * wm + o[1] * wo
-                p2 += s[2] * ws + t[2] * wt + m[2] * wm + o[2] * wo
-                p3 += s[3] * ws + t[3] * wt + m[3] * wm + o[3] * wo
-            out[i, j, 0], out[i, j, 1], out[i, j, 2], out[i, j, 3] = p0, p1, p2, min(p3, f4(1))
-    return out
-
-
-@njit
-def packed(picture):
-    """A picture (H, W, 3) as (H * W,) uint32 with a shared exponent: to 0.4 % of its brightest colour."""
-    out = np.empty(picture.shape[0] * picture.shape[1], np.uint32)
-    k = 0
-    for i in range(picture.shape[0]):
-        for j in range(picture.shape[1]):
-            r = min(max(picture[i, j, 0], f4(0)), f4(_MOST))
-            g = min(max(picture[i, j, 1], f4(0)), f4(_MOST))
-            b = min(max(picture[i, j, 2], f4(0)), f4(_MOST))
-            _, exponent = math.frexp(max(r, g, b))
-            shared = min(max(exponent + 15, 0), 31)
-            if max(r, g, b) / _STEP[shared] >= f4(511.5):
-                shared += 1
-            step = f4(1) / _STEP[shared]
-            out[k] = (
-                np.uint32(r * step + f4(0.5))
-                | np.uint32(g * step + f4(0.5)) << np.uint32(9)
-                | np.uint32(b * step + f4(0.5)) << np.uint32(18)
-                | np.uint32(shared) << np.uint32(27)
-            )
-            k += 1
-    return out
+    one, half = f4(1), f4(0.5)
+    for i in range(U(frames.shape[0])):
+        f = frames[i]
+        p0, p1, p2, p3 = f4(0), f4(0), f4(0), f4(0)
+        for k in range(U(samples.shape[0])):
+            p, q, r, weight = samples[k, 0], samples[k, 1], samples[k, 2], samples[k, 3]
+            level = U(i4(samples[k, 4]))
+            start, n = levels[level, 0], levels[level, 1]
+            u, v = _coordinates(p * f[0] + q * f[3] + r * f[6], p * f[1] + q * f[4] + r * f[7], p * f[2] + q * f[5] + r * f[8])
+            u, v = (u + one) * half * f4(n) + half, (v + one) * half * f4(n) + half
+            column, row = min(max(i4(u), i4(0)), n), min(max(i4(v), i4(0)), n)
+            fx, fy = u - f4(column), v - f4(row)
+            first = U(start + row * (n + i4(2)) + column)
+            for corner in range(4):
+                texel = texels[first + (U(n + i4(2)) if corner > 1 else U(0)) + U(corner & 1)]
+                share = weight * (fx if corner & 1 else one - fx) * (fy if corner > 1 else one - fy)
+                p0 += texel[0] * share
+                p1 += texel[1] * share
+                p2 += texel[2] * share
+                p3 += texel[3] * share
+        out[i, 0], out[i, 1], out[i, 2], out[i, 3] = p0, p1, p2, min(p3, one)
 
 
 @njit(fastmath=FAST)
@@ -221,53 +156,14 @@ def _angle(y, x):
 
 
 @njit(fastmath=FAST)
-def _rays(view, start, count, w):
-    """World directions RX, RY, RZ of some samples, any length; those of a grid lie in one row."""
-    r, lens = view.rotation, view.lens
-    r00, r01, r02, r10, r11, r12, r20, r21, r22 = (
-        r[0, 0], r[0, 1], r[0, 2], r[1, 0], r[1, 1], r[1, 2], r[2, 0], r[2, 1], r[2, 2],
-    )  # fmt: skip
-    if view.rays.shape[0] > 0:
-        for i in range(count):
-            ray = view.rays[U(start + i)]
-            w[RX + i], w[RY + i], w[RZ + i] = ray[0], ray[1], ray[2]
-    elif view.places.shape[0] > 0:
-        for i in range(count):
-            px, py = view.places[U(start + i), U(0)], view.places[U(start + i), U(1)]
-            w[RX + i] = lens[0, 0] * px + lens[0, 1] * py + lens[0, 2]
-            w[RY + i] = lens[1, 0] * px + lens[1, 1] * py + lens[1, 2]
-            w[RZ + i] = f4(1)
-    else:
-        row = start // i4(view.columns)
-        first, py = f4(start - row * i4(view.columns)) + f4(0.5), f4(row) + f4(0.5)
-        m00, m10 = lens[0, 0], lens[1, 0]
-        m01, m11 = lens[0, 1] * py + lens[0, 2], lens[1, 1] * py + lens[1, 2]
-        for i in range(count):
-            px = first + f4(i)
-            w[RX + i], w[RY + i], w[RZ + i] = m00 * px + m01, m10 * px + m11, f4(1)
-    for i in range(count):
-        x, y, z = w[RX + i], w[RY + i], w[RZ + i]
-        w[RX + i], w[RY + i], w[RZ + i] = r00 * x + r10 * y + r20 * z, r01 * x + r11 * y + r21 * z, r02 * x + r12 * y + r22 * z
-
-
-@njit
-def _level(view, surrounding):
-    """The level of the picture whose texels are about as large as a pixel."""
-    widest = surrounding.picture_levels[0, 1]
-    texels = float(view.pixel) * widest / (2 * math.pi)
-    level = math.floor(math.log2(max(texels, 1.0)) + 0.5)
-    return min(level, surrounding.picture_levels.shape[0] - 1)
-
-
-@njit(fastmath=FAST)
 def _read(t):
     """Red, green and blue of a packed texel."""
-    step = _STEP[U(t >> nb.uint32(27))]
+    step = STEP[U(t >> nb.uint32(27))]
     red, green, blue = t & nb.uint32(511), (t >> nb.uint32(9)) & nb.uint32(511), (t >> nb.uint32(18)) & nb.uint32(511)
     return f4(i4(red)) * step, f4(i4(green)) * step, f4(i4(blue)) * step
 
 
-@njit(fastmath=FAST)
+@njit(fastmath=FAST, inline="always")
 def _look_up(texels, first, width, height, count, w):
     """RX, RY, RZ: the picture's colours at column RU and row RV; bilinear."""
     zero, one = f4(0), f4(1)
@@ -293,62 +189,69 @@ def _look_up(texels, first, width, height, count, w):
         w[RZ + i] = p[2] * wp + q[2] * wq + r[2] * wr + s[2] * ws
 
 
-@njit
-def _is_covered(radiance, start, count):
-    least = f4(1)
+@njit(fastmath=FAST, inline="always")
+def _rays(listed, columns, m, start, count, w):
+    """RX, RY, RZ: directions of some samples as the map has them, any length; those of a grid lie in one row."""
+    if listed.shape[1] == 3:
+        for i in range(count):
+            ray = listed[U(start + i)]
+            w[RX + i], w[RY + i], w[RZ + i] = ray[0], ray[1], ray[2]
+    elif listed.shape[0] > 0:
+        for i in range(count):
+            place = listed[U(start + i)]
+            w[RX + i], w[RY + i], w[RZ + i] = place[0], place[1], f4(1)
+    else:
+        row = start // columns
+        across, down = f4(start - row * columns) + f4(0.5), f4(row) + f4(0.5)
+        for i in range(count):
+            w[RX + i], w[RY + i], w[RZ + i] = across + f4(i), down, f4(1)
+    m00, m01, m02, m10, m11, m12, m20, m21, m22 = m[0], m[1], m[2], m[3], m[4], m[5], m[6], m[7], m[8]
     for i in range(count):
-        least = min(least, radiance[U(start + i), U(3)])
-    return least >= f4(1)
+        x, y, z = w[RX + i], w[RY + i], w[RZ + i]
+        w[RX + i], w[RY + i], w[RZ + i] = m00 * x + m01 * y + m02 * z, m10 * x + m11 * y + m12 * z, m20 * x + m21 * y + m22 * z
 
 
 @njit(fastmath=FAST)
-def sky_behind(view, surrounding, radiance):
-    """Lay radiance (N, 4), scene-linear and premultiplied, over the sky, in place; no sky where the lens has no ray."""
+def lay_over_sky(listed, columns, numbers, picture, first, width, height, w, radiance):
+    """Lay radiance (N, 4), scene-linear and premultiplied, over the sky, in place; no sky where the lens has no ray.
+
+    listed: rays (N, 3) or places (N, 2) of the samples, or none (0, 2) for a grid of so many columns. numbers: (26,)
+    `environment.sky_behind`. picture: `Surrounding.picture`; first, width, height: its level. w: scratch of 6 * CHUNK.
+    """
     zero, one = f4(0), f4(1)
-    count = radiance.shape[0]
-    w = np.empty(6 * CHUNK, np.float32)
-    level = U(_level(view, surrounding))
-    levels = surrounding.picture_levels
-    first, width, height = levels[level, U(0)], levels[level, U(1)], levels[level, U(2)]
-    cosine, sine = surrounding.turn[0], surrounding.turn[1]
-    scale, base, sun, glow, disc = surrounding.seen, surrounding.behind, surrounding.sun, surrounding.glow, surrounding.disc
-    half, edge = surrounding.half_angle, one / max(view.pixel, f4(1e-6))
-    sun_x, sun_y, sun_z = sun[0], sun[1], sun[2]
-    s0, s1, s2, b0, b1, b2 = scale[0], scale[1], scale[2], base[0], base[1], base[2]
-    columns, is_listed = i4(view.columns), view.places.shape[0] > 0
+    count, is_listed = i4(radiance.shape[0]), listed.shape[0] > 0
+    sun_x, sun_y, sun_z, half, edge = numbers[9], numbers[10], numbers[11], numbers[24], numbers[25]
     start = i4(0)
     while start < count:
-        n = min(i4(CHUNK), i4(count) - start)
+        n = min(i4(CHUNK), count - start)
         n = n if is_listed else min(n, columns - start % columns)
-        if _is_covered(radiance, start, n):
+        open_ = 0
+        for i in range(n):
+            open_ += 1 if radiance[U(start + i), U(3)] < one else 0
+        if open_ == 0:
             start += n
             continue
-        _rays(view, start, n, w)
+        _rays(listed, columns, numbers, start, n, w)
         for i in range(n):
-            east, north, z = w[RX + i], w[RY + i], w[RZ + i]
-            x, y = cosine * east + sine * north, cosine * north - sine * east
+            x, y, z = w[RX + i], w[RY + i], w[RZ + i]
             w[RU + i] = (f4(0.5) - _angle(y, x) * f4(0.5 / math.pi)) * f4(width) - f4(0.5)
             w[RV + i] = (f4(0.5) - _angle(z, np.sqrt(x * x + y * y)) * f4(1 / math.pi)) * f4(height) - f4(0.5)
-            w[TOWARD + i] = (east * sun_x + north * sun_y + z * sun_z) / np.sqrt(x * x + y * y + z * z)
-        _look_up(surrounding.picture, first, width, height, n, w)
+            w[TOWARD + i] = (x * sun_x + y * sun_y + z * sun_z) / np.sqrt(x * x + y * y + z * z)
+        _look_up(picture, first, width, height, n, w)
         for i in range(n):
             toward = w[TOWARD + i]
             if math.isnan(toward):
                 continue
+            q = max(toward, zero)
+            q *= q
+            q *= q
+            halo = q * f4(0.12) + q * q * q * q * q * q * f4(0.25)
+            within = min(max((half - np.sqrt(max(f4(2) - toward - toward, zero))) * edge + f4(0.5), zero), one)
+            within = within if half > zero else zero
             p = radiance[U(start + i)]
             left = max(one - p[3], zero)
-            red, green, blue = w[RX + i] * s0 + b0, w[RY + i] * s1 + b1, w[RZ + i] * s2 + b2
-            if toward > zero:
-                q = toward * toward
-                q *= q
-                halo = q * f4(0.12) + q * q * q * q * q * q * f4(0.25)
-                within = min(max((half - np.sqrt(max(f4(2) - toward - toward, zero))) * edge + f4(0.5), zero), one)
-                within = within if half > zero else zero
-                red += halo * glow[0] + within * disc[0]
-                green += halo * glow[1] + within * disc[1]
-                blue += halo * glow[2] + within * disc[2]
-            p[0] += left * red
-            p[1] += left * green
-            p[2] += left * blue
+            for c in range(3):
+                sky = w[RX + c * CHUNK + i] * numbers[12 + c] + numbers[15 + c]
+                p[c] += left * (sky + halo * numbers[18 + c] + within * numbers[21 + c])
             p[3] += left
         start += n

@@ -2,7 +2,7 @@
 
 A pixel's footprint is an ellipse. Trilinear probes, one or up to eight, stand along its longer axis and are as sharp as its
 shorter axis lets them be (Schilling, Knittel and Strasser, Texram, 1996). Work is done in chunks of samples: first all places
-in memory, which are fetched early, then the sums.
+in memory, which are fetched early where the texture is large, then the sums.
 """
 
 from __future__ import annotations
@@ -10,11 +10,26 @@ from __future__ import annotations
 import math
 
 import numba as nb
-import numpy as np
 from llvmlite import ir
+from numba.core import cgutils
 from numba.extending import intrinsic
 
-from viewsphere.engines.raster.kernels_texture import CLAMP, FAST, REPEAT
+from viewsphere.engines.raster.kernels_lanes import (
+    REAL,
+    Lanes,
+    clamp,
+    lanewise,
+    least,
+    load,
+    most,
+    root,
+    scatter,
+    size,
+    spread,
+    store,
+    where,
+)
+from viewsphere.engines.raster.kernels_texture import CLAMP, FAST, MIRROR, REPEAT
 from viewsphere.geometry.jit import njit
 
 f4 = nb.float32
@@ -26,28 +41,20 @@ CHUNK = 32
 PROBES = 8  # at most, along a footprint's longer axis
 SPACING = 0.8  # probes per width of the footprint: a trilinear probe is wider than its level's texel
 SNAP = 0.2  # of a level: as near as that to one, the next is not looked at
-QUADS = CHUNK * PROBES * 2
+QUADS = CHUNK * PROBES * 2 + 8  # and room for what is written beyond the last
+PLANES = 3  # summed at once
+NEAR = 1 << 18  # words of a level that the processor's caches hold
 
 # Rows of a chunk: how u and v change from pixel to pixel, across and down; the coordinates; the mip level, the number of probes
-# and the step between them.
-UX, UY, VX, VY, U_AT, V_AT, LEVEL, COUNT, STEP_U, STEP_V = range(0, 10 * CHUNK, CHUNK)
-ROWS = 10
-# Rows of quads, four texels each: coordinates, level, share of the sum; then texels' weights.
-Q_U, Q_V, Q_SHARE, Q_ACROSS, Q_DOWN, W0, W1, W2, W3 = range(0, 9 * QUADS, QUADS)
-QUAD_ROWS = 9
-# Rows of whole numbers: level's first word and size; neighbours along u and v; then texels' first words.
-Q_LEVEL, Q_START, Q_WIDTH, Q_HEIGHT, X0, X1, Y0, Y1, P0, P1, P2, P3 = range(0, 12 * QUADS, QUADS)
+# and the step between them; the sharper of two levels, what a probe's share of each is; what is read, plane by plane.
+UX, UY, VX, VY, U_AT, V_AT, LEVEL, COUNT, STEP_U, STEP_V, LOW, SHARE, NEXT_SHARE, TEXEL = range(0, 14 * CHUNK, CHUNK)
+ROWS = 13 + 4 * PLANES
+# Rows of quads, four texels each: coordinates, then the second neighbour's weight; share of the sum; texels' weights.
+Q_U, Q_V, Q_SHARE, W0, W1, W2, W3 = range(0, 7 * QUADS, QUADS)
+QUAD_ROWS = 7
+# Rows of whole numbers: level's size and first word; neighbours along u and v; texels' first words; each sample's first quad.
+Q_WIDTH, Q_HEIGHT, Q_START, X0, X1, Y0, Y1, P0, P1, P2, P3, FIRST = range(0, 12 * QUADS, QUADS)
 PLACE_ROWS = 12
-
-
-@intrinsic
-def _bits(typing, x):
-    """The bits of a float32 as int32."""
-
-    def code(context, builder, signature, arguments):
-        return builder.bitcast(arguments[0], ir.IntType(32))
-
-    return nb.int32(nb.float32), code
 
 
 @intrinsic
@@ -67,143 +74,192 @@ def _fetch(typing, array, index):
     return nb.void(array, nb.uintp), code
 
 
-@njit(fastmath=FAST)
-def footprints(count, width, height, c):
-    """Rows LEVEL, COUNT, STEP_U and STEP_V of a chunk from its gradients, for a level 0 of this size."""
-    zero, one, widest = f4(0), f4(1), f4((PROBES / SPACING) ** 2)
-    for i in range(count):
-        ux, uy, vx, vy = c[UX + i], c[UY + i], c[VX + i], c[VY + i]
-        ax, ay, bx, by = ux * width, uy * width, vx * height, vy * height
-        across, down, mixed = ax * ax + bx * bx, ay * ay + by * by, ax * ay + bx * by
-        half = (across - down) * f4(0.5)
-        root = np.sqrt(half * half + mixed * mixed)
-        # What is no number counts as small.
-        major = (across + down) * f4(0.5) + root
-        major = major if major > one else one
-        area = ax * by - ay * bx
-        minor = area * area / major
-        minor = minor if minor > one else one
-        ratio = np.sqrt(major / minor)
-        probes = f4(i4(min(ratio * f4(SPACING) + f4(0.999), f4(PROBES))))
-        squared = max(minor, major / widest)
-        # log2 of the square, within 0.0001: exponent and a polynomial of the mantissa.
-        bits = _bits(squared)
-        m = f4(bits & i4(0x7FFFFF)) * f4(1 / 8388608.0)
-        log = f4((bits >> i4(23)) - i4(127)) + m * (
-            f4(1.44187) + m * (f4(-0.70905) + m * (f4(0.41596) + m * (f4(-0.19453) + m * f4(0.04575))))
+def _sums(*parts):
+    """A function that sums neighbouring channels, as vectors of so many: the compiler does not find them by itself."""
+
+    @intrinsic
+    def add_up(typing, texels, channel, q, places, begin, end, c, i):
+        """Weighted sums over the quads from `begin` to `end` of the channels from this one on, to rows TEXEL and on."""
+        return nb.void(texels, nb.uintp, q, places, nb.uintp, nb.uintp, c, nb.uintp), code
+
+    def code(context, builder, signature, arguments):
+        words, weights, at, sums = (
+            context.make_array(signature.args[k])(context, builder, arguments[k]).data for k in (0, 2, 3, 6)
         )
-        c[LEVEL + i] = f4(0.5) * log
-        c[COUNT + i] = probes
-        # The ellipse's longer axis is the image of this direction on the screen.
-        ex = root + half if half >= zero else mixed
-        ey = mixed if half >= zero else root - half
-        scale = one / (np.sqrt(ex * ex + ey * ey + f4(1e-30)) * probes)
-        du, dv = (ux * ex + uy * ey) * scale, (vx * ex + vy * ey) * scale
-        c[STEP_U + i], c[STEP_V + i] = du if abs(du) < f4(1e6) else zero, dv if abs(dv) < f4(1e6) else zero
+        channel, begin, end, i = (arguments[k] for k in (1, 4, 5, 7))
+        starts = [sum(parts[:k]) for k in range(len(parts))]
+        totals = [cgutils.alloca_once_value(builder, ir.Constant(ir.VectorType(REAL, n), None)) for n in parts]
+        with cgutils.for_range_slice(builder, begin, end, end.type(1)) as (k, _):
+            for corner in range(4):
+                place = builder.load(builder.gep(at, [builder.add(k, k.type(P0 + corner * QUADS))]))
+                weight = builder.load(builder.gep(weights, [builder.add(k, k.type(W0 + corner * QUADS))]))
+                first = builder.add(builder.zext(place, channel.type), channel)
+                for n, start, total in zip(parts, starts, totals, strict=True):
+                    value = load(builder, words, builder.add(first, first.type(start)), n).widened().real()
+                    found = Lanes(builder, builder.load(total)) + value * spread(builder, weight, n)
+                    builder.store(found.value, total)
+        for n, start, total in zip(parts, starts, totals, strict=True):
+            scatter(sums, i, {k: TEXEL + (start + k) * CHUNK for k in range(n)}, Lanes(builder, builder.load(total)))
+        return context.get_dummy_value()
+
+    return add_up
+
+
+_add_plane, _add_planes = _sums(4), _sums(8, 4)
+
+
+@lanewise
+def footprints(width, height, c):
+    """Rows LEVEL, COUNT, STEP_U and STEP_V of a chunk from its gradients, for a level 0 of this size."""
+    ux, uy, vx, vy = c.get(UX, UY, VX, VY)
+    ax, ay, bx, by = ux * width, uy * width, vx * height, vy * height
+    across, down, mixed = ax * ax + bx * bx, ay * ay + by * by, ax * ay + bx * by
+    half = (across - down) * 0.5
+    way = root(half * half + mixed * mixed)
+    # What is no number counts as small.
+    major = most((across + down) * 0.5 + way, 1)
+    area = ax * by - ay * bx
+    minor = most(area * area / major, 1)
+    probes = least(root(major / minor) * SPACING + 0.999, PROBES).whole().real()
+    squared = most(minor, major * (SPACING / PROBES) ** 2)
+    # log2 of the square, within 0.0001: exponent and a polynomial of the mantissa.
+    bits = squared.bits()
+    m = (bits & 0x7FFFFF).real() * (1 / 8388608)
+    fraction = m * (1.44187 + m * (-0.70905 + m * (0.41596 + m * (-0.19453 + m * 0.04575))))
+    c[LEVEL] = 0.5 * (((bits >> 23) - 127).real() + fraction)
+    c[COUNT] = probes
+    # The ellipse's longer axis is the image of this direction on the screen.
+    ex, ey = where(half >= 0, way + half, mixed), where(half >= 0, mixed, way - half)
+    scale = 1 / (root(ex * ex + ey * ey + 1e-30) * probes)
+    du, dv = (ux * ex + uy * ey) * scale, (vx * ex + vy * ey) * scale
+    c[STEP_U], c[STEP_V] = where(size(du) < 1e6, du, 0), where(size(dv) < 1e6, dv, 0)
+
+
+@lanewise
+def _choose_levels(last, c):
+    """Rows LOW, SHARE and NEXT_SHARE, and the coordinates of each first probe. One level will do where the other would hardly
+    count.
+    """
+    level, probes = least(c[LEVEL], last), c[COUNT]
+    low = level.whole().real()
+    fraction = clamp((level - low - SNAP) * (1 / (1 - 2 * SNAP)))
+    is_next = where(fraction >= 1, 1, 0)
+    fraction = fraction - is_next
+    c[LOW] = low + is_next
+    c[SHARE], c[NEXT_SHARE] = (1 - fraction) / probes, fraction / probes
+    middle = 0.5 * (probes - 1)
+    c[U_AT], c[V_AT] = c[U_AT] - c[STEP_U] * middle, c[V_AT] - c[STEP_V] * middle
+
+
+@intrinsic
+def _pair(typing, array, at, first, second):
+    """Store two numbers side by side."""
+
+    def code(context, builder, signature, arguments):
+        data = context.make_array(signature.args[0])(context, builder, arguments[0]).data
+        pair = ir.Constant(ir.VectorType(data.type.pointee, 2), ir.Undefined)
+        for k in range(2):
+            pair = builder.insert_element(pair, arguments[2 + k], ir.IntType(32)(k))
+        store(data, arguments[1], Lanes(builder, pair))
+        return context.get_dummy_value()
+
+    return nb.void(array, nb.uintp, array.dtype, array.dtype), code
 
 
 @njit(fastmath=FAST)
-def place(textures, bundle, count, c, q, places, first):
-    """Lay out the quads of a chunk's probes and fetch them; those of sample i are first[i] to first[i + 1]."""
-    last = f4(textures.modes[bundle, U(0)] - 1)
+def _lay_out(count, levels, c, q, places):
+    """Every probe's quads: coordinates, share, level; those of sample i begin at FIRST + i.
+
+    Of both levels, always; where one will do, the next probe's is written over the other.
+    """
     n = U(0)
-    for i in range(count):
-        first[i] = n
-        level, probes = min(c[LEVEL + i], last), c[COUNT + i]
-        low = max(i4(level), i4(0))
-        # One level will do where the other would hardly count.
-        fraction = min(max((level - f4(low) - f4(SNAP)) * f4(1 / (1 - 2 * SNAP)), f4(0)), f4(1))
-        low, fraction = (low + i4(1), f4(0)) if fraction == f4(1) else (low, fraction)
-        share = f4(1) / probes
-        du, dv = c[STEP_U + i], c[STEP_V + i]
-        middle = f4(0.5) * (probes - f4(1))
-        u, v = c[U_AT + i] - du * middle, c[V_AT + i] - dv * middle
-        for _ in range(i4(probes)):
-            q[U(Q_U) + n], q[U(Q_V) + n] = u, v
-            q[U(Q_SHARE) + n] = share * (f4(1) - fraction)
-            places[U(Q_LEVEL) + n] = low
-            n += U(1)
-            if fraction > f4(0):
-                q[U(Q_U) + n], q[U(Q_V) + n] = u, v
-                q[U(Q_SHARE) + n] = share * fraction
-                places[U(Q_LEVEL) + n] = low + i4(1)
-                n += U(1)
+    for i in range(U(count)):
+        places[U(FIRST) + i] = n
+        u, v, du, dv = c[U(U_AT) + i], c[U(V_AT) + i], c[U(STEP_U) + i], c[U(STEP_V) + i]
+        share, next_share = c[U(SHARE) + i], c[U(NEXT_SHARE) + i]
+        low = U(u4(c[U(LOW) + i]))
+        start, width, height = levels[low, U(0)], levels[low, U(1)], levels[low, U(2)]
+        low += U(1)
+        next_start, next_width, next_height = levels[low, U(0)], levels[low, U(1)], levels[low, U(2)]
+        step = U(2) if next_share > f4(0) else U(1)
+        for _ in range(i4(c[U(COUNT) + i])):
+            _pair(q, U(Q_U) + n, u, u)
+            _pair(q, U(Q_V) + n, v, v)
+            _pair(q, U(Q_SHARE) + n, share, next_share)
+            _pair(places, U(Q_START) + n, start, next_start)
+            _pair(places, U(Q_WIDTH) + n, width, next_width)
+            _pair(places, U(Q_HEIGHT) + n, height, next_height)
+            n += step
             u += du
             v += dv
-    first[count] = n
-    quads = i4(n)
-    levels = textures.levels
-    for k in range(quads):
-        level = U(places[Q_LEVEL + k])
-        places[Q_START + k] = levels[bundle, level, U(0)]
-        places[Q_WIDTH + k] = levels[bundle, level, U(1)]
-        places[Q_HEIGHT + k] = levels[bundle, level, U(2)]
-    is_nearest = textures.modes[bundle, U(3)] != 0
-    _neighbours(quads, textures.modes[bundle, U(1)], is_nearest, Q_U, Q_ACROSS, Q_WIDTH, X0, q, places)
-    _neighbours(quads, textures.modes[bundle, U(2)], is_nearest, Q_V, Q_DOWN, Q_HEIGHT, Y0, q, places)
-    channels = i4(4) * textures.modes[bundle, U(5)]
-    for k in range(quads):
-        width = places[Q_WIDTH + k]
-        top = places[Q_START + k] + places[Y0 + k] * width * channels
-        bottom = places[Q_START + k] + places[Y1 + k] * width * channels
-        left, right = places[X0 + k] * channels, places[X1 + k] * channels
-        places[P0 + k], places[P1 + k] = top + left, top + right
-        places[P2 + k], places[P3 + k] = bottom + left, bottom + right
-        across, share = q[Q_ACROSS + k], q[Q_SHARE + k]
-        lower = share * q[Q_DOWN + k]
-        upper = share - lower
-        q[W0 + k], q[W1 + k] = upper - upper * across, upper * across
-        q[W2 + k], q[W3 + k] = lower - lower * across, lower * across
-    for k in range(quads):
-        _fetch(textures.texels, U(u4(places[P0 + k])))
-        _fetch(textures.texels, U(u4(places[P2 + k])))
+    places[U(FIRST) + U(count)] = n
+    return n
 
 
 @njit(fastmath=FAST)
-def _neighbours(quads, wrap, is_nearest, coordinate, weight, size, first, q, places):
-    """The two texels beside each coordinate and the second one's weight; -1 and `size` wrap as `wrap` says."""
-    zero, one = f4(0), f4(1)
-    for k in range(quads):
-        x = q[coordinate + k]
-        if wrap == CLAMP:
-            x = min(max(x, zero), one)
-        else:
-            x = x if wrap == REPEAT else x * f4(0.5) + f4(0.5)
-            whole = f4(i4(x))
-            whole = whole - one if whole > x else whole
-            x = x - whole
-            x = x if wrap == REPEAT else abs(x + x - one)
-        width = places[size + k]
-        x = x * f4(width) + f4(0.5)
-        second = i4(x)
-        # What is too large for a whole number ends somewhere in the texture.
-        part = x - f4(second)
-        part = part if abs(part) < one else zero
-        q[weight + k] = (one if part >= f4(0.5) else zero) if is_nearest else part
-        before = second - i4(1)
-        if wrap == REPEAT:
-            before = width - i4(1) if before < i4(0) else before
-            second = second if second < width else i4(0)
-        places[first + k] = min(max(before, i4(0)), width - i4(1))
-        places[first + QUADS + k] = min(max(second, i4(0)), width - i4(1))
+def place(texels, levels, mode, count, c, q, places):
+    """Lay out the quads of a chunk's probes and fetch them; those of sample i begin at FIRST + i.
 
-
-@njit(fastmath={"contract", "nsz"})
-def mix(t, count, channel, q, places, first, texel):
-    """Weighted sums of four channels of a chunk's samples, into rows of `texel` (4 * CHUNK,).
-
-    Sums are kept in order, as the compiler then works on four channels at once.
+    levels (16, 3) and mode (14,): a bundle's rows of `Textures`.
     """
-    for i in range(count):
-        a0, a1, a2, a3 = f4(0), f4(0), f4(0), f4(0)
-        for k in range(first[i], first[i + 1]):
-            for corner in range(4):
-                at, w = U(u4(places[U(P0) + k + U(corner * QUADS)])) + channel, q[U(W0) + k + U(corner * QUADS)]
-                a0 += f4(i4(t[at])) * w
-                a1 += f4(i4(t[at + U(1)])) * w
-                a2 += f4(i4(t[at + U(2)])) * w
-                a3 += f4(i4(t[at + U(3)])) * w
-        texel[i], texel[CHUNK + i], texel[2 * CHUNK + i], texel[3 * CHUNK + i] = a0, a1, a2, a3
+    _choose_levels(count, f4(mode[0] - 1), c)
+    quads = _lay_out(count, levels, c, q, places)
+    _neighbours(quads, mode[1], mode[3], U(Q_U), U(Q_WIDTH), U(X0), q, places)
+    _neighbours(quads, mode[2], mode[3], U(Q_V), U(Q_HEIGHT), U(Y0), q, places)
+    channels = i4(4) * mode[5]
+    _corners(quads, channels, q, places)
+    level = U(u4(c[LOW]))  # neighbours read about the same
+    if levels[level, 1] * levels[level, 2] * channels > NEAR:
+        for k in range(quads):
+            _fetch(texels, U(u4(places[U(P0) + k])))
+            _fetch(texels, U(u4(places[U(P2) + k])))
+
+
+@lanewise
+def _neighbours(wrap, is_nearest, coordinate, length, first, q, places):
+    """The two texels beside each coordinate, and in its stead the second one's weight; -1 and `size` wrap as `wrap` says."""
+    repeats, mirrors, clamps = wrap.equals(REPEAT), wrap.equals(MIRROR), wrap.equals(CLAMP)
+    x = q[coordinate]
+    # A way there and back is two long.
+    x = where(mirrors, x * 0.5 + 0.5, x)
+    whole = x.whole().real()
+    x = x - where(clamps, 0, where(whole > x, whole - 1, whole))
+    # What is no number, or too large for a whole one, ends somewhere in the texture.
+    x = clamp(x)
+    x = where(mirrors, size(x + x - 1), x)
+    width = places[length]
+    last = width - 1
+    x = x * width.real() + 0.5
+    second = x.whole()
+    part = x - second.real()
+    q[coordinate] = where(is_nearest.equals(1), where(part >= 0.5, 1, 0), part)
+    places[first] = where(second > 0, second - 1, where(repeats, last, 0))
+    places[first, QUADS] = where(second < width, second, where(repeats, 0, last))
+
+
+@lanewise
+def _corners(channels, q, places):
+    """First words of the texels of quads, and their weights."""
+    start, line = places[Q_START], places[Q_WIDTH] * channels
+    top, bottom = start + places[Y0] * line, start + places[Y1] * line
+    left, right = places[X0] * channels, places[X1] * channels
+    places.put((P0, P1, P2, P3), (top + left, top + right, bottom + left, bottom + right))
+    across, share = q[Q_U], q[Q_SHARE]
+    lower = share * q[Q_V]
+    upper = share - lower
+    q.put((W0, W1, W2, W3), (upper - upper * across, upper * across, lower - lower * across, lower * across))
+
+
+@njit
+def mix(texels, count, first_plane, planes, q, places, c):
+    """Weighted sums of the channels of up to PLANES planes of a chunk's samples, into rows TEXEL and on."""
+    channel = U(4 * first_plane)
+    for i in range(U(count)):
+        begin, end = U(u4(places[U(FIRST) + i])), U(u4(places[U(FIRST + 1) + i]))
+        if planes == 1:
+            _add_plane(texels, channel, q, places, begin, end, c, i)
+        else:
+            _add_planes(texels, channel, q, places, begin, end, c, i)
 
 
 @njit(fastmath=FAST)

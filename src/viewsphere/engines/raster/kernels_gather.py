@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 import numba as nb
-import numpy as np
+from numba.extending import intrinsic
 
 from viewsphere.engines.raster.kernels_block import (
     ALPHA,
+    AX,
+    AY,
+    AZ,
     BARY1,
     BARY2,
     BLUE,
+    BX,
+    BY,
+    BZ,
     FADE,
     GREEN,
     GX,
@@ -24,22 +30,33 @@ from viewsphere.engines.raster.kernels_block import (
     PZ,
     RED,
     SCENERY,
+    SIDE,
     T0,
     T1,
+    T2,
     U0,
     U1,
+    UA0,
+    UA1,
     V0,
     V1,
+    VA0,
+    VA1,
     VX,
     VY,
     VZ,
 )  # fmt: skip
+from viewsphere.engines.raster.kernels_lanes import clamp, dot, lanewise, least, load, most, root, scatter, sign, size, spread
 from viewsphere.engines.raster.kernels_material import L_SCENERY
 from viewsphere.engines.raster.kernels_texture import FAST
 from viewsphere.geometry.jit import njit
 
 f4 = nb.float32
 U = nb.uintp
+VERTEX = 16  # numbers
+# Where the numbers of a vertex go (see `Surfaces.vertices`): of a point of a triangle, and of its edges.
+ATTRIBUTES = {0: NX, 1: NY, 2: NZ, 3: U0, 4: V0, 5: U1, 6: V1, 7: RED, 8: GREEN, 9: BLUE, 10: ALPHA}
+DIFFERENCES = {3: UA0, 4: VA0, 5: UA1, 6: VA1, 11: AX, 12: AY, 13: AZ}
 
 
 @njit(fastmath=FAST)
@@ -72,75 +89,103 @@ def _rays(view, start, count, slots, b):
 def locate(view, start, count, slots, depth, b):
     """Positions, directions and pixel sizes."""
     _rays(view, start, count, slots, b)
-    ex, ey, ez = view.eye[0], view.eye[1], view.eye[2]
-    scale, pixel = view.scale, view.pixel
-    r = view.rotation
-    r00, r01, r02, r10, r11, r12 = r[0, 0], r[0, 1], r[0, 2], r[1, 0], r[1, 1], r[1, 2]
-    r20, r21, r22 = r[2, 0], r[2, 1], r[2, 2]
     for i in range(count):
         b[T0 + i] = depth[U(slots[start + i])]
-    for i in range(count):
-        x, y, z = b[VX + i], b[VY + i], b[VZ + i]
-        dx, dy, dz = r00 * x + r10 * y + r20 * z, r01 * x + r11 * y + r21 * z, r02 * x + r12 * y + r22 * z
-        s = scale / b[T0 + i]
-        b[PX + i], b[PY + i], b[PZ + i] = ex + s * dx, ey + s * dy, ez + s * dz
-        b[PIXEL + i] = s * pixel
-        s = f4(-1) / np.sqrt(dx * dx + dy * dy + dz * dz)
-        b[VX + i], b[VY + i], b[VZ + i] = dx * s, dy * s, dz * s
+    _aim(count, view.eye, view.rotation, view.scale, view.pixel, b)
+
+
+@lanewise
+def _aim(eye, rotation, scale, pixel, b):
+    """Turn the rays from the camera's axes into the world's."""
+    ray = b.get(VX, VY, VZ)
+    way = tuple(dot(tuple(rotation.one(3 * row + k) for row in range(3)), ray) for k in range(3))
+    along = scale / b[T0]
+    for k, row in enumerate((PX, PY, PZ)):
+        b[row] = eye.one(k) + along * way[k]
+    b[PIXEL] = along * pixel
+    back = -1 / root(dot(way, way))
+    b.put((VX, VY, VZ), tuple(w * back for w in way))
+
+
+@intrinsic
+def _differ(typing, vertices, i, j, b, at):
+    """How row j of the vertices differs from row i: its DIFFERENCES, to b[row + at]."""
+
+    def code(context, builder, signature, arguments):
+        rows, target = (context.make_array(signature.args[n])(context, builder, arguments[n]).data for n in (0, 3))
+        first, second = (_vertex(builder, rows, row) for row in arguments[1:3])
+        scatter(target, arguments[4], DIFFERENCES, second - first)
+        return context.get_dummy_value()
+
+    return nb.void(vertices, nb.uintp, nb.uintp, b, nb.uintp), code
+
+
+@intrinsic
+def _blend(typing, vertices, i, j, k, g, h, b, at):
+    """Row i of the vertices, moved by g towards row j and by h towards row k: its ATTRIBUTES, to b[row + at]."""
+
+    def code(context, builder, signature, arguments):
+        rows, target = (context.make_array(signature.args[n])(context, builder, arguments[n]).data for n in (0, 6))
+        p0, p1, p2 = (_vertex(builder, rows, row) for row in arguments[1:4])
+        g, h = (spread(builder, share, VERTEX) for share in arguments[4:6])
+        scatter(target, arguments[7], ATTRIBUTES, p0 + (p1 - p0) * g + (p2 - p0) * h)
+        return context.get_dummy_value()
+
+    return nb.void(vertices, nb.uintp, nb.uintp, nb.uintp, nb.float32, nb.float32, b, nb.uintp), code
+
+
+def _vertex(builder, vertices, row):
+    return load(builder, vertices, builder.mul(row, row.type(VERTEX)), VERTEX)
 
 
 @njit(fastmath=FAST)
 def gather(surfaces, start, count, slots, triangle, b, seen, material):
-    """Vertex attributes of located samples, their triangles and materials; normals on the viewer's side."""
-    zero, one, tiny = f4(0), f4(1), f4(1e-30)
-    for i in range(count):
-        t = U(triangle[U(slots[start + i])])
-        seen[i] = t
-        p0 = surfaces.vertices[U(surfaces.triangles[t, U(0)])]
-        p1 = surfaces.vertices[U(surfaces.triangles[t, U(1)])]
-        p2 = surfaces.vertices[U(surfaces.triangles[t, U(2)])]
-        ax, ay, az = p1[11] - p0[11], p1[12] - p0[12], p1[13] - p0[13]
-        cx, cy, cz = p2[11] - p0[11], p2[12] - p0[12], p2[13] - p0[13]
-        qx, qy, qz = b[PX + i] - p0[11], b[PY + i] - p0[12], b[PZ + i] - p0[13]
-        aa, ac, cc = ax * ax + ay * ay + az * az, ax * cx + ay * cy + az * cz, cx * cx + cy * cy + cz * cz
-        qa, qc = qx * ax + qy * ay + qz * az, qx * cx + qy * cy + qz * cz
-        scale = one / max(aa * cc - ac * ac, tiny)
-        g = min(max((cc * qa - ac * qc) * scale, zero), one)
-        h = min(max((aa * qc - ac * qa) * scale, zero), one - g)
-        f = one - g - h
-        b[BARY1 + i], b[BARY2 + i] = g, h
-        b[NX + i] = f * p0[0] + g * p1[0] + h * p2[0]
-        b[NY + i] = f * p0[1] + g * p1[1] + h * p2[1]
-        b[NZ + i] = f * p0[2] + g * p1[2] + h * p2[2]
-        b[U0 + i] = f * p0[3] + g * p1[3] + h * p2[3]
-        b[V0 + i] = f * p0[4] + g * p1[4] + h * p2[4]
-        b[U1 + i] = f * p0[5] + g * p1[5] + h * p2[5]
-        b[V1 + i] = f * p0[6] + g * p1[6] + h * p2[6]
-        b[RED + i] = f * p0[7] + g * p1[7] + h * p2[7]
-        b[GREEN + i] = f * p0[8] + g * p1[8] + h * p2[8]
-        b[BLUE + i] = f * p0[9] + g * p1[9] + h * p2[9]
-        b[ALPHA + i] = f * p0[10] + g * p1[10] + h * p2[10]
-        normal = surfaces.normals[t]
-        b[GX + i], b[GY + i], b[GZ + i] = normal[0], normal[1], normal[2]
-        material[i] = surfaces.material[t]
-        b[FADE + i], b[SCENERY + i] = zero, surfaces.looks[U(material[i]), U(L_SCENERY)]
+    """Vertex attributes of located samples, their triangles and materials; normals on the viewer's side; edges."""
+    vertices, triangles, normals = surfaces.vertices, surfaces.triangles, surfaces.normals
+    for i in range(U(count)):
+        t = U(triangle[U(slots[U(start) + i])])
+        seen[i], m = t, surfaces.material[t]
+        material[i] = m
+        first = U(triangles[t, U(0)])
+        _differ(vertices, first, U(triangles[t, U(1)]), b, i)
+        _differ(vertices, first, U(triangles[t, U(2)]), b, i + U(BX - AX))
+        corner, normal = vertices[first], normals[t]
+        b[U(T0) + i], b[U(T1) + i], b[U(T2) + i] = corner[11], corner[12], corner[13]
+        b[U(GX) + i], b[U(GY) + i], b[U(GZ) + i] = normal[0], normal[1], normal[2]
+        b[U(SCENERY) + i] = surfaces.looks[U(m), U(L_SCENERY)]
+    _find(count, b)
+    for i in range(U(count)):
+        t = U(seen[i])
+        g, h = b[U(BARY1) + i], b[U(BARY2) + i]
+        _blend(vertices, U(triangles[t, U(0)]), U(triangles[t, U(1)]), U(triangles[t, U(2)]), g, h, b, i)
     _face_viewer(count, b)
 
 
-@njit(fastmath=FAST)
-def _face_viewer(count, b):
+@lanewise
+def _find(b):
+    """Barycentric coordinates of the places in their triangles."""
+    first, second = b.get(AX, AY, AZ), b.get(BX, BY, BZ)
+    place = tuple(b[row] - b[corner] for row, corner in ((PX, T0), (PY, T1), (PZ, T2)))
+    aa, ac, cc = dot(first, first), dot(first, second), dot(second, second)
+    qa, qc = dot(place, first), dot(place, second)
+    scale = 1 / most(aa * cc - ac * ac, 1e-30)
+    g = clamp((cc * qa - ac * qc) * scale)
+    b[BARY1], b[BARY2] = g, least(most((aa * qc - ac * qa) * scale, 0), 1 - g)
+    b[FADE] = 0
+
+
+@lanewise
+def _face_viewer(b):
     """Both normals on the side that is seen, whatever the winding; the smooth one at least a little."""
-    one, zero = f4(1), f4(0)
-    for i in range(count):
-        vx, vy, vz = b[VX + i], b[VY + i], b[VZ + i]
-        gx, gy, gz, nx, ny, nz = b[GX + i], b[GY + i], b[GZ + i], b[NX + i], b[NY + i], b[NZ + i]
-        s = one if gx * vx + gy * vy + gz * vz >= zero else -one
-        gx, gy, gz = gx * s, gy * s, gz * s
-        s = one if nx * gx + ny * gy + nz * gz >= zero else -one
-        nx, ny, nz = nx * s + gx * f4(1e-4), ny * s + gy * f4(1e-4), nz * s + gz * f4(1e-4)
-        s = one / np.sqrt(nx * nx + ny * ny + nz * nz + f4(1e-20))
-        b[GX + i], b[GY + i], b[GZ + i] = gx, gy, gz
-        b[NX + i], b[NY + i], b[NZ + i] = nx * s, ny * s, nz * s
+    g, n = b.get(GX, GY, GZ), b.get(NX, NY, NZ)
+    side = sign(dot(g, b.get(VX, VY, VZ)))
+    g = tuple(x * side for x in g)
+    side = sign(dot(n, g))
+    b[SIDE] = side
+    n = tuple(x * side + 1e-4 * w for x, w in zip(n, g, strict=True))
+    scale = 1 / root(dot(n, n) + 1e-20)
+    b.put((GX, GY, GZ), g)
+    b.put((NX, NY, NZ), tuple(x * scale for x in n))
 
 
 @njit(fastmath=FAST)
@@ -149,22 +194,26 @@ def gather_ground(view, floor, start, count, slots, triangle, b, seen, material)
 
     floor: uv per length, u and v at the origin, its material.
     """
-    zero, one = f4(0), f4(1)
-    ex, ey, ez = view.eye[0], view.eye[1], view.eye[2]
-    begins = np.sqrt(ex * ex + ey * ey + ez * ez) + f4(4)
-    per, u0, v0, own = floor[0], floor[1], floor[2], nb.int32(floor[3])
-    for i in range(count):
-        seen[i] = triangle[U(slots[start + i])]
+    own = nb.int32(floor[3])
+    for i in range(U(count)):
+        seen[i] = triangle[U(slots[U(start) + i])]
         material[i] = own
-    for i in range(count):
-        x, y = b[PX + i], b[PY + i]
-        side = one if b[VZ + i] >= zero else -one
-        b[NX + i], b[NY + i], b[NZ + i], b[GX + i], b[GY + i], b[GZ + i] = zero, zero, side, zero, zero, side
-        b[U0 + i], b[V0 + i] = x * per + u0, v0 - y * per
-        b[U1 + i], b[V1 + i], b[BARY1 + i], b[BARY2 + i] = zero, zero, zero, zero
-        b[RED + i], b[GREEN + i], b[BLUE + i], b[ALPHA + i] = one, one, one, one
-        dx, dy, dz = x - ex, y - ey, b[PZ + i] - ez
-        far = min(max((np.sqrt(dx * dx + dy * dy + dz * dz) - begins) * f4(1 / 26.0), zero), one)
-        far = one - (one - far) * (one - far)
-        low = min(max(f4(0.09) - abs(b[VZ + i]), zero) * f4(12), one)
-        b[FADE + i] = one - (one - far * far * (f4(3) - far - far)) * (one - low * low * (f4(3) - low - low))
+    _stand(count, view.eye, floor, b)
+
+
+@lanewise
+def _stand(eye, floor, b):
+    """Rows of places on the ground."""
+    side = sign(b[VZ])
+    for row in (NX, NY, GX, GY, U1, V1, BARY1, BARY2):
+        b[row] = 0
+    for row in (RED, GREEN, BLUE, ALPHA):
+        b[row] = 1
+    b[NZ], b[GZ] = side, side
+    per, place, origin = floor.one(0), b.get(PX, PY, PZ), tuple(eye.one(k) for k in range(3))
+    b[U0], b[V0] = place[0] * per + floor.one(1), floor.one(2) - place[1] * per
+    way = tuple(place[k] - origin[k] for k in range(3))
+    far = 1 - clamp((root(dot(way, way)) - root(dot(origin, origin)) - 4) * (1 / 26))
+    far = 1 - far * far
+    low = least(most(0.09 - size(b[VZ]), 0) * 12, 1)
+    b[FADE] = 1 - (1 - far * far * (3 - far - far)) * (1 - low * low * (3 - low - low))

@@ -15,11 +15,14 @@ import math
 import numba as nb
 import numpy as np
 
+from viewsphere.engines.raster.kernels_blend import blend
 from viewsphere.engines.raster.kernels_block import (
-    ALPHA, BASE_B, BASE_G, BASE_R, BLUE, BOUNCE, COAT, COAT_ROUGH, CX, CY, CZ, DB, DG, DR, EB, EDGE_B, EDGE_G, EDGE_R, EG, ER,
-    F0B, F0G, F0R, FACE_B, FACE_G, FACE_R, GREEN, GX, GY, GZ, IB, IG, IR, LOBE, LX, LY, LZ, METAL, NX, NY, NZ, OPEN, RED, RIM,
-    ROUGH, SB, SG, SHARE, SR, T0, T1, T2, T3, T4, T5, T6, T7, TAKEN, THROUGH, TRANSMISSION, UNLIT, VX, VY, VZ, WIDTH,
+    ALPHA, BASE_B, BASE_G, BASE_R, BLOCK, BLUE, BOUNCE, COAT, COAT_ROUGH, CX, CY, CZ, DB, DG, DR, EDGE_R, ER, F0R,
+    FACE_R, GREEN, GX, GY, GZ, IB, IG, IR, LOBE, LX, LY, LZ, METAL, NX, NY, NZ, OPEN, OPENX, OPENY, RED,
+    RIM, ROUGH, SHARE, SR, T0, T1, T2, T3, T4, T5, T6, T7, TAKEN, THROUGH, TRANSMISSION, UNLIT, VX, VY, VZ, WIDTH,
 )  # fmt: skip
+from viewsphere.engines.raster.kernels_environment import ABOVE, BELOW, LAMPS, SCALE, TURN
+from viewsphere.engines.raster.kernels_lanes import clamp, cross, dot, lanewise, least, most, root, where
 from viewsphere.engines.raster.kernels_texture import FAST
 from viewsphere.geometry.jit import njit
 from viewsphere.imaging.view import EXPOSURE
@@ -34,180 +37,157 @@ BRIGHTEST = np.float32(60000.0)
 UNEXPOSED = np.float32(1 / EXPOSURE)  # an unlit colour is meant to be seen as it is
 
 
-@njit(fastmath=FAST)
-def _albedo(albedo, facing, rough):
-    """The two integrals of a lobe, bilinear in the square root of the cosine and in roughness."""
-    last = albedo.shape[0] - 1
-    x = f4(math.sqrt(min(max(facing, f4(0)), f4(1)))) * f4(last)
-    y = min(max(rough, f4(0)), f4(1)) * f4(last)
-    i = min(max(i4(x), i4(0)), i4(last - 1))
-    j = min(max(i4(y), i4(0)), i4(last - 1))
-    fx, fy = x - f4(i), y - f4(j)
-    a, c = albedo[U(j)], albedo[U(j) + U(1)]
-    first, second = U(i), U(i) + U(1)
-    wa, wb, wc, wd = (f4(1) - fx) * (f4(1) - fy), fx * (f4(1) - fy), (f4(1) - fx) * fy, fx * fy
-    lobe = a[first, 0] * wa + a[second, 0] * wb + c[first, 0] * wc + c[second, 0] * wd
-    rim = a[first, 1] * wa + a[second, 1] * wb + c[first, 1] * wc + c[second, 1] * wd
-    return lobe, rim
+# Scratch of what a look-up in the maps needs, where a light was: rows of the texels, and their weights in the second map.
+FIRST, UNDER, NEXT, NEXT_UNDER, A0, A1, A2, A3 = LX, LY, LZ, IR, IG, IB, SHARE, WIDTH
+LEVEL, WEIGHT = OPENX, OPENY
+
+_blend2, _blend4 = blend(2), blend(4)
 
 
 @njit(fastmath=FAST)
 def _any(count, row, b):
-    most = f4(0)
+    """Whether a row has anything above 0. A count, as the compiler makes vectors of that."""
+    found = 0
     for i in range(count):
-        most = max(most, b[row + i])
-    return most > f4(0)
+        found += 1 if b[row + i] > f4(0) else 0
+    return found > 0
+
+
+@lanewise
+def _place_in_albedo(normal, rough, size, b):
+    """T0: which texel of the albedo's a layer's cosine to the viewer and roughness come after; T1 to T4: shares of four.
+
+    Bilinear in the cosine's root and in roughness. normal: row of its x.
+    """
+    x, y, z = b[normal], b[normal, BLOCK], b[normal, 2 * BLOCK]
+    facing = x * b[VX] + y * b[VY] + z * b[VZ]
+    # What is no number is taken as 0.
+    u, v = least(root(most(facing, 0)), 1) * (size - 1), least(most(b[rough], 0), 1) * (size - 1)
+    column, row = least(u, size - 2).whole().real(), least(v, size - 2).whole().real()
+    fx, fy = u - column, v - row
+    right = fx * fy
+    b[T0], b[T1] = row * size + column, 1 - fx - fy + right
+    b[T2], b[T3], b[T4] = fx - right, fy - right, right
 
 
 @njit(fastmath=FAST)
-def _channel(base, f0, metal, lobe, rim, lost, left, body):
-    """Of one colour: diffuse weight, both specular weights, as `weigh` says."""
-    one = f4(1)
-    more, more_metal = one + f0 * lost, one + base * lost
-    shine = more * (f0 * lobe + (one - f0) * rim)
-    face = left * ((one - metal) * more * f0 + metal * more_metal * base)
-    edge = left * ((one - metal) * more * (one - f0) + metal * more_metal * max(one - base, f4(0)))
-    return body * max(one - shine, f4(0)), face, edge
+def _integrals(count, normal, rough, albedo, b):
+    """T0, T1: both integrals of a layer's lobe."""
+    across = U(albedo.shape[0])
+    _place_in_albedo(count, U(normal), U(rough), f4(albedo.shape[0]), b)
+    for i in range(count):
+        first = U(i4(b[T0 + i]))
+        below = first + across
+        shares = b[T1 + i], b[T2 + i], b[T3 + i], b[T4 + i]
+        _blend2(albedo, (first, first + U(1), below, below + U(1)), shares, b, U(T0) + U(i))
 
 
-@njit(fastmath=FAST)
+@lanewise
+def _take_coat(is_coated, b):
+    """What the coat reflects."""
+    b[TAKEN] = b[COAT] * (COAT_F0 * b[T0] + (1 - COAT_F0) * b[T1]) * is_coated
+
+
+@lanewise
+def _share_out(b):
+    lobe, rim, metal = b[T0], b[T1], b[METAL]
+    b[LOBE], b[RIM] = lobe, rim
+    lost = (1 - lobe) / most(lobe, 0.05)  # light that bounces more than once between the facets
+    left, body, through = 1 - b[TAKEN], 1 - metal, clamp(b[TRANSMISSION])
+    shares = []
+    for k in range(0, 3 * BLOCK, BLOCK):
+        base, f0 = b[RED + k], b[F0R + k]
+        more, more_metal = body * (1 + f0 * lost), metal * (1 + base * lost)
+        b[FACE_R + k] = left * (more * f0 + more_metal * base)
+        b[EDGE_R + k] = left * (more * (1 - f0) + more_metal * most(1 - base, 0))
+        share = body * left * most(1 - (1 + f0 * lost) * (f0 * lobe + (1 - f0) * rim), 0)
+        b[BASE_R + k] = base * share * (1 - through)
+        shares.append(share)
+        b[DR + k], b[SR + k] = 0, 0
+    b[THROUGH] = through * (shares[0] + shares[1] + shares[2]) * (1 / 3)
+
+
+@njit
 def weigh(count, albedo, b):
     """Share out the light among a sample's layers, for any light: fills FACE_R to THROUGH, clears DR to SB.
 
     albedo: `Surrounding.albedo`.
     """
-    zero, one = f4(0), f4(1)
-    coated = _any(count, COAT, b)
-    for k in range(2 if coated else 1):
-        for i in range(count):
-            if k == 0:
-                facing = b[NX + i] * b[VX + i] + b[NY + i] * b[VY + i] + b[NZ + i] * b[VZ + i]
-            else:
-                facing = b[CX + i] * b[VX + i] + b[CY + i] * b[VY + i] + b[CZ + i] * b[VZ + i]
-            b[T0 + i], b[T1 + i] = facing, b[ROUGH + i] if k == 0 else b[COAT_ROUGH + i]
-        for i in range(count):
-            lobe, rim = _albedo(albedo, b[T0 + i], b[T1 + i])
-            if k == 0:
-                b[LOBE + i], b[RIM + i], b[TAKEN + i] = lobe, rim, zero
-            else:
-                b[TAKEN + i] = b[COAT + i] * (COAT_F0 * lobe + (one - COAT_F0) * rim)
-    for i in range(count):
-        lobe, rim, metal = b[LOBE + i], b[RIM + i], b[METAL + i]
-        left = one - b[TAKEN + i]
-        lost = (one - lobe) / max(lobe, f4(0.05))  # light that bounces more than once between the facets
-        through = min(max(b[TRANSMISSION + i], zero), one)
-        body = (one - metal) * left
-        kept = body * (one - through)
-        red, green, blue = b[RED + i], b[GREEN + i], b[BLUE + i]
-        share_r, b[FACE_R + i], b[EDGE_R + i] = _channel(red, b[F0R + i], metal, lobe, rim, lost, left, one)
-        share_g, b[FACE_G + i], b[EDGE_G + i] = _channel(green, b[F0G + i], metal, lobe, rim, lost, left, one)
-        share_b, b[FACE_B + i], b[EDGE_B + i] = _channel(blue, b[F0B + i], metal, lobe, rim, lost, left, one)
-        b[BASE_R + i], b[BASE_G + i], b[BASE_B + i] = red * share_r * kept, green * share_g * kept, blue * share_b * kept
-        b[THROUGH + i] = through * body * (share_r + share_g + share_b) * f4(1 / 3)
-        b[DR + i], b[DG + i], b[DB + i], b[SR + i], b[SG + i], b[SB + i] = zero, zero, zero, zero, zero, zero
+    is_coated = _any(count, COAT, b)
+    _integrals(count, CX if is_coated else NX, COAT_ROUGH if is_coated else ROUGH, albedo, b)
+    _take_coat(count, f4(1) if is_coated else f4(0), b)
+    if is_coated:
+        _integrals(count, NX, ROUGH, albedo, b)
+    _share_out(count, b)
 
 
 @njit(fastmath=FAST)
-def _base_layer(count, b):
-    """T3 to T6: normal and roughness below the coat."""
+def _layer(count, normal, rough, b):
+    """T3 to T6: normal and roughness of the base or of the coat on it, from these rows."""
     for i in range(count):
-        b[T3 + i], b[T4 + i], b[T5 + i], b[T6 + i] = b[NX + i], b[NY + i], b[NZ + i], b[ROUGH + i]
+        at = U(normal) + U(i)
+        b[T3 + i], b[T4 + i], b[T5 + i] = b[at], b[at + U(BLOCK)], b[at + U(2 * BLOCK)]
+        b[T6 + i] = b[U(rough) + U(i)]
 
 
-@njit(fastmath=FAST)
-def _coat_layer(count, b):
-    """T3 to T6: normal and roughness of the coat."""
-    for i in range(count):
-        b[T3 + i], b[T4 + i], b[T5 + i], b[T6 + i] = b[CX + i], b[CY + i], b[CZ + i], b[COAT_ROUGH + i]
-
-
-@njit(fastmath=FAST)
-def _lobes(count, b):
-    """T0 to T2 for the layer T3 to T6: the cosine towards a light, GGX times visibility times that cosine, Schlick's power.
+def _lobe(b, normal, rough):
+    """Of a layer: the cosine towards a light, GGX times visibility times that cosine, Schlick's power.
 
     The light is a ball of angular radius WIDTH: the lobe is that of its point nearest to the mirrored ray, and dimmed by as
     much as this makes it larger: by 1 + pi / 2 q + q^2 for q = WIDTH / 2 alpha.
     """
-    zero, one, tiny = f4(0), f4(1), f4(1e-20)
-    for i in range(count):
-        vx, vy, vz, nx, ny, nz = b[VX + i], b[VY + i], b[VZ + i], b[T3 + i], b[T4 + i], b[T5 + i]
-        lx, ly, lz = b[LX + i], b[LY + i], b[LZ + i]
-        nv = min(max(nx * vx + ny * vy + nz * vz, f4(1e-3)), one)
-        nl = min(max(nx * lx + ny * ly + nz * lz, zero), one)
-        a = min(max(b[T6 + i], SMOOTHEST), one)
-        a = a * a
-        aa = a * a
-        rx, ry, rz = (nv + nv) * nx - vx, (nv + nv) * ny - vy, (nv + nv) * nz - vz
-        along = rx * lx + ry * ly + rz * lz
-        w = min(max(b[WIDTH + i], zero), one)
-        sine, cosine = w * (one - w * w * f4(1 / 6)), one - w * w * f4(0.5) * (one - w * w * f4(1 / 12))
-        tx, ty, tz = rx - along * lx, ry - along * ly, rz - along * lz
-        s = sine / np.sqrt(tx * tx + ty * ty + tz * tz + tiny)
-        within = along >= cosine
-        hx = vx + (rx if within else lx * cosine + tx * s)
-        hy = vy + (ry if within else ly * cosine + ty * s)
-        hz = vz + (rz if within else lz * cosine + tz * s)
-        s = one / np.sqrt(hx * hx + hy * hy + hz * hz + tiny)
-        hx, hy, hz = hx * s, hy * s, hz * s
-        qx, qy, qz = ny * hz - nz * hy, nz * hx - nx * hz, nx * hy - ny * hx
-        off = qx * qx + qy * qy + qz * qz
-        d = off + aa * (one - off)
-        spread = aa / (aa + w * (a * f4(math.pi / 4) + w * f4(0.25)))
-        smith = nl * np.sqrt(nv * nv * (one - aa) + aa) + nv * np.sqrt(nl * nl * (one - aa) + aa)
-        om = one - min(max(vx * hx + vy * hy + vz * hz, zero), one)
-        power = om * om
-        b[T0 + i] = nl
-        b[T1 + i] = aa * spread * nl * f4(0.5 / math.pi) / (d * d * max(smith, f4(1e-6)))
-        b[T2 + i] = power * power * om
+    view, n, light = b.get(VX, VY, VZ), b.get(*normal), b.get(LX, LY, LZ)
+    nv, nl = least(most(dot(n, view), 1e-3), 1), clamp(dot(n, light))
+    a = least(most(b[rough], SMOOTHEST), 1)
+    a *= a
+    aa = a * a
+    ray = tuple((nv + nv) * n[k] - view[k] for k in range(3))
+    along = dot(ray, light)
+    w = clamp(b[WIDTH])
+    ww = w * w
+    sine, cosine = w * (1 - ww * (1 / 6)), 1 - ww * 0.5 * (1 - ww * (1 / 12))
+    off = tuple(ray[k] - along * light[k] for k in range(3))
+    s = sine / root(dot(off, off) + 1e-20)
+    is_within = along >= cosine
+    h = tuple(view[k] + where(is_within, ray[k], light[k] * cosine + off[k] * s) for k in range(3))
+    s = 1 / root(dot(h, h) + 1e-20)
+    h = tuple(c * s for c in h)
+    q = cross(n, h)
+    apart = dot(q, q)
+    d = apart + aa * (1 - apart)
+    dimmed = aa / (aa + w * (a * (math.pi / 4) + w * 0.25))
+    smith = nl * root(nv * nv * (1 - aa) + aa) + nv * root(nl * nl * (1 - aa) + aa)
+    om = 1 - clamp(dot(view, h))
+    power = om * om
+    return nl, aa * dimmed * nl * (0.5 / math.pi) / (d * d * most(smith, 1e-6)), power * power * om
 
 
-@njit(fastmath=FAST)
+@lanewise
+def _add_base(b):
+    cosine, lobe, power = _lobe(b, (NX, NY, NZ), ROUGH)
+    for k in range(0, 3 * BLOCK, BLOCK):
+        light = b[IR + k] * b[SHARE]
+        b[DR + k] = b[DR + k] + b[BASE_R + k] * cosine * (1 / math.pi) * light
+        b[SR + k] = b[SR + k] + least((b[FACE_R + k] + b[EDGE_R + k] * power) * lobe * light, BRIGHTEST)
+
+
+@lanewise
+def _add_coat(b):
+    _, lobe, power = _lobe(b, (CX, CY, CZ), COAT_ROUGH)
+    shine = b[COAT] * (COAT_F0 + (1 - COAT_F0) * power) * lobe * b[SHARE]
+    for k in range(0, 3 * BLOCK, BLOCK):
+        b[SR + k] = b[SR + k] + least(shine * b[IR + k], BRIGHTEST)
+
+
+@njit
 def add_light(count, b):
     """One light, rows LX to WIDTH: its diffuse reflection is added to DR, DG, DB, its mirrored image to SR, SG, SB."""
-    _base_layer(count, b)
-    _lobes(count, b)
-    for i in range(count):
-        share = b[SHARE + i]
-        red, green, blue = b[IR + i] * share, b[IG + i] * share, b[IB + i] * share
-        lambert, lobe, power = b[T0 + i] * f4(1 / math.pi), b[T1 + i], b[T2 + i]
-        b[DR + i] += b[BASE_R + i] * lambert * red
-        b[DG + i] += b[BASE_G + i] * lambert * green
-        b[DB + i] += b[BASE_B + i] * lambert * blue
-        b[SR + i] += min((b[FACE_R + i] + b[EDGE_R + i] * power) * lobe * red, BRIGHTEST)
-        b[SG + i] += min((b[FACE_G + i] + b[EDGE_G + i] * power) * lobe * green, BRIGHTEST)
-        b[SB + i] += min((b[FACE_B + i] + b[EDGE_B + i] * power) * lobe * blue, BRIGHTEST)
+    _add_base(count, b)
     if _any(count, COAT, b):
-        _coat_layer(count, b)
-        _lobes(count, b)
-        for i in range(count):
-            lobe = b[SHARE + i] * b[COAT + i] * (COAT_F0 + (f4(1) - COAT_F0) * b[T2 + i]) * b[T1 + i]
-            b[SR + i] += min(lobe * b[IR + i], BRIGHTEST)
-            b[SG + i] += min(lobe * b[IG + i], BRIGHTEST)
-            b[SB + i] += min(lobe * b[IB + i], BRIGHTEST)
+        _add_coat(count, b)
 
 
-@njit(fastmath=FAST)
-def _texel(maps, level, i, b, coordinates):
-    """Four numbers of a map at (T0, T1) in -1..1: bilinear, the maps have a border."""
-    start, size = maps[level, U(0)], maps[level, U(1)]
-    half = f4(size) * f4(0.5)
-    x, y = (b[T0 + i] + f4(1)) * half + f4(0.5), (b[T1 + i] + f4(1)) * half + f4(0.5)
-    column, row = min(max(i4(x), i4(0)), size), min(max(i4(y), i4(0)), size)
-    fx, fy = x - f4(column), y - f4(row)
-    first = U(start + row * (size + i4(2)) + column)
-    p, q = coordinates[first], coordinates[first + U(1)]
-    below = first + U(size + i4(2))
-    r, s = coordinates[below], coordinates[below + U(1)]
-    wp, wq, wr, ws = (f4(1) - fx) * (f4(1) - fy), fx * (f4(1) - fy), (f4(1) - fx) * fy, fx * fy
-    return (
-        p[0] * wp + q[0] * wq + r[0] * wr + s[0] * ws,
-        p[1] * wp + q[1] * wq + r[1] * wr + s[1] * ws,
-        p[2] * wp + q[2] * wq + r[2] * wr + s[2] * ws,
-        p[3] * wp + q[3] * wq + r[3] * wr + s[3] * ws,
-    )
-
-
-@njit(fastmath=FAST)
+@njit(fastmath=FAST, inline="always")
 def _place(count, turn, b):
     """Octahedral coordinates T0, T1 of the directions T0, T1, T2, any length."""
     zero, one, tiny = f4(0), f4(1), f4(1e-20)
@@ -223,53 +203,69 @@ def _place(count, turn, b):
         b[T1 + i] = v if z < zero else y
 
 
-@njit(fastmath=FAST)
-def _mirrored(count, texels, levels, b):
-    """T3 to T6: what the lobe of roughness T6 around (T0, T1) sees, and how much of it lies below; of -1, a matt surface."""
-    last = levels.shape[0] - 2
+@njit(fastmath=FAST, inline="always")
+def _around(count, texels, levels, b):
+    """T3 to T6: what the lobe of roughness T6 around (T0, T1) sees, and how much of it lies below; of -1, a matt surface.
+
+    LEVEL is left: 0 if matt. Of each of two maps four texels, in weighted sums of all their columns.
+    """
+    zero, one, half = f4(0), f4(1), f4(0.5)
+    last = f4(levels.shape[0] - 1)
     for i in range(count):
         rough = b[T6 + i]
-        lod = min(rough, f4(1)) * f4(last)
-        level = min(max(i4(lod), i4(0)), i4(last - 1)) if rough >= f4(0) else i4(-1)
-        weight = lod - f4(level) if rough >= f4(0) else f4(0)
-        p = _texel(levels, U(level + 1), i, b, texels)
-        if weight > f4(0):
-            q = _texel(levels, U(level + 2), i, b, texels)
-            p = (
-                p[0] + (q[0] - p[0]) * weight,
-                p[1] + (q[1] - p[1]) * weight,
-                p[2] + (q[2] - p[2]) * weight,
-                p[3] + (q[3] - p[3]) * weight,
-            )
-        b[T3 + i], b[T4 + i], b[T5 + i], b[T6 + i] = p
+        lod = min(max(rough, zero), one) * last
+        level = f4(i4(min(lod, last - one)))
+        b[WEIGHT + i] = lod - level if rough >= zero else zero
+        b[LEVEL + i] = level + one if rough >= zero else zero
+    for i in range(count):
+        _blend4(levels, (U(i4(b[LEVEL + i])),), (one,), b, U(FIRST) + U(i))
+    for which in range(2):
+        first, weight = (NEXT, A0) if which else (FIRST, T3)
+        for i in range(count):
+            start, size, share = b[first + i], b[first + BLOCK + i], b[WEIGHT + i]
+            share = share if which else one - share
+            x, y = (b[T0 + i] + one) * (size * half) + half, (b[T1 + i] + one) * (size * half) + half
+            column, row = f4(i4(min(max(zero, x), size))), f4(i4(min(max(zero, y), size)))
+            fx, fy = x - column, y - row
+            place = start + row * (size + f4(2)) + column
+            b[first + i], b[first + BLOCK + i] = place, place + size + f4(2)
+            lower = fy * share
+            upper = share - lower
+            b[weight + i], b[weight + BLOCK + i] = upper - upper * fx, upper * fx
+            b[weight + 2 * BLOCK + i], b[weight + 3 * BLOCK + i] = lower - lower * fx, lower * fx
+    for i in range(count):
+        p, q = U(i4(b[FIRST + i])), U(i4(b[UNDER + i]))
+        places, shares = (p, p + U(1), q, q + U(1)), (b[T3 + i], b[T4 + i], b[T5 + i], b[T6 + i])
+        if b[WEIGHT + i] > zero:
+            r, s = U(i4(b[NEXT + i])), U(i4(b[NEXT_UNDER + i]))
+            others = b[A0 + i], b[A1 + i], b[A2 + i], b[A3 + i]
+            _blend4(texels, (*places, r, r + U(1), s, s + U(1)), (*shares, *others), b, U(T3) + U(i))
+        else:
+            _blend4(texels, places, shares, b, U(T3) + U(i))
 
 
 @njit(fastmath=FAST)
-def _light(count, surrounding, is_matte, b):
+def light_around(count, surrounding, b):
     """T3, T4, T5: radiance around the direction T0, T1, T2 over roughness T6 (-1: of a white matt surface that faces it).
 
     The map's, the even light from above, the ground's as far as it reaches the sample. Lamps light the ground close by: a
     mirrored ray that goes down but little sees none of it.
     """
     zero, one = f4(0), f4(1)
-    lamp_r, lamp_g, lamp_b = surrounding.lamps[0], surrounding.lamps[1], surrounding.lamps[2]
-    _place(count, surrounding.turn, b)
-    _mirrored(count, surrounding.texels, surrounding.levels, b)
-    scale, above, below = surrounding.scale, surrounding.above, surrounding.below
-    scale_r, scale_g, scale_b = scale[0], scale[1], scale[2]
-    above_r, above_g, above_b = above[0], above[1], above[2]
-    below_r, below_g, below_b = below[0], below[1], below[2]
-    for i in range(count):
-        share = b[T6 + i]
-        sky, ground = one - share, share * b[BOUNCE + i]
-        down = one if is_matte else min(max(f4(-1.6) * b[T2 + i], zero), one)
-        near = ground * down * down
-        b[T3 + i] = max(b[T3 + i] * scale_r + sky * above_r + ground * below_r + near * lamp_r, zero)
-        b[T4 + i] = max(b[T4 + i] * scale_g + sky * above_g + ground * below_g + near * lamp_g, zero)
-        b[T5 + i] = max(b[T5 + i] * scale_b + sky * above_b + ground * below_b + near * lamp_b, zero)
+    _place(count, surrounding.light[TURN], b)
+    _around(count, surrounding.texels, surrounding.levels, b)
+    light = surrounding.light
+    for color in range(3):
+        k = color * BLOCK
+        scale, above, below, lamp = light[SCALE, color], light[ABOVE, color], light[BELOW, color], light[LAMPS, color]
+        for i in range(count):
+            share = b[T6 + i]
+            down = one if b[LEVEL + i] == zero else min(max(f4(-1.6) * b[T2 + i], zero), one)
+            ground = below + lamp * down * down
+            b[T3 + k + i] = max(b[T3 + k + i] * scale + (one - share) * above + share * b[BOUNCE + i] * ground, zero)
 
 
-@njit(fastmath=FAST)
+@njit(fastmath=FAST, inline="always")
 def _reflect(count, b):
     """T0, T1, T2: the middle of the lobe of the layer T3 to T6; T7: how much of it gets out of the surface and its crevice."""
     zero, one = f4(0), f4(1)
@@ -288,87 +284,85 @@ def _reflect(count, b):
         b[T6 + i] = r
 
 
+@njit(fastmath=FAST, inline="always")
+def _toward(count, layer, b):
+    """T0 to T2 and T6 for `light_around` of a layer: matt, base's mirror, coat's mirror, what is seen through it."""
+    if layer == 0:
+        for i in range(count):
+            b[T0 + i], b[T1 + i], b[T2 + i], b[T6 + i] = b[NX + i], b[NY + i], b[NZ + i], f4(-1)
+    elif layer == 3:
+        for i in range(count):
+            b[T0 + i], b[T1 + i], b[T2 + i], b[T6 + i] = -b[VX + i], -b[VY + i], -b[VZ + i], b[ROUGH + i]
+    else:
+        normal, rough = (CX, COAT_ROUGH) if layer == 2 else (NX, ROUGH)
+        _layer(count, normal, rough, b)
+        _reflect(count, b)
+
+
+@njit(fastmath=FAST, inline="always")
+def _add_around(count, layer, b):
+    """What a layer sends of the light T3 to T5."""
+    for color in range(3):
+        k = color * BLOCK
+        if layer == 0:
+            for i in range(count):
+                b[DR + k + i] += b[BASE_R + k + i] * b[T3 + k + i] * b[OPEN + i]
+        elif layer == 1:
+            for i in range(count):
+                shine = b[FACE_R + k + i] * b[LOBE + i] + b[EDGE_R + k + i] * b[RIM + i]
+                b[SR + k + i] += shine * b[T3 + k + i] * b[T7 + i]
+        elif layer == 2:
+            for i in range(count):
+                b[SR + k + i] += b[TAKEN + i] * b[T7 + i] * b[T3 + k + i]
+
+
 @njit(fastmath=FAST)
 def ambient(count, surrounding, b):
-    """The light of the surroundings, once the block is weighed: added to DR to SB. Reads OPEN and BOUNCE."""
-    coated = _any(count, COAT, b)
-    for k in range(3 if coated else 2):
-        if k == 0:
-            for i in range(count):
-                b[T0 + i], b[T1 + i], b[T2 + i], b[T6 + i] = b[NX + i], b[NY + i], b[NZ + i], f4(-1)
-        else:
-            if k == 1:
-                _base_layer(count, b)
-            else:
-                _coat_layer(count, b)
-            _reflect(count, b)
-        _light(count, surrounding, k == 0, b)
-        if k == 0:
-            for i in range(count):
-                open_ = b[OPEN + i]
-                b[DR + i] += b[BASE_R + i] * b[T3 + i] * open_
-                b[DG + i] += b[BASE_G + i] * b[T4 + i] * open_
-                b[DB + i] += b[BASE_B + i] * b[T5 + i] * open_
-        elif k == 1:
-            for i in range(count):
-                lobe, rim, seen = b[LOBE + i], b[RIM + i], b[T7 + i]
-                b[SR + i] += (b[FACE_R + i] * lobe + b[EDGE_R + i] * rim) * b[T3 + i] * seen
-                b[SG + i] += (b[FACE_G + i] * lobe + b[EDGE_G + i] * rim) * b[T4 + i] * seen
-                b[SB + i] += (b[FACE_B + i] * lobe + b[EDGE_B + i] * rim) * b[T5 + i] * seen
-        else:
-            for i in range(count):
-                seen = b[TAKEN + i] * b[T7 + i]
-                b[SR + i] += seen * b[T3 + i]
-                b[SG + i] += seen * b[T4 + i]
-                b[SB + i] += seen * b[T5 + i]
+    """The light of the surroundings, once the block is weighed: added to DR to SB. Reads OPEN and BOUNCE.
+
+    T3 to T5: the light behind what lets it through. What was in the light's rows is lost.
+    """
+    has_coat, has_glass = _any(count, COAT, b), _any(count, THROUGH, b)
+    for layer in range(4):
+        if (layer == 2 and not has_coat) or (layer == 3 and not has_glass):
+            continue
+        _toward(count, layer, b)
+        light_around(count, surrounding, b)
+        _add_around(count, layer, b)
 
 
-@njit(fastmath=FAST)
-def _sent(body, shine, base, alpha, shown, unlit):
-    value = body * alpha + shine * shown
-    value = value + unlit * (base * alpha * UNEXPOSED - value)
-    return min(value, BRIGHTEST) if value > f4(0) else f4(0)
+@lanewise
+def _compose(b):
+    alpha, unlit, through = clamp(b[ALPHA]), b[UNLIT], b[THROUGH]
+    lights = through > 0
+    tints = b.get(RED, GREEN, BLUE)
+    smooth = through * (1 - b[ROUGH] * b[ROUGH])
+    tint = clamp(least(least(tints[0], tints[1]), tints[2]))
+    clear = where(lights, most(smooth * tint, 0), 0)
+    shown = least(alpha * 8, 1)
+    for c, base in enumerate(tints):
+        k = c * BLOCK
+        behind = where(lights, b[T3 + k] * b[OPEN], 0)
+        b[T0 + k] = where(lights, smooth * alpha * (1 - unlit) * most(base - tint, 0), 0)
+        b[T3 + k] = behind
+        body = b[DR + k] + most(through * base - clear, 0) * behind
+        value = body * alpha + (b[SR + k] + b[ER + k]) * shown
+        value = value + unlit * (base * alpha * UNEXPOSED - value)
+        b[RED + k] = least(most(value, 0), BRIGHTEST)
+    b[T7] = clear
+    b[ALPHA] = alpha * (1 - clear * (1 - unlit))
 
 
-@njit(fastmath=FAST)
-def compose(count, surrounding, b):
+@njit
+def compose(count, b):
     """What the sample sends to the viewer, in place of the base colour: RED, GREEN, BLUE premultiplied, ALPHA its opacity.
 
     Thin glass lets through what is behind it by the least of its three tints; what the other two let through more, T0 to T2,
     is taken from the surroundings in the line of sight, T3 to T5: `lay` puts what is known to be behind in their place. The
     rougher, the more of it comes from the surroundings. A mirrored image does not become transparent with the surface (glass
-    made by alpha), except where that is all but clear.
+    made by alpha), except where that is all but clear. Call it right after `ambient`.
     """
-    zero, one = f4(0), f4(1)
-    if _any(count, THROUGH, b):
-        for i in range(count):
-            b[T0 + i], b[T1 + i], b[T2 + i], b[T6 + i] = -b[VX + i], -b[VY + i], -b[VZ + i], b[ROUGH + i]
-        _light(count, surrounding, False, b)
-        for i in range(count):
-            through, open_, rough = b[THROUGH + i], b[OPEN + i], b[ROUGH + i]
-            least = min(max(min(b[RED + i], b[GREEN + i], b[BLUE + i]), zero), one)
-            clear = through * least * (one - rough * rough)
-            clear = clear if clear > zero else zero
-            b[T7 + i] = clear
-            b[T3 + i], b[T4 + i], b[T5 + i] = b[T3 + i] * open_, b[T4 + i] * open_, b[T5 + i] * open_
-            b[DR + i] += max(through * b[RED + i] - clear, zero) * b[T3 + i]
-            b[DG + i] += max(through * b[GREEN + i] - clear, zero) * b[T4 + i]
-            b[DB + i] += max(through * b[BLUE + i] - clear, zero) * b[T5 + i]
-            sharp = through * (one - rough * rough) * min(max(b[ALPHA + i], zero), one) * (one - b[UNLIT + i])
-            sharp = sharp if sharp > zero else zero
-            b[T0 + i], b[T1 + i] = sharp * max(b[RED + i] - least, zero), sharp * max(b[GREEN + i] - least, zero)
-            b[T2 + i] = sharp * max(b[BLUE + i] - least, zero)
-    else:
-        for i in range(count):
-            b[T7 + i], b[T0 + i], b[T1 + i], b[T2 + i] = zero, zero, zero, zero
-            b[T3 + i], b[T4 + i], b[T5 + i] = zero, zero, zero
-    for i in range(count):
-        alpha, unlit = min(max(b[ALPHA + i], zero), one), b[UNLIT + i]
-        shown = min(alpha * f4(8), one)
-        b[RED + i] = _sent(b[DR + i], b[SR + i] + b[ER + i], b[RED + i], alpha, shown, unlit)
-        b[GREEN + i] = _sent(b[DG + i], b[SG + i] + b[EG + i], b[GREEN + i], alpha, shown, unlit)
-        b[BLUE + i] = _sent(b[DB + i], b[SB + i] + b[EB + i], b[BLUE + i], alpha, shown, unlit)
-        b[ALPHA + i] = alpha * (one - b[T7 + i] * (one - unlit))
+    _compose(count, b)
 
 
 @njit(fastmath=FAST)

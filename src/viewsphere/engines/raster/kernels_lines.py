@@ -26,36 +26,35 @@ NARROW = 1.0  # pixels: a line as wide as this is seen at some centre
 
 
 @njit
-def on_others(q, triangles, cutout, owner, triangle, depth):
-    """The triangles that have a vertex at a surface of another owner, which hides it at most a little."""
+def on_others(q, triangles, cutout, owner, triangle, depth, shown, lines):
+    """Mark in `lines` (T,) what has a vertex at a surface of another owner, which hides it at most a little.
+
+    shown (V,) int32 is room.
+    """
     height, width = triangle.shape
-    shown = np.full(q.shape[0], np.int32(-1))
     a, b, c, d = U(0), U(1), U(2), U(3)
     for i in range(U(q.shape[0])):
         x, y = q[i, a] * q[i, d], q[i, b] * q[i, d]
+        shown[i] = -1
         if (q[i, c] > 0.0) & (x >= 0.0) & (y >= 0.0) & (x < width) & (y < height):
-            row, column = U(y), U(x)
+            row, column = U(np.int64(y)), U(np.int64(x))
             level = depth[row, column]
             here = f4(q[i, d])
             if (here > level * (f4(1) - BEHIND)) & (here < level * (f4(1) + BEFORE)):
                 shown[i] = owner[U(triangle[row, column])]
-    order = np.empty(triangles.shape[0] + 1, np.int32)
-    n = U(0)
     for t in range(U(triangles.shape[0])):
         o = owner[t]
         s0, s1, s2 = shown[U(triangles[t, a])], shown[U(triangles[t, b])], shown[U(triangles[t, c])]
         is_on = ((s0 >= 0) & (s0 != o)) | ((s1 >= 0) & (s1 != o)) | ((s2 >= 0) & (s2 != o))
-        order[n] = t
-        n += U(is_on & (cutout[t] != NEVER))
-    return order[:n]
+        lines[t] = is_on & (cutout[t] != NEVER)
 
 
 @njit
 def mark(order, q, triangles, owner, offsets, triangle, depth, marks, wanted):
     """Mark the pixels that have a sample on one of these triangles where it is narrow, and that triangle in `wanted` (T,)."""
     height, width = triangle.shape
-    lowest, highest = offsets.min(), offsets.max()
     a, b, c, d = U(0), U(1), U(2), U(3)
+    lowest, highest = offsets[a, d], offsets[a, b]  # the outermost along either axis
     for k in range(U(order.shape[0])):
         t = U(order[k])
         i0, i1, i2 = U(triangles[t, a]), U(triangles[t, b]), U(triangles[t, c])

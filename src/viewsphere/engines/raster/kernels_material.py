@@ -11,9 +11,15 @@ import numpy as np
 from viewsphere.engines.raster.kernels_block import (
     ALPHA,
     AO,
+    AX,
+    AY,
+    AZ,
     BLENDED,
     BLOCK,
     BLUE,
+    BX,
+    BY,
+    BZ,
     CATCHER,
     COAT,
     COAT_ROUGH,
@@ -28,9 +34,6 @@ from viewsphere.engines.raster.kernels_block import (
     F0R,
     GREEN,
     GROUND,
-    GX,
-    GY,
-    GZ,
     METAL,
     NX,
     NY,
@@ -38,12 +41,18 @@ from viewsphere.engines.raster.kernels_block import (
     PIXEL,
     RED,
     ROUGH,
+    SIDE,
     T0,
     T1,
     TRANSMISSION,
     U0,
     U1,
+    UA0,
+    UB0,
     UNLIT,
+    V0,
+    VA0,
+    VB0,
     VX,
     VY,
     VZ,
@@ -51,8 +60,10 @@ from viewsphere.engines.raster.kernels_block import (
 from viewsphere.engines.raster.kernels_filter import (
     CHUNK,
     PLACE_ROWS,
+    PLANES,
     QUAD_ROWS,
     QUADS,
+    TEXEL,
     U_AT,
     UX,
     UY,
@@ -60,10 +71,11 @@ from viewsphere.engines.raster.kernels_filter import (
     footprints,
     mix,
     place,
-)
+)  # fmt: skip
 from viewsphere.engines.raster.kernels_filter import ROWS as FOOTPRINT_ROWS
 from viewsphere.engines.raster.kernels_filter import VX as VXX
 from viewsphere.engines.raster.kernels_filter import VY as VYY
+from viewsphere.engines.raster.kernels_lanes import clamp, cross, dot, lanewise, least, most, root, sign, where
 from viewsphere.engines.raster.kernels_texture import FAST
 from viewsphere.geometry.jit import njit
 
@@ -82,277 +94,217 @@ BASE, BUMP, ROUGHNESS, GLOW, SPECULAR_COLOR, COAT_BUMP = range(6)
 # base colour and alpha | normal, occlusion | roughness, metallic, coat, transmission | emission, specular | specular colour,
 # coat roughness | coat normal, unused
 
-CONSTANT_ROWS = (
-    (ROUGH, L_ROUGH), (METAL, L_METAL), (F0R, L_F0R), (F0G, L_F0G), (F0B, L_F0B), (ER, L_ER), (EG, L_EG), (EB, L_EB),
-    (COAT, L_COAT), (COAT_ROUGH, L_COAT_ROUGH), (TRANSMISSION, L_TRANSMISSION), (UNLIT, L_UNLIT), (GROUND, L_GROUND),
-    (CATCHER, L_CATCHER), (BLENDED, L_BLENDED), (T1, L_SPECULAR),
-)  # fmt: skip
+CONSTANT_ROWS = {
+    F0R: L_F0R, F0G: L_F0G, F0B: L_F0B, ER: L_ER, EG: L_EG, EB: L_EB, COAT: L_COAT, COAT_ROUGH: L_COAT_ROUGH,
+    TRANSMISSION: L_TRANSMISSION, UNLIT: L_UNLIT, GROUND: L_GROUND, CATCHER: L_CATCHER, BLENDED: L_BLENDED, T1: L_SPECULAR,
+}  # fmt: skip
 
-# Rows of a chunk: edges, how barycentric coordinates change from pixel to pixel, how u and v change along
-# the edges; a normal being turned.
-AX, AY, AZ, BX, BY, BZ, SIDE, G_X, H_X, G_Y, H_Y, UA, VA, UB, VB, TX, TY, TZ = range(0, 18 * CHUNK, CHUNK)
-EDGE_ROWS = 18
+# Rows of a chunk: how barycentric coordinates change from pixel to pixel, how u and v change along the edges.
+G_X, H_X, G_Y, H_Y, UA, VA, UB, VB = range(FOOTPRINT_ROWS * CHUNK, (FOOTPRINT_ROWS + 8) * CHUNK, CHUNK)
+CHUNK_ROWS = FOOTPRINT_ROWS + 8
+SECOND_SET = U1 - U0  # from a row of the first uv set to that of the second
 
 
 @njit(fastmath=FAST)
 def material(count, view, surfaces, textures, b, seen, which):
     """Fill the rows that say what the samples are made of; normals become those of the normal maps.
 
-    `seen` and `which` are the samples' triangles and materials. Rows read: V, G, N, PIXEL, uv, vertex colour in RED to ALPHA.
+    `which` are the samples' materials. Rows read: V, N, PIXEL, uv, vertex colour in RED to ALPHA, of textured ones AX to SIDE.
     """
-    e = np.empty(EDGE_ROWS * CHUNK, np.float32)
-    c = np.empty(FOOTPRINT_ROWS * CHUNK, np.float32)
+    c = np.empty(CHUNK_ROWS * CHUNK, np.float32)
     q = np.empty(QUAD_ROWS * QUADS, np.float32)
     places = np.empty(PLACE_ROWS * QUADS, np.int32)
-    quads = np.empty(CHUNK + 1, np.uintp)
-    texel = np.empty(4 * CHUNK, np.float32)
+    is_lens = f4(view.rays.shape[0] > 0)
     begin = 0
     while begin < count:
         m = U(which[begin])
         stop = begin + 1
         while stop < count and U(which[stop]) == m:
             stop += 1
-        _factors(begin, stop, surfaces.looks[m], b)
-        if surfaces.bundles[m, U(0)] >= 0:
+        look, bundles = surfaces.looks[m], surfaces.bundles[m]
+        own = b[U(begin) :]
+        _factors(stop - begin, look, own)
+        if bundles[0] >= 0:
+            if look[L_PER_LENGTH] > f4(0):
+                _lay_ground(stop - begin, look[L_PER_LENGTH], own)
             for start in range(begin, stop, CHUNK):
+                own = b[U(start) :]
                 size = min(CHUNK, stop - start)
-                _edges(size, surfaces, m, b, start, seen, e)
-                _barycentric_motion(size, view, b, start, e)
-                for n in range(U(surfaces.bundles.shape[1])):
-                    if surfaces.bundles[m, n] < 0:
+                _barycentric_motion(size, view.rotation, is_lens, own, c)
+                for n in range(U(bundles.shape[0])):
+                    if bundles[n] < 0:
                         break
-                    bundle = U(surfaces.bundles[m, n])
-                    _coordinates(size, surfaces, textures, bundle, m, b, start, seen, e, c)
-                    levels = textures.levels
-                    footprints(size, f4(levels[bundle, U(0), U(1)]), f4(levels[bundle, U(0), U(2)]), c)
-                    place(textures, bundle, size, c, q, places, quads)
-                    mode = textures.modes[bundle]
-                    for plane in range(U(mode[5])):
-                        kind = mode[U(6) + plane]
-                        mix(textures.texels, size, plane * U(4), q, places, quads, texel)
-                        if kind in (BUMP, COAT_BUMP):
-                            has_normals = mode[12] if kind == BUMP else mode[13]
-                            _bump(size, kind, has_normals, e, surfaces.looks[m], b, start, texel)
-                        else:
-                            _multiply(size, kind, surfaces.looks[m], b, start, texel)
+                    bundle = U(bundles[n])
+                    mode, levels = textures.modes[bundle], textures.levels[bundle]
+                    _coordinates(size, textures.transforms[bundle], U(mode[4] * SECOND_SET), own, c)
+                    footprints(size, f4(levels[0, 1]), f4(levels[0, 2]), c)
+                    place(textures.texels, levels, mode, size, c, q, places)
+                    for plane in range(mode[5]):
+                        if plane % PLANES == 0:
+                            mix(textures.texels, size, plane, mode[5], q, places, c)
+                        _apply(size, plane, mode, look, c, own)
         begin = stop
     _finish(count, b)
 
 
-@njit(fastmath=FAST)
-def _factors(first, stop, look, b):
+@lanewise(exact=True)
+def _factors(look, b):
     """What a run of samples of one material is made of without its textures."""
-    zero, one = f4(0), f4(1)
-    for row, column in CONSTANT_ROWS:
-        value = look[column]
-        for i in range(first, stop):
-            b[U(row) + U(i)] = value
-    rough, metal = look[L_ROUGH_TEXEL], look[L_METAL_TEXEL]
-    red, green, blue, alpha, is_blended = look[L_RED], look[L_GREEN], look[L_BLUE], look[L_ALPHA], look[L_BLENDED]
-    for i in range(first, stop):
-        b[RED + i] *= red
-        b[GREEN + i] *= green
-        b[BLUE + i] *= blue
-        b[ALPHA + i] = one + (b[ALPHA + i] * alpha - one) * is_blended
-        b[ROUGH + i] += rough
-        b[METAL + i] += metal
-        b[AO + i] = one
-        b[T0 + i] = zero
-        b[CX + i] = b[NX + i]
-        b[CY + i] = b[NY + i]
-        b[CZ + i] = b[NZ + i]
+    for row, column in CONSTANT_ROWS.items():
+        b[row] = look.one(column)
+    for row, column in ((RED, L_RED), (GREEN, L_GREEN), (BLUE, L_BLUE)):
+        b[row] = b[row] * look.one(column)
+    b[ALPHA] = 1 + (b[ALPHA] * look.one(L_ALPHA) - 1) * look.one(L_BLENDED)
+    b[ROUGH] = look.one(L_ROUGH) + look.one(L_ROUGH_TEXEL)
+    b[METAL] = look.one(L_METAL) + look.one(L_METAL_TEXEL)
+    b[AO], b[T0] = 1, 0
+    b.put((CX, CY, CZ), b.get(NX, NY, NZ))
 
 
-@njit(fastmath=FAST)
-def _edges(count, surfaces, m, b, start, seen, e):
-    """The triangles' edges from their first corners; -1 where the back of the file's normals is seen."""
-    zero, one = f4(0), f4(1)
-    per_length = surfaces.looks[m, U(L_PER_LENGTH)]
-    if per_length > zero:
-        for i in range(count):
-            e[AX + i], e[AY + i], e[AZ + i] = one / per_length, zero, zero
-            e[BX + i], e[BY + i], e[BZ + i] = zero, -one / per_length, zero
-            e[SIDE + i] = one if b[NZ + start + i] >= zero else -one
-        return
-    for i in range(count):
-        t, j = U(seen[start + i]), start + i
-        p0 = surfaces.vertices[U(surfaces.triangles[t, U(0)])]
-        p1 = surfaces.vertices[U(surfaces.triangles[t, U(1)])]
-        p2 = surfaces.vertices[U(surfaces.triangles[t, U(2)])]
-        e[AX + i], e[AY + i], e[AZ + i] = p1[11] - p0[11], p1[12] - p0[12], p1[13] - p0[13]
-        e[BX + i], e[BY + i], e[BZ + i] = p2[11] - p0[11], p2[12] - p0[12], p2[13] - p0[13]
-        side = b[NX + j] * p0[0] + b[NY + j] * p0[1] + b[NZ + j] * p0[2]
-        e[SIDE + i] = one if side >= zero else -one
+@lanewise(exact=True)
+def _lay_ground(per_length, b):
+    """Edges on the ground, along which its coordinates change by 1."""
+    length = 1 / per_length
+    for row in (AY, AZ, BX, BZ, VA0, UB0):
+        b[row] = 0
+    b[AX], b[BY], b[UA0], b[VB0] = length, -length, 1, 1
+    b[SIDE] = sign(b[NZ])
 
 
-@njit(fastmath=FAST)
-def _barycentric_motion(count, view, b, start, e):
+@lanewise
+def _barycentric_motion(rotation, is_lens, b, c):
     """How the two barycentric coordinates change from pixel to pixel, across (G_X, H_X) and down (G_Y, H_Y): the derivative of
     the place where the pixel's ray meets the triangle's plane (Igehy, Tracing Ray Differentials, 1999).
+
+    By Cramer's rule, as a step on the screen is a step along the edges and one along the ray.
     """
-    zero, one = f4(0), f4(1)
-    r = view.rotation
-    is_pinhole = view.rays.shape[0] == 0
-    for i in range(count):
-        j = start + i
-        vx, vy, vz, gx, gy, gz = b[VX + j], b[VY + j], b[VZ + j], b[GX + j], b[GY + j], b[GZ + j]
-        ax, ay, az, bx, by, bz = e[AX + i], e[AY + i], e[AZ + i], e[BX + i], e[BY + i], e[BZ + i]
-        slant = one / max(vx * gx + vy * gy + vz * gz, f4(1e-4))
-        aa, ab, bb = ax * ax + ay * ay + az * az, ax * bx + ay * by + az * bz, bx * bx + by * by + bz * bz
-        scale = b[PIXEL + j] / max(aa * bb - ab * ab, f4(1e-30))
-        # Across a lens's ray any two directions will do, as its pixels are about round there (Duff et al. 2017).
-        s = one if vz >= zero else -one
-        k = -one / (s + vz)
-        x = r[0, 0] if is_pinhole else one + s * vx * vx * k
-        y = r[0, 1] if is_pinhole else s * vx * vy * k
-        z = r[0, 2] if is_pinhole else -s * vx
-        along = (x * gx + y * gy + z * gz) * slant
-        x, y, z = x - vx * along, y - vy * along, z - vz * along
-        da, db = x * ax + y * ay + z * az, x * bx + y * by + z * bz
-        e[G_X + i], e[H_X + i] = (bb * da - ab * db) * scale, (aa * db - ab * da) * scale
-        x = r[1, 0] if is_pinhole else vx * vy * k
-        y = r[1, 1] if is_pinhole else s + vy * vy * k
-        z = r[1, 2] if is_pinhole else -vy
-        along = (x * gx + y * gy + z * gz) * slant
-        x, y, z = x - vx * along, y - vy * along, z - vz * along
-        da, db = x * ax + y * ay + z * az, x * bx + y * by + z * bz
-        e[G_Y + i], e[H_Y + i] = (bb * da - ab * db) * scale, (aa * db - ab * da) * scale
+    v, first, second = b.get(VX, VY, VZ), b.get(AX, AY, AZ), b.get(BX, BY, BZ)
+    g, h = cross(second, v), cross(v, first)
+    volume = dot(first, g)
+    scale = b[PIXEL] * volume / most(volume * volume, 1e-36)
+    # Across a lens's ray any two directions will do, as its pixels are about round there (Duff et al. 2017).
+    x, y, z = v
+    s = sign(z)
+    k = -1 / (s + z)
+    across = 1 + s * x * x * k, s * x * y * k, -s * x
+    down = x * y * k, s + y * y * k, -y
+    lens = is_lens > 0
+    across = tuple(where(lens, across[n], rotation.one(n)) for n in range(3))
+    down = tuple(where(lens, down[n], rotation.one(3 + n)) for n in range(3))
+    c[G_X], c[H_X] = dot(across, g) * scale, dot(across, h) * scale
+    c[G_Y], c[H_Y] = dot(down, g) * scale, dot(down, h) * scale
+
+
+@lanewise
+def _coordinates(transform, uv_set, b, c):
+    """A bundle's coordinates, their changes along the edges (UA to VB) and from pixel to pixel. uv_set: 0 or SECOND_SET."""
+    f = [transform.one(n) for n in range(6)]
+    u, v = b[U0, uv_set], b[V0, uv_set]
+    c[U_AT], c[V_AT] = f[0] * u + f[1] * v + f[2], f[3] * u + f[4] * v + f[5]
+    ua, va, ub, vb = b[UA0, uv_set], b[VA0, uv_set], b[UB0, uv_set], b[VB0, uv_set]
+    ua, va, ub, vb = f[0] * ua + f[1] * va, f[3] * ua + f[4] * va, f[0] * ub + f[1] * vb, f[3] * ub + f[4] * vb
+    c.put((UA, VA, UB, VB), (ua, va, ub, vb))
+    gx, hx, gy, hy = c.get(G_X, H_X, G_Y, H_Y)
+    c.put((UX, UY, VXX, VYY), (gx * ua + hx * ub, gy * ua + hy * ub, gx * va + hx * vb, gy * va + hy * vb))
 
 
 @njit(fastmath=FAST)
-def _coordinates(count, surfaces, textures, bundle, m, b, start, seen, e, c):
-    """A bundle's coordinates, their changes along the edges (UA to VB) and from pixel to pixel."""
-    f = textures.transforms[bundle]
-    second = textures.modes[bundle, U(4)] == 1
-    row = U(U1 if second else U0)
-    k = U(5) if second else U(3)
-    is_ground = surfaces.looks[m, U(L_PER_LENGTH)] > f4(0)
-    for i in range(count):
-        e[UA + i], e[VA + i], e[UB + i], e[VB + i] = f4(1), f4(0), f4(0), f4(1)
-        if not is_ground:
-            t = U(seen[start + i])
-            p0 = surfaces.vertices[U(surfaces.triangles[t, U(0)])]
-            p1 = surfaces.vertices[U(surfaces.triangles[t, U(1)])]
-            p2 = surfaces.vertices[U(surfaces.triangles[t, U(2)])]
-            e[UA + i], e[VA + i] = p1[k] - p0[k], p1[k + U(1)] - p0[k + U(1)]
-            e[UB + i], e[VB + i] = p2[k] - p0[k], p2[k + U(1)] - p0[k + U(1)]
-    for i in range(count):
-        u, v = b[row + U(start + i)], b[row + U(BLOCK + start + i)]
-        ua, va, ub, vb = e[UA + i], e[VA + i], e[UB + i], e[VB + i]
-        ua, va, ub, vb = f[0] * ua + f[1] * va, f[3] * ua + f[4] * va, f[0] * ub + f[1] * vb, f[3] * ub + f[4] * vb
-        e[UA + i], e[VA + i], e[UB + i], e[VB + i] = ua, va, ub, vb
-        c[U_AT + i], c[V_AT + i] = f[0] * u + f[1] * v + f[2], f[3] * u + f[4] * v + f[5]
-        c[UX + i], c[UY + i] = e[G_X + i] * ua + e[H_X + i] * ub, e[G_Y + i] * ua + e[H_Y + i] * ub
-        c[VXX + i], c[VYY + i] = e[G_X + i] * va + e[H_X + i] * vb, e[G_Y + i] * va + e[H_Y + i] * vb
-
-
-@njit(fastmath=FAST)
-def _multiply(count, kind, look, b, start, texel):
-    """Four channels of the textures times what the samples have so far."""
-    one, w = f4(1), f4(1 / 65535.0)
-    if kind == ROUGHNESS:
-        rough, metal = look[L_ROUGH_TEXEL] * w, look[L_METAL_TEXEL] * w
-        for i in range(count):
-            j = U(start + i)
-            b[U(ROUGH) + j] += rough * (texel[i] - f4(65535))
-            b[U(METAL) + j] += metal * (texel[CHUNK + i] - f4(65535))
-            b[U(COAT) + j] *= texel[2 * CHUNK + i] * w
-            b[U(TRANSMISSION) + j] *= texel[3 * CHUNK + i] * w
-        return
-    row, last = U(RED), U(ALPHA)
-    if kind == GLOW:
-        row, last = U(ER), U(T1)
+def _apply(count, plane, mode, look, c, b):
+    """Four channels of the textures."""
+    kind, at = mode[6 + plane], U(TEXEL + plane % PLANES * 4 * CHUNK)
+    one = f4(1)
+    if kind == BASE:
+        _multiply(count, U(RED), U(ALPHA), look[L_BLENDED], at, c, b)
+    elif kind == GLOW:
+        _multiply(count, U(ER), U(T1), one, at, c, b)
     elif kind == SPECULAR_COLOR:
-        row, last = U(F0R), U(COAT_ROUGH)
-    share = look[L_BLENDED] if kind == BASE else one
-    for c in range(U(3)):
-        for i in range(count):
-            b[row + c * U(BLOCK) + U(start + i)] *= texel[c * U(CHUNK) + U(i)] * w
-    for i in range(count):
-        b[last + U(start + i)] *= one + (texel[3 * CHUNK + i] * w - one) * share
+        _multiply(count, U(F0R), U(COAT_ROUGH), one, at, c, b)
+    elif kind == ROUGHNESS:
+        _roughen(count, look[L_ROUGH_TEXEL], look[L_METAL_TEXEL], at, c, b)
+    else:
+        is_coat = kind == COAT_BUMP
+        if not is_coat:
+            _occlude(count, look[L_OCCLUSION], at, c, b)
+        if mode[13 if is_coat else 12] != 0:
+            strength = one if is_coat else look[L_NORMAL]
+            _bump(count, strength, f4(0) if is_coat else strength * strength, U(CX - NX if is_coat else 0), at, c, b)
 
 
-@njit(fastmath=FAST)
-def _bump(count, kind, has_normals, e, look, b, start, texel):
+@lanewise(exact=True)
+def _multiply(row, last, share, at, c, b):
+    """Three channels times what the samples have so far, and a fourth, which counts as far as `share` says."""
+    for k in range(3):
+        b[row, k * BLOCK] = b[row, k * BLOCK] * (c[at, k * CHUNK] * (1 / 65535))
+    b[last] = b[last] * (1 + (c[at, 3 * CHUNK] * (1 / 65535) - 1) * share)
+
+
+@lanewise(exact=True)
+def _roughen(rough, metal, at, c, b):
+    """Roughness, metallic, coat and transmission."""
+    b[ROUGH] = b[ROUGH] + rough * (c[at] * (1 / 65535) - 1)
+    b[METAL] = b[METAL] + metal * (c[at, CHUNK] * (1 / 65535) - 1)
+    b[COAT] = b[COAT] * (c[at, 2 * CHUNK] * (1 / 65535))
+    b[TRANSMISSION] = b[TRANSMISSION] * (c[at, 3 * CHUNK] * (1 / 65535))
+
+
+@lanewise(exact=True)
+def _occlude(share, at, c, b):
+    b[AO] = b[AO] * (1 + share * (c[at, 3 * CHUNK] * (1 / 65535) - 1))
+
+
+@lanewise(exact=True)
+def _bump(strength, widening, coat, at, c, b):
     """Turn the normals as a normal map says: x along u, y against v (up in the image), also where the uv are mirrored; nothing
-    where they are degenerate.
+    where they are degenerate. coat: CX - NX for those of the coat, else 0.
 
     A mean of normals is the shorter the more they differ: bumps too small to see become roughness (Toksvig 2005; here as the
     concentrations of von Mises-Fisher lobes, Banerjee et al. 2005, of which the inverses add up).
     """
-    zero, one, w = f4(0), f4(1), f4(1 / 32767.0)
-    row, strength, widening = U(NX + start), look[L_NORMAL], look[L_NORMAL] * look[L_NORMAL]
-    if kind == COAT_BUMP:
-        row, strength, widening = U(CX + start), one, zero
-    else:
-        share = look[L_OCCLUSION] * f4(1 / 65535.0)
-        for i in range(count):
-            b[U(AO + start + i)] *= one + share * (texel[3 * CHUNK + i] - f4(65535))
-    if has_normals == 0:
-        return
-    for c in range(3):
-        for i in range(count):
-            e[TX + c * CHUNK + i] = b[row + U(c * BLOCK + i)]
-    for i in range(count):
-        p, q, z = (texel[i] - f4(32768)) * w, (texel[CHUNK + i] - f4(32768)) * w, (texel[2 * CHUNK + i] - f4(32768)) * w
-        squared = min(p * p + q * q + z * z, one)
-        spread = f4(2) * (one - squared) / max((f4(3) - squared) * np.sqrt(squared), f4(1e-3))
-        b[U(T0 + start + i)] += max(spread - f4(2e-4), zero) * widening
-        texel[i], texel[CHUNK + i], texel[2 * CHUNK + i] = p * strength, q * strength, z
-    for i in range(count):
-        p, q, z = texel[i], texel[CHUNK + i], texel[2 * CHUNK + i]
-        ax, ay, az, bx, by, bz = e[AX + i], e[AY + i], e[AZ + i], e[BX + i], e[BY + i], e[BZ + i]
-        ua, va, ub, vb = e[UA + i], e[VA + i], e[UB + i], e[VB + i]
-        side = e[SIDE + i]
-        nx, ny, nz = e[TX + i] * side, e[TY + i] * side, e[TZ + i] * side
-        turn = ua * vb - ub * va
-        mirror = (one if turn > zero else zero) - (one if turn < zero else zero)
-        tx, ty, tz = (vb * ax - va * bx) * mirror, (vb * ay - va * by) * mirror, (vb * az - va * bz) * mirror
-        lift = tx * nx + ty * ny + tz * nz
-        tx, ty, tz = tx - nx * lift, ty - ny * lift, tz - nz * lift
-        squared = tx * tx + ty * ty + tz * tz
-        usable = one if squared > f4(1e-30) else zero
-        scale = one / np.sqrt(max(squared, f4(1e-30)))
-        tx, ty, tz = tx * scale, ty * scale, tz * scale
-        ox, oy, oz = ny * tz - nz * ty, nz * tx - nx * tz, nx * ty - ny * tx
-        agree = (ub * ax - ua * bx) * ox + (ub * ay - ua * by) * oy + (ub * az - ua * bz) * oz
-        q = q if agree * mirror >= zero else -q
-        p, q, z = p * side * usable, q * side * usable, (one + (z - one) * usable) * side
-        texel[i] = tx * p + ox * q + nx * z
-        texel[CHUNK + i] = ty * p + oy * q + ny * z
-        texel[2 * CHUNK + i] = tz * p + oz * q + nz * z
-    for c in range(3):
-        for i in range(count):
-            b[row + U(c * BLOCK + i)] = texel[c * CHUNK + i]
+    p, q, z = ((c[at, k * CHUNK] - 32768) * (1 / 32767) for k in range(3))
+    squared = least(p * p + q * q + z * z, 1)
+    spread = 2 * (1 - squared) / most((3 - squared) * root(squared), 1e-3)
+    b[T0] = b[T0] + most(spread - 2e-4, 0) * widening
+    p, q = p * strength, q * strength
+    side = b[SIDE]
+    normal = tuple(b[row, coat] * side for row in (NX, NY, NZ))
+    first, second = b.get(AX, AY, AZ), b.get(BX, BY, BZ)
+    ua, va, ub, vb = c.get(UA, VA, UB, VB)
+    turn = ua * vb - ub * va
+    mirror = where(turn > 0, 1, where(turn < 0, -1, 0))
+    tangent = tuple((vb * first[k] - va * second[k]) * mirror for k in range(3))
+    lift = dot(tangent, normal)
+    tangent = tuple(tangent[k] - normal[k] * lift for k in range(3))
+    squared = dot(tangent, tangent)
+    usable = where(squared > 1e-30, 1, 0)
+    scale = 1 / root(most(squared, 1e-30))
+    tangent = tuple(t * scale for t in tangent)
+    other = cross(normal, tangent)
+    agree = dot(tuple(ub * first[k] - ua * second[k] for k in range(3)), other)
+    q = q * sign(agree * mirror)
+    p, q, z = p * side * usable, q * side * usable, (1 + (z - 1) * usable) * side
+    for k, row in enumerate((NX, NY, NZ)):
+        b[row, coat] = tangent[k] * p + other[k] * q + normal[k] * z
 
 
-@njit(fastmath=FAST)
-def _seen(x, y, z, vx, vy, vz):
+def _seen(normal, v):
     """The unit vector; one that looks away, and would be black, is turned until it is seen edge on."""
-    one = f4(1)
-    s = one / np.sqrt(x * x + y * y + z * z + f4(1e-20))
-    x, y, z = x * s, y * s, z * s
-    away = max(f4(0.01) - (x * vx + y * vy + z * vz), f4(0))
-    x, y, z = x + vx * away, y + vy * away, z + vz * away
-    s = one / np.sqrt(x * x + y * y + z * z + f4(1e-20))
-    return x * s, y * s, z * s
+    scale = 1 / root(dot(normal, normal) + 1e-20)
+    normal = tuple(x * scale for x in normal)
+    away = most(0.01 - dot(normal, v), 0)
+    normal = tuple(x + w * away for x, w in zip(normal, v, strict=True))
+    scale = 1 / root(dot(normal, normal) + 1e-20)
+    return tuple(x * scale for x in normal)
 
 
-@njit(fastmath=FAST)
-def _finish(count, b):
+@lanewise
+def _finish(b):
     """Unit normals that do not look away, roughness with what the bumps add, reflectance and transmission of the mixture."""
-    zero, one = f4(0), f4(1)
-    for i in range(count):
-        x, y, z = _seen(b[NX + i], b[NY + i], b[NZ + i], b[VX + i], b[VY + i], b[VZ + i])
-        b[NX + i], b[NY + i], b[NZ + i] = x, y, z
-    for i in range(count):
-        x, y, z = _seen(b[CX + i], b[CY + i], b[CZ + i], b[VX + i], b[VY + i], b[VZ + i])
-        b[CX + i], b[CY + i], b[CZ + i] = x, y, z
-    for i in range(count):
-        rough = min(max(b[ROUGH + i], zero), one)
-        b[ROUGH + i] = min(np.sqrt(np.sqrt(rough * rough * rough * rough + b[T0 + i])), one)
-        b[METAL + i] = min(max(b[METAL + i], zero), one)
-        b[F0R + i] = min(b[F0R + i], one) * b[T1 + i]
-        b[F0G + i] = min(b[F0G + i], one) * b[T1 + i]
-        b[F0B + i] = min(b[F0B + i], one) * b[T1 + i]
-        b[TRANSMISSION + i] *= one - b[METAL + i]
+    v = b.get(VX, VY, VZ)
+    for rows in ((NX, NY, NZ), (CX, CY, CZ)):
+        b.put(rows, _seen(b.get(*rows), v))
+    rough, metal = clamp(b[ROUGH]), clamp(b[METAL])
+    b[ROUGH] = least(root(root(rough * rough * rough * rough + b[T0])), 1)
+    b[METAL] = metal
+    for row in (F0R, F0G, F0B):
+        b[row] = least(b[row], 1) * b[T1]
+    b[TRANSMISSION] = b[TRANSMISSION] * (1 - metal)

@@ -56,32 +56,46 @@ GLINT = 2.0  # radiance, a little more than what is shown as white
 
 
 @njit
-def sorted_samples(triangle, kind, material, materials):
+def sorted_samples(triangle, kind, material, materials, radiance):
     """Indices (int32) of the samples that show solid surfaces, those of one material together, and of those of the ground.
 
     kind (T + 1,) uint8: of each triangle; the last of triangle -1, NOTHING. material (T,): which of so many `materials`.
+    radiance (S, 4) becomes 0 but where the ground is, which is not laid over anything.
     """
-    counts, starts = np.zeros(4, np.int64), np.zeros(materials + 1, np.int64)
-    for i in range(triangle.shape[0]):
-        t = triangle[i]
-        k = kind[t]
-        counts[U(k)] += 1
-        if k == SOLID:
-            starts[U(material[t]) + U(1)] += 1
-    for m in range(materials):
-        starts[m + 1] += starts[m]
-    solid, ground = np.empty(counts[SOLID], np.int32), np.empty(counts[FLOOR], np.int32)
-    c = U(0)
-    for i in range(triangle.shape[0]):
-        t = triangle[i]
+    size = U(triangle.shape[0])
+    grounds, starts = U(0), np.zeros(materials + 1, np.uint64)
+    i = U(0)
+    while i < size:
+        t, first = triangle[i], i
+        while i < size and triangle[i] == t:  # large triangles make long runs
+            i += U(1)
         k = kind[t]
         if k == FLOOR:
-            ground[c] = i
-            c += U(1)
+            grounds += i - first
+            continue
+        if k == SOLID:
+            starts[U(material[t]) + U(1)] += i - first
+        for j in range(first, i):
+            radiance[j, U(0)], radiance[j, U(1)], radiance[j, U(2)], radiance[j, U(3)] = f4(0), f4(0), f4(0), f4(0)
+    for m in range(U(materials)):
+        starts[m + U(1)] += starts[m]
+    solid, ground = np.empty(starts[U(materials)], np.int32), np.empty(grounds, np.int32)
+    i, grounds = U(0), U(0)
+    while i < size:
+        t, first = triangle[i], i
+        while i < size and triangle[i] == t:
+            i += U(1)
+        k = kind[t]
+        if k == FLOOR:
+            for j in range(first, i):
+                ground[grounds + (j - first)] = j
+            grounds += i - first
         elif k == SOLID:
             m = U(material[t])
-            solid[U(starts[m])] = i
-            starts[m] += 1
+            n = starts[m]
+            for j in range(first, i):
+                solid[n + (j - first)] = j
+            starts[m] += i - first
     return solid, ground
 
 
@@ -127,11 +141,9 @@ def _start_matte(count, floor, b):
 
 
 @njit(fastmath=FAST)
-def _take(count, is_catcher, is_matte, b):
+def _take(count, is_matte, b):
     """One light that has arrived."""
-    if is_catcher:
-        _catch(count, b)
-    elif is_matte:
+    if is_matte:
         add_light_matte(count, b)
     else:
         add_light(count, b)
@@ -139,18 +151,15 @@ def _take(count, is_catcher, is_matte, b):
 
 @njit(fastmath=FAST)
 def _lay_all(start, count, is_ground, slots, radiance, b):
-    """What the samples send and hide, over what is behind them; the ground as far as it has not faded."""
-    for i in range(count):
-        pixel = radiance[U(slots[start + i])]
-        if is_ground:
-            shown = f4(1) - b[FADE + i]
-            under = f4(1) - b[ALPHA + i] * shown
-            pixel[0] = pixel[0] * under + b[RED + i] * shown
-            pixel[1] = pixel[1] * under + b[GREEN + i] * shown
-            pixel[2] = pixel[2] * under + b[BLUE + i] * shown
-            pixel[3] = pixel[3] * under + b[ALPHA + i] * shown
-        else:
-            lay(pixel, i, b)
+    """What the samples send and hide, over what is behind them; the ground, behind all else, as far as it has not faded."""
+    if not is_ground:
+        for i in range(count):
+            lay(radiance[U(slots[start + i])], i, b)
+        return
+    for i in range(U(count)):
+        p, shown = U(slots[U(start) + i]), f4(1) - b[U(FADE) + i]
+        radiance[p, U(0)], radiance[p, U(1)] = b[U(RED) + i] * shown, b[U(GREEN) + i] * shown
+        radiance[p, U(2)], radiance[p, U(3)] = b[U(BLUE) + i] * shown, b[U(ALPHA) + i] * shown
 
 
 @njit(fastmath=FAST)
@@ -162,7 +171,6 @@ def shade(view, surfaces, textures, floor, surrounding, lights, occlusion, is_gr
     """
     b = np.zeros(ROWS * BLOCK, np.float32)
     seen, which = np.empty(BLOCK, np.int32), np.empty(BLOCK, np.int32)
-    is_catcher = is_ground and floor[4] == f4(2)
     is_matte = is_ground and floor[4] == f4(1)
     for start in range(0, slots.shape[0], BLOCK):
         count = min(slots.shape[0] - start, BLOCK)
@@ -171,9 +179,7 @@ def shade(view, surfaces, textures, floor, surrounding, lights, occlusion, is_gr
             gather_ground(view, floor, start, count, slots, triangle, b, seen, which)
         else:
             gather(surfaces, start, count, slots, triangle, b, seen, which)
-        if is_catcher:
-            _start_catcher(count, b)
-        elif is_matte:
+        if is_matte:
             _start_matte(count, floor, b)
         else:
             material(count, view, surfaces, textures, b, seen, which)
@@ -181,16 +187,32 @@ def shade(view, surfaces, textures, floor, surrounding, lights, occlusion, is_gr
         occlude(count, occlusion, b)
         for k in range(lights.kind.shape[0]):
             arrive(count, lights, k, b)
-            _take(count, is_catcher, is_matte, b)
-        if is_catcher:
-            _finish_catcher(count, surrounding, b)
-        elif is_matte:
+            _take(count, is_matte, b)
+        if is_matte:
             ambient_matte(count, surrounding, b)
             _finish_matte(count, b)
         else:
             ambient(count, surrounding, b)
-            compose(count, surrounding, b)
+            compose(count, b)
         _lay_all(start, count, is_ground, slots, radiance, b)
+
+
+@njit(fastmath=FAST)
+def catch(view, floor, surrounding, lights, occlusion, slots, triangle, depth, radiance):
+    """As `shade`, of ground that is a shadow catcher."""
+    b = np.zeros(ROWS * BLOCK, np.float32)
+    seen, which = np.empty(BLOCK, np.int32), np.empty(BLOCK, np.int32)
+    for start in range(0, slots.shape[0], BLOCK):
+        count = min(slots.shape[0] - start, BLOCK)
+        locate(view, start, count, slots, depth, b)
+        gather_ground(view, floor, start, count, slots, triangle, b, seen, which)
+        _start_catcher(count, b)
+        occlude(count, occlusion, b)
+        for k in range(lights.kind.shape[0]):
+            arrive(count, lights, k, b)
+            _catch(count, b)
+        _finish_catcher(count, surrounding, b)
+        _lay_all(start, count, True, slots, radiance, b)
 
 
 @njit

@@ -9,29 +9,37 @@ import numpy as np
 
 from viewsphere.engines.raster.kernels_filter import opacity
 from viewsphere.engines.raster.kernels_material import L_ALPHA, L_CASTS_FROM
+from viewsphere.engines.raster.kernels_texture import FAST
 from viewsphere.geometry.jit import njit
 
 f4 = nb.float32
 U = nb.uintp
+INNER = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}  # of kernels that only kernels call: half the time to compile
 
 # A view maps a homogeneous point to (u w, v w, q w, w): u and v in texels from the map's middle, q growing with
 # the distance to the light and linear in u and v on every plane: the distance itself from afar, -1 / distance from near.
 
-SPAN = 8  # texels a side of the smallest cell that has bounds
+STEP = 4  # texels from one of the finest cells to the next; each is two steps wide
 COARSEST = 16  # texels a side that a map's coarsest level has at least
 LEVELS = 12
+GAP = 16  # unused texels between rows: those of a window would else push each other out of the cache
+STEEP = 15.0
 # Columns of Views.form: four rows of the matrix, then what `kernels_arrive.look` needs: texels per length (at distance 1), the
 # bias in q from afar and in shares of q from near, the least q there is, how far from the middle the map is read, half its
 # size, whether the light is round, half its size along two axes in texels per q, the matrix from texels to those axes, whether
 # wide penumbrae are filtered finely.
 TEXELS, BIAS_FAR, BIAS_NEAR, NEAREST, READ, MIDDLE, ROUND, HALF_A, HALF_B, TO_A0, TO_A1, TO_B0, TO_B1, FINE = range(16, 30)
 FORM = 30
-# Columns of Views.grid: size, where each level of the depths begins, where each level of the bounds begins.
-SIZE, DEPTH_AT, BOUNDS_AT = 0, 1, 1 + LEVELS
-GRID = 1 + 2 * LEVELS
+# Columns of Views.grid: size, where its bounds begin, how many cells they have a side (a power of two), where each level of the
+# depths begins.
+SIZE, BOUNDS_AT, CELLS, DEPTH_AT = 0, 1, 2, 3
+GRID = 3 + LEVELS
+# Columns of Views.bounds: all that is in a cell lies between two planes of one slope; q of both in the cell's middle, slope per
+# texel.
+LOW, HIGH, ACROSS, DOWN = range(4)
 
 
-@njit
+@njit(**INNER)
 def _alpha(surfaces, textures, t, g, h):
     """Alpha of triangle t where its second and third corner weigh g and h."""
     i, j, k = surfaces.triangles[t]
@@ -43,7 +51,7 @@ def _alpha(surfaces, textures, t, g, h):
     return alpha * opacity(surfaces, textures, m, u0, v0, u1, v1)
 
 
-@njit
+@njit(**INNER)
 def _reach(corners, i, j, k, near, axis):
     """Least and greatest place along an axis of a triangle's part in front of the near plane, in texels from the middle."""
     low, high = np.inf, -np.inf
@@ -61,7 +69,7 @@ def _reach(corners, i, j, k, near, axis):
 
 @njit
 def draw_depth(corners, surfaces, textures, near, nearest, farthest):  # noqa: PLR0912, PLR0915, one loop
-    """Draw q of all triangles over the texels' centres: the least into nearest (n, n), the greatest into farthest.
+    """Draw q of all triangles over the texels' centres: the least into nearest (n, n + GAP), the greatest into farthest.
 
     corners (V, 4) float64: the vertices seen from a view. Only what has w >= near is drawn, and only where a surface's alpha
     reaches its material's L_CASTS_FROM. farthest may be (0, 0).
@@ -124,44 +132,93 @@ def draw_depth(corners, surfaces, textures, near, nearest, farthest):  # noqa: P
 
 
 @njit
-def finish_view(grid, depth, bounds):  # noqa: PLR0912, nested loops
-    """Fill the coarser levels of a view's drawn map, and its bounds; returns its smallest q.
+def finish_view(grid, form, depth, bounds):
+    """Fill the bounds of a view's drawn map; returns its smallest q.
 
-    A level takes every second texel of the one before in both directions. Bounds are the least and the greatest q of a cell
-    of SPAN texels; each further level joins 2 x 2 cells.
+    bounds (M, 4) come as (inf, -inf, 0, 0): nothing.
     """
-    size = grid[SIZE]
-    base = depth[grid[DEPTH_AT] : grid[DEPTH_AT] + size * size].reshape(size, size)
-    level = 1
-    while level < LEVELS and size >> level >= COARSEST:
-        n, middle, at = size >> level, 1 << (level - 1), grid[DEPTH_AT + level]
+    _find_slopes(grid, depth, form[BIAS_FAR] * f4(STEEP), form[BIAS_NEAR] * f4(STEEP), bounds)
+    nearest = _enclose(grid, depth, bounds)
+    _join(grid, bounds)
+    return nearest
+
+
+@njit(inline="always")
+def _find_slopes(grid, depth, far, near, bounds):
+    """ACROSS and DOWN of the finest cells: of the first STEP x STEP texels, as far as they may be one surface; else NaN."""
+    size, side, stride, last = grid[SIZE], grid[CELLS], grid[SIZE] + GAP, STEP - 1
+    for y in range(0, size, STEP):
+        for x in range(0, size, STEP):
+            at, cell = grid[DEPTH_AT] + y * stride + x, U(grid[BOUNDS_AT] + (y * 2 * side + x) // STEP)
+            for column in range(ACROSS, DOWN + 1):
+                along, beside = (1, stride) if column == ACROSS else (stride, 1)
+                total, count = f4(0), f4(0)
+                for k in range(STEP):
+                    z = depth[U(at + k * beside)]
+                    step = depth[U(at + k * beside + last * along)] - z
+                    if abs(step) < far + near * abs(z):
+                        total, count = total + step, count + f4(last)
+                bounds[cell, U(column)] = total / count
+
+
+@njit(fastmath=FAST, **INNER)
+def _mean_slope(bounds, cell, right, below):
+    """Mean ACROSS and DOWN of a cell and those to the right and below, where they are known."""
+    across, down, n, m = f4(0), f4(0), f4(0), f4(0)
+    for k in range(4):
+        own = U(cell + (k & 1) * right + (k >> 1) * below)
+        x, y = bounds[own, U(ACROSS)], bounds[own, U(DOWN)]
+        if abs(x) < f4(np.inf):
+            across, n = across + x, n + f4(1)
+        if abs(y) < f4(np.inf):
+            down, m = down + y, m + f4(1)
+    return across / max(n, f4(1)), down / max(m, f4(1))
+
+
+@njit(fastmath=FAST, inline="always")
+def _enclose(grid, depth, bounds):
+    """All columns of the finest cells from their slopes; returns the smallest q."""
+    size, side, stride = grid[SIZE], grid[CELLS], grid[SIZE] + GAP
+    nearest, middle = f4(np.inf), f4(STEP - 0.5)
+    for y in range(0, size, STEP):
+        for x in range(0, size, STEP):
+            at, cell = grid[DEPTH_AT] + y * stride + x, grid[BOUNDS_AT] + (y * 2 * side + x) // STEP
+            wide, high = min(2 * STEP, size - x), min(2 * STEP, size - y)
+            across, down = _mean_slope(bounds, cell, 1 if wide > STEP else 0, 2 * side if high > STEP else 0)
+            low, top = f4(np.inf), f4(-np.inf)
+            for j in range(high):
+                off = down * (f4(j) - middle)
+                for i in range(wide):
+                    z = depth[U(at + i)]
+                    nearest = min(nearest, z)
+                    z -= off + across * (f4(i) - middle)
+                    low, top = min(low, z), max(top, z)
+                at += stride
+            own = U(cell)
+            bounds[own, U(LOW)], bounds[own, U(HIGH)], bounds[own, U(ACROSS)], bounds[own, U(DOWN)] = low, top, across, down
+    return nearest
+
+
+@njit(fastmath=FAST, inline="always")
+def _join(grid, bounds):
+    """The coarser cells, each from four of the level before that lie side by side."""
+    width, n, half, first = 2 * grid[CELLS], grid[CELLS] >> 1, f4(STEP), grid[BOUNDS_AT]
+    at = first + 2 * n
+    while n > 0:
         for y in range(n):
-            row = base[(y << level) + middle]
             for x in range(n):
-                depth[at + y * n + x] = row[(x << level) + middle]
-        level += 1
-    n = size // SPAN
-    at = grid[BOUNDS_AT]
-    for y in range(n):
-        for x in range(n):
-            low, high = f4(np.inf), f4(-np.inf)
-            for v in range(SPAN):
-                row = base[U(y * SPAN + v)]
-                for u in range(SPAN):
-                    z = row[U(x * SPAN + u)]
-                    low, high = min(low, z), max(high, z)
-            bounds[at + y * n + x, 0], bounds[at + y * n + x, 1] = low, high
-    for k in range(1, LEVELS):
-        if n == 1:
-            break
-        m, below = (n + 1) // 2, at
-        at = grid[BOUNDS_AT + k]
-        for y in range(m):
-            for x in range(m):
-                low, high = f4(np.inf), f4(-np.inf)
-                for v in range(2 * y, min(2 * y + 2, n)):
-                    for u in range(2 * x, min(2 * x + 2, n)):
-                        low, high = min(low, bounds[below + v * n + u, 0]), max(high, bounds[below + v * n + u, 1])
-                bounds[at + y * m + x, 0], bounds[at + y * m + x, 1] = low, high
-        n = m
-    return bounds[at, 0]
+                # Beyond the last cell there are no texels.
+                right, below = 2 if x < n - 1 else 0, 2 if y < n - 1 else 0
+                child = first + 2 * y * width + 2 * x
+                across, down = _mean_slope(bounds, child, right, below * width)
+                low, top = f4(np.inf), f4(-np.inf)
+                for k in range(4):
+                    i, j = (k & 1) * right, (k >> 1) * below
+                    own = U(child + j * width + i)
+                    a, b = bounds[own, U(ACROSS)], bounds[own, U(DOWN)]
+                    off = (across * f4(i - 1) + down * f4(j - 1)) * half
+                    slack = (abs(a - across) + abs(b - down)) * half
+                    low, top = min(low, bounds[own, U(LOW)] - off - slack), max(top, bounds[own, U(HIGH)] - off + slack)
+                own = U(at + y * width + x)
+                bounds[own, U(LOW)], bounds[own, U(HIGH)], bounds[own, U(ACROSS)], bounds[own, U(DOWN)] = low, top, across, down
+        first, at, n, half = at, at + n, n >> 1, half + half

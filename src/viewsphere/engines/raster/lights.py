@@ -15,8 +15,8 @@ from viewsphere.engines.raster import kernels_shadow as kernels
 from viewsphere.engines.raster.kernels_arrive import AREA, DISTANT, POINT, SPOT
 from viewsphere.engines.raster.kernels_material import L_CASTS_FROM
 from viewsphere.engines.raster.records import Float32, Int32, Surfaces, Textures
-from viewsphere.geometry.camera import orbit_center
-from viewsphere.model.scene import AnyLight, AreaLight, HemisphereLight, PointLight, SpotLight, Sun
+from viewsphere.model.scene import AnyLight, AreaLight, HemisphereLight, PointLight, SpotLight
+from viewsphere.surroundings.sun import Distant
 
 Float = NDArray[np.float64]
 
@@ -43,18 +43,9 @@ class Extent:
     reach: float
 
 
-@dataclass(frozen=True)
-class Distant:
-    """A light so far away that its rays are parallel: unit direction to it, irradiance facing it, how wide it is."""
-
-    direction: tuple[float, float, float]
-    irradiance: tuple[float, float, float]
-    angle_deg: float
-
-
 class Views(NamedTuple):
     """What the lights see. form (V, FORM) float32 and grid (V, GRID) int64: columns named in `kernels_shadow`; depth (N,)
-    float32: all levels of all maps, row by row; bounds (M, 2) float32: least and greatest q of cells of all maps.
+    float32: all levels of all maps, row by row; bounds (M, 4) float32: planes before and behind what is in the maps' cells.
     """
 
     form: Float32
@@ -127,22 +118,6 @@ class _Source:
     half_angle: float = math.pi
     ramp: float = 1e6  # one over the difference of cosines over which a spot fades; it begins at `rim`
     rim: float = -2.0
-
-
-def distant_sun(sun: Sun) -> Distant:
-    """A recipe's sun."""
-    x, y, z = orbit_center(math.radians(sun.azimuth_deg), math.radians(sun.elevation_deg), 1.0).tolist()
-    r, g, b = (sun.strength * c for c in sun.color)
-    return Distant((x, y, z), (r, g, b), sun.angle_deg)
-
-
-def even_light(lights: Sequence[AnyLight]) -> Float:
-    """Radiance from above and from below that all hemisphere lights add to the ambient light, (2, 3).
-
-    On a normal with this z: irradiance / pi = above * (1 + z) / 2 + below * (1 - z) / 2.
-    """
-    even = [light for light in lights if isinstance(light, HemisphereLight)]
-    return sum((light.strength * np.array([light.color, light.below]) for light in even), np.zeros((2, 3)))
 
 
 def bake_lights(
@@ -360,7 +335,8 @@ def draw_views(views: Sequence[View], casters: Casters, opposite: bool = False) 
         view = views[i % len(views)]
         texels, cells = _lay_out(grid[i], view.size, texels, cells)
         form[i] = _form_row(view, i >= len(views))
-    result = Views(form, grid, np.empty(texels, np.float32), np.empty((cells, 2), np.float32))
+    result = Views(form, grid, np.empty(texels, np.float32), np.empty((cells, 4), np.float32))
+    result.bounds[:] = np.inf, -np.inf, 0, 0
     points = np.ones((len(casters.surfaces.vertices), 4))
     points[:, :3] = casters.surfaces.vertices[:, 11:14]
     for i, view in enumerate(views):
@@ -372,7 +348,8 @@ def draw_views(views: Sequence[View], casters: Casters, opposite: bool = False) 
         kernels.draw_depth(corners, casters.surfaces, casters.textures, view.near, nearest, farthest)
         np.negative(farthest, out=farthest)
     for i in range(count):
-        form[i, kernels.NEAREST] = kernels.finish_view(grid[i], result.depth, result.bounds)
+        _thin_out(result, i)
+        form[i, kernels.NEAREST] = kernels.finish_view(grid[i], form[i], result.depth, result.bounds)
     return result
 
 
@@ -384,8 +361,8 @@ def _joined(parts: Sequence[Views]) -> Views:
     cells = np.cumsum([0, *(len(p.bounds) for p in parts)])
     grids = [p.grid.copy() for p in parts]
     for i, grid in enumerate(grids):
-        grid[:, kernels.DEPTH_AT : kernels.BOUNDS_AT] += texels[i]
-        grid[:, kernels.BOUNDS_AT :] += cells[i]
+        grid[:, kernels.DEPTH_AT :] += texels[i]
+        grid[:, kernels.BOUNDS_AT] += cells[i]
     return Views(
         np.concatenate([p.form for p in parts]),
         np.concatenate(grids),
@@ -394,26 +371,34 @@ def _joined(parts: Sequence[Views]) -> Views:
     )
 
 
-def _level(views: Views, which: int, size: int) -> Float32:
-    start = int(views.grid[which, kernels.DEPTH_AT])
-    return views.depth[start : start + size * size].reshape(size, size)
+def _thin_out(views: Views, which: int) -> None:
+    """Fill the coarser levels of a drawn map: each has every second texel of the one before in both directions."""
+    size = int(views.grid[which, kernels.SIZE])
+    finest = _level(views, which, size)[:, :size]
+    for level in range(1, kernels.LEVELS):
+        n, middle = size >> level, 1 << level - 1
+        if n < kernels.COARSEST:
+            break
+        _level(views, which, n, level)[:, :n] = finest[middle :: 1 << level, middle :: 1 << level][:n, :n]
+
+
+def _level(views: Views, which: int, size: int, level: int = 0) -> Float32:
+    start, stride = int(views.grid[which, kernels.DEPTH_AT + level]), size + kernels.GAP
+    return views.depth[start : start + size * stride].reshape(size, stride)
 
 
 def _lay_out(row: NDArray[np.int64], size: int, texels: int, cells: int) -> tuple[int, int]:
     """Fill a view's row of `Views.grid`; returns where the next one begins."""
-    row[kernels.SIZE] = size
+    side = 1 << (size // kernels.STEP - 1).bit_length()
+    row[kernels.SIZE], row[kernels.BOUNDS_AT], row[kernels.CELLS] = size, cells, side
     for level in range(kernels.LEVELS):
-        if level and size >> level < kernels.COARSEST:
+        n = size >> level
+        if level and n < kernels.COARSEST:
             break
         row[kernels.DEPTH_AT + level] = texels
-        texels += (size >> level) ** 2
-    side = size // kernels.SPAN
-    for level in range(kernels.LEVELS):
-        row[kernels.BOUNDS_AT + level] = cells
-        cells += side**2
-        if side == 1:
-            break
-        side = (side + 1) // 2
+        texels += n * (n + kernels.GAP)
+    # The finest cells are the left half of a square's rows, coarser ones follow to their right.
+    cells += 2 * side * side
     return texels, cells
 
 

@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
-from fnmatch import fnmatchcase
-
 from viewsphere.assets.mesh import Material
 from viewsphere.engines.raster import kernels_material as column
 from viewsphere.model.shot import Repaint
@@ -15,16 +11,6 @@ ALWAYS, HALF, NEVER = 0.0, 0.5, 2.0
 
 CLEAR = 0.5
 """What lets more than this share of the light through casts no shadow."""
-
-
-def repainted(material: Material, repaints: Sequence[Repaint]) -> tuple[Material, Repaint | None]:
-    """The material with its new tint, and the last of the repaints whose pattern its name matches."""
-    found = next((r for r in reversed(repaints) if fnmatchcase(material.name, r.material)), None)
-    if found is None or found.tint is None:
-        return material, found
-    red, green, blue, alpha = material.base_color
-    tint = found.tint
-    return replace(material, base_color=(red * tint[0], green * tint[1], blue * tint[2], alpha)), found
 
 
 def look(

@@ -15,6 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.engines.raster import kernels_occlusion as kernels
+from viewsphere.engines.raster.arriving import arriving
+from viewsphere.engines.raster.kernels_arrive import DISTANT
 from viewsphere.engines.raster.lights import Casters, Lights, Views, draw_views, parallel_view
 from viewsphere.engines.raster.records import Float32
 
@@ -29,6 +31,7 @@ _MOST_OPEN_CELLS = 60_000  # where scenery may read any of them
 _PAD, _WIDE_PAD = 3, 6  # cells around the targets, without and with scenery
 _PUSH = 1.6  # cells between a surface and where it reads the volume
 _FLOOR = 128  # cells of the ground's map, each way
+_MOST_MARKED = 200_000  # points of surfaces at a time
 _DEEPEST = 0.92  # the rest is light that objects and ground throw back and forth
 
 
@@ -91,12 +94,22 @@ def with_ground_light(occlusion: Occlusion, lights: Lights, ambient: float) -> O
     """
     if not occlusion.floor_frame[5]:
         return occlusion
-    cells, x, y, z, height = (float(v) for v in occlusion.floor_frame[:5])
+    cells, left, front, z, height = (float(v) for v in occlusion.floor_frame[:5])
+    at = (np.arange(_FLOOR) + 0.5) / cells
+    x, y = np.meshgrid(left + at, front + at)
+    arrived, whole = ambient * occlusion.floor[..., 0], np.full((_FLOOR, _FLOOR), ambient)
+    for k, kind in enumerate(lights.kind.tolist()):
+        # What lamps give the ground around has their shadows taken off already; what lies on it keeps their light in.
+        is_lamp = kind != DISTANT
+        depth = 0.02 * height if is_lamp and occlusion.frame[6] else 0.0  # scenery may be the ground
+        places = np.stack([x, y, np.full_like(x, z - depth)], axis=-1).reshape(-1, 3)
+        irradiance, share = arriving(lights, k, places, 2 / cells)
+        got = irradiance.sum(axis=1)
+        arrived = arrived + (got * share).reshape(x.shape)
+        whole = whole + (got * share if is_lamp else got).reshape(x.shape)
     floor = occlusion.floor.copy()
-    corner = np.array([x + 0.5 / cells, y + 0.5 / cells], np.float32)
-    depth = np.float32(0.02 * height if occlusion.frame[6] else 0.0)  # scenery may be the ground
-    kernels.ground_light(lights, corner, np.float32(1 / cells), np.float32(z), depth, np.float32(ambient), floor)
-    floor[..., 1] = 1 - (1 - floor[..., 1]) * _window()
+    reaching = np.minimum(arrived / np.maximum(whole, 1e-30), 1)
+    floor[..., 1] = 1 - np.where(whole > 0, 1 - reaching, 0) * _window()
     return occlusion._replace(floor=floor)
 
 
@@ -145,9 +158,7 @@ def _volume(
         cells *= 0.9
     shape = (np.ceil(size * cells) + 2 * pad + 1).astype(int)[::-1]
     corner = low - pad / cells
-    wanted = np.full(shape, has_scenery)
-    if not has_scenery:
-        kernels.mark(casters.surfaces, casters.extent.triangles, corner, cells, _PUSH, wanted)
+    wanted = np.full(shape, True) if has_scenery else _read_points(casters, corner, cells, shape)
     points = corner + np.argwhere(wanted)[:, ::-1] / cells
     seen = np.zeros((len(points), kernels.COEFFICIENTS), np.float32)
     kernels.see(np.ascontiguousarray(points, np.float32), views, directions, seen)
@@ -158,6 +169,48 @@ def _volume(
     for _ in range(3):
         known = kernels.spread(volume, known)
     return volume, corner, cells
+
+
+def _read_points(casters: Casters, corner: Float, cells: float, shape: NDArray[np.int_]) -> NDArray[np.bool_]:
+    """The points of the volume that samples of the targets will read, on both sides of their surfaces.
+
+    corner (3,): where the first point lies; cells: per length.
+    """
+    triangles = casters.surfaces.triangles[: casters.extent.triangles].T
+    vertices = casters.surfaces.vertices.T
+    # Where and which way: lengths in cells.
+    known = np.concatenate([(vertices[11:14] - corner[:, None]) * cells, vertices[:3]], dtype=np.float32)
+    a, b, c = (known[:3, corners] for corners in triangles)
+    longest = np.sqrt(np.max([(d * d).sum(axis=0) for d in (b - a, c - b, a - c)], axis=0))
+    parts = np.maximum(np.ceil(1.5 * longest), 1)
+    is_first = np.zeros(shape, np.bool_)
+    is_corner = np.zeros(vertices.shape[1], np.bool_)
+    is_corner[triangles[:, parts == 1]] = True
+    _mark(known[:, is_corner], is_first)
+    for n in np.unique(parts[parts > 1]).astype(int).tolist():
+        f, g = np.mgrid[: n + 1, : n + 1].reshape(2, -1)[:, :, None].astype(np.float32) / n
+        f, g = f[f + g < 1 + 0.5 / n], g[f + g < 1 + 0.5 / n]
+        whole = triangles[:, parts == n]
+        step = max(_MOST_MARKED // len(f), 1)
+        for start in range(0, whole.shape[1], step):
+            p, q, r = (known[:, None, corners[start : start + step]] for corners in whole)
+            _mark((p + f[:, None] * (q - p) + g[:, None] * (r - p)).reshape(6, -1), is_first)
+    for axis in range(3):
+        along = np.moveaxis(is_first, axis, 0)
+        along[1:] |= along[:-1].copy()
+    return is_first
+
+
+def _mark(known: Float32, is_first: NDArray[np.bool_]) -> None:
+    """Mark the first of the eight points around where surface points (6, N) of this place and normal read the volume."""
+    place, normal = known[:3], known[3:]
+    off = normal * (_PUSH / np.maximum(np.sqrt((normal * normal).sum(axis=0)), 1e-6))
+    layers, rows, columns = is_first.shape
+    for read in (place - off, place + off):
+        with np.errstate(invalid="ignore"):
+            column, row, layer = read.astype(np.int32)
+        inside = (column >= 0) & (row >= 0) & (layer >= 0) & (column < columns) & (row < rows) & (layer < layers)
+        is_first[layer[inside], row[inside], column[inside]] = True
 
 
 def _floor(casters: Casters, z: float, directions: Float32, views: Views) -> tuple[Float32, Float32]:

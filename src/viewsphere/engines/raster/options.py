@@ -8,7 +8,7 @@ from typing import Literal
 
 from pydantic import JsonValue
 
-from viewsphere.errors import UserError
+from viewsphere.errors import RecipeError
 from viewsphere.model.mistakes import one_of
 
 
@@ -28,23 +28,25 @@ class Options:
 
 
 def parse_options(given: Mapping[str, JsonValue]) -> Options:
-    """Checked options. Raises UserError for an unknown name (with the nearest) or a value out of range."""
+    """Checked options. Raises RecipeError, which begins with the recipe's field, for an unknown name (with the nearest) or a
+    value out of range.
+    """
     known = [f.name for f in fields(Options)]
     for name in given:
         if name == "exposure":
-            raise UserError("raster engine: exposure: expected it as scene.view.exposure, found it among the engine's options")
+            raise RecipeError("engine.exposure: expected it as scene.view.exposure, found it among the engine's options")
         if name not in known:
-            raise UserError(f"raster engine: options: {one_of(name, known)}")
+            raise RecipeError(f"engine.{name}: {one_of(name, known)}")
     default = Options()
     antialias = given.get("antialias", default.antialias)
     if isinstance(antialias, bool) or antialias not in (1, 4):
-        raise UserError(f"raster engine: antialias: expected 1 or 4, found {antialias!r}")
+        raise RecipeError(f"engine.antialias: expected 1 or 4, found {antialias!r}")
     resolution = given.get("shadow_resolution", default.shadow_resolution)
     if isinstance(resolution, bool) or not isinstance(resolution, int) or not (resolution == 0 or 64 <= resolution <= 8192):
-        raise UserError(f"raster engine: shadow_resolution: expected an integer in 64..8192, found {resolution!r}")
+        raise RecipeError(f"engine.shadow_resolution: expected an integer in 64..8192, found {resolution!r}")
     occlusion = given.get("ambient_occlusion", default.ambient_occlusion)
     if occlusion is False:  # YAML's off
         occlusion = "off"
     if occlusion not in ("off", "fast", "fine"):
-        raise UserError(f"raster engine: ambient_occlusion: expected off, fast or fine, found {occlusion!r}")
+        raise RecipeError(f"engine.ambient_occlusion: expected off, fast or fine, found {occlusion!r}")
     return Options(4 if antialias == 4 else 1, resolution - resolution % 16, occlusion)

@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.engines.raster import kernels_paint
-from viewsphere.engines.raster.environment import Surrounding
-from viewsphere.engines.raster.kernels_environment import sky_behind
+from viewsphere.engines.raster.environment import Surrounding, sky_behind
 from viewsphere.engines.raster.lights import Lights
 from viewsphere.engines.raster.occlusion import Occlusion
 from viewsphere.engines.raster.records import Float32, Int32, Surfaces, Textures, View
@@ -51,15 +50,15 @@ def paint(baked: Baked, camera: Camera, visibility: Visibility, antialias: bool,
 
     Edge pixels are the mean of four samples. Where nothing is, the sky if `has_sky`, else 0.
     """
-    radiance[:] = 0
     triangle, depth = visibility.triangle.reshape(-1), visibility.inverse_depth.reshape(-1)
     samples = edge_samples(baked.geometry, camera, visibility, baked.owner) if antialias else None
     view = view_of(baked, camera)
     if samples is not None:
         triangle = triangle.copy()
         triangle[samples.pixels] = -1
-        _smooth(baked, camera, visibility, samples, has_sky, radiance)
     _shade(baked, camera, view, visibility, triangle, depth, radiance)
+    if samples is not None:
+        _smooth(baked, camera, visibility, samples, has_sky, radiance)
     if has_sky:
         sky_behind(view, baked.surrounding, radiance)
 
@@ -70,11 +69,11 @@ def _smooth(baked: Baked, camera: Camera, visibility: Visibility, samples: Sampl
     normals = baked.geometry.triangle_normals
     like = kernels_paint.shared_samples(samples.triangle, samples.inverse_depth, baked.owner, normals)
     is_copy = like != np.arange(len(like))
-    colors = np.zeros((len(like), 4), np.float32)
-    colors[is_copy, 3] = 1  # the sky need not look there
+    colors = np.empty((len(like), 4), np.float32)
     triangle = np.where(is_copy, np.int32(-1), samples.triangle)
     _shade(baked, camera, view, visibility, triangle, samples.inverse_depth, colors, samples)
     if has_sky:
+        colors[is_copy, 3] = 1  # the sky need not look there
         sky_behind(view, baked.surrounding, colors)
     kernels_paint.average_samples(samples.pixels, colors, like, radiance)
 
@@ -89,8 +88,9 @@ def _shade(
     radiance: Float32,
     samples: Samples | None = None,
 ) -> None:
-    """Shade samples over `radiance`; what is behind see-through surfaces first."""
-    solid, ground = kernels_paint.sorted_samples(triangle, baked.kind, baked.surfaces.material, len(baked.surfaces.looks))
+    """Fill `radiance` (S, 4) with what the samples show; what is behind see-through surfaces first."""
+    materials = baked.surfaces.material, len(baked.surfaces.looks)
+    solid, ground = kernels_paint.sorted_samples(triangle, baked.kind, *materials, radiance)
     _shade_some(baked, view, solid, False, triangle, depth, radiance)
     _shade_some(baked, view, ground, True, triangle, depth, radiance)
     # Also where no see-through surface is in front: a decal may lie on what is.
@@ -106,11 +106,13 @@ def _shade(
 def _shade_some(
     baked: Baked, view: View, slots: Int32, is_ground: bool, triangle: Int32, depth: Float32, radiance: Float32
 ) -> None:
-    if len(slots):
-        kernels_paint.shade(
-            view, baked.surfaces, baked.textures, baked.floor, baked.surrounding, baked.lights, baked.occlusion,
-            is_ground, slots, triangle, depth, radiance,
-        )  # fmt: skip
+    if len(slots) == 0:
+        return
+    light, seen = (baked.surrounding, baked.lights, baked.occlusion), (slots, triangle, depth)
+    if is_ground and baked.floor[4] == 2:
+        kernels_paint.catch(view, baked.floor, *light, *seen, radiance)
+    else:
+        kernels_paint.shade(view, baked.surfaces, baked.textures, baked.floor, *light, is_ground, *seen, radiance)
 
 
 def view_of(baked: Baked, camera: Camera, samples: Samples | None = None) -> View:

@@ -33,7 +33,8 @@ class Surfaces(NamedTuple):
 class Textures(NamedTuple):
     """All mip levels of all textures in one array, as bundles: textures that a material looks up together.
 
-    texels (N,) uint16: linear light and data, 65,535 is 1; components of normals, 32,768 is 0 and 65,535 is 1. levels
+    texels (N,) uint16: linear light and data, 65,535 is 1; components of normals, 32,768 is 0 and 65,535 is 1; behind the last,
+    room for reading three planes at once. levels
     (X, 16, 3) int32: first word, width and height of each level. modes (X, 14) int32: number of levels, wrap along u and v,
     nearest, uv set, number of planes of four channels, up to six planes' kinds, whether it has normals and the coat's normals.
     transforms (X, 6): rows of the 2 x 3 matrix on (u, v, 1).

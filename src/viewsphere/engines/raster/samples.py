@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,7 +79,7 @@ def edge_samples(geometry: Geometry, camera: Camera, visibility: Visibility, own
         points.draw(geometry, q, np.zeros(len(geometry.triangles) + 1, np.bool_), np.arange(len(geometry.triangles)))
         known = np.zeros(0, np.float32)
         found = points.pixels[:-1], points.nearest.astype(np.float32), points.seen, known, _ROTATED
-        pixels, position, triangle, inverse = kernels_edges.finish(len(points.seen), *found, *look)
+        pixels, position, triangle, inverse = _differing(len(points.seen), *found, *look)
         samples = Samples(pixels, position, _sample_rays(camera, pixels), triangle, inverse)
     return samples if len(samples.pixels) else None
 
@@ -241,17 +242,41 @@ def _pinhole_edges(
     geometry: Geometry, visibility: Visibility, marks: NDArray[np.uint8], q: NDArray[np.float64], owner: Int32
 ) -> tuple[Int32, Float32, Int32, Float32]:
     """pixels, position, triangle and inverse depth of `Samples`."""
-    shown = visibility.triangle, visibility.inverse_depth
-    wanted = np.zeros(len(geometry.triangles), np.uint8)
-    lines = kernels_lines.on_others(q, geometry.triangles, geometry.triangle_cutout, owner, *shown)
-    kernels_lines.mark(lines, q, geometry.triangles, owner, _ROTATED, *shown, marks, wanted)
-    grid, limit, pixels, starts, bound, nearest, seen = kernels_edges.begin(marks, *shown, wanted)
+    shown, (height, width) = (visibility.triangle, visibility.inverse_depth), visibility.triangle.shape
+    wanted, chosen = np.zeros((2, len(geometry.triangles)), np.uint8)
+    are_wanted, are_chosen = wanted.view(np.bool_), chosen.view(np.bool_)  # which numpy finds faster
+    kernels_lines.on_others(q, geometry.triangles, geometry.triangle_cutout, owner, *shown, np.empty(len(q), np.int32), chosen)
+    kernels_lines.mark(np.flatnonzero(are_chosen), q, geometry.triangles, owner, _ROTATED, *shown, marks, wanted)
+    marked = np.flatnonzero(marks != 0)
+    most = len(marked) + height * width // 8  # with those found later
+    pixels = np.empty(most, np.int32)
+    pixels[: len(marked)] = marked
+    starts = np.searchsorted(marked, width * np.arange(height + 1)).astype(np.int32)
+    grid, limit = np.full((height, width), -1, np.int32), shown[1] * np.float32(1 + kernels_edges.SLACK)
+    bound, nearest, seen = np.empty(len(marked), np.float32), np.empty((most, 4), np.float32), np.empty((most, 4), np.int32)
+    kernels_edges.begin(pixels, len(marked), *shown, grid, limit, bound, nearest, seen, wanted)
     surfaces = q, geometry.triangles, geometry.triangle_cutout, geometry.cutouts.arrays
-    canvas = _ROTATED, *shown, grid, limit, pixels, starts
-    count = kernels_edges.draw(kernels_edges.chosen(wanted), *surfaces, *canvas, len(bound), nearest, seen)
-    others = kernels_edges.with_corners_before(q, geometry.triangles, wanted, limit)
-    count = kernels_edges.draw(others, *surfaces, *canvas, count, nearest, seen)
-    return kernels_edges.finish(count, pixels, nearest, seen, bound, _ROTATED, *shown, owner, geometry.triangle_normals)
+    canvas = _room(width), _ROTATED, *shown, grid, limit, pixels, starts
+    count = kernels_edges.draw(np.flatnonzero(are_wanted), *surfaces, *canvas, len(bound), nearest, seen)
+    kernels_edges.with_corners_before(q, geometry.triangles, wanted, limit, np.empty(len(q), np.uint8), chosen)
+    count = kernels_edges.draw(np.flatnonzero(are_chosen), *surfaces, *canvas, count, nearest, seen)
+    return _differing(count, pixels, nearest, seen, bound, _ROTATED, *shown, owner, geometry.triangle_normals)
+
+
+def _room(width: int) -> tuple[NDArray[Any], ...]:
+    """Where `kernels_edges.draw` keeps a triangle's samples: pixels, x, y, 1/z, whether inside, the same of four in a word."""
+    room = max(width, kernels_edges.NARROW**2) + 1
+    words = np.empty(room, np.uint32)
+    found, (x, y) = np.empty(room, np.uint32), np.empty((2, 4 * room))
+    return found, x, y, np.empty(4 * room, np.float32), words.view(np.uint8), words
+
+
+def _differing(count: int, *known: NDArray[Any]) -> tuple[Int32, Float32, Int32, Float32]:
+    """Of `count` pixels those whose samples do not all look like the centre, as `kernels_edges.finish` finds them."""
+    pixels, position = np.empty(count, np.int32), np.empty((4 * count, 2), np.float32)
+    triangle, inverse = np.empty(4 * count, np.int32), np.empty(4 * count, np.float32)
+    n = kernels_edges.finish(count, *known, pixels, position, triangle, inverse)
+    return pixels[:n], position[: 4 * n], triangle[: 4 * n], inverse[: 4 * n]
 
 
 def _sample_rays(camera: Camera, pixels: Int32) -> Float32:

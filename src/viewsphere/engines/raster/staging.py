@@ -12,21 +12,22 @@ from numpy.typing import NDArray
 from viewsphere.assets.mesh import Mesh
 from viewsphere.assets.srgb import linear
 from viewsphere.engines.raster import kernels_paint
-from viewsphere.engines.raster.background import display_background
 from viewsphere.engines.raster.environment import bake_surrounding, lamps_on_ground, sky_lights
-from viewsphere.engines.raster.ground import ground_albedo, ground_frame, ground_material
 from viewsphere.engines.raster.kernels_material import L_BLENDED, L_METAL, L_METAL_TEXEL, L_TRANSMISSION
-from viewsphere.engines.raster.lights import Casters, Extent, bake_lights, even_light
+from viewsphere.engines.raster.lights import Casters, Extent, bake_lights
 from viewsphere.engines.raster.occlusion import bake_occlusion, with_ground_light
 from viewsphere.engines.raster.options import Options, parse_options
 from viewsphere.engines.raster.painting import Baked, paint
 from viewsphere.engines.raster.records import Float32
 from viewsphere.engines.raster.surface import pack_surfaces
+from viewsphere.imaging.background import display_background
 from viewsphere.imaging.finish import finished
-from viewsphere.imaging.seen import Seen
+from viewsphere.imaging.seen import Seen, seen_by
 from viewsphere.model.camera import Camera
 from viewsphere.model.scene import Ground, Scene
 from viewsphere.model.shot import Frame, ModelSpec, Placement, Shot
+from viewsphere.surroundings.ground import ground_albedo, ground_frame, ground_material
+from viewsphere.surroundings.sky import even_light
 from viewsphere.truth.geometry import Geometry, build_geometry
 from viewsphere.truth.visibility import Visibility
 
@@ -63,14 +64,8 @@ class RasterStage:
         return self._canvases[pixels]
 
     def _seen(self, camera: Camera, frame: Frame, visibility: Visibility) -> Seen:
-        is_target = np.append(self.geometry.triangle_object > 0, False)
         target = self.middle if frame.pose.target is None else np.array(frame.pose.target)
-        return Seen(
-            visibility.inverse_depth,
-            is_target[visibility.triangle],
-            camera.intrinsics,
-            float(camera.R[2] @ (target - camera.center)),
-        )
+        return seen_by(camera, target, visibility.inverse_depth, visibility.triangle, self.geometry.triangle_object)
 
 
 def build_stage(shot: Shot, load: Callable[[ModelSpec], Mesh]) -> RasterStage:

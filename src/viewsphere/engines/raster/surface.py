@@ -8,12 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.assets.mesh import Mesh
+from viewsphere.assets.repaint import repainted
 from viewsphere.engines.raster.bundles import BundlePacker
-from viewsphere.engines.raster.ground import ground_frame, ground_material
-from viewsphere.engines.raster.looks import look, repainted
+from viewsphere.engines.raster.looks import look
 from viewsphere.engines.raster.records import Surfaces, Textures
 from viewsphere.model.scene import Ground
 from viewsphere.model.shot import Placement, Repaint
+from viewsphere.surroundings.ground import ground_frame, ground_material
 from viewsphere.truth.geometry import Geometry
 
 

@@ -10,9 +10,9 @@ import OpenEXR
 import pytest
 from PIL import Image
 
-from viewsphere.engines.raster import environment_file
-from viewsphere.engines.raster.environment_file import read_environment
 from viewsphere.errors import UserError
+from viewsphere.surroundings import environment_file
+from viewsphere.surroundings.environment_file import read_environment
 
 HDRI = Path(__file__).parents[3] / "shared" / "models" / "hdri"
 

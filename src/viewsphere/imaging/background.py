@@ -10,21 +10,20 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
 import numpy as np
+from numpy.typing import NDArray
 
+from viewsphere.assets import limits
 from viewsphere.assets.srgb import linear
-from viewsphere.engines.raster.records import Float32
-from viewsphere.errors import UserError
+from viewsphere.errors import RecipeError
 from viewsphere.model.scene import Background
 
 if TYPE_CHECKING:
     from PIL.Image import Image
 
+Float32 = NDArray[np.float32]
 Box = tuple[float, float, float, float]
 Size = tuple[int, int]
 Rgb = tuple[int, int, int]
-
-MOST_PIXELS = 100_000_000
-"""A picture of more is refused before it is decoded."""
 
 FORMATS = ("PNG", "JPEG", "WEBP", "BMP", "GIF", "TIFF", "TGA", "PPM")
 
@@ -44,7 +43,7 @@ def display_background(background: Background, width: int, height: int) -> Float
     """The background as (height * width, 3) display-linear, exact in sRGB bytes; None for the sky, and for no background.
 
     Where a picture is clear the background's colour is seen, else white. The array is kept for the next frame and not to be
-    written to. Raises UserError for a picture that cannot be read or has more than `MOST_PIXELS`.
+    written to. Raises RecipeError for a picture that cannot be read or has more pixels than `limits` allows.
     """
     if background.transparent or (background.color is None and background.image is None):
         return None
@@ -120,7 +119,7 @@ class _Shelf:
     _pictures: dict[_Wanted, Image] = field(default_factory=dict["_Wanted", "Image"])
 
     def picture(self, wanted: _Wanted) -> Image:
-        """The picture, upright, RGB; raises UserError when it cannot be read."""
+        """The picture, upright, RGB; raises RecipeError when it cannot be read."""
         found = self._pictures.pop(wanted, None) or _decoded(wanted)
         self._pictures[wanted] = found  # the last used comes last
         held = sum(4 * p.width * p.height for p in self._pictures.values())
@@ -149,7 +148,7 @@ def _head(path: str, stamp: int) -> tuple[Size, int]:
     with _opened(path) as picture:
         width, height = picture.size
         orientation = _orientation(picture)
-    if width * height > MOST_PIXELS:
+    if width * height > limits.MAX_PICTURE_PIXELS:
         _too_large(path, f"{width} x {height}")
     return ((height, width) if orientation >= 5 else (width, height)), orientation
 
@@ -159,7 +158,7 @@ def _opened(path: str) -> Image:
 
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of large pictures, which MOST_PIXELS decides on
+            warnings.simplefilter("ignore")  # of large pictures, which a limit decides on
             return Image.open(path, formats=FORMATS)
     except UnidentifiedImageError:
         _refuse(path, f"none of {', '.join(FORMATS)}")
@@ -267,8 +266,11 @@ def _convolved(pixels: Float32, variance: float, axis: int) -> Float32:
 
 def _refuse(path: str, problem: str) -> NoReturn:
     problem = " ".join(problem.split())[:120]
-    raise UserError(f"background image {path}: expected a readable image, found {problem}: mend or remove it") from None
+    raise RecipeError(
+        f"scene.background: background image {path}: expected a readable image, found {problem}: mend or remove it"
+    ) from None
 
 
 def _too_large(path: str, found: str) -> NoReturn:
-    raise UserError(f"background image {path}: expected at most {MOST_PIXELS:,} pixels, found {found}: make it smaller")
+    most = f"{limits.MAX_PICTURE_PIXELS:,} pixels"
+    raise RecipeError(f"scene.background: background image {path}: expected at most {most}, found {found}: make it smaller")

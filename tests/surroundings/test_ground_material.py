@@ -9,9 +9,9 @@ import pytest
 
 from pictures import bricks, write
 from viewsphere.assets.srgb import linear
-from viewsphere.engines.raster.ground import SHARPEST, ground_albedo, ground_frame, ground_material
 from viewsphere.errors import UserError
 from viewsphere.model.scene import Ground
+from viewsphere.surroundings.ground import SHARPEST, ground_albedo, ground_frame, ground_material
 
 
 def test_plain_ground_has_its_colour_in_linear_light():

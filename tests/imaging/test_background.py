@@ -13,9 +13,9 @@ from scipy.ndimage import gaussian_filter
 
 from pictures import photograph, write
 from viewsphere.assets.srgb import encoded, linear
-from viewsphere.engines.raster import background as module
-from viewsphere.engines.raster.background import display_background
 from viewsphere.errors import UserError
+from viewsphere.imaging import background as module
+from viewsphere.imaging.background import display_background
 from viewsphere.model.scene import Background
 
 WHITE = (255, 255, 255)

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from viewsphere.assets.folder import UnreadableError, decode_image
 from viewsphere.assets.mesh import Image, Material, Texture
 from viewsphere.assets.srgb import linear
-from viewsphere.errors import UserError
+from viewsphere.errors import RecipeError
 from viewsphere.model.scene import Ground
 
 SHARPEST = 4096
@@ -30,7 +30,7 @@ def ground_material(ground: Ground) -> tuple[Material, tuple[Image, ...]]:
 
     Textures are used with (x, -y) / tile of the world; a picture that is not square keeps the proportions of the first one
     named. Where `image` is clear the ground's colour alone is seen; of `roughness_image` green counts, as in glTF. Raises
-    UserError, naming the field, for a picture that cannot be read.
+    RecipeError, naming the field, for a picture that cannot be read.
     """
     return _material(ground.model_dump_json(), tuple(_stamp(ground, name) for name in IMAGES))
 
@@ -86,9 +86,9 @@ def _image(name: str, path: str) -> Image:
     try:
         pixels = decode_image(Path(path).read_bytes(), f"scene.ground.{name}: {path}")
     except UnreadableError as error:
-        raise UserError(f"{error}: mend or replace it") from None
+        raise RecipeError(f"{error}: mend or replace it") from None
     except OSError as error:
-        raise UserError(f"scene.ground.{name}: expected a readable image, found {error.strerror}: {path}") from None
+        raise RecipeError(f"scene.ground.{name}: expected a readable image, found {error.strerror}: {path}") from None
     factor = -(-max(pixels.shape[:2]) // SHARPEST)
     if factor > 1:
         pixels = np.array(Pillow.fromarray(pixels).reduce(factor))
@@ -107,4 +107,4 @@ def _stamp(ground: Ground, name: str) -> int:
     try:
         return Path(path).stat().st_mtime_ns if path else 0
     except OSError as error:
-        raise UserError(f"scene.ground.{name}: expected an image file, found {error.strerror}: {path}") from None
+        raise RecipeError(f"scene.ground.{name}: expected an image file, found {error.strerror}: {path}") from None

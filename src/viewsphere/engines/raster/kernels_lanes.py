@@ -1,0 +1,301 @@
+"""Arithmetic on the processor's vectors, written as on numbers, for kernels that do the same to all samples of a block.
+
+A function decorated with `lanewise` is called from kernels like any other. What it does is written down directly as vector
+instructions: numba needs no types of it, which takes most of a kernel's time to compile, and nothing is left to chance.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numba as nb
+from llvmlite import ir
+from numba.core import cgutils
+from numba.extending import intrinsic
+
+from viewsphere.engines.raster.kernels_texture import FAST
+
+LANES = 8
+WHOLE, REAL, FLAG = ir.IntType(32), ir.FloatType(), ir.IntType(1)
+_FLAGS = tuple(sorted(FAST))
+
+
+class Lanes:
+    """Numbers side by side: float32, int32, or flags that comparisons give. The other operand may be one number for all."""
+
+    def __init__(self, builder: ir.IRBuilder, value: Any) -> None:
+        self.builder = builder
+        self.value = value
+
+    @property
+    def is_real(self) -> bool:
+        """Whether they are float32."""
+        return self.value.type.element == REAL
+
+    def like(self, other: Any) -> Any:
+        """The other operand's value."""
+        if isinstance(other, Lanes):
+            return other.value
+        number = float(other) if self.is_real else other
+        return ir.Constant(self.value.type, [number] * self.value.type.count)
+
+    def all(self, number: float) -> Lanes:
+        """A float32 in as many lanes."""
+        return Lanes(self.builder, ir.Constant(self._as(REAL), [number] * self.value.type.count))
+
+    def _do(self, real: str, whole: str, other: Any, *, swap: bool = False) -> Lanes:
+        values = self.value, self.like(other)
+        values = values[::-1] if swap else values
+        if self.is_real:
+            return Lanes(self.builder, getattr(self.builder, real)(*values, flags=_FLAGS))
+        return Lanes(self.builder, getattr(self.builder, whole)(*values))
+
+    def __add__(self, other: Any) -> Lanes:
+        return self._do("fadd", "add", other)
+
+    def __sub__(self, other: Any) -> Lanes:
+        return self._do("fsub", "sub", other)
+
+    def __mul__(self, other: Any) -> Lanes:
+        return self._do("fmul", "mul", other)
+
+    def __truediv__(self, other: Any) -> Lanes:
+        return self._do("fdiv", "", other)
+
+    def __radd__(self, other: Any) -> Lanes:
+        return self._do("fadd", "add", other, swap=True)
+
+    def __rsub__(self, other: Any) -> Lanes:
+        return self._do("fsub", "sub", other, swap=True)
+
+    def __rmul__(self, other: Any) -> Lanes:
+        return self._do("fmul", "mul", other, swap=True)
+
+    def __rtruediv__(self, other: Any) -> Lanes:
+        return self._do("fdiv", "", other, swap=True)
+
+    def __neg__(self) -> Lanes:
+        return 0 - self
+
+    def __and__(self, other: Any) -> Lanes:
+        return self._do("", "and_", other)
+
+    def __or__(self, other: Any) -> Lanes:
+        return self._do("", "or_", other)
+
+    def __xor__(self, other: Any) -> Lanes:
+        return self._do("", "xor", other)
+
+    def __rshift__(self, other: Any) -> Lanes:
+        return self._do("", "ashr", other)
+
+    def _compare(self, operator: str, other: Any) -> Lanes:
+        # No flags, so that what is no number compares as such; then nothing is less, equal or greater.
+        compare = self.builder.fcmp_ordered if self.is_real else self.builder.icmp_signed
+        return Lanes(self.builder, compare(operator, self.value, self.like(other)))
+
+    def __lt__(self, other: Any) -> Lanes:
+        return self._compare("<", other)
+
+    def __le__(self, other: Any) -> Lanes:
+        return self._compare("<=", other)
+
+    def __gt__(self, other: Any) -> Lanes:
+        return self._compare(">", other)
+
+    def __ge__(self, other: Any) -> Lanes:
+        return self._compare(">=", other)
+
+    def equals(self, other: Any) -> Lanes:
+        """Flags where both are the same."""
+        return self._compare("==", other)
+
+    def _as(self, element: Any) -> Any:
+        return ir.VectorType(element, self.value.type.count)
+
+    def whole(self) -> Lanes:
+        """Cut to int32, towards zero."""
+        return Lanes(self.builder, self.builder.fptosi(self.value, self._as(WHOLE)))
+
+    def real(self) -> Lanes:
+        """As float32."""
+        return Lanes(self.builder, self.builder.sitofp(self.value, self._as(REAL)))
+
+    def widened(self) -> Lanes:
+        """uint16 as int32."""
+        return Lanes(self.builder, self.builder.zext(self.value, self._as(WHOLE)))
+
+    def bits(self) -> Lanes:
+        """The bits of float32 as int32."""
+        return Lanes(self.builder, self.builder.bitcast(self.value, self._as(WHOLE)))
+
+    def _call(self, name: str) -> Lanes:
+        suffix = f"v{self.value.type.count}f32"
+        kind = ir.FunctionType(self.value.type, [self.value.type])
+        function = cgutils.get_or_insert_function(self.builder.module, kind, f"llvm.{name}.{suffix}")
+        return Lanes(self.builder, self.builder.call(function, [self.value], fastmath=_FLAGS))
+
+
+def where(flags: Lanes, yes: Any, no: Any) -> Lanes:
+    """`yes` where the flag is set, else `no`; float32 if both are numbers."""
+    model = next((a for a in (yes, no) if isinstance(a, Lanes)), None) or flags.all(1.0)
+    return Lanes(flags.builder, flags.builder.select(flags.value, model.like(yes), model.like(no)))
+
+
+def least(a: Lanes, b: Any) -> Lanes:
+    """The smaller; `b` where `a` is no number."""
+    return where(a < b, a, b)
+
+
+def most(a: Lanes, b: Any) -> Lanes:
+    """The larger; `b` where `a` is no number."""
+    return where(a > b, a, b)
+
+
+def root(a: Lanes) -> Lanes:
+    """The square root."""
+    return a._call("sqrt")
+
+
+def size(a: Lanes) -> Lanes:
+    """Without the sign."""
+    return a._call("fabs")
+
+
+def sign(a: Lanes) -> Lanes:
+    """1 where not negative, else -1."""
+    return where(a >= 0, 1, -1)
+
+
+def clamp(a: Lanes) -> Lanes:
+    """Between 0 and 1."""
+    return least(most(a, 0), 1)
+
+
+def dot(a: tuple[Lanes, ...], b: tuple[Lanes, ...]) -> Lanes:
+    """The scalar product of vectors of three."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def cross(a: tuple[Lanes, ...], b: tuple[Lanes, ...]) -> tuple[Lanes, ...]:
+    """The vector product."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+def spread(builder: ir.IRBuilder, value: Any, count: int = LANES) -> Lanes:
+    """One number in all lanes."""
+    lanes = ir.VectorType(value.type, count)
+    first = builder.insert_element(ir.Constant(lanes, ir.Undefined), value, WHOLE(0))
+    return Lanes(builder, builder.shuffle_vector(first, first, ir.Constant(ir.VectorType(WHOLE, count), [0] * count)))
+
+
+def load(builder: ir.IRBuilder, data: Any, at: Any, count: int = LANES) -> Lanes:
+    """Neighbouring numbers of an array from this index on."""
+    element = data.type.pointee
+    align = 4 if element == REAL else element.width // 8
+    return Lanes(builder, builder.load(_pointer(builder, data, at, count), align=align))
+
+
+def store(data: Any, at: Any, lanes: Lanes) -> None:
+    """Into neighbouring numbers of an array from this index on."""
+    lanes.builder.store(lanes.value, _pointer(lanes.builder, data, at, lanes.value.type.count), align=4)
+
+
+def scatter(data: Any, at: Any, rows: Mapping[int, int], lanes: Lanes) -> None:
+    """Store single lanes: `rows` maps each lane to where in the array, `at` is added."""
+    builder = lanes.builder
+    for lane, row in rows.items():
+        builder.store(builder.extract_element(lanes.value, WHOLE(lane)), builder.gep(data, [builder.add(at, at.type(row))]))
+
+
+def _pointer(builder: ir.IRBuilder, data: Any, at: Any, count: int) -> Any:
+    return builder.bitcast(builder.gep(data, [at]), ir.VectorType(data.type.pointee, count).as_pointer())
+
+
+class Rows:
+    """An array of rows; [row] are the lanes from `row + i` on, [row, shift] those from `row + shift + i` on.
+
+    Where `kept` flags are given, the other lanes keep what they have.
+    """
+
+    def __init__(self, builder: ir.IRBuilder, data: Any, i: Any, kept: Lanes | None) -> None:
+        self.builder = builder
+        self.data = data
+        self.i = i
+        self.kept = kept
+
+    def _at(self, row: Any) -> Any:
+        at = self.i
+        for part in row if isinstance(row, tuple) else (row,):
+            at = self.builder.add(at, at.type(part) if isinstance(part, int) else part)
+        return at
+
+    def __getitem__(self, row: Any) -> Lanes:
+        return load(self.builder, self.data, self._at(row))
+
+    def __setitem__(self, row: Any, lanes: Lanes | float) -> None:
+        if not isinstance(lanes, Lanes):
+            lanes = Lanes(self.builder, ir.Constant(ir.VectorType(REAL, LANES), [float(lanes)] * LANES))
+        if self.kept is not None:
+            lanes = where(self.kept, lanes, self[row])
+        store(self.data, self._at(row), lanes)
+
+    def one(self, at: int) -> Lanes:
+        """A number of the array, in all lanes."""
+        return spread(self.builder, self.builder.load(self.builder.gep(self.data, [self.i.type(at)])))
+
+    def get(self, *rows: int) -> tuple[Lanes, ...]:
+        """The lanes of several rows."""
+        return tuple(self[row] for row in rows)
+
+    def put(self, rows: tuple[int, ...], values: tuple[Lanes, ...]) -> None:
+        """Set several rows."""
+        for row, value in zip(rows, values, strict=True):
+            self[row] = value
+
+
+def lanewise(function: Callable[..., None] | None = None, *, exact: bool = False) -> Any:
+    """A function of rows and numbers, as one that kernels call with a count before its arguments: it is done for that many
+    samples, or a few more.
+
+    Arrays are passed as Rows, numbers of float32 as Lanes, unsigned ones as row numbers. With `exact`, what rows have beyond
+    the count stays.
+    """
+    if function is None:
+        return lambda f: lanewise(f, exact=exact)
+
+    def typed(typing: Any, count: Any, *arguments: Any) -> Any:
+        return nb.void(nb.intp, *arguments), code
+
+    def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        def samples(i: Any, kept: Lanes | None) -> None:
+            given = zip(signature.args[1:], arguments[1:], strict=True)
+            function(*(_argument(context, builder, kind, value, i, kept) for kind, value in given))
+
+        count = arguments[0]
+        full = builder.and_(count, count.type(-LANES)) if exact else count
+        with cgutils.for_range_slice(builder, count.type(0), full, count.type(LANES)) as (i, _):
+            samples(i, None)
+        if exact:
+            left = builder.sub(count, full)
+            with builder.if_then(builder.icmp_signed(">", left, left.type(0))):
+                order = Lanes(builder, ir.Constant(ir.VectorType(WHOLE, LANES), list(range(LANES))))
+                samples(full, order < spread(builder, builder.trunc(left, WHOLE)))
+        return context.get_dummy_value()
+
+    names = inspect.signature(function).parameters
+    kinds = [inspect.Parameter(name, inspect.Parameter.POSITIONAL_OR_KEYWORD) for name in ("typing", "count", *names)]
+    typed.__signature__ = inspect.Signature(kinds)
+    typed.__name__ = typed.__qualname__ = function.__name__
+    typed.__module__ = function.__module__
+    return intrinsic(typed)
+
+
+def _argument(context: Any, builder: Any, kind: Any, value: Any, i: Any, kept: Lanes | None) -> Any:
+    if isinstance(kind, nb.types.Array):
+        return Rows(builder, context.make_array(kind)(context, builder, value).data, i, kept)
+    if kind == nb.uintp:
+        return value
+    return spread(builder, builder.trunc(value, WHOLE) if kind == nb.intp else value)

@@ -1,0 +1,160 @@
+"""Pictures of the whole sphere: Radiance HDR (RGBE) and OpenEXR, and ordinary pictures as a makeshift."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.assets.folder import UnreadableError
+from viewsphere.assets.sphere import EXPECTED, ExrHead, HdrHead, check_shape, read_head, silenced
+from viewsphere.errors import RecipeError
+from viewsphere.surroundings.kernels_rgbe import decode_rows
+
+Float32 = NDArray[np.float32]
+
+FIELD = "scene.sky.hdri"
+"""The recipe's field that names such pictures."""
+
+SHARPEST = 4096
+"""Greatest width of what is kept, in texels."""
+
+_MOST_MENDED = 0.01  # share of texels that are no numbers
+_BRIGHTEST = 1e6  # anything more is as good as infinite
+_ROUNDING = -1e-3  # compression makes light as negative as this
+
+
+@dataclass(frozen=True, eq=False)
+class EnvironmentPicture:
+    """pixels (H, W, 3) float32: linear radiance, none negative, rows from the zenith down; notes: what had to be mended."""
+
+    pixels: Float32
+    notes: tuple[str, ...]
+
+
+def read_environment(path: Path) -> EnvironmentPicture:
+    """Read an equirectangular picture; what it is says its content, not its name. No wider than `SHARPEST`.
+
+    A few texels that are no numbers become 0, infinite ones the greatest there is, negative ones 0. PNG, JPEG and the
+    like are taken as sRGB. Raises RecipeError, beginning with the recipe's field: no such file, nothing that can be read,
+    damaged, more pixels than `limits` allows, not twice as wide as high, more than a hundredth of it no numbers.
+    """
+    try:
+        return _read(path)
+    except UnreadableError as error:
+        raise RecipeError(f"{FIELD}: {error}") from None
+
+
+def _read(path: Path) -> EnvironmentPicture:
+    notes: list[str] = []
+    head = read_head(path)
+    if isinstance(head, ExrHead):
+        pixels = _read_exr(path, head)
+    elif isinstance(head, HdrHead):
+        pixels = _read_hdr(path, head)
+    else:
+        pixels = _read_ordinary(path)
+        notes.append(f"{path}: expected an EXR or HDR picture; 8 bits cannot hold a bright light, taken as sRGB")
+    return EnvironmentPicture(_reduced(_mended(path, pixels, notes)), tuple(notes))
+
+
+def _error(path: Path, found: str) -> UnreadableError:
+    return UnreadableError(f"environment {path}: {EXPECTED}, {found}")
+
+
+def _read_exr(path: Path, head: ExrHead) -> Float32:
+    import OpenEXR
+
+    try:
+        with silenced(), OpenEXR.File(str(path), separate_channels=True) as file:
+            if not file.parts:  # what the library gives for pixels that it cannot read
+                raise _error(path, "found one whose pixels cannot be read: damaged or cut off; get or export it again")
+            channels: Any = file.parts[head.part].channels
+            planes = [np.asarray(channels[name].pixels, np.float32) for name in head.channels]
+    except (UnreadableError, MemoryError):
+        raise
+    except Exception as error:  # OpenEXR raises whatever its parser does
+        raise _error(path, f"found one that cannot be decoded ({str(error)[:120]})") from None
+    if any(plane.shape != (head.height, head.width) for plane in planes):
+        raise _error(path, "found channels of different sizes")
+    return np.stack(planes, axis=-1)
+
+
+def _read_hdr(path: Path, head: HdrHead) -> Float32:
+    data = path.read_bytes()
+    body = np.frombuffer(data, np.uint8)[data.index(head.text.splitlines()[-1]) :]
+    body = body[int(np.argmax(body == ord("\n"))) + 1 :]
+    exposure = np.prod(
+        [float(value) for value in re.findall(rb"\nEXPOSURE *= *(\d+\.?\d*(?:[eE][-+]?\d\d?)?)", head.text)] or [1.0]
+    )
+    pixels, done = decode_rows(body, head.rows, head.columns)
+    if done < head.rows:
+        raise _error(path, f"found one that ends or breaks off in row {done + 1} of {head.rows}; get or export it again")
+    if head.first[:1] == (b"+" if head.is_upright else b"-"):
+        pixels = pixels[::-1]
+    if head.second[:1] == (b"-" if head.is_upright else b"+"):
+        pixels = pixels[:, ::-1]
+    pixels = pixels if head.is_upright else pixels.transpose(1, 0, 2)
+    return np.ascontiguousarray(pixels / np.float32(exposure if exposure > 0 else 1.0))
+
+
+def _read_ordinary(path: Path) -> Float32:
+    from PIL import Image, UnidentifiedImageError
+
+    from viewsphere.assets.srgb import linear
+
+    try:
+        with Image.open(path) as image:
+            check_shape(path, *image.size)
+            grey_16 = image.mode.startswith("I;16")
+            eight = np.asarray(image.point(lambda v: v / 256).convert("L") if grey_16 else image.convert("RGB"))
+    except UnreadableError:
+        raise
+    except (Image.DecompressionBombError, UnidentifiedImageError):
+        raise _error(path, "found something else") from None
+    except MemoryError:
+        raise
+    except Exception as error:  # Pillow's decoders raise whatever their format's parser does
+        raise _error(path, f"found one that cannot be decoded ({str(error)[:120]})") from None
+    curve = linear(np.arange(256) / 255).astype(np.float32)
+    return curve[np.broadcast_to(eight.reshape(*eight.shape[:2], -1), (*eight.shape[:2], 3))]
+
+
+def _mended(path: Path, pixels: Float32, notes: list[str]) -> Float32:
+    """Every texel a finite number of at least 0."""
+    low, high = float(pixels.min()), float(pixels.max())
+    if low >= 0 and 0 < high <= _BRIGHTEST:
+        return pixels
+    finite = np.isfinite(pixels) & (pixels <= _BRIGHTEST)
+    bad = int((~finite).any(axis=-1).sum())
+    total = pixels.shape[0] * pixels.shape[1]
+    if bad > _MOST_MENDED * total:
+        raise _error(path, f"found {bad:,} of {total:,} texels that are no numbers, or above {_BRIGHTEST:g}; export it again")
+    if bad:
+        greatest = np.where(finite, pixels, 0).max()
+        pixels = np.where(finite, pixels, np.where(pixels > 0, greatest, 0)).astype(np.float32)
+        notes.append(f"{path}: mended {bad:,} texels that are no numbers, or above {_BRIGHTEST:g}")
+    negative = int((pixels < _ROUNDING).any(axis=-1).sum())
+    if negative:
+        notes.append(f"{path}: set {negative:,} texels with negative light to 0")
+    pixels = np.maximum(pixels, 0)
+    if not pixels.any():
+        raise _error(path, "found no light in it: all texels are black; take another")
+    return pixels
+
+
+def _reduced(pixels: Float32) -> Float32:
+    """No wider than `SHARPEST`: each texel the mean of all that it covers."""
+    from PIL import Image
+
+    if pixels.shape[1] <= SHARPEST:
+        return np.ascontiguousarray(pixels)
+    size = SHARPEST, SHARPEST // 2
+    planes = [
+        np.asarray(Image.fromarray(np.ascontiguousarray(pixels[..., c])).resize(size, Image.Resampling.BOX)) for c in range(3)
+    ]
+    return np.stack(planes, axis=-1)
