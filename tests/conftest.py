@@ -29,3 +29,15 @@ def small_dataset(small_run, tmp_path):
     from viewsphere import Dataset
 
     return Dataset(shutil.copytree(small_run, tmp_path / "small"))
+
+
+@pytest.fixture(scope="session")
+def blender():
+    """A Python that has Blender."""
+    from viewsphere.blender.interpreter import find_blender
+    from viewsphere.errors import MissingExtraError
+
+    try:
+        return find_blender()
+    except MissingExtraError as error:
+        pytest.skip(str(error))

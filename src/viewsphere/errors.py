@@ -6,7 +6,9 @@
     │   ├── ModelError            a model file that cannot be used
     │   ├── StoreError            an output folder that cannot be used
     │   └── MissingExtraError     a feature whose optional package is not installed
-    └── CheckFailedError          a data set that is not what it claims to be: exit status 1
+    ├── CheckFailedError          a data set that is not what it claims to be: exit status 1
+    ├── BlenderError              Blender answered that it cannot; it lives, and can be asked again
+    └── BlenderDied               Blender crashed, or hung and was ended; only another one can be asked
 
 A message says where, what was expected, what was found and what to do, in one line.
 """
@@ -40,3 +42,11 @@ class MissingExtraError(UserError):
 
 class CheckFailedError(ViewsphereError):
     """A data set that is not what it claims to be."""
+
+
+class BlenderError(ViewsphereError):
+    """Blender answered that it cannot do what it was asked; it lives, and can be asked again."""
+
+
+class BlenderDied(ViewsphereError):
+    """Blender crashed, or hung and was ended; only another one can be asked."""

@@ -7,7 +7,7 @@ import sys
 
 import typer
 
-from viewsphere.cli import completion, datasets, joining, making
+from viewsphere.cli import completion, datasets, doctor, joining, making
 from viewsphere.cli.next_step import Command
 from viewsphere.cli.terminal import complain
 from viewsphere.errors import CheckFailedError, UserError, ViewsphereError
@@ -30,6 +30,7 @@ for command in (
     datasets.export,
     datasets.check,
     datasets.report,
+    doctor.doctor,
 ):
     app.command(cls=Command)(command)
 app.command("merge", cls=Command)(joining.merge)

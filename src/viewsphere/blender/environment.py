@@ -1,0 +1,107 @@
+"""A Python environment that holds Blender and nothing else, made in the user's data folder."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+
+import platformdirs
+
+from viewsphere.errors import UserError
+
+PACKAGES = ("bpy==5.0.*", "numpy<2")
+ASIDE = "blender-making-"
+STALE_S = 86_400.0
+INSTALL_S = 3600.0
+
+Listener = Callable[[str], None]
+
+
+def home() -> Path:
+    """Where the environment lies, made or not: in the user's data folder."""
+    return Path(platformdirs.user_data_dir("viewsphere")) / "blender"
+
+
+def interpreter_of(environment: Path) -> Path:
+    """The interpreter of a virtual environment."""
+    return environment / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
+
+
+def make_environment(listener: Listener) -> Path:
+    """Make the environment, or make it anew, and return its interpreter.
+
+    It is made aside and renamed when it is whole. `listener` gets a line for each step, and pip's own. Raises UserError
+    when there is no Python 3.11, or pip cannot install what is needed.
+    """
+    place = home()
+    base = _python311()
+    try:
+        place.parent.mkdir(parents=True, exist_ok=True)
+        _sweep(place.parent)
+        aside = Path(tempfile.mkdtemp(prefix=ASIDE, dir=place.parent))
+    except OSError as error:
+        raise UserError(f"{place}: expected a place to write, found: {error.strerror or error}") from None
+    try:
+        listener(f"making {place} with {base}: about 1 GB")
+        _run([base, "-m", "venv", aside / "new"], listener)
+        made = interpreter_of(aside / "new")
+        _run([made, "-m", "pip", "install", "--disable-pip-version-check", *PACKAGES], listener)
+        with suppress(FileNotFoundError):
+            place.rename(aside / "old")
+        (aside / "new").rename(place)
+    finally:
+        shutil.rmtree(aside, ignore_errors=True)
+    return interpreter_of(place)
+
+
+def _python311() -> str:
+    """A Python 3.11: this one, or one on the PATH."""
+    if sys.version_info[:2] == (3, 11):
+        return sys.executable
+    for name in ("python3.11", "python3", "python"):
+        found = shutil.which(name)
+        if found and _version(found) == "3.11":
+            return found
+    here = "{}.{}".format(*sys.version_info)
+    raise UserError(f"--setup-blender: expected a Python 3.11, as Blender needs it; found {here} and no python3.11: install it")
+
+
+def _version(python: str) -> str:
+    code = "import sys; print('%d.%d' % sys.version_info[:2])"
+    with suppress(OSError, subprocess.TimeoutExpired):
+        return subprocess.run([python, "-c", code], capture_output=True, text=True, timeout=20).stdout.strip()
+    return ""
+
+
+def _run(command: list[str | Path], listener: Listener) -> None:
+    """Run a command and pass on what it says; UserError with its last word if it fails."""
+    said = ""
+    own = {name: value for name, value in os.environ.items() if not name.startswith("PYTHON")}
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace", env=own
+    ) as process:
+        assert process.stdout is not None
+        try:
+            for line in process.stdout:
+                listener(line.rstrip())
+                said = line.strip() if "error" in line.lower() or not said else said
+        except BaseException:
+            process.kill()
+            raise
+    if process.returncode:
+        raise UserError(f"--setup-blender: expected `python -m {command[2]}` to succeed, found: {said or 'no word'}")
+
+
+def _sweep(place: Path) -> None:
+    """Remove what was left half made by a process that was killed."""
+    for left in place.glob(f"{ASIDE}*"):
+        with suppress(OSError):
+            if left.stat().st_mtime < time.time() - STALE_S:
+                shutil.rmtree(left, ignore_errors=True)

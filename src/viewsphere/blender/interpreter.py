@@ -1,0 +1,161 @@
+"""Which Python has Blender, and whether it works."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from viewsphere.blender import environment
+from viewsphere.blender.process import BlenderProcess
+from viewsphere.errors import BlenderDied, BlenderError, MissingExtraError, UserError
+
+VARIABLE = "VIEWSPHERE_BLENDER_PYTHON"
+INSTALL = "pip install 'viewsphere[blender]' in Python 3.11, or run viewsphere doctor --setup-blender"
+PROBE_S = 60.0
+ASK_S = 20.0
+
+PACKAGES = {
+    "libEGL.so.1": "libegl1",
+    "libGL.so.1": "libgl1",
+    "libGLX.so.0": "libglx0",
+    "libICE.so.6": "libice6",
+    "libSM.so.6": "libsm6",
+    "libX11.so.6": "libx11-6",
+    "libXau.so.6": "libxau6",
+    "libXdmcp.so.6": "libxdmcp6",
+    "libXext.so.6": "libxext6",
+    "libXfixes.so.3": "libxfixes3",
+    "libXi.so.6": "libxi6",
+    "libXrender.so.1": "libxrender1",
+    "libXxf86vm.so.1": "libxxf86vm1",
+    "libbsd.so.0": "libbsd0",
+    "libgcc_s.so.1": "libgcc-s1",
+    "libgomp.so.1": "libgomp1",
+    "libstdc++.so.6": "libstdc++6",
+    "libuuid.so.1": "libuuid1",
+    "libwayland-client.so.0": "libwayland-client0",
+    "libxcb.so.1": "libxcb1",
+    "libxkbcommon.so.0": "libxkbcommon0",
+}
+"""Debian's and Ubuntu's packages of the libraries that Blender takes from the system."""
+
+
+@dataclass(frozen=True)
+class Device:
+    """What Cycles can compute on: CPU, CUDA, OPTIX, HIP, METAL or ONEAPI, and its name."""
+
+    kind: str
+    name: str
+
+
+@dataclass(frozen=True)
+class Library:
+    """A system library that is not there, and the Debian or Ubuntu package that has it, where that is known."""
+
+    name: str
+    package: str | None
+
+
+@dataclass(frozen=True)
+class Blender:
+    """The Blender of an interpreter: its version and devices, or what is wrong with it."""
+
+    python: Path
+    version: str | None = None
+    devices: tuple[Device, ...] = ()
+    problem: str | None = None
+    missing: tuple[Library, ...] = ()
+
+    @property
+    def cure(self) -> str | None:
+        """The command that brings the missing libraries on Debian and Ubuntu; None where none is known."""
+        packages = sorted({library.package for library in self.missing if library.package})
+        return f"apt-get install {' '.join(packages)}" if packages else None
+
+
+def find_blender(python: str | None = None) -> Path:
+    """The interpreter that has bpy.
+
+    The first of: `python` (a file, an environment's folder or a name on the PATH), $VIEWSPHERE_BLENDER_PYTHON, this
+    interpreter if it has bpy, the environment that `viewsphere doctor --setup-blender` makes. Whether its Blender works is
+    not looked at. Raises UserError for a named one that is not there, MissingExtraError when there is none.
+    """
+    for given, place in ((python, "engine.python"), (os.environ.get(VARIABLE), f"${VARIABLE}")):
+        if given:
+            return _program(given, place)
+    if importlib.util.find_spec("bpy"):
+        return Path(sys.executable)
+    own = environment.interpreter_of(environment.home())
+    if own.is_file():
+        return own
+    raise MissingExtraError(f"Blender: expected a Python that has bpy, found none: {INSTALL}")
+
+
+def probe(python: Path) -> Blender:
+    """Start this interpreter's Blender and ask what it is; takes some seconds, a minute at most."""
+    with tempfile.TemporaryDirectory(prefix="viewsphere-probe-") as folder:
+        try:
+            with BlenderProcess(python, Path(folder) / "log") as process:
+                told = process.ask("hello", PROBE_S)
+        except (BlenderError, BlenderDied) as error:
+            return _broken(python, str(error))
+    devices = tuple(Device(**device) for device in told["devices"])
+    return Blender(python, told["version"], devices)
+
+
+def missing_libraries(said: str) -> tuple[Library, ...]:
+    """The libraries that `ldd`, or the error of an import, says are not found."""
+    patterns = r"^\s*(\S+) => not found", r"(\S+\.so[\d.]*): cannot open shared object file"
+    names = {name for pattern in patterns for name in re.findall(pattern, said, re.MULTILINE)}
+    return tuple(Library(name, PACKAGES.get(name)) for name in sorted(names))
+
+
+def _program(given: str, place: str) -> Path:
+    """The interpreter that a user names."""
+    path = Path(given).expanduser()
+    if path.is_dir():
+        path = environment.interpreter_of(path)
+    found = path.absolute() if path.is_file() else shutil.which(given)
+    if found is None:
+        raise UserError(f"{place}: expected a Python that has bpy, found no {given}: {INSTALL}")
+    if Path(found).stem.lower() == "blender":
+        raise UserError(f"{place}: expected a Python that has bpy, found Blender's own program {found}: {INSTALL}")
+    return Path(found)
+
+
+def _broken(python: Path, error: str) -> Blender:
+    """What is wrong: no bpy at all, libraries that the system lacks, or something else."""
+    if "No module named 'bpy'" in error:
+        return Blender(python, problem=f"it has no bpy: {INSTALL}")
+    missing = missing_libraries(error + "\n" + _ldd(_module(python)))
+    if missing:
+        return Blender(python, problem=f"the system lacks {', '.join(m.name for m in missing)}", missing=missing)
+    return Blender(python, problem=error)
+
+
+def _module(python: Path) -> str | None:
+    """Where its bpy lies, found without importing it."""
+    code = "import importlib.util as u; s = u.find_spec('bpy'); print(s.origin if s else '')"
+    with suppress(OSError, subprocess.SubprocessError):
+        run = subprocess.run([python, "-P", "-c", code], capture_output=True, text=True, timeout=ASK_S)
+        return run.stdout.strip() or None
+    return None
+
+
+def _ldd(module: str | None) -> str:
+    """What Linux says of a shared object's libraries."""
+    ldd = shutil.which("ldd")
+    if module is None or ldd is None or not sys.platform.startswith("linux"):
+        return ""
+    with suppress(OSError, subprocess.SubprocessError):
+        run = subprocess.run([ldd, module], capture_output=True, text=True, errors="replace", timeout=ASK_S)
+        return run.stdout
+    return ""

@@ -1,0 +1,228 @@
+"""One Blender: a program that is started, asked and ended.
+
+It runs `worker/` in the interpreter that has bpy, with factory settings, and none of this process's Python or of the
+user's Blender: neither add-ons nor scripts. Requests and answers are JSON, a line each, over its standard input and output;
+arrays lie in files of a folder that both know. What Blender says besides goes to a log. When this process ends, however it
+does, Blender's input ends, and so do Blender and the folder.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import weakref
+from contextlib import suppress
+from pathlib import Path
+from threading import Timer
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.errors import BlenderDied, BlenderError
+
+START = """\
+import sys, runpy
+sys.path.append({package!r})
+runpy.run_module("worker", run_name="__main__", alter_sys=True)
+"""
+
+ANSWER_S = 120.0
+GRACE_S = 3.0
+"""An idle Blender ends within a few milliseconds of being told."""
+
+MEMORY = Path("/dev/shm")
+LEAST_MEMORY = 2 << 30
+"""Bytes that must be free there: containers often have 64 MB."""
+
+ASIDE = "viewsphere-blender-"
+STALE_S = 86_400.0
+TAIL_BYTES, TAIL_LINES = 4096, 6
+
+
+class BlenderProcess:
+    """A Blender of one's own, started at once; for one thread at a time.
+
+    `python` is an interpreter that has bpy (`find_blender`). What Blender says is added to the file `log`, by default one
+    that lasts as long as the process. Arrays and other files for Blender lie in `folder`, which lasts as long.
+    """
+
+    def __init__(self, python: Path, log: Path | None = None) -> None:
+        self.folder = _private_folder()
+        self.log = log or self.folder / "blender.log"
+        self._put: list[Path] = []
+        try:
+            with self.log.open("ab") as noise:
+                self._log_start = noise.tell()
+                self._process = subprocess.Popen(
+                    [python, "-P", "-c", START.format(package=str(Path(__file__).parent)), self.folder],
+                    stdin=subprocess.PIPE,
+                    stdout=subprocess.PIPE,
+                    stderr=noise,
+                    env=_environment(python, self.folder),
+                    process_group=0 if os.name == "posix" else None,
+                    creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
+                )
+        except OSError as error:
+            shutil.rmtree(self.folder, ignore_errors=True)
+            raise BlenderDied(f"{python}: Blender cannot be started: {error.strerror or error}") from None
+        self._end: weakref.finalize[Any, Any] = weakref.finalize(self, _end, self._process, self.folder, os.getpid())
+
+    def __enter__(self) -> BlenderProcess:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    @property
+    def pid(self) -> int:
+        """Its number in the system."""
+        return self._process.pid
+
+    def close(self) -> None:
+        """End it, and remove its folder. It ends by itself when it is forgotten, or when this process ends."""
+        self._end()
+
+    def put(self, array: NDArray[Any]) -> str:
+        """Write an array for the next request to name; once that is answered, the file is gone."""
+        file = self.folder / f"{len(self._put)}.npy"
+        np.save(file, array, allow_pickle=False)
+        self._put.append(file)
+        return str(file)
+
+    def ask(self, do: str, timeout_s: float = ANSWER_S, **told: Any) -> Any:
+        """What Blender answers to a request: plain data.
+
+        Raises BlenderError when it answers that it cannot (a note has the worker's trace), BlenderDied when it has ended
+        or does not answer in time, in which case it is ended.
+        """
+        request = json.dumps({"do": do, **told}).encode() + b"\n"
+        begun = time.monotonic()
+        timer = Timer(timeout_s, _kill, [self._process])  # breaks both pipes, whichever this thread waits for
+        timer.daemon = True
+        timer.start()
+        try:
+            answer = self._exchange(request)
+        except BaseException:
+            _kill(self._process)  # an answer that comes later would be taken for another request's
+            raise
+        finally:
+            timer.cancel()
+            self._forget()
+        if answer is None:
+            raise self._died(do, time.monotonic() - begun, timeout_s)
+        if "error" in answer:
+            error = BlenderError(answer["error"])
+            error.add_note(answer["trace"])
+            raise error
+        return answer["ok"]
+
+    def _exchange(self, request: bytes) -> dict[str, Any] | None:
+        """The answer to a request; None when there will be none."""
+        requests, answers = self._process.stdin, self._process.stdout
+        assert requests is not None and answers is not None
+        try:
+            requests.write(request)
+            requests.flush()
+            while line := answers.readline():
+                if line.startswith((b'{"ok"', b'{"error"')) and line.endswith(b"\n"):
+                    return json.loads(line)
+        except (OSError, ValueError):  # it has ended, or was closed
+            return None
+        return None
+
+    def _forget(self) -> None:
+        """Remove the arrays that were put: they have been read."""
+        for file in self._put:
+            file.unlink(missing_ok=True)
+        self._put.clear()
+
+    def _died(self, do: str, seconds: float, timeout_s: float) -> BlenderDied:
+        """How it ended, in one line."""
+        try:
+            status = self._process.wait(GRACE_S)
+        except subprocess.TimeoutExpired:
+            _kill(self._process)
+            status = self._process.wait()
+        if not self._end.alive:
+            return BlenderDied(f"Blender was ended before `{do}` was asked")
+        how = (
+            f"hung (no answer in {timeout_s:g} s)" if seconds >= timeout_s else f"died ({_named(status)}) after {seconds:.1f} s"
+        )
+        said = " | ".join(self._last_lines()) or "nothing"
+        return BlenderDied(f"Blender {how} of `{do}`; its log ends with: {said}")
+
+    def _last_lines(self) -> list[str]:
+        """The end of what this Blender said."""
+        with suppress(OSError), self.log.open("rb") as file:
+            size = file.seek(0, os.SEEK_END)
+            file.seek(max(self._log_start, size - TAIL_BYTES))
+            lines = file.read().decode("utf-8", "replace").splitlines()
+            return [line.strip() for line in lines if line.strip()][-TAIL_LINES:]
+        return []
+
+
+def _end(process: subprocess.Popen[bytes], folder: Path, owner: int) -> None:
+    """Let it end, or end it; a forked copy of its owner does nothing."""
+    if os.getpid() != owner:
+        return
+    assert process.stdin is not None and process.stdout is not None
+    with suppress(OSError):
+        process.stdin.close()
+    try:
+        process.wait(GRACE_S)
+    except subprocess.TimeoutExpired:
+        _kill(process)
+        process.wait()
+    process.stdout.close()
+    shutil.rmtree(folder, ignore_errors=True)
+
+
+def _kill(process: subprocess.Popen[bytes]) -> None:
+    """End it, and what it runs in where the interpreter is a script that starts one: they would hold the pipes open."""
+    if os.name != "posix":
+        process.kill()
+    elif process.returncode is None:
+        with suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)
+
+
+def _named(status: int) -> str:
+    """An exit status in words."""
+    if status >= 0:
+        return f"exit status {status}"
+    with suppress(ValueError):
+        return f"signal {signal.Signals(-status).name}"
+    return f"signal {-status}"
+
+
+def _environment(python: Path, folder: Path) -> dict[str, str]:
+    """This process's environment without what would lead Blender to files of the user's, or of another Python's."""
+    foreign = ("BLENDER_",) if python == Path(sys.executable) else ("BLENDER_", "PYTHON", "__PYVENV_LAUNCHER__")
+    kept = {name: value for name, value in os.environ.items() if not name.startswith(foreign)}
+    own = {name: str(folder) for name in ("TMPDIR", "TEMP", "TMP")}
+    return {**kept, **own, "BLENDER_USER_RESOURCES": str(folder / "user")}
+
+
+def _private_folder() -> Path:
+    """A new folder that others cannot read, in memory where there is enough."""
+    place = Path(tempfile.gettempdir())
+    with suppress(OSError):
+        if os.access(MEMORY, os.W_OK) and shutil.disk_usage(MEMORY).free >= LEAST_MEMORY:
+            place = MEMORY
+    _sweep(place)
+    return Path(tempfile.mkdtemp(prefix=ASIDE, dir=place))
+
+
+def _sweep(place: Path) -> None:
+    """Remove what was left behind where both processes were killed at once."""
+    for left in place.glob(f"{ASIDE}*"):
+        with suppress(OSError):
+            if left.stat().st_mtime < time.time() - STALE_S:
+                shutil.rmtree(left, ignore_errors=True)

@@ -1,0 +1,150 @@
+"""The loop: one JSON object a line in, one a line out.
+
+Blender writes to file descriptor 1 as it pleases, so answers go out by a copy of it that is made before bpy is imported,
+and 1 leads where 2 does: to the log. A thread of its own reads the requests: when the other side has gone, however it
+ended, it sees the end of file at once and ends this process, even in the midst of a render.
+"""
+
+from __future__ import annotations
+
+import faulthandler
+import json
+import os
+import shutil
+import signal
+import sys
+import threading
+import traceback
+from collections.abc import Callable
+from contextlib import suppress
+from functools import cache
+from pathlib import Path
+from queue import SimpleQueue
+from typing import Any, BinaryIO
+
+DEVICES = ("CPU", "CUDA", "OPTIX", "HIP", "METAL", "ONEAPI")
+ONLINE = ("socket.connect", "socket.getaddrinfo", "socket.gethostbyname", "socket.sendto", "socket.sendmsg")
+
+
+def main(folder: Path) -> None:
+    """Answer requests until there are no more; `folder` is where their arrays lie, and does not outlive the other side."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches all processes of a terminal; the other side decides
+    answers = _own_output()
+    faulthandler.enable()
+    requests: SimpleQueue[bytes] = SimpleQueue()
+    threading.Thread(target=_read, args=(requests, folder), daemon=True).start()
+    with suppress(Exception):  # whoever asks first is told
+        start_blender()
+    while True:
+        said = answer(requests.get())
+        try:
+            answers.write(said + b"\n")
+            answers.flush()
+        except OSError:  # nobody listens
+            _leave(folder)
+
+
+def answer(request: bytes) -> bytes:
+    """One request's answer: `{"ok": value}`, or `{"error": "one line", "trace": "..."}`."""
+    try:
+        told = json.loads(request)
+        do = told.pop("do", None)
+        if do not in REQUESTS:
+            raise ValueError(f"do: expected one of {', '.join(REQUESTS)}; found {do!r}")
+        start_blender()
+        return json.dumps({"ok": REQUESTS[do](told)}).encode()
+    except (Exception, SystemExit) as error:
+        traceback.print_exc()
+        said = " ".join(str(error).split())
+        return json.dumps({"error": f"{type(error).__name__}: {said}", "trace": traceback.format_exc()}).encode()
+
+
+@cache
+def start_blender() -> None:
+    """Import bpy and forbid what a file could do beyond being a scene: run scripts, reach the network."""
+    import bpy
+
+    preferences = bpy.context.preferences
+    preferences.filepaths.use_scripts_auto_execute = False
+    preferences.system.use_online_access = False
+    sys.addaudithook(_stay_offline)
+
+
+def _stay_offline(event: str, _: tuple[Any, ...]) -> None:
+    if event in ONLINE:
+        raise PermissionError("Blender is kept off the network")
+
+
+def _own_output() -> BinaryIO:
+    """The way to the other side; whatever else is written there goes to the log from now on."""
+    answers = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)
+    sys.stdout.reconfigure(line_buffering=True)
+    return answers
+
+
+def _read(requests: SimpleQueue[bytes], folder: Path) -> None:
+    while line := sys.stdin.buffer.readline():
+        requests.put(line)
+    _leave(folder)
+
+
+def _leave(folder: Path) -> None:
+    """End at once, whatever is being rendered, and leave nothing behind; Blender 4.5 hangs in its own way out."""
+    shutil.rmtree(folder, ignore_errors=True)
+    sys.stdout.flush()
+    os._exit(0)
+
+
+def _hello(_: dict[str, Any]) -> dict[str, Any]:
+    """Versions, and what Cycles can compute on."""
+    import bpy
+    import numpy as np
+
+    return {"version": bpy.app.version_string, "numpy": np.__version__, "devices": _devices()}
+
+
+def _devices() -> list[dict[str, str]]:
+    """Each of the kinds of devices that this Blender knows and this machine has."""
+    import _cycles
+
+    found: list[dict[str, str]] = []
+    for kind in DEVICES:
+        with suppress(ValueError):  # a kind that this build does not know
+            found += [{"kind": kind, "name": device[0]} for device in _cycles.available_devices(kind) if device[1] == kind]
+    return found
+
+
+def _memory(_: dict[str, Any]) -> dict[str, float | None]:
+    """Resident memory in megabytes, as it is now; on macOS the most there was, on Windows unknown."""
+    statm = Path("/proc/self/statm")
+    if statm.exists():
+        return {"rss_mb": int(statm.read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6}
+    with suppress(ImportError):
+        import resource
+
+        return {"rss_mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6}
+    return {"rss_mb": None}
+
+
+def _stage(told: dict[str, Any]) -> Any:
+    from .staging import stage
+
+    return stage(told)
+
+
+def _render(told: dict[str, Any]) -> Any:
+    from .rendering import render
+
+    return render(told)
+
+
+REQUESTS: dict[str, Callable[[dict[str, Any]], Any]] = {
+    "hello": _hello,
+    "memory": _memory,
+    "stage": _stage,
+    "render": _render,
+}
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))

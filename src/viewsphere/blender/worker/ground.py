@@ -1,0 +1,81 @@
+"""The ground's end: far behind the scene it fades into the sky, as the raster engine's does."""
+
+from __future__ import annotations
+
+import math
+
+import bpy
+
+from .graph import Graph
+
+SKY = "sky"
+"""Name of the node that says whether the sky is seen."""
+
+BEGIN, OVER = 4.0, 26.0
+"""Behind the scene's middle, in its units: where fading begins, and how long it takes."""
+
+FLAT = 0.09
+"""Sine of the angle between the view and the ground below which it fades, however near."""
+
+
+def fade(material, middle, unit, sky):
+    """Let the camera see the sky instead of the ground as far as it has faded; light and mirrors meet all of it.
+
+    Transparency would be drawn by lot: a holdout, with the sky's light where the film is not transparent, has no noise. `sky`:
+    picture and turn of what is seen, or None.
+    """
+    graph = Graph(material.node_tree)
+    output = next(node for node in material.node_tree.nodes if node.type == "OUTPUT_MATERIAL").inputs["Surface"]
+    surface = output.links[0].from_socket
+    gone = _gone(graph, middle, unit)
+    surface = graph.mix(gone, surface, graph.node("ShaderNodeHoldout").outputs[0])
+    if sky is not None:
+        shown = graph.product(gone, graph.node("ShaderNodeValue", name=SKY).outputs[0])
+        light = graph.node("ShaderNodeEmission", {"Color": _seen(graph, *sky), "Strength": shown}).outputs[0]
+        surface = graph.add(surface, light)
+    graph.give(output, surface)
+    material.cycles.emission_sampling = "NONE"
+
+
+def show_sky(is_shown):
+    """Whether what has faded is the sky, or nothing."""
+    for material in bpy.data.materials:
+        node = material.node_tree.nodes.get(SKY)
+        if node is not None and node.outputs[0].default_value != is_shown:
+            node.outputs[0].default_value = is_shown
+
+
+def _gone(graph, middle, unit):
+    """The share that has faded."""
+    place = graph.node(
+        "ShaderNodeVectorTransform", {0: tuple(middle)}, vector_type="POINT", convert_from="WORLD", convert_to="CAMERA"
+    )
+    middle_away = graph.node("ShaderNodeVectorMath", {0: place.outputs[0]}, operation="LENGTH").outputs["Value"]
+    away = graph.node("ShaderNodeCameraData").outputs["View Distance"]
+    behind = graph.math("DIVIDE", graph.math("SUBTRACT", away, middle_away), unit)
+    far = _between(graph, behind, BEGIN, BEGIN + OVER)
+    far = graph.complement(graph.math("POWER", graph.complement(far), 2.0))
+    incoming = graph.node("ShaderNodeNewGeometry").outputs["Incoming"]
+    sine = graph.math("ABSOLUTE", graph.dot(incoming, (0.0, 0.0, 1.0)))
+    flat = graph.math("MINIMUM", graph.product(12.0, graph.math("MAXIMUM", graph.math("SUBTRACT", FLAT, sine), 0.0)), 1.0)
+    left = graph.product(graph.complement(_smooth(graph, far)), graph.complement(_smooth(graph, flat)))
+    return graph.product(graph.node("ShaderNodeLightPath").outputs["Is Camera Ray"], graph.complement(left))
+
+
+def _seen(graph, image, turn_deg):
+    """The sky's picture in the direction of the view."""
+    view = graph.node("ShaderNodeNewGeometry").outputs["Incoming"]
+    away = graph.vector("MULTIPLY", view, (-1.0, -1.0, -1.0))
+    turned = graph.node("ShaderNodeMapping", {"Vector": away, "Rotation": (0.0, 0.0, -math.radians(turn_deg))})
+    return graph.node("ShaderNodeTexEnvironment", {"Vector": turned.outputs[0]}, image=image).outputs["Color"]
+
+
+def _between(graph, value, low, high):
+    """0 at low, 1 at high, and no less and no more beyond."""
+    return graph.node("ShaderNodeMapRange", {"Value": value, "From Min": low, "From Max": high}, clamp=True).outputs["Result"]
+
+
+def _smooth(graph, value):
+    """3 x^2 - 2 x^3."""
+    inputs = {"Value": value}
+    return graph.node("ShaderNodeMapRange", inputs, interpolation_type="SMOOTHSTEP").outputs["Result"]

@@ -1,0 +1,103 @@
+"""Lamps and the world's picture.
+
+viewsphere's irradiance E gives a white Lambert surface the radiance E / pi. Cycles: a sun's strength is irradiance; a lamp of P
+watts gives P / (4 pi) at one metre, a rectangle P / pi.
+"""
+
+from __future__ import annotations
+
+import math
+
+import bpy
+import numpy as np
+from mathutils import Matrix, Vector
+
+KINDS = {"sun": "SUN", "point": "POINT", "spot": "SPOT", "area": "AREA"}
+
+
+def add_light(scene, told):
+    """A lamp that is not seen itself. Its strength is that of its brightest colour, so that colours stay within 1."""
+    kind = told["kind"]
+    data = bpy.data.lights.new(kind, KINDS[kind])
+    color = told["irradiance"]
+    strength = max(*color, 1e-12)
+    data.color = [value / strength for value in color]
+    if kind == "sun":
+        data.energy, data.angle = strength, math.radians(told["angle_deg"])
+        place = _facing((0, 0, 0), [-v for v in told["direction"]])
+    else:
+        data.energy = strength * (math.pi if kind == "area" else 4 * math.pi)
+        place = _facing(told["position"], [b - a for a, b in zip(told["position"], told.get("toward", (0, 0, 0)), strict=True)])
+    if kind == "area":
+        data.shape, data.size, data.size_y = "RECTANGLE", *told["size"]
+    if kind in ("point", "spot"):
+        data.shadow_soft_size = told["radius"]
+    if kind == "spot":
+        data.spot_size, data.spot_blend = math.radians(told["angle_deg"]), told["blend"]
+    lamp = bpy.data.objects.new(kind, data)
+    lamp.matrix_world = place
+    lamp.visible_camera = False
+    scene.collection.objects.link(lamp)
+
+
+def _facing(position, direction):
+    """A lamp looks along its -Z; a rectangle's width lies level."""
+    direction = Vector(direction) if any(direction) else Vector((0, 0, -1))
+    return Matrix.Translation(position) @ direction.to_track_quat("-Z", "Y").to_matrix().to_4x4()
+
+
+def add_world(scene, told):
+    """Two pictures of the whole sphere: what lights, and what the camera sees (often the same).
+
+    The latter and its turn are returned, or None where there is no light.
+    """
+    world = bpy.data.worlds.new("world")
+    scene.world = world
+    if hasattr(world, "use_nodes") and not world.use_nodes:
+        world.use_nodes = True
+    tree = world.node_tree
+    tree.nodes.clear()
+    output = tree.nodes.new("ShaderNodeOutputWorld")
+    if told is None:
+        tree.links.new(tree.nodes.new("ShaderNodeBackground").outputs[0], output.inputs["Surface"])
+        tree.nodes["Background"].inputs["Strength"].default_value = 0
+        return None
+    place, image = _turned(tree, told["turn_deg"]), _picture(told["picture"])
+    lighting, seen = _background(tree, place, image), image
+    if told["seen"] == told["picture"]:
+        tree.links.new(lighting, output.inputs["Surface"])
+    else:
+        seen = _picture(told["seen"])
+        rays, mix = tree.nodes.new("ShaderNodeLightPath"), tree.nodes.new("ShaderNodeMixShader")
+        tree.links.new(rays.outputs["Is Camera Ray"], mix.inputs[0])
+        tree.links.new(lighting, mix.inputs[1])
+        tree.links.new(_background(tree, place, seen), mix.inputs[2])
+        tree.links.new(mix.outputs[0], output.inputs["Surface"])
+    return seen, told["turn_deg"]
+
+
+def _turned(tree, turn_deg):
+    """Directions in the picture's axes: the picture turns counter-clockwise from above."""
+    place, turn = tree.nodes.new("ShaderNodeTexCoord"), tree.nodes.new("ShaderNodeMapping")
+    turn.inputs["Rotation"].default_value = (0, 0, -math.radians(turn_deg))
+    tree.links.new(place.outputs["Generated"], turn.inputs["Vector"])
+    return turn.outputs["Vector"]
+
+
+def _background(tree, place, image):
+    node, light = tree.nodes.new("ShaderNodeTexEnvironment"), tree.nodes.new("ShaderNodeBackground")
+    node.image = image
+    tree.links.new(place, node.inputs["Vector"])
+    tree.links.new(node.outputs["Color"], light.inputs["Color"])
+    return light.outputs[0]
+
+
+def _picture(file):
+    pixels = np.load(file)
+    height, width, _ = pixels.shape
+    image = bpy.data.images.new("sky", width, height, float_buffer=True, is_data=True)
+    rows = np.ones((height, width, 4), np.float32)
+    rows[..., :3] = pixels[::-1]  # Blender's first row is the lowest
+    image.pixels.foreach_set(rows.reshape(-1))
+    image.pack()
+    return image

@@ -1,0 +1,286 @@
+"""glTF 2.0 materials as Cycles' nodes: the fields of `viewsphere.assets.mesh.Material`, understood as the raster engine does.
+
+A Principled BSDF does most of it: both know metals and dielectrics, roughness squared, Fresnel between the reflectance at
+normal incidence and 1, a clear coat of ior 1.5. Beside it:
+
+- Occlusion textures are left out: light that does not reach a crevice does not reach it here.
+- A BLEND material's reflections and emission do not become transparent with it (glass is often made by alpha), except where
+  it is all but clear. A material that transmits is never cut out, as labels have it.
+- What transmits is thin and refracts nothing: it lets through what is straight behind it, tinted by its base colour, and
+  scatters the square of its roughness of it; light passes likewise, so its shadows are as light as it is clear. A picture's
+  alpha has no colours: where the background is laid behind later, it shows through by the least of the tints, and what the
+  others let through more is light of the surroundings.
+- Unlit colours are seen as they are, from the camera and in mirrors; they light nothing and cast shadows.
+- All surfaces have two sides.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import bpy
+
+from .graph import Graph
+from .meshes import COLORS
+from .textures import Textures
+
+UNEXPOSED = 1 / 0.7
+"""Radiance that is shown as white: one over `viewsphere.imaging.view.EXPOSURE`."""
+
+TOTAL = 0.99
+"""Reflectance of dielectrics at most, as in Cycles."""
+
+GREY = 0.02
+"""Colours that differ by less between red, green and blue tint nothing."""
+
+SHARP = 0.1
+"""Roughness up to which thin glass is taken as clear: it would scatter a hundredth."""
+
+
+@dataclass(frozen=True)
+class _Look:
+    """What a material is made of: numbers, colours of three, or sockets. A normal of None is the surface's own."""
+
+    color: Any
+    alpha: Any
+    metallic: Any
+    roughness: Any
+    emission: Any
+    specular: Any
+    tint: Any
+    normal: Any
+    coat: Any
+    coat_roughness: Any
+    coat_normal: Any
+    transmission: Any  # of light that is not mirrored
+
+
+def build_material(told, images, has_uv, has_colors):
+    """A Blender material from a `Material` as a dict and `meshes.build_images` of its mesh.
+
+    has_uv: of both sets of coordinates, whether the mesh has them; textures that need others count as absent. Where the dict
+    has `fixed_metallic` or `fixed_roughness`, and not None, they stand for the factor and its texture.
+    """
+    material = bpy.data.materials.new(told["name"] or "material")
+    if material.node_tree is None:  # before Blender 5
+        material.use_nodes = True
+    material.node_tree.nodes.clear()
+    graph = Graph(material.node_tree)
+    textures = Textures(graph, images, tuple(has_uv))
+    if told["unlit"]:
+        color, alpha = _base(graph, textures, told, has_colors)
+        material.cycles.emission_sampling = "NONE"
+        surface = _veiled(graph, alpha, _unlit(graph, color))
+    else:
+        surface = _lit(graph, told, _look(graph, textures, told, has_colors))
+    graph.node("ShaderNodeOutputMaterial", {"Surface": surface})
+    return material
+
+
+def _nothing(graph, tint=(1.0, 1.0, 1.0)):
+    """What lets light pass straight on."""
+    return graph.node("ShaderNodeBsdfTransparent", {"Color": tint}).outputs[0]
+
+
+def _veiled(graph, alpha, surface):
+    """The surface as far as it is opaque."""
+    return surface if alpha == 1 else graph.mix(alpha, _nothing(graph), surface)
+
+
+def _base(graph, textures, told, has_colors):
+    """Base colour and the share of the light that the surface stops."""
+    *factor, opacity = told["base_color"]
+    texture, mode = told["base_color_texture"], told["alpha_mode"]
+    colors = graph.node("ShaderNodeVertexColor", layer_name=COLORS).outputs if has_colors else None
+    color = graph.colors(tuple(max(c, 0.0) for c in factor), *_given(textures.color(texture), colors and colors["Color"]))
+    if mode == "OPAQUE" or (mode == "MASK" and told["transmission"] > 0 and not told["unlit"]):
+        return color, 1.0
+    # Labels see the nearest texel, and a cut-out must end where they do.
+    texels = textures.alpha(texture, nearest=mode == "MASK")
+    alpha = graph.product(opacity, *_given(texels, colors and colors["Alpha"]))
+    if mode == "BLEND":
+        return color, _limited(graph, alpha)
+    return color, graph.complement(_is_less(graph, alpha, told["alpha_cutoff"] - 1e-6))
+
+
+def _given(*values):
+    return [value for value in values if value is not None]
+
+
+def _limited(graph, value):
+    """A number between 0 and 1."""
+    if isinstance(value, bpy.types.NodeSocket):
+        return graph.node("ShaderNodeClamp", {0: value}).outputs[0]
+    return min(max(value, 0.0), 1.0)
+
+
+def _is_less(graph, value, limit):
+    if isinstance(value, bpy.types.NodeSocket):
+        return graph.math("LESS_THAN", value, limit)
+    return float(value < limit)
+
+
+def _look(graph, textures, told, has_colors):
+    color, alpha = _base(graph, textures, told, has_colors)
+    metallic = _limited(graph, _textured(graph, textures, told, "metallic", "Blue"))
+    roughness = _limited(graph, _textured(graph, textures, told, "roughness", "Green"))
+    has_coat, has_specular = told["clearcoat"] > 0, told["specular"] > 0
+
+    def scaled(factor, texture, name):
+        return graph.product(told[factor], *_given(textures.channel(told[texture], name))) if told[factor] > 0 else 0.0
+
+    glow = tuple(max(c, 0.0) for c in told["emissive"])
+    return _Look(
+        color=color,
+        alpha=alpha,
+        metallic=metallic,
+        roughness=roughness,
+        emission=graph.colors(glow, *_given(textures.color(told["emissive_texture"]))) if max(glow) > 0 else glow,
+        specular=scaled("specular", "specular_texture", "Alpha"),
+        tint=_tint(graph, textures, told, metallic) if has_specular else (1.0, 1.0, 1.0),
+        normal=textures.normal(told["normal_texture"], told["normal_scale"]),
+        coat=scaled("clearcoat", "clearcoat_texture", "Red"),
+        coat_roughness=scaled("clearcoat_roughness", "clearcoat_roughness_texture", "Green") if has_coat else 0.0,
+        coat_normal=textures.normal(told["clearcoat_normal_texture"], 1.0) if has_coat else None,
+        transmission=_without_metal(graph, scaled("transmission", "transmission_texture", "Red"), metallic),
+    )
+
+
+def _textured(graph, textures, told, name, channel):
+    if told.get(f"fixed_{name}") is not None:
+        return told[f"fixed_{name}"]
+    if told[name] == 0:
+        return 0.0
+    return graph.product(told[name], *_given(textures.channel(told["metallic_roughness_texture"], channel)))
+
+
+def _without_metal(graph, share, metallic):
+    return 0.0 if share == 0 else graph.product(share, graph.complement(metallic))
+
+
+def _reflectance(told):
+    """Of a dielectric at normal incidence; an ior of 0 means total reflection (KHR_materials_ior)."""
+    return min(((told["ior"] - 1) / (told["ior"] + 1)) ** 2 if told["ior"] > 0 else 1.0, TOTAL)
+
+
+def _ior(reflectance):
+    root = reflectance**0.5
+    return (1 + root) / (1 - root)
+
+
+def _tint(graph, textures, told, metallic):
+    """KHR_materials_specular's colour, limited to total reflection; metals have their own."""
+    factor = tuple(max(c, 0.0) for c in told["specular_color"])
+    texels = textures.color(told["specular_color_texture"])
+    if factor == (1, 1, 1) and texels is None:
+        return factor
+    limit = 1 / max(_reflectance(told), 1e-6)
+    if texels is None:
+        tint = tuple(min(c, limit) for c in factor)
+    else:
+        tint = graph.colors(factor, texels)
+        tint = graph.vector("MINIMUM", tint, (limit,) * 3) if max(factor) > limit else tint
+    if metallic == 0:
+        return tint
+    node = graph.node("ShaderNodeMix", data_type="RGBA")
+    # Sockets of one name for every type: by place.
+    graph.give(node.inputs[0], metallic)
+    graph.give(node.inputs[6], tint)
+    graph.give(node.inputs[7], (1.0, 1.0, 1.0))
+    return node.outputs[2]
+
+
+def _unlit(graph, color):
+    """Light for whoever looks, none for what scatters it."""
+    path = graph.node("ShaderNodeLightPath").outputs
+    seen = graph.complement(path["Is Diffuse Ray"])
+    return graph.node("ShaderNodeEmission", {"Color": color, "Strength": graph.product(UNEXPOSED, seen)}).outputs[0]
+
+
+def _lit(graph, told, look):
+    """The surface with what shows through it."""
+    has_glass, is_blended = look.transmission != 0, told["alpha_mode"] == "BLEND" and look.alpha != 1
+    shine = None
+    if has_glass or is_blended:
+        shine = _principled(graph, told, look, graph.shades(look.color, look.metallic))
+    body = None if look.transmission == 1 else _principled(graph, told, look, look.color)
+    if has_glass:
+        body = graph.mix(look.transmission, body, graph.add(shine, _through(graph, told, look)))
+    surface = _veiled(graph, look.alpha, body)
+    return graph.add(surface, graph.mix(_more_shine(graph, look.alpha), None, shine)) if is_blended else surface
+
+
+def _more_shine(graph, alpha):
+    """The share of its mirrored light that a blended surface shows beyond its opacity.
+
+    Only to the camera: between surfaces, more light would leave than comes.
+    """
+    shown = graph.math("MINIMUM", graph.product(8.0, alpha), 1.0)
+    camera = graph.node("ShaderNodeLightPath").outputs["Is Camera Ray"]
+    return graph.product(graph.math("SUBTRACT", shown, alpha), camera)
+
+
+def _principled(graph, told, look, color):
+    """The opaque surface; with a colour of 0 where it is no metal, only what it mirrors and emits."""
+    reflectance = _reflectance(told)
+    inputs = {
+        "Base Color": color,
+        "Metallic": look.metallic,
+        "Roughness": look.roughness,
+        "IOR": _ior(reflectance),
+        "Specular IOR Level": graph.product(0.5, look.specular),
+        "Specular Tint": look.tint,
+    }
+    if look.normal is not None:
+        inputs["Normal"] = look.normal
+    if look.coat != 0:
+        inputs |= {"Coat Weight": look.coat, "Coat Roughness": look.coat_roughness}
+        if look.coat_normal is not None:
+            inputs["Coat Normal"] = look.coat_normal
+    if look.emission != (0, 0, 0):
+        inputs |= {"Emission Color": look.emission, "Emission Strength": 1.0}
+    return graph.node("ShaderNodeBsdfPrincipled", inputs, distribution="MULTI_GGX").outputs[0]
+
+
+def _through(graph, told, look):
+    """What is behind thin glass: what its surface does not mirror, in its colour."""
+    reflectance = min(_reflectance(told) * told["specular"], TOTAL)
+    left = graph.complement(_fresnel(graph, _ior(reflectance), look.normal)) if reflectance > 0 else 1.0
+    if look.coat != 0:
+        left = graph.product(left, graph.complement(graph.product(look.coat, _fresnel(graph, 1.5, look.coat_normal))))
+    tint = graph.shades(look.color, left)
+    clear = _clear(graph, look.color, left, tint)
+    if not isinstance(look.roughness, bpy.types.NodeSocket) and look.roughness <= SHARP:
+        return clear
+    milky = graph.node("ShaderNodeBsdfTranslucent", {"Color": tint}).outputs[0]
+    return graph.mix(graph.product(look.roughness, look.roughness), clear, milky)
+
+
+def _clear(graph, color, left, tint):
+    """What is straight behind, times `tint`, which is this share `left` of the colour."""
+    excess = _above_least(graph, color)
+    if not isinstance(excess, bpy.types.NodeSocket) and max(excess) < GREY:
+        return _nothing(graph, tint)
+    camera = graph.node("ShaderNodeLightPath").outputs["Is Camera Ray"]
+    excess = graph.shades(excess, graph.product(left, camera))
+    # Without a difference in ior it goes straight on, but Cycles does not count it as transparent.
+    straight = graph.node("ShaderNodeBsdfRefraction", {"Color": excess, "Roughness": 0.0, "IOR": 1.0}).outputs[0]
+    return graph.add(_nothing(graph, graph.vector("SUBTRACT", tint, excess)), straight)
+
+
+def _above_least(graph, color):
+    """A colour without its grey share."""
+    if not isinstance(color, bpy.types.NodeSocket):
+        return tuple(c - min(color) for c in color)
+    red, green, blue = graph.node("ShaderNodeSeparateColor", {0: color}).outputs
+    least = graph.math("MINIMUM", graph.math("MINIMUM", red, green), blue)
+    return graph.vector("SUBTRACT", color, least)
+
+
+def _fresnel(graph, ior, normal):
+    """What a thin sheet mirrors, from either side: the node would take its back for the inside of a solid."""
+    back = graph.node("ShaderNodeNewGeometry").outputs["Backfacing"]
+    turned = graph.math("POWER", ior, graph.math("MULTIPLY_ADD", back, -2.0, 1.0))
+    inputs = {"IOR": turned} | ({"Normal": normal} if normal is not None else {})
+    return graph.node("ShaderNodeFresnel", inputs).outputs[0]

@@ -1,0 +1,98 @@
+"""A picture of the staged scene: the camera to the pixel, pixels without a file of Blender's own.
+
+In a Blender without windows 'Render Result' has no pixels; Cycles' own result does while its engine runs.
+"""
+
+from __future__ import annotations
+
+import time
+
+import bpy
+import cycles
+import numpy as np
+from mathutils import Matrix
+
+from . import ground
+
+SENSOR = 36.0
+"""Millimetres; any will do."""
+
+
+def render(told):
+    """Write (H, W, 4) float32 to `out`: scene-linear, premultiplied, the first row on top; empty outside of the border."""
+    scene = bpy.context.scene
+    view = told["camera"]
+    place_camera(scene, view)
+    scene.render.film_transparent = told["transparent"]
+    ground.show_sky(not told["transparent"])
+    _set_border(scene, told["border"], view)
+    scene.update_tag()  # else persistent data hides what has changed
+    begun, cpu = time.monotonic(), time.process_time()
+    passes = _rendered(["Combined", *told["passes"]])
+    for name, pixels in passes.items():
+        file = told["out"] if name == "Combined" else told["out"].replace(".npy", f".{name}.npy")
+        np.save(file, _whole(pixels, told["border"], view))
+    return {"seconds": time.monotonic() - begun, "cpu_seconds": time.process_time() - cpu}
+
+
+def place_camera(scene, view):
+    """A pinhole with these intrinsics: the sensor's shift is the principal point, pixels that are not square fx / fy."""
+    width, height, fx, fy = view["width"], view["height"], view["fx"], view["fy"]
+    render = scene.render
+    render.resolution_x, render.resolution_y = width, height
+    render.pixel_aspect_x, render.pixel_aspect_y = max(fy / fx, 1), max(fx / fy, 1)
+    camera = scene.camera
+    data = camera.data
+    data.sensor_fit, data.sensor_width = "HORIZONTAL", SENSOR
+    data.lens = SENSOR * fx / width
+    data.shift_x = 0.5 - view["cx"] / width
+    data.shift_y = (view["cy"] - height / 2) / width * fx / fy
+    data.clip_start, data.clip_end = view["near"], view["far"]
+    rotation = np.array(view["R"]).T @ np.diag([1, -1, -1])  # Blender's camera looks along -Z, up is +Y
+    camera.matrix_world = Matrix.Translation(view["center"]) @ Matrix(rotation.tolist()).to_4x4()
+
+
+def _set_border(scene, border, view):
+    scene.render.use_border = scene.render.use_crop_to_border = border is not None
+    if border is not None:
+        # Blender truncates: a thousandth of a pixel more does not change the grid and keeps the whole numbers whole.
+        left, top, right, bottom = (v + 1e-3 for v in border)
+        scene.render.border_min_x, scene.render.border_max_x = left / view["width"], right / view["width"]
+        low, high = view["height"] - bottom + 2e-3, view["height"] - top + 2e-3
+        scene.render.border_min_y, scene.render.border_max_y = low / view["height"], high / view["height"]
+
+
+def _rendered(names):
+    """Cycles' passes of one render, (H, W, C) float32 each, the first row on top."""
+    found = {}
+    original = cycles.CyclesRender.render
+
+    def watched(self, depsgraph):
+        original(self, depsgraph)
+        result = self.get_result()
+        for name, one in result.layers[0].passes.items():
+            if name in names:
+                values = np.empty(result.resolution_x * result.resolution_y * one.channels, np.float32)
+                one.rect.foreach_get(values)
+                shape = result.resolution_y, result.resolution_x, one.channels
+                found[name] = np.ascontiguousarray(values.reshape(shape)[::-1])
+
+    cycles.CyclesRender.render = watched
+    try:
+        bpy.ops.render.render()
+    finally:
+        cycles.CyclesRender.render = original
+    missing = [name for name in names if name not in found]
+    if missing:
+        raise RuntimeError(f"Cycles gave no {', '.join(missing)}")
+    return found
+
+
+def _whole(pixels, border, view):
+    """The part within the border, in its place in a whole picture."""
+    if border is None:
+        return pixels
+    left, top, right, bottom = border
+    whole = np.zeros((view["height"], view["width"], pixels.shape[2]), np.float32)
+    whole[top:bottom, left:right] = pixels
+    return whole

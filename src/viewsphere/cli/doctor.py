@@ -1,0 +1,149 @@
+"""What works on this machine."""
+
+from __future__ import annotations
+
+import os
+import platform
+import re
+import sys
+from collections.abc import Iterator
+from importlib.metadata import PackageNotFoundError, requires, version
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from viewsphere.cli.arguments import AsJson, cores
+from viewsphere.cli.terminal import print_json
+from viewsphere.errors import UserError
+
+LEFT = 12
+
+
+def doctor(
+    setup_blender: Annotated[
+        bool,
+        typer.Option("--setup-blender", help="First make a Python environment with Blender in your data folder (about 1 GB)."),
+    ] = False,
+    json_: AsJson = False,
+) -> None:
+    """Say what works on this machine: processor, kernels, optional packages, Blender. What is missing is no error."""
+    if setup_blender:
+        _set_up_blender()
+    found = examine()
+    if json_:
+        print_json(found)
+        return
+    for name, value in _lines(found):
+        typer.echo(f"{name:{LEFT}} {value}")
+
+
+def examine() -> dict[str, Any]:
+    """What was found, as plain data."""
+    return {
+        "viewsphere": version("viewsphere"),
+        "python": {"version": platform.python_version(), "executable": sys.executable},
+        "system": platform.platform(),
+        "processor": _processor(),
+        "kernels": _kernels(),
+        "extras": [_extra(name, packages) for name, packages in sorted(_extras().items())],
+        "blender": _blender(),
+    }
+
+
+def _set_up_blender() -> None:
+    """Make the environment, unless there is one that works."""
+    from viewsphere.blender.environment import home, interpreter_of, make_environment
+    from viewsphere.blender.interpreter import probe
+
+    made = interpreter_of(home())
+    if made.is_file() and probe(made).problem is None:
+        typer.echo(f"{home()} has a Blender that works", err=True)
+        return
+    make_environment(lambda line: typer.echo(line, err=True))
+
+
+def _processor() -> dict[str, Any]:
+    import llvmlite.binding
+
+    return {"name": llvmlite.binding.get_host_cpu_name(), "cores": cores()}
+
+
+def _kernels() -> dict[str, Any]:
+    """Where compiled kernels are kept; whether that can be written, and has some."""
+    from viewsphere.geometry.jit import kernel_folder
+
+    folder = kernel_folder()
+    there = next(place for place in (folder, *folder.parents) if place.exists())
+    compiled = any(folder.glob("*/**/*.nbi"))
+    return {"folder": str(folder), "writable": there.is_dir() and os.access(there, os.W_OK), "compiled": compiled}
+
+
+def _extras() -> dict[str, list[str]]:
+    """Packages of each extra that this installation knows, without Blender: that may lie in another interpreter."""
+    found: dict[str, list[str]] = {}
+    for requirement in requires("viewsphere") or ():
+        extra = re.search(r"""extra == ['"]([\w-]+)['"]""", requirement)
+        package = re.match(r"[\w.-]+", requirement)
+        if extra and package and extra[1] != "blender":
+            found.setdefault(extra[1], []).append(package[0])
+    return found
+
+
+def _extra(name: str, packages: list[str]) -> dict[str, Any]:
+    versions = {package: _version(package) for package in packages}
+    missing = None in versions.values()
+    return {"name": name, "packages": versions, "install": f"pip install 'viewsphere[{name}]'" if missing else None}
+
+
+def _version(package: str) -> str | None:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return None
+
+
+def _blender() -> dict[str, Any]:
+    """The interpreter that has Blender, and what it says; `problem` is None where all is well."""
+    from viewsphere.blender.interpreter import find_blender, probe
+
+    try:
+        python: Path = find_blender()
+    except UserError as error:
+        return {"python": None, "version": None, "devices": [], "problem": str(error), "missing": [], "install": None}
+    blender = probe(python)
+    return {
+        "python": str(python),
+        "version": blender.version,
+        "devices": [{"kind": device.kind, "name": device.name} for device in blender.devices],
+        "problem": blender.problem,
+        "missing": [{"library": library.name, "package": library.package} for library in blender.missing],
+        "install": blender.cure,
+    }
+
+
+def _lines(found: dict[str, Any]) -> Iterator[tuple[str, str]]:
+    """The same in words: a name and what was found."""
+    python, processor, kernels, blender = (found[name] for name in ("python", "processor", "kernels", "blender"))
+    yield "viewsphere", found["viewsphere"]
+    yield "Python", f"{python['version']}, {python['executable']}"
+    yield "system", found["system"]
+    yield "processor", f"{processor['name']}, {processor['cores']} {'core' if processor['cores'] == 1 else 'cores'}"
+    compiled = "compiled" if kernels["compiled"] else "not compiled yet: the first picture takes about 20 seconds longer"
+    unwritable = "" if kernels["writable"] else "cannot be written: set VIEWSPHERE_CACHE; "
+    yield "kernels", f"{kernels['folder']}: {unwritable}{compiled}"
+    for extra in found["extras"]:
+        packages = ", ".join(f"{name} {is_ or 'missing'}" for name, is_ in extra["packages"].items())
+        yield f"[{extra['name']}]", packages + (f": {extra['install']}" if extra["install"] else "")
+    yield "Blender", _blender_line(blender)
+    for device in blender["devices"]:
+        yield "", f"{device['kind']}: {device['name']}"
+    if blender["install"]:
+        yield "", f"on Debian and Ubuntu: {blender['install']}"
+
+
+def _blender_line(blender: dict[str, Any]) -> str:
+    if blender["python"] is None:
+        return blender["problem"].removeprefix("Blender: ")
+    state = f"{blender['version'] or 'does not work'}, {blender['python']}"
+    return f"{state}: {blender['problem']}" if blender["problem"] else state

@@ -1,0 +1,82 @@
+"""`viewsphere doctor`, with and without Blender."""
+
+from __future__ import annotations
+
+import json
+import sys
+
+import pytest
+from fake_blender import LACKING, fake_blender, with_modules, without_blender
+from typer.testing import CliRunner
+
+from viewsphere import cli
+from viewsphere.blender import environment
+from viewsphere.blender.interpreter import VARIABLE
+
+pytestmark = pytest.mark.timeout(60)
+
+
+def doctor(*words):
+    run = CliRunner().invoke(cli.app, ["doctor", *words])
+    assert run.exit_code == 0, run.output
+    return run
+
+
+def test_a_machine_where_all_works(tmp_path, monkeypatch):
+    monkeypatch.setenv(VARIABLE, str(fake_blender(tmp_path)))
+    said = doctor().stdout
+    for word in ("viewsphere ", sys.executable, "cores", "kernels", "[codecs]", f"9.8.7, {tmp_path}", "CUDA: A card"):
+        assert word in said
+    told = json.loads(doctor("--json").stdout)
+    assert told["blender"]["problem"] is None
+    assert told["blender"]["devices"][0] == {"kind": "CPU", "name": "A processor"}
+    assert told["processor"]["cores"] >= 1
+    assert {extra["name"] for extra in told["extras"]} >= {"check", "codecs"}
+    assert all((extra["install"] is None) == (None not in extra["packages"].values()) for extra in told["extras"])
+
+
+def test_a_machine_without_blender(tmp_path, monkeypatch):
+    monkeypatch.delenv(VARIABLE, raising=False)
+    monkeypatch.setattr("importlib.util.find_spec", lambda _: None)
+    monkeypatch.setattr(environment, "home", lambda: tmp_path)
+    assert "found none: pip install 'viewsphere[blender]' in Python 3.11" in doctor().stdout
+    assert json.loads(doctor("--json").stdout)["blender"]["python"] is None
+
+
+def test_an_interpreter_that_lacks_bpy(tmp_path, monkeypatch):
+    monkeypatch.setenv(VARIABLE, str(without_blender(tmp_path)))
+    assert f"does not work, {tmp_path / 'python'}: it has no bpy: pip install" in doctor().stdout
+
+
+def test_a_system_that_lacks_a_library(tmp_path, monkeypatch):
+    monkeypatch.setenv(VARIABLE, str(with_modules(tmp_path, {"bpy": LACKING})))
+    said = doctor().stdout
+    assert "the system lacks libXi.so.6" in said
+    assert "on Debian and Ubuntu: apt-get install libxi6" in said
+    assert json.loads(doctor("--json").stdout)["blender"]["missing"] == [{"library": "libXi.so.6", "package": "libxi6"}]
+
+
+def test_a_cache_that_cannot_be_written(tmp_path, monkeypatch):
+    monkeypatch.setenv(VARIABLE, str(without_blender(tmp_path)))
+    (tmp_path / "file").touch()
+    monkeypatch.setenv("VIEWSPHERE_CACHE", str(tmp_path / "file" / "cache"))
+    kernels = json.loads(doctor("--json").stdout)["kernels"]
+    assert (kernels["writable"], kernels["compiled"]) == (False, False)
+    assert "set VIEWSPHERE_CACHE" in doctor().stdout
+
+
+def test_setting_up_says_each_step_and_only_once(tmp_path, monkeypatch):
+    monkeypatch.delenv(VARIABLE, raising=False)
+    monkeypatch.setattr("importlib.util.find_spec", lambda _: None)
+    monkeypatch.setattr(environment, "home", lambda: tmp_path / "env")
+
+    def make(listener):
+        listener("making")
+        (tmp_path / "env" / "bin").mkdir(parents=True)
+        fake_blender(tmp_path).rename(environment.interpreter_of(tmp_path / "env"))
+
+    monkeypatch.setattr(environment, "make_environment", make)
+    first, second = doctor("--setup-blender"), doctor("--setup-blender")
+    assert "making" in first.stderr
+    assert "making" not in second.stderr
+    assert "9.8.7" in first.stdout and "9.8.7" in second.stdout
