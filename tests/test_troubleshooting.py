@@ -62,6 +62,9 @@ FILES = {
     "photos/annotations/instances_train.json": json.dumps(
         {"images": [], "categories": [{"id": 1, "name": "x"}], "annotations": [{"id": 1, "image_id": 9, "category_id": 1}]}
     ),
+    "here/square.hdr": "#?RADIANCE\n\n-Y 9 +X 9\n",
+    "here/large.ppm": "P6 20000 8000 255 ",
+    "here/dull.obj": "v 0 0 0\nv 1 0 0\nv 0 1 1\nvn 0 0 0\nf 1//1 2//1 3//1\n",
     "folder/a.txt": "somebody's",
 }  # fmt: skip
 
@@ -97,6 +100,14 @@ COMMANDS = {
     "shares that add up to 1": "plan r.yaml --set splits.train=0.7",
     "split <name> is empty": "plan r.yaml --set splits.by=model --set splits.train=0.999 --set splits.val=0.001",
     "the ground hides the models": "plan r.yaml --set viewpoints.elevation=-10 --set scene.ground=on",
+    "no light<in some>": "plan r.yaml --set scene.sun=off --set scene.sky.strength=0",
+    "white is black": "plan r.yaml --set scene.view.exposure=-16",
+    "move the models' centre": "plan r.yaml --set scene.jitter.target=[9,9,9]",
+    "scene.sky.hdri": "plan r.yaml --set scene.sky=here/square.hdr",
+    "expected a readable image": "plan r.yaml --set scene.background.image=here/a.txt",
+    "(limit MAX_PICTURE_PIXELS)": "plan r.yaml --set scene.background.image=here/large.ppm",
+    "a pattern of its materials' names": "render t.yaml -o out --workers 0 --set 'scene.materials=[{material: x*, tint: red}]'",
+    "normals are missing": "inspect here/dull.obj",
     "set max_frames": "plan r.yaml --set max_frames=3",
     "which format <format> needs": "render r.yaml -o out --workers 0 --set channels=[instances] --format coco",
     "format: expected one of": "render r.yaml -o out --workers 0 --format kitti",
@@ -157,6 +168,7 @@ TRIED = {
     "changed since this data set was begun",
     "expected the frames of a finished shot",
     "data made by viewsphere",
+    "that is installed paints them",
     "hard links do not work here",
     "compiling kernels",
 }
@@ -279,6 +291,16 @@ def test_another_version_s_data_set(said, monkeypatch):
     record = json.loads(plan.read_text())
     plan.write_text(json.dumps({**record, "version": "0.0.1"}))
     assert_shown("data made by viewsphere", said("render t.yaml -o out --workers 0"))
+
+
+def test_another_state_of_the_engine(said):
+    said("render t.yaml -o out --workers 0 --set shot_frames=1")
+    plan = Path("out/store/plan.json")
+    record = json.loads(plan.read_text())
+    record["parts"][0]["settings"]["the engine's program"] = "another"
+    plan.write_text(json.dumps(record))
+    shutil.rmtree(next(Path("out/store/shots").glob("*/*")))
+    assert_shown("that is installed paints them", said("render t.yaml -o out --workers 0 --set shot_frames=1"))
 
 
 def test_no_hard_links(said, monkeypatch):

@@ -400,3 +400,13 @@ def test_flat_triangles_are_dropped_and_counted(gltf, cube):
     mesh = load(gltf)
     assert len(mesh.triangles) == 12
     assert mesh.warnings == ("hand.glb: 2 triangles without area dropped",)
+
+
+def test_normals_without_direction_are_smooth_and_said(gltf, cube):
+    normals = np.tile(np.array([0, 0, 1], np.float32), (8, 1))
+    normals[0], normals[1], normals[2] = np.nan, 0, np.inf
+    gltf.node(mesh=gltf.mesh(*cube, NORMAL=normals))
+    mesh, _ = load_model(gltf.write())
+    assert mesh.warnings == ("hand.glb: 3 of 8 normals are missing, NaN or of no length: smooth ones take their place",)
+    np.testing.assert_allclose(np.linalg.norm(mesh.normals, axis=1), 1, rtol=1e-6)
+    np.testing.assert_array_equal(mesh.normals[3:], normals[3:])

@@ -22,7 +22,7 @@ TESTED = {
     "MAX_READ_BYTES": "test_isolated",
     **dict.fromkeys(
         (
-            "MAX_FILE_BYTES", "MAX_FILES", "MAX_TRIANGLES", "MAX_VERTICES", "MAX_TEXTURE_SIDE", "MAX_TEXTURE_PIXELS",
+            "MAX_FILE_BYTES", "MAX_FILES", "MAX_TRIANGLES", "MAX_VERTICES", "MAX_PICTURE_PIXELS",
             "MAX_TEXTURES", "MAX_ALL_TEXTURE_PIXELS", "MAX_ZEROS", "MAX_INSTANCES", "MAX_NESTING", "MAX_ARCHIVE_BYTES",
             "MAX_SIZE", "MIN_SIZE",
         ),
@@ -168,14 +168,20 @@ def test_archive(tmp_path, refused):
     refused(path, "MAX_ARCHIVE_BYTES", 10**5, f"{size:,}")
 
 
-@pytest.mark.parametrize(("size", "name"), [((100_000, 100_000), "MAX_TEXTURE_SIDE"), ((16_000, 16_000), "MAX_TEXTURE_PIXELS")])
-def test_a_huge_texture_is_refused_before_it_is_decoded(write, size, name):
+@pytest.mark.parametrize("size", [(100_000, 100_000), (16_000, 16_000), (10_001, 10_000)])
+def test_a_huge_texture_is_refused_before_it_is_decoded(write, size):
     path = textured(write, (2, 2))
     write("t0.png", png_header(*size))
     mesh, _ = load_model(path)
     assert mesh.images == ()
-    assert name in mesh.warnings[0]
-    assert "100,000" in mesh.warnings[0] or "many more" in mesh.warnings[0] or f"{size[0]} x {size[1]}" in mesh.warnings[0]
+    assert "expected at most 100,000,000 pixels (limit MAX_PICTURE_PIXELS)" in mesh.warnings[0]
+    assert "many more" in mesh.warnings[0] or f"{size[0]} x {size[1]}" in mesh.warnings[0]
+
+
+def test_a_long_narrow_texture_is_reduced(write):
+    path = textured(write, (2, 2))
+    Image.new("L", (40_000, 2), 200).save(write("t0.png", b""))
+    assert load_model(path)[0].warnings[0].endswith("40,000 x 2 pixels are reduced to 4,000 x 1 (at most 4,096 a side)")
 
 
 def test_textures(write, refused):

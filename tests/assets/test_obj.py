@@ -288,3 +288,10 @@ def test_speed(write):
     assert len(mesh.triangles) == 2 * (side - 1) ** 2
     assert areas(mesh).sum() == pytest.approx((side - 1) ** 2)
     assert time.process_time() - start < 8
+
+
+def test_a_normal_without_direction_is_said(write):
+    path = write("n.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 0\nvn 0 0 1\nf 1//1 2//2 3//2\n")
+    mesh, _ = load_model(path)
+    assert mesh.warnings == ("n.obj: 1 of 3 normals are missing, NaN or of no length: smooth ones take their place",)
+    np.testing.assert_array_equal(mesh.normals, [[0, 0, 1]] * 3)

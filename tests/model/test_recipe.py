@@ -182,7 +182,67 @@ MISTAKES = [
     ({"scene": {"background": [255, 255, 255]}}, "scene.background: expected sky", "; found [255, 255, 255]"),
     ({"scene": {"background": {"image": "a.png", "images": "b"}}}, "scene.background: expected one of color, ", ""),
     ({"scene": {"background": {"image": "a.png", "draw": "fixed"}}}, "scene.background: expected images beside", ""),
-    ({"scene": {"ground": "of"}}, "scene.ground: expected on, off, auto, catcher, a mapping, a colour name", "; found 'of'"),
+    ({"scene": {"background": "skyy"}}, "scene.background: expected sky, environment", "; found 'skyy'; did you mean 'sky'?"),
+    ({"scene": {"sky": {"hdir": "a.exr"}}}, "scene.sky.hdir: expected one of zenith", "found 'hdir'; did you mean 'hdri'?"),
+    (
+        {"scene": {"sky": {"choise": ["daylight"]}}},
+        "scene.sky.choise: expected one of",
+        "found 'choise'; did you mean 'choice'?",
+    ),
+    ({"scene": {"sky": ["a.exr"]}}, "scene.sky: expected daylight, the path of an EXR or HDR file, or a mapping", "['a.exr']"),
+    (
+        {"scene": {"lights": [{"kind": "spot", "position": [0, 0, 0], "strength": 1}]}},
+        "scene.lights[0].position: expected another place than toward, at which it points; ",
+        "found [0.0, 0.0, 0.0] for both",
+    ),
+    (
+        {
+            "scene": {
+                "lights": [{"kind": "area", "position": {"choice": [[1, 1, 1], [2, 2, 2]]}, "toward": [2, 2, 2], "strength": 1}]
+            }
+        },
+        "scene.lights[0].position: expected another place than toward",
+        "found [2.0, 2.0, 2.0] for both",
+    ),
+    (
+        {
+            "scene": {
+                "lights": [{"kind": "area", "at": {"elevation_deg": 90, "distance": 3}, "toward": [0, 0, 3], "strength": 1}]
+            }
+        },
+        "scene.lights[0].at: expected another place than toward",
+        "found [0.0, 0.0, 3.0] for both",
+    ),
+    (
+        {"scene": {"lights": [{"kind": "area", "position": [0, 0, 1], "size": [1, 0], "strength": 1}]}},
+        "scene.lights[0].size[1]: expected a number greater than 0",
+        "found 0",
+    ),
+    (
+        {"scene": {"lights": [{"position": [0, 0, 1e20], "strength": 1}]}},
+        "scene.lights[0].position[2]: expected a number less than or equal to 100000",
+        "found 1e+20",
+    ),
+    ({"scene": {"sun": {"strength": -1}}}, "scene.sun.strength: expected a number greater than or equal to 0", "found -1"),
+    ({"scene": {"sun": {"strength": 1e38}}}, "scene.sun.strength: expected a number less than or equal to 1000000000", "1e+38"),
+    (
+        {"scene": {"sun": {"color": [1e38, 1, 1]}}},
+        "scene.sun.color[0]: expected a number less than or equal to 1000000",
+        "1e+38",
+    ),
+    ({"scene": {"view": {"temperature_k": 100}}}, "scene.view.temperature_k: expected a number greater", "1500; found 100"),
+    (
+        {"scene": {"background": "transparent", "smoother": {"kind": {"choice": ["none", "poisson"]}}}},
+        "scene.smoother.kind: expected none, box or gaussian beside background: transparent; found poisson, which takes",
+        "choose another, or give a background",
+    ),
+    ({"scene": {"planes": [{"image": "a", "height": 1e30, "at": [0, 1, 0]}]}}, "scene.planes[0].height: expected", "1e+30"),
+    ({"viewpoints": {"distance": [1, 1e30]}}, "viewpoints.distance: expected distances of at most 1,000,000 m", "found 1e+30"),
+    (
+        {"scene": {"ground": "of"}},
+        "scene.ground: expected on, off, auto, catcher, a mapping, a colour name",
+        "; found 'of'; did you mean 'off'?",
+    ),
     ({"scene": {"sun": {"elevation": 3}}}, "scene.sun.elevation: expected one of azimuth_deg", "'elevation_deg'?"),
     ({"scene": {"sun": 3}}, "scene.sun: expected auto, on, off or a mapping; found 3", ""),
     ({"scene": {"sun": {"date": "2026-06-21"}}}, "scene.sun: expected date, time, latitude, longitude together", "found date"),

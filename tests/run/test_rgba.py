@@ -7,7 +7,7 @@ import pytest
 
 from pictures import photograph, write
 from viewsphere.assets.srgb import encoded, linear
-from viewsphere.engines.raster.background import display_background
+from viewsphere.imaging.background import display_background
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.scene import Background, Finish, Ground, Scene
 from viewsphere.model.shot import Frame, ModelSpec, Placement, Pose, Shot

@@ -256,7 +256,9 @@ def test_mistakes_are_said_before_anything_is_read(tmp_path, tiny):
         scene={"planes": [{**plane, "images": str(tmp_path)}]}
     )
     (tmp_path / "broken.png").write_text("no picture")
-    with pytest.raises(RecipeError, match=r"scene.planes: expected a readable image; found no image in .*broken.png"):
+    with pytest.raises(
+        RecipeError, match=r"scene.planes\[0\].image: expected a readable image; found none of PNG, .* in .*broken.png"
+    ):
         check_images(plan(recipe(scene={"planes": [{**plane, "image": str(tmp_path / "broken.png")}]})))
 
 

@@ -201,7 +201,7 @@ def decode_image(data: bytes, where: str, *, upright: bool = False) -> NDArray[n
             warnings.simplefilter("ignore")
             picture = Pillow.open(io.BytesIO(data), formats=IMAGE_FORMATS)
             width, height = picture.size
-            if max(width, height) <= limits.MAX_TEXTURE_SIDE and width * height <= limits.MAX_TEXTURE_PIXELS:
+            if width * height <= limits.MAX_PICTURE_PIXELS:
                 return image_pixels(ImageOps.exif_transpose(picture) if upright else picture)
             found = f"{width} x {height}"
     except UnidentifiedImageError:
@@ -212,10 +212,8 @@ def decode_image(data: bytes, where: str, *, upright: bool = False) -> NDArray[n
         raise
     except Exception as error:  # Pillow's decoders raise whatever their format's parser does
         raise UnreadableError(f"{where} cannot be decoded ({str(error)[:80]})") from None
-    side, most = f"{limits.MAX_TEXTURE_SIDE:,}", f"{limits.MAX_TEXTURE_PIXELS:,}"
     raise UnreadableError(
-        f"{where}: expected at most {side} px a side (limit MAX_TEXTURE_SIDE) and {most} in all (limit MAX_TEXTURE_PIXELS), "
-        f"found {found}"
+        f"{where}: expected at most {limits.MAX_PICTURE_PIXELS:,} pixels (limit MAX_PICTURE_PIXELS), found {found}"
     )
 
 

@@ -1,4 +1,4 @@
-"""How much a model file may ask for: no file makes the reader run out of memory or time.
+"""How much a model file or a picture may ask for: no file makes the reader run out of memory or time.
 
 An error that a limit causes gives its name, its value and what was found.
 """
@@ -18,8 +18,8 @@ MAX_FILE_BYTES = 4 << 30
 MAX_FILES = 10_000  # that one model names: textures, buffers, material libraries
 MAX_TRIANGLES = 20_000_000
 MAX_VERTICES = 3 * MAX_TRIANGLES
-MAX_TEXTURE_SIDE = 16_384  # pixels
-MAX_TEXTURE_PIXELS = 1 << 27  # 512 MiB once it is RGBA
+MAX_PICTURE_PIXELS = 100_000_000
+"""Pixels of any one picture: a texture, the ground's, a plane's, a background's, a sky's; 400 MB once it is RGBA."""
 MAX_TEXTURES = 1_024
 MAX_ALL_TEXTURE_PIXELS = 1 << 29  # of all textures of a model, 2 GiB as RGBA
 MAX_ZEROS = 10_000_000  # elements of a glTF accessor that has no bytes in the file

@@ -89,8 +89,8 @@ def assemble(
     """Join pieces into one mesh, parts in order of first appearance, unused parts, materials and images left
     out.
 
-    Triangles with NaN or infinite corners and those without area are dropped with a warning; a normal that is
-    unknown or not a direction becomes its face's. Raises ModelError when no triangle is left or there are too
+    Triangles with NaN or infinite corners and those without area are dropped with a warning; a normal that is no direction
+    becomes the mean of its faces', with a warning too. Raises ModelError when no triangle is left or there are too
     many.
     """
     pieces, materials = _without_lost_textures(folder, pieces, materials)
@@ -125,7 +125,7 @@ def assemble(
     mesh = Mesh(
         vertices=vertices,
         triangles=triangles,
-        normals=_normals(pieces, vertices, triangles, used),
+        normals=_normals(folder, pieces, vertices, triangles, used),
         triangle_material=material.astype(np.int32),
         triangle_part=part.astype(np.int32),
         materials=kept,
@@ -207,10 +207,23 @@ def _join(pieces: Sequence[Piece], name: str, width: int, empty: float, used: In
 
 
 def _normals(
-    pieces: Sequence[Piece], vertices: NDArray[np.float32], triangles: NDArray[np.int32], used: Int
+    folder: ModelFolder,
+    pieces: Sequence[Piece],
+    vertices: NDArray[np.float32],
+    triangles: NDArray[np.int32],
+    used: Int,
 ) -> NDArray[np.float32]:
     given = _join(pieces, "normals", 3, 0.0, used)
+    if given is not None:
+        lost = np.count_nonzero(~_is_direction(given))
+        if lost:
+            folder.warn(f"{lost} of {len(given)} normals are missing, NaN or of no length: smooth ones take their place")
     return unit_normals(vertices, triangles, given)
+
+
+def _is_direction(vectors: NDArray[np.floating]) -> NDArray[np.bool_]:
+    """Which of the vectors (N, 3) are long enough to have one; NaN has none."""
+    return np.linalg.norm(vectors, axis=1) > 1e-12
 
 
 def unit_normals(
@@ -219,7 +232,7 @@ def unit_normals(
     """Unit normals (V, 3): the given ones, and the area-weighted mean of the faces where they are zero."""
     normals = np.zeros((len(vertices), 3)) if given is None else given.astype(np.float64)
     lengths = np.linalg.norm(normals, axis=1)
-    missing = ~(lengths > 1e-12)
+    missing = ~_is_direction(normals)
     if missing.any():
         faces = face_normals(vertices.astype(np.float64), triangles)
         mean = np.zeros_like(normals)

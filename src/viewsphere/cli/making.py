@@ -99,10 +99,13 @@ def plan(
     json_: AsJson = False,
 ) -> None:
     """Say what a recipe would make: models, poses, frames, splits. Without --estimate no model is read."""
+    from viewsphere.sampling.plan import check_engine, check_images
     from viewsphere.sampling.plan import plan as make_plan
 
     loaded = load_recipe(recipe, changes)
     planned = make_plan(loaded)
+    check_engine(loaded)
+    check_images(planned)
     if not json_:
         print_plan(planned)
     cost = _estimate(loaded, workers) if estimate else None
@@ -143,7 +146,8 @@ def preview(
     else:
         recipe = load_recipe(source, changes)
         _announce_compilation()
-        samples = list(preview_samples(recipe, count))
+        with recipe.located():
+            samples = list(preview_samples(recipe, count))
     if not samples:
         raise StoreError(f"{source}: expected finished frames, found none: render first")
     write_picture(output, contact_sheet(samples, [d.value for d in draw or ()], columns))

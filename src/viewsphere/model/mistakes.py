@@ -51,9 +51,10 @@ class Marks:
 
 
 def nearest(name: object, known: Iterable[str]) -> str:
-    """`; did you mean 'x'?` with the known name most like this one; empty if none is like it."""
-    by_lower = {k.lower(): k for k in known}
-    close = get_close_matches(str(name).lower(), by_lower, 1, 0.6)
+    """`; did you mean 'x'?` with the known name most like this one, or that it begins; empty if none is like it."""
+    by_lower, lower = {k.lower(): k for k in known}, str(name).lower()
+    begun = [k for k in by_lower if len(lower) > 2 and k.startswith(lower)]
+    close = get_close_matches(lower, by_lower, 1, 0.6) or begun[:1]
     return f"; did you mean {by_lower[close[0]]!r}?" if close else ""
 
 

@@ -178,6 +178,10 @@ class Recipe(Frozen):
         except RecipeError as error:
             raise RecipeError("\n".join(map(self._marks.located, str(error).splitlines()))) from None
 
+    def locate(self, message: str) -> str:
+        """The message with the recipe's file and line before it, if it begins with a field's name."""
+        return self._marks.located(message)
+
     @property
     def folder(self) -> Path:
         """Absolute folder that relative paths start from."""

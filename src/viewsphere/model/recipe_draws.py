@@ -28,7 +28,7 @@ from pydantic import (
 from pydantic_core import CoreSchema, core_schema
 
 from viewsphere.model.frozen import Frozen
-from viewsphere.model.mistakes import at, shown
+from viewsphere.model.mistakes import at, nearest, shown
 from viewsphere.model.recipe_values import COLOR_FORMS, Number, OrShort, parse_color
 
 if TYPE_CHECKING:
@@ -37,6 +37,9 @@ if TYPE_CHECKING:
 KINDS = ("uniform", "log_uniform", "normal", "choice")
 
 DEEPEST = 16
+
+NEARLY_ALWAYS = 3.0
+"""Standard deviations from a normal distribution's mean that hold all but one draw of four hundred."""
 
 Steps = tuple[str, ...]
 RngOf = Callable[[Steps], "Generator"]
@@ -180,7 +183,7 @@ class _Reader(NamedTuple):
             if len(ends) != 2:
                 raise ValueError(f"expected a number, [low, high] or a distribution; found {shown(value)}")
             value = {"uniform": ends}
-        if not isinstance(value, Mapping) or (self.of == "entry" and "choice" not in value):
+        if not isinstance(value, Mapping) or (self.of == "entry" and not _means_choice(value)):
             return self.plain(value)
         if self.depth == DEEPEST:
             raise ValueError(f"expected at most {DEEPEST} distributions in one another; found more")
@@ -231,6 +234,11 @@ class _Reader(NamedTuple):
         return tuple(parts)
 
 
+def _means_choice(value: Mapping[Any, Any]) -> bool:
+    """Whether a mapping is a choice of entries, the word perhaps misspelt, rather than an entry."""
+    return "choice" in value or any(nearest(key, ("choice",)) for key in value)
+
+
 def _ordered(low: Any, high: Any) -> bool:
     """Whether no component of `low` is above that of `high`; those that are drawn do not count."""
     if isinstance(low, tuple) and isinstance(high, tuple):
@@ -255,6 +263,34 @@ def _lowest(value: Any) -> float:
             return low if value.normal.min is None else max(low, _lowest(value.normal.min))
         return min(map(_lowest, getattr(value, value.kind)))
     return min(map(_lowest, cast(tuple[Any, ...], value))) if isinstance(value, tuple) else float(value)
+
+
+def span(value: Any) -> tuple[float, float]:
+    """Least and greatest number that may come of a value, vectors as a whole; of a normal distribution nearly always."""
+    if isinstance(value, Distribution):
+        if value.normal is None:
+            return span(getattr(value, value.kind))
+        normal, limits = value.normal, value._limits  # pyright: ignore[reportPrivateUsage]
+        mean, reach = span(normal.mean), NEARLY_ALWAYS * span(normal.deviation)[1]
+        low = max(mean[0] - reach, limits[0], -math.inf if normal.min is None else span(normal.min)[0])
+        high = min(mean[1] + reach, limits[1], math.inf if normal.max is None else span(normal.max)[1])
+        return low, high
+    if isinstance(value, tuple):
+        parts = [span(part) for part in cast(tuple[Any, ...], value)]
+        return min(low for low, _ in parts), max(high for _, high in parts)
+    return float(value), float(value)
+
+
+def component(value: Any, index: int) -> Any:
+    """One number of a vector that may be drawn, as a number that may be drawn; a number stands for each component."""
+    if isinstance(value, tuple):
+        return cast(tuple[Any, ...], value)[index]
+    if not isinstance(value, Distribution):
+        return value
+    if value.normal is not None:
+        parts = {name: component(part, index) for name, part in value.normal if part is not None}
+        return value.model_copy(update={"normal": value.normal.model_copy(update=parts)})
+    return value.model_copy(update={value.kind: tuple(component(part, index) for part in getattr(value, value.kind))})
 
 
 class OrDrawn:
@@ -330,11 +366,17 @@ def alternatives(value: Any) -> Iterator[Any]:
         yield value
 
 
-Amount = Annotated[float, Field(strict=True, ge=0)]
+FARTHEST = 1e5
+"""Metres that anything of a scene may be away from its middle, as large as models may be: single precision ends soon after."""
+
+Amount = Annotated[float, Field(strict=True, ge=0, le=1e6)]
+Strength = Annotated[float, Field(strict=True, ge=0, le=1e9)]
+Length = Annotated[float, Field(strict=True, gt=0, le=FARTHEST)]
 Portion = Annotated[float, Field(strict=True, ge=0, le=1)]
 Signed = Annotated[float, Field(strict=True, ge=-1, le=1)]
 Coordinate = Drawn[Number]
-PointDrawn = Drawn[tuple[Coordinate, Coordinate, Coordinate]]
+Metres = Drawn[Annotated[float, Field(strict=True, ge=-FARTHEST, le=FARTHEST)]]
+PointDrawn = Drawn[tuple[Metres, Metres, Metres]]
 
 
 def is_drawn_color(value: Any) -> bool:

@@ -11,6 +11,7 @@ from viewsphere.model.recipe_draws import (
     Coordinate,
     Distribution,
     Drawn,
+    Length,
     PointDrawn,
     Portion,
     Signed,
@@ -20,7 +21,7 @@ from viewsphere.model.recipe_draws import (
 )
 from viewsphere.model.recipe_scenery import Draw
 from viewsphere.model.recipe_surface import Picture
-from viewsphere.model.recipe_values import COLOR_FORMS, OrShort, Positive, parse_color
+from viewsphere.model.recipe_values import COLOR_FORMS, OrShort, parse_color
 from viewsphere.model.scene import Background, Smoother, View
 
 _BACKGROUND, _SMOOTHER, _VIEW = Background(), Smoother(), View()
@@ -29,6 +30,7 @@ Fit = Literal["cover", "stretch", "crop"]
 Kernel = Literal["none", "box", "gaussian", "poisson"]
 Transform = Literal["standard", "filmic", "agx", "raw"]
 
+WORDS = ("sky", "environment", "transparent")
 SOURCES = ("color", "image", "images", "environment", "transparent")
 OF_IMAGES = ("fit", "zoom", "place", "flip", "blur")
 
@@ -92,15 +94,15 @@ def _background(value: Any) -> Any:
         return {"color": value}
     if isinstance(value, (dict, BackgroundEntry)):
         return value
-    if value in ("sky", "environment", "transparent"):
+    if value in WORDS:
         return {} if value == "sky" else {value: True}
-    return {"color": parse_color(value, "sky, environment, transparent, a mapping of image or images, ")}
+    return {"color": parse_color(value, "sky, environment, transparent, a mapping of image or images, ", WORDS)}
 
 
 BackgroundField = Annotated[
     BackgroundEntry,
     BeforeValidator(_background),
-    OrShort({"enum": ["sky", "environment", "transparent"]}, *COLOR_FORMS),
+    OrShort({"enum": [*WORDS]}, *COLOR_FORMS),
 ]
 
 
@@ -133,7 +135,7 @@ class EffectsEntry(PerFrame):
     motion_blur: Drawn[Portion] = Field(default=0.0, description="the camera moves")
     motion_angle_deg: Coordinate = Field(default=0.0, description="which way: counter-clockwise from the right")
     depth_of_field: Drawn[Portion] = Field(default=0.0, description="what is nearer or farther than focus is blurred")
-    focus: Drawn[Positive] | None = Field(default=None, description="metres; default: what the camera looks at")
+    focus: Drawn[Length] | None = Field(default=None, description="metres; default: what the camera looks at")
     vignetting: Drawn[Portion] = Field(default=0.0, description="darker corners")
     chromatic_aberration: Drawn[Portion] = Field(default=0.0, description="coloured edges towards the corners")
     brightness: Drawn[Signed] = Field(default=0.0, description="-1 to 1")

@@ -2,24 +2,41 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping
 from datetime import date, timedelta
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, cast
 
 from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag, model_validator
 
+from viewsphere.geometry.camera import orbit_center
 from viewsphere.model.frozen import Frozen
-from viewsphere.model.mistakes import shown
-from viewsphere.model.recipe_draws import Amount, Coordinate, Drawn, LinearDrawn, PointDrawn, Portion
-from viewsphere.model.recipe_values import Natural, OrShort, Positive, shape_of, switch
-from viewsphere.model.scene import WHITE, AreaLight, Daylight, PointLight, Sky, SpotLight, Sun
+from viewsphere.model.mistakes import at as standing_at
+from viewsphere.model.mistakes import nearest, one_of, shown
+from viewsphere.model.recipe_draws import (
+    Amount,
+    Coordinate,
+    Drawn,
+    Length,
+    LinearDrawn,
+    PointDrawn,
+    Portion,
+    Strength,
+    alternatives,
+    is_random,
+)
+from viewsphere.model.recipe_values import Natural, OrShort, shape_of, switch
+from viewsphere.model.scene import WHITE, AreaLight, Daylight, PointLight, Sky, SpotLight, Sun, Vector
 
 SWITCH: list[Any] = [True, False, "on", "off"]
 _SUN, _SKY, _DAYLIGHT = Sun(), Sky(), Daylight()
 _POINT = PointLight(position=(0, 0, 0), strength=0)
 _SPOT = SpotLight(position=(0, 0, 0), strength=0)
 _AREA = AreaLight(position=(0, 0, 0), strength=0)
+SKIES = ("zenith", "horizon", "strength", "daylight", "hdri", "rotation_deg")
+"""Fields of skies of all kinds."""
+
 SKY_SUFFIXES = (".exr", ".hdr")
 WHEN = ("date", "time", "latitude", "longitude")
 _TIME = re.compile(r"(\d\d?):(\d\d)(?::(\d\d))?(?:Z|([+-])(\d\d)(?::?(\d\d))?)\Z")
@@ -68,7 +85,7 @@ class SunEntry(Frozen):
     longitude: Drawn[Annotated[float, Field(strict=True, ge=-180, le=180)]] | None = Field(
         default=None, description="with date: degrees east"
     )
-    strength: Drawn[Amount] = Field(default=_SUN.strength, description="irradiance of what faces it, in the sky's units")
+    strength: Drawn[Strength] = Field(default=_SUN.strength, description="irradiance of what faces it, in the sky's units")
     color: LinearDrawn = Field(default=_SUN.color, description="[r, g, b] of linear light, a name or '#rrggbb'")
     angle_deg: Drawn[Annotated[float, Field(strict=True, ge=0, le=60)]] = Field(
         default=_SUN.angle_deg, description="how wide it is: wider means softer shadows"
@@ -102,7 +119,7 @@ class GradientEntry(Frozen):
 
     zenith: LinearDrawn = Field(default=_SKY.zenith, description="colour overhead: linear [r, g, b], a name or '#rrggbb'")
     horizon: LinearDrawn = Field(default=_SKY.horizon, description="colour at the horizon")
-    strength: Drawn[Amount] = Field(default=_SKY.strength, description="factor of both colours")
+    strength: Drawn[Strength] = Field(default=_SKY.strength, description="factor of both colours")
 
 
 class DaylightEntry(Frozen):
@@ -112,7 +129,7 @@ class DaylightEntry(Frozen):
         default=_DAYLIGHT.turbidity, description="haze: 2 is very clear, 10 hazy"
     )
     clouds: Drawn[Portion] = Field(default=_DAYLIGHT.clouds, description="0 clear, 1 overcast: then there is no sun")
-    strength: Drawn[Amount] = Field(default=_DAYLIGHT.strength, description="factor of the sky's light")
+    strength: Drawn[Strength] = Field(default=_DAYLIGHT.strength, description="factor of the sky's light")
 
 
 class DaylightSky(Frozen):
@@ -127,14 +144,21 @@ class HdriSky(Frozen):
     hdri: Drawn[Annotated[str, Field(min_length=1)]] = Field(
         description="an EXR or HDR file of the whole sphere (equirectangular), or a folder of them to draw from"
     )
-    strength: Drawn[Amount] = Field(default=1.0, description="factor of its light")
+    strength: Drawn[Strength] = Field(default=1.0, description="factor of its light")
     rotation_deg: Coordinate = Field(default=0.0, description="turns it about the vertical, counter-clockwise from above")
 
 
 def _sky(value: Any) -> Any:
     if isinstance(value, str):
         return {"daylight": {}} if value == "daylight" else {"hdri": value}
-    return value
+    if isinstance(value, Mapping):
+        for name in cast(Mapping[Any, Any], value):
+            if nearest(name, SKIES) and name not in SKIES:
+                with standing_at(str(name)):
+                    raise ValueError(one_of(name, SKIES))
+    elif not isinstance(value, Frozen):
+        raise ValueError(f"expected daylight, the path of an EXR or HDR file, or a mapping; found {shown(value)}")
+    return cast(Any, value)
 
 
 def _kind_of_sky(value: Any) -> str:
@@ -160,14 +184,14 @@ class At(Frozen):
     elevation_deg: Drawn[Annotated[float, Field(strict=True, ge=-90, le=90)]] = Field(
         default=45.0, description="degrees above the horizon"
     )
-    distance: Drawn[Positive] = Field(description="metres")
+    distance: Drawn[Length] = Field(description="metres")
 
 
 class _Lamp(Frozen):
     """What all lamps have."""
 
     count: Drawn[Annotated[Natural, Field(le=64)]] = Field(default=1, description="how many of them, each drawn by itself")
-    strength: Drawn[Amount] = Field(description="irradiance at one metre, facing it; of a hemisphere its radiance")
+    strength: Drawn[Strength] = Field(description="irradiance at one metre, facing it; of a hemisphere its radiance")
     color: LinearDrawn = Field(default=WHITE, description="[r, g, b] of linear light, a name or '#rrggbb'")
 
 
@@ -182,6 +206,34 @@ class _Placed(_Lamp):
         return self
 
 
+class _Aimed(_Placed):
+    """A lamp that points somewhere: two places give the direction."""
+
+    toward: PointDrawn = Field(default=_SPOT.toward, description="what it points at, [x, y, z] as for position")
+
+    @model_validator(mode="after")
+    def _pointed(self) -> _Aimed:
+        places = (_standing(self.at),) if self.at is not None else tuple(alternatives(self.position))
+        for place in places:
+            if any(_is_one_point(place, toward) for toward in alternatives(self.toward)):
+                with standing_at("position" if self.at is None else "at"):
+                    raise ValueError(f"expected another place than toward, at which it points; found {shown(place)} for both")
+        return self
+
+
+def _standing(at: At) -> Any:
+    """Where `at` is, None if that is drawn."""
+    if is_random(at):
+        return None
+    direction = orbit_center(math.radians(at.azimuth_deg), math.radians(at.elevation_deg), at.distance)
+    return tuple(round(x, 9) + 0.0 for x in direction.tolist())
+
+
+def _is_one_point(a: Any, b: Any) -> bool:
+    known = isinstance(a, tuple) and isinstance(b, tuple) and not is_random(a) and not is_random(b)
+    return known and math.dist(cast(Vector, a), cast(Vector, b)) < 1e-6
+
+
 class PointEntry(_Placed):
     """Small balls that shine everywhere."""
 
@@ -189,24 +241,22 @@ class PointEntry(_Placed):
     radius: Drawn[Amount] = Field(default=_POINT.radius, description="metres: larger means softer shadows")
 
 
-class SpotEntry(_Placed):
+class SpotEntry(_Aimed):
     """Lamps that shine into a cone."""
 
     kind: Literal["spot"] = Field(description="a cone of light")
     radius: Drawn[Amount] = Field(default=_SPOT.radius, description="metres: larger means softer shadows")
-    toward: PointDrawn = Field(default=_SPOT.toward, description="what it points at, [x, y, z] as for position")
     angle_deg: Drawn[Annotated[float, Field(strict=True, gt=0, le=160)]] = Field(
         default=_SPOT.angle_deg, description="of the whole cone"
     )
     blend: Drawn[Portion] = Field(default=_SPOT.blend, description="share of the cone that fades")
 
 
-class AreaEntry(_Placed):
+class AreaEntry(_Aimed):
     """Rectangles that shine to one side."""
 
     kind: Literal["area"] = Field(description="a rectangle that shines to one side")
-    toward: PointDrawn = Field(default=_AREA.toward, description="what it faces, [x, y, z] as for position")
-    size: Drawn[tuple[Drawn[Positive], Drawn[Positive]]] = Field(default=_AREA.size, description="[width, height] in metres")
+    size: Drawn[tuple[Drawn[Length], Drawn[Length]]] = Field(default=_AREA.size, description="[width, height] in metres")
 
 
 class HemisphereEntry(_Lamp):

@@ -10,7 +10,7 @@ from pydantic import BeforeValidator, ConfigDict, Field, JsonValue, field_valida
 from viewsphere.geometry.camera import focal_from_fov, focal_from_sensor
 from viewsphere.model.camera import Distortion, Intrinsics
 from viewsphere.model.frozen import Frozen
-from viewsphere.model.mistakes import shown
+from viewsphere.model.mistakes import at, shown
 from viewsphere.model.recipe_draws import Drawn, alternatives, is_random
 from viewsphere.model.recipe_finish import (
     BackgroundEntry,
@@ -163,6 +163,12 @@ class SceneEntry(Frozen):
             raise ValueError("expected a transparent background in all frames or in none; found it among others")
         if len(backgrounds) > 1 and any(entry.draw != "per_frame" for entry in backgrounds):
             raise ValueError("expected no draw inside of a choice of backgrounds, which is made per_frame; found one")
+        if any(entry.transparent for entry in backgrounds) and "poisson" in alternatives(self.smoother.kind):
+            with at("smoother", "kind"):
+                raise ValueError(
+                    "expected none, box or gaussian beside background: transparent; found poisson, which takes the border's "
+                    "colours from a background: choose another, or give a background"
+                )
         return self
 
     @property

@@ -9,14 +9,15 @@ from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
 
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.mistakes import shown
-from viewsphere.model.recipe_draws import Drawn, is_random
+from viewsphere.model.recipe_draws import FARTHEST, Drawn, Length, is_random
 from viewsphere.model.recipe_models import ZOO, Unit
-from viewsphere.model.recipe_values import Count, Interval, Number, OrShort, Point, Positive, shape_of
+from viewsphere.model.recipe_values import Count, Interval, Number, OrShort, Point, shape_of
 from viewsphere.model.shot import Axis
 
 Draw = Literal["fixed", "per_model", "per_frame"]
 Labels = Literal["background", "own"]
-Spot = tuple[Number, Number, Number]
+Away = Annotated[float, Field(strict=True, ge=-FARTHEST, le=FARTHEST)]
+Spot = tuple[Away, Away, Number]
 
 DRAWS = "one for the whole data set (fixed), one a model (per_model) or one a frame (per_frame)"
 LABELS = "background, or own: every piece is an object with a category, boxes and a mask"
@@ -102,8 +103,8 @@ class Around(Frozen):
 
     @model_validator(mode="after")
     def _check(self) -> Around:
-        if self.distance[0] <= 0:
-            raise ValueError(f"expected distances above 0; found {shown(self.distance)}")
+        if self.distance[0] <= 0 or self.distance[1] > FARTHEST:
+            raise ValueError(f"expected distances above 0 and up to {FARTHEST:g}; found {shown(self.distance)}")
         return self
 
 
@@ -112,7 +113,7 @@ class PlaneEntry(Frozen):
 
     image: str | None = Field(default=None, min_length=1, description="path of a picture")
     images: str | None = Field(default=None, min_length=1, description="folder of pictures to draw from")
-    height: Positive = Field(description="metres; the width follows from the picture")
+    height: Length = Field(description="metres; the width follows from the picture")
     at: Spot | None = Field(default=None, description="[x, y, azimuth in degrees that the picture faces]")
     around: Around | None = Field(default=None, description="or anywhere around the origin: {distance, azimuth}")
     count: Count = Field(default=1, description="how many planes")

@@ -7,8 +7,8 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
 
 from viewsphere.model.frozen import Frozen
-from viewsphere.model.recipe_draws import Drawn, LinearDrawn, Portion, SrgbDrawn, is_drawn_color
-from viewsphere.model.recipe_values import COLOR_FORMS, OrShort, Positive, parse_color, shape_of, switch
+from viewsphere.model.recipe_draws import Drawn, Length, LinearDrawn, Portion, SrgbDrawn, is_drawn_color
+from viewsphere.model.recipe_values import COLOR_FORMS, OrShort, parse_color, shape_of, switch
 from viewsphere.model.scene import Ground
 
 Picture = Annotated[str, Field(min_length=1)]
@@ -24,7 +24,7 @@ class GroundEntry(Frozen):
     roughness_image: Drawn[Picture] | None = Field(default=None, description="path of a grey picture: 0 smooth, white rough")
     normal_image: Drawn[Picture] | None = Field(default=None, description="path of a normal map (green up)")
     metallic: Drawn[Portion] = Field(default=_GROUND.metallic, description="1: metal")
-    tile: Drawn[Positive] = Field(default=_GROUND.tile, description="metres after which images repeat")
+    tile: Drawn[Length] = Field(default=_GROUND.tile, description="metres after which images repeat")
     catcher: bool = Field(default=False, strict=True, description="true: only the shadows on it are seen, over the background")
 
 
@@ -38,7 +38,7 @@ def _ground(value: Any) -> Any:
         return "on" if on else "off"
     if value == "catcher":
         return {"catcher": True}
-    return value if value == "auto" else {"color": parse_color(value, WORDS)}
+    return value if value == "auto" else {"color": parse_color(value, WORDS, ("on", "off", "auto", "catcher"))}
 
 
 WORDS = "on, off, auto, catcher, a mapping, "

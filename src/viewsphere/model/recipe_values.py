@@ -113,10 +113,10 @@ Interval = Annotated[
 ]
 
 
-def parse_color(value: object, also: str = "") -> tuple[float, float, float]:
+def parse_color(value: object, also: str = "", words: Sequence[str] = ()) -> tuple[float, float, float]:
     """An sRGB colour, three numbers of 0..1, from its name, `#rgb`, `#rrggbb` or [r, g, b].
 
-    Raises ValueError, which names what `also` would have been right.
+    Raises ValueError, which names what `also` would have been right, and the nearest of colours and `words`.
     """
     expected = f"expected {also}a colour name, '#rrggbb' or [r, g, b] of 0..1"
     if isinstance(value, str):
@@ -125,7 +125,7 @@ def parse_color(value: object, also: str = "") -> tuple[float, float, float]:
             from PIL.ImageColor import colormap, getrgb
 
             if code not in colormap:
-                raise ValueError(f"{expected}; found {shown(value)}{nearest(code, colormap)}")
+                raise ValueError(f"{expected}; found {shown(value)}{nearest(code, (*words, *colormap))}")
             r, g, b = (c / 255 for c in getrgb(code)[:3])
             return r, g, b
         if re.fullmatch(r"#[0-9a-f]{3}", code):

@@ -13,6 +13,9 @@ from viewsphere.model.shot import Axis
 
 AZIMUTH = "0: the camera faces the model's front; 90: it stands on the model's left, +X"
 ELEVATION = "above the horizon, -90 to 90"
+FARTHEST = 1e6
+"""Metres: ten times the largest model there may be."""
+
 DISTANCE = "from the target to the camera, metres"
 TILT = "roll of the camera about its axis, clockwise seen from behind"
 
@@ -43,9 +46,11 @@ def _in_elevation(low: float, high: float) -> None:
         raise ValueError(f"expected elevations of -90 to 90 degrees; found {low if low < -90 else high:g}")
 
 
-def _above_zero(low: float) -> None:
+def _in_reach(low: float, high: float) -> None:
     if low <= 0:
         raise ValueError(f"expected distances above 0 m; found {low:g}")
+    if high > FARTHEST:
+        raise ValueError(f"expected distances of at most {FARTHEST:,.0f} m; found {high:g}")
 
 
 class _Aimed(Frozen):
@@ -109,7 +114,7 @@ class _Axes(_Aimed):
     @field_validator("distance")
     @classmethod
     def _distance(cls, values: float | tuple[float, ...] | Range) -> float | tuple[float, ...] | Range:
-        _above_zero(_ends(values)[0])
+        _in_reach(*_ends(values))
         return values
 
     @property
@@ -147,7 +152,8 @@ class Jitter(_Axes):
 
     @model_validator(mode="after")
     def _in_front(self) -> Jitter:
-        _above_zero(_ends(self.distance)[0] - self.plus_minus.distance)
+        low, high = _ends(self.distance)
+        _in_reach(low - self.plus_minus.distance, high)
         return self
 
 
@@ -170,7 +176,7 @@ class Sphere(_Aimed):
     @field_validator("distance")
     @classmethod
     def _distance(cls, value: tuple[float, float]) -> tuple[float, float]:
-        _above_zero(value[0])
+        _in_reach(*value)
         return value
 
 
@@ -181,7 +187,7 @@ class Normal(_Aimed):
     count: Count = Field(description="how many viewpoints")
     azimuth: Number = Field(default=0.0, description=f"mean, degrees; {AZIMUTH}")
     elevation: Annotated[Number, Field(ge=-90, le=90)] = Field(default=20.0, description=f"mean, degrees {ELEVATION}")
-    distance: Positive = Field(description=f"mean; {DISTANCE}")
+    distance: Annotated[Positive, Field(le=FARTHEST)] = Field(description=f"mean; {DISTANCE}")
     tilt: Number = Field(default=0.0, description=f"mean, degrees; {TILT}")
     sd: Spread = Field(description="standard deviations")
 

@@ -14,8 +14,10 @@ from viewsphere.model.channel import missing
 from viewsphere.model.recipe import Recipe
 from viewsphere.run.opening import commit, to_append, to_render
 from viewsphere.run.pool import Job, Outcome, run_jobs
+from viewsphere.run.skies import check_skies
 from viewsphere.run.stages import Stages, StoredBoxes, prepare
 from viewsphere.run.tasks import Kind, Task
+from viewsphere.run.unpainted import unpainted
 from viewsphere.run.warm import compile_kernels
 from viewsphere.sampling.composition import BoxOf
 from viewsphere.sampling.extension import Portion
@@ -27,7 +29,8 @@ from viewsphere.store import Dataset, ShotRow, Store
 class Progress:
     """Where a run stands: `done` of `total`; `resumed` of them were there before this run.
 
-    Phases are models, kernels (compiled once on a machine, then cached), frames and exports.
+    Phases are skies (their pictures are looked at), models, kernels (compiled once on a machine, then cached), frames and
+    exports; those without anything to do are left out.
     """
 
     phase: str
@@ -92,12 +95,15 @@ def generate(
     with recipe.located(), store.occupied():
         if portion.adds_nothing:
             _compare_models(portion, store, workers)
+        notes = () if portion.adds_nothing else _check_skies(portion, store, tell)
         rendered, skipped = (0, {}) if portion.adds_nothing else _render_part(portion, store, workers, keep_going, tell)
-        notes = export(store.root, wanted, listener=tell)
+        notes += export(store.root, wanted, listener=tell)
     if append and not rendered:
         notes += (f"{store.root}: nothing to add, it has all that the recipe asks for",)
     dataset = Dataset(store.root)
     warnings = {info.key: info.warnings for info in dataset.models if info.warnings}
+    for key, more in unpainted(recipe, [s for s in planned.model_specs if s.key not in skipped], store).items():
+        warnings[key] = warnings.get(key, ()) + more
     return Summary(store.root, len(dataset), rendered, skipped, time.monotonic() - begun, wanted, notes, warnings)
 
 
@@ -114,6 +120,13 @@ def _check_channels(name: str, channels: Sequence[str]) -> None:
 
 def _unheard(progress: Progress) -> None:
     """Nobody listens."""
+
+
+def _check_skies(portion: Portion, store: Store, tell: Listener) -> tuple[str, ...]:
+    """Notes on the skies' pictures, if there is anything left to render; raises RecipeError for one that cannot be used."""
+    if all(store.has_shot(key) for key, _, _ in portion.shot_table()):
+        return ()
+    return check_skies(portion.plan, lambda done, total: tell(Progress("skies", done, total)))
 
 
 def _render_part(portion: Portion, store: Store, workers: int, keep_going: bool, tell: Listener) -> tuple[int, dict[str, str]]:

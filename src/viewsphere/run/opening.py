@@ -6,7 +6,8 @@ from contextlib import suppress
 from importlib.metadata import version
 
 from viewsphere.errors import StoreError
-from viewsphere.sampling.extension import Portion, extend, whole
+from viewsphere.sampling.extension import LOOK, Portion, extend, whole
+from viewsphere.sampling.look import engine_look
 from viewsphere.sampling.plan import Plan
 from viewsphere.store import PlanRecord, Store
 
@@ -14,14 +15,16 @@ from viewsphere.store import PlanRecord, Store
 def to_render(planned: Plan, store: Store) -> Portion:
     """The part of the data set that this plan began before, else the whole of a new data set. Nothing is written.
 
-    Raises StoreError for a data set that another version made.
+    Raises StoreError for a data set that another version made, or another state of the engine's program.
     """
     found = None
     with suppress(StoreError):  # whether another plan may be replaced, the store decides
         found = store.plan()
     number = found and found.part_with(planned.digest)
-    if found is None or number is None or len(found.parts) == 1:
+    if found is None or number is None:
         return whole(planned)
+    if len(found.parts) == 1 and (found.version != version("viewsphere") or not any(_finished(store, found, number))):
+        return whole(planned)  # which the store refuses, or puts in the place of the one without frames
     return _resumed(planned, store, found, number)
 
 
@@ -60,7 +63,22 @@ def commit(portion: Portion, store: Store) -> None:
 
 def _resumed(planned: Plan, store: Store, found: PlanRecord, number: int) -> Portion:
     _check_versions(store, found)
+    _check_look(planned, store, found, number)
     return Portion(planned, found, number)
+
+
+def _check_look(planned: Plan, store: Store, found: PlanRecord, number: int) -> None:
+    """Raise StoreError where a part's missing frames would be painted otherwise than those that it has."""
+    then, now = found.parts[number].settings.get(LOOK), engine_look(planned.recipe.engine.name)
+    if then in (None, now):
+        return
+    has = _finished(store, found, number)
+    if any(has) and not all(has):
+        engine = planned.recipe.engine.name
+        raise StoreError(
+            f"{store.root}: expected pictures as the {engine} engine that is installed paints them, found another's: "
+            "install the one that made them to go on, or choose another output folder"
+        )
 
 
 def _check_versions(store: Store, found: PlanRecord) -> None:
@@ -71,3 +89,8 @@ def _check_versions(store: Store, found: PlanRecord) -> None:
                 f"{store.root}: expected data made by viewsphere {installed}, found {part.version}: "
                 "install that version to go on, or choose another output folder"
             )
+
+
+def _finished(store: Store, found: PlanRecord, number: int) -> list[bool]:
+    """Of every shot of a part: whether it is there."""
+    return [store.has_shot(key) for key, _, _ in found.shots_of(number)]

@@ -18,7 +18,7 @@ from viewsphere.model.channel import PICTURES
 from viewsphere.model.recipe import Recipe
 from viewsphere.model.sample import Float, Sample
 from viewsphere.model.shot import Frame, ModelSpec, Placement, Shot, Size
-from viewsphere.sampling.plan import Plan, check_images, plan
+from viewsphere.sampling.plan import Plan, check_engine, check_images, plan
 from viewsphere.sampling.viewpoints import camera_for, inside_box
 from viewsphere.store import Store, check_codecs
 from viewsphere.truth.channels import observe
@@ -47,9 +47,7 @@ def prepare(recipe: Recipe) -> Plan:
     Raises UserError for the user's mistakes: files, names, counts, engine options, background images.
     """
     planned = plan(recipe)
-    engine: plugins.Engine = plugins.load("engines", recipe.engine.name)
-    with recipe.located():
-        engine.check(recipe.engine.options)
+    check_engine(recipe)
     check_images(planned)
     check_codecs(recipe.channels, recipe.files)
     return planned

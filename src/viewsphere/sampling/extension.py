@@ -24,11 +24,15 @@ from viewsphere.model.mistakes import shown
 from viewsphere.model.recipe import Splits
 from viewsphere.model.shot import Frame, ModelSpec, Shot
 from viewsphere.sampling.composition import BoxOf
+from viewsphere.sampling.look import engine_look
 from viewsphere.sampling.plan import Plan
 from viewsphere.sampling.viewpoints import Poses
 from viewsphere.store import Category, Part, PlanRecord, Row, ShotRow
 
 FITTING = "appended frames have to fit those that are there; choose another output folder for others"
+
+LOOK = "the engine's program"
+"""Name of the setting that says how the engine paints."""
 
 Indices = NDArray[np.int64]
 Ranges = tuple[tuple[int, int], ...]
@@ -244,7 +248,8 @@ def settings(planned: Plan) -> dict[str, str]:
         "viewpoints.bins": viewpoints.get("bins"),
         "scene's images": [file.rpartition("/")[2] for files in (planned.images, *planes) for file in files],
     }
-    return {name: hashlib.sha256(json.dumps(value[name]).encode()).hexdigest()[:16] for name in value}
+    digests = {name: hashlib.sha256(json.dumps(value[name]).encode()).hexdigest()[:16] for name in value}
+    return digests | {LOOK: engine_look(recipe.engine.name)}
 
 
 def _check_settings(planned: Plan, part: Part) -> None:

@@ -2,16 +2,25 @@
 
 from __future__ import annotations
 
+import os
+import re
 import warnings
 from collections.abc import Iterator, Mapping
 from functools import lru_cache
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
+from viewsphere.assets import limits
+from viewsphere.assets.folder import UnreadableError
+from viewsphere.assets.sphere import read_head
 from viewsphere.errors import RecipeError
+from viewsphere.model.mistakes import nearest
 from viewsphere.model.recipe import Recipe
 from viewsphere.model.recipe_draws import alternatives
 from viewsphere.model.recipe_light import SKY_SUFFIXES
+
+if TYPE_CHECKING:
+    from PIL.Image import Image
 
 IMAGE_SUFFIXES = (".bmp", ".jpeg", ".jpg", ".png", ".tif", ".tiff", ".webp")
 
@@ -29,8 +38,11 @@ FIELDS: tuple[tuple[str, str, Kind], ...] = (
     ("ground", "normal_image", "image"),
     ("sky", "hdri", "hdri"),
 )
-_RADIANCE = (b"#?RADIANCE", b"#?RGBE")
-_OPENEXR = b"\x76\x2f\x31\x01"
+PICTURE_FORMATS = ("PNG", "JPEG", "WEBP", "BMP", "GIF", "TIFF", "TGA", "PPM")
+"""Kinds of picture that all parts of a scene can show."""
+
+_ENDS = {"PNG": b"IEND", "JPEG": b"\xff\xd9", "GIF": b"\x3b"}
+_TAIL = 64  # bytes in which an end is searched: some programs write a little behind it
 
 
 def scene_pictures(recipe: Recipe) -> Pictures:
@@ -39,7 +51,9 @@ def scene_pictures(recipe: Recipe) -> Pictures:
 
 
 def check_pictures(recipe: Recipe, pictures: Pictures) -> None:
-    """See that the files of a scene begin as pictures do; raises RecipeError for the first that does not."""
+    """See that the files of a scene are pictures, as far as their first and last bytes tell; raises RecipeError for the first
+    that is not.
+    """
     for field, kind, path in _paths(recipe):
         for file in pictures[kind, path]:
             if kind == "hdri":
@@ -65,9 +79,10 @@ def _files(recipe: Recipe, field: str, kind: Kind, written: str) -> tuple[str, .
         raise RecipeError(f"{field}: expected an image file; found none at {path}")
     suffixes = IMAGE_SUFFIXES if kind == "images" else SKY_SUFFIXES
     found = files_in(path, suffixes)
+    hint = nearest(written, ("daylight",)) if kind == "hdri" else ""
     if not found:
         what = "a folder with images" if kind == "images" else "daylight, a file or a folder with files"
-        raise RecipeError(f"{field}: expected {what} ({', '.join(suffixes)}); found none in {path}")
+        raise RecipeError(f"{field}: expected {what} ({', '.join(suffixes)}); found none in {path}{hint}")
     return found
 
 
@@ -78,27 +93,63 @@ def files_in(folder: Path, suffixes: tuple[str, ...] = IMAGE_SUFFIXES) -> tuple[
 
 @lru_cache(maxsize=4096)
 def proportions(path: str, field: str = "scene.planes") -> float:
-    """Width over height of a picture as it is shown; raises RecipeError about the recipe's field when it cannot be read."""
+    """Width over height of a picture as it is shown; raises RecipeError about the recipe's field when it cannot be read.
+
+    A file that ends early is told by its end, where its kind has one, and is refused when it cannot be decoded.
+    """
     from PIL import Image, UnidentifiedImageError
 
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of large pictures, whose readers have limits of their own
-            image = Image.open(path)
-        with image:
-            width, height = image.size
-            sideways = image.getexif().get(0x0112, 1) >= 5
-    except (OSError, ValueError, UnidentifiedImageError, Image.DecompressionBombError) as error:
-        problem = "no image" if isinstance(error, UnidentifiedImageError) else error
-        raise RecipeError(f"{field}: expected a readable image; found {problem} in {path}: mend or remove it") from None
+            warnings.simplefilter("ignore")  # of large pictures, which a limit decides on
+            with Image.open(path, formats=PICTURE_FORMATS) as image:
+                width, height = image.size
+                sideways = _is_sideways(image)
+                if width * height <= limits.MAX_PICTURE_PIXELS and not _ends_well(path, image.format or ""):
+                    image.load()
+    except UnidentifiedImageError:
+        raise _unreadable(field, f"none of {', '.join(PICTURE_FORMATS)}", path) from None
+    except Image.DecompressionBombError as error:
+        raise _too_large(field, f"{int(re.findall(r'[0-9]+', str(error))[0]):,}", path) from None
+    except Exception as error:  # Pillow's decoders raise whatever their format's parser does
+        problem = (error.strerror if isinstance(error, OSError) else None) or str(error)
+        raise _unreadable(field, " ".join(problem.split())[:120], path) from None
+    if width * height > limits.MAX_PICTURE_PIXELS:
+        raise _too_large(field, f"{width * height:,} ({width} x {height})", path)
     return height / width if sideways else width / height
+
+
+def _unreadable(field: str, problem: str, path: str) -> RecipeError:
+    return RecipeError(f"{field}: expected a readable image; found {problem} in {path}: mend or remove it")
+
+
+def _too_large(field: str, found: str, path: str) -> RecipeError:
+    most = f"{limits.MAX_PICTURE_PIXELS:,} pixels (limit MAX_PICTURE_PIXELS)"
+    return RecipeError(f"{field}: expected at most {most}; found {found} in {path}: make it smaller")
+
+
+def _is_sideways(image: Image) -> bool:
+    """Whether EXIF says that the camera was turned; what cannot be read says nothing."""
+    try:
+        return image.getexif().get(0x0112, 1) >= 5
+    except Exception:  # the parser of a damaged block raises whatever it meets
+        return False
+
+
+def _ends_well(path: str, kind: str) -> bool:
+    """Whether a file's last bytes are those that end its kind; True where the kind has no such."""
+    if kind not in _ENDS:
+        return True
+    with Path(path).open("rb") as file:
+        file.seek(0, os.SEEK_END)
+        file.seek(-min(file.tell(), _TAIL), os.SEEK_END)
+        return _ENDS[kind] in file.read()
 
 
 def _check_sphere(path: str, field: str) -> None:
     try:
-        with Path(path).open("rb") as file:
-            start = file.read(16)
-    except OSError as error:
-        raise RecipeError(f"{field}: expected a readable file; found {error.strerror or error} in {path}") from None
-    if not start.startswith((_OPENEXR, *_RADIANCE)):
+        head = read_head(Path(path))
+    except UnreadableError as error:
+        raise RecipeError(f"{field}: {error}") from None
+    if head is None:
         raise RecipeError(f"{field}: expected an OpenEXR or Radiance HDR file; found another kind in {path}: convert it")

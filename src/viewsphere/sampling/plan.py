@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from functools import cached_property
-from itertools import accumulate
+from itertools import accumulate, chain
 from pathlib import Path
 
 import numpy as np
@@ -24,10 +24,11 @@ from viewsphere.geometry.rotation import transform
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.mistakes import nearest, one_of
 from viewsphere.model.recipe import Recipe
-from viewsphere.model.recipe_draws import alternatives
+from viewsphere.model.recipe_draws import alternatives, span
 from viewsphere.model.scene import Vector
 from viewsphere.model.shot import Frame, ModelSpec, Placement, Pose, Shot
 from viewsphere.sampling.composition import BoxOf, Composition, compose
+from viewsphere.sampling.doubts import hidden_by_exposure, no_light, out_of_view
 from viewsphere.sampling.models import categories, count_models, model_specs
 from viewsphere.sampling.pictures import Pictures, check_pictures, proportions, scene_pictures
 from viewsphere.sampling.scenes import Scenes, is_night
@@ -120,14 +121,16 @@ class Plan:
             for name, count in self.split_counts.items()
             if count == 0
         ]
-        lowest = self.pose_list.lowest_elevation
-        if lowest < 0 and (self.recipe.scene.has_ground or self.recipe.scene.place is not None):
+        scene = self.recipe.scene
+        lowest = self.pose_list.lowest_elevation + min(span(scene.jitter.elevation_deg)[0], 0.0)
+        if lowest < 0 and (scene.has_ground or scene.place is not None):
             found.append(
                 f"elevations go down to {lowest:g}: from below, the ground hides the models; set scene.ground: off to see them"
             )
-        if any(is_night(sun) for sun in alternatives(self.recipe.scene.sun)):
+        if any(is_night(sun) for sun in alternatives(scene.sun)):
             found.append("scene.sun: at this date, time and place the sun is below the horizon: there is none, and no daylight")
-        return tuple(found)
+        doubts = chain(no_light(scene), hidden_by_exposure(scene), out_of_view(scene, self.pose_list, self.intrinsics))
+        return tuple(map(self.recipe.locate, (*found, *doubts)))
 
     def split(self, spec: ModelSpec, pose: int) -> str:
         """The split of a frame; it follows from the seed and the names of what is kept together, and nothing else."""
@@ -341,12 +344,21 @@ def plan(recipe: Recipe, shot_frames: int | None = None) -> Plan:
         return replace(planned, categories=composition.categories, composition=composition)
 
 
+def check_engine(recipe: Recipe) -> None:
+    """See that the engine takes its options; raises UserError where it does not, or lacks its extra."""
+    engine: plugins.Engine = plugins.load("engines", recipe.engine.name)
+    with recipe.located():
+        engine.check(recipe.engine.options)
+
+
 def check_images(planned: Plan) -> None:
     """See that the pictures of the scene and its planes are pictures; raises RecipeError for the first that is not."""
     with planned.recipe.located():
         check_pictures(planned.recipe, planned.pictures)
-        for path in () if planned.composition is None else [p for files in planned.composition.images for p in files]:
-            proportions(path)
+        for i, files in enumerate(() if planned.composition is None else planned.composition.images):
+            field = "images" if planned.recipe.scene.planes[i].image is None else "image"
+            for path in files:
+                proportions(path, f"scene.planes[{i}].{field}")
 
 
 def center(placement: Placement, box_of: BoxOf) -> Vector:

@@ -1,0 +1,137 @@
+"""What of a recipe would make pictures without anything to see: no light, an exposure that hides all, a camera that looks away.
+
+All of it is told from the recipe alone, hence of lamps and photographed skies with a wide margin.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from itertools import product
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.geometry.camera import orbit_center
+from viewsphere.model.camera import Intrinsics
+from viewsphere.model.recipe_draws import alternatives, component, span
+from viewsphere.model.recipe_light import DaylightSky, HdriSky, SunEntry
+from viewsphere.model.recipe_scene import SceneEntry
+from viewsphere.model.scene import Sun
+from viewsphere.sampling.scenes import is_night
+from viewsphere.sampling.viewpoints import Poses
+
+Float = NDArray[np.float64]
+
+MOST_POSES = 1000
+"""Poses that are looked at, evenly over all."""
+
+UNKNOWN = 30.0
+"""How much brighter or darker than its strength says a lamp may be, which may be near, or a photograph."""
+
+DARK, BRIGHT = 2.0**-10, 16.0
+"""Radiance that every view transform shows as black, and as white."""
+
+BLACKEST = 0.02
+"""Reflectance of the darkest paint."""
+
+
+def no_light(scene: SceneEntry) -> Iterator[str]:
+    """A warning if there is no light at all, or none in some of the scenes that may be drawn."""
+    dark = [high == 0 for _, high in _lights(scene)]
+    if any(dark):
+        some = "" if all(dark) else " in some of what may be drawn"
+        yield (
+            f"scene: no light{some}: sun, sky and lights are off or of strength 0: models are black, unless they shine by "
+            "themselves; set scene.sun: on, or a strength"
+        )
+
+
+def hidden_by_exposure(scene: SceneEntry) -> Iterator[str]:
+    """A warning for an exposure that makes white black, or black white."""
+    lit = [light for light in _lights(scene) if light[1] > 0]
+    if not lit:
+        return
+    low, high = span(scene.view.exposure)
+    if max(light[1] for light in lit) * 2**low < DARK:
+        yield f"scene.view.exposure: at {low:g} stops white is black, and so is the picture; raise it, or the lights' strength"
+    if BLACKEST * min(light[0] for light in lit) * 2**high > BRIGHT:
+        yield f"scene.view.exposure: at {high:g} stops black is white, and so is the picture; lower it, or the lights' strength"
+
+
+def out_of_view(scene: SceneEntry, views: Poses, lens: Intrinsics) -> Iterator[str]:
+    """A warning if the models' centre is in no picture, or jitter moves it out of some.
+
+    How large the models are is not known yet: near ones may still be seen.
+    """
+    if lens.distortion is not None:
+        return
+    widest = math.hypot(max(lens.cx, lens.width - lens.cx) / lens.fx, max(lens.cy, lens.height - lens.cy) / lens.fy)
+    chosen = np.unique(np.linspace(0, len(views) - 1, min(len(views), MOST_POSES)).round().astype(int)).tolist()
+    centres = [views.target(i) for i in chosen]
+    away = [_offset(views, i) for i in chosen]
+    if not scene.is_composed and all(
+        c is not None and _misses(np.array([c]), d, widest) for c, d in zip(centres, away, strict=True)
+    ):
+        yield (
+            "viewpoints: the models' centre, which stands at the origin, is in no picture: pictures may be empty; "
+            "look at it with target: center, or from farther away"
+        )
+        return
+    ends = [span(component(scene.jitter.target, axis)) for axis in range(3)]
+    corners = np.array(list(product(*ends)))
+    if not corners.any():
+        return
+    least = 1 + span(scene.jitter.distance)[0]
+    if any(_misses(corners, d * least, widest) for c, d in zip(centres, away, strict=True) if c is None):
+        farthest = float(np.linalg.norm(corners, axis=1).max())
+        yield (
+            f"scene.jitter.target: up to {farthest:.3g} m move the models' centre out of the picture: pictures may be empty; "
+            "ask for less, for a larger viewpoints.distance or for a larger camera.fov_deg"
+        )
+
+
+def _offset(views: Poses, index: int) -> Float:
+    """From what a camera looks at to where it stands, (3,)."""
+    view = views.view(index)
+    return orbit_center(math.radians(view.azimuth), math.radians(view.elevation), view.distance)
+
+
+def _misses(targets: Float, offset: Float, widest: float) -> bool:
+    """Whether the origin is out of a picture that looks at one of the targets (N, 3) from this offset (3,) to it."""
+    distance = float(np.linalg.norm(offset))
+    along = targets @ (offset / distance)
+    beside = np.linalg.norm(targets - along[:, None] * (offset / distance), axis=1)
+    depth = distance + along
+    return bool(((depth <= 0) | (beside > widest * np.maximum(depth, 0))).any())
+
+
+def _lights(scene: SceneEntry) -> Iterator[tuple[float, float]]:
+    """About the least and the greatest radiance of white, for every pair of skies and suns that there may be."""
+    lamps = 0.0
+    for lamp in scene.lights:
+        color = max(span(lamp.color)[1], span(getattr(lamp, "below", 0.0))[1])
+        lamps += UNKNOWN * span(lamp.count)[1] * span(lamp.strength)[1] * color
+    for sky, sun in product(alternatives(scene.sky), alternatives(scene.sun)):
+        above, shining = _sky(sky, is_night(sun)), _sun(sun, isinstance(sky, HdriSky))
+        yield above[0] + shining[0], above[1] + shining[1] + lamps
+
+
+def _sky(sky: Any, night: bool) -> tuple[float, float]:
+    if isinstance(sky, HdriSky):
+        return span(sky.strength)[0] / UNKNOWN, span(sky.strength)[1] * UNKNOWN
+    if isinstance(sky, DaylightSky):
+        low, high = span(sky.daylight.strength)
+        return (0.0, 0.0) if night else (low / UNKNOWN, high * UNKNOWN)
+    low, high = span(sky.strength)
+    colors = [span(sky.zenith), span(sky.horizon)]
+    return low * min(c[0] for c in colors), high * max(c[1] for c in colors)
+
+
+def _sun(sun: Any, photographed: bool) -> tuple[float, float]:
+    if sun == "off" or is_night(sun) or (sun == "auto" and photographed):
+        return 0.0, 0.0
+    entry = sun if isinstance(sun, SunEntry) else Sun()
+    strength, color = span(entry.strength), span(entry.color)
+    return 0.0, strength[1] * color[1] / math.pi

@@ -1,0 +1,70 @@
+"""A data set does not get frames that the engine of another day painted."""
+
+import json
+
+import pytest
+
+from small import small_recipe, tree_hash
+from viewsphere.errors import RecipeError, StoreError
+from viewsphere.run.generate import generate
+from viewsphere.sampling.extension import LOOK
+from viewsphere.sampling.look import engine_look
+from viewsphere.store import Store
+
+RECIPE = {"channels": ["rgb"], "formats": [], "shot_frames": 3}
+
+
+@pytest.fixture
+def half(tmp_path):
+    """A data set that lacks a shot."""
+    out = tmp_path / "out"
+    generate(small_recipe(**RECIPE), out)
+    store = Store(out)
+    folder = store.shot_folder(store.plan().shots[-1][0])
+    folder.rename(tmp_path / "taken")
+    return out
+
+
+def painted_by(out, look):
+    """Let the data set say that its pictures have another look; None: that it says nothing."""
+    file = Store(out).plan_file
+    value = json.loads(file.read_text())
+    for part in value["parts"]:
+        part["settings"].pop(LOOK)
+        if look is not None:
+            part["settings"][LOOK] = look
+    file.write_text(json.dumps(value))
+
+
+def test_it_is_of_the_sources():
+    assert len(engine_look("raster")) == 16
+
+
+def test_resuming_with_another_engine_is_refused_and_nothing_is_lost(half):
+    painted_by(half, "0" * 16)
+    before = tree_hash(half)
+    with pytest.raises(
+        StoreError, match="expected pictures as the raster engine that is installed paints them, found another's"
+    ):
+        generate(small_recipe(**RECIPE), half)
+    assert tree_hash(half) == before
+
+
+@pytest.mark.parametrize("look", [None, engine_look("raster")])
+def test_resuming_with_the_same_goes_on(half, look):
+    painted_by(half, look)
+    assert generate(small_recipe(**RECIPE), half).rendered == 3
+
+
+def test_a_finished_data_set_is_exported_whatever_painted_it(half):
+    generate(small_recipe(**RECIPE), half)
+    painted_by(half, "0" * 16)
+    assert generate(small_recipe(**RECIPE), half, formats=["native"]).rendered == 0
+
+
+def test_appending_with_another_engine_is_refused(half):
+    generate(small_recipe(**RECIPE), half)
+    painted_by(half, "0" * 16)
+    more = small_recipe(**RECIPE, viewpoints={"azimuth": [0, 90, 120, 240], "elevation": [15, 50], "distance": 1.0})
+    with pytest.raises(RecipeError, match="the engine's program: expected what the data set has; found another"):
+        generate(more, half, append=True)
