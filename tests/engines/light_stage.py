@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from called import called
 from test_raster import box, mesh_of, rectangle
 
 from viewsphere.assets.mesh import Material, Mesh
@@ -21,6 +22,7 @@ from viewsphere.model.shot import ModelSpec, Placement
 from viewsphere.truth.geometry import build_geometry
 from viewsphere.truth.visibility import rasterize
 
+occluded = called(occlude)
 SPEC = ModelSpec(key="model", source="memory", category="thing", category_id=1)
 IDENTITY = ((1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1))
 
@@ -119,7 +121,7 @@ class LightStage:
         for ground in (False, True):
             part = s.is_ground == ground
             own = Samples(s.place[part], s.smooth[part], s.normal[part], s.pixel[part], s.is_ground[part])
-            result[part] = self._in_blocks(lambda n, b: occlude(n, baked, b), own, "OPEN BOUNCE")
+            result[part] = self._in_blocks(lambda n, b: occluded(n, baked, b), own, "OPEN BOUNCE")
         return result
 
     def _in_blocks(self, kernel, s: Samples, rows: str) -> np.ndarray:

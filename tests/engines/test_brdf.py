@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from called import called
 
 from viewsphere.engines.raster import kernels_block as rows
-from viewsphere.engines.raster import kernels_light as stages
+from viewsphere.engines.raster import kernels_light
 from viewsphere.engines.raster.environment import Surrounding, bake_surrounding, lobe_albedo
 from viewsphere.engines.raster.kernels_environment import BELOW
 from viewsphere.imaging.view import EXPOSURE
 from viewsphere.model.scene import Sky
 
 N = rows.BLOCK
+NAMES = "weigh", "add_light", "add_light_matte", "ambient", "ambient_matte", "compose"
+stages = SimpleNamespace(**{name: called(getattr(kernels_light, name)) for name in NAMES})
 WHITE = Sky(zenith=(1, 1, 1), horizon=(1, 1, 1))
 DEFAULTS = {
     "ALPHA": 1, "F0R": 0.04, "F0G": 0.04, "F0B": 0.04, "RED": 1, "GREEN": 1, "BLUE": 1, "ROUGH": 0.5, "OPEN": 1, "BOUNCE": 1,

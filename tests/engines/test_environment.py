@@ -7,10 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from called import called
 
 from viewsphere.engines.raster import kernels_block as rows
-from viewsphere.engines.raster import kernels_light as stages
 from viewsphere.engines.raster.environment import bake_surrounding, sky_behind, sky_lights, without_sun
+from viewsphere.engines.raster.kernels_light import light_around
 from viewsphere.engines.raster.records import View
 from viewsphere.errors import UserError
 from viewsphere.model.scene import Daylight, Environment, Sky, Sun
@@ -18,6 +19,7 @@ from viewsphere.surroundings.daylight import air, daylight_picture
 from viewsphere.surroundings.sun import sun_light
 
 N = rows.BLOCK
+lit_around = called(light_around)
 HDRI = Path(__file__).parents[3] / "shared" / "models" / "hdri"
 
 
@@ -47,7 +49,7 @@ def seen(surrounding, normals, rough=None, bounce=1.0):
         b[row : row + N] = np.resize(normals[axis], N)
     b[rows.T6 : rows.T6 + N] = -1 if rough is None else rough
     b[rows.BOUNCE : rows.BOUNCE + N] = bounce
-    stages.light_around(N, surrounding, b)
+    lit_around(N, surrounding, b)
     return np.stack([b[row : row + N] for row in (rows.T3, rows.T4, rows.T5)], axis=-1)[: normals.shape[1]].astype(float)
 
 

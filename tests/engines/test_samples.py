@@ -7,7 +7,7 @@ import pytest
 
 from truth.truth_scenes import LENSES, cube, lens, mesh_of, orbit_camera, placed, random_soup
 from viewsphere.assets.mesh import Image, Material, Texture
-from viewsphere.engines.raster.kernels_paint import GLINT, average_samples
+from viewsphere.engines.raster.kernels_paint import BRIGHT, GLINT, average_samples, shared_samples
 from viewsphere.engines.raster.kernels_samples import TIE
 from viewsphere.engines.raster.samples import OFFSETS, edge_samples, layers
 from viewsphere.geometry.camera import pixel_rays
@@ -339,10 +339,47 @@ def test_one_glint_among_four_samples_is_no_white_dot():
     samples[1] = 500, 250, 0, 1
     samples[4:8] = 30, 20, 10, 1
     samples[8:12, :3] = np.arange(12).reshape(4, 3) / 10
-    like = np.arange(12, dtype=np.int32)
+    like = ~np.arange(12, dtype=np.int32)
     found = np.zeros((5, 4), np.float32)
-    average_samples(np.array([3, 0, 4], np.int32), samples, like, found)
+    average_samples(np.array([3, 0, 4], np.int32), like, samples, found)
     np.testing.assert_allclose(found[3], [0.3 / 4 + GLINT / 4, 0.3 / 4 + GLINT / 8, 0.3 / 4, 1.3 / 4], rtol=1e-5)
     np.testing.assert_allclose(found[0], [30, 20, 10, 1], rtol=1e-5)
     np.testing.assert_allclose(found[4], samples[8:12].mean(axis=0), rtol=1e-5)
     assert not found[1:3].any()
+
+
+def test_a_pixels_mean_is_of_the_centres_as_they_were():
+    """Neighbours that take each other's colour do not take each other's mean."""
+    found = np.zeros((2, 4), np.float32)
+    found[1] = 1
+    average_samples(np.array([0, 1], np.int32), np.array([0, 0, 0, 1, 0, 1, 1, 1], np.int32), found[:0], found)
+    np.testing.assert_allclose(found[:, 0], [0.25, 0.75])
+
+
+@pytest.mark.parametrize("name", ["car", "bicycle"])
+def test_samples_take_the_colour_of_what_they_show(name):
+    """Of a centre less than a pixel away that shows the same thing, or their own; never of a centre that is too bright."""
+    geometry = placed(build(name, np.random.default_rng(1)), ground=True)
+    camera = orbit_camera(lens(160, 120, 0.6), 0.3, 0.2, 7.0)
+    visibility, owner, normals = rasterize(geometry, camera), owner_of(geometry), geometry.triangle_normals
+    samples = edge_samples(geometry, camera, visibility, owner)
+    radiance = np.full((160 * 120, 4), 0.5, np.float32)
+    radiance[::7] = 2 * BRIGHT
+    shown, centres = (samples.triangle, samples.inverse_depth), (visibility.triangle, visibility.inverse_depth)
+    like, rows = shared_samples(samples.pixels, *shown, *centres, owner, normals, radiance)
+    taken = np.flatnonzero(like >= 0)
+    source = like[taken]
+    assert len(taken) > 0.5 * len(like)
+    assert np.array_equal(
+        owner_at(geometry, samples.triangle[taken]), owner_at(geometry, visibility.triangle.reshape(-1)[source])
+    )
+    y, x = np.divmod(source, 160)
+    assert np.hypot(*(samples.position[taken] - np.stack([x, y], axis=1) - 0.5).T).max() < 1
+    assert (radiance[source, 0][samples.triangle[taken] >= 0] <= BRIGHT).all()
+    own = np.flatnonzero(like < 0)
+    k = ~like[own]  # each has its own colour, or that of another of its pixel
+    assert np.array_equal(rows[k // 4], own // 4)
+    assert np.array_equal(
+        owner_at(geometry, samples.triangle[own]), owner_at(geometry, samples.triangle[4 * rows[k // 4] + k % 4])
+    )
+    assert (like[4 * rows[k // 4] + k % 4] == ~k).all()

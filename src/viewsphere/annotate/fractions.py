@@ -12,9 +12,6 @@ from viewsphere.geometry.box import Bounds, overlap
 from viewsphere.model.camera import Camera
 from viewsphere.truth.geometry import Geometry
 
-TOUCHING = 1e-6
-"""Share of an object's height within which a triangle counts as lying in the ground."""
-
 
 def visible_and_cut(
     geometry: Geometry,
@@ -65,19 +62,7 @@ def _unobstructed(
             return False
     if geometry.ground_z is None:
         return True
-    return float(camera.center[2]) > geometry.ground_z and not _lies_in_ground(geometry, object_id)
-
-
-def _lies_in_ground(geometry: Geometry, object_id: int) -> bool:
-    """Whether a triangle lies in the ground's plane, where rounding decides which of the two is seen."""
-    from viewsphere.geometry.kernels_box import lies_below
-
-    base, stop = geometry.vertex_start[object_id - 1 : object_id + 1]
-    first, last = geometry.triangle_start[object_id - 1 : object_id + 1]
-    heights = geometry.vertices[base:stop, 2]
-    assert geometry.ground_z is not None
-    limit = geometry.ground_z + TOUCHING * (float(heights.max()) - geometry.ground_z)
-    return bool(lies_below(geometry.vertices, geometry.triangles, first, last, limit))
+    return float(camera.center[2]) > geometry.ground_z and not geometry.in_ground[object_id - 1]
 
 
 def _pixels_alone(geometry: Geometry, camera: Camera, object_id: int, own: Bounds | None) -> tuple[int, int]:

@@ -49,11 +49,14 @@ def annotate(
             f"annotate: frame {frame.index}: expected {count} objects, boxes and models, "
             f"got {len(placements)}, {len(boxes)}, {len(models)}"
         )
-    ids, areas, tight = instance_map(visibility.triangle, geometry.triangle_object, count)
+    height, width = visibility.triangle.shape
+    ids, areas = np.empty((height, width), np.int32), np.zeros(count + 1, np.int64)
+    tight = np.tile(np.array([width, height, 0, 0]), (count + 1, 1))
+    instance_map(visibility.triangle, geometry.triangle_object, ids, areas, tight)
     parts = pairwise(geometry.triangle_start[: count + 1])
     points = pairwise(geometry.vertex_start[: count + 1])
     projections = [
-        projected_bounds(camera, geometry.vertices, geometry.triangles, part, corners)
+        projected_bounds(camera, geometry.vertices, geometry.triangles, part, corners, geometry.is_used)
         for part, corners in zip(parts, points, strict=True)
     ]
     bounds, whole = [b for b, _ in projections], [w for _, w in projections]

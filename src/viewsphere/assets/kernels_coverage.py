@@ -2,7 +2,7 @@
 
 import math
 
-from viewsphere.geometry.jit import njit
+from viewsphere.geometry.jit import inner, njit
 
 
 @njit
@@ -23,7 +23,7 @@ def add_triangles(steps, corners):
             _add_span(steps, row, math.ceil(left - 0.5), math.ceil(right - 0.5))
 
 
-@njit
+@inner
 def _crossing(triangle, y):
     """Where a horizontal line enters and leaves a triangle that it meets."""
     left, right = math.inf, -math.inf
@@ -36,7 +36,7 @@ def _crossing(triangle, y):
     return left, right
 
 
-@njit
+@inner
 def _add_span(steps, row, first, end):
     """Add texels from `first` to before `end` of a row."""
     height, width = steps.shape[0], steps.shape[1] - 1

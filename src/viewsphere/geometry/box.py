@@ -79,21 +79,33 @@ def projected_bounds(
     triangles: NDArray[np.int32],
     faces: tuple[int, int],
     points: tuple[int, int],
+    is_used: NDArray[np.bool_] | None = None,
 ) -> tuple[Bounds | None, bool]:
     """The 2D box of triangles [faces) whose corners are world vertices [points), and whether the lens sees
-    all of them.
+    all of them. `is_used`, if known: of all vertices, whether a triangle has them.
 
     Triangles that cross the plane z = NEAR of the camera (or the limit of a distorted lens) are cut there.
     None if nothing of them is on the camera's side. Under lens distortion straight edges bend; they are
     followed to 1/100 px.
     """
-    from viewsphere.geometry.kernels_box import projected_bounds as kernel
+    from viewsphere.geometry import kernels_box as kernels
 
     if camera.distortion is not None:
         used = vertices[triangles[faces[0] : faces[1]]]
         x0, y0, x1, y1, whole = _distorted_bounds(camera, used)
-    else:
-        x0, y0, x1, y1, whole = kernel(vertices, triangles, *faces, *points, camera.K, camera.R, camera.t, NEAR)
+        return ((x0, y0, x1, y1) if x0 <= x1 else None), whole
+    if faces[0] == faces[1]:
+        return None, True
+    if is_used is None:
+        is_used = np.zeros(len(vertices), np.bool_)
+        is_used[triangles[faces[0] : faces[1]]] = True
+    base, stop = points
+    seen, used = np.empty((3, stop - base)), is_used[base:stop]
+    kernels.project(vertices, base, camera.K, camera.R, camera.t, seen)
+    u, v, w = seen if used.all() else seen[:, used]
+    if w.min() >= NEAR:
+        return (float(u.min()), float(v.min()), float(u.max()), float(v.max())), True
+    x0, y0, x1, y1, whole = kernels.cut_bounds(vertices, triangles, *faces, *points, camera.K, camera.R, camera.t, NEAR)
     return ((x0, y0, x1, y1) if x0 <= x1 else None), bool(whole)
 
 

@@ -1,4 +1,4 @@
-"""Compiled loops over triangles: the box of a projected model, and what lies in a plane."""
+"""Compiled loops over vertices, triangles and pixels: the box of a projected model, and of what is seen of it."""
 
 from __future__ import annotations
 
@@ -6,9 +6,11 @@ import numpy as np
 
 from viewsphere.geometry.jit import njit
 
+U = np.uintp
+
 
 @njit
-def projected_bounds(vertices, triangles, first, last, base, stop, k, r, t, near):
+def cut_bounds(vertices, triangles, first, last, base, stop, k, r, t, near):
     """Bounds (u0, v0, u1, v1) in pixels of the part with w >= near of triangles [first, last), and whether
     all of them is.
 
@@ -53,37 +55,37 @@ def projected_bounds(vertices, triangles, first, last, base, stop, k, r, t, near
 
 
 @njit
-def lies_below(vertices, triangles, first, last, z):
-    """Whether any triangle of [first, last) has all its corners at or below the height z."""
-    for f in range(first, last):
-        if vertices[triangles[f, 0], 2] <= z and vertices[triangles[f, 1], 2] <= z and vertices[triangles[f, 2], 2] <= z:
-            return True
-    return False
+def project(vertices, base, k, r, t, uvw):
+    """Pixels and distance along the axis of vertices from `base` on, (3, n)."""
+    for j in range(U(uvw.shape[1])):
+        i = U(base) + j
+        x, y, z = vertices[i, U(0)], vertices[i, U(1)], vertices[i, U(2)]
+        a = r[0, 0] * x + r[0, 1] * y + r[0, 2] * z + t[0]
+        b = r[1, 0] * x + r[1, 1] * y + r[1, 2] * z + t[1]
+        w = r[2, 0] * x + r[2, 1] * y + r[2, 2] * z + t[2]
+        uvw[U(0), j] = (k[0, 0] * a + k[0, 1] * b + k[0, 2] * w) / w
+        uvw[U(1), j] = (k[1, 1] * b + k[1, 2] * w) / w
+        uvw[U(2), j] = w
 
 
 @njit
-def instance_map(triangle, triangle_object, count):
-    """Ids (H, W) int32 of the objects seen, visible pixels (count + 1,), tight half-open boxes (count +
-    1, 4) by id.
+def instance_map(triangle, objects, ids, area, box):
+    """Ids (H, W) int32 of the objects seen; adds to their visible pixels (count + 1,), widens their tight half-open boxes
+    (count + 1, 4), by id.
     """
-    height, width = triangle.shape
-    ids = np.zeros((height, width), np.int32)
-    area = np.zeros(count + 1, np.int64)
-    box = np.zeros((count + 1, 4), np.int64)
-    box[:, 0], box[:, 1] = width, height
+    height, width = U(triangle.shape[0]), U(triangle.shape[1])
     for y in range(height):
         for x in range(width):
             face = triangle[y, x]
-            if face < 0:
-                continue
-            i = triangle_object[face]
-            if i == 0:
-                continue
-            ids[y, x] = i
-            area[i] += 1
-            box[i, 0] = min(box[i, 0], x)
-            box[i, 1] = min(box[i, 1], y)
-            if x >= box[i, 2]:
-                box[i, 2] = x + 1
-            box[i, 3] = y + 1
-    return ids, area, box
+            ids[y, x] = objects[U(face)] if face >= 0 else np.int32(0)
+        x = U(0)
+        while x < width:
+            own, first = ids[y, x], x
+            x += U(1)
+            while x < width and ids[y, x] == own:
+                x += U(1)
+            if own > 0:
+                i, left, top, right = U(own), np.intp(first), np.intp(y), np.intp(x)
+                area[i] += right - left
+                box[i, U(0)], box[i, U(1)] = min(box[i, U(0)], left), min(box[i, U(1)], top)
+                box[i, U(2)], box[i, U(3)] = max(box[i, U(2)], right), top + 1

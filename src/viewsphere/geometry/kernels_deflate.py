@@ -10,11 +10,12 @@ from functools import cache
 
 import numpy as np
 
-from viewsphere.geometry.jit import njit
+from viewsphere.geometry.jit import inner, njit
 
 U = np.uintp
 SHORTEST = 64  # bytes of a run that is worth two blocks
 LONGEST = 258
+AHEAD = 48  # words that are compared at once: whole pixels of 1 and of 3
 STORED = 65535
 
 
@@ -46,9 +47,12 @@ def deflate_runs(words, step, codes, widths, data, out, at):
     waiting, bits = np.uint64(0), 0
     i, literal = 0, 0
     while i < count:
-        a, b, c = words[i], words[i + second], words[i + third]
+        i = _next_run(words, step, i)
+        a, b, c = words[U(i)], words[U(i + second)], words[U(i + third)]
         j = i + step
-        while j < count and words[j] == a and words[j + second] == b and words[j + third] == c:
+        while j + AHEAD <= count and _repeats(words, step, j):
+            j += AHEAD
+        while j < count and words[U(j)] == a and words[U(j + second)] == b and words[U(j + third)] == c:
             j += step
         left = 4 * (j - i - step)
         is_run, is_last = left >= SHORTEST, j == count
@@ -78,7 +82,43 @@ def deflate_runs(words, step, codes, widths, data, out, at):
     return _send(out, at, waiting, (bits + 7) // 8 * 8)[0]
 
 
-@njit
+@inner
+def _next_run(words, step, i):
+    """Where the first run at or after i that is worth coding begins, or an earlier, shorter one; i is where a run begins.
+
+    One pair of neighbours is looked at where a run that is long enough has as many pairs.
+    """
+    count, first, stride = len(words), i, SHORTEST // 4 // step * step
+    while i + stride + step <= count:
+        at = i + stride - step
+        if words[U(at)] == words[U(at + step)] and words[U(at + step - 1)] == words[U(at + 2 * step - 1)]:
+            while at > first and _is_like(words, step, at - step):
+                at -= step
+            return at
+        i = at + step
+    return i
+
+
+@inner
+def _is_like(words, step, i):
+    """Whether a pixel is like the next."""
+    second, third = step // 3, 2 * (step // 3)
+    a, b, c = U(i), U(i + second), U(i + third)
+    s = U(step)
+    return words[a] == words[a + s] and words[b] == words[b + s] and words[c] == words[c + s]
+
+
+@inner
+def _repeats(words, step, j):
+    """Whether AHEAD words from j on are like those of the pixel before."""
+    different = np.uint32(0)
+    before, own = U(j - step), U(j)
+    for k in range(U(AHEAD)):
+        different |= words[own + k] ^ words[before + k]
+    return different == 0
+
+
+@inner
 def _send(out, at, waiting, bits):
     """Write the whole bytes of what is waiting."""
     while bits >= 8:

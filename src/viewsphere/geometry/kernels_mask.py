@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from viewsphere.geometry.jit import njit
+from viewsphere.geometry.jit import inner, njit
 
 # Headings: 0 right, 1 down, 2 left, 3 up. The foreground lies on the right hand of the walk.
 STEP_X = (1, 0, -1, 0)
@@ -14,7 +14,7 @@ LEFT_ROW, LEFT_COLUMN = (-1, 0, 0, -1), (0, 0, -1, -1)
 RIGHT_ROW, RIGHT_COLUMN = (0, 0, -1, -1), (0, -1, -1, 0)
 
 
-@njit
+@inner
 def _turn(mask, x, y, heading):
     """The heading after corner (x, y) of the padded mask; at a diagonal touch the walk stays with its own
     pixel.
@@ -26,7 +26,7 @@ def _turn(mask, x, y, heading):
     return heading
 
 
-@njit
+@inner
 def _push(ring, start, count, x, y):
     """Append a corner to the ring that began at `start`; a corner on the way straight on is replaced."""
     if count - start >= 2:
@@ -39,7 +39,7 @@ def _push(ring, start, count, x, y):
     return count + 1
 
 
-@njit
+@inner
 def _mark_loops(mask, seen, hole_below):
     """Walk every loop once: marks its horizontal edges, notes each hole at the corner above it, counts
     edges and rings.
@@ -80,7 +80,7 @@ def _mark_loops(mask, seen, hole_below):
     return edges, rings
 
 
-@njit
+@inner
 def _walk(mask, hole_below, ring, count, sx, sy, stack):
     """Append the outer ring that starts at (sx, sy) heading right, its holes joined by vertical bridges."""
     start, depth = count, 0
@@ -138,29 +138,6 @@ def trace_rings(mask):
                 ends[found] = count
                 found += 1
     return ring[:count], ends
-
-
-@njit
-def run_lengths(ids, wanted, x0, y0, x1, y1):
-    """COCO's uncompressed run lengths of `ids == wanted`, all of it in columns [x0, x1) and rows [y0, y1)."""
-    height, width = ids.shape
-    runs = np.empty((x1 - x0) * (y1 - y0 + 1) + 2, np.int64)
-    count, last, inside = 0, 0, False
-    for x in range(x0, x1):
-        for y in range(y0, y1):
-            if (ids[y, x] == wanted) != inside:
-                position = x * height + y
-                runs[count] = position - last
-                count, last, inside = count + 1, position, not inside
-        whole_columns = y0 == 0 and y1 == height
-        if inside and not (whole_columns and x + 1 < x1):
-            position = x * height + y1
-            if position == width * height:
-                break
-            runs[count] = position - last
-            count, last, inside = count + 1, position, False
-    runs[count] = width * height - last
-    return runs[: count + 1]
 
 
 @njit

@@ -39,12 +39,22 @@ def rle_of_id(ids: NDArray[np.int32], wanted: int, box: tuple[int, int, int, int
     """
     from pycocotools import mask as coco
 
-    from viewsphere.geometry.kernels_mask import run_lengths
-
     height, width = ids.shape
-    runs = run_lengths(ids, wanted, *box)
+    runs = np.diff(_ends(ids, wanted, box), prepend=0, append=height * width)
     code: Any = coco.frPyObjects({"size": [height, width], "counts": runs.tolist()}, height, width)
     return code["counts"].decode("ascii")
+
+
+def _ends(ids: NDArray[np.int32], wanted: int, box: tuple[int, int, int, int]) -> NDArray[np.intp]:
+    """Where `ids == wanted`, in column-major order, begins and ceases to be; all of it lies in the box."""
+    height, width = ids.shape
+    x0, y0, x1, y1 = box
+    rows = y1 - y0 if (y0, y1) == (0, height) else y1 - y0 + 1  # one more between columns, unless they touch
+    inside = np.zeros((x1 - x0, rows), np.bool_)
+    inside[:, : y1 - y0] = (ids[y0:y1, x0:x1] == wanted).T
+    x, y = np.divmod(np.flatnonzero(np.diff(inside.ravel(), prepend=False, append=False)), max(rows, 1))
+    ends = (x0 + x) * height + y0 + y
+    return ends[ends < height * width]
 
 
 def mask_box(mask: Mask) -> tuple[int, int, int, int] | None:

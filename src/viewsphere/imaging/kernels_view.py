@@ -8,7 +8,7 @@ from __future__ import annotations
 import numba as nb
 import numpy as np
 
-from viewsphere.geometry.jit import njit
+from viewsphere.geometry.jit import inner, njit
 
 f4 = nb.float32
 U = nb.uintp
@@ -33,11 +33,14 @@ def expose(radiance, matrix, p):
     yr, yg, yb = matrix[b, a], matrix[b, b], matrix[b, c]
     zr, zg, zb = matrix[c, a], matrix[c, b], matrix[c, c]
     for i in range(U(radiance.shape[0])):
-        red, green, blue = radiance[i, a], radiance[i, b], radiance[i, c]
-        x, y = max(zero, xr * red + xg * green + xb * blue), max(zero, yr * red + yg * green + yb * blue)
-        z = max(zero, zr * red + zg * green + zb * blue)
-        alpha = min(one, max(radiance[i, d], x, y, z))
-        s = one / max(alpha, f4(1e-6))
+        red, green, blue, alpha = radiance[i, a], radiance[i, b], radiance[i, c], radiance[i, d]
+        x, y, z = xr * red + xg * green + xb * blue, yr * red + yg * green + yb * blue, zr * red + zg * green + zb * blue
+        x, y, z = x if x > zero else zero, y if y > zero else zero, z if z > zero else zero
+        alpha = x if x > alpha else alpha
+        alpha = y if y > alpha else alpha
+        alpha = z if z > alpha else alpha
+        alpha = alpha if alpha < one else one
+        s = one / (alpha if alpha > f4(1e-6) else f4(1e-6))
         p[i], p[U(GREEN) + i], p[U(BLUE) + i], p[U(ALPHA) + i] = x * s, y * s, z * s, alpha
 
 
@@ -49,7 +52,7 @@ def standard(p):
         p[i] = min(p[i], KNEE) + (f4(1) - KNEE) * over / (f4(1) - KNEE + over)
 
 
-@njit(fastmath=FAST)
+@inner(fastmath=FAST)
 def _narkowicz(x):
     t = min(x, f4(100)) * GREY_IN
     return min(t * (f4(2.51) * t + f4(0.03)) / (t * (f4(2.43) * t + f4(0.59)) + f4(0.14)), f4(1))
@@ -91,20 +94,24 @@ def agx(p, sigmoid, decoded):
             p[j] = decoded[at] + (decoded[at + U(1)] - decoded[at]) * (x - f4(nb.int32(x)))
 
 
-@njit(fastmath=FAST)
+@inner(fastmath=FAST)
 def _byte(x, curve):
     return curve[U(nb.int32(x * f4(65535) + f4(0.5)))]
 
 
 @njit(fastmath=FAST)
 def over_bytes(p, background, curve, out):
-    """A block over the background (n or 1, 3), as bytes (n, 3)."""
+    """A block over the background (n or 1, 3), as bytes (n, 3). Its colours are lost: places in the curve stand there then."""
     step = U(0) if background.shape[0] == 1 else U(1)
+    at = p.view(np.int32)
     for c in range(U(3)):
         row = c * U(BLOCK)
         for i in range(U(out.shape[0])):
             under = background[i * step, c]
-            out[i, c] = _byte(under + (p[row + i] - under) * p[U(ALPHA) + i], curve)
+            at[row + i] = nb.int32((under + (p[row + i] - under) * p[U(ALPHA) + i]) * f4(65535) + f4(0.5))
+    for i in range(U(out.shape[0])):
+        red, green, blue = at[i], at[U(GREEN) + i], at[U(BLUE) + i]
+        out[i, U(0)], out[i, U(1)], out[i, U(2)] = curve[U(red)], curve[U(green)], curve[U(blue)]
 
 
 @njit(fastmath=FAST)

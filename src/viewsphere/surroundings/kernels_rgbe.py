@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from viewsphere.geometry.jit import njit
+from viewsphere.geometry.jit import inner, njit
 
 
 @njit
@@ -29,7 +29,7 @@ def decode_rows(data, rows, columns):
     return out, rows
 
 
-@njit
+@inner
 def _new_row(data, at, row):
     """Where the next row begins, -1 if this one is damaged."""
     at += 4
@@ -51,7 +51,7 @@ def _new_row(data, at, row):
     return at
 
 
-@njit
+@inner
 def _old_row(data, at, row):
     """The same; (1, 1, 1, n) repeats the texel before it n times, in a row of such n times 256, and so on."""
     j, shift = 0, 0

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from itertools import accumulate, pairwise
 from typing import Any
 
@@ -19,6 +19,9 @@ BACKGROUND = 0
 """Object, part and category id of scenery and ground: they have depth and normals but are background to every label."""
 
 GROUND_REACH = 1000.0
+
+TOUCHING = 1e-6
+"""Share of an object's height within which a triangle counts as lying in the ground."""
 
 STACKED = (
     "vertices",
@@ -69,6 +72,27 @@ class Geometry:
     def has_scenery(self) -> bool:
         """Whether anything but objects and the ground is there."""
         return self.object_count < len(self.vertex_start) - 1
+
+    @cached_property
+    def is_used(self) -> NDArray[np.bool_]:
+        """(V,): whether a vertex is a triangle's corner."""
+        used = np.zeros(len(self.vertices), np.bool_)
+        used[self.triangles] = True
+        return used
+
+    @cached_property
+    def in_ground(self) -> tuple[bool, ...]:
+        """Of each object, whether one of its triangles lies in the ground's plane, where rounding decides which is seen."""
+        if self.ground_z is None:
+            return (False,) * self.object_count
+        found: list[bool] = []
+        for i in range(self.object_count):
+            base, stop = self.vertex_start[i : i + 2]
+            first, last = self.triangle_start[i : i + 2]
+            heights = self.vertices[base:stop, 2]
+            low = heights <= self.ground_z + TOUCHING * (float(heights.max(initial=self.ground_z)) - self.ground_z)
+            found.append(bool(low.any() and low[self.triangles[first:last] - base].all(axis=1).any()))
+        return tuple(found)
 
 
 def build_geometry(placements: Sequence[Placement], meshes: Sequence[Mesh], ground: bool, label_alpha: float) -> Geometry:
@@ -147,7 +171,7 @@ def _labels(placement: Placement, mesh: Mesh) -> NDArray[np.int32]:
 
 def _ground(parts: Sequence[Geometry]) -> Geometry:
     """Two triangles below all that is placed, counter-clockwise seen from above."""
-    used = np.concatenate([part.vertices[_used(part)] for part in parts])
+    used = np.concatenate([part.vertices[part.is_used] for part in parts])
     low, high = (used.min(axis=0), used.max(axis=0)) if len(used) else (np.zeros(3), np.zeros(3))
     size = float(np.max(high - low)) or 1.0
     x, y = (low[:2] + high[:2]) / 2
@@ -173,12 +197,6 @@ def _ground(parts: Sequence[Geometry]) -> Geometry:
         object_count=0,
         ground_z=float(low[2]),
     )
-
-
-def _used(part: Geometry) -> NDArray[np.bool_]:
-    used = np.zeros(len(part.vertices), np.bool_)
-    used[part.triangles] = True
-    return used
 
 
 def _joined(arrays: Sequence[NDArray[Any]], empty: tuple[int, ...], dtype: type) -> NDArray[Any]:

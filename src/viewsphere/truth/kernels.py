@@ -12,7 +12,7 @@ import math
 
 import numpy as np
 
-from viewsphere.geometry.jit import njit
+from viewsphere.geometry.jit import inner, njit
 
 EPSILON = 1e-5  # pixels a bounding box is widened by: more than the edge functions' rounding
 BEHIND = -(1 << 30)
@@ -58,7 +58,7 @@ def cells(q, samples, x0, y0, width, height, cell):
                 cell[i, k] = BEHIND
 
 
-@njit
+@inner
 def is_surface(cutouts, row, b0, b1, b2):
     """Whether the point with these barycentrics of cut-out triangle `row` is surface; `cutouts` is `Cutouts.arrays`."""
     texels, layout, levels, material, corners = cutouts
@@ -70,7 +70,7 @@ def is_surface(cutouts, row, b0, b1, b2):
     return alpha * levels[material[row], 0] >= levels[material[row], 1]
 
 
-@njit
+@inner
 def _texel(u, size, wrap):
     """Index of the nearest texel; wrap as in `mesh.WRAPS`."""
     if wrap == CLAMP:
@@ -83,13 +83,13 @@ def _texel(u, size, wrap):
     return min(np.int64(u * size), size - 1)
 
 
-@njit
+@inner
 def edge(a, b):
     """Coefficients of det[p, a, b] in p; those of edge(b, a) are exactly the opposite."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
-@njit
+@inner
 def plane(q0, q1, q2):
     """Normal of the triangle and its product with q0, from differences: exact to the triangle's size."""
     ax, ay, az = q1[0] - q0[0], q1[1] - q0[1], q1[2] - q0[2]
@@ -98,13 +98,13 @@ def plane(q0, q1, q2):
     return nx, ny, nz, nx * q0[0] + ny * q0[1] + nz * q0[2]
 
 
-@njit
+@inner
 def negated(e):
     """The opposite of three coefficients."""
     return -e[0], -e[1], -e[2]
 
 
-@njit
+@inner
 def _inside(a, b, c, px, f0, f1, f2):
     return a[0] * px + f0 >= 0.0 and b[0] * px + f1 >= 0.0 and c[0] * px + f2 >= 0.0
 
@@ -155,7 +155,7 @@ def draw(q, cell, triangles, span, canvas, cutout, cutouts, nearest, seen):
             _draw_rows(t, e0, e1, e2, n, box, canvas, nearest, seen)
 
 
-@njit
+@inner
 def _hidden(nearest, xa, ya, xb, yb, most):
     """Whether all pixels of the box already show something nearer than 1/z = most."""
     for y in range(max(ya, 0), yb + 1):
@@ -165,7 +165,7 @@ def _hidden(nearest, xa, ya, xb, yb, most):
     return True
 
 
-@njit
+@inner
 def _draw_small(t, e0, e1, e2, n, box, canvas, nearest, seen):
     """Draw a narrow triangle: every pixel of its box is tested."""
     xa, ya, xb, yb = box
@@ -186,7 +186,7 @@ def _draw_small(t, e0, e1, e2, n, box, canvas, nearest, seen):
                 seen[uy, ux] = t
 
 
-@njit
+@inner
 def _draw_rows(t, e0, e1, e2, n, box, canvas, nearest, seen):
     """Draw a wide triangle row by row: where it begins and ends is computed, then settled by the exact test.
 
@@ -224,13 +224,13 @@ def _draw_rows(t, e0, e1, e2, n, box, canvas, nearest, seen):
             seen[uy, ux] = t if better else seen[uy, ux]
 
 
-@njit
+@inner
 def crossing_at(e, samples):
     """What f is multiplied by to give the sample at which e x + f is 0; 0 for an edge along the row."""
     return -samples / e if e != 0.0 else 0.0
 
 
-@njit
+@inner
 def _draw_checked(t, q0, q1, q2, box, canvas, bounds, cutout, cutouts, nearest, seen):
     """Draw a cut-out, or a sliver whose facing is uncertain: either sign will do, 1/z stays within the corners' `bounds`."""
     xa, ya, xb, yb = box
@@ -251,7 +251,7 @@ def _draw_checked(t, q0, q1, q2, box, canvas, bounds, cutout, cutouts, nearest, 
                 seen[y, x] = t
 
 
-@njit
+@inner
 def hits_surface(cutouts, cutout, e0, e1, e2):
     """Whether the triangle has no cut-out, or is surface where its edges' functions have these values."""
     total = e0 + e1 + e2

@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from viewsphere.geometry.jit import njit
+from viewsphere.geometry.jit import inner, njit
 
 ONE = np.float32(1)
 NONE = -2  # no triangle, nor the background's -1
@@ -38,7 +38,7 @@ def labels(seen, table, empty, out):
             out[y, x] = table[np.uintp(t)] if t >= 0 else empty
 
 
-@njit
+@inner
 def _edges(q, i0, i1, i2, px, py, pz):
     """det[p, q_j, q_k] of the three edges. Taking p's share from each corner first keeps them exact for tiny triangles."""
     a, b, c = np.uintp(0), np.uintp(1), np.uintp(2)
@@ -60,7 +60,7 @@ def _edges(q, i0, i1, i2, px, py, pz):
     return e0, e1, e2
 
 
-@njit
+@inner
 def _weights(q, i0, i1, i2, px, py, pz):
     """Barycentrics of the ray in the triangle."""
     e0, e1, e2 = _edges(q, i0, i1, i2, px, py, pz)
@@ -126,7 +126,7 @@ def normals_geometric(seen, triangle_normals, rays, camera_from_p, rotation, out
             out[y, x, 0], out[y, x, 1], out[y, x, 2] = nx, ny, nz
 
 
-@njit
+@inner
 def _rotated(r, x, y, z):
     return (
         r[0, 0] * x + r[0, 1] * y + r[0, 2] * z,
@@ -186,7 +186,7 @@ def normals_shading(seen, triangles, q, rays, values, side, triangle_normals, ca
             last = t if side[ut] == 2 or side[ut] == -2 else NONE
 
 
-@njit
+@inner
 def _towards(normal, r, dx, dy, dz):
     """The world normal in camera axes, turned towards the camera along ray d."""
     x, y, z = _rotated(r, np.float64(normal[0]), np.float64(normal[1]), np.float64(normal[2]))

@@ -13,7 +13,7 @@ import math
 
 import numpy as np
 
-from viewsphere.geometry.jit import njit
+from viewsphere.geometry.jit import inner, njit
 from viewsphere.truth.kernels import NEVER, edge, hits_surface, negated, plane
 
 LEAF = 8  # pixels of a leaf's side
@@ -64,7 +64,7 @@ def build_tree(rays, levels):
     return boxes
 
 
-@njit
+@inner
 def _on_face(face, x, y, z):
     """Projection on a cube's face (0 to 5: +z, -z, +x, -x, +y, -y) and the distance along its axis, not positive if behind."""
     sign = 1.0 - 2.0 * (face % 2)
@@ -92,7 +92,7 @@ def build_faces(rays, count, size):
     return cells
 
 
-@njit
+@inner
 def _cell(u, size):
     return min(np.int64((u + 1.0) * 0.5 * size), size - 1)
 
@@ -127,17 +127,17 @@ def pixel_box(cells, q0, q1, q2):
     return (xb - xa + 1) * (yb - ya + 1) <= MANY_PIXELS or xb < 0, (xa, ya, xb, yb)
 
 
-@njit
+@inner
 def _highest(e, box):
     return max(e[0] * box[0], e[0] * box[3]) + (max(e[1] * box[1], e[1] * box[4]) + max(e[2] * box[2], e[2] * box[5]))
 
 
-@njit
+@inner
 def _lowest(e, box):
     return min(e[0] * box[0], e[0] * box[3]) + (min(e[1] * box[1], e[1] * box[4]) + min(e[2] * box[2], e[2] * box[5]))
 
 
-@njit
+@inner
 def _may_hit(e0, e1, e2, sliver, box):
     """Whether some ray in the box may pass the test of all three edges, with the other sign too for a sliver."""
     if box[0] > box[3]:
@@ -147,7 +147,7 @@ def _may_hit(e0, e1, e2, sliver, box):
     return sliver and _lowest(e0, box) <= 0.0 and _lowest(e1, box) <= 0.0 and _lowest(e2, box) <= 0.0
 
 
-@njit
+@inner
 def _bounds(q0, q1, q2, unit):
     """Least and greatest 1/s on a triangle."""
     if unit:
@@ -167,7 +167,7 @@ def limits(q0, q1, q2, det, unit):
     return sliver, _bounds(q0, q1, q2, unit) if sliver else (0.0, np.inf)
 
 
-@njit
+@inner
 def _distance(a, b):
     x, y, z = a[0] - b[0], a[1] - b[1], a[2] - b[2]
     return math.sqrt(x * x + y * y + z * z)
@@ -246,7 +246,7 @@ def touched(e0, e1, e2, sliver, levels, boxes, window, leaves):
     return found
 
 
-@njit
+@inner
 def _draw_box(t, a, b, c, n, sliver, bounds, rays, box, origin, cutout, cutouts, nearest, seen):
     """Test each ray of a box of pixels (both ends included), as far as the canvas reaches."""
     height, width = nearest.shape

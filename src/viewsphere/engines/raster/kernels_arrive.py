@@ -16,7 +16,6 @@ import numba as nb
 
 from viewsphere.engines.raster.kernels_block import (
     BARY1,
-    BARY2,
     BLOCK,
     GX,
     GY,
@@ -64,7 +63,6 @@ from viewsphere.engines.raster.kernels_shadow import (
     HALF_A,
     HALF_B,
     HIGH,
-    INNER,
     LOW,
     MIDDLE,
     NEAREST,
@@ -79,20 +77,20 @@ from viewsphere.engines.raster.kernels_shadow import (
     TO_B1,
 )  # fmt: skip
 from viewsphere.engines.raster.kernels_texture import FAST
-from viewsphere.geometry.jit import njit
+from viewsphere.geometry.jit import inner, njit
 
 f4 = nb.float32
 U = nb.uintp
 DISTANT, POINT, SPOT, AREA = 0, 1, 2, 3
 # Rows while a view is looked at; the irradiance comes after. Coordinates in textures are read by then.
 U_, V_, Q_, DU, DV, NEAR, SOFT, RADIUS, STATE, FACING = T1, T2, T3, T4, T5, T6, T7, IR, IG, IB
-CELL, OFF_U, OFF_V, HIGH_, ACROSS_, DOWN_ = U0, V0, U1, V1, BARY1, BARY2
-LOW_ = CELL
+CELL, OFF_U, OFF_V, DOWN_, OWN = U0, V0, U1, V1, BARY1
+LOW_, HIGH_, ACROSS_ = CELL, OFF_U, OFF_V
 SHARPEST, BLUNTEST = 1.2, 16.0  # texels: least half width of a filter, and most that a pixel's size asks for
 GRAZING = 0.02  # a plane's slope in a map is limited to that of a light this far above it
 
 
-@njit(fastmath=FAST, inline="always")
+@inner(fastmath=FAST, inline="always")
 def _is_any_nearer(window, rows, wide, x, y, step, near, du, dv):
     """Whether any texel in rows so wide lies before the plane: on most surfaces none does, and that is quickly told."""
     hits, per_row = f4(0), f4(1) / wide
@@ -104,7 +102,7 @@ def _is_any_nearer(window, rows, wide, x, y, step, near, du, dv):
     return hits > f4(0)
 
 
-@njit(fastmath=FAST, **INNER)
+@inner(fastmath=FAST)
 def _blockers(window, rows, wide, x, y, step, axes, q, near, du, dv, softest):
     """Number of texels in rows so wide that hide part of the light, and the sum of their distances in q.
 
@@ -131,7 +129,7 @@ def _blockers(window, rows, wide, x, y, step, axes, q, near, du, dv, softest):
     return count, total
 
 
-@njit(fastmath=FAST, **INNER)
+@inner(fastmath=FAST)
 def _filtered(window, rows, wide, x, y, step, axes, q, near, du, dv, softest, radius_a, radius_b):
     """Share of the texels within a filter of these half widths (texels of the map) that hide nothing of the light."""
     zero, one, half = f4(0), f4(1), f4(0.5)
@@ -169,7 +167,7 @@ def _power(x):
     return Lanes(x.builder, x.builder.bitcast((x.bits() & 0x7F800000).value, x.value.type))
 
 
-@njit(fastmath=FAST, inline="always")
+@inner(fastmath=FAST, inline="always")
 def _level_for(radius, most, size):
     """The finest level of a map on which a radius is at most so many texels."""
     level = nb.int32(0)
@@ -182,6 +180,19 @@ def _level_for(radius, most, size):
 def _seen(row, first, x, y, z):
     """A row of a view's matrix times a point."""
     return row.one(first) * x + row.one(first + 1) * y + row.one(first + 2) * z + row.one(first + 3)
+
+
+@inner(fastmath=FAST)
+def _is_seen(count, row, b):
+    """Whether any sample that has light is on a view's map."""
+    x0, x1, x2, x3, y0, y1, y2, y3 = row[0], row[1], row[2], row[3], row[4], row[5], row[6], row[7]
+    w0, w1, w2, w3, read, found = row[12], row[13], row[14], row[15], row[READ], f4(0)
+    for i in range(U(count)):
+        x, y, z = b[U(PX) + i], b[U(PY) + i], b[U(PZ) + i]
+        u, v = abs(x0 * x + x1 * y + x2 * z + x3), abs(y0 * x + y1 * y + y2 * z + y3)
+        edge = read * (w0 * x + w1 * y + w2 * z + w3)
+        found += f4(1) if (u <= edge) & (v <= edge) & (b[U(FACING) + i] > f4(0)) else f4(0)
+    return found > f4(0)
 
 
 @lanewise
@@ -223,52 +234,71 @@ def _find_cells(side, b):
     b.put((OFF_U, OFF_V), (u - (x + 1) * step, v - (y + 1) * step))
 
 
-@njit(fastmath=FAST, inline="always")
+@inner(fastmath=FAST, inline="always")
 def _read_cells(count, at, bounds, b):
-    """The planes of each sample's cell; LOW_ takes the place of CELL."""
-    for i in range(count):
-        k = at + U(nb.int32(b[CELL + i]))
-        b[LOW_ + i], b[HIGH_ + i], b[ACROSS_ + i], b[DOWN_ + i] = (
-            bounds[k, U(LOW)],
-            bounds[k, U(HIGH)],
-            bounds[k, U(ACROSS)],
-            bounds[k, U(DOWN)],
-        )
+    """The planes of each sample's cell where the sample is, and their slopes; they take the places of CELL, OFF_U, OFF_V."""
+    for i in range(U(count)):
+        k = at + U(nb.int32(b[U(CELL) + i]))
+        across, down = bounds[k, U(ACROSS)], bounds[k, U(DOWN)]
+        on = across * b[U(OFF_U) + i] + down * b[U(OFF_V) + i]
+        b[U(LOW_) + i], b[U(HIGH_) + i] = bounds[k, U(LOW)] + on, bounds[k, U(HIGH)] + on
+        b[U(ACROSS_) + i], b[U(DOWN_) + i] = across, down
 
 
 @lanewise
 def _judge(widest, b):
     """STATE of samples that lie before all that is within RADIUS (1) or behind it (0); of others a smaller RADIUS."""
-    near, radius, state, across, down = b.get(NEAR, RADIUS, STATE, ACROSS_, DOWN_)
-    on = across * b[OFF_U] + down * b[OFF_V]
+    near, radius, across, down, low = b.get(NEAR, RADIUS, ACROSS_, DOWN_, LOW_)
     tilt = (size(across - b[DU]) + size(down - b[DV])) * (radius + 0.5)
-    low, high = b[LOW_] + on, b[HIGH_] + on
-    told = where(near + tilt <= low, 1, where(near - tilt > high, 0, state))
-    b[STATE] = where(state.equals(-1), told, state)
+    b[STATE] = where(near + tilt <= low, 1, where(near - tilt > b[HIGH_], 0, -1))
     gap = most(b[Q_] - low + (size(across) + size(down)) * radius, 0)
     b[RADIUS] = least(widest * gap + b[SOFT], radius)
 
 
-@njit(fastmath=FAST, **INNER)
-def _untold(count, b):
-    """How many samples on the map are neither lit nor dark yet."""
-    left = f4(0)
-    for i in range(count):
-        left += f4(1) if b[STATE + i] == f4(-1) else f4(0)
+@inner
+def _gather_on(count, b):
+    """Move the samples on the map together, OWN being what they were; gives their number."""
+    left = U(0)
+    for i in range(U(count)):
+        if b[U(STATE) + i] == f4(-1):
+            b[U(OWN) + left] = f4(i)
+            left = _move(i, left, b)
     return left
 
 
-@njit(fastmath=FAST, **INNER)
+@inner
+def _settle(count, b):
+    """Put what is told into SHARE and FACING, and move the other samples together; gives their number."""
+    left = U(0)
+    for i in range(U(count)):
+        state, own = b[U(STATE) + i], U(nb.int32(b[U(OWN) + i]))
+        if state >= f4(0):
+            b[U(SHARE) + own] *= state
+            b[U(FACING) + own] = f4(0)
+        else:
+            b[U(OWN) + left] = b[U(OWN) + i]
+            left = _move(i, left, b)
+    return left
+
+
+@inner(inline="always")
+def _move(i, to, b):
+    """What is known of a sample on the map; gives the place after it."""
+    for row in range(U(U_), U(SOFT + 1), U(BLOCK)):
+        b[row + to] = b[row + i]
+    b[U(RADIUS) + to] = b[U(RADIUS) + i]
+    return to + U(1)
+
+
+@inner(fastmath=FAST)
 def _search(count, row, grid, depth, window, b):
-    """STATE of the other samples: within RADIUS for blockers, then within their penumbra."""
+    """STATE of samples that are searched: within RADIUS for blockers, then within their penumbra."""
     one, half = f4(1), f4(0.5)
     axes = (
         row[HALF_A], row[HALF_B], row[ROUND], row[TO_A0], row[TO_A1], row[TO_B0], row[TO_B1],
     )  # fmt: skip
     size, fine = nb.int32(grid[SIZE]), row[FINE] > f4(0)
     for i in range(count):
-        if b[STATE + i] != -one:
-            continue
         u, v, q, near, du, dv = b[U_ + i], b[V_ + i], b[Q_ + i], b[NEAR + i], b[DU + i], b[DV + i]
         softest, radius = b[SOFT + i], b[RADIUS + i]
         share, radius_a, radius_b = one, softest, softest
@@ -375,30 +405,19 @@ def _from_afar(place, radius, b):
 
 
 @lanewise
-def _turn(b):
-    """SHARE of a light before its shadows: what the surface's tilt leaves."""
-    way, arrives = b.get(LX, LY, LZ), b[T0]
-    share = clamp(1.6 + 4 * dot(b.get(GX, GY, GZ), way))
-    b[SHARE] = where((dot(b.get(NX, NY, NZ), way) > 0) & (arrives > 0), share, 0)
+def _turn(place, near, b):
+    """SHARE of a light before its shadows: what the surface's tilt leaves; FACING, of samples that have light.
 
-
-@lanewise
-def _face(place, near, b):
-    """FACING, of samples that have light; near: 1 for a light at a place, 0 for a distant one.
-
-    The views look from a rectangle's middle, which is not where most of its light comes from.
+    near: 1 for a light at a place, 0 for a distant one. The views look from a rectangle's middle, which is not where most of
+    its light comes from.
     """
+    way, normal = b.get(LX, LY, LZ), b.get(GX, GY, GZ)
+    share = clamp(1.6 + 4 * dot(normal, way))
+    share = where((dot(b.get(NX, NY, NZ), way) > 0) & (b[T0] > 0), share, 0)
+    b[SHARE] = share
     way = tuple(place.one(k) - b[row] * near for k, row in enumerate((PX, PY, PZ)))
-    facing = most(dot(b.get(GX, GY, GZ), way), GRAZING * root(dot(way, way)))
-    b[FACING] = where(b[SHARE] > 0, facing, 0)
-
-
-@lanewise
-def _tell(b):
-    """SHARE and FACING after a view."""
-    state = b[STATE]
-    b[SHARE] = b[SHARE] * where(state >= 0, state, 1)
-    b[FACING] = where(state >= 0, 0, b[FACING])
+    facing = most(dot(normal, way), GRAZING * root(dot(way, way)))
+    b[FACING] = where(share > 0, facing, 0)
 
 
 @lanewise
@@ -407,7 +426,7 @@ def _shine(color, b):
         b[row] = color.one(k) * b[T0]
 
 
-@njit(fastmath=FAST, **INNER)
+@inner(fastmath=FAST)
 def look(count, form, grid, depth, bounds, k, window, b):
     """Multiply SHARE by what view k (uintp) of these `Views` leaves of its light, where the samples are on its map.
 
@@ -416,20 +435,20 @@ def look(count, form, grid, depth, bounds, k, window, b):
     (256,) float32: scratch.
     """
     row, places = form[k], grid[k]
-    _see(count, row, b)
-    left = _untold(count, b)
-    if left == f4(0):
+    if not _is_seen(count, row, b):
         return
+    _see(count, row, b)
     _project(count, row, b)
+    left = nb.intp(_gather_on(count, b))
     for _ in range(3):
-        if left > f4(0):
-            _find_cells(count, f4(places[CELLS]), b)
-            _read_cells(count, U(places[BOUNDS_AT]), bounds, b)
-            _judge(count, max(row[HALF_A], row[HALF_B]), b)
-            left = _untold(count, b)
-    if left > f4(0):
-        _search(count, row, places, depth, window, b)
-    _tell(count, b)
+        if left > 0:
+            _find_cells(left, f4(places[CELLS]), b)
+            _read_cells(left, U(places[BOUNDS_AT]), bounds, b)
+            _judge(left, max(row[HALF_A], row[HALF_B]), b)
+            left = nb.intp(_settle(left, b))
+    if left > 0:
+        _search(left, row, places, depth, window, b)
+        _settle(left, b)
 
 
 @njit(fastmath=FAST)
@@ -447,11 +466,9 @@ def arrive(count, lights, k, b):
         _from_area(count, place, lights.axis[k], lights.right[k], lights.up[k], radius, b)
     else:
         _from_place(count, place, lights.axis[k], lights.cone[k], radius, b)
-    _turn(count, b)
+    _turn(count, place, f4(0) if kind == DISTANT else f4(1), b)
     first, stop, views = lights.first[k], lights.first[k + U(1)], lights.views
-    if first < stop:
-        _face(count, place, f4(0) if kind == DISTANT else f4(1), b)
-        # For each sample the first view that it is on.
-        for which in range(first, stop):
-            look(count, views.form, views.grid, views.depth, views.bounds, U(which), b[U0 : U0 + 2 * BLOCK], b)
+    # For each sample the first view that it is on.
+    for which in range(first, stop):
+        look(count, views.form, views.grid, views.depth, views.bounds, U(which), b[U0 : U0 + 2 * BLOCK], b)
     _shine(count, lights.color[k], b)

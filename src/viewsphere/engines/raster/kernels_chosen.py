@@ -6,70 +6,63 @@ number of the next chosen one, so that a triangle finds what it may cover in a r
 
 from __future__ import annotations
 
+from typing import Any
+
 import numba as nb
 import numpy as np
+from llvmlite import ir
 
+from viewsphere.engines.raster.kernels_lanes import LANES, Lanes, Rows, lanewise, size, store
 from viewsphere.geometry.jit import njit
 
 f4 = nb.float32
 U = nb.uintp
+BYTES = ir.VectorType(ir.IntType(8), LANES)
 TILE = 8  # pixels of a tile's side
 CLOSED = np.int32(2**31 - 1)
 
 
 @njit
-def differing(triangle, depth, owner, normals):
-    """Pixels that look different from the one beside, above or below: uint8, one after another, padded to whole words of 8.
+def compare(triangle, depth, owner, normals, room, owners, beside, above):
+    """Set in beside, above (H * W + 8,) uint8 where a pixel shows another surface than the one to its left (any, in the first
+    column), and than the one above (from the second row on).
 
-    owner (T,) int32: equal where neighbouring triangles look alike; normals (T, 3).
+    owner (T,) int32: equal where neighbouring triangles look alike; normals (T, 3). room (8, W + 16) float32 and owners
+    (4, W + 16) int32 hold what this row and the last one show: normals (any, where none) and depth, owner (-1, where none) and
+    triangle.
     """
     height, width = triangle.shape
-    marks = np.zeros((height * width + 7) // 8 * 8, np.uint8)
-    flags = np.empty(width, np.uint8)
-    above, here = np.empty((4, width), np.float32), np.empty((4, width), np.float32)
-    one = U(1)
+    a, b, c, d, eight = U(0), U(1), U(2), U(3), U(8)
+    stride = U(room.shape[1])
+    reals, wholes = room.reshape(-1), owners.reshape(-1)
     for y in range(U(height)):
-        _gather_row(triangle[y], owner, normals, here)
-        row = marks[y * U(width) : (y + one) * U(width)]
-        for k in range(U(2)):  # beside, above
-            if k > y:
-                continue
-            other, shift = y - k, one - k
-            _compare_rows(triangle[y], triangle[other], depth[y], depth[other], here, above if k else here, shift, flags)
-            last = marks[other * U(width) : (other + one) * U(width)]
-            for x in range(shift, U(width)):
-                row[x] |= flags[x]
-            for x in range(shift, U(width)):
-                last[x - shift] |= flags[x]
-        above, here = here, above
-    return marks
+        m, k = (y & b) * U(4), (y & b) * c
+        for x in range(U(width)):
+            t, at = triangle[y, x], x + eight
+            u = U(max(t, np.int32(0)))
+            room[m, at], room[m + b, at], room[m + c, at] = normals[u, a], normals[u, b], normals[u, c]
+            room[m + d, at], owners[k, at], owners[k + b, at] = depth[y, x], owner[u] | (t >> np.int32(31)), t
+        here, whole = m * stride + eight, k * stride + eight
+        _differ(width, reals, here, here - b, wholes, whole, whole - b, stride, beside, y * U(width))
+        if y > 0:
+            there, other = (U(4) - m) * stride + eight, (c - k) * stride + eight
+            _differ(width, reals, here, there, wholes, whole, other, stride, above, y * U(width))
 
 
-@njit
-def _gather_row(triangle, owner, normals, out):
-    """Normal (any, where none) and owner (bits; -1, where none) of what a row shows."""
-    a, b, c = U(0), U(1), U(2)
-    owners = out[3].view(np.int32)
-    for x in range(U(triangle.shape[0])):
-        t = triangle[x]
-        u = U(max(t, np.int32(0)))
-        out[a, x], out[b, x], out[c, x] = normals[u, a], normals[u, b], normals[u, c]
-        owners[x] = owner[u] | (t >> np.int32(31))
-
-
-@njit
-def _compare_rows(t, s, p, q, n, m, shift, flags):
-    """Which pixels of one row show another surface than those of another, or than those `shift` to the left.
+@lanewise
+def _differ(reals: Rows, p: Any, q: Any, wholes: Rows, k: Any, m: Any, stride: Any, flags: Rows, at: Any) -> None:
+    """Where the pixels of which `compare` has put what they show at p and k show another surface than those at q and m.
 
     It is the same if owners are, the planes differ by less than 20 degrees, and the depths by less than 1 %.
     """
-    a, b, c = U(0), U(1), U(2)
-    o, w = n[3].view(np.int32), m[3].view(np.int32)
-    for x in range(shift, U(t.shape[0])):
-        v = x - shift
-        bend = abs(n[a, x] * m[a, v] + n[b, x] * m[b, v] + n[c, x] * m[c, v])
-        far = max(p[x], q[v]) > min(p[x], q[v]) * f4(1.01)
-        flags[x] = (t[x] != s[v]) & ((o[x] != w[v]) | (bend < f4(0.94)) | far)
+    to = reals[p,] * reals[q,] + reals[p, stride] * reals[q, stride]
+    bend = size(to + reals[p, stride, stride] * reals[q, stride, stride])
+    z, far = reals[p, stride, stride, stride], reals[q, stride, stride, stride]
+    # one is farther by 1 %
+    apart = (z > far * 1.01) | (far > z * 1.01)
+    same = wholes[k,].equals(wholes[m,]) & (bend >= 0.94)
+    flag = (same ^ 1 | apart) & (wholes[k, stride].equals(wholes[m, stride]) ^ 1)
+    store(flags.data, flags.builder.add(flags.i, at), Lanes(flag.builder, flag.builder.zext(flag.value, BYTES)))
 
 
 @njit

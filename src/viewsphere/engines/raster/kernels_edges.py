@@ -12,7 +12,8 @@ import math
 import numba as nb
 import numpy as np
 
-from viewsphere.geometry.jit import njit
+from viewsphere.engines.raster.kernels_four import nearer, put_before
+from viewsphere.geometry.jit import inner, njit
 from viewsphere.truth.kernels import EPSILON, NEVER, crossing_at, edge, hits_surface, negated, plane
 
 f4 = nb.float32
@@ -74,7 +75,7 @@ def draw(  # noqa: PLR0912, PLR0915, one loop, whose state is not worth handing 
     numbered pixel's farthest sample. Returns how many pixels are numbered in the end.
     """
     height, width = triangle.shape
-    found, sx, sy, inverse, inside, words = room
+    found, inverse = room
     a, b, c, d = U(0), U(1), U(2), U(3)
     lowest, highest = offsets[a, d], offsets[a, b]  # the outermost along either axis
     for o in range(U(order.shape[0])):
@@ -127,49 +128,43 @@ def draw(  # noqa: PLR0912, PLR0915, one loop, whose state is not worth handing 
                         found[n] = row << U(16) | U(x)
                         n += U((x >= left) & (x <= right))
             for j in range(n):
-                x, v = float(found[j] & np.uint32(0xFFFF)), float(found[j] >> np.uint32(16))
-                for i in range(U(4)):
-                    sx[U(4) * j + i], sy[U(4) * j + i] = x + offsets[a, i], v + offsets[b, i]
-            for m in range(U(4) * n):
-                px, py = sx[m], sy[m]
-                f0, f1, f2 = e0[1] * py + e0[2], e1[1] * py + e1[2], e2[1] * py + e2[2]
-                inside[m] = (e0[0] * px + f0 >= 0.0) & (e1[0] * px + f1 >= 0.0) & (e2[0] * px + f2 >= 0.0)
-                inverse[m] = min(max(nx * px + (ny * py + nz), low), high)
-            if cutout[t] >= 0:
-                for m in range(U(4) * n):
-                    if inside[m]:
-                        px, py = sx[m], sy[m]
-                        f0, f1, f2 = e0[1] * py + e0[2], e1[1] * py + e1[2], e2[1] * py + e2[2]
-                        inside[m] = hits_surface(cutouts, cutout[t], e0[0] * px + f0, e1[0] * px + f1, e2[0] * px + f2)
-            for j in range(n):
-                if words[j] == 0:
-                    continue
-                row, column, m = U(found[j] >> np.uint32(16)), U(found[j] & np.uint32(0xFFFF)), U(4) * j
+                row, column = U(found[j] >> np.uint32(16)), U(found[j] & np.uint32(0xFFFF))
                 k = grid[row, column]
+                u = U(k)
+                if k < 0:
+                    if count == pixels.shape[0]:
+                        continue
+                    u = U(count)
+                    for i in range(U(4)):
+                        nearest[u, i], seen[u, i] = depth[row, column], triangle[row, column]
+                x, v = float(np.int32(column)), float(np.int32(row))
+                which = nearer((e0, e1, e2), (nx, ny, nz), (low, high), x, v, offsets, nearest, u, inverse)
+                if which != 0 and cutout[t] >= 0:
+                    which &= _hits((e0, e1, e2), x, v, offsets, cutouts, cutout[t])
+                if which == 0:
+                    continue
                 if k < 0:
                     ahead = f4(0)
                     for i in range(U(4)):
-                        ahead = max(ahead, inverse[m + i] if inside[m + i] else f4(0))
-                    if ahead <= limit[row, column] or count == pixels.shape[0]:
+                        ahead = max(ahead, inverse[i] if (which >> i) & 1 else f4(0))
+                    if ahead <= limit[row, column]:
                         continue
-                    k = np.int32(count)
+                    grid[row, column], pixels[u] = count, row * U(width) + column
                     count += 1
-                    grid[row, column], pixels[k] = k, row * U(width) + column
-                    for i in range(U(4)):
-                        nearest[U(k), i], seen[U(k), i] = depth[row, column], triangle[row, column]
-                u = U(k)
-                o0, o1, o2, o3 = nearest[u, a], nearest[u, b], nearest[u, c], nearest[u, d]
-                s0, s1, s2, s3 = seen[u, a], seen[u, b], seen[u, c], seen[u, d]
-                n0, n1, n2, n3 = inverse[m], inverse[m + b], inverse[m + c], inverse[m + d]
-                b0, b1 = (inside[m] != 0) & (n0 > o0), (inside[m + b] != 0) & (n1 > o1)
-                b2, b3 = (inside[m + c] != 0) & (n2 > o2), (inside[m + d] != 0) & (n3 > o3)
-                n0, n1, n2, n3 = n0 if b0 else o0, n1 if b1 else o1, n2 if b2 else o2, n3 if b3 else o3
-                index = np.int32(t)
-                nearest[u, a], nearest[u, b], nearest[u, c], nearest[u, d] = n0, n1, n2, n3
-                seen[u, a], seen[u, b] = index if b0 else s0, index if b1 else s1
-                seen[u, c], seen[u, d] = index if b2 else s2, index if b3 else s3
-                limit[row, column] = min(n0, n1, n2, n3)
+                limit[row, column] = put_before(which, inverse, np.int32(t), nearest, seen, u)
     return count
+
+
+@inner
+def _hits(edges, x, y, offsets, cutouts, cutout):
+    """At which samples of the pixel at (x, y) a triangle that is cut out is surface: a bit each."""
+    e0, e1, e2 = edges
+    found = 0
+    for i in range(U(4)):
+        px, py = x + offsets[U(0), i], y + offsets[U(1), i]
+        f0, f1, f2 = e0[1] * py + e0[2], e1[1] * py + e1[2], e2[1] * py + e2[2]
+        found |= hits_surface(cutouts, cutout, e0[0] * px + f0, e1[0] * px + f1, e2[0] * px + f2) << i
+    return found
 
 
 @njit
@@ -195,13 +190,18 @@ def finish(count, pixels, nearest, seen, bound, offsets, triangle, depth, owner,
     arrays have room for all; returns how many pixels there are.
     """
     width = triangle.shape[1]
-    a, b, c = U(0), U(1), U(2)
+    a, b, c, d = U(0), U(1), U(2), U(3)
     n = U(0)
     for k in range(U(count)):
         p = pixels[k]
         y, x = U(p // width), U(p % width)
         centre, level = triangle[y, x], depth[y, x]
         is_filled = k < U(bound.shape[0]) and bound[k] > f4(0)
+        none = np.int32(-1) if is_filled else centre
+        s0, s1, s2, s3 = seen[k, a], seen[k, b], seen[k, c], seen[k, d]
+        is_even = ((s0 == centre) | (s0 == none)) & ((s1 == centre) | (s1 == none))
+        if is_even & ((s2 == centre) | (s2 == none)) & ((s3 == centre) | (s3 == none)):
+            continue
         differs = False
         u = U(max(centre, np.int32(0)))
         o = owner[u] if centre >= 0 else np.int32(-1)

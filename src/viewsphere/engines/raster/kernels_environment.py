@@ -12,7 +12,7 @@ import numba as nb
 import numpy as np
 
 from viewsphere.engines.raster.kernels_texture import FAST
-from viewsphere.geometry.jit import njit
+from viewsphere.geometry.jit import inner, njit
 
 f4 = nb.float32
 i4 = nb.int32
@@ -26,7 +26,7 @@ SOFT_HORIZON = 0.025  # sine of the elevation within which the ground turns into
 STEP = np.array([2.0 ** (k - 24) for k in range(32)], np.float32)
 
 
-@njit(fastmath=FAST, inline="always")
+@inner(fastmath=FAST, inline="always")
 def _direction(x, y):
     """The unit direction at octahedral coordinates in -1..1."""
     z = f4(1) - abs(x) - abs(y)
@@ -39,7 +39,7 @@ def _direction(x, y):
     return x * s, y * s, z * s
 
 
-@njit(fastmath=FAST, inline="always")
+@inner(fastmath=FAST, inline="always")
 def _coordinates(x, y, z):
     """Octahedral coordinates in -1..1 of a direction of any length."""
     s = f4(1) / (abs(x) + abs(y) + abs(z) + f4(1e-20))
@@ -141,7 +141,7 @@ def blurred(texels, levels, samples, frames, out):
         out[i, 0], out[i, 1], out[i, 2], out[i, 3] = p0, p1, p2, min(p3, one)
 
 
-@njit(fastmath=FAST)
+@inner(fastmath=FAST)
 def _angle(y, x):
     """The angle of a vector in the plane, -pi..pi, to 1e-5."""
     a, b = abs(x), abs(y)
@@ -155,7 +155,7 @@ def _angle(y, x):
     return -r if y < f4(0) else r
 
 
-@njit(fastmath=FAST)
+@inner(fastmath=FAST)
 def _read(t):
     """Red, green and blue of a packed texel."""
     step = STEP[U(t >> nb.uint32(27))]
@@ -163,7 +163,7 @@ def _read(t):
     return f4(i4(red)) * step, f4(i4(green)) * step, f4(i4(blue)) * step
 
 
-@njit(fastmath=FAST, inline="always")
+@inner(fastmath=FAST, inline="always")
 def _look_up(texels, first, width, height, count, w):
     """RX, RY, RZ: the picture's colours at column RU and row RV; bilinear."""
     zero, one = f4(0), f4(1)
@@ -189,7 +189,7 @@ def _look_up(texels, first, width, height, count, w):
         w[RZ + i] = p[2] * wp + q[2] * wq + r[2] * wr + s[2] * ws
 
 
-@njit(fastmath=FAST, inline="always")
+@inner(fastmath=FAST, inline="always")
 def _rays(listed, columns, m, start, count, w):
     """RX, RY, RZ: directions of some samples as the map has them, any length; those of a grid lie in one row."""
     if listed.shape[1] == 3:

@@ -30,7 +30,7 @@ from viewsphere.engines.raster.kernels_lanes import (
     where,
 )
 from viewsphere.engines.raster.kernels_texture import CLAMP, FAST, MIRROR, REPEAT
-from viewsphere.geometry.jit import njit
+from viewsphere.geometry.jit import inner, njit
 
 f4 = nb.float32
 i4 = nb.int32
@@ -166,7 +166,7 @@ def _pair(typing, array, at, first, second):
     return nb.void(array, nb.uintp, array.dtype, array.dtype), code
 
 
-@njit(fastmath=FAST)
+@inner(fastmath=FAST)
 def _lay_out(count, levels, c, q, places):
     """Every probe's quads: coordinates, share, level; those of sample i begin at FIRST + i.
 
@@ -281,7 +281,7 @@ def opacity(surfaces, textures, m, u0, v0, u1, v1):
     return f4(1)
 
 
-@njit(fastmath=FAST)
+@inner(fastmath=FAST)
 def _nearest(x, size, wrap):
     """The texel that a coordinate lies in."""
     if wrap == REPEAT:

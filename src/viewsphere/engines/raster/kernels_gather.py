@@ -49,7 +49,7 @@ from viewsphere.engines.raster.kernels_block import (
 from viewsphere.engines.raster.kernels_lanes import clamp, dot, lanewise, least, load, most, root, scatter, sign, size, spread
 from viewsphere.engines.raster.kernels_material import L_SCENERY
 from viewsphere.engines.raster.kernels_texture import FAST
-from viewsphere.geometry.jit import njit
+from viewsphere.geometry.jit import inner
 
 f4 = nb.float32
 U = nb.uintp
@@ -59,7 +59,7 @@ ATTRIBUTES = {0: NX, 1: NY, 2: NZ, 3: U0, 4: V0, 5: U1, 6: V1, 7: RED, 8: GREEN,
 DIFFERENCES = {3: UA0, 4: VA0, 5: UA1, 6: VA1, 11: AX, 12: AY, 13: AZ}
 
 
-@njit(fastmath=FAST)
+@inner(fastmath=FAST)
 def _rays(view, start, count, slots, b):
     """Unnormalised directions in the camera's axes, into VX, VY, VZ: each ends where 1 / inverse depth says."""
     one, half = f4(1), f4(0.5)
@@ -85,7 +85,7 @@ def _rays(view, start, count, slots, b):
         b[VX + i], b[VY + i], b[VZ + i] = a0 * x + a1 * y + a2, c0 * x + c1 * y + c2, one
 
 
-@njit(fastmath=FAST)
+@inner(fastmath=FAST)
 def locate(view, start, count, slots, depth, b):
     """Positions, directions and pixel sizes."""
     _rays(view, start, count, slots, b)
@@ -138,7 +138,7 @@ def _vertex(builder, vertices, row):
     return load(builder, vertices, builder.mul(row, row.type(VERTEX)), VERTEX)
 
 
-@njit(fastmath=FAST)
+@inner(fastmath=FAST)
 def gather(surfaces, start, count, slots, triangle, b, seen, material):
     """Vertex attributes of located samples, their triangles and materials; normals on the viewer's side; edges."""
     vertices, triangles, normals = surfaces.vertices, surfaces.triangles, surfaces.normals
@@ -188,7 +188,7 @@ def _face_viewer(b):
     b.put((NX, NY, NZ), tuple(x * scale for x in n))
 
 
-@njit(fastmath=FAST)
+@inner(fastmath=FAST)
 def gather_ground(view, floor, start, count, slots, triangle, b, seen, material):
     """The same for samples of the ground: its texture repeats in the world, and it fades into the sky far behind the origin.
 

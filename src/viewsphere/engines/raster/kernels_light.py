@@ -17,14 +17,14 @@ import numpy as np
 
 from viewsphere.engines.raster.kernels_blend import blend
 from viewsphere.engines.raster.kernels_block import (
-    ALPHA, BASE_B, BASE_G, BASE_R, BLOCK, BLUE, BOUNCE, COAT, COAT_ROUGH, CX, CY, CZ, DB, DG, DR, EDGE_R, ER, F0R,
+    ALPHA, BASE_R, BLOCK, BLUE, BOUNCE, COAT, COAT_ROUGH, CX, CY, CZ, DR, EDGE_R, ER, F0R,
     FACE_R, GREEN, GX, GY, GZ, IB, IG, IR, LOBE, LX, LY, LZ, METAL, NX, NY, NZ, OPEN, OPENX, OPENY, RED,
     RIM, ROUGH, SHARE, SR, T0, T1, T2, T3, T4, T5, T6, T7, TAKEN, THROUGH, TRANSMISSION, UNLIT, VX, VY, VZ, WIDTH,
 )  # fmt: skip
 from viewsphere.engines.raster.kernels_environment import ABOVE, BELOW, LAMPS, SCALE, TURN
-from viewsphere.engines.raster.kernels_lanes import clamp, cross, dot, lanewise, least, most, root, where
+from viewsphere.engines.raster.kernels_lanes import clamp, cross, dot, lanewise, least, most, root, size, where
 from viewsphere.engines.raster.kernels_texture import FAST
-from viewsphere.geometry.jit import njit
+from viewsphere.geometry.jit import inner
 from viewsphere.imaging.view import EXPOSURE
 
 f4 = nb.float32
@@ -44,7 +44,7 @@ LEVEL, WEIGHT = OPENX, OPENY
 _blend2, _blend4 = blend(2), blend(4)
 
 
-@njit(fastmath=FAST)
+@inner(fastmath=FAST)
 def _any(count, row, b):
     """Whether a row has anything above 0. A count, as the compiler makes vectors of that."""
     found = 0
@@ -70,7 +70,7 @@ def _place_in_albedo(normal, rough, size, b):
     b[T2], b[T3], b[T4] = fx - right, fy - right, right
 
 
-@njit(fastmath=FAST)
+@inner(fastmath=FAST)
 def _integrals(count, normal, rough, albedo, b):
     """T0, T1: both integrals of a layer's lobe."""
     across = U(albedo.shape[0])
@@ -107,7 +107,7 @@ def _share_out(b):
     b[THROUGH] = through * (shares[0] + shares[1] + shares[2]) * (1 / 3)
 
 
-@njit
+@inner
 def weigh(count, albedo, b):
     """Share out the light among a sample's layers, for any light: fills FACE_R to THROUGH, clears DR to SB.
 
@@ -119,15 +119,6 @@ def weigh(count, albedo, b):
     if is_coated:
         _integrals(count, NX, ROUGH, albedo, b)
     _share_out(count, b)
-
-
-@njit(fastmath=FAST)
-def _layer(count, normal, rough, b):
-    """T3 to T6: normal and roughness of the base or of the coat on it, from these rows."""
-    for i in range(count):
-        at = U(normal) + U(i)
-        b[T3 + i], b[T4 + i], b[T5 + i] = b[at], b[at + U(BLOCK)], b[at + U(2 * BLOCK)]
-        b[T6 + i] = b[U(rough) + U(i)]
 
 
 def _lobe(b, normal, rough):
@@ -179,7 +170,7 @@ def _add_coat(b):
         b[SR + k] = b[SR + k] + least(shine * b[IR + k], BRIGHTEST)
 
 
-@njit
+@inner
 def add_light(count, b):
     """One light, rows LX to WIDTH: its diffuse reflection is added to DR, DG, DB, its mirrored image to SR, SG, SB."""
     _add_base(count, b)
@@ -187,148 +178,169 @@ def add_light(count, b):
         _add_coat(count, b)
 
 
-@njit(fastmath=FAST, inline="always")
-def _place(count, turn, b):
-    """Octahedral coordinates T0, T1 of the directions T0, T1, T2, any length."""
-    zero, one, tiny = f4(0), f4(1), f4(1e-20)
-    cosine, sine = turn[0], turn[1]
-    for i in range(count):
-        east, north, z = b[T0 + i], b[T1 + i], b[T2 + i]
-        x, y = cosine * east + sine * north, cosine * north - sine * east
-        s = one / (abs(x) + abs(y) + abs(z) + tiny)
-        x, y = x * s, y * s
-        u, v = one - abs(y), one - abs(x)
-        u, v = u if x >= zero else -u, v if y >= zero else -v
-        b[T0 + i] = u if z < zero else x
-        b[T1 + i] = v if z < zero else y
-
-
-@njit(fastmath=FAST, inline="always")
-def _around(count, texels, levels, b):
-    """T3 to T6: what the lobe of roughness T6 around (T0, T1) sees, and how much of it lies below; of -1, a matt surface.
-
-    LEVEL is left: 0 if matt. Of each of two maps four texels, in weighted sums of all their columns.
+@lanewise
+def _place(light, last, b):
+    """Octahedral coordinates T0, T1 of the directions T0, T1, T2, any length; the level of roughness T6, LEVEL, and how far it
+    lies from there to the next, WEIGHT. Matt is the level 0. last: of the levels of roughness.
     """
-    zero, one, half = f4(0), f4(1), f4(0.5)
-    last = f4(levels.shape[0] - 1)
-    for i in range(count):
-        rough = b[T6 + i]
-        lod = min(max(rough, zero), one) * last
-        level = f4(i4(min(lod, last - one)))
-        b[WEIGHT + i] = lod - level if rough >= zero else zero
-        b[LEVEL + i] = level + one if rough >= zero else zero
-    for i in range(count):
-        _blend4(levels, (U(i4(b[LEVEL + i])),), (one,), b, U(FIRST) + U(i))
-    for which in range(2):
-        first, weight = (NEXT, A0) if which else (FIRST, T3)
-        for i in range(count):
-            start, size, share = b[first + i], b[first + BLOCK + i], b[WEIGHT + i]
-            share = share if which else one - share
-            x, y = (b[T0 + i] + one) * (size * half) + half, (b[T1 + i] + one) * (size * half) + half
-            column, row = f4(i4(min(max(zero, x), size))), f4(i4(min(max(zero, y), size)))
-            fx, fy = x - column, y - row
-            place = start + row * (size + f4(2)) + column
-            b[first + i], b[first + BLOCK + i] = place, place + size + f4(2)
-            lower = fy * share
-            upper = share - lower
-            b[weight + i], b[weight + BLOCK + i] = upper - upper * fx, upper * fx
-            b[weight + 2 * BLOCK + i], b[weight + 3 * BLOCK + i] = lower - lower * fx, lower * fx
-    for i in range(count):
-        p, q = U(i4(b[FIRST + i])), U(i4(b[UNDER + i]))
-        places, shares = (p, p + U(1), q, q + U(1)), (b[T3 + i], b[T4 + i], b[T5 + i], b[T6 + i])
-        if b[WEIGHT + i] > zero:
-            r, s = U(i4(b[NEXT + i])), U(i4(b[NEXT_UNDER + i]))
-            others = b[A0 + i], b[A1 + i], b[A2 + i], b[A3 + i]
-            _blend4(texels, (*places, r, r + U(1), s, s + U(1)), (*shares, *others), b, U(T3) + U(i))
+    cosine, sine = light.one(3 * TURN), light.one(3 * TURN + 1)
+    east, north, z = b.get(T0, T1, T2)
+    x, y = cosine * east + sine * north, cosine * north - sine * east
+    s = 1 / (size(x) + size(y) + size(z) + 1e-20)
+    x, y = x * s, y * s
+    u, v = 1 - size(y), 1 - size(x)
+    is_down = z < 0
+    b[T0] = where(is_down, where(x >= 0, u, -u), x)
+    b[T1] = where(is_down, where(y >= 0, v, -v), y)
+    rough = b[T6]
+    is_shiny = rough >= 0
+    lod = clamp(rough) * last
+    level = least(lod, last - 1).whole().real()
+    b[WEIGHT] = where(is_shiny, lod - level, 0)
+    b[LEVEL] = where(is_shiny, level + 1, 0)
+
+
+@lanewise
+def _share_texels(b):
+    """FIRST to NEXT_UNDER: first texel and width of two maps; then rows of the four texels, two by two, around T0, T1.
+
+    T3 to T6 and A0 to A3: their shares.
+    """
+    x, y, share = b[T0] + 1, b[T1] + 1, b[WEIGHT]
+    for first, weight, part in ((FIRST, T3, 1 - share), (NEXT, A0, share)):
+        start, width = b[first], b[first + BLOCK]
+        u, v = x * (width * 0.5) + 0.5, y * (width * 0.5) + 0.5
+        # What is no number is taken as 0.
+        column, row = (least(most(place, 0), width).whole().real() for place in (u, v))
+        fx, fy = u - column, v - row
+        place = start + row * (width + 2) + column
+        b[first], b[first + BLOCK] = place, place + width + 2
+        lower = fy * part
+        upper = part - lower
+        b[weight], b[weight + BLOCK] = upper - upper * fx, upper * fx
+        b[weight + 2 * BLOCK], b[weight + 3 * BLOCK] = lower - lower * fx, lower * fx
+
+
+@inner(fastmath=FAST)
+def _read_texels(count, texels, b):
+    """T3 to T6: weighted sums of all columns of the texels."""
+    one = U(1)
+    for i in range(U(count)):
+        p, q = U(i4(b[U(FIRST) + i])), U(i4(b[U(UNDER) + i]))
+        places, shares = (p, p + one, q, q + one), (b[U(T3) + i], b[U(T4) + i], b[U(T5) + i], b[U(T6) + i])
+        if b[U(WEIGHT) + i] > f4(0):
+            r, s = U(i4(b[U(NEXT) + i])), U(i4(b[U(NEXT_UNDER) + i]))
+            others = b[U(A0) + i], b[U(A1) + i], b[U(A2) + i], b[U(A3) + i]
+            _blend4(texels, (*places, r, r + one, s, s + one), (*shares, *others), b, U(T3) + i)
         else:
-            _blend4(texels, places, shares, b, U(T3) + U(i))
+            _blend4(texels, places, shares, b, U(T3) + i)
 
 
-@njit(fastmath=FAST)
+@lanewise
+def _light(light, b):
+    """T3 to T5: radiance, from the map's and the share of it that lies below, T6."""
+    share, bounce = b[T6], b[BOUNCE]
+    down = where(b[LEVEL].equals(0), 1, clamp(-1.6 * b[T2]))
+    down = down * down
+    for k in range(3):
+        scale, above, below, lamp = (light.one(3 * row + k) for row in (SCALE, ABOVE, BELOW, LAMPS))
+        ground = below + lamp * down
+        b[T3 + k * BLOCK] = most(b[T3 + k * BLOCK] * scale + (1 - share) * above + share * bounce * ground, 0)
+
+
+@inner(fastmath=FAST)
 def light_around(count, surrounding, b):
     """T3, T4, T5: radiance around the direction T0, T1, T2 over roughness T6 (-1: of a white matt surface that faces it).
 
     The map's, the even light from above, the ground's as far as it reaches the sample. Lamps light the ground close by: a
-    mirrored ray that goes down but little sees none of it.
+    mirrored ray that goes down but little sees none of it. LEVEL is left: 0 if matt.
     """
-    zero, one = f4(0), f4(1)
-    _place(count, surrounding.light[TURN], b)
-    _around(count, surrounding.texels, surrounding.levels, b)
-    light = surrounding.light
-    for color in range(3):
-        k = color * BLOCK
-        scale, above, below, lamp = light[SCALE, color], light[ABOVE, color], light[BELOW, color], light[LAMPS, color]
-        for i in range(count):
-            share = b[T6 + i]
-            down = one if b[LEVEL + i] == zero else min(max(f4(-1.6) * b[T2 + i], zero), one)
-            ground = below + lamp * down * down
-            b[T3 + k + i] = max(b[T3 + k + i] * scale + (one - share) * above + share * b[BOUNCE + i] * ground, zero)
+    levels = surrounding.levels
+    _place(count, surrounding.light, f4(levels.shape[0] - 1), b)
+    for i in range(U(count)):
+        _blend4(levels, (U(i4(b[U(LEVEL) + i])),), (f4(1),), b, U(FIRST) + i)
+    _share_texels(count, b)
+    _read_texels(count, surrounding.texels, b)
+    _light(count, surrounding.light, b)
 
 
-@njit(fastmath=FAST, inline="always")
-def _reflect(count, b):
-    """T0, T1, T2: the middle of the lobe of the layer T3 to T6; T7: how much of it gets out of the surface and its crevice."""
-    zero, one = f4(0), f4(1)
-    for i in range(count):
-        vx, vy, vz, nx, ny, nz = b[VX + i], b[VY + i], b[VZ + i], b[T3 + i], b[T4 + i], b[T5 + i]
-        nv = min(max(nx * vx + ny * vy + nz * vz, zero), one)
-        r = min(max(b[T6 + i], zero), one)
-        rx, ry, rz = (nv + nv) * nx - vx, (nv + nv) * ny - vy, (nv + nv) * nz - vz
-        # The shading normal may send the ray into the surface; cf. Lagarde and de Rousiers 2014 for both terms.
-        out = max(one + min(rx * b[GX + i] + ry * b[GY + i] + rz * b[GZ + i], zero), zero)
-        open_, smooth = b[OPEN + i], (one - r) * (one - r)
-        seen = open_ + smooth * open_ * (one - open_) * (nv + nv - f4(1.1))
-        b[T7 + i] = min(max(seen, zero), one) * out * out
-        a = r * r * r * r
-        b[T0 + i], b[T1 + i], b[T2 + i] = rx + (nx - rx) * a, ry + (ny - ry) * a, rz + (nz - rz) * a
-        b[T6 + i] = r
+@lanewise
+def _mirror(normal, rough, b):
+    """T0, T1, T2: the middle of a layer's lobe; T6: its roughness; T7: how much of it gets out of the surface and its crevice.
+
+    normal: row of its x; rough: of its roughness.
+    """
+    view, facet = b.get(VX, VY, VZ), b.get(GX, GY, GZ)
+    n = b[normal], b[normal, BLOCK], b[normal, 2 * BLOCK]
+    nv, r = clamp(dot(n, view)), clamp(b[rough])
+    ray = tuple((nv + nv) * n[k] - view[k] for k in range(3))
+    # The shading normal may send the ray into the surface; cf. Lagarde and de Rousiers 2014 for both terms.
+    out = most(1 + least(dot(ray, facet), 0), 0)
+    open_, smooth = b[OPEN], (1 - r) * (1 - r)
+    b[T7] = clamp(open_ + smooth * open_ * (1 - open_) * (nv + nv - 1.1)) * out * out
+    a = r * r * r * r
+    b.put((T0, T1, T2), tuple(p + (q - p) * a for p, q in zip(ray, n, strict=True)))
+    b[T6] = r
 
 
-@njit(fastmath=FAST, inline="always")
-def _toward(count, layer, b):
-    """T0 to T2 and T6 for `light_around` of a layer: matt, base's mirror, coat's mirror, what is seen through it."""
-    if layer == 0:
-        for i in range(count):
-            b[T0 + i], b[T1 + i], b[T2 + i], b[T6 + i] = b[NX + i], b[NY + i], b[NZ + i], f4(-1)
-    elif layer == 3:
-        for i in range(count):
-            b[T0 + i], b[T1 + i], b[T2 + i], b[T6 + i] = -b[VX + i], -b[VY + i], -b[VZ + i], b[ROUGH + i]
-    else:
-        normal, rough = (CX, COAT_ROUGH) if layer == 2 else (NX, ROUGH)
-        _layer(count, normal, rough, b)
-        _reflect(count, b)
+@lanewise
+def _face(b):
+    """T0 to T2 and T6 of what the matt layer sees."""
+    b.put((T0, T1, T2), b.get(NX, NY, NZ))
+    b[T6] = -1
 
 
-@njit(fastmath=FAST, inline="always")
-def _add_around(count, layer, b):
-    """What a layer sends of the light T3 to T5."""
-    for color in range(3):
-        k = color * BLOCK
-        if layer == 0:
-            for i in range(count):
-                b[DR + k + i] += b[BASE_R + k + i] * b[T3 + k + i] * b[OPEN + i]
-        elif layer == 1:
-            for i in range(count):
-                shine = b[FACE_R + k + i] * b[LOBE + i] + b[EDGE_R + k + i] * b[RIM + i]
-                b[SR + k + i] += shine * b[T3 + k + i] * b[T7 + i]
-        elif layer == 2:
-            for i in range(count):
-                b[SR + k + i] += b[TAKEN + i] * b[T7 + i] * b[T3 + k + i]
+@lanewise
+def _look_through(b):
+    """T0 to T2 and T6 of what is seen through a surface."""
+    b.put((T0, T1, T2), tuple(-v for v in b.get(VX, VY, VZ)))
+    b[T6] = b[ROUGH]
 
 
-@njit(fastmath=FAST)
+@lanewise
+def _scatter(b):
+    for k in range(0, 3 * BLOCK, BLOCK):
+        b[DR + k] = b[DR + k] + b[BASE_R + k] * b[T3 + k] * b[OPEN]
+
+
+@lanewise
+def _shine(b):
+    lobe, rim, out = b.get(LOBE, RIM, T7)
+    for k in range(0, 3 * BLOCK, BLOCK):
+        b[SR + k] = b[SR + k] + (b[FACE_R + k] * lobe + b[EDGE_R + k] * rim) * b[T3 + k] * out
+
+
+@lanewise
+def _shine_coat(b):
+    shine = b[TAKEN] * b[T7]
+    for k in range(0, 3 * BLOCK, BLOCK):
+        b[SR + k] = b[SR + k] + shine * b[T3 + k]
+
+
+@inner(fastmath=FAST)
 def ambient(count, surrounding, b):
     """The light of the surroundings, once the block is weighed: added to DR to SB. Reads OPEN and BOUNCE.
 
     T3 to T5: the light behind what lets it through. What was in the light's rows is lost.
     """
     has_coat, has_glass = _any(count, COAT, b), _any(count, THROUGH, b)
+    # Matt, mirror, coat, what is behind: one call, so that it is compiled once.
     for layer in range(4):
         if (layer == 2 and not has_coat) or (layer == 3 and not has_glass):
             continue
-        _toward(count, layer, b)
+        if layer == 0:
+            _face(count, b)
+        elif layer == 3:
+            _look_through(count, b)
+        else:
+            _mirror(count, U(CX if layer == 2 else NX), U(COAT_ROUGH if layer == 2 else ROUGH), b)
         light_around(count, surrounding, b)
-        _add_around(count, layer, b)
+        if layer == 0:
+            _scatter(count, b)
+        elif layer == 1:
+            _shine(count, b)
+        elif layer == 2:
+            _shine_coat(count, b)
 
 
 @lanewise
@@ -353,7 +365,7 @@ def _compose(b):
     b[ALPHA] = alpha * (1 - clear * (1 - unlit))
 
 
-@njit
+@inner
 def compose(count, b):
     """What the sample sends to the viewer, in place of the base colour: RED, GREEN, BLUE premultiplied, ALPHA its opacity.
 
@@ -365,7 +377,7 @@ def compose(count, b):
     _compose(count, b)
 
 
-@njit(fastmath=FAST)
+@inner(fastmath=FAST)
 def lay(pixel, i, b):
     """Put a composed sample over what a pixel (4,) shows so far, premultiplied; coloured glass tints that."""
     under, behind = f4(1) - b[ALPHA + i], pixel[3]
@@ -375,23 +387,27 @@ def lay(pixel, i, b):
     pixel[3] = behind * under + b[ALPHA + i]
 
 
-@njit(fastmath=FAST)
+@lanewise
+def _add_matte(b):
+    lambert = most(dot(b.get(NX, NY, NZ), b.get(LX, LY, LZ)), 0) * (1 / math.pi) * b[SHARE]
+    for k in range(0, 3 * BLOCK, BLOCK):
+        b[DR + k] = b[DR + k] + b[BASE_R + k] * lambert * b[IR + k]
+
+
+@inner
 def add_light_matte(count, b):
     """`add_light` for what only scatters, as plain ground; BASE_R, BASE_G, BASE_B are its colour."""
-    for i in range(count):
-        nl = b[NX + i] * b[LX + i] + b[NY + i] * b[LY + i] + b[NZ + i] * b[LZ + i]
-        lambert = max(nl, f4(0)) * f4(1 / math.pi) * b[SHARE + i]
-        b[DR + i] += b[BASE_R + i] * lambert * b[IR + i]
-        b[DG + i] += b[BASE_G + i] * lambert * b[IG + i]
-        b[DB + i] += b[BASE_B + i] * lambert * b[IB + i]
+    _add_matte(count, b)
 
 
-@njit(fastmath=FAST)
+@lanewise
+def _open_matte(up, b):
+    for k in range(3):
+        row = k * BLOCK
+        b[DR + row] = b[DR + row] + b[BASE_R + row] * up.one(k) * b[OPEN]
+
+
+@inner
 def ambient_matte(count, surrounding, b):
     """`ambient` for level ground that only scatters."""
-    red, green, blue = surrounding.up[0], surrounding.up[1], surrounding.up[2]
-    for i in range(count):
-        open_ = b[OPEN + i]
-        b[DR + i] += b[BASE_R + i] * red * open_
-        b[DG + i] += b[BASE_G + i] * green * open_
-        b[DB + i] += b[BASE_B + i] * blue * open_
+    _open_matte(count, surrounding.up, b)

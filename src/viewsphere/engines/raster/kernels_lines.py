@@ -12,7 +12,7 @@ import numba as nb
 import numpy as np
 
 from viewsphere.engines.raster.kernels_edges import span
-from viewsphere.geometry.jit import njit
+from viewsphere.geometry.jit import inner, njit
 from viewsphere.truth.kernels import NEVER, plane
 
 f4 = nb.float32
@@ -101,7 +101,7 @@ def mark(order, q, triangles, owner, offsets, triangle, depth, marks, wanted):
                             break
 
 
-@njit
+@inner
 def _is_flush(inverse, px, py, t, q, triangles):
     """Whether 1/z is at (px, py) no more than a little behind a triangle's plane."""
     i0, i1, i2 = triangles[t, 0], triangles[t, 1], triangles[t, 2]

@@ -77,7 +77,7 @@ from viewsphere.engines.raster.kernels_filter import VX as VXX
 from viewsphere.engines.raster.kernels_filter import VY as VYY
 from viewsphere.engines.raster.kernels_lanes import clamp, cross, dot, lanewise, least, most, root, sign, where
 from viewsphere.engines.raster.kernels_texture import FAST
-from viewsphere.geometry.jit import njit
+from viewsphere.geometry.jit import inner, njit
 
 f4 = nb.float32
 U = nb.uintp
@@ -208,7 +208,7 @@ def _coordinates(transform, uv_set, b, c):
     c.put((UX, UY, VXX, VYY), (gx * ua + hx * ub, gy * ua + hy * ub, gx * va + hx * vb, gy * va + hy * vb))
 
 
-@njit(fastmath=FAST)
+@inner(fastmath=FAST)
 def _apply(count, plane, mode, look, c, b):
     """Four channels of the textures."""
     kind, at = mode[6 + plane], U(TEXEL + plane % PLANES * 4 * CHUNK)

@@ -6,7 +6,7 @@ import math
 
 import numba as nb
 
-from viewsphere.geometry.jit import njit
+from viewsphere.geometry.jit import inner, njit
 
 f4 = nb.float32
 U = nb.uintp
@@ -45,7 +45,7 @@ def fill_normals(texels, channel, pixels, factor):
             texels[y, x, channel + 2] = nb.uint16(c * scale + f4(ZERO_NORMAL + 0.5))
 
 
-@njit
+@inner
 def _direction(red, green, blue):
     """The unit vector of a normal map's texel; black, as between an atlas's islands, is level. 127 and 128 are both 0."""
     a, b, c = f4(red) * f4(2 / 255) - f4(1), f4(green) * f4(2 / 255) - f4(1), max(f4(blue) * f4(2 / 255) - f4(1), f4(0))

@@ -41,7 +41,7 @@ from viewsphere.engines.raster.kernels_block import (
     T7,
 )  # fmt: skip
 from viewsphere.engines.raster.kernels_texture import FAST
-from viewsphere.geometry.jit import njit
+from viewsphere.geometry.jit import inner, njit
 
 f4 = nb.float32
 i4 = nb.int32
@@ -106,7 +106,7 @@ def spread(volume, known):
     return after
 
 
-@njit(fastmath=FAST, inline="always")
+@inner(fastmath=FAST, inline="always")
 def _read_floor(count, floor, frame, b):
     """SKY and LIGHT, both shares of what the targets stand on, at each sample: from four cells; 1 beyond the map."""
     zero, one, half = f4(0), f4(1), f4(0.5)
@@ -133,7 +133,7 @@ def _read_floor(count, floor, frame, b):
                 _blend2(floor, (p, p + U(1), q, q + U(1)), weights, b, U(SKY) + U(i))
 
 
-@njit(fastmath=FAST, inline="always")
+@inner(fastmath=FAST, inline="always")
 def _read_volume(count, volume, frame, b):
     """The volume's coefficients into T0..T7 at each sample: a little off its surface, from the points on its side.
 
@@ -174,7 +174,7 @@ def _read_volume(count, volume, frame, b):
         _blend8(volume, (p, p + U(1), q, q + U(1), r, r + U(1), s, s + U(1)), (*near, *far), b, U(T0) + U(i))
 
 
-@njit(fastmath=FAST, inline="always")
+@inner(fastmath=FAST, inline="always")
 def _shares(count, has_ground, b):
     """OPEN and BOUNCE from the coefficients."""
     zero, one, half, two, eps, gain = f4(0), f4(1), f4(0.5), f4(2), f4(HORIZON), f4(GAIN)
@@ -189,7 +189,7 @@ def _shares(count, has_ground, b):
         b[OPEN + i], b[BOUNCE + i] = one + (above - one) * within, one + (below - one) * within
 
 
-@njit(fastmath=FAST, inline="always")
+@inner(fastmath=FAST, inline="always")
 def _near_floor(count, frame, b):
     """What the targets stand on sends up less light beside them; scenery that it is, is as dark as it."""
     zero, one = f4(0), f4(1)
@@ -203,7 +203,7 @@ def _near_floor(count, frame, b):
         b[OPEN + i] += (min(b[OPEN + i], b[SKY + i]) - b[OPEN + i]) * close
 
 
-@njit(fastmath=FAST)
+@inner(fastmath=FAST)
 def occlude(count, occlusion, b):
     """Fill OPEN and BOUNCE of a block of the ground's samples or of others (row GROUND of its first).
 

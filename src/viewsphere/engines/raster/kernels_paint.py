@@ -35,6 +35,7 @@ from viewsphere.engines.raster.kernels_block import (
     SHARE,
 )  # isort: skip  # fmt: skip
 from viewsphere.engines.raster.kernels_gather import gather, gather_ground, locate
+from viewsphere.engines.raster.kernels_lanes import lanewise
 from viewsphere.engines.raster.kernels_light import (
     add_light,
     add_light_matte,
@@ -47,12 +48,16 @@ from viewsphere.engines.raster.kernels_light import (
 from viewsphere.engines.raster.kernels_material import material
 from viewsphere.engines.raster.kernels_occlusion import occlude
 from viewsphere.engines.raster.kernels_texture import FAST
-from viewsphere.geometry.jit import njit
+from viewsphere.geometry.jit import inner, njit
 
 f4 = nb.float32
 U = nb.uintp
 NOTHING, SOLID, SEE_THROUGH, FLOOR = range(4)
 GLINT = 2.0  # radiance, a little more than what is shown as white
+BRIGHT = 1.1  # radiance up to which a centre's colour stands for samples beside it: a glint on a crease is narrow
+# From a pixel to the centres nearest to each of its samples (`samples.OFFSETS`), three each.
+STEPS_X = (0, 0, -1, 0, 1, 0, 0, 0, 1, 0, -1, 0)
+STEPS_Y = (0, -1, 0, 0, 0, -1, 0, 1, 0, 0, 0, 1)
 
 
 @njit
@@ -99,14 +104,14 @@ def sorted_samples(triangle, kind, material, materials, radiance):
     return solid, ground
 
 
-@njit(fastmath=FAST)
+@inner(fastmath=FAST)
 def _start_catcher(count, b):
     """DR and DG collect the light that comes and the light that would come without what stands on the catcher."""
     for i in range(count):
         b[DR + i], b[DG + i], b[GROUND + i], b[AO + i] = f4(0), f4(0), f4(1), f4(1)
 
 
-@njit(fastmath=FAST)
+@inner(fastmath=FAST)
 def _catch(count, b):
     """One light on a shadow catcher."""
     for i in range(count):
@@ -116,7 +121,7 @@ def _catch(count, b):
         b[DR + i] += light * b[SHARE + i]
 
 
-@njit(fastmath=FAST)
+@inner(fastmath=FAST)
 def _finish_catcher(count, surrounding, b):
     """Black, as opaque as there is light missing."""
     even = (surrounding.up[0] + surrounding.up[1] + surrounding.up[2]) * f4(1 / 3)
@@ -127,20 +132,22 @@ def _finish_catcher(count, surrounding, b):
         b[ALPHA + i] = max(f4(1) - left, f4(0)) if all_light > f4(0) else f4(0)
 
 
-@njit(fastmath=FAST)
-def _finish_matte(count, b):
-    for i in range(count):
-        b[RED + i], b[GREEN + i], b[BLUE + i], b[ALPHA + i] = b[DR + i], b[DG + i], b[DB + i], f4(1)
+@lanewise
+def _finish_matte(b):
+    b.put((RED, GREEN, BLUE), b.get(DR, DG, DB))
+    b[ALPHA] = 1
 
 
-@njit(fastmath=FAST)
-def _start_matte(count, floor, b):
-    for i in range(count):
-        b[BASE_R + i], b[BASE_G + i], b[BASE_B + i] = floor[5], floor[6], floor[7]
-        b[DR + i], b[DG + i], b[DB + i], b[GROUND + i], b[AO + i] = f4(0), f4(0), f4(0), f4(1), f4(1)
+@lanewise
+def _start_matte(floor, b):
+    for k, row in enumerate((BASE_R, BASE_G, BASE_B)):
+        b[row] = floor.one(5 + k)
+    for row in (DR, DG, DB):
+        b[row] = 0
+    b[GROUND], b[AO] = 1, 1
 
 
-@njit(fastmath=FAST)
+@inner(fastmath=FAST)
 def _take(count, is_matte, b):
     """One light that has arrived."""
     if is_matte:
@@ -149,7 +156,7 @@ def _take(count, is_matte, b):
         add_light(count, b)
 
 
-@njit(fastmath=FAST)
+@inner(fastmath=FAST)
 def _lay_all(start, count, is_ground, slots, radiance, b):
     """What the samples send and hide, over what is behind them; the ground, behind all else, as far as it has not faded."""
     if not is_ground:
@@ -215,43 +222,74 @@ def catch(view, floor, surrounding, lights, occlusion, slots, triangle, depth, r
         _lay_all(start, count, True, slots, radiance, b)
 
 
+@inner
+def _alike(t, s, depth, other, owner, normals):
+    """Whether two places look alike: same owner, planes less than 10 degrees apart, depths (1/z) less than 0.5 %."""
+    if t == s or t < 0 or s < 0:
+        return t == s
+    a, b, c, t, s = U(0), U(1), U(2), U(t), U(s)
+    bend = normals[t, a] * normals[s, a] + normals[t, b] * normals[s, b] + normals[t, c] * normals[s, c]
+    ratio = depth / other
+    return (owner[t] == owner[s]) & (abs(bend) > f4(0.985)) & (ratio > f4(0.995)) & (ratio < f4(1.005))
+
+
 @njit
-def shared_samples(triangle, depth, owner, normals):
-    """For each of the samples, four a pixel, the first of its pixel that looks alike: same owner, about the same plane."""
-    like = np.empty(triangle.shape[0], np.int32)
-    for i in range(triangle.shape[0]):
-        t, first = triangle[i], i // 4 * 4
-        like[i] = i
-        for k in range(first, i):
-            q = triangle[k]
-            if like[k] != k or (q != t and (q < 0 or t < 0 or owner[q] != owner[t])):
-                continue
-            if q == t:
-                like[i] = k
-                break
-            bend = normals[q, 0] * normals[t, 0] + normals[q, 1] * normals[t, 1] + normals[q, 2] * normals[t, 2]
-            ratio = depth[k] / depth[i]
-            if abs(bend) > f4(0.94) and f4(0.99) < ratio < f4(1.01):
-                like[i] = k
-                break
-    return like
+def shared_samples(pixels, triangle, depth, seen, inverse_depth, owner, normals, radiance):
+    """Whose colour each of the samples, four a pixel, has: of the nearest pixel's centre that looks like it, or its own.
+
+    seen, inverse_depth (H, W), radiance (H * W, 4): at the centres. Returns like (4N,): the centre's pixel, or ~k; rows (R,):
+    the pixels (indices in `pixels`) that have samples of their own: sample k % 4 of row k // 4.
+    """
+    height, width = seen.shape
+    like, rows = np.empty(triangle.shape[0], np.int32), np.empty(pixels.shape[0], np.int32)
+    count = 0
+    for n in range(pixels.shape[0]):
+        y, x = pixels[n] // width, pixels[n] % width
+        rows[count], own = n, 0
+        for i in range(4):
+            m = U(4 * n + i)
+            like[m] = -1
+            for k in range(3):  # its own centre, that beyond the side it is at, and beyond the next nearest
+                v, u = y + STEPS_Y[3 * i + k], x + STEPS_X[3 * i + k]
+                if like[m] < 0 and 0 <= v < height and 0 <= u < width:
+                    v, u = U(v), U(u)
+                    p = v * U(width) + u
+                    if triangle[m] >= 0 and max(radiance[p, 0], radiance[p, 1], radiance[p, 2]) > f4(BRIGHT):
+                        continue
+                    if _alike(triangle[m], seen[v, u], depth[m], inverse_depth[v, u], owner, normals):
+                        like[m] = p
+            for k in range(i):
+                j = U(4 * n + k)
+                if like[m] == -1 and like[j] < 0 and _alike(triangle[m], triangle[j], depth[m], depth[j], owner, normals):
+                    like[m] = like[j]
+            if like[m] == -1:
+                like[m] = ~(4 * count + i)
+                own = 1
+        count += own
+    return like, rows[:count]
 
 
 @njit(fastmath=FAST)
-def average_samples(pixels, samples, like, radiance):
-    """Each pixel becomes the mean of its four samples (premultiplied), each of which looks `like` one of them.
+def average_samples(pixels, like, samples, radiance):
+    """Each pixel becomes the mean of its four samples (premultiplied), whose colours `shared_samples` tells.
 
     A glint counts no more than GLINT, or than the least of them, else thin things would be dotted.
     """
+    means = np.empty((pixels.shape[0], 4), np.float32)
     for i in range(pixels.shape[0]):
-        p, least = U(pixels[i]), f4(1e9)
+        least = f4(1e9)
         for k in range(4):
-            own = samples[U(like[4 * i + k])]
+            j = like[4 * i + k]
+            own = radiance[U(j)] if j >= 0 else samples[U(~j)]
             least = min(least, max(own[0], own[1], own[2]))
         most = max(least, f4(GLINT))
         red, green, blue, alpha = f4(0), f4(0), f4(0), f4(0)
         for k in range(4):
-            own = samples[U(like[4 * i + k])]
+            j = like[4 * i + k]
+            own = radiance[U(j)] if j >= 0 else samples[U(~j)]
             share = f4(0.25) * min(most / max(own[0], own[1], own[2], f4(1e-6)), f4(1))
             red, green, blue, alpha = red + own[0] * share, green + own[1] * share, blue + own[2] * share, alpha + own[3]
-        radiance[p, 0], radiance[p, 1], radiance[p, 2], radiance[p, 3] = red, green, blue, alpha * f4(0.25)
+        means[i, 0], means[i, 1], means[i, 2], means[i, 3] = red, green, blue, alpha * f4(0.25)
+    for i in range(pixels.shape[0]):
+        for c in range(4):
+            radiance[U(pixels[i]), c] = means[i, c]

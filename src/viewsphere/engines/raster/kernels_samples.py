@@ -14,7 +14,7 @@ import numba as nb
 import numpy as np
 
 from viewsphere.engines.raster.kernels_chosen import CLOSED, TILE, level
-from viewsphere.geometry.jit import njit
+from viewsphere.geometry.jit import inner, njit
 from viewsphere.truth.kernels import BEHIND, EPSILON, NEVER, ROUNDED_UP, SLIVER, crossing_at, edge, hits_surface, negated, plane
 from viewsphere.truth.kernels_rays import LEAF, leaf_list, limits, pixel_box, touched
 
@@ -24,7 +24,7 @@ NARROW = TILE  # pixels: the size up to which every pixel of a box is looked at
 MEDIUM = 64  # likewise every tile; beyond it, rows
 
 
-@njit
+@inner
 def _box(q, i0, i1, i2, reach, width, height):
     """First and last pixel (x0, y0, x1, y1) of which points may be covered; x0 is BEHIND if a corner is behind the camera."""
     c, d = U(2), U(3)
@@ -139,7 +139,7 @@ def draw(q, order, triangles, cutout, cutouts, see_through, points, solid, fragm
             _draw_solid(surface, edges, found, count, points, solid)
 
 
-@njit
+@inner
 def _draw_wide(surface, edges, checked, box, most, found, points, cutouts, triangles, solid, fragments):
     """Draw a triangle tile by tile, or row by row if it is very large."""
     xa, ya, xb, yb = box
@@ -160,7 +160,7 @@ def _draw_wide(surface, edges, checked, box, most, found, points, cutouts, trian
             _draw_solid(surface, edges, found, count, points, solid)
 
 
-@njit
+@inner
 def _is_hidden(tiles, xa, ya, xb, yb, most):
     """Whether the tiles know that no pixel of the box shows anything farther than `most`."""
     for row in range(U(ya // TILE), U(yb // TILE + 1)):
@@ -170,7 +170,7 @@ def _is_hidden(tiles, xa, ya, xb, yb, most):
     return True
 
 
-@njit
+@inner
 def _open(farthest, xa, ya, xb, yb, most, found):
     """Pixels of the box that show something farther than `most`, as row << 16 | column."""
     count = U(0)
@@ -181,7 +181,7 @@ def _open(farthest, xa, ya, xb, yb, most, found):
     return count
 
 
-@njit
+@inner
 def _open_tiles(farthest, blocks, box, edges, most, found):
     """As `_open`, in the tiles of the box that the triangle may touch."""
     xa, ya, xb, yb = box
@@ -200,13 +200,13 @@ def _open_tiles(farthest, blocks, box, edges, most, found):
     return count
 
 
-@njit
+@inner
 def _is_outside(e, x, y):
     """Whether all of the tile that begins at (x, y) is outside of an edge."""
     return max(e[0] * x, e[0] * (x + TILE)) + (max(e[1] * y, e[1] * (y + TILE)) + e[2]) < 0.0
 
 
-@njit
+@inner
 def _open_row(farthest, points, y, span, thorough, most, found):
     """As `_open` for a part of a row; of a long part only chosen pixels, unless `thorough`."""
     grid, pixels, _, _ = points
@@ -225,7 +225,7 @@ def _open_row(farthest, points, y, span, thorough, most, found):
     return count
 
 
-@njit
+@inner
 def _span(edges, scales, y, xa, xb, reach):
     """First and last pixel of a row of which a point may be covered."""
     low, high = float(xa), float(xb)
@@ -241,7 +241,7 @@ def _span(edges, scales, y, xa, xb, reach):
     return (0, -1) if low > high else (math.ceil(low), math.floor(high))
 
 
-@njit
+@inner
 def _draw_solid(surface, edges, found, count, points, solid):
     """Draw a solid triangle at these pixels: four points are tested at once, and only where some is covered one by one."""
     grid, _, offsets, _ = points
@@ -281,7 +281,7 @@ def _draw_solid(surface, edges, found, count, points, solid):
         farthest[row, column] = max(farthest[row, column], least)
 
 
-@njit
+@inner
 def _draw_checked(surface, edges, found, count, points, cutouts, triangles, solid, fragments):
     """Draw a cut-out, a sliver or a see-through triangle at these pixels."""
     grid, _, offsets, _ = points
@@ -295,7 +295,7 @@ def _draw_checked(surface, edges, found, count, points, cutouts, triangles, soli
         farthest[row, column] = max(farthest[row, column], level(nearest[k].min()))
 
 
-@njit
+@inner
 def _cast(surface, edges, ray, p, cutouts, triangles, solid, fragments):
     """What truth does for cut-outs and slivers, for one point's ray; a see-through surface is listed."""
     t, cutout, is_see_through, (nx, ny, nz, det), bounds = surface
@@ -314,7 +314,7 @@ def _cast(surface, edges, ray, p, cutouts, triangles, solid, fragments):
         seen[p] = t
 
 
-@njit
+@inner
 def _insert(t, inverse, p, triangles, fragments):
     """List a see-through surface by distance; of those that lie on one another the last triangle is in front.
 
@@ -338,7 +338,7 @@ def _insert(t, inverse, p, triangles, fragments):
     counts[p] = min(count + 1, capacity)
 
 
-@njit
+@inner
 def _share_edge(vertices, triangles, s, t):
     """Whether two corners of triangle s are where corners of t are."""
     same = 0
@@ -385,7 +385,7 @@ def draw_rays(q, order, triangles, cutout, cutouts, see_through, unit, table, po
             _cast_box(surface, (e0, e1, e2), box, rays, cutouts, triangles, points, solid, fragments)
 
 
-@njit
+@inner
 def _is_empty(points, box):
     """Whether no pixel of a box of rays is chosen."""
     grid, pixels, side = points
@@ -396,7 +396,7 @@ def _is_empty(points, box):
     return empty
 
 
-@njit
+@inner
 def _cast_box(surface, edges, box, rays, cutouts, triangles, points, solid, fragments):
     """Draw a triangle at the chosen pixels of a box of rays (both ends included)."""
     grid, pixels, side = points

@@ -10,11 +10,10 @@ import numpy as np
 from viewsphere.engines.raster.kernels_filter import opacity
 from viewsphere.engines.raster.kernels_material import L_ALPHA, L_CASTS_FROM
 from viewsphere.engines.raster.kernels_texture import FAST
-from viewsphere.geometry.jit import njit
+from viewsphere.geometry.jit import inner, njit
 
 f4 = nb.float32
 U = nb.uintp
-INNER = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}  # of kernels that only kernels call: half the time to compile
 
 # A view maps a homogeneous point to (u w, v w, q w, w): u and v in texels from the map's middle, q growing with
 # the distance to the light and linear in u and v on every plane: the distance itself from afar, -1 / distance from near.
@@ -39,7 +38,7 @@ GRID = 3 + LEVELS
 LOW, HIGH, ACROSS, DOWN = range(4)
 
 
-@njit(**INNER)
+@inner
 def _alpha(surfaces, textures, t, g, h):
     """Alpha of triangle t where its second and third corner weigh g and h."""
     i, j, k = surfaces.triangles[t]
@@ -51,7 +50,7 @@ def _alpha(surfaces, textures, t, g, h):
     return alpha * opacity(surfaces, textures, m, u0, v0, u1, v1)
 
 
-@njit(**INNER)
+@inner
 def _reach(corners, i, j, k, near, axis):
     """Least and greatest place along an axis of a triangle's part in front of the near plane, in texels from the middle."""
     low, high = np.inf, -np.inf
@@ -143,7 +142,7 @@ def finish_view(grid, form, depth, bounds):
     return nearest
 
 
-@njit(inline="always")
+@inner(inline="always")
 def _find_slopes(grid, depth, far, near, bounds):
     """ACROSS and DOWN of the finest cells: of the first STEP x STEP texels, as far as they may be one surface; else NaN."""
     size, side, stride, last = grid[SIZE], grid[CELLS], grid[SIZE] + GAP, STEP - 1
@@ -161,7 +160,7 @@ def _find_slopes(grid, depth, far, near, bounds):
                 bounds[cell, U(column)] = total / count
 
 
-@njit(fastmath=FAST, **INNER)
+@inner(fastmath=FAST)
 def _mean_slope(bounds, cell, right, below):
     """Mean ACROSS and DOWN of a cell and those to the right and below, where they are known."""
     across, down, n, m = f4(0), f4(0), f4(0), f4(0)
@@ -175,7 +174,7 @@ def _mean_slope(bounds, cell, right, below):
     return across / max(n, f4(1)), down / max(m, f4(1))
 
 
-@njit(fastmath=FAST, inline="always")
+@inner(fastmath=FAST, inline="always")
 def _enclose(grid, depth, bounds):
     """All columns of the finest cells from their slopes; returns the smallest q."""
     size, side, stride = grid[SIZE], grid[CELLS], grid[SIZE] + GAP
@@ -199,7 +198,7 @@ def _enclose(grid, depth, bounds):
     return nearest
 
 
-@njit(fastmath=FAST, inline="always")
+@inner(fastmath=FAST, inline="always")
 def _join(grid, bounds):
     """The coarser cells, each from four of the level before that lie side by side."""
     width, n, half, first = 2 * grid[CELLS], grid[CELLS] >> 1, f4(STEP), grid[BOUNDS_AT]

@@ -50,32 +50,37 @@ def paint(baked: Baked, camera: Camera, visibility: Visibility, antialias: bool,
 
     Edge pixels are the mean of four samples. Where nothing is, the sky if `has_sky`, else 0.
     """
-    triangle, depth = visibility.triangle.reshape(-1), visibility.inverse_depth.reshape(-1)
-    samples = edge_samples(baked.geometry, camera, visibility, baked.owner) if antialias else None
     view = view_of(baked, camera)
-    if samples is not None:
-        triangle = triangle.copy()
-        triangle[samples.pixels] = -1
+    triangle, depth = visibility.triangle.reshape(-1), visibility.inverse_depth.reshape(-1)
     _shade(baked, camera, view, visibility, triangle, depth, radiance)
-    if samples is not None:
-        _smooth(baked, camera, visibility, samples, has_sky, radiance)
     if has_sky:
         sky_behind(view, baked.surrounding, radiance)
+    samples = edge_samples(baked.geometry, camera, visibility, baked.owner) if antialias else None
+    if samples is not None:
+        _smooth(baked, camera, visibility, samples, has_sky, radiance)
 
 
 def _smooth(baked: Baked, camera: Camera, visibility: Visibility, samples: Samples, has_sky: bool, radiance: Float32) -> None:
-    """Edge pixels: the mean of their samples; those of a pixel that look alike are shaded once."""
-    view = view_of(baked, camera, samples)
+    """Edge pixels: the mean of their samples. Only those that look like no pixel's centre around are shaded."""
+    shown, centres = (samples.triangle, samples.inverse_depth), (visibility.triangle, visibility.inverse_depth)
     normals = baked.geometry.triangle_normals
-    like = kernels_paint.shared_samples(samples.triangle, samples.inverse_depth, baked.owner, normals)
-    is_copy = like != np.arange(len(like))
-    colors = np.empty((len(like), 4), np.float32)
-    triangle = np.where(is_copy, np.int32(-1), samples.triangle)
-    _shade(baked, camera, view, visibility, triangle, samples.inverse_depth, colors, samples)
+    like, rows = kernels_paint.shared_samples(samples.pixels, *shown, *centres, baked.owner, normals, radiance)
+    at = (4 * rows[:, None] + np.arange(4, dtype=np.int32)).reshape(-1)
+    is_own = like[at] == ~np.arange(len(at))
+    own = Samples(
+        samples.pixels[rows],
+        samples.position[at],
+        samples.rays[at] if len(samples.rays) else samples.rays,
+        np.where(is_own, samples.triangle[at], np.int32(-1)),
+        samples.inverse_depth[at],
+    )
+    view = view_of(baked, camera, own)
+    colors = np.empty((len(at), 4), np.float32)
+    _shade(baked, camera, view, visibility, own.triangle, own.inverse_depth, colors, own)
     if has_sky:
-        colors[is_copy, 3] = 1  # the sky need not look there
+        colors[~is_own, 3] = 1  # the sky need not look there
         sky_behind(view, baked.surrounding, colors)
-    kernels_paint.average_samples(samples.pixels, colors, like, radiance)
+    kernels_paint.average_samples(samples.pixels, like, colors, radiance)
 
 
 def _shade(

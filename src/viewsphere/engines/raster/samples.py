@@ -69,7 +69,7 @@ def edge_samples(geometry: Geometry, camera: Camera, visibility: Visibility, own
     such a pixel is left out (`kernels_edges`), and what is behind it, or at the centre, is shown instead.
     """
     look = visibility.triangle, visibility.inverse_depth, owner, geometry.triangle_normals
-    marks = kernels_chosen.differing(*look)
+    marks = _differs_from_neighbour(*look)
     q = homogeneous(geometry, camera) if visibility.corners is None else visibility.corners
     if camera.distortion is None:
         pixels, position, triangle, inverse = _pinhole_edges(geometry, visibility, marks, q, owner)
@@ -238,6 +238,22 @@ class _Points:
         kernels.draw(q, *surfaces, (self.grid, self.pixels, offsets, reach), solid, fragments)
 
 
+def _differs_from_neighbour(triangle: Int32, depth: Float32, owner: Int32, normals: Float32) -> NDArray[np.uint8]:
+    """Pixels that look different from the one beside, above or below: uint8, one after another, padded to whole words of 8."""
+    height, width = triangle.shape
+    beside, above = np.empty((2, height * width + 8), np.uint8)
+    room, owners = np.zeros((8, width + 16), np.float32), np.zeros((4, width + 16), np.int32)
+    kernels_chosen.compare(triangle, depth, owner, normals, room, owners, beside, above)
+    size = height * width
+    beside[:size:width] = 0
+    above[:width] = 0
+    marks = np.zeros((size + 7) // 8 * 8, np.uint8)
+    marks[:size] = beside[:size] | above[:size]
+    marks[: size - 1] |= beside[1:size]
+    marks[: size - width] |= above[width:size]
+    return marks
+
+
 def _pinhole_edges(
     geometry: Geometry, visibility: Visibility, marks: NDArray[np.uint8], q: NDArray[np.float64], owner: Int32
 ) -> tuple[Int32, Float32, Int32, Float32]:
@@ -263,12 +279,9 @@ def _pinhole_edges(
     return _differing(count, pixels, nearest, seen, bound, _ROTATED, *shown, owner, geometry.triangle_normals)
 
 
-def _room(width: int) -> tuple[NDArray[Any], ...]:
-    """Where `kernels_edges.draw` keeps a triangle's samples: pixels, x, y, 1/z, whether inside, the same of four in a word."""
-    room = max(width, kernels_edges.NARROW**2) + 1
-    words = np.empty(room, np.uint32)
-    found, (x, y) = np.empty(room, np.uint32), np.empty((2, 4 * room))
-    return found, x, y, np.empty(4 * room, np.float32), words.view(np.uint8), words
+def _room(width: int) -> tuple[NDArray[np.uint32], Float32]:
+    """Where `kernels_edges.draw` keeps the pixels of a triangle, and 1/z at the samples of one."""
+    return np.empty(max(width, kernels_edges.NARROW**2) + 1, np.uint32), np.empty(4, np.float32)
 
 
 def _differing(count: int, *known: NDArray[Any]) -> tuple[Int32, Float32, Int32, Float32]:

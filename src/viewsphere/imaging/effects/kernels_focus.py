@@ -10,7 +10,7 @@ import math
 import numba as nb
 import numpy as np
 
-from viewsphere.geometry.jit import njit
+from viewsphere.geometry.jit import inner, njit
 from viewsphere.imaging.kernels_view import FAST
 
 f4 = nb.float32
@@ -22,7 +22,7 @@ BEHIND, FRONT = 0, 1
 MADE_UP = f4(0.05)  # weight of what is drawn on behind something near: it counts where little else spreads
 
 
-@njit(fastmath=FAST)
+@inner(fastmath=FAST)
 def _reaches(radius, near, margin, slack, y0, x0, rows):
     """The largest disc that touches some lines of pixels, and the largest in front of the focus; -1 where none does."""
     largest, nearest = f4(-1), f4(-1)
@@ -37,7 +37,7 @@ def _reaches(radius, near, margin, slack, y0, x0, rows):
     return largest, nearest
 
 
-@njit(fastmath=FAST)
+@inner(fastmath=FAST)
 def _gather(p, plane, width, at, channels, reach, stride, layer, b):
     """Sums of weighted colours, and after them of weights, over all discs that reach the line of pixels from `at`.
 
@@ -71,7 +71,7 @@ def _gather(p, plane, width, at, channels, reach, stride, layer, b):
                     b[total + U(k)] += b[U(k)] * p[line + U(k)]
 
 
-@njit(fastmath=FAST)
+@inner(fastmath=FAST)
 def _mix(b, channels, has_near, y, x0, out):
     """What is in front of the focus over the rest; where there is no rest, it alone."""
     back, front = LINE, LINE * (channels + 2)
