@@ -17,22 +17,37 @@ from . import ground
 SENSOR = 36.0
 """Millimetres; any will do."""
 
+PASSES = {"index": ("use_pass_object_index", ("Object Index", "IndexOB")), "depth": ("use_pass_z", ("Depth",))}
+"""What may be asked for besides the colours: the layer's property, the pass's names in Blender 5 and before."""
+
 
 def render(told):
-    """Write (H, W, 4) float32 to `out`: scene-linear, premultiplied, the first row on top; empty outside of the border."""
+    """Write (H, W, 4) float32 to `out`: scene-linear, premultiplied, the first row on top; empty outside of the border.
+
+    Each of the `passes` goes beside it, (H, W, 1): for `picture.npy`, `picture.index.npy`.
+    """
     scene = bpy.context.scene
     view = told["camera"]
     place_camera(scene, view)
     scene.render.film_transparent = told["transparent"]
     ground.show_sky(not told["transparent"])
     _set_border(scene, told["border"], view)
+    wanted = _switched(scene.view_layers[0], told)
     scene.update_tag()  # else persistent data hides what has changed
     begun, cpu = time.monotonic(), time.process_time()
-    passes = _rendered(["Combined", *told["passes"]])
-    for name, pixels in passes.items():
-        file = told["out"] if name == "Combined" else told["out"].replace(".npy", f".{name}.npy")
-        np.save(file, _whole(pixels, told["border"], view))
+    for name, pixels in _rendered(wanted).items():
+        np.save(wanted[name], _whole(pixels, told["border"], view))
     return {"seconds": time.monotonic() - begun, "cpu_seconds": time.process_time() - cpu}
+
+
+def _switched(layer, told):
+    """Switch on the passes that are asked for, and no others; the file for each name that one may have."""
+    wanted = {"Combined": told["out"]}
+    for name, (switch, names) in PASSES.items():
+        setattr(layer, switch, name in told["passes"])
+        if name in told["passes"]:
+            wanted |= dict.fromkeys(names, told["out"].replace(".npy", f".{name}.npy"))
+    return wanted
 
 
 def place_camera(scene, view):
@@ -82,9 +97,8 @@ def _rendered(names):
         bpy.ops.render.render()
     finally:
         cycles.CyclesRender.render = original
-    missing = [name for name in names if name not in found]
-    if missing:
-        raise RuntimeError(f"Cycles gave no {', '.join(missing)}")
+    if "Combined" not in found:
+        raise RuntimeError("Cycles gave no picture")
     return found
 
 

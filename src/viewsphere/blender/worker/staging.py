@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+
 import bpy
 from mathutils import Matrix
 
@@ -34,7 +36,6 @@ def set_up(scene, settings):
     scene.render.use_persistent_data = True
     scene.render.threads_mode, scene.render.threads = "FIXED", settings["threads"]
     scene.render.resolution_percentage = 100
-    scene.view_layers[0].use_pass_object_index = True
     cycles = scene.cycles
     cycles.samples = settings["samples"]
     cycles.use_adaptive_sampling = False
@@ -74,9 +75,11 @@ def _choose_device(cycles, name):
     if name == "CPU":
         return
     preferences = bpy.context.preferences.addons["cycles"].preferences
-    preferences.compute_device_type = name
-    preferences.refresh_devices()
-    chosen = [device for device in preferences.devices if device.type == name]
+    chosen = []
+    with suppress(TypeError):  # a kind that this build does not know
+        preferences.compute_device_type = name
+        preferences.refresh_devices()
+        chosen = [device for device in preferences.devices if device.type == name]
     if not chosen:
         raise ValueError(f"engine.device: expected cpu or a device that Cycles can reach, found no {name.lower()} device")
     for device in preferences.devices:

@@ -1,0 +1,31 @@
+"""cycles: path-traced pictures by Blender's Cycles, which runs in a process of its own; labels are the same as raster's."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from pydantic import JsonValue
+
+    from viewsphere.assets.mesh import Mesh
+    from viewsphere.engines.cycles.staging import CyclesStage
+    from viewsphere.model.shot import ModelSpec, Shot
+
+
+def check(options: Mapping[str, JsonValue]) -> None:
+    """Raise UserError for an option that is not known (with the nearest name), out of range, or without a Blender."""
+    from viewsphere.blender.interpreter import find_blender
+    from viewsphere.engines.cycles.options import parse_options
+
+    find_blender(parse_options(options).python)
+
+
+def stage(shot: Shot, load: Callable[[ModelSpec], Mesh]) -> CyclesStage:
+    """Build the shot's scene in Blender, and its geometry here.
+
+    Raises UserError for an unknown engine option or one out of range, or where Blender cannot be used.
+    """
+    from viewsphere.engines.cycles.staging import build_stage
+
+    return build_stage(shot, load)

@@ -1,0 +1,101 @@
+"""Lenses that Blender's camera does not have: pinhole pictures that cover the lens's rays, sampled along these.
+
+Labels are truth's in any case: it casts the same rays.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.geometry.camera import pixel_rays
+from viewsphere.model.camera import Camera, Intrinsics
+
+Float = NDArray[np.float64]
+Float32 = NDArray[np.float32]
+
+FINER = 1.25
+"""Pixels of a covering picture in one of the lens's, along a line."""
+
+STEEPEST = 1.5
+"""Tangent of the angle from the axis up to which one picture will do."""
+
+MARGIN = 2
+"""Pixels around the outermost rays."""
+
+FACES: tuple[tuple[tuple[int, int, int], ...], ...] = (
+    ((1, 0, 0), (0, 1, 0), (0, 0, 1)),
+    ((0, 0, -1), (0, 1, 0), (1, 0, 0)),
+    ((0, 0, 1), (0, 1, 0), (-1, 0, 0)),
+    ((1, 0, 0), (0, 0, -1), (0, 1, 0)),
+    ((1, 0, 0), (0, 0, 1), (0, -1, 0)),
+    ((-1, 0, 0), (0, 1, 0), (0, 0, -1)),
+)
+"""Rows: axes of a view ahead, to the right, left, down, up and behind, in the camera's."""
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """A pinhole picture: `camera`, and which of the lens's pixels look through it, where.
+
+    pixels (N,) indices of the lens's pixels; x, y (N,): where their rays meet the picture; None where its pixels are these.
+    """
+
+    camera: Camera
+    pixels: NDArray[np.int64] | None = None
+    x: Float | None = None
+    y: Float | None = None
+
+
+def views_of(camera: Camera) -> tuple[View, ...]:
+    """The pictures that a camera's own is made from: itself for a pinhole without skew, one that is somewhat wider for a lens
+    that bends rays a little, else up to six sides of a cube.
+    """
+    if camera.distortion is None and camera.intrinsics.skew == 0:
+        return (View(camera),)
+    rays = pixel_rays(camera.intrinsics).reshape(-1, 3)
+    known = np.flatnonzero(np.isfinite(rays).all(axis=1))
+    ahead = rays[known]
+    if (ahead[:, 2] > 0).all() and (np.abs(ahead[:, :2]).max(axis=1) <= STEEPEST * ahead[:, 2]).all():
+        return (_view(camera, np.eye(3), known, ahead),)
+    turned = [ahead @ np.array(face, float).T for face in FACES]
+    nearest = np.argmax([t[:, 2] for t in turned], axis=0)
+    views = [
+        _view(camera, np.array(face, float), known[nearest == i], turned[i][nearest == i])
+        for i, face in enumerate(FACES)
+        if (nearest == i).any()
+    ]
+    return tuple(views)
+
+
+def _view(camera: Camera, face: Float, pixels: NDArray[np.int64], rays: Float) -> View:
+    """The smallest picture through which these rays, in the view's axes, pass."""
+    focal = FINER * max(camera.intrinsics.fx, camera.intrinsics.fy)
+    x, y = focal * rays[:, 0] / rays[:, 2], focal * rays[:, 1] / rays[:, 2]
+    left, top = math.floor(x.min()) - MARGIN, math.floor(y.min()) - MARGIN
+    width, height = math.ceil(x.max()) + MARGIN - left, math.ceil(y.max()) + MARGIN - top
+    pinhole = Intrinsics(width=width, height=height, fx=focal, fy=focal, cx=-left, cy=-top)
+    return View(Camera(pinhole, face @ camera.R, face @ camera.t), pixels, x - left, y - top)
+
+
+def resampled(camera: Camera, views: Sequence[View], pictures: Sequence[Float32]) -> Float32:
+    """The lens's picture (H, W, 4) float32, bilinear; empty where it has no ray."""
+    out = np.zeros((camera.height * camera.width, 4), np.float32)
+    for view, picture in zip(views, pictures, strict=True):
+        if view.pixels is None or view.x is None or view.y is None:
+            return picture
+        out[view.pixels] = _bilinear(picture, view.x - 0.5, view.y - 0.5)
+    return out.reshape(camera.height, camera.width, 4)
+
+
+def _bilinear(picture: Float32, x: Float, y: Float) -> NDArray[Any]:
+    column, row = np.floor(x).astype(int), np.floor(y).astype(int)
+    across, down = (x - column)[:, None].astype(np.float32), (y - row)[:, None].astype(np.float32)
+    upper = picture[row, column] * (1 - across) + picture[row, column + 1] * across
+    lower = picture[row + 1, column] * (1 - across) + picture[row + 1, column + 1] * across
+    return upper * (1 - down) + lower * down

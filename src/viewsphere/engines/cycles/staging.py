@@ -1,0 +1,188 @@
+"""The Cycles engine's stage: truth's geometry here, the same triangles in a Blender that paints them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.assets.mesh import Mesh
+from viewsphere.blender.interpreter import find_blender
+from viewsphere.blender.process import BlenderProcess
+from viewsphere.engines.cycles.lens import resampled, views_of
+from viewsphere.engines.cycles.options import Options, parse_options
+from viewsphere.engines.cycles.told import middle_of, told_scene
+from viewsphere.errors import BlenderDied, BlenderError, ModelError, UserError
+from viewsphere.imaging.background import display_background
+from viewsphere.imaging.finish import finished
+from viewsphere.imaging.seen import seen_by
+from viewsphere.model.camera import Camera
+from viewsphere.model.shot import Frame, ModelSpec, Shot
+from viewsphere.truth.geometry import Geometry, build_geometry
+from viewsphere.truth.visibility import Visibility, homogeneous
+
+STAGE_SECONDS = 600.0
+"""A scene that Blender has not built by then hangs."""
+
+FRAME_SECONDS = 3600.0
+
+NEAREST, FARTHEST = 1e-3, 1e7
+"""Metres in which the camera sees."""
+
+AROUND = 2
+"""Pixels to which Cycles' filter spreads what is seen."""
+
+Float32 = NDArray[np.float32]
+
+
+@dataclass(eq=False)
+class Keeper:
+    """The one Blender of this process: it has one shot's scene at a time, and is replaced when it has served long enough."""
+
+    python: Path
+    process: BlenderProcess | None = None
+    _stage: CyclesStage | None = None
+    _served: int = 0
+
+    def process_for(self, stage: CyclesStage) -> BlenderProcess:
+        """A Blender that has this stage's scene."""
+        if self.process is not None and self._stage is stage:
+            return self.process
+        if stage.options.replace_after and self._served >= stage.options.replace_after:
+            self.drop()
+        if self.process is None:
+            self.process = _started(self.python)
+        self._stage, self._served = None, self._served + 1
+        stage.tell(self.process)
+        self._stage = stage
+        return self.process
+
+    def drop(self) -> None:
+        """End it; the next picture starts another."""
+        if self.process is not None:
+            self.process.close()
+        self.process, self._stage, self._served = None, None, 0
+
+
+def _started(python: Path) -> BlenderProcess:
+    process = BlenderProcess(python)
+    try:
+        process.ask("hello")
+    except BlenderError as error:
+        process.close()
+        raise UserError(f"engine.python: {python}: its Blender does not start: {error}; ask `viewsphere doctor`") from None
+    return process
+
+
+@cache
+def keeper_of(python: Path) -> Keeper:
+    """The keeper of this process's Blender in this interpreter, the same one every time."""
+    return Keeper(python)
+
+
+@dataclass(frozen=True, eq=False)
+class CyclesStage:
+    """A scene in Blender; `color` renders it."""
+
+    geometry: Geometry
+    shot: Shot
+    meshes: Sequence[Mesh]
+    options: Options
+    keeper: Keeper
+    middle: NDArray[np.float64]
+
+    def color(self, camera: Camera, frame: Frame, visibility: Visibility) -> NDArray[np.uint8]:
+        """The picture, (H, W, 3) uint8 sRGB, or (H, W, 4) with straight alpha where the background is transparent.
+
+        A Blender that dies or hangs is started again, once. Raises ModelError when it dies again, UserError for an
+        unreadable background image.
+        """
+        finish = frame.finish or self.shot.scene.finish
+        background = display_background(finish.background, camera.width, camera.height)
+        is_open = background is not None or finish.background.transparent
+        radiance = self._radiance(camera, is_open)
+        target = self.middle if frame.pose.target is None else np.array(frame.pose.target)
+        return finished(
+            radiance,
+            background,
+            finish,
+            lambda: seen_by(camera, target, visibility.inverse_depth, visibility.triangle, self.geometry.triangle_object),
+        )
+
+    def _radiance(self, camera: Camera, is_open: bool) -> Float32:
+        """Scene-linear, premultiplied, (H, W, 4) float32."""
+        died: BlenderDied | None = None
+        for _ in range(2):
+            try:
+                return self._rendered(camera, is_open)
+            except BlenderDied as error:
+                self.keeper.drop()
+                died = error
+        raise ModelError(f"{', '.join(sorted({p.model.key for p in self.shot.placements}))}: {died}")
+
+    def _rendered(self, camera: Camera, is_open: bool) -> Float32:
+        process = self.keeper.process_for(self)
+        views = views_of(camera)
+        pictures = [self._picture(process, view.camera, is_open) for view in views]
+        return resampled(camera, views, pictures)
+
+    def _picture(self, process: BlenderProcess, camera: Camera, is_open: bool) -> Float32:
+        border = border_of(self.geometry, camera) if is_open and self.shot.scene.ground is None else None
+        if border is not None and (border[0] >= border[2] or border[1] >= border[3]):
+            return np.zeros((camera.height, camera.width, 4), np.float32)
+        out = str(process.folder / "picture.npy")
+        told = told_camera(camera)
+        process.ask("render", FRAME_SECONDS, camera=told, transparent=is_open, border=border, passes=[], out=out)
+        return np.load(out)
+
+    def tell(self, process: BlenderProcess) -> None:
+        """Build the scene in this Blender. Raises UserError for what Cycles does not know or have."""
+        told = told_scene(self.shot.placements, self.meshes, self.geometry, self.shot.scene, self.options, process.put)
+        try:
+            process.ask("stage", STAGE_SECONDS, **told)
+        except BlenderError as error:
+            raise UserError(str(error).removeprefix("ValueError: ")) from error
+
+
+def told_camera(camera: Camera) -> dict[str, Any]:
+    """A pinhole without skew as the worker's `render` wants it."""
+    return {
+        **{name: getattr(camera.intrinsics, name) for name in ("width", "height", "fx", "fy", "cx", "cy")},
+        "R": camera.R.tolist(),
+        "center": camera.center.tolist(),
+        "near": NEAREST,
+        "far": FARTHEST,
+    }
+
+
+def border_of(geometry: Geometry, camera: Camera) -> tuple[int, int, int, int] | None:
+    """Pixels x0, y0, x1, y1 outside of which a pinhole without skew sees nothing of the scene; None where part of the scene
+    is beside or behind the camera.
+    """
+    used = geometry.triangles.reshape(-1)
+    q = homogeneous(geometry, camera)[used]
+    if not len(q) or not (q[:, 2] > 0).all():
+        return None
+    x, y = q[:, 0] / q[:, 2], q[:, 1] / q[:, 2]
+    left, top = max(math.floor(x.min()) - AROUND, 0), max(math.floor(y.min()) - AROUND, 0)
+    right = min(math.ceil(x.max()) + AROUND, camera.width)
+    return left, top, right, min(math.ceil(y.max()) + AROUND, camera.height)
+
+
+def build_stage(shot: Shot, load: Callable[[ModelSpec], Mesh]) -> CyclesStage:
+    """Geometry and scene of a shot; Blender builds it when the first picture is asked for."""
+    options = parse_options(shot.engine_options)
+    loaded: dict[ModelSpec, Mesh] = {}
+    for placement in shot.placements:
+        if placement.model not in loaded:
+            loaded[placement.model] = load(placement.model)
+    meshes = [loaded[placement.model] for placement in shot.placements]
+    geometry = build_geometry(shot.placements, meshes, shot.scene.ground is not None, shot.label_alpha)
+    keeper = keeper_of(find_blender(options.python))
+    return CyclesStage(geometry, shot, meshes, options, keeper, middle_of(geometry, min(len(meshes), 1)))

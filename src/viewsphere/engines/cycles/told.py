@@ -1,0 +1,156 @@
+"""A shot as the plain data and arrays that Blender's worker stages (`viewsphere.blender.worker.staging`)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.assets.mesh import Image, Material, Mesh
+from viewsphere.assets.repaint import repainted
+from viewsphere.engines.cycles.options import Options
+from viewsphere.model.scene import AnyLight, Ground, HemisphereLight, Scene
+from viewsphere.model.shot import Placement, Repaint
+from viewsphere.surroundings.ground import ground_frame, ground_material
+from viewsphere.surroundings.sky import sky_pictures
+from viewsphere.surroundings.sun import sun_light
+from viewsphere.truth.geometry import Geometry
+
+Put = Callable[[NDArray[Any]], str]
+"""Keeps an array where the worker can read it, and gives its path."""
+
+Told = dict[str, Any]
+
+ARRAYS = ("vertices", "triangles", "normals", "triangle_material", "uv0", "uv1", "colors")
+
+
+def told_scene(
+    placements: Sequence[Placement], meshes: Sequence[Mesh], geometry: Geometry, scene: Scene, options: Options, put: Put
+) -> Told:
+    """The worker's `stage` request. Raises UserError for a picture of sky or ground that cannot be read."""
+    kinds: dict[tuple[int, tuple[Repaint, ...]], int] = {}
+    told: list[Told] = []
+    shared: dict[int, Told] = {}
+    objects: list[Told] = []
+    for placement, mesh in zip(placements, meshes, strict=True):
+        kind = id(mesh), placement.repaints
+        if kind not in kinds:
+            kinds[kind] = len(told)
+            if id(mesh) not in shared:
+                shared[id(mesh)] = _told_mesh(mesh, put)
+            told.append({**shared[id(mesh)], "materials": [_told_material(m, placement.repaints) for m in mesh.materials]})
+        objects.append({"mesh": kinds[kind], "matrix": placement.world_from_object, "index": placement.id})
+    has_scenery = any(p.scenery for p in placements)
+    return {
+        "meshes": told,
+        "objects": objects,
+        "ground": None if scene.ground is None else _told_ground(scene.ground, geometry, has_scenery, put),
+        "lights": _told_lights(scene, middle_of(geometry, sum(not p.scenery for p in placements))),
+        "world": _told_world(scene, put),
+        "settings": told_settings(options),
+    }
+
+
+def told_settings(options: Options) -> Told:
+    """The worker's settings of Cycles."""
+    return {
+        "samples": options.samples,
+        "denoise": options.denoise,
+        "bounces": options.bounces,
+        "device": options.device.upper(),
+        "threads": options.threads,
+        "cycles": dict(options.settings),
+    }
+
+
+def _told_mesh(mesh: Mesh, put: Put) -> Told:
+    arrays = {name: getattr(mesh, name) for name in ARRAYS}
+    return {
+        **{name: None if array is None else put(array) for name, array in arrays.items()},
+        "images": _told_images(mesh.images, put),
+    }
+
+
+def _told_images(images: Sequence[Image], put: Put) -> list[Told]:
+    return [{"name": image.name, "pixels": put(image.pixels)} for image in images]
+
+
+def _told_material(material: Material, repaints: Sequence[Repaint]) -> Told:
+    """Metallic and roughness of a repaint stand for the factor and its texture."""
+    tinted, repaint = repainted(material, repaints)
+    told = asdict(tinted)
+    told["fixed_metallic"] = None if repaint is None else repaint.metallic
+    told["fixed_roughness"] = None if repaint is None else repaint.roughness
+    return told
+
+
+def _told_ground(ground: Ground, geometry: Geometry, has_scenery: bool, put: Put) -> Told:
+    """Truth's own ground, with the texture coordinates that raster's has, and as far as that is seen."""
+    vertices = geometry.vertices[geometry.vertex_start[-1] :]
+    triangles = geometry.triangles[geometry.triangle_start[-1] :] - geometry.vertex_start[-1]
+    material, images = ground_material(ground)
+    only_scatters = ground.roughness == 1 and ground.metallic == 0 and not images  # as raster has it
+    per_length, u, v = ground_frame(ground, material, (0, 0, 0), 1.0)
+    uv = np.stack([u + per_length * vertices[:, 0], v - per_length * vertices[:, 1]], axis=1)
+    mesh = {
+        "vertices": put(vertices.astype(np.float32)),
+        "triangles": put(triangles.astype(np.int32)),
+        "normals": put(np.tile(np.array([0, 0, 1], np.float32), (len(vertices), 1))),
+        "triangle_material": put(np.zeros(len(triangles), np.int32)),
+        "uv0": put(uv.astype(np.float32)),
+        "uv1": None,
+        "colors": None,
+        "images": _told_images(images, put),
+        "materials": [_told_material(replace(material, specular=0.0) if only_scatters else material, ())],
+    }
+    middle, unit = _extent(geometry, has_scenery)
+    return {"mesh": mesh, "catcher": ground.catcher, "middle": middle.tolist(), "unit": unit}
+
+
+def _extent(geometry: Geometry, has_scenery: bool) -> tuple[NDArray[np.float64], float]:
+    """Centre (3,) and half the diagonal of all that is placed; with scenery the world's origin and the next power of two, so
+    that they stay when the targets change.
+    """
+    placed = geometry.vertices[geometry.triangles[: geometry.triangle_start[-1]].reshape(-1)]
+    if not len(placed):
+        return np.zeros(3), 1.0
+    low, high = placed.min(axis=0), placed.max(axis=0)
+    unit = float(np.linalg.norm(high - low)) / 2 or 1.0
+    return (np.zeros(3), 2.0 ** math.ceil(math.log2(unit))) if has_scenery else ((low + high) / 2, unit)
+
+
+def middle_of(geometry: Geometry, count: int) -> NDArray[np.float64]:
+    """Centre (3,) of the box around the first so many placements, world metres."""
+    seen = geometry.vertices[geometry.triangles[: geometry.triangle_start[count]].reshape(-1)]
+    return (seen.min(axis=0) + seen.max(axis=0)) / 2 if len(seen) else np.zeros(3)
+
+
+def _told_lights(scene: Scene, middle: NDArray[np.float64]) -> list[Told]:
+    """The sun as it arrives, and the lamps; hemispheres are part of the world."""
+    told: list[Told] = []
+    sun = sun_light(scene.sky, scene.sun)
+    if sun is not None:
+        told.append(
+            {"kind": "sun", "direction": sun.direction, "irradiance": sun.irradiance, "angle_deg": sun.angle_deg},
+        )
+    return told + [_told_lamp(light, middle) for light in scene.lights if not isinstance(light, HemisphereLight)]
+
+
+def _told_lamp(light: AnyLight, middle: NDArray[np.float64]) -> Told:
+    told = light.model_dump()
+    told["irradiance"] = [light.strength * c for c in light.color]
+    for name in ("position", "toward"):
+        if name in told:
+            told[name] = (np.array(told[name]) + middle).tolist()
+    return told
+
+
+def _told_world(scene: Scene, put: Put) -> Told:
+    pictures = sky_pictures(scene.sky, scene.sun, scene.lights, scene.ground is not None)
+    lighting = put(pictures.lighting)
+    seen = lighting if pictures.seen is pictures.lighting else put(pictures.seen)
+    return {"picture": lighting, "seen": seen, "turn_deg": pictures.turn_deg}

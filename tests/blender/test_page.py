@@ -1,0 +1,52 @@
+"""docs/blender.md is true: its recipes are, its options are all there are, its commands run."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from dataclasses import fields
+
+import pytest
+import yaml
+
+from small import ROOT
+from viewsphere import Dataset, Recipe, plan
+from viewsphere.engines.cycles.options import PRESETS, Options, parse_options
+
+PAGE = (ROOT / "docs" / "blender.md").read_text("utf-8")
+RECIPE, ENGINE = re.findall(r"```yaml\n(.*?)```", PAGE, re.DOTALL)
+ROWS = dict(re.findall(r"^\| `(\w+)` \|([^\n]*)\|$", PAGE, re.MULTILINE))
+
+
+def test_recipes_are_valid():
+    recipe = Recipe(**yaml.safe_load(RECIPE))
+    assert plan(recipe).frames == 2
+    parse_options(recipe.engine.options)
+    found = parse_options({k: v for k, v in yaml.safe_load(ENGINE)["engine"].items() if k != "name"})
+    assert (found.bounces, found.settings["seed"]) == (12, 7)
+
+
+def test_the_table_has_every_option_and_preset():
+    assert set(ROWS) == {f.name for f in fields(Options)} | {"quality"}
+    presets = list(PRESETS.values())
+    assert list(PRESETS) == re.findall(r"`(\w+)`", ROWS["quality"].split("|")[1])
+    for name in ("samples", "bounces"):
+        assert [getattr(p, name) for p in presets] == [int(n) for n in re.findall(r"\d+", ROWS[name])]
+    assert [p.denoise for p in presets] == re.findall(r"`(\w+)`", ROWS["denoise"])[-3:]
+    for name in ("threads", "replace_after"):
+        assert int(re.findall(r"\d+", ROWS[name])[0]) == getattr(Options(), name)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(300)
+@pytest.mark.usefixtures("blender")
+def test_commands_run(tmp_path):
+    (tmp_path / "drier.yaml").write_text(RECIPE, "utf-8")
+    commands = [line for block in re.findall(r"```sh\n(.*?)```", PAGE, re.DOTALL) for line in block.splitlines()]
+    assert [line.split()[1] for line in commands] == ["doctor", "doctor", "render", "check"]
+    for line in commands:
+        if "--setup-blender" not in line:  # downloads a gigabyte
+            run = subprocess.run([sys.executable, "-m", *line.split()], cwd=tmp_path, capture_output=True, text=True)
+            assert run.returncode == 0, f"{line}\n{run.stdout}{run.stderr}"
+    assert len(Dataset(tmp_path / "drier")) == 2

@@ -1,0 +1,68 @@
+"""Shots that both engines render, and what Blender is asked for directly."""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+
+import numpy as np
+
+from viewsphere import Recipe, plan
+from viewsphere.engines import cycles
+from viewsphere.engines.cycles.staging import CyclesStage, told_camera
+from viewsphere.run.stages import Stages
+
+DRAFT = {"name": "cycles", "quality": "draft"}
+HAIR_DRIER = {"source": "zoo:hair_drier", "category": "hair drier", "scale": {"length": 0.3}}
+
+
+def recipe_of(engine=DRAFT, camera=None, **changed) -> Recipe:
+    """One model of the zoo from two sides, without ground."""
+    given = {
+        "name": "cycles",
+        "models": [HAIR_DRIER],
+        "viewpoints": {"azimuth": [20, 140], "elevation": [25], "distance": 0.9},
+        "camera": {"size": [96, 96], "fov_deg": 40, **(camera or {})},
+        "scene": {"ground": False},
+        "engine": engine,
+        "channels": ["rgb"],
+        "formats": [],
+    }
+    return Recipe(**(given | changed))
+
+
+@cache
+def stages() -> Stages:
+    return Stages()
+
+
+def stage_of(recipe: Recipe) -> CyclesStage:
+    """The first shot's stage."""
+    known = stages()
+    return cycles.stage(next(plan(recipe).shots(known.box)), known.model)
+
+
+def asked(stage: CyclesStage, camera, passes=(), **changed) -> dict[str, np.ndarray]:
+    """A picture of the stage as Cycles gives it, and passes."""
+    process = stage.keeper.process_for(stage)
+    out = str(process.folder / "asked.npy")
+    told = {"camera": told_camera(camera), "transparent": True, "border": None, "passes": list(passes), "out": out}
+    process.ask("render", **(told | changed))
+    found = {name: np.load(out.replace(".npy", f".{name}.npy"))[..., 0] for name in passes}
+    return found | {"picture": np.load(out)}
+
+
+def shift_between(first, second) -> float:
+    """Pixels by which two grey pictures (H, W) are moved against one another: phase correlation of the lower frequencies.
+
+    The slope of the phases of what both have, weighted by how much of it there is.
+    """
+    window = np.hanning(first.shape[0])[:, None] * np.hanning(first.shape[1])[None]
+    a, b = (np.fft.fft2((p - p.mean()) * window) for p in (first, second))
+    down, across = np.fft.fftfreq(first.shape[0])[:, None], np.fft.fftfreq(first.shape[1])[None]
+    cross = a * np.conj(b)
+    weight = np.abs(cross) * (np.hypot(down, across) < 0.2)
+    rows = np.stack(np.broadcast_arrays(across, down), axis=-1).reshape(-1, 2) * 2 * math.pi
+    phase, weight = np.angle(cross).reshape(-1), np.sqrt(weight.reshape(-1))
+    moved, *_ = np.linalg.lstsq(rows * weight[:, None], phase * weight, rcond=None)
+    return float(np.hypot(*moved))
