@@ -43,7 +43,7 @@ def pictures(channel="rgb", **given):
 def test_labels_are_rasters_and_colours_lie_on_them(lens):
     given = {"camera": LENSES[lens], "channels": ["rgb", *LABELS]}
     pairs = zip(
-        render(recipe_of(DRAFT | {"samples": 16}, **given)), render(recipe_of({"name": "raster"}, **given)), strict=True
+        render(recipe_of(DRAFT | {"samples": 48}, **given)), render(recipe_of({"name": "raster"}, **given)), strict=True
     )
     for cycles, raster in pairs:
         for name in LABELS:

@@ -19,7 +19,7 @@ from viewsphere.model.camera import Camera, Intrinsics
 Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
 
-FINER = 1.25
+FINER = 1.5
 """Pixels of a covering picture in one of the lens's, along a line."""
 
 STEEPEST = 1.5
