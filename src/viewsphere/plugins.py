@@ -1,7 +1,7 @@
 """The seams: what an engine and a format must offer, and how a name finds its module.
 
 A plug-in is one module; its name is its file's name, listed without importing it. Third parties use the entry-point
-groups `viewsphere.engines` and `viewsphere.formats`. The only user of importlib.
+groups `viewsphere.engines` and `viewsphere.formats`. What is found by name is imported here and nowhere else.
 """
 
 from __future__ import annotations

@@ -8,21 +8,23 @@ from pathlib import Path
 
 from viewsphere import plugins
 
-IMAGING = Path(__file__).parents[1] / "imaging"
-"""What finishes the pictures of every engine."""
+SHARED = tuple(Path(__file__).parents[1] / name for name in ("imaging", "surroundings"))
+"""What every engine paints with: what finishes pictures, and what is around the targets."""
 
 
 @cache
 def engine_look(name: str) -> str:
-    """A digest of the sources of the engine of this name and of what finishes its pictures.
+    """A digest of the sources of the engine of this name, of the programs it runs (its `PROGRAMS`, if it has any), and of what
+    all engines share.
 
     Two states of a program may carry one version, but only equal sources surely paint alike. Raises UserError for an engine
     that is not there.
     """
-    file = getattr(plugins.load("engines", name), "__file__", None)
+    engine = plugins.load("engines", name)
+    file = getattr(engine, "__file__", None)
     own = [] if file is None else [Path(file).parent if Path(file).name == "__init__.py" else Path(file)]
     digest = hashlib.sha256()
-    for root in (*own, IMAGING):
+    for root in (*own, *getattr(engine, "PROGRAMS", ()), *SHARED):
         for source in sorted(root.rglob("*.py")) if root.is_dir() else [root]:
             digest.update(source.name.encode() + b"\0" + source.read_bytes())
     return digest.hexdigest()[:16]

@@ -35,6 +35,11 @@ def ground_material(ground: Ground) -> tuple[Material, tuple[Image, ...]]:
     return _material(ground.model_dump_json(), tuple(_stamp(ground, name) for name in IMAGES))
 
 
+def only_scatters(ground: Ground) -> bool:
+    """Whether the ground mirrors nothing and has one colour."""
+    return ground.roughness == 1 and ground.metallic == 0 and not any(getattr(ground, name) for name in IMAGES)
+
+
 def ground_frame(ground: Ground, material: Material, origin: ArrayLike, unit: float) -> tuple[float, float, float]:
     """(per_length, u0, v0) with which a point (x, y) in units from `origin`, world metres, has the texture coordinates
     u = u0 + per_length x, v = v0 - per_length y.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from itertools import accumulate, pairwise
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from viewsphere.assets.mesh import Mesh
-from viewsphere.model.shot import Placement
+from viewsphere.model.shot import ModelSpec, Placement
 from viewsphere.truth.cutouts import NO_CUTOUTS, SURFACE, Cutouts, mesh_cutouts, stack_cutouts
 
 BACKGROUND = 0
@@ -93,6 +93,12 @@ class Geometry:
             low = heights <= self.ground_z + TOUCHING * (float(heights.max(initial=self.ground_z)) - self.ground_z)
             found.append(bool(low.any() and low[self.triangles[first:last] - base].all(axis=1).any()))
         return tuple(found)
+
+
+def placed_meshes(placements: Sequence[Placement], load: Callable[[ModelSpec], Mesh]) -> list[Mesh]:
+    """The model of each placement; each is loaded once."""
+    loaded = {spec: load(spec) for spec in dict.fromkeys(p.model for p in placements)}
+    return [loaded[p.model] for p in placements]
 
 
 def build_geometry(placements: Sequence[Placement], meshes: Sequence[Mesh], ground: bool, label_alpha: float) -> Geometry:

@@ -22,15 +22,14 @@ def fade(material, middle, unit, sky):
     """Let the camera see the sky instead of the ground as far as it has faded; light and mirrors meet all of it.
 
     Transparency would be drawn by lot: a holdout, or the sky's light where the film is not transparent, has no noise. `sky`:
-    picture and turn of what is seen, or None.
+    picture and turn of what is seen.
     """
     graph = Graph(material.node_tree)
     output = next(node for node in material.node_tree.nodes if node.type == "OUTPUT_MATERIAL").inputs["Surface"]
     surface = output.links[0].from_socket
-    behind = graph.node("ShaderNodeHoldout").outputs[0]
-    if sky is not None:
-        light = graph.node("ShaderNodeEmission", {"Color": _seen(graph, *sky)}).outputs[0]
-        behind = graph.mix(graph.node("ShaderNodeValue", name=SKY).outputs[0], behind, light)
+    light = graph.node("ShaderNodeEmission", {"Color": _seen(graph, *sky)}).outputs[0]
+    nothing = graph.node("ShaderNodeHoldout").outputs[0]
+    behind = graph.mix(graph.node("ShaderNodeValue", name=SKY).outputs[0], nothing, light)
     graph.give(output, graph.mix(_gone(graph, middle, unit), surface, behind))
     material.cycles.emission_sampling = "NONE"
 

@@ -49,7 +49,7 @@ def _facing(position, direction):
 def add_world(scene, told):
     """Two pictures of the whole sphere: what lights, and what the camera sees (often the same).
 
-    The latter and its turn are returned, or None where there is no light.
+    The latter and its turn are returned.
     """
     world = bpy.data.worlds.new("world")
     scene.world = world
@@ -58,10 +58,6 @@ def add_world(scene, told):
     tree = world.node_tree
     tree.nodes.clear()
     output = tree.nodes.new("ShaderNodeOutputWorld")
-    if told is None:
-        tree.links.new(tree.nodes.new("ShaderNodeBackground").outputs[0], output.inputs["Surface"])
-        tree.nodes["Background"].inputs["Strength"].default_value = 0
-        return None
     place, image = _turned(tree, told["turn_deg"]), _picture(told["picture"])
     lighting, seen = _background(tree, place, image), image
     if told["seen"] == told["picture"]:

@@ -34,7 +34,8 @@ def set_up(scene, settings):
     """How Cycles works: one process a core, no adaptive sampling unless asked for, what is unchanged stays in memory."""
     scene.render.engine = "CYCLES"
     scene.render.use_persistent_data = True
-    scene.render.threads_mode, scene.render.threads = "FIXED", settings["threads"]
+    scene.render.threads_mode = "FIXED" if settings["threads"] else "AUTO"
+    scene.render.threads = max(settings["threads"], 1)
     scene.render.resolution_percentage = 100
     cycles = scene.cycles
     cycles.samples = settings["samples"]

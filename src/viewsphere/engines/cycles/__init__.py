@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -11,6 +12,9 @@ if TYPE_CHECKING:
     from viewsphere.assets.mesh import Mesh
     from viewsphere.engines.cycles.staging import CyclesStage
     from viewsphere.model.shot import ModelSpec, Shot
+
+PROGRAMS = (Path(__file__).parents[2] / "blender" / "worker",)
+"""Sources besides these that pictures depend on."""
 
 
 def check(options: Mapping[str, JsonValue]) -> None:

@@ -24,7 +24,7 @@ from viewsphere.imaging.finish import finished
 from viewsphere.imaging.seen import seen_by
 from viewsphere.model.camera import Camera
 from viewsphere.model.shot import Frame, ModelSpec, Shot
-from viewsphere.truth.geometry import Geometry, build_geometry
+from viewsphere.truth.geometry import Geometry, build_geometry, placed_meshes
 from viewsphere.truth.visibility import Visibility, homogeneous
 
 STAGE_SECONDS = 600.0
@@ -178,11 +178,7 @@ def border_of(geometry: Geometry, camera: Camera) -> tuple[int, int, int, int] |
 def build_stage(shot: Shot, load: Callable[[ModelSpec], Mesh]) -> CyclesStage:
     """Geometry and scene of a shot; Blender builds it when the first picture is asked for."""
     options = parse_options(shot.engine_options)
-    loaded: dict[ModelSpec, Mesh] = {}
-    for placement in shot.placements:
-        if placement.model not in loaded:
-            loaded[placement.model] = load(placement.model)
-    meshes = [loaded[placement.model] for placement in shot.placements]
+    meshes = placed_meshes(shot.placements, load)
     geometry = build_geometry(shot.placements, meshes, shot.scene.ground is not None, shot.label_alpha)
     keeper = keeper_of(find_blender(options.python))
     return CyclesStage(geometry, shot, meshes, options, keeper, middle_of(geometry, min(len(meshes), 1)))

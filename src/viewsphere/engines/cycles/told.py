@@ -15,7 +15,7 @@ from viewsphere.assets.repaint import repainted
 from viewsphere.engines.cycles.options import Options
 from viewsphere.model.scene import AnyLight, Ground, HemisphereLight, Scene
 from viewsphere.model.shot import Placement, Repaint
-from viewsphere.surroundings.ground import ground_frame, ground_material
+from viewsphere.surroundings.ground import ground_frame, ground_material, only_scatters
 from viewsphere.surroundings.sky import sky_pictures
 from viewsphere.surroundings.sun import sun_light
 from viewsphere.truth.geometry import Geometry
@@ -93,7 +93,6 @@ def _told_ground(ground: Ground, geometry: Geometry, has_scenery: bool, put: Put
     vertices = geometry.vertices[geometry.vertex_start[-1] :]
     triangles = geometry.triangles[geometry.triangle_start[-1] :] - geometry.vertex_start[-1]
     material, images = ground_material(ground)
-    only_scatters = ground.roughness == 1 and ground.metallic == 0 and not images  # as raster has it
     per_length, u, v = ground_frame(ground, material, (0, 0, 0), 1.0)
     uv = np.stack([u + per_length * vertices[:, 0], v - per_length * vertices[:, 1]], axis=1)
     mesh = {
@@ -105,7 +104,7 @@ def _told_ground(ground: Ground, geometry: Geometry, has_scenery: bool, put: Put
         "uv1": None,
         "colors": None,
         "images": _told_images(images, put),
-        "materials": [_told_material(replace(material, specular=0.0) if only_scatters else material, ())],
+        "materials": [_told_material(replace(material, specular=0.0) if only_scatters(ground) else material, ())],
     }
     middle, unit = _extent(geometry, has_scenery)
     return {"mesh": mesh, "catcher": ground.catcher, "middle": middle.tolist(), "unit": unit}

@@ -17,7 +17,7 @@ ROUGH, METAL, F0R, F0G, F0B, COAT, COAT_ROUGH, TRANSMISSION = range(20 * BLOCK, 
 ER, EG, EB, UNLIT, GROUND, CATCHER, BLENDED, AO = range(28 * BLOCK, 36 * BLOCK, BLOCK)
 # Interpolated: both uv sets; barycentrics of the second and third corner.
 U0, V0, U1, V1, BARY1, BARY2 = range(36 * BLOCK, 42 * BLOCK, BLOCK)
-# What reaches it: share of the ambient light from above and of the ground's, the mean direction that is open (0: unknown).
+# What reaches it: share of the ambient light from above and of the ground's; then scratch.
 OPEN, BOUNCE, OPENX, OPENY, OPENZ = range(42 * BLOCK, 47 * BLOCK, BLOCK)
 # Until then, of textured triangles: edges from the first corner to the second and the third, how both uv sets change along
 # them; -1 where the back of the file's normals is seen.

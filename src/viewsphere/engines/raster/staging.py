@@ -26,9 +26,9 @@ from viewsphere.imaging.seen import Seen, seen_by
 from viewsphere.model.camera import Camera
 from viewsphere.model.scene import Ground, Scene
 from viewsphere.model.shot import Frame, ModelSpec, Placement, Shot
-from viewsphere.surroundings.ground import ground_albedo, ground_frame, ground_material
+from viewsphere.surroundings.ground import ground_albedo, ground_frame, ground_material, only_scatters
 from viewsphere.surroundings.sky import even_light
-from viewsphere.truth.geometry import Geometry, build_geometry
+from viewsphere.truth.geometry import Geometry, build_geometry, placed_meshes
 from viewsphere.truth.visibility import Visibility
 
 
@@ -73,11 +73,7 @@ def build_stage(shot: Shot, load: Callable[[ModelSpec], Mesh]) -> RasterStage:
     options = parse_options(shot.engine_options)
     size = options.for_width(max(shot.intrinsics.width, shot.intrinsics.height))
     options = replace(options, shadow_resolution=size)
-    loaded: dict[ModelSpec, Mesh] = {}
-    for placement in shot.placements:
-        if placement.model not in loaded:
-            loaded[placement.model] = load(placement.model)
-    meshes = [loaded[placement.model] for placement in shot.placements]
+    meshes = placed_meshes(shot.placements, load)
     scene = shot.scene
     geometry = build_geometry(shot.placements, meshes, scene.ground is not None, shot.label_alpha)
     targets = sum(not p.scenery for p in shot.placements)
@@ -157,8 +153,7 @@ def _floor(
     if ground is None:
         return np.zeros(8, np.float32), None
     made, images = ground_material(ground)
-    only_scatters = ground.roughness == 1 and ground.metallic == 0 and not images
-    how = 2.0 if ground.catcher else float(only_scatters)
+    how = 2.0 if ground.catcher else float(only_scatters(ground))
     color = linear(ground.color).tolist()
     frame = ground_frame(ground, made, origin, unit)
     return np.array([*frame, material, how, *color], np.float32), ground_albedo(made, images)
