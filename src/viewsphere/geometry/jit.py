@@ -5,9 +5,6 @@ folder keyed by a digest of its source file, of the files of all kernels it can 
 numba's version and of the processor's name.
 """
 
-# pyright: reportAttributeAccessIssue=false, reportPrivateUsage=false
-# Only through its internals does numba let others choose what is optimized when.
-
 from __future__ import annotations
 
 import hashlib
@@ -23,10 +20,9 @@ from typing import Any
 import llvmlite.binding
 import numba
 import platformdirs
-from numba import _dynfunc
 from numba.core import config
-from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import Compiler
+
+from viewsphere.geometry import compiler
 
 _IMPORT = re.compile(r"^from (viewsphere[\w.]*) import", re.MULTILINE)
 _BUILD = (numba.__version__, llvmlite.binding.get_host_cpu_name(), os.environ.get("NUMBA_BOUNDSCHECK"))
@@ -39,63 +35,19 @@ def njit(function: Callable[..., Any] | None = None, **options: Any) -> Any:
     if not os.environ.get("NUMBA_CACHE_DIR"):
         folder = _cache_folder(_sources(function.__code__.co_filename))
         setattr(config, "CACHE_DIR", folder)  # noqa: B010, not in its stubs
-    return numba.njit(nogil=True, cache=True, error_model="numpy", pipeline_class=_Kernel, **options)(function)
+    whole = {"cache": True, "no_cfunc_wrapper": True, "pipeline_class": compiler.Kernel}
+    return numba.njit(nogil=True, error_model="numpy", **whole, **options)(function)
 
 
 def inner(function: Callable[..., Any] | None = None, **options: Any) -> Any:
     """`njit` for what only kernels call: a part of each of them, neither optimized nor cached by itself.
 
-    That takes most of the time. Python cannot call it.
+    That takes most of the time. Python cannot call it, and it cannot allocate.
     """
     if function is None:
         return partial(inner, **options)
-    parts = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "pipeline_class": _Inner}
-    return numba.njit(nogil=True, error_model="numpy", **parts, **options)(function)
-
-
-class _Whole(JITCodeLibrary):
-    """Code that is optimized once, with all of its parts: numba's own goes through three times."""
-
-    def _optimize_functions(self, ll_module: Any) -> None:
-        ll_module.data_layout = self._codegen._data_layout
-
-    def _optimize_final_module(self) -> None:
-        passes, builder = self._codegen._module_pass_manager()
-        passes.run(self._final_module, builder)
-
-
-class _Part(_Whole):
-    """Code that is neither optimized nor translated by itself: those that call it do both with all of their parts at once."""
-
-    def finalize(self) -> None:
-        for library in dict.fromkeys(self._linking_libraries):
-            self._reload_init.update(library._reload_init)
-            self._final_module.link_in(library._get_module_for_linking(), preserve=True)
-        self._finalize_dynamic_globals()
-        self._finalized = True
-
-
-class _Kernel(Compiler):
-    """Compiles functions as a whole."""
-
-    def compile_extra(self, func: Callable[..., Any]) -> Any:
-        self.state.library = _Whole(self.state.targetctx.codegen(), func.__qualname__)
-        self.state.library.enable_object_caching()
-        return super().compile_extra(func)
-
-
-class _Inner(Compiler):
-    """Compiles functions to parts."""
-
-    def compile_extra(self, func: Callable[..., Any]) -> Any:
-        state = self.state
-        state.library = _Part(state.targetctx.codegen(), func.__qualname__)
-        state.flags.no_compile = True
-        made = super().compile_extra(func)
-        # What numba knows an overload by; there is nothing to call.
-        key = _dynfunc.make_function(made.fndesc.lookup_module(), func.__name__, "", 0, made.environment, (made.library,))
-        state.targetctx.insert_user_function(key, made.fndesc, [made.library])
-        return made._replace(entry_point=key)
+    part = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "_nrt": False, "pipeline_class": compiler.Part}
+    return numba.njit(nogil=True, error_model="numpy", **part, **options)(function)
 
 
 def kernel_folder() -> Path:
@@ -121,7 +73,7 @@ def _sources(file: str) -> frozenset[str]:
 def _cache_folder(sources: frozenset[str]) -> str:
     """A writable folder for these sources: in the user's cache, else in the temporary folder."""
     digest = hashlib.sha256(repr(_BUILD).encode())
-    for source in sorted(sources):
+    for source in (__file__, compiler.__file__, *sorted(sources)):
         digest.update(Path(source).read_bytes())
     for root in (kernel_folder(), Path(tempfile.gettempdir()) / f"viewsphere-{Path.home().name}" / "kernels"):
         folder = root / digest.hexdigest()[:16]

@@ -289,10 +289,12 @@ def _draw_checked(surface, edges, found, count, points, cutouts, triangles, soli
     for j in range(count):
         row, column = found[j] >> np.uint32(16), found[j] & np.uint32(0xFFFF)
         k = grid[row, column]
+        least = CLOSED
         for i in range(nearest.shape[1]):
             ray = (column + offsets[0, i], row + offsets[1, i], 1.0)
             _cast(surface, edges, ray, (U(k), U(i)), cutouts, triangles, solid, fragments)
-        farthest[row, column] = max(farthest[row, column], level(nearest[k].min()))
+            least = min(least, level(nearest[U(k), U(i)]))
+        farthest[row, column] = max(farthest[row, column], least)
 
 
 @inner

@@ -1,0 +1,147 @@
+"""numba's compiler with the passes that kernels need and no more, each done once.
+
+Four fifths of the time it takes is Python's own, not LLVM's.
+"""
+
+# pyright: reportAttributeAccessIssue=false, reportPrivateUsage=false, reportMissingTypeArgument=false
+# pyright: reportUnknownMemberType=false, reportUnknownVariableType=false, reportUnknownArgumentType=false
+# Only through its internals does numba let others choose what is done when.
+
+from __future__ import annotations
+
+import gc
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
+from functools import cache
+from typing import Any
+
+from numba import _dynfunc
+from numba.core import types
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import CompilerBase
+from numba.core.compiler_lock import global_compiler_lock
+from numba.core.compiler_machinery import PassManager
+from numba.core.targetconfig import ConfigStack
+from numba.core.typed_passes import (
+    AnnotateTypes,
+    IRLegalization,
+    NativeLowering,
+    NoPythonBackend,
+    NopythonTypeInference,
+    PreLowerStripPhis,
+)
+from numba.core.types.functions import BaseFunction
+from numba.core.untyped_passes import (
+    DeadBranchPrune,
+    FixupArgs,
+    GenericRewrites,
+    IRProcessing,
+    ReconstructSSA,
+    RewriteSemanticConstants,
+    TranslateByteCode,
+)
+
+PASSES = (
+    TranslateByteCode,
+    FixupArgs,
+    IRProcessing,
+    RewriteSemanticConstants,
+    GenericRewrites,
+    ReconstructSSA,
+    DeadBranchPrune,
+    NopythonTypeInference,
+    PreLowerStripPhis,
+    IRLegalization,
+    AnnotateTypes,
+    NativeLowering,
+    NoPythonBackend,
+)
+"""numba's, without those for closures, `with`, `literally`, raising what is computed, and expressions of whole arrays."""
+
+_PLAIN = (types.Number, types.Boolean, types.Array, types.BaseTuple)
+_resolve = BaseFunction.get_call_type
+
+
+@cache
+def _resolved(function: Any, context: Any, args: tuple[Any, ...], _how: tuple[Any, ...]) -> Any:
+    return _resolve(function, context, args, {})
+
+
+def _resolve_once(function: Any, context: Any, args: tuple[Any, ...], kws: dict[str, Any]) -> Any:
+    """What a function of numba's makes of operands of these types: numba would try all it could mean, at every place anew."""
+    if kws or not all(isinstance(arg, _PLAIN) for arg in args):
+        return _resolve(function, context, args, kws)
+    flags = ConfigStack().top()
+    how = frozenset(flags.fastmath.flags), flags.nrt, flags.error_model, flags.boundscheck
+    return _resolved(function, context, args, how)
+
+
+@contextmanager
+def _quickly() -> Generator[None]:
+    """Types are resolved once, and nobody looks for garbage among millions of living objects."""
+    with global_compiler_lock:
+        collects = gc.isenabled()
+        gc.disable()
+        was, BaseFunction.get_call_type = BaseFunction.get_call_type, _resolve_once
+        try:
+            yield
+        finally:
+            BaseFunction.get_call_type = was
+            if collects:
+                gc.enable()
+
+
+class _Whole(JITCodeLibrary):
+    """Code that is optimized once, with all of its parts: numba's own goes through three times."""
+
+    def _optimize_functions(self, ll_module: Any) -> None:
+        ll_module.data_layout = self._codegen._data_layout
+
+    def _optimize_final_module(self) -> None:
+        passes, builder = self._codegen._module_pass_manager()
+        passes.run(self._final_module, builder)
+
+
+class _Part(_Whole):
+    """Code that is neither optimized nor translated by itself: those that call it do both with all of their parts at once."""
+
+    def finalize(self) -> None:
+        for library in dict.fromkeys(self._linking_libraries):
+            self._reload_init.update(library._reload_init)
+            self._final_module.link_in(library._get_module_for_linking(), preserve=True)
+        self._finalize_dynamic_globals()
+        self._finalized = True
+
+
+class Kernel(CompilerBase):
+    """Compiles functions as a whole."""
+
+    def define_pipelines(self) -> list[PassManager]:
+        """The one list of passes."""
+        passes = PassManager("kernel")
+        for each in PASSES:
+            passes.add_pass(each, each.__name__)
+        passes.finalize()
+        return [passes]
+
+    def compile_extra(self, func: Callable[..., Any]) -> Any:
+        """Compiles the function; returns numba's result."""
+        self.state.library = _Whole(self.state.targetctx.codegen(), func.__qualname__)
+        self.state.library.enable_object_caching()
+        with _quickly():
+            return super().compile_extra(func)
+
+
+class Part(Kernel):
+    """Compiles functions to parts of kernels, which Python cannot call."""
+
+    def compile_extra(self, func: Callable[..., Any]) -> Any:
+        """Compiles the function; returns numba's result, without an address."""
+        state = self.state
+        state.library = _Part(state.targetctx.codegen(), func.__qualname__)
+        state.flags.no_compile = True
+        made = CompilerBase.compile_extra(self, func)
+        # What numba knows an overload by; there is nothing to call.
+        key = _dynfunc.make_function(made.fndesc.lookup_module(), func.__name__, "", 0, made.environment, (made.library,))
+        state.targetctx.insert_user_function(key, made.fndesc, [made.library])
+        return made._replace(entry_point=key)
