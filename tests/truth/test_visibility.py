@@ -229,3 +229,18 @@ def test_silhouette_agrees_with_the_picture_and_goes_beyond_it(name):
     assert silhouette(geometry, camera, 1, wide).sum() > silhouette(geometry, camera, 1, (0, 0, 80, 60)).sum()
     with pytest.raises(ValueError, match=r"object_id: expected 1\.\.2, got 3"):
         silhouette(geometry, camera, 3, wide)
+
+
+@pytest.mark.parametrize("elevation", [0.3, 1.2])
+def test_instances_are_the_objects_seen_counted_once(elevation):
+    geometry = placed(random_soup(np.random.default_rng(3), 60), cube(), ground=True)
+    seen = rasterize(geometry, orbit_camera(lens(301, 200, 1.2), 0.3, elevation, 4.0))
+    ids = np.where(seen.triangle >= 0, geometry.triangle_object[seen.triangle], 0)
+    found = seen.instances(geometry)
+    assert seen.instances(geometry) is found
+    assert np.array_equal(found.ids, ids)
+    assert set(np.unique(ids)) == {0, 1, 2}
+    for i in (1, 2):
+        rows, columns = np.nonzero(ids == i)
+        assert found.area[i] == len(rows)
+        assert found.box[i].tolist() == [columns.min(), rows.min(), columns.max() + 1, rows.max() + 1]

@@ -41,18 +41,13 @@ def annotate(
     set and `real_sizes[i]` its true size (by default the one its spec gives in numbers); `geometry` is the shot's stage and
     `visibility` what this camera sees of it. An object that covers no pixel has an empty mask, no `box2d` and visibility 0.
     """
-    from viewsphere.geometry.kernels_box import instance_map
-
     count, placements = geometry.object_count, shot.objects
     if not len(placements) == len(boxes) == len(models) == count:
         raise ValueError(
             f"annotate: frame {frame.index}: expected {count} objects, boxes and models, "
             f"got {len(placements)}, {len(boxes)}, {len(models)}"
         )
-    height, width = visibility.triangle.shape
-    ids, areas = np.empty((height, width), np.int32), np.zeros(count + 1, np.int64)
-    tight = np.tile(np.array([width, height, 0, 0]), (count + 1, 1))
-    instance_map(visibility.triangle, geometry.triangle_object, ids, areas, tight)
+    seen = visibility.instances(geometry)
     parts = pairwise(geometry.triangle_start[: count + 1])
     points = pairwise(geometry.vertex_start[: count + 1])
     projections = [
@@ -62,8 +57,8 @@ def annotate(
     bounds, whole = [b for b, _ in projections], [w for _, w in projections]
     annotations: list[ObjectAnnotation] = []
     for i, placement in enumerate(placements):
-        area = int(areas[i + 1])
-        x0, y0, x1, y1 = tight[i + 1].tolist() if area else (0, 0, 0, 0)
+        area = int(seen.area[i + 1])
+        x0, y0, x1, y1 = seen.box[i + 1].tolist() if area else (0, 0, 0, 0)
         visible, truncated = visible_and_cut(geometry, camera, i + 1, area, bounds, whole)
         annotations.append(
             ObjectAnnotation(
@@ -74,7 +69,7 @@ def annotate(
                 key=placement.model.key,
                 model=models[i],
                 real_size=real_sizes[i] if real_sizes else _real_size(placement.model),
-                rle=Rle(camera.height, camera.width, rle_of_id(ids, i + 1, (x0, y0, x1, y1))),
+                rle=Rle(camera.height, camera.width, rle_of_id(seen.ids, i + 1, (x0, y0, x1, y1))),
                 area=area,
                 visibility=visible,
                 truncation=truncated,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,24 +21,24 @@ def view_of(camera_from_object: Float, center: Float) -> View:
     way, to look at the point; so for a camera that looks at it anyway these are the numbers of its pose.
     Straight above or below, where azimuth and tilt are one, tilt is 0.
     """
-    rotation = camera_from_object[:3, :3]
+    columns: list[list[float]] = camera_from_object[:3, :3].T.tolist()
     seen = transform(camera_from_object, center)
     distance = math.hypot(*seen.tolist())
     if distance == 0:
         return View(0.0, 0.0, 0.0, 0.0)
-    direction = seen / distance
-    x, y, z = (float(-c) for c in transform(rotation.T, direction))
+    direction: list[float] = (seen / distance).tolist()
+    x, y, z = (-_dot(column, direction) for column in columns)
     level = math.hypot(x, y)
     elevation = math.atan2(z, level)
-    facing = transform(_shortest_turn(direction), rotation.T).T
+    first = _shortest_turn(*direction)
+    facing = [_dot(first, column) for column in columns]
     if level > 1e-9:
         azimuth = math.atan2(x, -y)
-        right = np.array([math.cos(azimuth), math.sin(azimuth), 0.0])
-        down = np.array([z * math.sin(azimuth), -z * math.cos(azimuth), -level])
-        first = facing[0]
-        tilt = math.atan2(float((first * down).sum()), float((first * right).sum()))
+        right = math.cos(azimuth), math.sin(azimuth), 0.0
+        down = z * math.sin(azimuth), -z * math.cos(azimuth), -level
+        tilt = math.atan2(_dot(facing, down), _dot(facing, right))
     else:
-        azimuth, tilt = math.atan2(float(facing[0, 1]), float(facing[0, 0])), 0.0
+        azimuth, tilt = math.atan2(facing[1], facing[0]), 0.0
     return View(_degrees(azimuth) % 360.0, _degrees(elevation), distance, _degrees(tilt))
 
 
@@ -46,10 +47,13 @@ def _degrees(angle: float) -> float:
     return round(math.degrees(angle), 9) + 0.0
 
 
-def _shortest_turn(direction: Float) -> Float:
-    """The rotation (3, 3) that takes a unit vector to +z by the shortest way."""
-    x, y, z = (float(c) for c in direction)
+def _shortest_turn(x: float, y: float, z: float) -> tuple[float, float, float]:
+    """The first row of the rotation that takes the unit vector (x, y, z) to +z by the shortest way."""
     if z < -1 + 1e-12:
-        return np.diag([1.0, -1.0, -1.0])
+        return 1.0, 0.0, 0.0
     k = 1 / (1 + z)
-    return np.array([[1 - k * x * x, -k * x * y, -x], [-k * x * y, 1 - k * y * y, -y], [x, y, z]])
+    return 1 - k * x * x, -k * x * y, -x
+
+
+def _dot(a: Sequence[float], b: Sequence[float]) -> float:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]

@@ -15,6 +15,7 @@ from contextlib import contextmanager
 from functools import cache
 from typing import Any
 
+import numba
 from numba import _dynfunc
 from numba.core import types
 from numba.core.codegen import JITCodeLibrary
@@ -31,6 +32,7 @@ from numba.core.typed_passes import (
     PreLowerStripPhis,
 )
 from numba.core.types.functions import BaseFunction
+from numba.core.typing.templates import _OverloadFunctionTemplate
 from numba.core.untyped_passes import (
     DeadBranchPrune,
     FixupArgs,
@@ -76,19 +78,33 @@ def _resolve_once(function: Any, context: Any, args: tuple[Any, ...], kws: dict[
     return _resolved(function, context, args, how)
 
 
+def _as_part(**options: Any) -> Any:
+    """`numba.jit` for numba's own functions that kernels call, as `min` or `np.empty`."""
+    return numba.jit(**{**options, **PART})
+
+
 @contextmanager
 def _quickly() -> Generator[None]:
-    """Types are resolved once, and nobody looks for garbage among millions of living objects."""
-    with global_compiler_lock:
-        collects = gc.isenabled()
-        gc.disable()
-        was, BaseFunction.get_call_type = BaseFunction.get_call_type, _resolve_once
+    """Types are resolved once, numba's functions are parts as ours are, and nobody looks for garbage among living objects."""
+    with global_compiler_lock, pause_collection():
+        was = BaseFunction.get_call_type, _OverloadFunctionTemplate._get_jit_decorator
+        BaseFunction.get_call_type, _OverloadFunctionTemplate._get_jit_decorator = _resolve_once, lambda _: _as_part
         try:
             yield
         finally:
-            BaseFunction.get_call_type = was
-            if collects:
-                gc.enable()
+            BaseFunction.get_call_type, _OverloadFunctionTemplate._get_jit_decorator = was
+
+
+@contextmanager
+def pause_collection() -> Generator[None]:
+    """No garbage is collected while the context lasts: among millions of living objects that would be a quarter of the time."""
+    collects = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if collects:
+            gc.enable()
 
 
 class _Whole(JITCodeLibrary):
@@ -145,3 +161,7 @@ class Part(Kernel):
         key = _dynfunc.make_function(made.fndesc.lookup_module(), func.__name__, "", 0, made.environment, (made.library,))
         state.targetctx.insert_user_function(key, made.fndesc, [made.library])
         return made._replace(entry_point=key)
+
+
+PART: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "pipeline_class": Part}
+"""Options of parts."""

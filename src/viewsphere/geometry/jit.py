@@ -46,7 +46,7 @@ def inner(function: Callable[..., Any] | None = None, **options: Any) -> Any:
     """
     if function is None:
         return partial(inner, **options)
-    part = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "_nrt": False, "pipeline_class": compiler.Part}
+    part = {**compiler.PART, "_nrt": False}
     return numba.njit(nogil=True, error_model="numpy", **part, **options)(function)
 
 

@@ -1,4 +1,4 @@
-"""Compiled loops over vertices, triangles and pixels: the box of a projected model, and of what is seen of it."""
+"""Compiled loops over vertices and triangles: the box of a projected model."""
 
 from __future__ import annotations
 
@@ -66,26 +66,3 @@ def project(vertices, base, k, r, t, uvw):
         uvw[U(0), j] = (k[0, 0] * a + k[0, 1] * b + k[0, 2] * w) / w
         uvw[U(1), j] = (k[1, 1] * b + k[1, 2] * w) / w
         uvw[U(2), j] = w
-
-
-@njit
-def instance_map(triangle, objects, ids, area, box):
-    """Ids (H, W) int32 of the objects seen; adds to their visible pixels (count + 1,), widens their tight half-open boxes
-    (count + 1, 4), by id.
-    """
-    height, width = U(triangle.shape[0]), U(triangle.shape[1])
-    for y in range(height):
-        for x in range(width):
-            face = triangle[y, x]
-            ids[y, x] = objects[U(face)] if face >= 0 else np.int32(0)
-        x = U(0)
-        while x < width:
-            own, first = ids[y, x], x
-            x += U(1)
-            while x < width and ids[y, x] == own:
-                x += U(1)
-            if own > 0:
-                i, left, top, right = U(own), np.intp(first), np.intp(y), np.intp(x)
-                area[i] += right - left
-                box[i, U(0)], box[i, U(1)] = min(box[i, U(0)], left), min(box[i, U(1)], top)
-                box[i, U(2)], box[i, U(3)] = max(box[i, U(2)], right), top + 1

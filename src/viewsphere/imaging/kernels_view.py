@@ -24,16 +24,17 @@ SHARE_R, SHARE_G, SHARE_B = f4(0.04235), f4(0.07845), f4(0.0792)  # of red, gree
 
 @njit(fastmath=FAST)
 def expose(radiance, matrix, p):
-    """Unpremultiplied, balanced, exposed light and alpha of radiance (n, 4).
+    """Unpremultiplied, balanced, exposed light and alpha of radiance (4 n,), flat so that its pixels are known to touch.
 
     Where light exceeds what its coverage can show, as a glint on clear glass, it covers more: it outshines what is behind.
     """
-    zero, one, a, b, c, d = f4(0), f4(1), U(0), U(1), U(2), U(3)
+    zero, one, a, b, c = f4(0), f4(1), U(0), U(1), U(2)
     xr, xg, xb = matrix[a, a], matrix[a, b], matrix[a, c]
     yr, yg, yb = matrix[b, a], matrix[b, b], matrix[b, c]
     zr, zg, zb = matrix[c, a], matrix[c, b], matrix[c, c]
-    for i in range(U(radiance.shape[0])):
-        red, green, blue, alpha = radiance[i, a], radiance[i, b], radiance[i, c], radiance[i, d]
+    for i in range(U(radiance.shape[0] // 4)):
+        j = U(4) * i
+        red, green, blue, alpha = radiance[j], radiance[j + U(1)], radiance[j + U(2)], radiance[j + U(3)]
         x, y, z = xr * red + xg * green + xb * blue, yr * red + yg * green + yb * blue, zr * red + zg * green + zb * blue
         x, y, z = x if x > zero else zero, y if y > zero else zero, z if z > zero else zero
         alpha = x if x > alpha else alpha

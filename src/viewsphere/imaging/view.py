@@ -124,7 +124,7 @@ def _blocks(radiance: Float32, background: Float32 | None, view: View) -> Iterat
     light = p[: 3 * kernels.BLOCK]
     for first in range(0, len(rows), kernels.BLOCK):
         part = slice(first, first + kernels.BLOCK)
-        kernels.expose(rows[part], matrix, p)
+        kernels.expose(rows[part].reshape(-1), matrix, p)
         if view.transform == "standard":
             kernels.standard(p)
         elif view.transform == "filmic":

@@ -26,7 +26,8 @@ def observe(geometry: Geometry, camera: Camera, visibility: Visibility, names: I
     `visibility` is `rasterize(geometry, camera)`. All channels but rgb: `depth` (z; behind a fisheye it is negative),
     `instances`, `categories`, `parts`, `triangles` (index within its object; -1 on scenery and ground), `normals`
     (interpolated, on the visible side of its triangle, and bent to at most perpendicular to the ray where interpolation turns
-    it away), `normals_geometric`, `coordinates` (NaN on scenery and ground), `barycentrics`. Raises ValueError for other names.
+    it away), `normals_geometric`, `coordinates` (NaN on scenery and ground), `barycentrics`. `instances` are those that the
+    visibility keeps, so not to be written to. Raises ValueError for other names.
     """
     view, names = _View(geometry, camera, visibility), tuple(names)
     unknown = [name for name in names if name not in _CHANNELS]
@@ -125,7 +126,7 @@ def _barycentrics(view: _View) -> Array:
 
 _CHANNELS: dict[str, Callable[[_View], Array]] = {
     "depth": _depth,
-    "instances": lambda view: _labels(view, "instances", view.geometry.triangle_object),
+    "instances": lambda view: view.visibility.instances(view.geometry).ids,
     "categories": lambda view: _labels(view, "categories", view.geometry.triangle_category),
     "parts": lambda view: _labels(view, "parts", view.geometry.triangle_part),
     "normals": _normals,

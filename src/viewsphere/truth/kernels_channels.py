@@ -14,6 +14,7 @@ from viewsphere.geometry.jit import inner, njit
 
 ONE = np.float32(1)
 NONE = -2  # no triangle, nor the background's -1
+AHEAD = 64  # pixels that are compared at once: more than compilers unroll instead
 
 
 @njit
@@ -36,6 +37,38 @@ def labels(seen, table, empty, out):
         for x in range(width):
             t = seen[y, x]
             out[y, x] = table[np.uintp(t)] if t >= 0 else empty
+
+
+@njit
+def instances(seen, objects, ids, area, box):
+    """Ids of the objects seen; adds to their pixels (count + 1,), widens their tight half-open boxes (count + 1, 4), by id."""
+    height, width = np.uintp(seen.shape[0]), np.uintp(seen.shape[1])
+    for y in range(height):
+        for x in range(width):
+            t = seen[y, x]
+            ids[y, x] = objects[np.uintp(t)] if t >= 0 else np.int32(0)
+        x = np.uintp(0)
+        while x < width:
+            own, first = ids[y, x], x
+            x += np.uintp(1)
+            while x + np.uintp(AHEAD) <= width and _goes_on(ids, y, x, own):
+                x += np.uintp(AHEAD)
+            while x < width and ids[y, x] == own:
+                x += np.uintp(1)
+            if own > 0:
+                i, left, top, right = np.uintp(own), np.intp(first), np.intp(y), np.intp(x)
+                area[i] += right - left
+                box[i, np.uintp(0)], box[i, np.uintp(1)] = min(box[i, np.uintp(0)], left), min(box[i, np.uintp(1)], top)
+                box[i, np.uintp(2)], box[i, np.uintp(3)] = max(box[i, np.uintp(2)], right), top + 1
+
+
+@inner
+def _goes_on(ids, y, x, own):
+    """Whether the next AHEAD pixels of row y, from x on, are this object's too."""
+    different = np.int32(0)
+    for k in range(np.uintp(AHEAD)):
+        different |= ids[y, x + k] ^ own
+    return different == 0
 
 
 @inner

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any
 
@@ -17,6 +17,17 @@ LARGEST_AROUND = 4_000_000  # pixels of a ray table that reaches beyond the imag
 
 
 @dataclass(frozen=True, eq=False)
+class Instances:
+    """ids (H, W) int32, the object seen, 0 where none. By id: area (N + 1,), the visible pixels, and box (N + 1, 4), the tight
+    half-open box (x0, y0, x1, y1) of what is visible; meaningless where the area is 0, and for id 0.
+    """
+
+    ids: NDArray[np.int32]
+    area: NDArray[np.int64]
+    box: NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
 class Visibility:
     """triangle (H, W) int32, -1 where no triangle; inverse_depth (H, W) float32, 1/s, 0 where none.
 
@@ -27,6 +38,24 @@ class Visibility:
     triangle: NDArray[np.int32]
     inverse_depth: NDArray[np.float32]
     corners: NDArray[np.float64] | None = None  # `homogeneous` of all vertices, for those who need it next
+    _instances: dict[Geometry, Instances] = field(default_factory=dict[Geometry, Instances], repr=False)
+
+    def instances(self, geometry: Geometry) -> Instances:
+        """What is seen of the objects of this geometry, whose triangles these are; counted once, so not to be written to."""
+        if geometry not in self._instances:
+            self._instances[geometry] = _count_instances(geometry, self.triangle)
+        return self._instances[geometry]
+
+
+def _count_instances(geometry: Geometry, triangle: NDArray[np.int32]) -> Instances:
+    from viewsphere.truth import kernels_channels as kernels
+
+    height, width = triangle.shape
+    ids, area = np.empty((height, width), np.int32), np.zeros(geometry.object_count + 1, np.int64)
+    box = np.tile(np.array([width, height, 0, 0]), (geometry.object_count + 1, 1))
+    kernels.instances(triangle, geometry.triangle_object, ids, area, box)
+    ids.setflags(write=False)
+    return Instances(ids, area, box)
 
 
 def rasterize(
