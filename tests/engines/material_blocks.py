@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from called import called
 
 from viewsphere.assets.mesh import Image, Material, Mesh
 from viewsphere.engines.raster import kernels_block as block
@@ -13,6 +14,7 @@ from viewsphere.model.scene import Ground
 from viewsphere.model.shot import ModelSpec, Placement
 from viewsphere.truth.geometry import build_geometry
 
+shown = called(material)
 SPEC = ModelSpec(key="model", source="memory", category="thing", category_id=1)
 LEVEL = np.array([128, 128, 255, 255], np.uint8)
 
@@ -99,7 +101,7 @@ def made(surfaces, textures, given, seen=0, which=0, view=FRONT) -> dict[str, np
             b[getattr(block, name) :][:size] = value[part]
         own = np.zeros(block.BLOCK, np.int32), np.zeros(block.BLOCK, np.int32)
         own[0][:size], own[1][:size] = seen[part], which[part]
-        material(size, view, surfaces, textures, b, *own)
+        shown(size, view, surfaces, textures, b, *own)
         for name in names:
             found[name][part] = b[getattr(block, name) :][:size]
     return found

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from called import called
 from material_blocks import card, edges_of, made, packed, view_of
 
 from viewsphere.assets.mesh import Image, Material, Texture
@@ -20,6 +21,9 @@ NOISE = Image("noise", RNG.integers(0, 256, (16, 16, 4)).astype(np.uint8))
 
 def textured(image, **options):
     return card(Material(base_color_texture=Texture(0, **options)), [image])
+
+
+opacity = called(kf.opacity)
 
 
 @njit
@@ -330,5 +334,5 @@ def test_opacity_is_that_of_the_nearest_texel(wrap):
         else:
             place = np.where(place % 32 < 16, place % 32, 31 - place % 32)
         zero = np.float32(0)
-        found = kf.opacity(surfaces, textures, np.uintp(0), zero, zero, u, v)
+        found = opacity(surfaces, textures, np.uintp(0), zero, zero, u, v)
         assert found == pytest.approx(NOISE.pixels[tuple(place)][3] / 255, abs=1e-4)

@@ -42,12 +42,12 @@ def njit(function: Callable[..., Any] | None = None, **options: Any) -> Any:
 def inner(function: Callable[..., Any] | None = None, **options: Any) -> Any:
     """`njit` for what only kernels call: a part of each of them, neither optimized nor cached by itself.
 
-    That takes most of the time. Python cannot call it, and it cannot allocate.
+    That takes most of the time. Python cannot call it, and it allocates no arrays unless `_nrt`.
     """
     if function is None:
         return partial(inner, **options)
-    part = {**compiler.PART, "_nrt": False}
-    return numba.njit(nogil=True, error_model="numpy", **part, **options)(function)
+    part: dict[str, Any] = {**compiler.PART, "_nrt": False, **options}
+    return numba.njit(nogil=True, error_model="numpy", **part)(function)
 
 
 def kernel_folder() -> Path:

@@ -167,7 +167,7 @@ def _hits(edges, x, y, offsets, cutouts, cutout):
     return found
 
 
-@njit
+@inner
 def span(edges, y, xa, xb, lowest, highest):
     """First and last pixel of a row of which a sample may be covered."""
     low, high = float(xa), float(xb)

@@ -30,7 +30,7 @@ from viewsphere.engines.raster.kernels_lanes import (
     where,
 )
 from viewsphere.engines.raster.kernels_texture import CLAMP, FAST, MIRROR, REPEAT
-from viewsphere.geometry.jit import inner, njit
+from viewsphere.geometry.jit import inner
 
 f4 = nb.float32
 i4 = nb.int32
@@ -196,7 +196,7 @@ def _lay_out(count, levels, c, q, places):
     return n
 
 
-@njit(fastmath=FAST)
+@inner(fastmath=FAST)
 def place(texels, levels, mode, count, c, q, places):
     """Lay out the quads of a chunk's probes and fetch them; those of sample i begin at FIRST + i.
 
@@ -250,7 +250,7 @@ def _corners(channels, q, places):
     q.put((W0, W1, W2, W3), (upper - upper * across, upper * across, lower - lower * across, lower * across))
 
 
-@njit
+@inner
 def mix(texels, count, first_plane, planes, q, places, c):
     """Weighted sums of the channels of up to PLANES planes of a chunk's samples, into rows TEXEL and on."""
     channel = U(4 * first_plane)
@@ -262,7 +262,7 @@ def mix(texels, count, first_plane, planes, q, places, c):
             _add_planes(texels, channel, q, places, begin, end, c, i)
 
 
-@njit(fastmath=FAST)
+@inner(fastmath=FAST)
 def opacity(surfaces, textures, m, u0, v0, u1, v1):
     """Alpha of a material's base colour texture at these coordinates of both sets, of the nearest texel as labels have it."""
     for n in range(U(surfaces.bundles.shape[1])):

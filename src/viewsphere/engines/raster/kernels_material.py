@@ -77,7 +77,7 @@ from viewsphere.engines.raster.kernels_filter import VX as VXX
 from viewsphere.engines.raster.kernels_filter import VY as VYY
 from viewsphere.engines.raster.kernels_lanes import clamp, cross, dot, lanewise, least, most, root, sign, where
 from viewsphere.engines.raster.kernels_texture import FAST
-from viewsphere.geometry.jit import inner, njit
+from viewsphere.geometry.jit import inner
 
 f4 = nb.float32
 U = nb.uintp
@@ -105,7 +105,7 @@ CHUNK_ROWS = FOOTPRINT_ROWS + 8
 SECOND_SET = U1 - U0  # from a row of the first uv set to that of the second
 
 
-@njit(fastmath=FAST)
+@inner(fastmath=FAST, _nrt=True)
 def material(count, view, surfaces, textures, b, seen, which):
     """Fill the rows that say what the samples are made of; normals become those of the normal maps.
 
