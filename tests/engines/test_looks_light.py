@@ -116,7 +116,7 @@ def test_missing_normals_are_flat_not_black():
 @pytest.mark.parametrize("shade", [0.0, 0.9])
 @pytest.mark.parametrize("kind", ["point", "spot", "area"])
 def test_no_light_gets_out_of_a_closed_box(kind, shade):
-    """Nor by the ground, which would throw it back; the pixels where box and ground meet aside."""
+    """Nor by the ground, which would throw it back, nor at its foot."""
     box = flat(cuboid((-0.6, -0.6, -0.6), (0.6, 0.6, 0.6)))
     at, down = (0.1, 0.0, 0.0), (0.1, 0.0, -0.6)
     lamp = {
@@ -127,4 +127,4 @@ def test_no_light_gets_out_of_a_closed_box(kind, shade):
     dark = Scene(sun=None, sky=Sky(strength=0.1), ground=Ground(color=(shade, shade, shade)))
     lit = dark.model_copy(update={"lights": (lamp,)})
     more = np.abs(picture(box, lit) - picture(box, dark)).max(axis=2)
-    assert np.percentile(more, 99) <= 2 and more.mean() < 0.7
+    assert more.max() <= 2

@@ -177,6 +177,56 @@ def test_an_area_light_s_penumbra():
     assert math.sqrt(12) * spread(x, share) == pytest.approx(width * height / (above - height), rel=0.15)
 
 
+@pytest.mark.parametrize("kind", ["point", "spot", "area"])
+@pytest.mark.parametrize("away", [-1.3, 0.0, 1.3, 2.5])
+@pytest.mark.parametrize("along", [0, 1])
+def test_penumbrae_are_as_wide_off_the_lamp_s_axis(kind, away, along):
+    """A lamp of width w at d, `away` from above an edge at h: w h / (d - h); a ball is wider across its rays."""
+    height, above, width = 0.5, 2.5, 0.4
+    stage = hanging(height)
+    at = np.array([0.0, 0.0, above])
+    at[along] = away
+    x, y, z = (at - (stage.casters.extent.low + stage.casters.extent.high) / 2 * stage.unit - stage.origin).tolist()
+    lamp = {
+        "point": PointLight(position=(x, y, z), strength=1, radius=width / 2),
+        "spot": SpotLight(position=(x, y, z), toward=(0, 0, height), strength=1, radius=width / 2, angle_deg=150),
+        "area": AreaLight(position=(x, y, z), toward=(x, y, -9), strength=1, size=(width, width)),
+    }[kind]
+    past = height / (above - height)
+    expected = width * past
+    if kind != "area" and along == 0:
+        expected *= math.hypot(1, away / (above - height))
+    middle = -away * past if along == 0 else 0.0
+    places = np.linspace(middle - 1.5 * expected, middle + 1.5 * expected, 3001)
+    share = edge_profile(stage, stage.lights([], [lamp]), places)
+    deviations = math.sqrt(12) if kind == "area" else 4
+    assert deviations * spread(places, share) == pytest.approx(expected, rel=0.06)
+    assert share[0] == 0 and share[-1] == 1
+    assert abs(places[np.searchsorted(share, 0.5)] - middle) < 0.08 * expected
+
+
+@pytest.mark.parametrize("height", [0.03, 0.06, 0.1])
+@pytest.mark.parametrize(("top", "edge"), [(0.5, 0.1), (0.5, 0.2), (0.8, 0.1), (0.8, 0.2)])
+def test_a_handle_has_a_shadow_beneath_what_hangs_over_it(height, top, edge):
+    """A bar near the ground and a card above x > edge, under a wide light: the part of it that neither hides."""
+    width, above, bar = 0.8, 2.0, 0.02
+    pieces = quad((-bar / 2, -0.6, height), (bar, 0, 0), (0, 1.2, 0)), quad((edge, -0.6, top), (0.8, 0, 0), (0, 1.2, 0))
+    stage = LightStage(flat(np.concatenate([*pieces, quad((-1.2, -0.6, 0), (0.02, 0, 0), (0, -0.02, 0))])))
+    middle = (stage.casters.extent.low + stage.casters.extent.high) / 2 * stage.unit + stage.origin
+    x, y, z = (np.array([0, 0, above]) - middle).tolist()
+    light = AreaLight(position=(x, y, z), toward=(x, y, -9), strength=1, size=(width, width))
+    x = np.linspace(-0.3, 0.3, 241)
+    light_x = (np.arange(2000) + 0.5) / 2000 * width - width / 2
+
+    def ray(height):
+        return x[:, None] + (light_x - x[:, None]) * height / above
+
+    hidden = (np.abs(ray(height)) < bar / 2) | ((ray(top) > edge) & (ray(top) < edge + 0.8))
+    off = np.abs(edge_profile(stage, stage.lights([], [light]), x) - 1 + hidden.mean(axis=1))
+    assert off.max() < 0.25
+    assert off.mean() < 0.04
+
+
 @pytest.fixture(scope="module")
 def crumb():
     """Hardly anything, so that the stage's unit is not a metre and nothing is in the way."""
@@ -319,6 +369,25 @@ def test_a_light_in_a_box_lights_its_walls_and_nothing_else(light):
     assert stage.arrives(lights, 0, inside)["share"].min() > 0.9
     outside = points([[x, y, 0] for x in (1.2, 2.0, 5.0) for y in (-3.0, 0.1, 2.0)], (0, 0, 1), is_ground=True)
     assert stage.arrives(lights, 0, outside)["irradiance"].max() == 0
+
+
+@pytest.mark.parametrize("has_bottom", [True, False])
+@pytest.mark.parametrize("pixel", [5e-4, 0.01, 0.05])
+def test_a_lamp_in_a_box_does_not_light_the_ground_beside_its_foot(has_bottom, pixel):
+    """However large a pixel is: a part of it would lie under the box."""
+    box = cuboid((-0.6, -0.6, 0), (0.6, 0.6, 1.2)).reshape(-1, 3, 3)
+    box = box if has_bottom else box[box[:, :, 2].max(axis=1) > 0]
+    stage = LightStage(flat(box.reshape(-1, 3)))
+    along, off = (a.ravel() for a in np.meshgrid(np.linspace(-0.6, 0.6, 41), [5e-4, 0.003, 0.01, 0.05]))
+    beside = np.concatenate([np.stack(xy, axis=1) for xy in ((along, 0.6 + off), (0.6 + off, along), (-0.6 - off, along))])
+    foot = points(np.column_stack([beside, 0 * beside[:, 0]]), (0, 0, 1), pixel, True)
+    under = points([[0, 0, 0], [0.05, 0.1, 0]], (0, 0, 1), pixel, not has_bottom)
+    for place in ((0.1, 0, 0), (-0.15, 0.1, -0.4), (0.2, 0.1, 0.4)):
+        spot = SpotLight(position=place, toward=(0, 0, -9), strength=5, angle_deg=140)
+        for lamp in (PointLight(position=place, strength=5), spot):
+            lights = stage.lights([], [lamp])
+            assert stage.arrives(lights, 0, under)["share"].min() == 1
+            assert stage.arrives(lights, 0, foot)["irradiance"].max() == 0
 
 
 def test_lights_at_awkward_places_give_finite_light():

@@ -3,11 +3,10 @@
 Most samples lie before all that is near them in the map, or behind it: planes around cells of the map tell. The others are
 searched for blockers.
 
-Soft shadows: percentage-closer soft shadows (Fernando 2005), where a texel blocks only if it lies between the sample and some
-part of the light, as in backprojection (Guennebaud et al. 2006); the filter is a window of the map's own texels, on a
-coarser level the wider it is, so that nothing is random. Area lights: the light vector of a polygon (Lambert 1760).
+Area lights: the light vector of a polygon (Lambert 1760).
 """
 
+# ruff: isort: skip_file
 from __future__ import annotations
 
 import math
@@ -15,66 +14,14 @@ import math
 import numba as nb
 
 from viewsphere.engines.raster.kernels_block import (
-    BARY1,
-    BLOCK,
-    GX,
-    GY,
-    GZ,
-    IB,
-    IG,
-    IR,
-    LX,
-    LY,
-    LZ,
-    NX,
-    NY,
-    NZ,
-    PIXEL,
-    PX,
-    PY,
-    PZ,
-    SHARE,
-    T0,
-    T1,
-    T2,
-    T3,
-    T4,
-    T5,
-    T6,
-    T7,
-    U0,
-    U1,
-    V0,
-    V1,
-    WIDTH,
+    BARY1, BLOCK, GX, GY, GZ, IB, IG, IR, LX, LY, LZ, NX, NY, NZ, PIXEL, PX, PY, PZ, SHARE, T0, U0, U1, V0, V1, WIDTH,
 )  # fmt: skip
-from viewsphere.engines.raster.kernels_lanes import Lanes, clamp, cross, dot, lanewise, least, most, root, size, where
+from viewsphere.engines.raster.kernels_lanes import clamp, cross, dot, lanewise, least, most, root, size, where
+from viewsphere.engines.raster.kernels_penumbra import (
+    DU, DV, FACING, NEAR, Q_, RADIUS, SOFT, STATE, U_, V_, power, search, span,
+)  # fmt: skip
 from viewsphere.engines.raster.kernels_shadow import (
-    ACROSS,
-    BIAS_FAR,
-    BIAS_NEAR,
-    BOUNDS_AT,
-    CELLS,
-    COARSEST,
-    DEPTH_AT,
-    DOWN,
-    FINE,
-    GAP,
-    HALF_A,
-    HALF_B,
-    HIGH,
-    LOW,
-    MIDDLE,
-    NEAREST,
-    READ,
-    ROUND,
-    SIZE,
-    STEP,
-    TEXELS,
-    TO_A0,
-    TO_A1,
-    TO_B0,
-    TO_B1,
+    ACROSS, BIAS_FAR, BIAS_NEAR, BOUNDS_AT, CELLS, DOWN, HIGH, LOW, MIDDLE, NEAREST, READ, SHARPEST, STEP, TEXELS,
 )  # fmt: skip
 from viewsphere.engines.raster.kernels_texture import FAST
 from viewsphere.geometry.jit import inner, njit
@@ -82,99 +29,11 @@ from viewsphere.geometry.jit import inner, njit
 f4 = nb.float32
 U = nb.uintp
 DISTANT, POINT, SPOT, AREA = 0, 1, 2, 3
-# Rows while a view is looked at; the irradiance comes after. Coordinates in textures are read by then.
-U_, V_, Q_, DU, DV, NEAR, SOFT, RADIUS, STATE, FACING = T1, T2, T3, T4, T5, T6, T7, IR, IG, IB
+# Rows while a view is looked at, besides those of `kernels_penumbra`.
 CELL, OFF_U, OFF_V, DOWN_, OWN = U0, V0, U1, V1, BARY1
 LOW_, HIGH_, ACROSS_ = CELL, OFF_U, OFF_V
-SHARPEST, BLUNTEST = 1.2, 16.0  # texels: least half width of a filter, and most that a pixel's size asks for
+BLUNTEST = 16.0  # texels: half width of a filter that a pixel's size asks for, at most
 GRAZING = 0.02  # a plane's slope in a map is limited to that of a light this far above it
-
-
-@inner(fastmath=FAST, inline="always")
-def _is_any_nearer(window, rows, wide, x, y, step, near, du, dv):
-    """Whether any texel in rows so wide lies before the plane: on most surfaces none does, and that is quickly told."""
-    hits, per_row = f4(0), f4(1) / wide
-    for i in range(rows * nb.int32(wide)):
-        at = f4(nb.int32(i))
-        row = f4(nb.int32(at * per_row))
-        dx, dy = x + (at - row * wide) * step, y + row * step
-        hits += f4(1) if window[U(i)] < near + du * dx + dv * dy else f4(0)
-    return hits > f4(0)
-
-
-@inner(fastmath=FAST)
-def _blockers(window, rows, wide, x, y, step, axes, q, near, du, dv, softest):
-    """Number of texels in rows so wide that hide part of the light, and the sum of their distances in q.
-
-    (x, y) is the window's corner from the sample and `step` a texel's width, in the map's texels.
-    """
-    zero, one = f4(0), f4(1)
-    half_a, half_b, is_round, a0, a1, b0, b1 = axes
-    per_row = one / wide
-    softest += step * f4(0.75)
-    count, total = zero, zero
-    for i in range(rows * nb.int32(wide)):
-        at = f4(nb.int32(i))
-        row = f4(nb.int32(at * per_row))
-        dx, dy = x + (at - row * wide) * step, y + row * step
-        z = window[U(i)]
-        gap = max(q - z, zero)
-        a, b = a0 * dx + a1 * dy, b0 * dx + b1 * dy
-        reach_a, reach_b = half_a * gap + softest, half_b * gap + softest
-        hit = one if z < near + du * dx + dv * dy else zero
-        hit *= one if a * a + b * b * is_round <= reach_a * reach_a else zero
-        hit *= one if b * b <= reach_b * reach_b else zero
-        count += hit
-        total += hit * gap
-    return count, total
-
-
-@inner(fastmath=FAST)
-def _filtered(window, rows, wide, x, y, step, axes, q, near, du, dv, softest, radius_a, radius_b):
-    """Share of the texels within a filter of these half widths (texels of the map) that hide nothing of the light."""
-    zero, one, half = f4(0), f4(1), f4(0.5)
-    half_a, half_b, is_round, a0, a1, b0, b1 = axes
-    per_row = one / wide
-    per = one / step
-    soft_a, soft_b = radius_a * per + half, radius_b * per + half
-    # A disc's edge is one texel wide: near its rim (1 - d^2 / r^2) r / 2 is r - d.
-    rim, fall = (soft_a + half) * half, half * per / radius_a
-    softest += step
-    # What lies deep behind others that are nearer to the light hides more than its own penumbra tells.
-    half_a, half_b = half_a * f4(3), half_b * f4(3)
-    lit, whole = zero, zero
-    for i in range(rows * nb.int32(wide)):
-        at = f4(nb.int32(i))
-        row = f4(nb.int32(at * per_row))
-        dx, dy = x + (at - row * wide) * step, y + row * step
-        z = window[U(i)]
-        gap = max(q - z, zero)
-        a, b = abs(a0 * dx + a1 * dy), abs(b0 * dx + b1 * dy)
-        reach_a, reach_b = half_a * gap + softest, half_b * gap + softest
-        hit = one if z < near + du * dx + dv * dy else zero
-        hit *= one if a * a + b * b * is_round <= reach_a * reach_a else zero
-        hit *= one if b * b <= reach_b * reach_b else zero
-        disc = min(max(rim - (a * a + b * b) * fall, zero), one)
-        square = min(max(soft_a - a * per, zero), one) * min(max(soft_b - b * per, zero), one)
-        weight = square + (disc - square) * is_round
-        whole += weight
-        lit += weight - weight * hit
-    return lit / max(whole, f4(1e-6))
-
-
-def _power(x):
-    """The power of two that is at most x > 0."""
-    return Lanes(x.builder, x.builder.bitcast((x.bits() & 0x7F800000).value, x.value.type))
-
-
-@inner(fastmath=FAST, inline="always")
-def _level_for(radius, most, size):
-    """The finest level of a map on which a radius is at most so many texels."""
-    level = nb.int32(0)
-    while radius > most and size >> (level + nb.int32(1)) >= nb.int32(COARSEST):
-        level += nb.int32(1)
-        radius *= f4(0.5)
-    return level
 
 
 def _seen(row, first, x, y, z):
@@ -215,11 +74,11 @@ def _project(row, b):
     q = where(on, _seen(row, 8, *b.get(PX, PY, PZ)) * inverse, 0)
     slope = 1 / (texels * texels * most(b[FACING], 1e-6))
     du, dv = (dot(tuple(row.one(first + k) for k in range(3)), normal) * slope for first in (0, 4))
-    softest = least(most(b[PIXEL] * texels * inverse * 0.5, SHARPEST), BLUNTEST)
+    softest = least(most(b[PIXEL] * texels * inverse * 0.5, row.one(SHARPEST)), BLUNTEST)
     b.put((U_, V_), (where(on, b[U_], 0) + middle, where(on, b[V_], 0) + middle))
     b.put((Q_, DU, DV, SOFT), (q, du, dv, softest))
     b[NEAR] = q - row.one(BIAS_FAR) - row.one(BIAS_NEAR) * size(q) - 0.6 * (size(du) + size(dv))
-    b[RADIUS] = least(most(most(row.one(HALF_A), row.one(HALF_B)) * (q - row.one(NEAREST)), 0) + softest, middle)
+    b[RADIUS] = least(most(span(row, b) * (q - row.one(NEAREST)), 0) + softest, middle)
 
 
 @lanewise
@@ -227,14 +86,14 @@ def _find_cells(side, b):
     """CELL: which one holds all within RADIUS of each sample; OFF_U, OFF_V: the sample's place from its middle."""
     u, v, radius = b.get(U_, V_, RADIUS)
     # The power of two that is at most the radius: cells' steps are four times that.
-    level = least(most(_power(radius), 1), side)
+    level = least(most(power(radius), 1), side)
     step, last = level * STEP, side / level - 1
     x, y = (least(most((place - radius - 0.5) / step, 0).whole().real(), last) for place in (u, v))
     b[CELL] = (2 * side) * (y + 1) - (2 * side) / level + x
     b.put((OFF_U, OFF_V), (u - (x + 1) * step, v - (y + 1) * step))
 
 
-@inner(fastmath=FAST, inline="always")
+@inner(fastmath=FAST)
 def _read_cells(count, at, bounds, b):
     """The planes of each sample's cell where the sample is, and their slopes; they take the places of CELL, OFF_U, OFF_V."""
     for i in range(U(count)):
@@ -246,13 +105,13 @@ def _read_cells(count, at, bounds, b):
 
 
 @lanewise
-def _judge(widest, b):
+def _judge(row, b):
     """STATE of samples that lie before all that is within RADIUS (1) or behind it (0); of others a smaller RADIUS."""
     near, radius, across, down, low = b.get(NEAR, RADIUS, ACROSS_, DOWN_, LOW_)
     tilt = (size(across - b[DU]) + size(down - b[DV])) * (radius + 0.5)
     b[STATE] = where(near + tilt <= low, 1, where(near - tilt > b[HIGH_], 0, -1))
     gap = most(b[Q_] - low + (size(across) + size(down)) * radius, 0)
-    b[RADIUS] = least(widest * gap + b[SOFT], radius)
+    b[RADIUS] = least(span(row, b) * gap + b[SOFT], radius)
 
 
 @inner
@@ -281,58 +140,13 @@ def _settle(count, b):
     return left
 
 
-@inner(inline="always")
+@inner
 def _move(i, to, b):
     """What is known of a sample on the map; gives the place after it."""
     for row in range(U(U_), U(SOFT + 1), U(BLOCK)):
         b[row + to] = b[row + i]
     b[U(RADIUS) + to] = b[U(RADIUS) + i]
     return to + U(1)
-
-
-@inner(fastmath=FAST)
-def _search(count, row, grid, depth, window, b):
-    """STATE of samples that are searched: within RADIUS for blockers, then within their penumbra."""
-    one, half = f4(1), f4(0.5)
-    axes = (
-        row[HALF_A], row[HALF_B], row[ROUND], row[TO_A0], row[TO_A1], row[TO_B0], row[TO_B1],
-    )  # fmt: skip
-    size, fine = nb.int32(grid[SIZE]), row[FINE] > f4(0)
-    for i in range(count):
-        u, v, q, near, du, dv = b[U_ + i], b[V_ + i], b[Q_ + i], b[NEAR + i], b[DU + i], b[DV + i]
-        softest, radius = b[SOFT + i], b[RADIUS + i]
-        share, radius_a, radius_b = one, softest, softest
-        for filtering in range(2):
-            # Blockers are sought on 8 x 8 texels, those of a wide light and a wide penumbra on 16 x 16, or fewer rows.
-            is_wide = fine and radius > (f4(2.5) if filtering == 1 else f4(9))
-            wide = nb.int32(16) if is_wide else nb.int32(8)
-            level = _level_for(radius, f4(6.5) if is_wide else f4(2.25), size)
-            step, middle, n = f4(1 << level), half + f4(1 << level >> 1), size >> level
-            x, y = (u - middle) / step, (v - middle) / step
-            rows = min(nb.int32(2) * nb.int32(radius / step + (half if filtering == 1 else f4(0.75))) + nb.int32(2), wide)
-            left = min(max(nb.int32(math.floor(x)) - (wide >> 1) + nb.int32(1), nb.int32(0)), n - wide)
-            top = min(max(nb.int32(math.floor(y)) - (rows >> 1) + nb.int32(1), nb.int32(0)), n - rows)
-            stride = n + nb.int32(GAP)
-            at, to = U(grid[U(DEPTH_AT) + U(level)] + nb.int64(top) * stride + left), U(0)
-            for _r in range(rows):
-                for part in range(0, wide, 8):
-                    for c in range(8):
-                        window[to + U(c)] = depth[at + U(part) + U(c)]
-                    to += U(8)
-                at += U(stride)
-            dx, dy = (f4(left) - x) * step, (f4(top) - y) * step
-            if filtering == 0:
-                if not _is_any_nearer(window, rows, f4(wide), dx, dy, step, near, du, dv):
-                    break
-                found, total = _blockers(window, rows, f4(wide), dx, dy, step, axes, q, near, du, dv, softest)
-                if found == f4(0):
-                    break
-                gap = total / found
-                radius_a, radius_b = max(axes[0] * gap, softest), max(axes[1] * gap, softest)
-                radius = max(radius_a, radius_b)
-            else:
-                share = _filtered(window, rows, f4(wide), dx, dy, step, axes, q, near, du, dv, softest, radius_a, radius_b)
-        b[STATE + i] = share
 
 
 @lanewise
@@ -427,12 +241,11 @@ def _shine(color, b):
 
 
 @inner(fastmath=FAST)
-def look(count, form, grid, depth, bounds, k, window, b):
+def look(count, form, grid, depth, bounds, k, b):
     """Multiply SHARE by what view k (uintp) of these `Views` leaves of its light, where the samples are on its map.
 
     FACING holds the cosine between the surface and the light, times the distance to a light at a place; it becomes 0 where
-    this view has told; where it is not above 0, nothing changes. (GX, GY, GZ) may be zero where there is no surface. window
-    (256,) float32: scratch.
+    this view has told; where it is not above 0, nothing changes. (GX, GY, GZ) may be zero where there is no surface.
     """
     row, places = form[k], grid[k]
     if not _is_seen(count, row, b):
@@ -444,10 +257,10 @@ def look(count, form, grid, depth, bounds, k, window, b):
         if left > 0:
             _find_cells(left, f4(places[CELLS]), b)
             _read_cells(left, U(places[BOUNDS_AT]), bounds, b)
-            _judge(left, max(row[HALF_A], row[HALF_B]), b)
+            _judge(left, row, b)
             left = nb.intp(_settle(left, b))
     if left > 0:
-        _search(left, row, places, depth, window, b)
+        search(left, row, places, depth, b)
         _settle(left, b)
 
 
@@ -470,5 +283,5 @@ def arrive(count, lights, k, b):
     first, stop, views = lights.first[k], lights.first[k + U(1)], lights.views
     # For each sample the first view that it is on.
     for which in range(first, stop):
-        look(count, views.form, views.grid, views.depth, views.bounds, U(which), b[U0 : U0 + 2 * BLOCK], b)
+        look(count, views.form, views.grid, views.depth, views.bounds, U(which), b)
     _shine(count, lights.color[k], b)

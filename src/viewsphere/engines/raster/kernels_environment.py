@@ -26,7 +26,7 @@ SOFT_HORIZON = 0.025  # sine of the elevation within which the ground turns into
 STEP = np.array([2.0 ** (k - 24) for k in range(32)], np.float32)
 
 
-@inner(fastmath=FAST, inline="always")
+@inner(fastmath=FAST)
 def _direction(x, y):
     """The unit direction at octahedral coordinates in -1..1."""
     z = f4(1) - abs(x) - abs(y)
@@ -39,7 +39,7 @@ def _direction(x, y):
     return x * s, y * s, z * s
 
 
-@inner(fastmath=FAST, inline="always")
+@inner(fastmath=FAST)
 def _coordinates(x, y, z):
     """Octahedral coordinates in -1..1 of a direction of any length."""
     s = f4(1) / (abs(x) + abs(y) + abs(z) + f4(1e-20))
@@ -163,7 +163,7 @@ def _read(t):
     return f4(i4(red)) * step, f4(i4(green)) * step, f4(i4(blue)) * step
 
 
-@inner(fastmath=FAST, inline="always")
+@inner(fastmath=FAST)
 def _look_up(texels, first, width, height, count, w):
     """RX, RY, RZ: the picture's colours at column RU and row RV; bilinear."""
     zero, one = f4(0), f4(1)
@@ -189,7 +189,7 @@ def _look_up(texels, first, width, height, count, w):
         w[RZ + i] = p[2] * wp + q[2] * wq + r[2] * wr + s[2] * ws
 
 
-@inner(fastmath=FAST, inline="always")
+@inner(fastmath=FAST)
 def _rays(listed, columns, m, start, count, w):
     """RX, RY, RZ: directions of some samples as the map has them, any length; those of a grid lie in one row."""
     if listed.shape[1] == 3:

@@ -25,10 +25,13 @@ GAP = 16  # unused texels between rows: those of a window would else push each o
 STEEP = 15.0
 # Columns of Views.form: four rows of the matrix, then what `kernels_arrive.look` needs: texels per length (at distance 1), the
 # bias in q from afar and in shares of q from near, the least q there is, how far from the middle the map is read, half its
-# size, whether the light is round, half its size along two axes in texels per q, the matrix from texels to those axes, whether
-# wide penumbrae are filtered finely.
-TEXELS, BIAS_FAR, BIAS_NEAR, NEAREST, READ, MIDDLE, ROUND, HALF_A, HALF_B, TO_A0, TO_A1, TO_B0, TO_B1, FINE = range(16, 30)
-FORM = 30
+# size, whether the light is round, how an ellipse grows with the squared texels from the middle; a rectangle's half sides
+# along the view's axes, or the radius and zeros: texels per q, the third per q alone; bounds of the light's half width and
+# height in texels per q, how those grow per texel from the middle, whether wide penumbrae are filtered finely; the least half
+# width of a filter in texels, and how many times what it hides counts.
+TEXELS, BIAS_FAR, BIAS_NEAR, NEAREST, READ, MIDDLE, ROUND, TILT, SIDES = range(16, 25)
+SPAN_U, SPAN_V, MORE, FINE, SHARPEST, DARKER = range(SIDES + 6, SIDES + 12)
+FORM = SIDES + 12
 # Columns of Views.grid: size, where its bounds begin, how many cells they have a side (a power of two), where each level of the
 # depths begins.
 SIZE, BOUNDS_AT, CELLS, DEPTH_AT = 0, 1, 2, 3
@@ -142,7 +145,7 @@ def finish_view(grid, form, depth, bounds):
     return nearest
 
 
-@inner(inline="always")
+@inner
 def _find_slopes(grid, depth, far, near, bounds):
     """ACROSS and DOWN of the finest cells: of the first STEP x STEP texels, as far as they may be one surface; else NaN."""
     size, side, stride, last = grid[SIZE], grid[CELLS], grid[SIZE] + GAP, STEP - 1
@@ -174,7 +177,7 @@ def _mean_slope(bounds, cell, right, below):
     return across / max(n, f4(1)), down / max(m, f4(1))
 
 
-@inner(fastmath=FAST, inline="always")
+@inner(fastmath=FAST)
 def _enclose(grid, depth, bounds):
     """All columns of the finest cells from their slopes; returns the smallest q."""
     size, side, stride = grid[SIZE], grid[CELLS], grid[SIZE] + GAP
@@ -198,7 +201,7 @@ def _enclose(grid, depth, bounds):
     return nearest
 
 
-@inner(fastmath=FAST, inline="always")
+@inner(fastmath=FAST)
 def _join(grid, bounds):
     """The coarser cells, each from four of the level before that lie side by side."""
     width, n, half, first = 2 * grid[CELLS], grid[CELLS] >> 1, f4(STEP), grid[BOUNDS_AT]

@@ -27,6 +27,8 @@ _MOST_WIDE = 3
 _FACE = 1.15  # half width of a cube's face at distance 1; only the middle 1.03 is read, so that filters have room
 _READ = 1.03
 _WIDEST = 2.5  # tangent from which one perspective is too coarse
+_SHARPEST = 1.2  # texels: half the width of a filter, at least
+_TIGHT = 6.0, 4.0  # of a lamp that is shut in: half the width of a filter, and how many times what it hides counts
 _MANY = 4  # fitted maps from which on all are half as wide
 
 
@@ -76,8 +78,8 @@ class Lights(NamedTuple):
 @dataclass(frozen=True)
 class View:
     """One map to draw: the (4, 4) matrix from the world, from which w on, texels per length (at distance 1), the least
-    distance from the border at which it is read, half the light's size along two axes in texels per q, and the (2, 2) matrix
-    from texels to those axes; whether the light is round, and whether wide penumbrae are filtered finely.
+    distance from the border at which it is read, and half the light's sides (2, 3) along the view's axes (per length), or the
+    radius and zeros if it is round; whether wide penumbrae are filtered finely.
     """
 
     matrix: Float
@@ -85,8 +87,7 @@ class View:
     texels: float
     size: int
     guard: float
-    half: tuple[float, float]
-    to_axes: Float
+    sides: Float
     is_round: bool
     is_fine: bool = True
 
@@ -199,7 +200,22 @@ def _views(source: _Source, points: Float, casters: Casters, size: int) -> Views
     views = [] if fitted is None else [fitted]
     if has_scenery or (fitted is None and len(points)):
         views += _all_round(source, max(size // 2, 64))
-    return draw_views(views, casters)
+    drawn = draw_views(views, casters)
+    if fitted is None and not has_scenery and _is_shut_in(views, drawn, casters.extent.ground_z is not None):
+        # Beyond a wall the filter would find the lit floor before it.
+        drawn.form[:, (kernels.SHARPEST, kernels.DARKER)] = _TIGHT
+    return drawn
+
+
+def _is_shut_in(views: Sequence[View], drawn: Views, has_ground: bool) -> bool:
+    """Whether all that is seen in these views ends at a target, or on the ground."""
+    for i, view in enumerate(views):
+        right, up, ahead = view.matrix[0, 2] / view.texels, view.matrix[1, 2] / view.texels, view.matrix[3, 2]
+        place = (np.arange(view.size) + 0.5 - view.size / 2) / view.texels
+        is_down = ahead + right * place + up * place[:, None] < 0
+        if not (np.isfinite(_level(drawn, i, view.size)[:, : view.size]) | (is_down & has_ground)).all():
+            return False
+    return len(views) > 0
 
 
 @dataclass(frozen=True)
@@ -248,8 +264,11 @@ def parallel_view(away: Float, middle: Float, span: float, tangent: float, size:
     matrix[:3, :3] = np.stack([texels * right, texels * up, away])
     matrix[:2, 3] = -matrix[:2, :3] @ middle
     matrix[3, 3] = 1.0
-    half = max(texels * tangent, 1e-3)
-    return View(matrix, 0.5, texels, size, 1.0, (half, half), np.eye(2), True)
+    return View(matrix, 0.5, texels, size, 1.0, _ball(tangent), True)
+
+
+def _ball(radius: float) -> Float:
+    return np.array([[radius, 0.0, 0.0], [0.0, radius, 0.0]])
 
 
 def _fitted_from_afar(source: _Source, points: Float, casters: Casters, size: int) -> View:
@@ -276,13 +295,9 @@ def _perspective(source: _Source, axes: Float, tangent: float, size: int, guard:
     matrix[:, 3] = -matrix[:, :3] @ source.place
     matrix[2, 3] = -1.0
     near = max(1e-3, (0.02 if source.kind == AREA else 1.0) * source.radius)
-    half, to_axes, is_round = (texels * source.radius,) * 2, np.eye(2), True
-    if source.kind == AREA:
-        sides = texels * np.stack([axes[:2] @ source.right, axes[:2] @ source.up], axis=1)
-        lengths = np.linalg.norm(sides, axis=0)
-        if lengths.min() > 0 and abs(np.linalg.det(sides / lengths)) > 0.3:
-            half, to_axes, is_round = (float(lengths[0]), float(lengths[1])), np.linalg.inv(sides / lengths), False
-    return View(matrix, near, texels, size, guard, (max(half[0], 1e-3), max(half[1], 1e-3)), to_axes, is_round)
+    is_round = source.kind != AREA or source.radius == 0
+    sides = _ball(source.radius) if is_round else np.stack([source.right, source.up]) @ axes.T
+    return View(matrix, near, texels, size, guard, sides, is_round)
 
 
 def _fitted_from_place(source: _Source, points: Float, casters: Casters, size: int) -> View | None:
@@ -410,9 +425,17 @@ def _form_row(view: View, from_behind: bool) -> Float32:
     row[:16] = matrix.ravel()
     row[kernels.TEXELS], row[kernels.MIDDLE], row[kernels.READ] = view.texels, view.size / 2, view.size / 2 - view.guard
     row[kernels.ROUND], row[kernels.FINE] = view.is_round, view.is_fine
-    row[kernels.BIAS_FAR if matrix[3, 3] == 1 and not matrix[3, :3].any() else kernels.BIAS_NEAR] = 1.2 / view.texels
-    row[kernels.HALF_A], row[kernels.HALF_B] = view.half
-    row[kernels.TO_A0 : kernels.TO_B1 + 1] = view.to_axes.ravel()
+    row[kernels.SHARPEST], row[kernels.DARKER] = _SHARPEST, 1
+    is_far = matrix[3, 3] == 1 and not matrix[3, :3].any()
+    row[kernels.BIAS_FAR if is_far else kernels.BIAS_NEAR] = 1.2 / view.texels
+    row[kernels.TILT] = 0 if is_far else view.texels**-2
+    sides = view.sides * [view.texels, view.texels, 1]
+    row[kernels.SIDES : kernels.SIDES + 6] = sides.ravel()
+    row[kernels.SPAN_U], row[kernels.SPAN_V], row[kernels.MORE] = np.abs(sides).sum(axis=0)
+    if view.is_round and not is_far:
+        # An ellipse's half width is a convex function: less than on the line to the border.
+        slant = row[kernels.READ] / view.texels
+        row[kernels.MORE] = sides[0, 0] * (math.hypot(1, slant) - 1) / row[kernels.READ]
     return row
 
 

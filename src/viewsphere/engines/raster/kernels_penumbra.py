@@ -1,0 +1,268 @@
+"""How much of a light a sample sees past what the light's map shows: blockers first, then a filter as wide as its penumbra.
+
+Percentage-closer soft shadows (Fernando 2005), where a texel blocks only if it lies between the sample and some part of the
+light, as in backprojection (Guennebaud et al. 2006); the filter is a window of the map's own texels, on a coarser level the
+wider it is, so that nothing is random. A light has the shape and the size it has seen from the sample.
+"""
+
+# ruff: isort: skip_file
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numba as nb
+from llvmlite import ir
+from numba.core import cgutils
+from numba.extending import intrinsic
+
+from viewsphere.engines.raster.kernels_block import (
+    BARY2, IB, IG, IR, OPENX, OPENY, OPENZ, T1, T2, T3, T4, T5, T6, T7, U0, U1, V0, V1,
+)  # fmt: skip
+from viewsphere.engines.raster.kernels_lanes import (
+    LANES, REAL, Lanes, Rows, clamp, lanewise, least, load, most, root, size, spread, where,
+)  # fmt: skip
+from viewsphere.engines.raster.kernels_shadow import (
+    COARSEST, DARKER, DEPTH_AT, FINE, GAP, MIDDLE, MORE, ROUND, SIDES, SIZE, SPAN_U, SPAN_V, TILT,
+)  # fmt: skip
+from viewsphere.engines.raster.kernels_texture import FAST
+from viewsphere.geometry.jit import inner
+
+f4 = nb.float32
+U = nb.uintp
+# Rows while a view is looked at; the irradiance comes after. Coordinates in textures are read by then.
+U_, V_, Q_, DU, DV, NEAR, SOFT, RADIUS, STATE, FACING = T1, T2, T3, T4, T5, T6, T7, IR, IG, IB
+LEFT, TOP, TEXEL, TALL, REACH = U0, V0, U1, V1, BARY2
+MEAN, SUM, COUNT = OPENX, OPENY, OPENZ
+NARROW, WIDE = 6.5, 9.0
+
+
+def span(form: Rows, b: Rows) -> Lanes:
+    """Half the width of the light, seen from samples, across or down, in texels per q; or a little more."""
+    u, v, middle = b[U_], b[V_], form.one(MIDDLE)
+    return most(form.one(SPAN_U) + size(u - middle) * form.one(MORE), form.one(SPAN_V) + size(v - middle) * form.one(MORE))
+
+
+def power(x: Lanes) -> Lanes:
+    """The power of two that is at most x > 0."""
+    return Lanes(x.builder, x.builder.bitcast((x.bits() & 0x7F800000).value, x.value.type))
+
+
+class _Light:
+    """As samples see it: half its sizes along two axes, in texels per q, the matrix from texels to those axes, and how many
+    times as wide or high as its half sizes it is.
+    """
+
+    def __init__(self, form: Rows, b: Rows) -> None:
+        u, v = b[U_] - form.one(MIDDLE), b[V_] - form.one(MIDDLE)
+        self.is_round = form.one(ROUND)
+        is_round = self.is_round > 0
+        # A ball is an ellipse, the longer the farther from the map's middle.
+        tilt = form.one(TILT)
+        longer = root(1 + (u * u + v * v) * tilt)
+        less = tilt / (longer * (longer + 1))
+        # What of a rectangle's sides lies along the map's axis is seen aslant.
+        au, av, aq, bu, bv, bq = (form.one(SIDES + k) for k in range(6))
+        au, av, bu, bv = au - u * aq, av - v * aq, bu - u * bq, bv - v * bq
+        long_a, long_b = most(root(au * au + av * av), 1e-3), most(root(bu * bu + bv * bv), 1e-3)
+        self.half_a, self.half_b = long_a, where(is_round, long_a, long_b)
+        per_a, per_b = 1 / long_a, 1 / long_b
+        au, av, bu, bv = au * per_a, av * per_a, bu * per_b, bv * per_b
+        sine = au * bv - av * bu
+        per = 1 / where(sine < 0, least(sine, -0.1), most(sine, 0.1))  # seen from its own plane it is a line
+        self.u_to_a, self.v_to_a = where(is_round, 1 - u * u * less, bv * per), where(is_round, -u * v * less, -bu * per)
+        self.u_to_b, self.v_to_b = where(is_round, -u * v * less, -av * per), where(is_round, 1 - v * v * less, au * per)
+        self.stretch = where(is_round, longer, most(size(au) + size(bu), size(av) + size(bv)))
+
+        self.q, self.near, self.du, self.dv = b.get(Q_, NEAR, DU, DV)
+        # The first search, before which STATE is above 1, is of all that there is.
+        self.farthest = where(b[STATE] > 1, math.inf, b[REACH] / most(self.half_a, self.half_b))
+
+    def meet(self, z: Lanes, x: Lanes, y: Lanes) -> tuple[Lanes, Lanes, Lanes, Lanes]:
+        """Whether what is at a place from the sample lies before its plane, but not so far that its penumbra is wider than
+        REACH; how far in q; how far along the light's axes.
+        """
+        gap = most(self.q - z, 0)
+        is_nearer = (z < self.near + self.du * x + self.dv * y) & (gap <= self.farthest)
+        return is_nearer, gap, size(self.u_to_a * x + self.v_to_a * y), size(self.u_to_b * x + self.v_to_b * y)
+
+
+class _Sample(Rows):
+    """A block of which all lanes are one sample."""
+
+    def __getitem__(self, row: Any) -> Lanes:
+        return spread(self.builder, self.builder.load(self.builder.gep(self.data, [self._at(row)])))
+
+
+def _over_window(*sums: int) -> Any:
+    """A function of a view's form and a sample, as one that kernels call: `(depth, at, stride, form, b, i)`.
+
+    It returns a function of q and place (from the sample, in the map's texels) of texels; what that returns, summed over the
+    window of sample i (uintp), goes to the rows `sums`. The window begins at depth[at], its rows are `stride` apart (uintp).
+    """
+
+    def decorate(function: Callable[[Rows, Rows], Callable[[Lanes, Lanes, Lanes], tuple[Lanes, ...]]]) -> Any:
+        @intrinsic
+        def summed(typing, depth, at, stride, form, b, i):
+            def code(context, builder, signature, arguments):
+                texels, numbers, block = (
+                    context.make_array(signature.args[k])(context, builder, arguments[k]).data for k in (0, 3, 4)
+                )
+                first, along, own = (arguments[k] for k in (1, 2, 5))
+                sample = _Sample(builder, block, own, None)
+                texel = function(Rows(builder, numbers, own, None), sample)
+                order = Lanes(builder, ir.Constant(ir.VectorType(REAL, LANES), [float(k) for k in range(LANES)]))
+                step = sample[TEXEL]
+                middle = where(step > 1, step * 0.5, 0) + 0.5
+                left, top = sample[LEFT] * step + middle - sample[U_], sample[TOP] * step + middle - sample[V_]
+                kept = [cgutils.alloca_once_value(builder, order.all(0).value) for _ in sums]
+                high = builder.fptoui(builder.load(builder.gep(block, [builder.add(own, own.type(TALL))])), own.type)
+                wide = builder.select(builder.icmp_unsigned(">", high, high.type(8)), high.type(16), high.type(8))
+                with cgutils.for_range(builder, high) as row:
+                    y = top + spread(builder, builder.uitofp(row.index, REAL)) * step
+                    start = builder.add(first, builder.mul(row.index, along))
+                    with cgutils.for_range_slice(builder, wide.type(0), wide, wide.type(LANES)) as (part, _):
+                        x = left + (order + spread(builder, builder.uitofp(part, REAL))) * step
+                        found = texel(load(builder, texels, builder.add(start, part)), x, y)
+                        for place, value in zip(kept, found, strict=True):
+                            builder.store((Lanes(builder, builder.load(place)) + value).value, place)
+                for place, target in zip(kept, sums, strict=True):
+                    value = _total(builder, builder.load(place))
+                    builder.store(value, builder.gep(block, [builder.add(own, own.type(target))]))
+                return context.get_dummy_value()
+
+            return nb.void(depth, nb.uintp, nb.uintp, form, b, nb.uintp), code
+
+        return summed
+
+    return decorate
+
+
+def _total(builder: Any, lanes: Any) -> Any:
+    kind = ir.FunctionType(REAL, [REAL, lanes.type])
+    function = cgutils.get_or_insert_function(builder.module, kind, f"llvm.vector.reduce.fadd.v{LANES}f32")
+    return builder.call(function, [REAL(-0.0), lanes], fastmath=tuple(sorted(FAST)))
+
+
+@_over_window(COUNT, SUM)
+def _block(form, b):
+    """COUNT of texels that hide part of the light, less at its rim, and the SUM of their distances in q."""
+    light, step = _Light(form, b), b[TEXEL]
+    soft, per = b[SOFT] + step, 1 / step
+
+    def texel(z, x, y):
+        is_hit, gap, a, b = light.meet(z, x, y)
+        reach_a, reach_b = light.half_a * gap + soft, light.half_b * gap + soft
+        disc = clamp((reach_a * reach_a - a * a - b * b) * 0.5 * per / reach_a)
+        square = clamp((reach_a - a) * per) * clamp((reach_b - b) * per)
+        hit = where(is_hit, square + (disc - square) * light.is_round, 0)
+        return hit, hit * gap
+
+    return texel
+
+
+@_over_window(COUNT, SUM)
+def _filter(form, b):
+    """SUM of the weights of texels in a filter as wide as the light is past blockers at MEAN; COUNT: of those it gets past."""
+    light, soft, step = _Light(form, b), b[SOFT], b[TEXEL]
+    radius_a, radius_b, per = most(light.half_a * b[MEAN], soft), most(light.half_b * b[MEAN], soft), 1 / step
+    soft_a, soft_b = radius_a * per + 0.5, radius_b * per + 0.5
+    # A disc's edge is one texel wide: near its rim (1 - d^2 / r^2) r / 2 is r - d.
+    rim, fall = (soft_a + 0.5) * 0.5, 0.5 * per / radius_a
+    # What lies deep behind others that are nearer to the light hides more than its own penumbra tells.
+    deep_a, deep_b, soft = light.half_a * 3, light.half_b * 3, soft + step
+    left = 1 - least(b[COUNT], 1)  # blockers come and go little by little
+
+    def texel(z, x, y):
+        is_hit, gap, a, b = light.meet(z, x, y)
+        reach_a, reach_b, far = deep_a * gap + soft, deep_b * gap + soft, a * a + b * b
+        is_hit = is_hit & (a * a + b * b * light.is_round <= reach_a * reach_a) & (b <= reach_b)
+        disc = clamp(rim - far * fall)
+        square = clamp(soft_a - a * per) * clamp(soft_b - b * per)
+        weight = square + (disc - square) * light.is_round
+        return where(is_hit, weight * left, weight), weight
+
+    return texel
+
+
+@lanewise
+def _start(is_fine, b):
+    """REACH: the widest penumbra that there may be."""
+    radius = b[RADIUS]
+    wide = power(radius * (1.999999 / NARROW)) * NARROW
+    b[REACH] = where(radius * is_fine > WIDE, wide, most(radius, 1e-3))
+    b[STATE] = 2
+
+
+@lanewise
+def _place_windows(radius, wide_from, margin, side, b):
+    """Where the window of texels within a radius is: 8 x 8, beyond `wide_from` 16 x 16, or fewer rows. radius: its row."""
+    radius = b[radius]
+    is_wide = radius > wide_from
+    step = power(radius / where(is_wide, NARROW, 2.25) * 1.999999)  # the least power that is enough
+    step = most(least(step, power(side / COARSEST)), 1)
+    rows = least((radius / step + margin).whole().real() * 2 + 2, where(is_wide, 16, 8))
+    wide, last = where(rows > 8, 16, 8), (side / step).whole().real()
+    middle = where(step > 1, step * 0.5, 0) + 0.5
+    for row, place, count in ((LEFT, b[U_], wide), (TOP, b[V_], rows)):
+        first = ((place - middle) / step).whole().real() - count * 0.5 + 1
+        b[row] = least(most(first, 0), last - count)
+    b[TEXEL], b[TALL] = step, rows
+
+
+@lanewise
+def _tell_blocked(form, b):
+    """MEAN distance of blockers, and RADIUS of the penumbra that things so far away make."""
+    light = _Light(form, b)
+    mean = b[SUM] / most(b[COUNT], 1)
+    b[MEAN], b[SUM] = mean, 0
+    b[RADIUS] = most(most(light.half_a, light.half_b) * mean, b[SOFT]) * light.stretch
+
+
+@lanewise
+def _tell_filtered(form, b):
+    """STATE: the least share there is; half the REACH, 0 where that was narrow."""
+    whole, reach = b[SUM], b[REACH]
+    hidden = where(whole > 0, 1 - b[COUNT] / most(whole, 1e-6), 0)
+    b[STATE] = least(b[STATE], most(1 - hidden * form.one(DARKER), 0))
+    b[REACH] = where(reach > WIDE, reach * 0.5, 0)
+
+
+@inner
+def _begin(grid, i, b):
+    """Where a sample's window begins in the depths, and how far its rows are apart."""
+    step, level = nb.int64(b[U(TEXEL) + i]), U(0)
+    while step >> nb.int64(level) > 1:
+        level += U(1)
+    stride = (grid[SIZE] >> nb.int64(level)) + GAP
+    return U(grid[U(DEPTH_AT) + level] + nb.int64(b[U(TOP) + i]) * stride + nb.int64(b[U(LEFT) + i])), U(stride)
+
+
+@inner(fastmath=FAST)
+def search(count, form, grid, depth, b):
+    """STATE of samples on a view's map that may be in a penumbra: the share of the light that they see.
+
+    form, grid: a view's rows of `Views`. RADIUS: within which there may be blockers.
+    """
+    side, fine = f4(grid[SIZE]), form[FINE]
+    none = f4(0) if fine > f4(0) else f4(math.inf)
+    _start(count, fine, b)
+    left = 1
+    while left > 0:
+        left = 0
+        _place_windows(count, U(REACH), none + f4(WIDE), f4(0.75), side, b)
+        for i in range(U(count)):
+            b[U(COUNT) + i] = f4(0)
+            if b[U(REACH) + i] > f4(0):
+                at, stride = _begin(grid, i, b)
+                _block(depth, at, stride, form, b, i)
+                left += 1 if b[U(REACH) + i] > f4(WIDE) else 0
+        left = 0 if fine == f4(0) else left
+        _tell_blocked(count, form, b)
+        _place_windows(count, U(RADIUS), none + f4(2.5), f4(0.5), side, b)
+        for i in range(U(count)):
+            if b[U(COUNT) + i] > f4(0):
+                at, stride = _begin(grid, i, b)
+                _filter(depth, at, stride, form, b, i)
+        _tell_filtered(count, form, b)
