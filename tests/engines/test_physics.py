@@ -398,6 +398,26 @@ def test_transparent_layers_lie_over_one_another_as_they_stand(azimuth, antialia
     assert np.abs(seen.astype(int) - np.round(255 * encoded(light))).max() <= 1
 
 
+@pytest.mark.parametrize("antialias", [1, 4])
+@pytest.mark.parametrize("wrap", ["clamp", "repeat", "mirror"])
+def test_a_magnified_blended_texture_fades_from_texel_to_texel(wrap, antialias):
+    """Four texels wide, clear, opaque, clear, clear: alpha falls to 0 at the middle of either neighbour, over nothing too."""
+    pixels = np.zeros((1, 4, 4), np.uint8)
+    pixels[0, :, :3], pixels[0, 1, 3] = 255, 255
+    used = Material(unlit=True, alpha_mode="BLEND", base_color_texture=Texture(0, wrap_s=wrap))
+    mesh = flat(quad((-1, 0, -1), (2, 0, 0), (0, 0, 2)), used)
+    uv = (mesh.vertices[:, ::2] + 1) / 2
+    mesh = replace(mesh, uv0=uv, images=(Image("spot", pixels),))
+    background = (0.2, 0.5, 0.8)
+    scene = Scene(sun=None, finish=Finish(background=Background(color=background), view=View(transform="raw")))
+    view = camera(100, 5, 200, 0, 0, 4, (0, 0, 0))  # 100 pixels are 2 metres
+    seen = picture(mesh, scene, view, antialias=antialias)
+    texel = (np.arange(100) + 0.5) / 25 - 0.5
+    alpha = np.clip(1 - np.abs(texel - 1), 0, 1)[:, None]
+    expected = 255 * encoded(alpha + linear(np.array(background)) * (1 - alpha))
+    assert np.abs(seen.astype(int) - expected).max() <= 2
+
+
 @pytest.mark.parametrize("lit", ["sun", "low sun", "sky"])
 def test_a_catcher_darkens_as_the_ground_does(lit):
     """Over a plain background of the open ground's colour a catcher looks like the ground; light and ground are grey."""

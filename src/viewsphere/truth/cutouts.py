@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.assets.mesh import WRAPS, Material, Mesh
+from viewsphere.assets.mesh import WRAPS, Material, Mesh, Texture, Wrap
 
 SURFACE, NEVER = -1, -2
+SEEN = 1 / 512  # alpha: whatever is not clear
+_BORDERS: dict[Wrap, Literal["wrap", "symmetric", "edge"]] = {"repeat": "wrap", "mirror": "symmetric", "clamp": "edge"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,16 +48,20 @@ NO_CUTOUTS = Cutouts(
 )
 
 
-def mesh_cutouts(mesh: Mesh, label_alpha: float) -> tuple[Cutouts, NDArray[np.int32]]:
-    """The mesh's cut-outs and, per triangle, SURFACE, NEVER or its row of `corners`."""
+def mesh_cutouts(mesh: Mesh, label_alpha: float | None) -> tuple[Cutouts, NDArray[np.int32]]:
+    """The mesh's cut-outs and, per triangle, SURFACE, NEVER or its row of `corners`.
+
+    Without `label_alpha`, a BLEND material is surface wherever it has a colour, which filtering carries to the next texel.
+    """
     rows = np.full(len(mesh.triangles), SURFACE, np.int32)
     cutouts = NO_CUTOUTS
     for index, material in enumerate(mesh.materials):
         chosen = np.flatnonzero(mesh.triangle_material == index)
         if len(chosen) == 0 or material.alpha_mode == "OPAQUE" or material.transmission > 0:
             continue
-        threshold = material.alpha_cutoff if material.alpha_mode == "MASK" else label_alpha
-        own = _material_cutouts(mesh, material, chosen, threshold)
+        is_spread = material.alpha_mode == "BLEND" and label_alpha is None
+        threshold = material.alpha_cutoff if material.alpha_mode == "MASK" else label_alpha or SEEN
+        own = _material_cutouts(mesh, material, chosen, threshold, is_spread)
         alpha = own.corners[:, :, 2]
         lowest, highest = own.texels.min() / 255 * own.levels[0, 0], own.texels.max() / 255 * own.levels[0, 0]
         mixed = (lowest * alpha.min(axis=1) < threshold) & (highest * alpha.max(axis=1) >= threshold)
@@ -88,7 +94,7 @@ def _appended(a: Cutouts, b: Cutouts) -> Cutouts:
     )
 
 
-def _material_cutouts(mesh: Mesh, material: Material, chosen: NDArray[np.intp], threshold: float) -> Cutouts:
+def _material_cutouts(mesh: Mesh, material: Material, chosen: NDArray[np.intp], threshold: float, is_spread: bool) -> Cutouts:
     texture = material.base_color_texture
     uv = None if texture is None else (mesh.uv0, mesh.uv1)[texture.texcoord]
     corners = np.zeros((len(chosen), 3, 3))
@@ -98,6 +104,7 @@ def _material_cutouts(mesh: Mesh, material: Material, chosen: NDArray[np.intp], 
     if texture is not None and uv is not None:
         corners[:, :, :2] = _transformed(texture.matrix, uv[used].astype(np.float64))
         texels = mesh.images[texture.image].pixels[:, :, 3]
+        texels = _spread(texels, texture) if is_spread and not texture.nearest else texels
         wraps = (WRAPS.index(texture.wrap_s), WRAPS.index(texture.wrap_t))
     return Cutouts(
         np.ascontiguousarray(texels).reshape(-1),
@@ -106,6 +113,14 @@ def _material_cutouts(mesh: Mesh, material: Material, chosen: NDArray[np.intp], 
         np.zeros(len(chosen), np.int32),
         corners,
     )
+
+
+def _spread(texels: NDArray[np.uint8], texture: Texture) -> NDArray[np.uint8]:
+    """The highest of each texel and its eight neighbours."""
+    tall = np.pad(texels, ((1, 1), (0, 0)), _BORDERS[texture.wrap_t])
+    most = np.maximum(np.maximum(tall[:-2], tall[1:-1]), tall[2:])
+    wide = np.pad(most, ((0, 0), (1, 1)), _BORDERS[texture.wrap_s])
+    return np.maximum(np.maximum(wide[:, :-2], wide[:, 1:-1]), wide[:, 2:])
 
 
 def _transformed(matrix: NDArray[np.float64], uv: NDArray[np.float64]) -> NDArray[np.float64]:

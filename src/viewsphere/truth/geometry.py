@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from itertools import accumulate, pairwise
 from typing import Any
@@ -118,6 +118,15 @@ def build_geometry(placements: Sequence[Placement], meshes: Sequence[Mesh], grou
     if count < len(meshes):
         parts.append(_scenery(tuple(placements[count:]), tuple(meshes[count:]), label_alpha))
     return _stacked([*parts, _ground(parts)] if ground else parts)
+
+
+def with_blended_colors(geometry: Geometry, meshes: Sequence[Mesh]) -> Geometry:
+    """The same, but BLEND materials are surface wherever they have a colour, which labels leave out where it is faint."""
+    if not any(material.alpha_mode == "BLEND" for mesh in meshes for material in mesh.materials):
+        return geometry
+    ground = np.full(len(geometry.triangles) - geometry.triangle_start[-1], SURFACE, np.int32)
+    cutouts, rows = stack_cutouts([*(mesh_cutouts(mesh, None) for mesh in meshes), (NO_CUTOUTS, ground)])
+    return replace(geometry, cutouts=cutouts, triangle_cutout=rows)
 
 
 def _placed(placements: tuple[Placement, ...], meshes: tuple[Mesh, ...], label_alpha: float) -> Geometry:

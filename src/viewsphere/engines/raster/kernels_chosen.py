@@ -93,7 +93,8 @@ def level(inverse):
 
 @njit
 def shown_farthest(triangle, depth, pixels, height, width):
-    """Level of the farthest surface that the points of each pixel show, (H, W) int32; CLOSED where they show none.
+    """Level of the farthest surface that the points of each pixel show, (H, W) int32: 0 where they show none, CLOSED where
+    there are none.
 
     triangle, depth (N, M): of the points of `pixels` (N,), or of all pixels in order if that is empty.
     """
@@ -102,7 +103,7 @@ def shown_farthest(triangle, depth, pixels, height, width):
     for k in range(U(triangle.shape[0])):
         least = CLOSED
         for i in range(U(triangle.shape[1])):
-            least = min(least, level(depth[k, i]) if triangle[k, i] >= 0 else CLOSED)
+            least = min(least, level(depth[k, i]) if triangle[k, i] >= 0 else np.int32(0))
         flat[U(pixels[k]) if pixels.shape[0] else k] = least
     return farthest
 

@@ -28,7 +28,7 @@ class Baked:
 
     floor (8,): texture repeats per length of the ground, its texture coordinates at the origin, its material, 1 if it only
     scatters, 2 if it is a shadow catcher, its colour. kind (T + 1,) uint8: of each triangle, see `kernels_paint`; owner (T,)
-    int32: equal where neighbouring triangles look alike; see_through (T + 1,).
+    int32: equal where neighbouring triangles look alike; see_through (T + 1,). blended: `with_blended_colors`.
     """
 
     geometry: Geometry
@@ -43,6 +43,7 @@ class Baked:
     kind: NDArray[np.uint8]
     owner: Int32
     see_through: NDArray[np.bool_]
+    blended: Geometry
 
 
 def paint(baked: Baked, camera: Camera, visibility: Visibility, antialias: bool, has_sky: bool, radiance: Float32) -> None:
@@ -100,7 +101,7 @@ def _shade(
     _shade_some(baked, view, ground, True, triangle, depth, radiance)
     # Also where no see-through surface is in front: a decal may lie on what is.
     pixels = None if samples is None else samples.pixels
-    for layer in layers(baked.geometry, camera, triangle, depth, baked.see_through, pixels, visibility.corners):
+    for layer in layers(baked.blended, camera, triangle, depth, baked.see_through, pixels, visibility.corners):
         behind, behind_depth = triangle.copy(), depth.copy()
         behind[layer.slot], behind_depth[layer.slot] = layer.triangle, layer.inverse_depth
         is_ground = baked.kind[layer.triangle] == kernels_paint.FLOOR

@@ -96,10 +96,10 @@ def layers(
     """What is seen at the points that see through something: the solid surfaces behind, then see-through ones, back to front.
 
     The points, with what each shows (N,), are all pixels' centres in order, or the four samples of each of `pixels`; a slot is
-    a point's index. A pixel whose points all show nothing is left out. see_through (T + 1,): the last entry, for triangle -1,
-    is False; `corners` is `Visibility.corners`, if known. The first layer holds the nearest solid surfaces (nothing where there
-    is none), the second the farthest see-through one of every such point, the third the next of those that have two, up to 8;
-    farther ones are left out. Empty where nothing is see-through.
+    a point's index. see_through (T + 1,): the last entry, for triangle -1, is False; `corners` is `Visibility.corners`, if
+    known. The first layer holds the nearest solid surfaces (nothing where there is none), the second the farthest see-through
+    one of every such point, the third the next of those that have two, up to 8; farther ones are left out. Empty where nothing
+    is see-through.
 
     A see-through surface that lies on a solid one (1/z the same within 1e-5) is in front of it, and of two that lie on one
     another the later triangle is in front: decals are on top.

@@ -28,7 +28,7 @@ from viewsphere.model.scene import Ground, Scene
 from viewsphere.model.shot import Frame, ModelSpec, Placement, Shot
 from viewsphere.surroundings.ground import ground_albedo, ground_frame, ground_material, only_scatters
 from viewsphere.surroundings.sky import even_light
-from viewsphere.truth.geometry import Geometry, build_geometry, placed_meshes
+from viewsphere.truth.geometry import Geometry, build_geometry, placed_meshes, with_blended_colors
 from viewsphere.truth.visibility import Visibility
 
 
@@ -137,6 +137,7 @@ def _baked(
         kind=np.append(kind, np.uint8(kernels_paint.NOTHING)),
         owner=(geometry.triangle_object * len(surfaces.looks) + surfaces.material).astype(np.int32),
         see_through=see_through,
+        blended=with_blended_colors(geometry, meshes),
     )
 
 
