@@ -152,8 +152,11 @@ def test_a_bad_image_is_a_warning(folder, write, data):
 @pytest.mark.parametrize(
     ("name", "message"),
     [
-        ("a.blend", "Blender files are not read; convert it to GLB .in Blender"),
-        ("a.usdz", "USD files are not read; convert it to GLB .in Blender"),
+        ("a.x3d", "X3D files are not read; convert it to GLB .in Blender"),
+        ("a.blend", "no such file"),
+        ("a.blend/Object/Car", "a.blend: no such file"),
+        ("a.blend/Car", "expected a.blend/Object/NAME or a.blend/Collection/NAME, found a.blend/Car"),
+        ("a.usdz", "no such file"),
         ("a.step", "STEP .CAD. files are not read; convert it to GLB .with its program"),
         ("a.xyz", "glb, gltf, obj"),
         ("a", "found 'none'"),

@@ -20,6 +20,7 @@ LIMITS = {name for name in vars(limits) if name.startswith(("MAX_", "MIN_"))}
 TESTED = {
     "MAX_READ_SECONDS": "test_isolated",
     "MAX_READ_BYTES": "test_isolated",
+    "MAX_BLENDER_TRIANGLES": "test_formats",
     **dict.fromkeys(
         (
             "MAX_FILE_BYTES", "MAX_FILES", "MAX_TRIANGLES", "MAX_VERTICES", "MAX_PICTURE_PIXELS",

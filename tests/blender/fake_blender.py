@@ -39,7 +39,9 @@ def with_modules(folder: Path, modules: dict[str, str]) -> Path:
     place.mkdir()
     for name, source in modules.items():
         (place / f"{name}.py").write_text(source)
-    return interpreter(folder, f'echo noise of a wrapper\nPYTHONPATH={shlex.quote(str(place))} exec "$python" "$@"')
+    return interpreter(
+        folder, f'trap "" PIPE\necho noise of a wrapper\nPYTHONPATH={shlex.quote(str(place))} exec "$python" "$@"'
+    )
 
 
 def fake_blender(folder: Path) -> Path:

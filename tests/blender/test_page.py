@@ -15,7 +15,7 @@ from viewsphere import Dataset, Recipe, plan
 from viewsphere.engines.cycles.options import PRESETS, Options, parse_options
 
 PAGE = (ROOT / "docs" / "blender.md").read_text("utf-8")
-RECIPE, ENGINE = re.findall(r"```yaml\n(.*?)```", PAGE, re.DOTALL)
+RECIPE, ENGINE, FORMATS = re.findall(r"```yaml\n(.*?)```", PAGE, re.DOTALL)
 ROWS = dict(re.findall(r"^\| `(\w+)` \|([^\n]*)\|$", PAGE, re.MULTILINE))
 
 
@@ -25,6 +25,8 @@ def test_recipes_are_valid():
     parse_options(recipe.engine.options)
     found = parse_options({k: v for k, v in yaml.safe_load(ENGINE)["engine"].items() if k != "name"})
     assert (found.bounces, found.settings["seed"]) == (12, 7)
+    formats = Recipe(models=yaml.safe_load(FORMATS)["models"], viewpoints={"distance": 9})
+    assert len(formats.models) == 2
 
 
 def test_the_table_has_every_option_and_preset():

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from viewsphere import blender as package
+from viewsphere.blender.process import BlenderProcess
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(120)]
 
@@ -70,3 +71,12 @@ def test_files_do_not_run_and_sockets_do_not_open(blender, tmp_path):
     assert opened.returncode == 0, opened.stderr
     assert "kept off" in opened.stdout
     assert "['driver ran', 'text ran']" in opened.stdout
+
+
+def test_a_model_that_is_read_does_not_run(blender, tmp_path):
+    run = subprocess.run([blender, "-c", MAKE + LEAVE, tmp_path], capture_output=True, text=True, timeout=100)
+    assert run.returncode == 0, run.stderr
+    with BlenderProcess(blender) as process:  # not confined, so that what ran could be seen
+        told = {"kind": "blend", "inside": [], "root": None, "most": 1000, "folder": str(process.folder)}
+        assert process.ask("read", file=str(tmp_path / "file.blend"), **told)["placed"]
+    assert [file.name for file in tmp_path.iterdir()] == ["file.blend"]

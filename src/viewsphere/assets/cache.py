@@ -23,6 +23,7 @@ from pathlib import Path
 import platformdirs
 
 from viewsphere.assets import limits
+from viewsphere.assets.inside import split_source
 from viewsphere.assets.isolated import read_apart
 from viewsphere.assets.load import check_source
 from viewsphere.assets.mesh import Mesh
@@ -56,11 +57,11 @@ def load(
     if spec.source.startswith(ZOO):
         raw, facts = load_zoo(spec, build)
         return normalise(raw, facts, spec), facts
-    path = Path(spec.source)
+    path, inside = split_source(Path(spec.source))
     folder = folder or cache_folder()
     check_source(path)
     try:
-        first = _first_digest(path, spec)
+        first = _first_digest(path, inside, spec)
     except OSError:
         first = None  # the reader says what is wrong with the file
     stored = None if first is None else _stored(folder, first, path)
@@ -110,26 +111,27 @@ def cache_folder() -> Path:
     return Path(os.environ.get("VIEWSPHERE_CACHE") or platformdirs.user_cache_dir("viewsphere")) / "models"
 
 
-def _first_digest(path: Path, spec: ModelSpec) -> str:
+def _first_digest(path: Path, inside: tuple[str, ...], spec: ModelSpec) -> str:
     if not path.is_file() or path.stat().st_size > limits.MAX_FILE_BYTES:
         raise FileNotFoundError(path)
     digest = hashlib.sha256(_readers_digest().encode())
     digest.update(spec.model_dump_json(include=set(SETTINGS)).encode())
-    digest.update(path.suffix.lower().encode() + path.name.encode())
+    digest.update(path.suffix.lower().encode() + path.name.encode() + b"\0".join(text.encode() for text in inside))
     with path.open("rb") as file:
         digest.update(hashlib.file_digest(file, "sha256").digest())
     return digest.hexdigest()
 
 
 def _readers_digest() -> str:
-    """Digest of this package's sources and the versions of the libraries that parse for it."""
+    """Digest of this package's and Blender's worker's sources, and the versions of the libraries that parse for it."""
     digest = hashlib.sha256()
     for library in ("numpy", "trimesh", "pycollada", "pillow"):
         try:
             digest.update(f"{library} {version(library)};".encode())
         except PackageNotFoundError:
             digest.update(f"{library} unknown;".encode())
-    for source in sorted(Path(__file__).parent.rglob("*.py")):
+    own = Path(__file__).parent
+    for source in [*sorted(own.rglob("*.py")), *sorted((own.with_name("blender") / "worker").glob("*.py"))]:
         digest.update(source.read_bytes())
     return digest.hexdigest()
 

@@ -35,12 +35,14 @@ class UnreadableError(Exception):
 class ModelFolder:
     """The folder of one model file while it is read.
 
-    `files` are all files read or looked for, the model itself first; `warnings` what had to be left out, each
-    naming the model's file; `images` the textures decoded so far, in order of first use.
+    `inside` is what of the file is meant (`inside.split_source`); `files` are all files read or looked for, the model itself
+    first; `warnings` what had to be left out, each naming the model's file; `images` the textures decoded so far, in order of
+    first use.
     """
 
     model: Path
     confined: bool = True
+    inside: tuple[str, ...] = ()
     files: list[Path] = field(default_factory=list[Path])
     warnings: list[str] = field(default_factory=list[str])
     images: list[Image] = field(default_factory=list[Image])
@@ -125,7 +127,7 @@ class ModelFolder:
     def _existing(self, path: Path) -> Path | None:
         """This file, or the one beside it whose name differs in case only; both are remembered."""
         try:
-            self._remember(path)
+            self.remember(path)
             if path.is_file():
                 return path
             if not path.parent.is_dir():
@@ -133,13 +135,14 @@ class ModelFolder:
             wanted = path.name.casefold()
             for other in sorted(path.parent.iterdir()):
                 if other.name.casefold() == wanted and other.is_file():
-                    self._remember(other)
+                    self.remember(other)
                     return other
         except (OSError, ValueError):
             return None
         return None
 
-    def _remember(self, path: Path) -> None:
+    def remember(self, path: Path) -> None:
+        """Count a file among those that the model depends on."""
         if path not in self.files:
             self.check("MAX_FILES", len(self.files), "files that it names")
             self.files.append(path)

@@ -12,6 +12,7 @@ from threading import Event, Timer
 from typing import Any
 
 from viewsphere.assets import limits
+from viewsphere.assets.load import BLENDER_SUFFIXES, check_source
 from viewsphere.assets.reader import MESH, OUTCOME, Job, read
 from viewsphere.errors import ModelError
 from viewsphere.model.shot import ModelSpec
@@ -32,7 +33,8 @@ def read_apart(spec: ModelSpec, folder: Path) -> tuple[Path, list[Path]]:
     """
     seconds = limits.from_environment("MAX_READ_SECONDS")
     memory = int(limits.from_environment("MAX_READ_BYTES"))
-    job = Job(spec.model_dump(mode="json"), str(folder), seconds, memory, os.getpid())
+    by_blender = check_source(Path(spec.source)) in BLENDER_SUFFIXES
+    job = Job(spec.model_dump(mode="json"), str(folder), seconds, memory, os.getpid(), by_blender)
     outcome = read(job) if os.environ.get(READ_HERE) == "1" else _run(job)
     if "error" in outcome:
         raise ModelError(outcome["error"])
@@ -62,7 +64,7 @@ def _run(job: Job) -> dict[str, Any]:
 
 def _started(job: Job) -> tuple[subprocess.Popen[bytes], int]:
     """The child, and our end of the pipe that is its standard input."""
-    environment = os.environ | SINGLE_THREADED
+    environment = os.environ | SINGLE_THREADED | dict.fromkeys(("TMPDIR", "TEMP", "TMP"), job.folder)  # gone with it
     environment["PYTHONPATH"] = os.pathsep.join(entry or str(Path.cwd()) for entry in sys.path)
     command = [sys.executable, "-P", "-m", "viewsphere.assets.reader", job.to_json()]
     theirs, ours = os.pipe()

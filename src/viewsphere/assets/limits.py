@@ -17,6 +17,7 @@ MAX_READ_BYTES = 4 << 30
 MAX_FILE_BYTES = 4 << 30
 MAX_FILES = 10_000  # that one model names: textures, buffers, material libraries
 MAX_TRIANGLES = 20_000_000
+MAX_BLENDER_TRIANGLES = 10_000_000  # that Blender may make of a file
 MAX_VERTICES = 3 * MAX_TRIANGLES
 MAX_PICTURE_PIXELS = 100_000_000
 """Pixels of any one picture: a texture, the ground's, a plane's, a background's, a sky's; 400 MB once it is RGBA."""

@@ -7,18 +7,18 @@ from pathlib import Path
 import numpy as np
 
 from viewsphere.assets.folder import ModelFolder
+from viewsphere.assets.inside import split_source
 from viewsphere.assets.mesh import Mesh
 from viewsphere.assets.piece import FileFacts
 from viewsphere.errors import ModelError
 
 SUFFIXES = ("3mf", "dae", "glb", "gltf", "obj", "off", "ply", "stl")
+BLENDER_SUFFIXES = ("abc", "blend", "fbx", "usd", "usda", "usdc", "usdz")
+"""What only Blender reads."""
 PICTURE_SUFFIXES = ("bmp", "jpeg", "jpg", "png", "tif", "tiff", "webp")
 
 KNOWN = {
     "3ds": "3D Studio",
-    "abc": "Alembic",
-    "blend": "Blender",
-    "fbx": "FBX",
     "iges": "IGES (CAD)",
     "igs": "IGES (CAD)",
     "max": "3ds Max",
@@ -29,18 +29,14 @@ KNOWN = {
     "skp": "SketchUp",
     "step": "STEP (CAD)",
     "stp": "STEP (CAD)",
-    "usd": "USD",
-    "usda": "USD",
-    "usdc": "USD",
-    "usdz": "USD",
     "wrl": "VRML",
     "x": "DirectX",
     "x3d": "X3D",
 }
 """Model formats that are not read, by suffix."""
 
-IN_BLENDER = {"blend", "fbx", "usd", "usda", "usdc", "usdz", "abc", "x3d", "wrl"}
-"""Those of them that Blender opens."""
+IN_BLENDER = {"x3d", "wrl"}
+"""Those of them that Blender opens with an extension."""
 
 
 def load_model(path: Path, *, confined: bool = True) -> tuple[Mesh, FileFacts]:
@@ -56,35 +52,40 @@ def load_model(path: Path, *, confined: bool = True) -> tuple[Mesh, FileFacts]:
     | stl       | +z            | -y           | unknown, taken as 1 m | no rule; CAD, often in millimetres  |
     | off       | +z            | -y           | unknown, taken as 1 m | no rule                             |
     | pictures  | +z            | -y           | its height            | `picture`                           |
+    | others    | +z            | -y           | metre                 | Blender turns and scales them       |
 
-    COLLADA: Y_UP has its front at +z, Z_UP at -y, X_UP at +z. With `confined`, files that the model names
+    COLLADA: Y_UP has its front at +z, Z_UP at -y, X_UP at +z. Others are FBX, USD, Alembic and .blend (`via_blender`), of
+    which `file.blend/Object/NAME` and `file.blend/Collection/NAME` are parts. With `confined`, files that the model names
     (textures, buffers, material libraries) are read only from its own folder and below. Raises ModelError in
     one line that names the file: missing, empty, truncated, not a model, no triangles, or more of them than
     `limits` allows.
     """
     suffix = check_source(path)
+    file, inside = split_source(path)
     # NaN and infinity are found and reported once the whole file is read.
     with np.errstate(all="ignore"):
-        return _read(ModelFolder(path, confined), suffix)
+        return _read(ModelFolder(file, confined, inside), suffix)
 
 
 def check_source(path: Path) -> str:
-    """The path's suffix in lower case, without its dot; ModelError when files of its kind are not read."""
-    suffix = path.suffix[1:].lower()
-    if suffix in SUFFIXES or suffix in PICTURE_SUFFIXES:
+    """The file's suffix in lower case, without its dot; ModelError when files of its kind are not read."""
+    suffix = split_source(path)[0].suffix[1:].lower()
+    if suffix in SUFFIXES or suffix in BLENDER_SUFFIXES or suffix in PICTURE_SUFFIXES:
         return suffix
     if suffix in KNOWN:
         how = "in Blender: File > Open or Import, then File > Export > glTF 2.0" if suffix in IN_BLENDER else "with its program"
         raise ModelError(f"{path}: {KNOWN[suffix]} files are not read; convert it to GLB ({how}) and use that")
-    expected = f"{', '.join(SUFFIXES)} or a picture ({', '.join(PICTURE_SUFFIXES)})"
+    expected = f"{', '.join((*SUFFIXES, *BLENDER_SUFFIXES))} or a picture ({', '.join(PICTURE_SUFFIXES)})"
     raise ModelError(f"{path}: expected a model file with suffix {expected}, found {path.suffix or 'none'!r}")
 
 
 def _read(folder: ModelFolder, suffix: str) -> tuple[Mesh, FileFacts]:
     if suffix in {"glb", "gltf"}:
-        from viewsphere.assets.gltf import read_gltf
+        return _read_gltf(folder)
+    if suffix in BLENDER_SUFFIXES:
+        from viewsphere.assets.via_blender import read_via_blender
 
-        return read_gltf(folder)
+        return read_via_blender(folder)
     if suffix == "obj":
         from viewsphere.assets.obj import read_obj
 
@@ -96,3 +97,19 @@ def _read(folder: ModelFolder, suffix: str) -> tuple[Mesh, FileFacts]:
     from viewsphere.assets.via_trimesh import read_via_trimesh
 
     return read_via_trimesh(folder)
+
+
+def _read_gltf(folder: ModelFolder) -> tuple[Mesh, FileFacts]:
+    """A glTF file; by Blender where it is compressed in a way that only Blender reads, and there is one."""
+    from viewsphere.assets.gltf import read_gltf
+    from viewsphere.assets.gltf.document import ForBlenderError
+
+    try:
+        return read_gltf(folder)
+    except ForBlenderError as error:
+        from viewsphere.assets.via_blender import read_via_blender
+
+        try:
+            return read_via_blender(ModelFolder(folder.model, folder.confined))
+        except ModelError as second:
+            raise ModelError(f"{error}; {str(second).removeprefix(f'{folder.model}: ')}") from None

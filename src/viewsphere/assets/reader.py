@@ -24,13 +24,16 @@ MESH, OUTCOME = "mesh.npz", "outcome.json"
 
 @dataclass(frozen=True)
 class Job:
-    """What to read (a ModelSpec's fields), where the result goes, seconds, bytes and the asking process's id."""
+    """What to read (a ModelSpec's fields), where the result goes, seconds, bytes, the asking process's id, and whether Blender
+    is what reads it.
+    """
 
     spec: dict[str, Any]
     folder: str
     seconds: float
     memory: int
     parent: int
+    by_blender: bool = False
 
     def to_json(self) -> str:
         """One line of text."""
@@ -102,7 +105,9 @@ def _limit(job: Job) -> None:
         return
     import resource
 
-    wanted = {"RLIMIT_AS": job.memory, "RLIMIT_FSIZE": job.memory, "RLIMIT_CPU": int(2 * job.seconds) + 1, "RLIMIT_CORE": 0}
+    # Blender reserves much more memory than it writes to.
+    memory = "RLIMIT_DATA" if job.by_blender else "RLIMIT_AS"
+    wanted = {memory: job.memory, "RLIMIT_FSIZE": job.memory, "RLIMIT_CPU": int(2 * job.seconds) + 1, "RLIMIT_CORE": 0}
     for name, most in wanted.items():
         with suppress(ValueError, OSError, AttributeError):  # what a platform lacks, or has set lower
             kind = getattr(resource, name)

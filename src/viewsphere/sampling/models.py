@@ -15,6 +15,8 @@ from glob import glob, has_magic
 from pathlib import Path
 from typing import Literal
 
+from viewsphere.assets.inside import split_source
+from viewsphere.assets.load import BLENDER_SUFFIXES
 from viewsphere.errors import RecipeError
 from viewsphere.model.mistakes import nearest
 from viewsphere.model.recipe import Recipe
@@ -24,7 +26,7 @@ from viewsphere.sampling.seeds import generator
 from viewsphere.store import Category
 
 MODEL_SUFFIXES = frozenset({".obj", ".glb", ".gltf", ".ply", ".stl", ".off", ".dae", ".3mf"})
-"""Endings that folders and patterns are searched for."""
+"""Endings that folders and patterns are searched for; others are found by patterns that end in them, as `cars/*.fbx` does."""
 
 LONGEST_KEY = 150
 """Bytes; names of files and of folders that are being written add up to some hundred more."""
@@ -139,7 +141,7 @@ def _files(recipe: Recipe, index: int) -> tuple[Path, ...]:
 
 def _matching(folder: Path, source: str, where: str) -> list[Path]:
     path = folder / Path(source).expanduser()
-    if path.is_file():
+    if split_source(path)[0].is_file():
         matches = [path]
     elif path.is_dir():
         matches = [f for f in path.rglob("*") if not any(map(_is_hidden, f.relative_to(path).parts))]
@@ -149,7 +151,9 @@ def _matching(folder: Path, source: str, where: str) -> list[Path]:
         kinds = "a file, folder, pattern or zoo:<family>"
         raise RecipeError(f"{where}.source: expected {kinds}; found no {source!r} in {folder}")
     if matches != [path]:
-        matches = [f for f in matches if f.suffix.lower() in MODEL_SUFFIXES and f.is_file()]
+        ending = path.suffix.lower()
+        wanted = {ending} if ending[1:] in BLENDER_SUFFIXES else MODEL_SUFFIXES
+        matches = [f for f in matches if f.suffix.lower() in wanted and f.is_file()]
     if not matches:
         endings = ", ".join(sorted(MODEL_SUFFIXES))
         raise RecipeError(f"{where}.source: expected model files ({endings}); {source!r} gives none in {folder}")

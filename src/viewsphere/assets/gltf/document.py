@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from viewsphere.assets.folder import ModelFolder, UnreadableError
 from viewsphere.assets.gltf.field import Field
+from viewsphere.errors import ModelError
 
 COMPONENTS: dict[int, type[np.generic]] = {
     5120: np.int8,
@@ -51,6 +52,14 @@ HARMLESS_EXTENSIONS = {
 }
 """Extensions that change neither the geometry nor what this package keeps of a material."""
 
+DRACO = "KHR_draco_mesh_compression"
+BLENDER_EXTENSIONS = {DRACO}
+"""Extensions that are not read here and that Blender reads."""
+
+
+class ForBlenderError(ModelError):
+    """A file that is not read here and that Blender may read."""
+
 
 @dataclass(eq=False)
 class Document:
@@ -84,7 +93,8 @@ class Document:
         required = {str(extension.value) for extension in self.root.items("extensionsRequired")}
         unknown = sorted(required - READ_EXTENSIONS - HARMLESS_EXTENSIONS)
         if unknown:
-            raise self.folder.error(f"requires the extension {', '.join(unknown)}, not read here; export without it")
+            said = f"{self.folder.model}: requires the extension {', '.join(unknown)}, not read here; export without it"
+            raise (ForBlenderError if BLENDER_EXTENSIONS.issuperset(unknown) else ModelError)(said)
 
     def buffer(self, index: int) -> bytes:
         """Bytes of a buffer; ModelError when it is missing or shorter than it says."""

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from viewsphere.assets.gltf.document import Document
+from viewsphere.assets.gltf.document import DRACO, Document, ForBlenderError
 from viewsphere.assets.gltf.field import Field
 from viewsphere.assets.piece import Float, Int, Piece, compact
 from viewsphere.assets.smoothing import flat
@@ -201,8 +201,8 @@ def _primitive(document: Document, entry: Field) -> Piece | None:
         document.folder.warn("points and lines are left out")
         return None
     if "POSITION" not in attributes:
-        if entry.extension("KHR_draco_mesh_compression") is not None:
-            raise document.folder.error("uses KHR_draco_mesh_compression, not read here; export without compression")
+        if entry.extension(DRACO) is not None:
+            raise ForBlenderError(f"{document.folder.model}: uses {DRACO}, not read here; export without compression")
         document.folder.warn("a primitive without positions is left out")
         return None
     positions = _attribute(document, attributes, "POSITION", (3,), None)

@@ -26,8 +26,14 @@ DEVICES = ("CPU", "CUDA", "OPTIX", "HIP", "METAL", "ONEAPI")
 ONLINE = ("socket.connect", "socket.getaddrinfo", "socket.gethostbyname", "socket.sendto", "socket.sendmsg")
 
 
-def main(folder: Path) -> None:
-    """Answer requests until there are no more; `folder` is where their arrays lie, and does not outlive the other side."""
+def main(folder: Path, readable: list[str] | None = None) -> None:
+    """Answer requests until there are no more; `folder` is where their arrays lie, and does not outlive the other side.
+
+    With `readable`, files are read only from these folders and from the system's, and written only to `folder`, where the
+    system can see to that.
+    """
+    if readable is not None:
+        _bind(folder, readable)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches all processes of a terminal; the other side decides
     answers = _own_output()
     faulthandler.enable()
@@ -42,6 +48,15 @@ def main(folder: Path) -> None:
             answers.flush()
         except OSError:  # nobody listens
             _leave(folder)
+
+
+def _bind(folder: Path, readable: list[str]) -> None:
+    """Bounds that hold for all that comes later."""
+    from .confine import confine, die_with_parent
+
+    os.environ["TF_DEBUG"] = "SDF_LAYER"  # USD says in the log which files it opens
+    die_with_parent()
+    confine(readable, [str(folder)])
 
 
 def answer(request: bytes) -> bytes:
@@ -133,6 +148,12 @@ def _stage(told: dict[str, Any]) -> Any:
     return stage(told)
 
 
+def _read_model(told: dict[str, Any]) -> Any:
+    from .reading import read
+
+    return read(told)
+
+
 def _render(told: dict[str, Any]) -> Any:
     from .rendering import render
 
@@ -142,9 +163,10 @@ def _render(told: dict[str, Any]) -> Any:
 REQUESTS: dict[str, Callable[[dict[str, Any]], Any]] = {
     "hello": _hello,
     "memory": _memory,
+    "read": _read_model,
     "stage": _stage,
     "render": _render,
 }
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    main(Path(sys.argv[1]), *map(json.loads, sys.argv[2:]))

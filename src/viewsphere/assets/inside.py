@@ -1,0 +1,25 @@
+"""What is inside of a .blend file: paths as Blender writes them, `street.blend/Collection/Cars`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from viewsphere.errors import ModelError
+
+BLEND = ".blend"
+KINDS = ("Object", "Collection")
+
+
+def split_source(path: Path) -> tuple[Path, tuple[str, ...]]:
+    """The file, and what of it is meant: nothing for all of it, else `("Object", name)` or `("Collection", name)`.
+
+    Raises ModelError for a path into a .blend file that is neither.
+    """
+    for file in path.parents:
+        if file.suffix.lower() == BLEND and not file.is_dir():
+            kind, *name = path.relative_to(file).parts
+            if kind not in KINDS or not name:
+                wanted = " or ".join(f"{file.name}/{kind}/NAME" for kind in KINDS)
+                raise ModelError(f"{path}: expected {wanted}, found {file.name}/{'/'.join((kind, *name))}")
+            return file, (kind, "/".join(name))
+    return path, ()

@@ -1,0 +1,200 @@
+"""FBX, USD, Alembic and .blend files: Blender opens and evaluates them once, in a process of its own.
+
+Blender reads only the model's folder unless the model says `confined: false`, writes nowhere, runs no scripts and reaches no
+network. Textures are read here, like any other model's.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from viewsphere.assets import limits
+from viewsphere.assets.alpha import SOLID, with_alpha_modes
+from viewsphere.assets.folder import SHARPEST, ModelFolder, reduced
+from viewsphere.assets.mesh import Image, Material, Mesh
+from viewsphere.assets.nodes import Painter, Picture, images_of
+from viewsphere.assets.piece import FileFacts, Float, Piece, assemble
+from viewsphere.assets.transform import moved
+from viewsphere.blender.interpreter import find_blender
+from viewsphere.blender.process import BlenderProcess
+from viewsphere.errors import BlenderDied, BlenderError, MissingExtraError, UserError
+
+NAMES = {
+    "abc": "Alembic",
+    "blend": "Blender",
+    "fbx": "FBX",
+    **dict.fromkeys(("usd", "usda", "usdc", "usdz"), "USD"),
+    **dict.fromkeys(("glb", "gltf"), "compressed glTF"),
+}
+SETUP = "set it up by viewsphere doctor --setup-blender"
+
+OPENED = re.compile(r"SdfLayer::FindOrOpen\('([^']+)'")
+UNOPENED = re.compile(r"Could not open asset @([^@]+)@")
+
+
+def read_via_blender(folder: ModelFolder) -> tuple[Mesh, FileFacts]:
+    """The file as it would be rendered at its first frame, in Blender's axes (up +Z, front -Y) and metres.
+
+    Of a .blend file, what `folder.inside` names: an object with its children, a collection, or all of it. One part an
+    object, those that another one instances by both names. Raises ModelError in one line.
+    """
+    kind = folder.model.suffix[1:].lower()
+    _check_beginning(folder, kind, folder.read_model())
+    with _started(folder) as process:
+        told = _asked(folder, process, kind)
+        _check_layers(folder, process.log)
+        for warning in told["warnings"]:
+            folder.warn(warning)
+        return _built(folder, told, kind)
+
+
+def _check_beginning(folder: ModelFolder, kind: str, data: bytes) -> None:
+    """Refuse Alembic files that are none or cut off, at which Blender says nothing or crashes (Ogawa's header: the place of its
+    root group, which is written last)."""
+    if kind == "abc" and not (data.startswith(b"Ogawa") and int.from_bytes(data[8:16], "little") < len(data)):
+        raise folder.error("expected an Alembic file (Ogawa), found another kind or a part of one: truncated or damaged")
+
+
+def _started(folder: ModelFolder) -> BlenderProcess:
+    try:
+        python = find_blender()
+    except MissingExtraError:
+        kind = NAMES.get(folder.model.suffix[1:].lower(), "such")
+        raise folder.error(f"{kind} files are read by Blender, found none: {SETUP}") from None
+    except UserError as error:
+        raise folder.error(str(error)) from None
+    readable = [folder.model.parent.resolve()] if folder.confined else [Path("/")]
+    return BlenderProcess(python, readable=readable)
+
+
+def _asked(folder: ModelFolder, process: BlenderProcess, kind: str) -> dict[str, Any]:
+    root = str(folder.model.parent.resolve()) if folder.confined else None
+    seconds = limits.from_environment("MAX_READ_SECONDS")
+    file = str(folder.model.resolve())
+    try:
+        return process.ask(
+            "read", seconds, file=file, kind=kind, inside=folder.inside, root=root, most=limits.MAX_BLENDER_TRIANGLES,
+            folder=str(process.folder),
+        )  # fmt: skip
+    except BlenderError as error:
+        said = str(error).partition(": ")[2].removesuffix(", see console for detail")
+        raise folder.error(f"Blender cannot read it: {said}") from None
+    except BlenderDied as error:
+        raise folder.error(_end(str(error).partition("; its log")[0], seconds)) from None
+
+
+def _end(said: str, seconds: float) -> str:
+    """Why there is no answer."""
+    if said.startswith("Blender hung"):
+        return (
+            f"expected to be read within {seconds:g} s (limit MAX_READ_SECONDS), stopped then; simplify the model, or "
+            "set VIEWSPHERE_MAX_READ_SECONDS higher"
+        )
+    memory = f"{int(limits.from_environment('MAX_READ_BYTES')):,} bytes of memory (limit MAX_READ_BYTES)"
+    return f"reading it crashed ({said}), with {memory}: damaged, or larger than that allows"
+
+
+def _check_layers(folder: ModelFolder, log: Path) -> None:
+    """Remember the layers of a USD file, by what its library says of them; warn of those that were not read."""
+    said = log.read_text(encoding="utf-8", errors="replace")
+    missing = set(UNOPENED.findall(said))
+    for name in sorted({*OPENED.findall(said), *missing}):
+        path = Path(name.partition("[")[0])
+        if path.is_absolute() and not _may_read(folder, path):
+            if name not in missing:
+                raise folder.error(f"layer {name!r} is outside the model's folder; set confined: false to allow")
+            folder.warn(f"layer {name!r} is outside the model's folder, not read; set confined: false to allow")
+        elif name in missing:
+            folder.warn(f"layer {name!r} does not exist, or cannot be read")
+        _remember(folder, path)
+
+
+def _remember(folder: ModelFolder, path: Path) -> None:
+    if path.is_absolute() and _may_read(folder, path):
+        folder.remember(path)
+
+
+def _may_read(folder: ModelFolder, path: Path) -> bool:
+    return not folder.confined or path.resolve().is_relative_to(folder.model.parent.resolve())
+
+
+def _built(folder: ModelFolder, told: Mapping[str, Any], kind: str) -> tuple[Mesh, FileFacts]:
+    for file in told["files"]:
+        _remember(folder, Path(file))
+    used = {one["material"] for one in told["pieces"]} - {None}
+    shown = {leaf["image"] for number in used for field in told["materials"][number].values() for leaf in images_of(field)}
+    pictures = [_picture(folder, one, i) if i in shown else None for i, one in enumerate(told["images"])]
+    painter = Painter(folder, pictures)
+    materials: list[Material] = []
+    local: list[Piece] = []
+    for one in told["pieces"]:
+        material = Material(name="default")
+        if one["material"] is not None:
+            material = painter.material(told["materials"][one["material"]], one["uvs"])
+        if material not in materials:
+            materials.append(material)
+        local.append(_piece(one, materials.index(material)))
+    pieces = [
+        replace(moved(local[number], np.array(placed["matrix"])), part=placed["part"])
+        for placed in told["placed"]
+        for number in placed["pieces"]
+    ]
+    if not pieces:
+        why = f" ({folder.warnings[0].partition(': ')[2]})" if folder.warnings else ""
+        raise folder.error(f"no triangles found that a render would show{why}; export the model as a mesh of faces")
+    facts = FileFacts(folder.model, kind, "+z", "-y", float(told["unit"]))
+    return assemble(folder, pieces, _with_modes(pieces, materials, folder.images), facts)
+
+
+def _piece(told: Mapping[str, Any], material: int) -> Piece:
+    def loaded(name: str) -> Float | None:
+        return None if told[name] is None else np.load(told[name]).astype(np.float64)
+
+    def downwards(name: str) -> Float | None:
+        uv = loaded(name)
+        return None if uv is None else np.column_stack([uv[:, 0], 1 - uv[:, 1]])
+
+    return Piece(
+        part="",
+        material=material,
+        positions=np.load(told["positions"]).astype(np.float64),
+        triangles=np.load(told["triangles"]).astype(np.int64),
+        normals=loaded("normals"),
+        uv0=downwards("uv0"),
+        uv1=downwards("uv1"),
+        colors=loaded("colors"),
+    )
+
+
+def _picture(folder: ModelFolder, told: Mapping[str, Any], number: int) -> Picture:
+    """The picture in the folder's images: read from its file, from the bytes that the model holds, or as Blender decoded it."""
+    name = told["name"]
+    if "pixels" in told:
+        index = folder.derived(f"#{number}", lambda: Image(name, reduced(np.load(told["pixels"]), SHARPEST)))
+    elif "data" in told:
+        index = folder.image(f"#{number}", name, Path(told["data"]).read_bytes())
+    elif told.get("path"):
+        path, root = Path(told["path"]), folder.model.parent.resolve()
+        reference = path.relative_to(root).as_posix() if path.is_relative_to(root) else str(path)
+        index = folder.image(reference, reference)
+    else:
+        folder.warn(f"texture {name!r} has no pixels; the material's plain factor is used")
+        index = None
+    return Picture(index, told["is_srgb"])
+
+
+def _with_modes(pieces: Sequence[Piece], materials: Sequence[Material], images: Sequence[Image]) -> list[Material]:
+    """The materials with the alpha modes that their textures ask for; where a texture is turned, its alpha blends."""
+    found = with_alpha_modes(pieces, materials, images)
+    for i, material in enumerate(materials):
+        texture = material.base_color_texture
+        if texture is not None and (texture.rotation or min(texture.scale) < 0) and material.alpha_mode == "OPAQUE":
+            clear = images[texture.image].pixels[..., 3].min() < SOLID
+            found[i] = replace(material, alpha_mode="BLEND" if clear else "OPAQUE")
+    return found

@@ -1,0 +1,214 @@
+"""What Blender evaluated, object by object, as arrays of triangles."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from .nodes import Reader
+
+SOLID = ("MESH", "META")
+"""Objects whose triangles are taken; text, curves and surfaces come as meshes when they are evaluated."""
+
+LEFT_OUT = {"CURVES": "hair", "POINTCLOUD": "points", "VOLUME": "a volume", "GREASEPENCIL": "grease pencil"}
+NAMES_SAID = 5
+
+
+class Gathering:
+    """Takes the triangles of what is rendered.
+
+    `pieces` are triangles of one material, with files of arrays: positions, triangles, normals, uv0, uv1 and colors, the last
+    three None where there are none; `uvs` names the two layers. `placed` says which pieces stand where, as what part.
+    """
+
+    def __init__(self, folder, pictures, wanted, most):
+        self.pieces, self.placed, self.materials, self.warnings = [], [], [], []
+        self._folder, self._pictures, self._wanted, self._most = folder, pictures, wanted, most
+        self._count = 0
+        self._meshes = {}  # of those that stand more than once: numbers of their pieces and of their triangles
+        self._known = {}  # numbers of materials
+
+    def take(self, depsgraph):
+        """All that a render of this would show, in the order of names."""
+        for material in bpy.data.materials:
+            self._known[material.as_pointer()] = len(self.materials)
+            self.materials.append(Reader(self._pictures).read(material))
+        left_out, skipped = {}, []
+        for instance in depsgraph.object_instances:
+            item = instance.object
+            owner = instance.parent if instance.is_instance else item
+            if not instance.show_self or (self._wanted is not None and owner.original.as_pointer() not in self._wanted):
+                continue
+            if item.type in LEFT_OUT:
+                left_out.setdefault(LEFT_OUT[item.type], []).append(item.name)
+            elif item.type in SOLID and (not item.visible_camera or item.is_shadow_catcher or item.is_holdout):
+                skipped.append(item.name)
+            elif item.type in SOLID:
+                self._place(instance, item, owner)
+        for what, names in left_out.items():
+            self.warnings.append(f"{what} is left out: {_listed(names)}; convert it to a mesh")
+        if skipped:
+            self.warnings.append(f"not seen by cameras, left out: {_listed(skipped)}")
+        self._sort()
+
+    def _sort(self):
+        """Order what stands by its part, and pieces by their first use."""
+        self.placed.sort(key=lambda placed: placed["part"])
+        order = dict.fromkeys(number for placed in self.placed for number in placed["pieces"])
+        rank = {number: k for k, number in enumerate(order)}
+        self.pieces = [self.pieces[number] for number in order]
+        for placed in self.placed:
+            placed["pieces"] = [rank[number] for number in placed["pieces"]]
+
+    def _place(self, instance, item, owner):
+        pieces, count = self._mesh(item)
+        self._count += count
+        if self._count > self._most:
+            raise ValueError(f"expected at most {self._most:,} triangles, found more as evaluated (in {item.name!r})")
+        name = item.name if item.original == owner.original else f"{owner.name}/{item.name}"
+        if pieces:
+            self.placed.append({"pieces": list(pieces), "part": name, "matrix": [list(row) for row in instance.matrix_world]})
+
+    def _mesh(self, item):
+        """Numbers of an object's pieces, and how many triangles they are."""
+        slots = [slot.material for slot in item.material_slots]
+        key = None if item.type == "META" else (item.data.as_pointer(), *(m and m.as_pointer() for m in slots))
+        if key is not None and key in self._meshes:
+            return self._meshes[key]
+        mesh = item.to_mesh() if item.type == "META" else item.data
+        if mesh is None:
+            return [], 0
+        try:
+            triangles = len(mesh.loop_triangles)
+            if self._count + triangles > self._most:
+                return [], triangles
+            found = self._cut(mesh, slots or list(mesh.materials)), triangles
+        finally:
+            if item.type == "META":
+                item.to_mesh_clear()
+        if key is not None:
+            self._meshes[key] = found
+        return found
+
+    def _cut(self, mesh, slots):
+        """The mesh's triangles, one piece a material."""
+        count = len(mesh.loop_triangles)
+        if count == 0:
+            return []
+        loops, polygons = np.empty(3 * count, np.int32), np.empty(count, np.int32)
+        mesh.loop_triangles.foreach_get("loops", loops)
+        mesh.loop_triangles.foreach_get("polygon_index", polygons)
+        slot_of = np.zeros(len(mesh.polygons), np.int32)
+        mesh.polygons.foreach_get("material_index", slot_of)
+        slot_of = slot_of.clip(0, max(len(slots) - 1, 0))[polygons]
+        arrays = self._arrays(mesh)
+        numbers = [self._number(slots[k] if slots else None) for k in range(max(len(slots), 1))]
+        return [
+            self._piece(mesh, arrays, loops.reshape(-1, 3)[slot_of == k].reshape(-1), numbers[k]) for k in np.unique(slot_of)
+        ]
+
+    def _number(self, material):
+        """The number of a material; None for none."""
+        return None if material is None else self._known[material.original.as_pointer()]
+
+    def _arrays(self, mesh):
+        """Vertex and normal of each corner, and the vertices' positions."""
+        vertices = np.empty(3 * len(mesh.vertices), np.float32)
+        mesh.vertices.foreach_get("co", vertices)
+        corners = np.empty(len(mesh.loops), np.int32)
+        mesh.loops.foreach_get("vertex_index", corners)
+        normals = np.empty(3 * len(mesh.loops), np.float32)
+        mesh.corner_normals.foreach_get("vector", normals)
+        return vertices.reshape(-1, 3), corners, normals.reshape(-1, 3)
+
+    def _piece(self, mesh, arrays, loops, number):
+        """Write the triangles with these corners; a vertex for all that are alike."""
+        vertices, corners, normals = arrays
+        material = self.materials[number] if number is not None else None
+        uvs = _layers(mesh, material)
+        columns = {"corner": corners[loops, None].view(np.float32), "normals": normals[loops]}
+        for k, name in enumerate(uvs):
+            columns[f"uv{k}"] = None if name is None else _corner_values(mesh.uv_layers[name].uv, "vector", 2, mesh)[loops]
+        columns["colors"] = _colors(mesh, material, corners, loops)
+        held = {name: values for name, values in columns.items() if values is not None}
+        first, triangles = _welded(np.concatenate(list(held.values()), axis=1))
+        told = {name: self._saved(name, held[name][first]) for name in held if name != "corner"}
+        told["positions"] = self._saved("positions", vertices[corners[loops[first]]])
+        told["triangles"] = self._saved("triangles", triangles.reshape(-1, 3).astype(np.int32))
+        self.pieces.append({"uv0": None, "uv1": None, "colors": None, **told, "uvs": uvs, "material": number})
+        return len(self.pieces) - 1
+
+    def _saved(self, name, array):
+        file = Path(self._folder, f"piece{len(self.pieces)}.{name}.npy")
+        np.save(file, array)
+        return str(file)
+
+
+def _layers(mesh, material):
+    """Names of the two layers of texture coordinates: the one that is used by default, and another that the material names."""
+    main = next((layer.name for layer in mesh.uv_layers if layer.active_render), None)
+    named = (_uses(material, "uv") - {"", main}) & set(mesh.uv_layers.keys())
+    return [main, min(named, default=None)]
+
+
+def _uses(told, key):
+    """All values of this name within an expression."""
+    if isinstance(told, dict):
+        own = {told[key]} if isinstance(told.get(key), str) else set()
+        return own.union(*(_uses(value, key) for value in told.values()))
+    return set().union(*(_uses(value, key) for value in told)) if isinstance(told, list) else set()
+
+
+def _colors(mesh, material, corners, loops):
+    """Linear colours (N, 4) of corners, where the material asks for them or there is no material; else None."""
+    attributes = mesh.color_attributes
+    if material is None:
+        names = [attributes[attributes.render_color_index].name] if len(attributes) else []
+    else:
+        main = attributes[attributes.render_color_index].name if len(attributes) else None
+        names = [main if name == "" else name for name in sorted(_asked(material))]
+    layer = next((attributes[name] for name in names if name in attributes), None)
+    if layer is None or layer.domain not in ("POINT", "CORNER"):
+        return None
+    values = np.empty(4 * len(layer.data), np.float32)
+    layer.data.foreach_get("color", values)
+    values = values.reshape(-1, 4)
+    return values[corners[loops]] if layer.domain == "POINT" else values[loops]
+
+
+def _asked(told):
+    """Names of the colour attributes in a material's colour."""
+    if isinstance(told, dict):
+        own = {told["name"]} if told.get("do") == "attribute" else set()
+        return own.union(*(_asked(value) for value in told.values()))
+    return set().union(*map(_asked, told)) if isinstance(told, list) else set()
+
+
+def _corner_values(data, name, width, mesh):
+    values = np.empty(width * len(mesh.loops), np.float32)
+    data.foreach_get(name, values)
+    return values.reshape(-1, width)
+
+
+def _welded(rows):
+    """Of equal rows (N, K) float32 the first, and for each row the number of its first: by a hash, which is checked."""
+    bits = np.ascontiguousarray(rows).view(np.uint32).astype(np.uint64)
+    mixed = np.zeros(len(bits), np.uint64)
+    for column in bits.T:
+        mixed = (mixed ^ column) * np.uint64(0x9E3779B97F4A7C15)
+        mixed ^= mixed >> np.uint64(29)
+    _, first, inverse = np.unique(mixed, return_index=True, return_inverse=True)
+    if not np.array_equal(bits[first][inverse], bits):
+        return np.arange(len(rows)), np.arange(len(rows))
+    order = np.argsort(first)  # in the order of the file
+    rank = np.empty_like(order)
+    rank[order] = np.arange(len(order))
+    return first[order], rank[inverse]
+
+
+def _listed(names):
+    names = sorted(set(names))
+    more = f" and {len(names) - NAMES_SAID} more" if len(names) > NAMES_SAID else ""
+    return ", ".join(map(repr, names[:NAMES_SAID])) + more

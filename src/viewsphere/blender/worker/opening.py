@@ -1,0 +1,103 @@
+"""Opening and importing files, and what of a .blend file is wanted."""
+
+from __future__ import annotations
+
+from difflib import get_close_matches
+from pathlib import Path
+
+import bpy
+
+IMPORTS = {
+    "abc": lambda file: bpy.ops.wm.alembic_import(filepath=file, as_background_job=False),
+    "fbx": lambda file: bpy.ops.wm.fbx_import(filepath=file),
+    "glb": lambda file: bpy.ops.import_scene.gltf(filepath=file, disable_bone_shape=True),
+    "usd": lambda file: bpy.ops.wm.usd_import(
+        filepath=file, import_cameras=False, import_lights=False, create_world_material=False
+    ),
+}
+SAME = {"gltf": "glb", "usda": "usd", "usdc": "usd", "usdz": "usd"}
+NAMES_SAID = 8
+
+
+def open_file(file, kind, root):
+    """Make the file the scene, at its first frame; metres in one of its units, and warnings."""
+    try:
+        if kind == "blend":
+            bpy.ops.wm.open_mainfile(filepath=file, load_ui=False, use_scripts=False)
+        else:
+            bpy.ops.wm.read_factory_settings(use_empty=True)
+            IMPORTS[SAME.get(kind, kind)](file)
+    except RuntimeError as error:
+        raise ValueError(" ".join(str(error).removeprefix("Error: ").split())) from None
+    scene = bpy.context.scene
+    if kind != "blend" and bpy.data.actions:
+        scene.frame_start = round(min(action.frame_range[0] for action in bpy.data.actions))
+    scene.frame_set(scene.frame_start)
+    units = scene.unit_settings
+    metres = units.scale_length if kind == "blend" and units.system != "NONE" else 1.0
+    return metres, [*_newer(kind), *_libraries(root)]
+
+
+def _newer(kind):
+    """A warning where a file comes from a later Blender than this one."""
+    version = bpy.data.version[:2]
+    if kind != "blend" or tuple(version) <= tuple(bpy.app.version[:2]):
+        return []
+    here, there = (".".join(map(str, v)) for v in (bpy.app.version[:2], version))
+    return [f"written by Blender {there}, read by {here}: what is new in it is lost"]
+
+
+def _libraries(root):
+    """Warnings about files that this one links: those outside of `root` are put out of use, others may be missing."""
+    said = []
+    for library in list(bpy.data.libraries):
+        path = Path(bpy.path.abspath(library.filepath, library=library.parent)).resolve()
+        if root is not None and not is_within(path, root):
+            bpy.data.libraries.remove(library)
+            said.append(f"library {str(path)!r} is outside the model's folder, not read; set confined: false to allow")
+        elif not path.is_file():
+            said.append(f"library {str(path)!r} does not exist")
+    return said
+
+
+def is_within(path, root):
+    """Whether a file lies in the folder or below, links followed."""
+    return Path(path).resolve().is_relative_to(Path(root).resolve())
+
+
+def choose(scene, inside):
+    """The objects that are wanted, made part of the scene, by name and library; None for all that are rendered."""
+    if not inside:
+        return None
+    kind, name = inside
+    there = {"Object": bpy.data.objects, "Collection": bpy.data.collections}[kind]
+    found = there.get(name)
+    if found is None:
+        raise ValueError(f"expected {_article(kind)} of the name {name!r}, found {_named(there, name)}")
+    objects = [found, *found.children_recursive] if kind == "Object" else list(_rendered(found))
+    if kind == "Object":
+        found.hide_render = False  # who asks for it by name wants it
+    linked = set(scene.collection.objects)
+    for one in objects:
+        if one not in linked:
+            scene.collection.objects.link(one)
+    return {one.as_pointer() for one in objects}
+
+
+def _rendered(collection):
+    """Its objects and those of the collections in it, without those that renders do not show."""
+    yield from dict.fromkeys(collection.objects)
+    for child in collection.children:
+        if not child.hide_render:
+            yield from _rendered(child)
+
+
+def _article(kind):
+    return "an object" if kind == "Object" else "a collection"
+
+
+def _named(there, name):
+    names = [one.name for one in there]
+    near = get_close_matches(name, names, NAMES_SAID, 0.4) or names[:NAMES_SAID]
+    more = f" and {len(names) - len(near)} more" if len(names) > len(near) else ""
+    return ", ".join(map(repr, near)) + more if names else "none at all"
