@@ -10,4 +10,5 @@ from viewsphere.geometry.jit import njit
 
 def called(kernel: Any) -> Callable[..., Any]:
     """The same kernel, compiled so that Python can call it."""
-    return njit(kernel.py_func, fastmath=kernel.targetoptions.get("fastmath", False))
+    options = {name: kernel.targetoptions[name] for name in ("fastmath", "_nrt") if name in kernel.targetoptions}
+    return njit(kernel.py_func, **options)

@@ -52,8 +52,8 @@ def asked(stage: CyclesStage, camera, passes=(), **changed) -> dict[str, np.ndar
     return found | {"picture": np.load(out)}
 
 
-def shift_between(first, second) -> float:
-    """Pixels by which two grey pictures (H, W) are moved against one another: phase correlation of the lower frequencies.
+def shift_between(first, second) -> np.ndarray:
+    """Pixels, across and down, by which two grey pictures (H, W) are moved against one another: phase correlation of the lower frequencies.
 
     The slope of the phases of what both have, weighted by how much of it there is.
     """
@@ -65,4 +65,4 @@ def shift_between(first, second) -> float:
     rows = np.stack(np.broadcast_arrays(across, down), axis=-1).reshape(-1, 2) * 2 * math.pi
     phase, weight = np.angle(cross).reshape(-1), np.sqrt(weight.reshape(-1))
     moved, *_ = np.linalg.lstsq(rows * weight[:, None], phase * weight, rcond=None)
-    return float(np.hypot(*moved))
+    return moved

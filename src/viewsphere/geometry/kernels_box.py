@@ -9,7 +9,7 @@ from viewsphere.geometry.jit import njit
 U = np.uintp
 
 
-@njit
+@njit(_nrt=True)
 def cut_bounds(vertices, triangles, first, last, base, stop, k, r, t, near):
     """Bounds (u0, v0, u1, v1) in pixels of the part with w >= near of triangles [first, last), and whether
     all of them is.

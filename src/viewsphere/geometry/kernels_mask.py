@@ -117,7 +117,7 @@ def _walk(mask, hole_below, ring, count, sx, sy, stack):
         heading = turned
 
 
-@njit
+@njit(_nrt=True)
 def trace_rings(mask):
     """Corners (n, 2) int32 of one ring per 4-connected component, and the rings' ends (rings,).
 
@@ -140,7 +140,7 @@ def trace_rings(mask):
     return ring[:count], ends
 
 
-@njit
+@njit(_nrt=True)
 def decode_runs(codes, height, width):
     """The mask (height, width) bool of a compressed run-length code's characters, and whether it is whole and fills it."""
     mask = np.zeros((height, width), np.bool_)

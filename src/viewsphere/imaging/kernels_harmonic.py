@@ -15,7 +15,7 @@ from viewsphere.imaging.kernels_view import FAST
 f4 = nb.float32
 
 
-@njit(fastmath=FAST)
+@njit(fastmath=FAST, _nrt=True)
 def relax(values, right, inverse, sweeps):
     """Red-black Gauss-Seidel sweeps."""
     width = values.shape[2]

@@ -7,7 +7,7 @@ import numpy as np
 from viewsphere.geometry.jit import inner, njit
 
 
-@njit
+@njit(_nrt=True)
 def decode_rows(data, rows, columns):
     """Pixels (rows, columns, 3) float32 of a picture's bytes, and how many of its rows were whole."""
     out = np.zeros((rows, columns, 3), np.float32)

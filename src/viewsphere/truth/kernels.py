@@ -23,13 +23,8 @@ NEVER, CLAMP, MIRROR = -2, 1, 2  # as in cutouts.py
 
 
 @njit
-def transform(vertices, start, stop, k, rotation, translation, homogeneous):
-    """K (R X + t) = (u, v, w) of vertices [start, stop) and 1/w, (n, 4); no BLAS, whose rounding depends on the processor."""
-    m = np.empty((3, 4))
-    for r in range(3):
-        for c in range(3):
-            m[r, c] = k[r, 0] * rotation[0, c] + k[r, 1] * rotation[1, c] + k[r, 2] * rotation[2, c]
-        m[r, 3] = k[r, 0] * translation[0] + k[r, 1] * translation[1] + k[r, 2] * translation[2]
+def transform(vertices, start, stop, m, homogeneous):
+    """(u, v, w) = m (x, y, z, 1) of vertices [start, stop), and 1/w, (n, 4); no BLAS: its rounding depends on the processor."""
     for i in range(start, stop):
         x, y, z = vertices[i, 0], vertices[i, 1], vertices[i, 2]
         homogeneous[i - start, 0] = m[0, 0] * x + m[0, 1] * y + m[0, 2] * z + m[0, 3]

@@ -23,7 +23,7 @@ SLIVER = 1e-12  # of the corners' distances' product: below it the sign of det i
 ORIGIN = (0.0, 0.0, 0.0)
 
 
-@njit
+@njit(_nrt=True)
 def tree_levels(height, width):
     """Per level, leaves first: index of its first node, rows, columns. (L, 3) int64."""
     rows, columns = (height + LEAF - 1) // LEAF, (width + LEAF - 1) // LEAF
@@ -38,7 +38,7 @@ def tree_levels(height, width):
         rows, columns = (rows + 1) // 2, (columns + 1) // 2
 
 
-@njit
+@njit(_nrt=True)
 def build_tree(rays, levels):
     """Box of each node's rays, (N, 6) float64: lowest x, y, z, highest x, y, z; lowest > highest if it has none."""
     height, width = rays.shape[:2]
@@ -75,7 +75,7 @@ def _on_face(face, x, y, z):
     return z / (sign * y), x / (sign * y), sign * y
 
 
-@njit
+@njit(_nrt=True)
 def build_faces(rays, count, size):
     """First and last pixel whose ray passes each cell of the first `count` faces: (count, size, size, 4) x, y, x, y."""
     height, width = rays.shape[:2]
@@ -173,7 +173,7 @@ def _distance(a, b):
     return math.sqrt(x * x + y * y + z * z)
 
 
-@njit
+@njit(_nrt=True)
 def draw(q, triangles, span, table, origin, unit, cutout, cutouts, nearest, seen):
     """Draw triangles into nearest (1/s, 0 where none) and seen (triangle, -1 where none).
 
@@ -210,7 +210,7 @@ def draw(q, triangles, span, table, origin, unit, cutout, cutouts, nearest, seen
             _draw_box(t, e0, e1, e2, n, sliver, bounds, rays, box, origin, cutout[t], cutouts, nearest, seen)
 
 
-@njit
+@njit(_nrt=True)
 def leaf_list(levels):
     """Room for `touched` to list all leaves of a tree."""
     return np.empty((levels[0, 1] * levels[0, 2] + 256, 3), np.int32)

@@ -103,7 +103,8 @@ def homogeneous(geometry: Geometry, camera: Camera, base: int = 0, stop: int | N
     stop = len(geometry.vertices) if stop is None else stop
     q = np.empty((stop - base, 4))
     k = camera.K if camera.distortion is None else np.eye(3)
-    kernels.transform(geometry.vertices, base, stop, k, camera.R, camera.t, q)
+    moved = np.column_stack((camera.R, camera.t))
+    kernels.transform(geometry.vertices, base, stop, k[:, :1] * moved[0] + k[:, 1:2] * moved[1] + k[:, 2:] * moved[2], q)
     return q
 
 

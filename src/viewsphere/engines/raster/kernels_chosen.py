@@ -65,7 +65,7 @@ def _differ(reals: Rows, p: Any, q: Any, wholes: Rows, k: Any, m: Any, stride: A
     store(flags.data, flags.builder.add(flags.i, at), Lanes(flag.builder, flag.builder.zext(flag.value, BYTES)))
 
 
-@njit
+@njit(_nrt=True)
 def numbered(marks):
     """The grid of the marked pixels, and their flat indices behind one another with the sentinel."""
     height, width = marks.shape
@@ -91,7 +91,7 @@ def level(inverse):
     return np.float32(inverse).view(np.int32)
 
 
-@njit
+@njit(_nrt=True)
 def shown_farthest(triangle, depth, pixels, height, width):
     """Level of the farthest surface that the points of each pixel show, (H, W) int32: 0 where they show none, CLOSED where
     there are none.
@@ -108,7 +108,7 @@ def shown_farthest(triangle, depth, pixels, height, width):
     return farthest
 
 
-@njit
+@njit(_nrt=True)
 def tiled(farthest):
     """Least level in each tile, and in each with its neighbours to the right and below: whatever box begins in a tile and is no
     wider is there.

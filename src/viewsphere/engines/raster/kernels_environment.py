@@ -11,6 +11,7 @@ import math
 import numba as nb
 import numpy as np
 
+from viewsphere.engines.raster.kernels_lanes import clamp, dot, lanewise, least, most, root, size, where
 from viewsphere.engines.raster.kernels_texture import FAST
 from viewsphere.geometry.jit import inner, njit
 
@@ -141,18 +142,17 @@ def blurred(texels, levels, samples, frames, out):
         out[i, 0], out[i, 1], out[i, 2], out[i, 3] = p0, p1, p2, min(p3, one)
 
 
-@inner(fastmath=FAST)
 def _angle(y, x):
     """The angle of a vector in the plane, -pi..pi, to 1e-5."""
-    a, b = abs(x), abs(y)
-    t = min(a, b) / max(a, b, f4(1e-20))
+    a, b = size(x), size(y)
+    t = least(a, b) / most(most(a, b), 1e-20)
     s = t * t
-    r = f4(0.05265332) - s * f4(0.01172120)
-    r = f4(0.99997726) + s * (f4(-0.33262347) + s * (f4(0.19354346) + s * (f4(-0.11643287) + s * r)))
-    r *= t
-    r = f4(math.pi / 2) - r if b > a else r
-    r = f4(math.pi) - r if x < f4(0) else r
-    return -r if y < f4(0) else r
+    r = 0.05265332 - s * 0.01172120
+    r = 0.99997726 + s * (-0.33262347 + s * (0.19354346 + s * (-0.11643287 + s * r)))
+    r = r * t
+    r = where(b > a, math.pi / 2 - r, r)
+    r = where(x < 0, math.pi - r, r)
+    return where(y < 0, -r, r)
 
 
 @inner(fastmath=FAST)
@@ -190,8 +190,8 @@ def _look_up(texels, first, width, height, count, w):
 
 
 @inner(fastmath=FAST)
-def _rays(listed, columns, m, start, count, w):
-    """RX, RY, RZ: directions of some samples as the map has them, any length; those of a grid lie in one row."""
+def _rays(listed, columns, start, count, w):
+    """RX, RY, RZ: directions of some samples, or their places; those of a grid lie in one row."""
     if listed.shape[1] == 3:
         for i in range(count):
             ray = listed[U(start + i)]
@@ -205,10 +205,31 @@ def _rays(listed, columns, m, start, count, w):
         across, down = f4(start - row * columns) + f4(0.5), f4(row) + f4(0.5)
         for i in range(count):
             w[RX + i], w[RY + i], w[RZ + i] = across + f4(i), down, f4(1)
-    m00, m01, m02, m10, m11, m12, m20, m21, m22 = m[0], m[1], m[2], m[3], m[4], m[5], m[6], m[7], m[8]
-    for i in range(count):
-        x, y, z = w[RX + i], w[RY + i], w[RZ + i]
-        w[RX + i], w[RY + i], w[RZ + i] = m00 * x + m01 * y + m02 * z, m10 * x + m11 * y + m12 * z, m20 * x + m21 * y + m22 * z
+
+
+@lanewise
+def _aim(numbers, width, height, w):
+    """RU, RV: where in the picture the rays end; TOWARD: cosines of their angles to the sun."""
+    ray = w.get(RX, RY, RZ)
+    x, y, z = (dot(tuple(numbers.one(3 * row + k) for k in range(3)), ray) for row in range(3))
+    flat = x * x + y * y
+    w[RU] = (0.5 - _angle(y, x) * (0.5 / math.pi)) * width - 0.5
+    w[RV] = (0.5 - _angle(z, root(flat)) * (1 / math.pi)) * height - 0.5
+    w[TOWARD] = dot((x, y, z), tuple(numbers.one(9 + k) for k in range(3))) / root(flat + z * z)
+
+
+@lanewise
+def _add_sun(numbers, w):
+    """RX, RY, RZ: radiance of the sky, from the picture's."""
+    toward, half, edge = w[TOWARD], numbers.one(24), numbers.one(25)
+    q = most(toward, 0)
+    q = q * q
+    q = q * q
+    halo = q * 0.12 + q * q * q * q * q * q * 0.25
+    within = clamp((half - root(most(2 - toward - toward, 0))) * edge + 0.5)
+    within = where(half > 0, within, 0)
+    for c, row in enumerate((RX, RY, RZ)):
+        w[row] = w[row] * numbers.one(12 + c) + numbers.one(15 + c) + halo * numbers.one(18 + c) + within * numbers.one(21 + c)
 
 
 @njit(fastmath=FAST)
@@ -218,9 +239,7 @@ def lay_over_sky(listed, columns, numbers, picture, first, width, height, w, rad
     listed: rays (N, 3) or places (N, 2) of the samples, or none (0, 2) for a grid of so many columns. numbers: (26,)
     `environment.sky_behind`. picture: `Surrounding.picture`; first, width, height: its level. w: scratch of 6 * CHUNK.
     """
-    zero, one = f4(0), f4(1)
-    count, is_listed = i4(radiance.shape[0]), listed.shape[0] > 0
-    sun_x, sun_y, sun_z, half, edge = numbers[9], numbers[10], numbers[11], numbers[24], numbers[25]
+    count, is_listed, one = i4(radiance.shape[0]), listed.shape[0] > 0, f4(1)
     start = i4(0)
     while start < count:
         n = min(i4(CHUNK), count - start)
@@ -228,30 +247,16 @@ def lay_over_sky(listed, columns, numbers, picture, first, width, height, w, rad
         open_ = 0
         for i in range(n):
             open_ += 1 if radiance[U(start + i), U(3)] < one else 0
-        if open_ == 0:
-            start += n
-            continue
-        _rays(listed, columns, numbers, start, n, w)
-        for i in range(n):
-            x, y, z = w[RX + i], w[RY + i], w[RZ + i]
-            w[RU + i] = (f4(0.5) - _angle(y, x) * f4(0.5 / math.pi)) * f4(width) - f4(0.5)
-            w[RV + i] = (f4(0.5) - _angle(z, np.sqrt(x * x + y * y)) * f4(1 / math.pi)) * f4(height) - f4(0.5)
-            w[TOWARD + i] = (x * sun_x + y * sun_y + z * sun_z) / np.sqrt(x * x + y * y + z * z)
-        _look_up(picture, first, width, height, n, w)
-        for i in range(n):
-            toward = w[TOWARD + i]
-            if math.isnan(toward):
-                continue
-            q = max(toward, zero)
-            q *= q
-            q *= q
-            halo = q * f4(0.12) + q * q * q * q * q * q * f4(0.25)
-            within = min(max((half - np.sqrt(max(f4(2) - toward - toward, zero))) * edge + f4(0.5), zero), one)
-            within = within if half > zero else zero
-            p = radiance[U(start + i)]
-            left = max(one - p[3], zero)
-            for c in range(3):
-                sky = w[RX + c * CHUNK + i] * numbers[12 + c] + numbers[15 + c]
-                p[c] += left * (sky + halo * numbers[18 + c] + within * numbers[21 + c])
-            p[3] += left
+        if open_ > 0:
+            _rays(listed, columns, start, n, w)
+            _aim(n, numbers, f4(width), f4(height), w)
+            _look_up(picture, first, width, height, n, w)
+            _add_sun(n, numbers, w)
+            for i in range(n):
+                if not math.isnan(w[TOWARD + i]):
+                    p = radiance[U(start + i)]
+                    left = max(one - p[3], f4(0))
+                    for c in range(3):
+                        p[c] += left * w[RX + c * CHUNK + i]
+                    p[3] += left
         start += n

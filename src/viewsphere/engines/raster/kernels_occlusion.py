@@ -8,7 +8,6 @@ weighted share that a surface with normal n can see is m + 2 v . n.
 from __future__ import annotations
 
 import numba as nb
-import numpy as np
 
 from viewsphere.engines.raster.kernels_arrive import FACING, look
 from viewsphere.engines.raster.kernels_blend import blend
@@ -28,7 +27,6 @@ from viewsphere.engines.raster.kernels_block import (
     PX,
     PY,
     PZ,
-    ROWS,
     SCENERY,
     SHARE,
     T0,
@@ -56,9 +54,11 @@ HORIZON = 0.03  # keeps the share of a sky that a surface hardly faces from bein
 
 
 @njit
-def see(points, views, directions, out):
-    """For each point (N, 3) the visible share and mean direction above the horizon and below, into out (N, 8)."""
-    b = np.zeros(ROWS * BLOCK, np.float32)
+def see(points, views, directions, b, out):
+    """For each point (N, 3) the visible share and mean direction above the horizon and below, into out (N, 8).
+
+    b (ROWS * BLOCK,) is room.
+    """
     per = f4(1.0 / directions.shape[0])
     for start in range(0, points.shape[0], BLOCK):
         count = min(BLOCK, points.shape[0] - start)
@@ -77,33 +77,6 @@ def see(points, views, directions, out):
                 out[start + i, first + 1] += share * x
                 out[start + i, first + 2] += share * y
                 out[start + i, first + 3] += share * z
-
-
-@njit
-def spread(volume, known):
-    """Give unknown points beside known ones their mean, once; returns what is known then."""
-    layers, rows, columns = known.shape
-    after = known.copy()
-    total = np.empty(COEFFICIENTS, np.float32)
-    for m in range(layers):
-        for n in range(rows):
-            for o in range(columns):
-                if known[m, n, o]:
-                    continue
-                count = 0
-                total[:] = f4(0)
-                for k in range(6):
-                    step = 1 if k % 2 else -1
-                    p, q, r = m + (step if k < 2 else 0), n + (step if k // 2 == 1 else 0), o + (step if k > 3 else 0)
-                    if 0 <= p < layers and 0 <= q < rows and 0 <= r < columns and known[p, q, r]:
-                        count += 1
-                        for c in range(COEFFICIENTS):
-                            total[c] += volume[p, q, r, c]
-                if count > 0:
-                    for c in range(COEFFICIENTS):
-                        volume[m, n, o, c] = total[c] / f4(count)
-                    after[m, n, o] = True
-    return after
 
 
 @lanewise

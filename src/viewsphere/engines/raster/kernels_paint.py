@@ -61,14 +61,14 @@ STEPS_Y = (0, -1, 0, 0, 0, -1, 0, 1, 0, 0, 0, 1)
 
 
 @njit
-def sorted_samples(triangle, kind, material, materials, radiance):
-    """Indices (int32) of the samples that show solid surfaces, those of one material together, and of those of the ground.
+def sorted_samples(triangle, kind, material, starts, radiance, solid, ground):
+    """Indices of the samples that show solid surfaces, those of one material together, and of those of the ground.
 
-    kind (T + 1,) uint8: of each triangle; the last of triangle -1, NOTHING. material (T,): which of so many `materials`.
-    radiance (S, 4) becomes 0 but where the ground is, which is not laid over anything.
+    kind (T + 1,) uint8: of each triangle; the last of triangle -1, NOTHING. material (T,): which one. starts (M + 1,): 0s;
+    of so many materials where the next begins, then. radiance (S, 4) becomes 0 but where the ground is, which is not laid over
+    anything. solid, ground (S,) int32; returns how many each of them has.
     """
-    size = U(triangle.shape[0])
-    grounds, starts = U(0), np.zeros(materials + 1, np.uint64)
+    size, materials, grounds = U(triangle.shape[0]), U(starts.shape[0] - 1), U(0)
     i = U(0)
     while i < size:
         t, first = triangle[i], i
@@ -82,9 +82,8 @@ def sorted_samples(triangle, kind, material, materials, radiance):
             starts[U(material[t]) + U(1)] += i - first
         for j in range(first, i):
             radiance[j, U(0)], radiance[j, U(1)], radiance[j, U(2)], radiance[j, U(3)] = f4(0), f4(0), f4(0), f4(0)
-    for m in range(U(materials)):
+    for m in range(materials):
         starts[m + U(1)] += starts[m]
-    solid, ground = np.empty(starts[U(materials)], np.int32), np.empty(grounds, np.int32)
     i, grounds = U(0), U(0)
     while i < size:
         t, first = triangle[i], i
@@ -101,7 +100,7 @@ def sorted_samples(triangle, kind, material, materials, radiance):
             for j in range(first, i):
                 solid[n + (j - first)] = j
             starts[m] += i - first
-    return solid, ground
+    return starts[materials], grounds
 
 
 @inner(fastmath=FAST)
@@ -169,7 +168,7 @@ def _lay_all(start, count, is_ground, slots, radiance, b):
         radiance[p, U(2)], radiance[p, U(3)] = b[U(BLUE) + i] * shown, b[U(ALPHA) + i] * shown
 
 
-@njit(fastmath=FAST)
+@njit(fastmath=FAST, _nrt=True)
 def shade(view, surfaces, textures, floor, surrounding, lights, occlusion, is_ground, slots, triangle, depth, radiance):
     """Shade the samples in `slots` (N,) int32 over `radiance` (S, 4) float32, premultiplied, in place.
 
@@ -204,7 +203,7 @@ def shade(view, surfaces, textures, floor, surrounding, lights, occlusion, is_gr
         _lay_all(start, count, is_ground, slots, radiance, b)
 
 
-@njit(fastmath=FAST)
+@njit(fastmath=FAST, _nrt=True)
 def catch(view, floor, surrounding, lights, occlusion, slots, triangle, depth, radiance):
     """As `shade`, of ground that is a shadow catcher."""
     b = np.zeros(ROWS * BLOCK, np.float32)
@@ -233,7 +232,7 @@ def _alike(t, s, depth, other, owner, normals):
     return (owner[t] == owner[s]) & (abs(bend) > f4(0.985)) & (ratio > f4(0.995)) & (ratio < f4(1.005))
 
 
-@njit
+@njit(_nrt=True)
 def shared_samples(pixels, triangle, depth, seen, inverse_depth, owner, normals, radiance):
     """Whose colour each of the samples, four a pixel, has: of the nearest pixel's centre that looks like it, or its own.
 
@@ -269,7 +268,7 @@ def shared_samples(pixels, triangle, depth, seen, inverse_depth, owner, normals,
     return like, rows[:count]
 
 
-@njit(fastmath=FAST)
+@njit(fastmath=FAST, _nrt=True)
 def average_samples(pixels, like, samples, radiance):
     """Each pixel becomes the mean of its four samples (premultiplied), whose colours `shared_samples` tells.
 

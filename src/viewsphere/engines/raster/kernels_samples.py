@@ -41,7 +41,7 @@ def _box(q, i0, i1, i2, reach, width, height):
     )
 
 
-@njit
+@njit(_nrt=True)
 def around(q, triangles, left_out, window):
     """The triangles that may touch a window (x0, y0, x1, y1; pixels, both ends included) but those left out, int64."""
     x0, y0, x1, y1 = window
@@ -60,7 +60,7 @@ def around(q, triangles, left_out, window):
     return order[:n]
 
 
-@njit
+@njit(_nrt=True)
 def touched_boxes(q, order, triangles, reach, farthest):
     """Which pixels these triangles' boxes contain that show something behind their nearest corner, (H, W) uint8."""
     height, width = farthest.shape
@@ -86,7 +86,7 @@ def first(grid, y, x):
     return max(k, ~k)
 
 
-@njit
+@njit(_nrt=True)
 def draw(q, order, triangles, cutout, cutouts, see_through, points, solid, fragments):
     """Draw the triangles in `order` through a pinhole.
 
@@ -352,7 +352,7 @@ def _share_edge(vertices, triangles, s, t):
     return same >= 2
 
 
-@njit
+@njit(_nrt=True)
 def draw_rays(q, order, triangles, cutout, cutouts, see_through, unit, table, points, solid, fragments):
     """As `draw`, along rays: `table` is (rays, levels, boxes, cells) of `kernels_rays`, of S x S rays a pixel.
 

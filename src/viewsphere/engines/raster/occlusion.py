@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from viewsphere.engines.raster import kernels_occlusion as kernels
 from viewsphere.engines.raster.arriving import arriving
 from viewsphere.engines.raster.kernels_arrive import DISTANT
+from viewsphere.engines.raster.kernels_block import BLOCK, ROWS
 from viewsphere.engines.raster.lights import Casters, Lights, Views, draw_views, parallel_view
 from viewsphere.engines.raster.records import Float32
 
@@ -160,15 +161,36 @@ def _volume(
     corner = low - pad / cells
     wanted = np.full(shape, True) if has_scenery else _read_points(casters, corner, cells, shape)
     points = corner + np.argwhere(wanted)[:, ::-1] / cells
-    seen = np.zeros((len(points), kernels.COEFFICIENTS), np.float32)
-    kernels.see(np.ascontiguousarray(points, np.float32), views, directions, seen)
+    seen = _seen(points, views, directions)
     volume = np.empty((*shape, kernels.COEFFICIENTS), np.float32)
     volume[:] = [0.5, 0.0, 0.0, 0.25, 0.5, 0.0, 0.0, -0.25]
     volume[wanted] = seen
     known = wanted & (volume[..., 0] + volume[..., 4] >= kernels.HIDDEN)
     for _ in range(3):
-        known = kernels.spread(volume, known)
+        known = _spread(volume, known)
     return volume, corner, cells
+
+
+def _seen(points: Float, views: Views, directions: Float32) -> Float32:
+    """What of these directions each point (N, 3) sees, as coefficients (N, 8)."""
+    seen = np.zeros((len(points), kernels.COEFFICIENTS), np.float32)
+    room = np.zeros(ROWS * BLOCK, np.float32)
+    kernels.see(np.ascontiguousarray(points, np.float32), views, directions, room, seen)
+    return seen
+
+
+def _spread(volume: Float32, known: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Give unknown points beside known ones their mean, once; returns what is known then."""
+    own = np.concatenate([volume, np.ones((*known.shape, 1), np.float32)], axis=-1)
+    own[~known] = 0
+    total = np.zeros_like(own)
+    for axis in range(3):
+        beside, here = np.moveaxis(own, axis, 0), np.moveaxis(total, axis, 0)
+        here[1:] += beside[:-1]
+        here[:-1] += beside[1:]
+    fresh = ~known & (total[..., -1] > 0)
+    volume[fresh] = total[fresh, :-1] / total[fresh, -1:]
+    return known | fresh
 
 
 def _read_points(casters: Casters, corner: Float, cells: float, shape: NDArray[np.int_]) -> NDArray[np.bool_]:
@@ -223,9 +245,8 @@ def _floor(casters: Casters, z: float, directions: Float32, views: Views) -> tup
     at = (np.arange(_FLOOR) + 0.5) / cells
     x, y = np.meshgrid(corner[0] + at, corner[1] + at)
     points = np.stack([x, y, np.full_like(x, z)], axis=-1).reshape(-1, 3)
-    seen = np.zeros((len(points), kernels.COEFFICIENTS), np.float32)
     upper = len(directions) // 2
-    kernels.see(np.ascontiguousarray(points, np.float32), views, directions[:upper], seen)
+    seen = _seen(points, views, directions[:upper])
     share = (seen[:, 3] / directions[:upper, 2].mean()).reshape(x.shape)
     floor = np.empty((_FLOOR, _FLOOR, 2), np.float32)
     floor[:] = (1 - (1 - np.clip(share, 0, 1)) * _DEEPEST * _window())[..., None]

@@ -95,10 +95,11 @@ def _shade(
     samples: Samples | None = None,
 ) -> None:
     """Fill `radiance` (S, 4) with what the samples show; what is behind see-through surfaces first."""
-    materials = baked.surfaces.material, len(baked.surfaces.looks)
-    solid, ground = kernels_paint.sorted_samples(triangle, baked.kind, *materials, radiance)
-    _shade_some(baked, view, solid, False, triangle, depth, radiance)
-    _shade_some(baked, view, ground, True, triangle, depth, radiance)
+    solid, ground = np.empty((2, len(triangle)), np.int32)
+    materials = baked.surfaces.material, np.zeros(len(baked.surfaces.looks) + 1, np.uint64)
+    solids, grounds = kernels_paint.sorted_samples(triangle, baked.kind, *materials, radiance, solid, ground)
+    _shade_some(baked, view, solid[:solids], False, triangle, depth, radiance)
+    _shade_some(baked, view, ground[:grounds], True, triangle, depth, radiance)
     # Also where no see-through surface is in front: a decal may lie on what is.
     pixels = None if samples is None else samples.pixels
     for layer in layers(baked.blended, camera, triangle, depth, baked.see_through, pixels, visibility.corners):

@@ -87,7 +87,7 @@ def _mix(b, channels, has_near, y, x0, out):
             out[y, x0 + i, c] = color
 
 
-@njit(fastmath=FAST)
+@njit(fastmath=FAST, _nrt=True)
 def spread_discs(planes, margin, stride, out):
     """out (H, W, C) from planes (4 + C + 1, h, w) with a margin and, on the right, `LINE` pixels more.
 
