@@ -53,7 +53,8 @@ def asked(stage: CyclesStage, camera, passes=(), **changed) -> dict[str, np.ndar
 
 
 def shift_between(first, second) -> np.ndarray:
-    """Pixels, across and down, by which two grey pictures (H, W) are moved against one another: phase correlation of the lower frequencies.
+    """Pixels, across and down, by which two grey pictures (H, W) are moved against one another: phase correlation of the lower
+    frequencies.
 
     The slope of the phases of what both have, weighted by how much of it there is.
     """
