@@ -450,4 +450,5 @@ def test_real_files(name, size, textures):
     mesh, facts = load_model(MODELS / name)
     np.testing.assert_allclose(facts.size, size, atol=2e-3)
     assert len(mesh.images) == textures
-    assert os.path.commonpath([MODELS, *facts.files]) == str(MODELS)
+    root = MODELS.resolve()
+    assert os.path.commonpath([root, *(Path(file).resolve() for file in facts.files)]) == str(root)
