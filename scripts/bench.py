@@ -153,17 +153,32 @@ def measure(frames: int, antialias: int, folder: Path) -> tuple[Clock, int]:
     warm_up = engine.stage(shot, lambda spec: mesh)  # compiles, or reads the cache
     one_shot(Clock(), shot, shot.frames[:2], warm_up, mesh, store)
     stage = clock("stage: baked already", lambda: engine.stage(shot, lambda spec: mesh))
+    rivals = rival_scenes(stage.geometry)
     for first in range(0, len(shot.frames), SHOT_FRAMES):
-        one_shot(clock, shot, shot.frames[first : first + SHOT_FRAMES], stage, mesh, store)
+        frames_of_run = shot.frames[first : first + SHOT_FRAMES]
+        one_shot(clock, shot, frames_of_run, stage, mesh, store)
+        for name, (scene, cast) in rivals.items():
+            cast_shot(clock, name, lambda camera, scene=scene, cast=cast: cast(scene, camera), shot, frames_of_run, mesh)
     frames_parts = zip(*(clock.times[name] for name in STAGES), strict=True)
     clock.times["whole frame"] = [sum(parts) for parts in frames_parts]
+    return clock, len(stage.geometry.triangles)
+
+
+def rival_scenes(geometry: Any) -> dict[str, tuple[Any, Callable[..., Any]]]:
+    """The rivals that are installed: each one's scene of this geometry, and what casts a frame's rays at it."""
+    scenes: dict[str, tuple[Any, Callable[..., Any]]] = {}
     for name, (build, cast) in RIVALS.items():
         with suppress(ImportError):
-            scene = build(stage.geometry)
-            for frame in [shot.frames[0], *shot.frames]:
-                camera = camera_for(shot.intrinsics, frame.pose, box_vertices(*mesh.bounds).mean(axis=0))
-                clock(name, lambda scene=scene, cast=cast, camera=camera: cast(scene, camera))
-    return clock, len(stage.geometry.triangles)
+            scenes[name] = (build(geometry), cast)
+    return scenes
+
+
+def cast_shot(clock: Clock, name: str, cast: Callable[..., Any], shot: Shot, frames: Sequence[Frame], mesh: Mesh) -> None:
+    """A rival's rays for the same frames, right after ours: what slows the machine for seconds slows both."""
+    cameras = [camera_for(shot.intrinsics, frame.pose, box_vertices(*mesh.bounds).mean(axis=0)) for frame in frames]
+    cast(cameras[0])  # its scene comes back into the caches, as ours has
+    for camera in cameras:
+        clock(name, lambda camera=camera: cast(camera))
 
 
 def one_frame(clock: Clock, shot: Shot, frame: Frame, stage: plugins.Stage, mesh: Mesh) -> Sample:
