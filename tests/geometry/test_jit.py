@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
+
 import numpy as np
 
 from viewsphere.geometry.jit import inner, njit
@@ -28,3 +32,22 @@ def both(numbers):
 def test_inner_kernels_become_parts_of_those_that_call_them():
     assert both(np.arange(10.0)) == 1 + 2 * 45 + 6
     assert both(np.arange(10)) == 1 + 2 * 45 + 6  # another type of the same
+
+
+LOOK = """
+import sys
+import numpy as np
+from viewsphere.geometry.kernels_lens import radial_fisheye
+assert radial_fisheye(np.zeros(4), 0.5)[0] == 0.5
+print("numba.np.arraymath" in sys.modules)
+"""
+
+
+def test_a_cached_kernel_is_not_prepared_for_compiling(tmp_path):
+    """numba prepares for a second, which each of a run's processes would pay."""
+    environment = {**os.environ, "VIEWSPHERE_CACHE": str(tmp_path)}
+    said = [
+        subprocess.run([sys.executable, "-c", LOOK], env=environment, capture_output=True, text=True, check=True).stdout
+        for _ in range(2)
+    ]
+    assert said == ["True\n", "False\n"]

@@ -18,10 +18,12 @@ from typing import Any
 import numba
 from numba import _dynfunc
 from numba.core import types
+from numba.core.caching import FunctionCache
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.compiler_machinery import PassManager
+from numba.core.runtime.nrt import rtsys
 from numba.core.targetconfig import ConfigStack
 from numba.core.typed_passes import (
     AnnotateTypes,
@@ -161,6 +163,16 @@ class Part(Kernel):
         key = _dynfunc.make_function(made.fndesc.lookup_module(), func.__name__, "", 0, made.environment, (made.library,))
         state.targetctx.insert_user_function(key, made.fndesc, [made.library])
         return made._replace(entry_point=key)
+
+
+class KernelCache(FunctionCache):
+    """numba's cache of a function, which does not prepare to compile before it looks whether it has to: that takes a second."""
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """The compiled function for these types, None if it has none."""
+        rtsys.initialize(target_context)
+        with self._guard_against_spurious_io_errors():
+            return self._load_overload(sig, target_context)
 
 
 PART: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "pipeline_class": Part}

@@ -38,8 +38,10 @@ def njit(function: Callable[..., Any] | None = None, **options: Any) -> Any:
     if not os.environ.get("NUMBA_CACHE_DIR"):
         folder = _cache_folder(_sources(function.__code__.co_filename))
         setattr(config, "CACHE_DIR", folder)  # noqa: B010, not in its stubs
-    whole: dict[str, Any] = {"cache": True, "no_cfunc_wrapper": True, "pipeline_class": compiler.Kernel, "_nrt": False}
-    return numba.njit(nogil=True, error_model="numpy", **{**whole, **options})(function)
+    whole: dict[str, Any] = {"no_cfunc_wrapper": True, "pipeline_class": compiler.Kernel, "_nrt": False}
+    made = numba.njit(nogil=True, error_model="numpy", **{**whole, **options})(function)
+    setattr(made, "_cache", compiler.KernelCache(function))  # noqa: B010, not in its stubs
+    return made
 
 
 def inner(function: Callable[..., Any] | None = None, **options: Any) -> Any:
