@@ -3,7 +3,7 @@
 Reference scene (bench_scene.py): a zoo car cut to about 75,000 triangles with 1,024 x 1,024 textures (base colour,
 occlusion-roughness-metallic, normals) on every material, the ground, an environment with a sun, 640x480; files: RGB PNG,
 instance PNG, float32 depth and normals, annotations. `--scaling` measures how cost grows instead and draws
-docs/images/scaling.svg.
+docs/images/scaling.svg. `--cycles` and `--endurance` measure the Cycles engine instead (bench_cycles.py).
 """
 
 from __future__ import annotations
@@ -239,6 +239,8 @@ def main() -> None:
     options.add_argument("--frames", type=int, default=48)
     options.add_argument("--workers", action="store_true", help="measure frames a second with one and two workers, too")
     options.add_argument("--scaling", action="store_true", help="measure how cost grows, and draw it")
+    options.add_argument("--cycles", type=int, metavar="FRAMES", help="measure the Cycles engine beside BlenderProc's way")
+    options.add_argument("--endurance", type=int, metavar="FRAMES", help="tell the memory of one Blender over so many frames")
     options.add_argument("--json", type=Path, help="write the figures here too")
     args = options.parse_args()
     print(f"{processor()}, {os.cpu_count()} cores, Python {platform.python_version()}")
@@ -246,6 +248,14 @@ def main() -> None:
         from bench_scaling import scaling
 
         scaling(ROOT / "docs" / "images")
+        return
+    if args.cycles or args.endurance:
+        from bench_cycles import cycles, endurance
+
+        if args.cycles:
+            cycles(args.cycles)
+        if args.endurance:
+            endurance(args.endurance)
         return
     figures: dict[str, Any] = {}
     with tempfile.TemporaryDirectory() as name:

@@ -16,7 +16,7 @@ from viewsphere import Recipe
 from viewsphere.geometry.box import EDGES, FACES
 from viewsphere.model.camera import Camera, Intrinsics
 from viewsphere.model.sample import ObjectAnnotation, Sample
-from viewsphere.model.scene import Background, Scene
+from viewsphere.model.scene import Background, Finish, Scene
 from viewsphere.model.shot import Frame, Placement, Pose, Shot
 from viewsphere.preview import INK, PALETTE, PAPER, draw_sample
 from viewsphere.run.stages import Stages, prepare
@@ -317,7 +317,7 @@ def pose_sphere(made_of: Recipe, size: int) -> Picture:
         key="sphere",
         placements=(Placement(id=1, model=spec),),
         intrinsics=lens,
-        scene=Scene(background=Background(color=(1.0, 1.0, 1.0))),
+        scene=Scene(finish=Finish(background=Background(color=(1.0, 1.0, 1.0)))),
         frames=(Frame(index=0, pose=pose, split=""),),
         channels=("rgb", "depth", "instances"),
     )

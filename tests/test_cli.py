@@ -156,5 +156,13 @@ def test_ctrl_c_keeps_what_is_finished(tmp_path):
     assert "Traceback" not in err
 
 
+def test_a_part_is_exported_beside_the_data_set(small_run, tmp_path):
+    run = viewsphere("export", small_run, "-f", "native", "--frames", "0-2", "-o", "part", cwd=tmp_path)
+    assert run.returncode == 0 and "wrote part/native" in run.stdout
+    assert len(list((tmp_path / "part" / "native").rglob("RGB/*.png"))) == 3
+    assert "--output: expected another folder" in fails("export", small_run, "-f", "native", "--models", "*_000")
+    assert "--frames: expected numbers" in fails("export", small_run, "-f", "native", "--frames", "x", "-o", tmp_path / "b")
+
+
 def test_an_export_to_no_format_is_a_mistake(small_run):
-    assert "expected one or more of coco, native" in fails("export", small_run, "-f", ",")
+    assert "expected one or more of blend, coco, native" in fails("export", small_run, "-f", ",")

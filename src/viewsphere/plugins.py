@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import importlib
 import pkgutil
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from importlib.metadata import entry_points
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Protocol
@@ -45,7 +45,9 @@ class Stage(Protocol):
 
 
 class Engine(Protocol):
-    """A module that paints pictures: `check` its options, `stage` a shot."""
+    """A module that paints pictures: `check` its options, `stage` a shot. Only with `OPENS_SCENES = True` it is given shots
+    whose scene is a .blend file (`scene.blend`).
+    """
 
     def check(self, options: Mapping[str, JsonValue]) -> None:
         """Raise UserError for an option that is not known, or out of range; asked before anything is rendered."""
@@ -58,12 +60,15 @@ class Engine(Protocol):
 
 class Format(Protocol):
     """A module that writes a data set in one format: `export`; with `CHANNELS`, the names of the channels it needs, a run
-    that does not keep them is refused before it begins. One that has `read(path, *, keep_going) -> ForeignDataset`
-    (`viewsphere.store.foreign`) can be imported, too.
+    that does not keep them is refused before it begins; with `check()`, one that cannot be written here, by a UserError. One
+    that has `read(path, *, keep_going) -> ForeignDataset` (`viewsphere.store.foreign`) can be imported, too.
     """
 
-    def export(self, dataset: Dataset, folder: Path) -> None:
-        """Write the finished frames of the data set into this empty folder; images by `dataset.link`."""
+    def export(self, dataset: Dataset, folder: Path) -> Sequence[str] | None:
+        """Write the finished frames of the data set into this empty folder; images by `dataset.link`.
+
+        May give notes for the user, a line each.
+        """
         ...
 
 

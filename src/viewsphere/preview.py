@@ -37,8 +37,10 @@ def preview_samples(recipe: Recipe, count: int = 12, width: int = 320) -> Iterat
     planned = prepare(recipe)
     stages = Stages()
     for model, poses in _spread(planned, count):
+        stages.read_ahead(planned, planned.model_specs[model])
         stages.check_distances(planned, planned.model_specs[model])
-        groups = [[pose] for pose in poses] if recipe.scene.is_new_each_frame else [poses]
+        schedule = planned.schedules[model]
+        groups = [[pose] for pose in poses] if recipe.scene.is_new_each_frame else schedule.together(poses)
         for group in groups:
             shot = planned.take(model, group, stages.box)
             channels = tuple(dict.fromkeys((*shot.channels, picture_of(shot.channels) or "rgb", "depth", "instances")))
@@ -54,13 +56,16 @@ def dataset_samples(dataset: Dataset, count: int = 12) -> list[Sample]:
 
 def _spread(planned: Plan, count: int) -> list[tuple[int, list[int]]]:
     """Model and pose indices such that models follow in order and poses step through the grid; all where there are so few."""
+    own = (
+        [list(schedule.poses) for schedule in planned.schedules] if planned.timings else [range(planned.poses)] * planned.models
+    )
     if count >= planned.frames:
-        return [(model, list(range(planned.poses))) for model in range(planned.models)]
+        return [(model, list(poses)) for model, poses in enumerate(own)]
     models = np.linspace(0, planned.models - 1, count).round().astype(int)
-    poses = (np.arange(count) * planned.poses / count * (1 + 1 / max(count, 1))).astype(int) % planned.poses
     chosen: dict[int, list[int]] = {}
-    for model, pose in zip(models.tolist(), poses.tolist(), strict=True):
-        chosen.setdefault(model, []).append(pose)
+    for i, model in enumerate(models.tolist()):
+        poses = own[model]
+        chosen.setdefault(model, []).append(poses[int(i * len(poses) / count * (1 + 1 / max(count, 1))) % len(poses)])
     return list(chosen.items())
 
 
@@ -121,6 +126,7 @@ def _caption(sample: Sample) -> str:
     if pose is None:
         return ", ".join(dict.fromkeys(o.category for o in seen)) or "nothing labelled"
     key = f"{seen[0].key}  " if seen else ""
+    key += f"{pose.time.seconds:.3g} s  " if pose.time else ""
     return f"{key}az {pose.azimuth_deg:.4g}  el {pose.elevation_deg:.4g}  d {pose.distance:.4g}"
 
 

@@ -122,6 +122,7 @@ def test_a_blender_killed_between_frames_costs_nothing(blender):
     for sample in render(recipe_of()):
         found.append(sample.channels["rgb"])
         os.kill(keeper_of(blender).process.pid, signal.SIGKILL)
+    keeper_of(blender).drop()
     assert np.array_equal(found, expected)
 
 
@@ -330,3 +331,15 @@ def test_memory_stays_flat_over_many_shots(blender):
         asked(stage, camera)
         used.append(keeper_of(blender).process.ask("memory")["rss_mb"])
     assert max(used[40:]) <= 1.05 * max(used[10:20])
+
+
+@pytest.mark.skipif(not hasattr(os, "sched_getaffinity"), reason="needs Linux")
+def test_one_thread_starts_no_others_and_any_core_may_run_it(blender):
+    """Libraries count cores as they are loaded; those that find no work for theirs would spin."""
+    threads = {}
+    for count in (1, 2):
+        pictures(engine=DRAFT | {"threads": count}, viewpoints={"azimuth": [0], "distance": 0.9})
+        tasks = [int(t.name) for t in Path(f"/proc/{keeper_of(blender).process.pid}/task").iterdir()]
+        assert all(os.sched_getaffinity(task) == os.sched_getaffinity(0) for task in tasks)
+        threads[count] = len(tasks)
+    assert threads[1] <= threads[2]

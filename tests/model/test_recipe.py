@@ -165,7 +165,7 @@ MISTAKES = [
     ({"viewpoints": {**VIEWS, "elevation": 91}}, "viewpoints.elevation: expected elevations of -90", "; found 91"),
     ({"viewpoints": {**VIEWS, "azimuth": [0, 90, 0]}}, "viewpoints.azimuth: expected distinct values; found 0 twi", ""),
     ({"viewpoints": {**VIEWS, "bins": 50}}, "viewpoints.bins: expected a number of degrees that divides 360", ""),
-    ({"viewpoints": {**VIEWS, "target": "centre"}}, "viewpoints.target: expected center or [x, y, z]", ""),
+    ({"viewpoints": {**VIEWS, "target": "centre"}}, "viewpoints.target: expected center, follow or [x, y, z]", ""),
     ({"viewpoints": {"kind": "sphere", "count": 5, "distance": [5, 4]}}, "viewpoints.distance: expected [low, h", ""),
     ({"viewpoints": {"kind": "jitter", "distance": 1, "plus_minus": {"distance": 1}}}, "viewpoints: expected dist", ""),
     ({"camera": {"size": [0, 480]}}, "camera.size[0]: expected a number greater than or equal to 1; found 0", ""),

@@ -51,7 +51,8 @@ def load_error(path: Path) -> str:
 POSITIONS = [
     (
         ("category:", "categry:"),
-        "recipe.yaml:5: models[0].categry: expected one of source, category, supercategory, count, name, up, forward, "
+        "recipe.yaml:5: models[0].categry: expected one of source, category, supercategory, count, name, "
+        "frames, clip, poses, up, forward, "
         "unit, centring, real_size, scale, confined; found 'categry'; did you mean 'category'?",
     ),
     (("count: 2", "count: two"), "recipe.yaml:4: models[0].count: expected a whole number; found 'two'"),

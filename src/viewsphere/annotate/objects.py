@@ -71,6 +71,7 @@ def annotate(
                 real_size=real_sizes[i] if real_sizes else _real_size(placement.model),
                 rle=Rle(camera.height, camera.width, rle_of_id(seen.ids, i + 1, (x0, y0, x1, y1))),
                 area=area,
+                track=placement.model.track,
                 visibility=visible,
                 truncation=truncated,
                 **_flat_boxes(camera, (float(x0), float(y0), float(x1), float(y1)), bounds[i], whole[i]),

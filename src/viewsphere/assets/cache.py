@@ -15,27 +15,32 @@ import os
 import shutil
 import tempfile
 import time
-from collections.abc import Callable, Generator, Iterable
+from collections.abc import Callable, Generator, Iterable, Sequence
 from contextlib import contextmanager, suppress
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+from typing import Any
 
 import platformdirs
 
 from viewsphere.assets import limits
 from viewsphere.assets.inside import split_source
-from viewsphere.assets.isolated import read_apart
+from viewsphere.assets.isolated import read_apart, read_frames_apart
 from viewsphere.assets.load import check_source
 from viewsphere.assets.mesh import Mesh
 from viewsphere.assets.mesh_file import read_mesh
 from viewsphere.assets.normalise import normalise
+from viewsphere.assets.parts import taken
 from viewsphere.assets.piece import FileFacts, extents
 from viewsphere.errors import ModelError
 from viewsphere.model.shot import ModelSpec
 
-SETTINGS = ("up", "forward", "unit", "centring", "scale", "real_size", "confined")
+SETTINGS = ("up", "forward", "unit", "centring", "scale", "real_size", "confined", "frame", "clip", "shown")
 ZOO = "zoo:"
 ASIDE = "reading-"
+BATCH = 32
+"""Most frames of a file that are read at once."""
+
 STALE_SECONDS = 86_400.0
 
 
@@ -54,6 +59,9 @@ def load(
     `cache_folder()`. A damaged entry is built again; a cache that cannot be written is no error. Read back, every
     array is equal bit for bit. Raises ModelError as the readers do and when reading takes too long or too much.
     """
+    if spec.parts is not None:
+        whole, facts = load(spec.whole, build, folder)
+        return taken(whole, spec), facts
     if spec.source.startswith(ZOO):
         raw, facts = load_zoo(spec, build)
         return normalise(raw, facts, spec), facts
@@ -73,6 +81,53 @@ def load(
         if first is not None:
             _store(folder, first, path, named, file)
     return mesh, facts
+
+
+def read_ahead(specs: Sequence[ModelSpec], folder: Path | None = None) -> None:
+    """Put what the cache lacks of these moments of one model, alike but for key and frame, into it: the file is opened once.
+
+    Raises ModelError as `load` does; a cache that cannot be written is no error.
+    """
+    folder = folder or cache_folder()
+    path, inside = split_source(Path(specs[0].source))
+    lacking: dict[int, str] = {}
+    with suppress(OSError):
+        for spec in specs:
+            first = _first_digest(path, inside, spec)
+            if spec.frame is not None and not _is_stored(folder, first, path):
+                lacking[spec.frame] = first
+    for frames in _batches(sorted(lacking)):
+        with _aside(folder) as place:
+            files, named = read_frames_apart(specs[0], frames, place)
+            for frame, file in zip(frames, files, strict=True):
+                _store(folder, lacking[frame], path, named, file)
+
+
+def kept(path: Path, about: str, ask: Callable[[], tuple[Any, Iterable[Path]]]) -> Any:
+    """What `ask` says of a file, plain data, and which files it read for it; from the cache as long as they stay the same."""
+    folder = cache_folder()
+    try:
+        with path.open("rb") as file:
+            own = hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError:
+        return ask()[0]
+    entry = folder / f"{hashlib.sha256(f'{_readers_digest()} {about} {path.name} {own}'.encode()).hexdigest()}.json"
+    with suppress(OSError, ValueError, TypeError, KeyError):
+        held = json.loads(entry.read_text(encoding="utf-8"))
+        if held["state"] == _second_digest(own, path, held["files"]):
+            return held["told"]
+    told, files = ask()
+    with suppress(OSError), _aside(folder) as place:
+        names = _names(path, files)
+        aside = place / "told.json"
+        aside.write_text(json.dumps({"told": told, "files": names, "state": _second_digest(own, path, names)}), "utf-8")
+        aside.replace(entry)
+    return told
+
+
+def _batches(frames: Sequence[int]) -> Iterable[Sequence[int]]:
+    """So many frames at once that what they leave on disk stays small, and opening the file counts for little."""
+    return (frames[i : i + BATCH] for i in range(0, len(frames), BATCH)) if len(frames) > 1 else ()
 
 
 @contextmanager
@@ -151,6 +206,14 @@ def _second_digest(first: str, path: Path, names: Iterable[str]) -> str:
     return digest.hexdigest()
 
 
+def _is_stored(folder: Path, first: str, path: Path) -> bool:
+    try:
+        names = json.loads((folder / f"{first}.json").read_text(encoding="utf-8"))
+        return (folder / f"{_second_digest(first, path, names)}.npz").is_file()
+    except (OSError, ValueError):
+        return False
+
+
 def _stored(folder: Path, first: str, path: Path) -> tuple[Mesh, FileFacts] | None:
     """The mesh in the cache and its facts, None when they are not there or damaged."""
     try:
@@ -160,10 +223,15 @@ def _stored(folder: Path, first: str, path: Path) -> tuple[Mesh, FileFacts] | No
         return None
 
 
+def _names(path: Path, files: Iterable[Path]) -> list[str]:
+    """Paths of files that a model depends on, from its own folder."""
+    root = os.path.realpath(path.parent)
+    return sorted({os.path.relpath(os.path.realpath(file), root).replace(os.sep, "/") for file in files})
+
+
 def _store(folder: Path, first: str, path: Path, files: Iterable[Path], mesh: Path) -> None:
     """Move a mesh's file into the cache; each of the two files appears whole or not at all."""
-    root = os.path.realpath(path.parent)
-    names = sorted({os.path.relpath(os.path.realpath(file), root).replace(os.sep, "/") for file in files})
+    names = _names(path, files)
     aside = mesh.with_name("files.json")
     with suppress(OSError):
         mesh.replace(folder / f"{_second_digest(first, path, names)}.npz")

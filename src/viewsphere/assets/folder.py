@@ -9,7 +9,7 @@ import os
 import re
 import warnings
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePosixPath
 from typing import Any
 from urllib.parse import unquote, unquote_to_bytes
@@ -35,7 +35,8 @@ class UnreadableError(Exception):
 class ModelFolder:
     """The folder of one model file while it is read.
 
-    `inside` is what of the file is meant (`inside.split_source`); `files` are all files read or looked for, the model itself
+    `inside` is what of the file is meant (`inside.split_source`); `shown` are objects of it that count though renders do not
+    show them; `files` are all files read or looked for, the model itself
     first; `warnings` what had to be left out, each naming the model's file; `images` the textures decoded so far, in order of
     first use.
     """
@@ -43,11 +44,17 @@ class ModelFolder:
     model: Path
     confined: bool = True
     inside: tuple[str, ...] = ()
+    shown: tuple[str, ...] = ()
+    clip: str | None = None
     files: list[Path] = field(default_factory=list[Path])
     warnings: list[str] = field(default_factory=list[str])
     images: list[Image] = field(default_factory=list[Image])
     _said: set[str] = field(default_factory=set[str])
     _indices: dict[str, int | None] = field(default_factory=dict[str, "int | None"])
+
+    def copy(self) -> ModelFolder:
+        """One that goes on from here, without images."""
+        return replace(self, files=[*self.files], warnings=[*self.warnings], images=[], _said={*self._said}, _indices={})
 
     def warn(self, message: str) -> None:
         """Add a warning, once, with the model's name before it."""

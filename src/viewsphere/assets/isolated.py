@@ -7,13 +7,14 @@ import os
 import signal
 import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from threading import Event, Timer
 from typing import Any
 
 from viewsphere.assets import limits
 from viewsphere.assets.load import BLENDER_SUFFIXES, check_source
-from viewsphere.assets.reader import MESH, OUTCOME, Job, read
+from viewsphere.assets.reader import OUTCOME, Job, mesh_name, read
 from viewsphere.errors import ModelError
 from viewsphere.model.shot import ModelSpec
 
@@ -31,14 +32,20 @@ def read_apart(spec: ModelSpec, folder: Path) -> tuple[Path, list[Path]]:
     Gives the file that `mesh_file.read_mesh` reads, and the files that the model named. Raises ModelError in one line:
     what the reader says of the file, or how its process came to its end (killed for time or memory, crashed).
     """
-    seconds = limits.from_environment("MAX_READ_SECONDS")
+    meshes, files = read_frames_apart(spec, () if spec.frame is None else (spec.frame,), folder)
+    return meshes[0], files
+
+
+def read_frames_apart(spec: ModelSpec, frames: Sequence[int], folder: Path) -> tuple[list[Path], list[Path]]:
+    """The same for frames of an animated file, which ascend: a mesh for each; for no frames, one of the file as it stands."""
     memory = int(limits.from_environment("MAX_READ_BYTES"))
-    by_blender = check_source(Path(spec.source)) in BLENDER_SUFFIXES
-    job = Job(spec.model_dump(mode="json"), str(folder), seconds, memory, os.getpid(), by_blender)
+    seconds = limits.from_environment("MAX_READ_SECONDS") * (1 + len(frames))
+    by_blender = bool(frames) or check_source(Path(spec.source)) in BLENDER_SUFFIXES
+    job = Job(spec.model_dump(mode="json"), str(folder), seconds, memory, os.getpid(), by_blender, tuple(frames))
     outcome = read(job) if os.environ.get(READ_HERE) == "1" else _run(job)
     if "error" in outcome:
         raise ModelError(outcome["error"])
-    return folder / MESH, [Path(file) for file in outcome["files"]]
+    return [folder / mesh_name(i) for i in range(max(len(frames), 1))], [Path(file) for file in outcome["files"]]
 
 
 def _run(job: Job) -> dict[str, Any]:

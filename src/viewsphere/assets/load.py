@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ from viewsphere.errors import ModelError
 SUFFIXES = ("3mf", "dae", "glb", "gltf", "obj", "off", "ply", "stl")
 BLENDER_SUFFIXES = ("abc", "blend", "fbx", "usd", "usda", "usdc", "usdz")
 """What only Blender reads."""
+ANIMATED_SUFFIXES = (*BLENDER_SUFFIXES, "glb", "gltf")
 PICTURE_SUFFIXES = ("bmp", "jpeg", "jpg", "png", "tif", "tiff", "webp")
 
 KNOWN = {
@@ -39,7 +41,7 @@ IN_BLENDER = {"x3d", "wrl"}
 """Those of them that Blender opens with an extension."""
 
 
-def load_model(path: Path, *, confined: bool = True) -> tuple[Mesh, FileFacts]:
+def load_model(path: Path, *, confined: bool = True, shown: tuple[str, ...] = ()) -> tuple[Mesh, FileFacts]:
     """Read a model file, in this process: its triangles in its own axes and unit, and what it says of these.
 
     | suffix    | up            | front        | unit                  | source                              |
@@ -56,7 +58,8 @@ def load_model(path: Path, *, confined: bool = True) -> tuple[Mesh, FileFacts]:
 
     COLLADA: Y_UP has its front at +z, Z_UP at -y, X_UP at +z. Others are FBX, USD, Alembic and .blend (`via_blender`), of
     which `file.blend/Object/NAME` and `file.blend/Collection/NAME` are parts. With `confined`, files that the model names
-    (textures, buffers, material libraries) are read only from its own folder and below. Raises ModelError in
+    (textures, buffers, material libraries) are read only from its own folder and below; `shown` are objects of a .blend file
+    that are read although renders do not show them. Raises ModelError in
     one line that names the file: missing, empty, truncated, not a model, no triangles, or more of them than
     `limits` allows.
     """
@@ -64,7 +67,32 @@ def load_model(path: Path, *, confined: bool = True) -> tuple[Mesh, FileFacts]:
     file, inside = split_source(path)
     # NaN and infinity are found and reported once the whole file is read.
     with np.errstate(all="ignore"):
-        return _read(ModelFolder(file, confined, inside), suffix)
+        return _read(ModelFolder(file, confined, inside, shown), suffix)
+
+
+def load_frames(
+    path: Path, frames: Sequence[int], *, confined: bool = True, shown: tuple[str, ...] = (), clip: str | None = None
+) -> Iterator[tuple[Mesh, FileFacts]]:
+    """A model file as it is at its first frame, then as at each of these, which ascend, by Blender, which opens it once.
+
+    `clip` names the animation that is played, where the file has several.
+
+    Otherwise as `load_model`; ModelError for files that cannot move.
+    """
+    check_animated(path)
+    file, inside = split_source(path)
+    from viewsphere.assets.via_blender import read_frames
+
+    with np.errstate(all="ignore"):
+        yield from read_frames(ModelFolder(file, confined, inside, shown, clip), frames)
+
+
+def check_animated(path: Path) -> str:
+    """The suffix of a file whose kind may hold an animation that is read; ModelError for another."""
+    suffix = check_source(path)
+    if suffix in ANIMATED_SUFFIXES:
+        return suffix
+    raise ModelError(f"{path}: expected a file that can move ({', '.join(ANIMATED_SUFFIXES)}) for frames, found {suffix}")
 
 
 def check_source(path: Path) -> str:

@@ -15,7 +15,7 @@ from viewsphere.model.shot import Axis, ModelSpec, Size
 PROPORTION_TOLERANCE = 0.1
 
 
-def normalise(mesh: Mesh, facts: FileFacts, spec: ModelSpec) -> Mesh:
+def normalise(mesh: Mesh, facts: FileFacts, spec: ModelSpec, first: tuple[Mesh, FileFacts] | None = None) -> Mesh:
     """The mesh in object axes and metres: turned, scaled and centred as the model's settings say.
 
     Axes: `spec.up` becomes +Z and `spec.forward` -Y, by an exact permutation and change of signs; unset ones
@@ -26,24 +26,14 @@ def normalise(mesh: Mesh, facts: FileFacts, spec: ModelSpec) -> Mesh:
     in x and y and its lowest point at z = 0; `as_is` keeps the file's own origin.
 
     Computed in float64, stored as float32; triangles come sorted by part and material, otherwise in the
-    file's order. Raises ModelError for parallel axes and for a result smaller or larger than `limits` allows.
+    file's order. `first`, what the file has at its first frame, is scaled and centred in the place of the mesh: what moves then
+    moves. Raises ModelError for parallel axes and for a result smaller or larger than `limits` allows.
     """
     turn = rotation(spec.up or facts.up, spec.forward or facts.forward, str(facts.path))
-    vertices = mesh.vertices.astype(np.float64) @ turn.T
-    low, high = np.sort(mesh.bounds @ turn.T, axis=0)
-    factor, warnings = _factor(high - low, facts, spec)
-    vertices *= factor
-    low, high = low * factor, high * factor
-    _check_size(float((high - low).max()), facts)
-    if spec.centring == "area":
-        center = _area_centroid(vertices, mesh)
-    elif spec.centring == "as_is":
-        center = np.zeros(3)
-    else:
-        center = (low + high) / 2
-        if spec.centring == "floor":
-            center[2] = low[2]
-    stored = (vertices - center).astype(np.float32)
+    still, origin = (mesh, facts.origin) if first is None else (first[0], first[1].origin)
+    factor, center, warnings = _placing(still, turn, facts, spec)
+    shift = factor * (np.subtract(facts.origin, origin) @ turn.T) - center
+    stored = (factor * (mesh.vertices.astype(np.float64) @ turn.T) + shift).astype(np.float32)
     order = np.lexsort((mesh.triangle_material, mesh.triangle_part))
     triangles = mesh.triangles[order]
     return replace(
@@ -55,6 +45,22 @@ def normalise(mesh: Mesh, facts: FileFacts, spec: ModelSpec) -> Mesh:
         triangle_part=mesh.triangle_part[order],
         warnings=mesh.warnings + warnings,
     )
+
+
+def _placing(mesh: Mesh, turn: Float, facts: FileFacts, spec: ModelSpec) -> tuple[float, Float, tuple[str, ...]]:
+    """Metres in one unit of the file, what lands on the origin (3,) in turned metres, and warnings."""
+    low, high = np.sort(mesh.bounds @ turn.T, axis=0)
+    factor, warnings = _factor(high - low, facts, spec)
+    low, high = low * factor, high * factor
+    _check_size(float((high - low).max()), facts)
+    if spec.centring == "area":
+        return factor, _area_centroid(factor * (mesh.vertices.astype(np.float64) @ turn.T), mesh), warnings
+    if spec.centring == "as_is":
+        return factor, np.zeros(3), warnings
+    center = (low + high) / 2
+    if spec.centring == "floor":
+        center[2] = low[2]
+    return factor, center, warnings
 
 
 def rotation(up: Axis, forward: Axis, where: str) -> Float:

@@ -121,7 +121,7 @@ def assemble(
     vertices = positions[used].astype(np.float32)
     part_used, part = np.unique(part, return_inverse=True)
     material_used, material = np.unique(material, return_inverse=True)
-    kept, images = _used_images([materials[i] for i in material_used], folder.images)
+    kept, images = used_images([materials[i] for i in material_used], folder.images)
     mesh = Mesh(
         vertices=vertices,
         triangles=triangles,
@@ -253,7 +253,7 @@ def face_normals(positions: Float, triangles: NDArray[np.integer]) -> Float:
     return np.cross(b - a, c - a)
 
 
-def _used_images(materials: Sequence[Material], images: Sequence[Image]) -> tuple[tuple[Material, ...], tuple[Image, ...]]:
+def used_images(materials: Sequence[Material], images: Sequence[Image]) -> tuple[tuple[Material, ...], tuple[Image, ...]]:
     """These materials and only the images they use, renumbered."""
     textures = [getattr(material, name) for material in materials for name in TEXTURE_FIELDS]
     used = sorted({texture.image for texture in textures if texture is not None})

@@ -11,13 +11,17 @@ import json
 import os
 import signal
 import sys
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from threading import Thread
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from viewsphere.errors import ModelError
+
+if TYPE_CHECKING:
+    from viewsphere.model.shot import ModelSpec
 
 MESH, OUTCOME = "mesh.npz", "outcome.json"
 
@@ -25,7 +29,7 @@ MESH, OUTCOME = "mesh.npz", "outcome.json"
 @dataclass(frozen=True)
 class Job:
     """What to read (a ModelSpec's fields), where the result goes, seconds, bytes, the asking process's id, and whether Blender
-    is what reads it.
+    is what reads it. `frames`, which ascend, are read instead of the one of the specification.
     """
 
     spec: dict[str, Any]
@@ -34,6 +38,7 @@ class Job:
     memory: int
     parent: int
     by_blender: bool = False
+    frames: tuple[int, ...] = ()
 
     def to_json(self) -> str:
         """One line of text."""
@@ -42,7 +47,8 @@ class Job:
 
 def main() -> None:
     """Read what the first argument says, write the result, end."""
-    job = Job(**json.loads(sys.argv[1]))
+    told = json.loads(sys.argv[1])
+    job = Job(**told | {"frames": tuple(told["frames"])})
     _end_with(job.parent)
     _limit(job)
     outcome = read(job)
@@ -56,15 +62,11 @@ def read(job: Job) -> dict[str, Any]:
 
     Whatever goes wrong in a reader becomes one line that names the model.
     """
-    from viewsphere.assets.load import load_model
-    from viewsphere.assets.mesh_file import write_mesh
-    from viewsphere.assets.normalise import normalise
     from viewsphere.model.shot import ModelSpec
 
     spec = ModelSpec.model_validate(job.spec)
     try:
-        raw, facts = load_model(Path(spec.source), confined=spec.confined)
-        write_mesh(Path(job.folder) / MESH, normalise(raw, facts, spec), facts)
+        files = _read_model(spec, job)
     except ModelError as error:
         return {"error": str(error)}
     except MemoryError:
@@ -76,7 +78,32 @@ def read(job: Job) -> dict[str, Any]:
     except Exception as error:
         said = " ".join(str(error).split())[:200]
         return {"error": f"{spec.source}: its reader failed ({type(error).__name__}: {said}): damaged?"}
-    return {"files": [str(file) for file in facts.files]}
+    return {"files": [str(file) for file in files]}
+
+
+def _read_model(spec: ModelSpec, job: Job) -> Sequence[Path]:
+    """Write the mesh, or one for each frame; the files that the model named."""
+    from viewsphere.assets.load import load_frames, load_model
+    from viewsphere.assets.mesh_file import write_mesh
+    from viewsphere.assets.normalise import normalise
+
+    folder, source = Path(job.folder), Path(spec.source)
+    if not job.frames:
+        raw, facts = load_model(source, confined=spec.confined, shown=spec.shown)
+        write_mesh(folder / MESH, normalise(raw, facts, spec), facts)
+        return facts.files
+    found = load_frames(source, job.frames, confined=spec.confined, shown=spec.shown, clip=spec.clip)
+    first = next(found)
+    files = dict.fromkeys(first[1].files)
+    for number, (raw, facts) in enumerate(found):
+        write_mesh(folder / mesh_name(number), normalise(raw, facts, spec, first), facts)
+        files |= dict.fromkeys(facts.files)
+    return tuple(files)
+
+
+def mesh_name(number: int) -> str:
+    """File of a job's frame of this number."""
+    return MESH if number == 0 else f"mesh{number}.npz"
 
 
 def _end_with(parent: int) -> None:

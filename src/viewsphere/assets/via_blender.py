@@ -1,4 +1,4 @@
-"""FBX, USD, Alembic and .blend files: Blender opens and evaluates them once, in a process of its own.
+"""FBX, USD, Alembic and .blend files, and frames of animated glTF: Blender opens and evaluates them, in a process of its own.
 
 Blender reads only the model's folder unless the model says `confined: false`, writes nowhere, runs no scripts and reaches no
 network. Textures are read here, like any other model's.
@@ -7,12 +7,13 @@ network. Textures are read here, like any other model's.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from viewsphere.assets import limits
 from viewsphere.assets.alpha import SOLID, with_alpha_modes
@@ -38,20 +39,53 @@ OPENED = re.compile(r"SdfLayer::FindOrOpen\('([^']+)'")
 UNOPENED = re.compile(r"Could not open asset @([^@]+)@")
 
 
+GLTF_FROM_BLENDER = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
+
+
 def read_via_blender(folder: ModelFolder) -> tuple[Mesh, FileFacts]:
     """The file as it would be rendered at its first frame, in Blender's axes (up +Z, front -Y) and metres.
 
     Of a .blend file, what `folder.inside` names: an object with its children, a collection, or all of it. One part an
     object, those that another one instances by both names. Raises ModelError in one line.
     """
+    return next(_read(folder, [None]))
+
+
+def read_frames(folder: ModelFolder, frames: Sequence[int]) -> Iterator[tuple[Mesh, FileFacts]]:
+    """The file as it would be rendered at its first frame, then at each of these, which ascend; opened once.
+
+    As `read_via_blender`, but for glTF, which keeps its own axes (up +Y, front +Z).
+    """
+    kind = folder.model.suffix[1:].lower()
+    for mesh, facts in _read(folder, [None, *frames], GLTF_FROM_BLENDER if kind in ("glb", "gltf") else None):
+        yield mesh, facts if kind not in ("glb", "gltf") else replace(facts, up="+y", forward="+z")
+
+
+def _read(
+    folder: ModelFolder, frames: Sequence[int | None], turn: NDArray[np.float64] | None = None
+) -> Iterator[tuple[Mesh, FileFacts]]:
+    """The file at each of the frames, turned."""
     kind = folder.model.suffix[1:].lower()
     _check_beginning(folder, kind, folder.read_model())
-    with _started(folder) as process:
-        told = _asked(folder, process, kind)
-        _check_layers(folder, process.log)
-        for warning in told["warnings"]:
-            folder.warn(warning)
-        return _built(folder, told, kind)
+    with started(folder) as process:
+        unit, after = 1.0, None
+        for frame in frames:
+            told = asked(
+                folder, process, "read", inside=folder.inside, most=limits.MAX_BLENDER_TRIANGLES, folder=str(process.folder),
+                frame=frame, after=after, shown=folder.shown, clip=folder.clip,
+            )  # fmt: skip
+            if after is None:
+                unit = float(told["unit"])
+                _check_layers(folder, process.log)
+                for warning in told["opened"]:
+                    folder.warn(warning)
+            after = int(told["frame"])
+            at_frame = folder.copy()
+            for warning in told["warnings"]:
+                at_frame.warn(warning)
+            yield _built(at_frame, told, FileFacts(folder.model, kind, "+z", "-y", unit), turn)
+            for file in process.folder.glob("piece*.npy"):
+                file.unlink()
 
 
 def _check_beginning(folder: ModelFolder, kind: str, data: bytes) -> None:
@@ -61,7 +95,8 @@ def _check_beginning(folder: ModelFolder, kind: str, data: bytes) -> None:
         raise folder.error("expected an Alembic file (Ogawa), found another kind or a part of one: truncated or damaged")
 
 
-def _started(folder: ModelFolder) -> BlenderProcess:
+def started(folder: ModelFolder) -> BlenderProcess:
+    """A Blender that reads what the folder may; ModelError when there is none."""
     try:
         python = find_blender()
     except MissingExtraError:
@@ -73,15 +108,13 @@ def _started(folder: ModelFolder) -> BlenderProcess:
     return BlenderProcess(python, readable=readable)
 
 
-def _asked(folder: ModelFolder, process: BlenderProcess, kind: str) -> dict[str, Any]:
+def asked(folder: ModelFolder, process: BlenderProcess, do: str, /, **told: Any) -> dict[str, Any]:
+    """What Blender answers to a request about the file; ModelError when it cannot."""
     root = str(folder.model.parent.resolve()) if folder.confined else None
     seconds = limits.from_environment("MAX_READ_SECONDS")
-    file = str(folder.model.resolve())
+    kind = folder.model.suffix[1:].lower()
     try:
-        return process.ask(
-            "read", seconds, file=file, kind=kind, inside=folder.inside, root=root, most=limits.MAX_BLENDER_TRIANGLES,
-            folder=str(process.folder),
-        )  # fmt: skip
+        return process.ask(do, seconds, file=str(folder.model.resolve()), kind=kind, root=root, **told)
     except BlenderError as error:
         said = str(error).partition(": ")[2].removesuffix(", see console for detail")
         raise folder.error(f"Blender cannot read it: {said}") from None
@@ -124,7 +157,9 @@ def _may_read(folder: ModelFolder, path: Path) -> bool:
     return not folder.confined or path.resolve().is_relative_to(folder.model.parent.resolve())
 
 
-def _built(folder: ModelFolder, told: Mapping[str, Any], kind: str) -> tuple[Mesh, FileFacts]:
+def _built(
+    folder: ModelFolder, told: Mapping[str, Any], facts: FileFacts, turn: NDArray[np.float64] | None
+) -> tuple[Mesh, FileFacts]:
     for file in told["files"]:
         _remember(folder, Path(file))
     used = {one["material"] for one in told["pieces"]} - {None}
@@ -141,14 +176,14 @@ def _built(folder: ModelFolder, told: Mapping[str, Any], kind: str) -> tuple[Mes
             materials.append(material)
         local.append(_piece(one, materials.index(material)))
     pieces = [
-        replace(moved(local[number], np.array(placed["matrix"])), part=placed["part"])
+        replace(moved(local[number], matrix if turn is None else turn @ matrix), part=placed["part"])
         for placed in told["placed"]
+        for matrix in (np.array(placed["matrix"]),)
         for number in placed["pieces"]
     ]
     if not pieces:
         why = f" ({folder.warnings[0].partition(': ')[2]})" if folder.warnings else ""
         raise folder.error(f"no triangles found that a render would show{why}; export the model as a mesh of faces")
-    facts = FileFacts(folder.model, kind, "+z", "-y", float(told["unit"]))
     return assemble(folder, pieces, _with_modes(pieces, materials, folder.images), facts)
 
 

@@ -53,19 +53,20 @@ class BlenderProcess:
     `python` is an interpreter that has bpy (`find_blender`). What Blender says is added to the file `log`, by default one
     that lasts as long as the process. Arrays and other files for Blender lie in `folder`, which lasts as long. One that is
     given folders as `readable` reads only what lies there, where the system can see to that (Linux 5.13 and later), and
-    ends with the thread that starts it; its `folder` is where this process keeps temporary files.
+    ends with the thread that starts it; its `folder` is where this process keeps temporary files. It works with this many
+    `threads`, 0 for one a core.
     """
 
-    def __init__(self, python: Path, log: Path | None = None, readable: Sequence[Path] | None = None) -> None:
+    def __init__(self, python: Path, log: Path | None = None, readable: Sequence[Path] | None = None, threads: int = 0) -> None:
         self.folder = _private_folder() if readable is None else Path(tempfile.mkdtemp(prefix=ASIDE))
         self.log = log or self.folder / "blender.log"
         self._put: list[Path] = []
-        bounds = [] if readable is None else [json.dumps([str(place) for place in readable])]
+        told = [json.dumps(None if readable is None else [str(place) for place in readable]), json.dumps(threads)]
         try:
             with self.log.open("ab") as noise:
                 self._log_start = noise.tell()
                 self._process = subprocess.Popen(
-                    [python, "-P", "-c", START.format(package=str(Path(__file__).parent)), self.folder, *bounds],
+                    [python, "-P", "-c", START.format(package=str(Path(__file__).parent)), self.folder, *told],
                     stdin=subprocess.PIPE,
                     stdout=subprocess.PIPE,
                     stderr=noise,

@@ -63,13 +63,15 @@ class RayCaster:
         self._owner = np.zeros(0, np.int64)
         self._middle = np.zeros(3)
         self._lowest = 0.0
+        self._last: tuple[str, float | None] = "", None
         self._complete = True
 
     def off_surface(self, sample: Sample) -> Iterator[str]:
         """What stored depth and instances say and the models, seen by Embree, do not.
 
         Each point must lie on the right object, and nothing that cannot be seen through may be in front of it; a point of the
-        background must lie on scenery, or on a ground at the lowest point of all; through empty pixels nothing may be seen.
+        background must lie on scenery, or on a ground at the lowest point of all (or lower, where the shot says so); through
+        empty pixels nothing may be seen.
         """
         if not sample.objects:
             return
@@ -116,8 +118,8 @@ class RayCaster:
             )
 
     def _build(self, sample: Sample) -> None:
-        scenery = self._scenery(sample.index)
-        key = [(o.key, o.world_from_object.tobytes()) for o in sample.objects], scenery
+        scenery, floor = self._scenery(sample.index), self._floor(sample.index)
+        key = [(o.key, o.world_from_object.tobytes()) for o in sample.objects], scenery, floor
         if key == self._key:
             return
         self._middle = np.mean([o.box3d.mean(axis=0) for o in sample.objects], axis=0)
@@ -130,14 +132,24 @@ class RayCaster:
         corners = np.concatenate([transform(world, soup.corners) - self._middle for _, world, soup in placed])
         opaque = np.concatenate([soup.opaque for _, _, soup in placed])
         self._owner = np.repeat([i for i, _, _ in placed], [len(soup.corners) for _, _, soup in placed])
-        self._lowest = float(corners[..., 2].min())
+        self._lowest = min(float(corners[..., 2].min()), np.inf if floor is None else floor - self._middle[2])
         self._all, self._solid = _scene(corners), _scene(corners[opaque])
         self._key = key
 
+    def _shot_key(self, frame: int) -> str:
+        return self._shots[bisect_right(self._shots, (frame, "\U0010ffff")) - 1][1]
+
     def _scenery(self, frame: int) -> SceneryRecord | None:
-        key = self._shots[bisect_right(self._shots, (frame, "\U0010ffff")) - 1][1]
-        text = self._dataset.store.scenery(key)
+        text = self._dataset.store.scenery(self._shot_key(frame))
         return SceneryRecord.model_validate_json(text) if text else None
+
+    def _floor(self, frame: int) -> float | None:
+        """How high the ground of a frame is at most; the last shot's is kept."""
+        key = self._shot_key(frame)
+        if key != self._last[0]:
+            shot = self._dataset.store.shot(key)
+            self._last = key, None if shot is None else shot.scene.floor
+        return self._last[1]
 
     def _exported(self, key: str) -> _Soup:
         soup = self._known.get(key) or _read(self._files[key])

@@ -23,24 +23,38 @@ def export(
         str | None,
         typer.Option("--format", "-f", help="Formats, with commas.", show_default=False, autocompletion=completion.formats),
     ] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", help="Folder for the formats' folders; default: the data set's.", show_default=False),
+    ] = None,
+    models: Annotated[
+        str | None,
+        typer.Option(help="Only frames of these models: keys or patterns, with commas; needs --output.", show_default=False),
+    ] = None,
+    frames: Annotated[
+        str | None,
+        typer.Option(help="Only these frames: numbers from 0 and ranges, such as 0-15,40; needs --output.", show_default=False),
+    ] = None,
     json_: AsJson = False,
 ) -> None:
-    """Write a finished or half-finished data set in other formats, without rendering."""
+    """Write a finished or half-finished data set, or some of its frames, in other formats, without rendering."""
     from viewsphere.run.generate import export as write_formats
+    from viewsphere.store import Choice, frame_ranges
 
     names = split(format_)
     if not names:
         from viewsphere import plugins
 
         raise UserError(f"--format: expected one or more of {', '.join(plugins.names('formats'))}; found none")
-    notes = write_formats(folder, names)
+    choice = Choice(split(models) or (), frame_ranges(frames or ""))
+    notes = write_formats(folder, names, output=output, choice=choice)
     if json_:
         print_json({"formats": list(names), "notes": list(notes)})
         return
     for note in notes:
         typer.echo(note)
     for name in names:
-        typer.echo(f"wrote {folder / name}")
+        typer.echo(f"wrote {(output or folder) / name}")
 
 
 def check(

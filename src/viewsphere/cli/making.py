@@ -113,6 +113,7 @@ def plan(
         "name": planned.recipe.name,
         "models": planned.models,
         "poses": planned.poses,
+        **({"time_steps": planned.time_steps} if planned.timings else {}),
         "frames": planned.frames,
     }
     if json_:

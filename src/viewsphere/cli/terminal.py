@@ -54,9 +54,7 @@ def print_json(value: object) -> None:
 def print_plan(planned: Plan) -> None:
     """Print the counts of a plan, and its warnings."""
     splits = ", ".join(f"{name} {count:,}" for name, count in planned.split_counts.items())
-    typer.echo(
-        f"{planned.recipe.name}: {planned.models:,} models x {planned.poses:,} poses = {planned.frames:,} frames ({splits})"
-    )
+    typer.echo(f"{planned.recipe.name}: {planned.factors} = {planned.frames:,} frames ({splits})")
     for warning in planned.warnings:
         typer.echo(f"warning: {warning}", err=True)
 

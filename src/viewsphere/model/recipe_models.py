@@ -9,6 +9,7 @@ from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
 
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.mistakes import nearest, shown
+from viewsphere.model.recipe_time import STEPS, Frames, Steps
 from viewsphere.model.recipe_values import Count, OrShort, Positive, shape_of
 from viewsphere.model.shot import Axis
 
@@ -105,12 +106,23 @@ class ModelEntry(Frozen):
         default=None,
         description="begins the models' keys: <name>_<file name>, or <name>_000, <name>_001, ... for the zoo",
     )
+    frames: Frames | None = Field(
+        default=None,
+        description="time steps of an animated file (abc, blend, fbx, glb, gltf, usd): all, a list of frames, or {first, last, "
+        "step}. Without it, the file as at its first frame",
+    )
+    clip: Annotated[str, Field(min_length=1)] | None = Field(
+        default=None,
+        description="with frames: the animation to play, where the file has several (actions, takes); by default its first",
+    )
+    poses: Steps = Field(default="each", description=f"with frames: {STEPS}")
     up: Axis | None = Field(default=None, description="the file's axis that points up; by default what its format says")
     forward: Axis | None = Field(default=None, description="the file's axis that the model's front faces")
     unit: Unit | None = Field(default=None, description="the file's unit: m, cm, mm, in, ft or the metres in one unit")
-    centring: Literal["box", "area", "floor"] = Field(
+    centring: Literal["box", "area", "floor", "as_is"] = Field(
         default="box",
-        description="what lands on the origin: the box's centre, the surface's centroid, or the centre of the box's bottom",
+        description="what lands on the origin: the box's centre, the surface's centroid, the centre of the box's bottom, or "
+        "as_is the file's own origin",
     )
     real_size: RealSize | None = Field(
         default=None,
@@ -139,6 +151,11 @@ class ModelEntry(Frozen):
             raise ValueError("expected a category, such as car; found none (only zoo families have one of their own)")
         if self.up and self.forward and self.up[1] == self.forward[1]:
             raise ValueError(f"expected up and forward along different axes; found {self.up} and {self.forward}")
+        if families and self.frames is not None:
+            raise ValueError("expected a file for frames; found the zoo, whose models do not move")
+        for name in ("poses", "clip"):
+            if self.frames is None and getattr(self, name) not in (None, "each"):
+                raise ValueError(f"expected frames, for {name}: {getattr(self, name)}; found none")
         if self.scale == "real_size" and self.real_size is None and not families:
             raise ValueError("expected real_size to be set, for scale: real_size; found none")
         return self

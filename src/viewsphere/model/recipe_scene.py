@@ -11,6 +11,7 @@ from viewsphere.geometry.camera import focal_from_fov, focal_from_sensor
 from viewsphere.model.camera import Distortion, Intrinsics
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.mistakes import at, shown
+from viewsphere.model.recipe_blend import BlendField
 from viewsphere.model.recipe_draws import Drawn, alternatives, is_random
 from viewsphere.model.recipe_finish import (
     BackgroundEntry,
@@ -22,12 +23,14 @@ from viewsphere.model.recipe_finish import (
     ViewEntry,
     ViewField,
 )
-from viewsphere.model.recipe_light import SKY_SUFFIXES, GradientEntry, HdriSky, LightsField, SkyField, SunField
+from viewsphere.model.recipe_light import SKY_SUFFIXES, GradientEntry, HdriSky, HemisphereEntry, LightsField, SkyField, SunField
 from viewsphere.model.recipe_scenery import CompanyField, Draw, PlaceField, PlanesField
 from viewsphere.model.recipe_surface import GroundEntry, GroundField, MaterialEntry
 from viewsphere.model.recipe_values import Count, Number, OrShort, Positive, pair
 
 LARGEST_IMAGE = 16384
+OF_FILE = ("place", "sun", "sky", "ground")
+"""What a .blend file brings with it."""
 LENSES = ("fov_deg", "focal_px", "focal_mm", "K", "of_viewpoints")
 
 Row = tuple[Number, Number, Number]
@@ -123,6 +126,11 @@ class SceneEntry(Frozen):
     place: PlaceField = Field(
         default=None, description="where the targets stand: zoo:neighbourhood, a model file, or a mapping of source and more"
     )
+    blend: BlendField = Field(
+        default=None,
+        description="a .blend file around the targets, rendered as it is by engine: cycles: its path, or a mapping of file, "
+        "at, labels, variants and more",
+    )
     company: CompanyField = Field(
         default=None, description="how many other models of the same split stand beside each, or a mapping of count and layout"
     )
@@ -169,7 +177,21 @@ class SceneEntry(Frozen):
                     "expected none, box or gaussian beside background: transparent; found poisson, which takes the border's "
                     "colours from a background: choose another, or give a background"
                 )
+        self._check_blend()
         return self
+
+    def _check_blend(self) -> None:
+        if self.blend is None:
+            return
+        for name in OF_FILE:
+            given = getattr(self, name)
+            if given != type(self).model_fields[name].default and (name, given) != ("ground", "off"):
+                with at(name):
+                    raise ValueError(f"expected no {name} beside blend, whose file has its own; found one: leave it out")
+        for i, lamp in enumerate(self.lights):
+            if isinstance(lamp, HemisphereEntry):
+                with at("lights", i):
+                    raise ValueError("expected a lamp beside blend, whose file has its own sky; found hemisphere: leave it out")
 
     @property
     def backgrounds(self) -> tuple[BackgroundEntry, ...]:
@@ -179,6 +201,8 @@ class SceneEntry(Frozen):
     @property
     def automatic_ground(self) -> Literal["on", "off", "catcher"]:
         """What `ground: auto` means."""
+        if self.blend is not None:
+            return "off"
         if any(entry.environment for entry in self.backgrounds):
             return "catcher"
         return "on" if all(entry.is_sky for entry in self.backgrounds) else "off"
@@ -193,12 +217,14 @@ class SceneEntry(Frozen):
     @property
     def is_composed(self) -> bool:
         """Whether there is more than one model and the ground: then world z = 0 is the floor that all stand on."""
-        return bool(self.place or self.company or self.planes)
+        return bool(self.place or self.blend or self.company or self.planes)
 
     @property
     def is_moved_each_frame(self) -> bool:
         """Whether what stands around is drawn for every frame."""
         drawn = (self.place, self.company, *self.planes)
+        if self.blend is not None and self.blend.is_drawn_per_frame:
+            return True
         return any(entry is not None and entry.draw == "per_frame" for entry in drawn)
 
     @property
@@ -215,8 +241,9 @@ class SceneEntry(Frozen):
     @property
     def has_fixed_scenery(self) -> bool:
         """Whether there is a place or planes, the same for all models."""
-        drawn = (self.place, *self.planes)
-        return any(drawn) and not any(entry is not None and entry.draw != "fixed" for entry in drawn)
+        variants = () if self.blend is None else self.blend.variants.values()
+        drawn = [entry for entry in (self.place, *self.planes, *variants) if entry is not None]
+        return bool(drawn or self.blend) and all(entry.draw == "fixed" for entry in drawn)
 
 
 class EngineEntry(Frozen):

@@ -8,6 +8,7 @@ from pydantic import Discriminator, Field, Tag, field_validator, model_validator
 
 from viewsphere.geometry.pose_category import pose_category
 from viewsphere.model.frozen import Frozen
+from viewsphere.model.recipe_time import Frames
 from viewsphere.model.recipe_values import Count, Interval, Number, Point, Positive, Range, Values
 from viewsphere.model.shot import Axis
 
@@ -56,9 +57,10 @@ def _in_reach(low: float, high: float) -> None:
 class _Aimed(Frozen):
     """What all kinds of viewpoints have."""
 
-    target: Literal["center"] | Point = Field(
+    target: Literal["center", "follow"] | Point = Field(
         default="center",
-        description="what the camera looks at: the centre of the model's box, or a point [x, y, z] in metres",
+        description="what the camera looks at: the centre of the model's box, or a point [x, y, z] in metres. An animated "
+        "model's centre is that of the first frame; follow goes with it",
     )
     bins: Positive = Field(
         default=45.0,
@@ -68,8 +70,8 @@ class _Aimed(Frozen):
     @field_validator("target", mode="before")
     @classmethod
     def _target(cls, value: Any) -> Any:
-        if value != "center" and not (isinstance(value, (list, tuple)) and len(value) == 3):
-            raise ValueError(f"expected center or [x, y, z]; found {value!r}")
+        if value not in ("center", "follow") and not (isinstance(value, (list, tuple)) and len(value) == 3):
+            raise ValueError(f"expected center, follow or [x, y, z]; found {value!r}")
         return value
 
     @field_validator("bins")
@@ -201,10 +203,29 @@ class PoseList(_Aimed):
 
     kind: Literal["file"] = Field(description="from a file")
     path: Annotated[str, Field(min_length=1)] = Field(description="the file, or COLMAP's folder")
-    format: Literal["auto", "csv", "view", "tum", "kitti", "nerfstudio", "colmap"] = Field(
-        default="auto", description="auto: by the file's ending, and by the numbers in its first line"
+    format: Literal["auto", "csv", "view", "tum", "kitti", "nerfstudio", "colmap", "cameras"] = Field(
+        default="auto", description="auto: by the file's ending, and by the numbers in its first line; cameras: of a 3D file"
     )
     every: Count = Field(default=1, description="take every n-th pose")
+    camera: Annotated[str, Field(min_length=1)] | None = Field(
+        default=None, description="3D files: name of the camera; by default the scene's, or the only one"
+    )
+    frames: Frames | None = Field(
+        default=None, description="3D files: when: all, a list of frames, or {first, last, step}; by default the first frame"
+    )
+    clip: Annotated[str, Field(min_length=1)] | None = Field(
+        default=None, description="3D files: the animation to play, where the file has several; by default its first"
+    )
+    at: Annotated[str, Field(min_length=1)] | None = Field(
+        default=None,
+        description="3D files: an object whose place and turn (at the first frame) become the world's, as scene.blend.at",
+    )
+    size: tuple[Annotated[Count, Field(le=16384)], Annotated[Count, Field(le=16384)]] | None = Field(
+        default=None, description="3D files: [width, height] of the camera's picture in pixels; by default the scene's"
+    )
+    confined: bool = Field(
+        default=True, strict=True, description="3D files: whether what the file names has to stay in its folder"
+    )
     origin: Point = Field(default=(0.0, 0.0, 0.0), description="motions: where the models stand, in the file's world and unit")
     scale: Positive = Field(default=1.0, description="motions: metres in one unit of the file")
     up: Axis | None = Field(default=None, description="motions: the file's axis that points up; default: the format's")
@@ -218,6 +239,12 @@ class PoseList(_Aimed):
         if self.up and self.forward and self.up[1] == self.forward[1]:
             raise ValueError(f"expected up and forward at right angles; found up {self.up} and forward {self.forward}")
         return self
+
+    @property
+    def of_cameras(self) -> dict[str, object]:
+        """What only cameras of 3D files have, as far as it is given."""
+        names = ("camera", "frames", "clip", "at", "size")
+        return {name: value for name in names if (value := getattr(self, name)) is not None}
 
 
 def _kind(value: Any) -> Any:

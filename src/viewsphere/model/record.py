@@ -81,6 +81,8 @@ def _object_to_record(annotation: ObjectAnnotation) -> dict[str, Any]:
         record[name] = _without_nan(record[name])
     if annotation.source is None:
         del record["source"]
+    if not annotation.track:
+        del record["track"]
     return record
 
 

@@ -55,6 +55,9 @@ class ObjectAnnotation:
     visib_fract, on a canvas of three times the image's width and height); `truncation` is the share of the
     latter outside the image.
 
+    Of an animated model, `key` and all that is said of the model are those of the frame's moment; `track` is the key of the
+    model that stays itself, else empty.
+
     An object of an imported data set has `source`, its annotation there; what that does not say is NaN, and its
     key and model may be empty. Where it says no mask, the mask is empty, but `box2d` and `area` are the source's.
     """
@@ -85,6 +88,7 @@ class ObjectAnnotation:
     visibility: float
     truncation: float
     source: Mapping[str, Any] | None = None
+    track: str = ""
 
     @property
     def is_placed(self) -> bool:

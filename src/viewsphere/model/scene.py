@@ -12,6 +12,8 @@ from pydantic import Field
 from viewsphere.model.frozen import Frozen
 
 Vector = tuple[float, float, float]
+Row = tuple[float, float, float, float]
+Matrix4 = tuple[Row, Row, Row, Row]
 Component = Annotated[float, Field(ge=0)]
 Color = tuple[Component, Component, Component]
 Share = Annotated[float, Field(ge=0, le=1)]
@@ -114,7 +116,7 @@ class Ground(Frozen):
     A catcher shows nothing but the shadows and the occlusion it receives.
     """
 
-    color: Color = (0.42, 0.41, 0.39)  # sRGB 0..1; multiplies the image
+    color: Color = (0.56, 0.55, 0.53)  # sRGB 0..1; multiplies the image
     image: str | None = None  # absolute path, sRGB
     roughness: Share = 1.0
     roughness_image: str | None = None
@@ -191,11 +193,31 @@ class Finish(Frozen):
     effects: Effects = Effects()
 
 
+class BlendScene(Frozen):
+    """A .blend file whose scene is rendered as it is; what of it is labelled are placements of the shot.
+
+    `world_from_file` is rigid and in metres on both sides; `unit` is the metres in one unit of the file. `shown` are objects
+    that are rendered although the file hides them, `hidden` those that are not. Without light of its own (`is_lit`) the
+    scene's sun and sky light it.
+    """
+
+    file: str  # absolute path
+    world_from_file: Matrix4 = ((1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1))
+    unit: float = Field(default=1.0, gt=0)
+    shown: tuple[str, ...] = ()
+    hidden: tuple[str, ...] = ()
+    is_lit: bool = True
+    frame: int | None = None  # the file's; None: its first
+    confined: bool = True  # textures and libraries may not lie outside of its folder
+
+
 class Scene(Frozen):
-    """Light, ground and finish; None for `sun` or `ground` means there is none."""
+    """Light, ground and finish; None for `sun` or `ground` means there is none. `blend` has its own light and ground."""
 
     sun: Sun | None = Sun()
     sky: AnySky = Sky()
     lights: tuple[AnyLight, ...] = ()
     ground: Ground | None = None
+    floor: float | None = None  # metres: the ground is at most this high, where something moves
     finish: Finish = Finish()
+    blend: BlendScene | None = None

@@ -9,23 +9,30 @@ from pydantic import Field, JsonValue
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.files import Files
 from viewsphere.model.frozen import Frozen
-from viewsphere.model.scene import Color, Finish, Scene, Vector
+from viewsphere.model.scene import Color, Finish, Matrix4, Scene, Vector
 
 Axis = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
 Size = tuple[float, float, float]  # width along X, height along Z, length along Y, metres
-Matrix4 = tuple[
-    tuple[float, float, float, float],
-    tuple[float, float, float, float],
-    tuple[float, float, float, float],
-    tuple[float, float, float, float],
-]
+
+
+class Parts(Frozen):
+    """What is taken of a model that was read: the parts of the objects in `only` (None: all) but for those in `without`.
+
+    An object's parts are its own and those that it instances: of `Car` these are `Car` and `Car/Wheel`. They stand in the
+    rigid axes `file_from_axes` (metres) of the whole model's.
+    """
+
+    only: tuple[str, ...] | None = None
+    without: tuple[str, ...] = ()
+    file_from_axes: Matrix4 = ((1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1))
 
 
 class ModelSpec(Frozen):
     """Which model, and how its file is turned into an object that faces -Y with +Z up, in metres.
 
     `source` is a file's absolute path, or `zoo:<family>` with `seed` naming the draw. None for `up`, `forward` or
-    `unit` means what the file (or its format's specification) says.
+    `unit` means what the file (or its format's specification) says. At a later `frame` a model is turned, scaled and
+    centred as it is at its file's first.
     """
 
     key: str  # unique and stable in the data set: also the name of its folder
@@ -41,6 +48,17 @@ class ModelSpec(Frozen):
     scale: Literal["as_is", "real_size"] | float = "as_is"  # a number: metres from front to back
     real_size: Size | Literal["file"] | None = None  # "file": the size the file has, before any scaling
     confined: bool = True  # texture and buffer paths may not leave the model's folder
+    frame: int | None = None  # of an animated file, which Blender then reads; None: the first, by which it is also placed
+    clip: str | None = None  # name of the animation that is played, where the file has several; with a frame
+    track: str = ""  # key of the animated model that this is at a moment: what stays itself over time
+    shown: tuple[str, ...] = ()  # objects of a .blend file that are read although renders do not show them
+    parts: Parts | None = None  # what is taken of it, when it is read and normalised
+
+    @property
+    def whole(self) -> ModelSpec:
+        """The model that this one is a part of: equal for all parts of one."""
+        unnamed = {"key": "", "category": "", "supercategory": "", "category_id": 0, "track": "", "parts": None}
+        return self.model_copy(update=unnamed)
 
 
 class Repaint(Frozen):
@@ -68,8 +86,15 @@ class Placement(Frozen):
     repaints: tuple[Repaint, ...] = ()  # the last that matches a material counts
 
 
+class Moment(Frozen):
+    """A time step: a frame of an animated file, and the seconds since that file's first frame."""
+
+    frame: int
+    seconds: float
+
+
 class Pose(Frozen):
-    """One viewpoint: camera on a sphere around `target` (world metres; None: the box centre of object 1)."""
+    """One viewpoint: camera on a sphere around `target` (world metres; None: the box centre of object 1), and when."""
 
     index: int
     azimuth_deg: float
@@ -78,6 +103,7 @@ class Pose(Frozen):
     tilt_deg: float = 0.0
     target: Vector | None = None
     category: str = ""  # named bin: front, front-left, ..., top
+    time: Moment | None = None  # where something is animated
 
 
 class Frame(Frozen):

@@ -124,12 +124,12 @@ def _export(store: Store, formats: Sequence[str], stopwatch: _Stopwatch) -> floa
 def _spread(planned: Plan) -> dict[int, list[int]]:
     """Models, evenly over the plan, and the indices of some shots of each: together evenly over the poses."""
     models = min(MODELS, planned.models)
-    each = planned.shot_count // planned.models
     chosen: dict[int, list[int]] = {}
     for i in range(models):
         model = i * (planned.models - 1) // max(models - 1, 1)
-        parts = {int((i * SHOTS_PER_MODEL + k + 1) * GOLDEN % 1 * each) for k in range(SHOTS_PER_MODEL)}
-        chosen[model] = [model * each + part for part in sorted(parts)]
+        shots = planned.shots_of(model)
+        parts = {int((i * SHOTS_PER_MODEL + k + 1) * GOLDEN % 1 * len(shots)) for k in range(SHOTS_PER_MODEL)}
+        chosen[model] = [shots[part] for part in sorted(parts)]
     return chosen
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import time
+from collections import defaultdict
 from collections.abc import Callable, Container, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -12,17 +13,18 @@ from viewsphere import plugins
 from viewsphere.errors import ModelError, RecipeError, UserError, ViewsphereError
 from viewsphere.model.channel import missing
 from viewsphere.model.recipe import Recipe
+from viewsphere.model.shot import ModelSpec
 from viewsphere.run.opening import commit, to_append, to_render
 from viewsphere.run.pool import Job, Outcome, run_jobs
 from viewsphere.run.skies import check_skies
 from viewsphere.run.stages import Stages, StoredBoxes, prepare
-from viewsphere.run.tasks import Kind, Task
+from viewsphere.run.tasks import MODELS, Kind, Task
 from viewsphere.run.unpainted import unpainted
 from viewsphere.run.warm import compile_kernels
 from viewsphere.sampling.composition import BoxOf
 from viewsphere.sampling.extension import Portion
 from viewsphere.sampling.plan import Plan
-from viewsphere.store import Dataset, ShotRow, Store
+from viewsphere.store import Choice, Dataset, ShotRow, Store, new_folder
 
 
 @dataclass(frozen=True)
@@ -108,8 +110,10 @@ def generate(
 
 
 def _check_channels(name: str, channels: Sequence[str]) -> None:
-    """Raises UserError for a format that is not known, or that needs a channel which is not kept."""
-    needed: Sequence[str] = getattr(plugins.load("formats", name), "CHANNELS", ())
+    """Raises UserError for a format that is not known, does not work here, or needs a channel which is not kept."""
+    module = plugins.load("formats", name)
+    getattr(module, "check", lambda: None)()
+    needed: Sequence[str] = getattr(module, "CHANNELS", ())
     lacking = missing(needed, channels)
     if lacking:
         raise RecipeError(
@@ -148,8 +152,7 @@ def _render_part(portion: Portion, store: Store, workers: int, keep_going: bool,
 def _prepare_models(portion: Portion, store: Store, workers: int, keep_going: bool, tell: Listener) -> dict[str, str]:
     """Normalise and export every model; gives the keys left out, and why."""
     planned = portion.plan
-    kind: Kind = "same model" if portion.number else "model"
-    jobs = [Job(m.key, m.key, lambda m=m: Task(kind, m.key, m.key, m.model_dump_json())) for m in portion.model_specs]
+    jobs = _model_jobs("same model" if portion.number else "model", portion.model_specs)
     total = len(jobs)
     failed: dict[str, ViewsphereError] = {}
     tell(Progress("models", 0, total))
@@ -166,10 +169,21 @@ def _prepare_models(portion: Portion, store: Store, workers: int, keep_going: bo
     return {key: str(error) for key, error in failed.items()}
 
 
+def _model_jobs(kind: Kind, specs: Sequence[ModelSpec]) -> list[Job]:
+    """A job for each model, with its moments."""
+    groups: defaultdict[str, list[ModelSpec]] = defaultdict(list)
+    for spec in specs:
+        groups[spec.track or spec.key].append(spec)
+    return [
+        Job(key, key, lambda key=key, group=group: Task(kind, key, key, MODELS.dump_json(tuple(group)).decode()))
+        for key, group in groups.items()
+    ]
+
+
 def _compare_models(portion: Portion, store: Store, workers: int) -> None:
     """Raises StoreError where a model is no longer the one that the data set shows."""
     specs = [spec for spec in portion.model_specs if store.model_info(spec.key) is not None]
-    jobs = [Job(m.key, m.key, lambda m=m: Task("same model", m.key, m.key, m.model_dump_json())) for m in specs]
+    jobs = _model_jobs("same model", specs)
     errors = [outcome.error for outcome in run_jobs(jobs, store.root, min(workers, len(jobs))) if outcome.error]
     if errors:
         raise _joined(errors)
@@ -250,25 +264,46 @@ def _note_skipped(portion: Portion, store: Store, skipped: dict[str, str]) -> No
     """Keep what was left out, of other parts too."""
     own = {spec.key for spec in portion.model_specs} | {key for key, _, _ in portion.shot_table()}
     others = {key: why for key, why in store.skipped().items() if key not in own} if portion.number else {}
-    store.write_file("skipped.json", json.dumps(others | skipped, indent=1, sort_keys=True))
+    moments = {spec.key: skipped[spec.track] for spec in portion.model_specs if spec.track in skipped}
+    store.write_file("skipped.json", json.dumps(others | moments | skipped, indent=1, sort_keys=True))
 
 
-def export(out: Path | str, formats: Sequence[str], *, listener: Listener | None = None) -> tuple[str, ...]:
-    """Write the finished frames of a data set in these formats, each to OUT/<format>; gives notes for the user.
+def _check_choice(dataset: Dataset, is_own: bool) -> None:
+    """Raise UserError for a choice that would take the place of an export of everything, or that leaves nothing."""
+    if dataset.choice.is_some and is_own:
+        raise UserError("--output: expected another folder than the data set's, beside --models or --frames; found none")
+    if dataset.choice.is_some and not len(dataset):
+        raise UserError(f"{dataset.root}: expected finished frames that --models and --frames fit; found none")
 
-    An older export of the same format is replaced only when the new one is whole. Raises UserError for an unknown format,
-    StoreError if `out` is no data set or cannot be written.
+
+def export(
+    out: Path | str,
+    formats: Sequence[str],
+    *,
+    output: Path | str | None = None,
+    choice: Choice | None = None,
+    listener: Listener | None = None,
+) -> tuple[str, ...]:
+    """Write the finished frames of a data set in these formats, each to OUT/<format>, or OUTPUT/<format>; gives notes for the
+    user.
+
+    An older export of the same format is replaced only when the new one is whole; one of all frames is not replaced by a
+    choice of them. Raises UserError for an unknown format or a choice without output or frames, StoreError if `out` is no data
+    set or one of the folders cannot be written.
     """
     tell = listener or _unheard
-    dataset = Dataset(out)
+    dataset = Dataset(out, choice)
+    place = dataset.root if output is None else Path(output)
+    is_own = place.resolve() == dataset.root.resolve()
+    _check_choice(dataset, is_own)
+    notes: list[str] = []
     for done, name in enumerate(formats):
         tell(Progress("exports", done, len(formats)))
         writer: plugins.Format = plugins.load("formats", name)
-        target = dataset.root / name
-        with dataset.store.replacing(target) as folder:
-            writer.export(dataset, folder)
+        with dataset.store.replacing(dataset.root / name) if is_own else new_folder(place / name) as folder:
+            notes += writer.export(dataset, folder) or ()
     tell(Progress("exports", len(formats), len(formats)))
     kinds = dataset.link_kinds - {"hard link"}
-    return tuple(
+    return tuple(dict.fromkeys(notes)) + tuple(
         f"{dataset.root}: files of the exports are made as a {kind}, hard links do not work here" for kind in sorted(kinds)
     )

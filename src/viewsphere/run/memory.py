@@ -15,10 +15,9 @@ def render(recipe: Recipe) -> Iterator[Sample]:
     Raises UserError for the user's mistakes, as soon as they are met.
     """
     planned = prepare(recipe)
-    stages, last = Stages(), None
-    for shot in planned.shots(stages.box):
-        spec = shot.placements[0].model
-        if spec is not last:
-            stages.check_distances(planned, spec)
-        last = spec
-        yield from stages.render(shot)
+    stages = Stages()
+    for model, spec in enumerate(planned.model_specs):
+        stages.read_ahead(planned, spec)
+        stages.check_distances(planned, spec)
+        for index in planned.shots_of(model):
+            yield from stages.render(planned.shot(index, stages.box))

@@ -262,8 +262,8 @@ def _link_frames(source: _Source, store: Store, record: PlanRecord, listener: Li
     for key, first, count in source.shots:
         start = first - source.first_frame
         if not store.has_shot(key):
-            scenery = source.dataset.store.scenery(key.partition("~")[2])
-            link_shot(store, key, (_renumbered(source, source.dataset[start + i], first + i) for i in range(count)), scenery)
+            known = source.dataset.store.known_of(key.partition("~")[2])
+            link_shot(store, key, (_renumbered(source, source.dataset[start + i], first + i) for i in range(count)), known)
         if listener:
             listener(Progress("frames", first + count, record.frames))
 

@@ -9,8 +9,9 @@ import numpy as np
 
 from viewsphere import plugins
 from viewsphere.annotate import annotate
-from viewsphere.assets.cache import load_normalised
+from viewsphere.assets.cache import load_normalised, read_ahead
 from viewsphere.assets.mesh import Mesh
+from viewsphere.assets.parts import taken
 from viewsphere.errors import ModelError, RecipeError
 from viewsphere.geometry.box import box_size, box_vertices
 from viewsphere.geometry.rotation import transform
@@ -88,7 +89,7 @@ class Stages:
     def model(self, spec: ModelSpec) -> Mesh:
         """The normalised model; raises ModelError if its file cannot be used."""
         name = spec.model_dump_json()
-        mesh = self._models.pop(name, None) or load_normalised(spec, build_zoo_model)
+        mesh = self._models.pop(name, None) or self._loaded(spec)
         self._models[name] = mesh  # the last used comes last
         if name not in self._boxes:
             self._boxes[name] = box_vertices(*mesh.bounds)
@@ -96,6 +97,10 @@ class Stages:
         while held > WARM_BYTES and len(self._models) > 1:
             held -= _size(self._models.pop(next(iter(self._models))))
         return mesh
+
+    def _loaded(self, spec: ModelSpec) -> Mesh:
+        """Many may be parts of one model, which is loaded once."""
+        return load_normalised(spec, build_zoo_model) if spec.parts is None else taken(self.model(spec.whole), spec)
 
     def box(self, spec: ModelSpec) -> Float:
         """The 3D box (8, 3) of the normalised model in its own axes; raises ModelError if its file cannot be used."""
@@ -112,6 +117,12 @@ class Stages:
         if name not in self._sizes:
             self._sizes[name] = box_size(self.box(spec.model_copy(update={"scale": "as_is"})))
         return self._sizes[name]
+
+    def read_ahead(self, planned: Plan, spec: ModelSpec) -> None:
+        """Read all moments of a model of the plan at once, where it moves, instead of one after another."""
+        moments = planned.moments_of(spec)
+        if moments:
+            read_ahead((spec, *moments))
 
     def check_distances(self, planned: Plan, spec: ModelSpec) -> None:
         """Raise RecipeError if a pose's camera would stand inside this model, or one that stands beside it."""

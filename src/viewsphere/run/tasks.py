@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Literal
 
+from pydantic import TypeAdapter
+
+from viewsphere.assets.cache import read_ahead
 from viewsphere.assets.export import export_glb, export_obj
 from viewsphere.assets.mesh import Mesh
 from viewsphere.errors import StoreError
@@ -16,13 +20,15 @@ from viewsphere.model.shot import ModelSpec, Placement, Shot
 from viewsphere.run.stages import Stages, model_files
 from viewsphere.store import ModelInfo, Store
 
+MODELS = TypeAdapter(tuple[ModelSpec, ...])
+
 Kind = Literal["model", "same model", "shot"]
 
 
 @dataclass(frozen=True)
 class Task:
-    """A model or a shot as JSON; "same model" has to be what the store holds, if it is there. Tasks of one `affinity` share a
-    warm stage.
+    """A model, with its moments behind it, or a shot as JSON; "same model" has to be what the store holds, if it is there.
+    Tasks of one `affinity` share a warm stage.
     """
 
     kind: Kind
@@ -49,10 +55,10 @@ class Worker:
     def do(self, task: Task) -> int:
         """Do one task; gives the number of frames it made."""
         if task.kind != "shot":
-            self.make_model(ModelSpec.model_validate_json(task.payload), trusted=task.kind == "model")
+            self.make_models(MODELS.validate_json(task.payload), trusted=task.kind == "model")
             return 0
         shot = Shot.model_validate_json(task.payload)
-        return self.store.write_shot(shot.key, self.stages.render(shot), self._scenery(shot), shot.files)
+        return self.store.write_shot(shot.key, self.stages.render(shot), self._scenery(shot), shot.files, shot)
 
     def _scenery(self, shot: Shot) -> str:
         """What is background in a shot, and digests of its meshes, as `SceneryRecord` reads it; empty if nothing is."""
@@ -62,6 +68,13 @@ class Worker:
                 self._digests[spec.key] = mesh_digest(self.stages.model(spec))
         digests = {p.model.key: self._digests[p.model.key] for p in placements}
         return SceneryRecord(placements=placements, digests=digests).model_dump_json() if placements else ""
+
+    def make_models(self, specs: Sequence[ModelSpec], trusted: bool = True) -> None:
+        """Make a model, and its moments behind it, as `make_model` does."""
+        if len(specs) > 1 and specs[0].parts is None:
+            read_ahead(specs)
+        for spec in specs:
+            self.make_model(spec, trusted)
 
     def make_model(self, spec: ModelSpec, trusted: bool = True) -> None:
         """Normalise a model and export it into the store, or see that the one there is the same.

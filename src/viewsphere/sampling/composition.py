@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cache, cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,7 @@ from viewsphere.model.recipe import Recipe
 from viewsphere.model.recipe_scenery import Labels
 from viewsphere.model.scene import Vector
 from viewsphere.model.shot import ModelSpec, Placement
+from viewsphere.sampling.blend_scene import BlendScenery
 from viewsphere.sampling.company import Names, companions, footprint, layout, standing
 from viewsphere.sampling.scenery import (
     Piece,
@@ -27,6 +28,7 @@ from viewsphere.sampling.scenery import (
     plane_pieces,
     plane_spec,
 )
+from viewsphere.sampling.viewpoints import Poses
 from viewsphere.store import Category
 
 BoxOf = Callable[[ModelSpec], NDArray[np.float64]]
@@ -45,6 +47,7 @@ class Composition:
     groups: dict[str, tuple[ModelSpec, ...]]  # model key -> those of its split
     images: tuple[tuple[str, ...], ...]
     recipe_categories: tuple[Category, ...]
+    blend: BlendScenery | None = None
 
     @cached_property
     def categories(self) -> tuple[Category, ...]:
@@ -62,6 +65,8 @@ class Composition:
                 yield from (piece.category for piece in laid)
             if not place.name:
                 yield place.category
+        if self.blend is not None:
+            yield from (one.category for one in self.blend.labelled)
         yield from (entry.category for entry in self.recipe.scene.planes if entry.labels == "own")
 
     @cached_property
@@ -86,6 +91,8 @@ class Composition:
         if place is not None and place.labels == "own":
             for names in self._place_draws:
                 yield from (piece.model for piece in self._place(names))
+        if self.blend is not None:
+            yield from self.blend.models(self._category_id)
         for entry, files in zip(self.recipe.scene.planes, self.images, strict=True):
             if entry.labels == "own":
                 yield from (plane_spec(self.recipe, entry, file, self._category_id) for file in files)
@@ -96,6 +103,7 @@ class Composition:
         scene = self.recipe.scene
         count = 1 + (scene.company.number if scene.company else 0)
         count += sum(entry.count for entry in scene.planes if entry.labels == "own")
+        count += 0 if self.blend is None else len(self.blend.labelled)
         if scene.place is not None and scene.place.labels == "own":
             seed, name = self.recipe.seed, scene.place.name
             count += max(len(draw_place(seed, name, n).pieces) if name else 1 for n in self._place_draws)
@@ -141,6 +149,8 @@ class Composition:
         pieces: list[Piece] = []
         if place is not None:
             pieces += self._place(draw_names(place.draw, spec.key, pose))
+        if self.blend is not None:
+            pieces += self.blend.pieces(spec.key, pose, self._category_id)
         prints = [footprint(box_of(t.model), t.world_from_object) for t in targets]
         return pieces + list(plane_pieces(self.recipe, self.images, spec.key, pose, prints, self._category_id))
 
@@ -165,8 +175,11 @@ class Composition:
         return x, y, z
 
 
-def compose(recipe: Recipe, specs: tuple[ModelSpec, ...], own: tuple[Category, ...], splits: Sequence[str]) -> Composition:
-    """The composition of a recipe; `splits[i]` is what keeps `specs[i]` from the others: its split, or one name for all.
+def compose(
+    recipe: Recipe, specs: tuple[ModelSpec, ...], own: tuple[Category, ...], splits: Sequence[str], views: Poses
+) -> Composition:
+    """The composition of a recipe with these poses; `splits[i]` is what keeps `specs[i]` from the others: its split, or one
+    name for all.
 
     Raises RecipeError for pictures and places that are not there, and where there are too few models for company.
     """
@@ -187,7 +200,27 @@ def compose(recipe: Recipe, specs: tuple[ModelSpec, ...], own: tuple[Category, .
         {spec.key: tuple(members[split]) for spec, split in zip(specs, splits, strict=True)},
         plane_images(recipe),
         own,
+        _blend(recipe, specs, views),
     )
     if place is not None:
         place_pieces(recipe, place, draw_names(place.draw, specs[0].key, ""), lambda category, labels: 1)
+    return made
+
+
+def _blend(recipe: Recipe, specs: tuple[ModelSpec, ...], views: Poses) -> BlendScenery | None:
+    """The recipe's .blend file; frames take turns in the data set's order. Raises RecipeError where it does not fit."""
+    entry = recipe.scene.blend
+    if entry is None:
+        return None
+
+    @cache
+    def numbers() -> tuple[dict[str, int], dict[str, int]]:
+        return {spec.key: i for i, spec in enumerate(specs)}, {views.name(i): i for i in range(len(views))}
+
+    def turn_of(names: Names) -> int:
+        models, poses = numbers()
+        return models[names[0]] if len(names) == 1 else models[names[0]] * len(poses) + poses[names[1]]
+
+    made = BlendScenery(recipe, entry, turn_of)
+    made.check()
     return made

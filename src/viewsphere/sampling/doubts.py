@@ -39,7 +39,7 @@ BLACKEST = 0.02
 
 def no_light(scene: SceneEntry) -> Iterator[str]:
     """A warning if there is no light at all, or none in some of the scenes that may be drawn."""
-    dark = [high == 0 for _, high in _lights(scene)]
+    dark = [] if scene.blend is not None else [high == 0 for _, high in _lights(scene)]
     if any(dark):
         some = "" if all(dark) else " in some of what may be drawn"
         yield (
@@ -51,7 +51,7 @@ def no_light(scene: SceneEntry) -> Iterator[str]:
 def hidden_by_exposure(scene: SceneEntry) -> Iterator[str]:
     """A warning for an exposure that makes white black, or black white."""
     lit = [light for light in _lights(scene) if light[1] > 0]
-    if not lit:
+    if not lit or scene.blend is not None:
         return
     low, high = span(scene.view.exposure)
     if max(light[1] for light in lit) * 2**low < DARK:

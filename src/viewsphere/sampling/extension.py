@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 from base64 import b64decode, b64encode
+from bisect import bisect_right
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -61,7 +62,7 @@ class Portion:
         plan, part = self.plan, self.part
         there = plan.frames - part.frames
         less = f" less {there:,} that are there" if there else ""
-        text = f"adds {part.frames:,} frames ({plan.models:,} models x {plan.poses:,} poses{less})"
+        text = f"adds {part.frames:,} frames ({plan.factors}{less})"
         for number, channels in part.supplies:
             text += f", and {', '.join(channels)} to {self.record.parts[number].frames:,} frames that are there"
         return text
@@ -105,7 +106,7 @@ class Portion:
         """The model of a shot, and its poses as the data set numbers them."""
         _, first, count = row
         shown_there = self._spans[self.record.part_of(first)]
-        start, models, poses = next(span for span in reversed(shown_there) if span[0] <= first)
+        start, models, poses = shown_there[bisect_right(shown_there, first, key=lambda span: span[0]) - 1]
         model, pose = divmod(first - start, len(poses))
         return models[model], poses[pose : pose + count]
 
@@ -324,23 +325,27 @@ def _categories(planned: Plan, there: PlanRecord) -> tuple[Category, ...]:
 
 def _missing(planned: Plan, there: PlanRecord, numbers: Indices) -> Iterator[Row]:
     """Rows of the frames that the data set lacks: models in the recipe's order, poses in the data set's."""
-    ordered = np.sort(numbers)
     held: defaultdict[str, list[Ranges]] = defaultdict(list)
     for row in chain.from_iterable(part.rows for part in there.parts):
         for key in row.models:
             held[key].append(row.poses)
     first_of = _firsts(there)
-    lacks: dict[tuple[Ranges, ...], Ranges] = {}
+    lacks: dict[tuple[int, tuple[Ranges, ...]], tuple[Ranges, ...]] = {}
 
-    def lack(spec: ModelSpec) -> Ranges:
-        has = tuple(held[spec.key])
-        if has not in lacks:
-            lacks[has] = _ranges(np.setdiff1d(ordered, first_of[_flat(chain.from_iterable(has))]))
-        return lacks[has]
+    def lack(model: int) -> tuple[Ranges, ...]:
+        """Of each time step."""
+        has, schedule = tuple(held[planned.model_specs[model].key]), planned.schedules[model]
+        known = id(schedule), has
+        if known not in lacks:
+            there = first_of[_flat(chain.from_iterable(has))]
+            found = (_ranges(np.setdiff1d(numbers[run.first : run.stop], there)) for run in schedule.runs)
+            lacks[known] = tuple(poses for poses in found if poses)
+        return lacks[known]
 
-    for poses, specs in groupby(planned.model_specs, lack):
-        if poses:
-            yield Row(tuple(spec.key for spec in specs), poses)
+    for steps, models in groupby(range(planned.models), lack):
+        keys = tuple(planned.model_specs[model].key for model in models)
+        for group in (keys,) if len(steps) == 1 else ((key,) for key in keys):
+            yield from (Row(group, poses) for poses in steps)
 
 
 def _supplies(planned: Plan, there: PlanRecord, numbers: Indices) -> Iterator[tuple[int, tuple[str, ...]]]:

@@ -8,8 +8,8 @@ from pathlib import Path
 
 from viewsphere import plugins
 
-SHARED = tuple(Path(__file__).parents[1] / name for name in ("imaging", "surroundings"))
-"""What every engine paints with: what finishes pictures, and what is around the targets."""
+SHARED = tuple(Path(__file__).parents[1] / name for name in ("imaging", "surroundings", "model/scene.py"))
+"""What every engine paints with: what finishes pictures, what is around the targets, and what a scene is if nobody says."""
 
 
 @cache

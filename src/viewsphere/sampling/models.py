@@ -59,12 +59,20 @@ def count_models(recipe: Recipe) -> int:
 def model_specs(recipe: Recipe) -> tuple[ModelSpec, ...]:
     """One specification a model: entries in the recipe's order, files sorted; keys follow from names only.
 
+    Raises RecipeError as `numbered_specs` does.
+    """
+    return tuple(spec for spec, _ in numbered_specs(recipe))
+
+
+def numbered_specs(recipe: Recipe) -> tuple[tuple[ModelSpec, int], ...]:
+    """The same, each with the number of its entry.
+
     Raises RecipeError for files not found, two models of one key, a model that a table of sizes lacks, and a category
     with two supercategories.
     """
     ids = {c.name: c.id for c in categories(recipe)}
     table = cache(_read_sizes)
-    specs: list[ModelSpec] = []
+    specs: list[tuple[ModelSpec, int]] = []
     for found in _with_unique_keys([f for i in range(len(recipe.models)) for f in _found(recipe, i)]):
         entry = recipe.models[found.entry]
         category = _category(entry, found.source)
@@ -83,7 +91,7 @@ def model_specs(recipe: Recipe) -> tuple[ModelSpec, ...]:
             real_size=_real_size(recipe, found, table),
             confined=entry.confined,
         )
-        specs.append(spec)
+        specs.append((spec, found.entry))
     return tuple(specs)
 
 

@@ -25,11 +25,23 @@ from viewsphere.model.camera import Intrinsics
 from viewsphere.model.mistakes import nearest, one_of
 from viewsphere.model.recipe import Recipe
 from viewsphere.model.recipe_draws import alternatives, span
-from viewsphere.model.scene import Vector
+from viewsphere.model.scene import Scene, Vector
 from viewsphere.model.shot import Frame, ModelSpec, Placement, Pose, Shot
+from viewsphere.sampling.blend_scene import BlendScenery
 from viewsphere.sampling.composition import BoxOf, Composition, compose
 from viewsphere.sampling.doubts import hidden_by_exposure, no_light, out_of_view
-from viewsphere.sampling.models import categories, count_models, model_specs
+from viewsphere.sampling.models import categories, count_models, numbered_specs
+from viewsphere.sampling.moments import (
+    Run,
+    Schedule,
+    TimedPoses,
+    Timing,
+    at_frame,
+    at_step,
+    check_keys,
+    schedules,
+    timed,
+)
 from viewsphere.sampling.pictures import Pictures, check_pictures, proportions, scene_pictures
 from viewsphere.sampling.scenes import Scenes, is_night
 from viewsphere.sampling.seeds import share
@@ -42,7 +54,9 @@ SHOT_FRAMES = 16
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """What will be rendered. Frame index = model index * poses + pose index; nothing here grows with the frames."""
+    """What will be rendered: of every model, in order, its poses, by time steps where something moves (else frame index =
+    model index * poses + pose index). Nothing here grows with the frames.
+    """
 
     recipe: Recipe
     model_specs: tuple[ModelSpec, ...]
@@ -51,6 +65,7 @@ class Plan:
     pictures: Pictures  # of the scene
     shot_frames: int
     composition: Composition | None = None  # of place, company and planes
+    timings: tuple[Timing | None, ...] = ()  # of each model; none at all where nothing moves
 
     @cached_property
     def intrinsics(self) -> Intrinsics:
@@ -74,13 +89,41 @@ class Plan:
 
     @property
     def poses(self) -> int:
-        """Number of poses of each model."""
+        """Number of poses of each model; of all time steps together where something moves."""
         return len(self.pose_list)
 
     @property
     def frames(self) -> int:
-        """Number of frames: models x poses."""
-        return self.models * self.poses
+        """Number of frames: models x poses, or as many as their time steps have."""
+        return self._firsts[-1]
+
+    @cached_property
+    def schedules(self) -> tuple[Schedule, ...]:
+        """Which poses each model is taken from, and when."""
+        return schedules(self.timings or (None,) * self.models, self.pose_list)
+
+    @property
+    def time_steps(self) -> int | None:
+        """Time steps that all models have, 0 if nothing moves; None if they have different numbers."""
+        counts = {len(timing.steps) if timing else 0 for timing in self.timings}
+        return counts.pop() if len(counts) == 1 else None if counts else 0
+
+    @property
+    def factors(self) -> str:
+        """What its frames are the product of, in words."""
+        if not self.timings:
+            return f"{self.models:,} models x {self.poses:,} poses"
+        base = self.pose_list.base if isinstance(self.pose_list, TimedPoses) else self.pose_list
+        if self.time_steps is None:
+            return f"{self.models:,} models of different time steps, {len(base):,} poses"
+        moving = [timing.moving for timing in self.timings if timing]
+        poses = "a pose each" if all(moving) else f"{len(base):,} poses{', of some a pose each' if any(moving) else ''}"
+        return f"{self.models:,} models x {self.time_steps:,} time steps x {poses}"
+
+    @cached_property
+    def _firsts(self) -> tuple[int, ...]:
+        """First frame of each model, and the number of all frames."""
+        return tuple(accumulate((schedule.count for schedule in self.schedules), initial=0))
 
     @property
     def max_objects(self) -> int:
@@ -88,9 +131,34 @@ class Plan:
         return 1 if self.composition is None else self.composition.max_objects
 
     @property
+    def blend(self) -> BlendScenery | None:
+        """The .blend file around the targets, if there is one."""
+        return None if self.composition is None else self.composition.blend
+
+    @property
     def kept_specs(self) -> tuple[ModelSpec, ...]:
-        """All models that the data set keeps: the recipe's, then labelled scenery's."""
-        return self.model_specs + (() if self.composition is None else self.composition.models)
+        """All models that the data set keeps: the recipe's, then labelled scenery's, each as it moves behind it."""
+        scenery = () if self.composition is None else self.composition.models
+        if not self.timings:
+            return self.model_specs + scenery
+        own = ((spec, *self.moments_of(spec)) for spec in self.model_specs)
+        moved = ((spec, *self._moments_of_scenery(spec)) for spec in scenery)
+        return tuple(chain.from_iterable((*own, *moved)))
+
+    def moments_of(self, spec: ModelSpec) -> tuple[ModelSpec, ...]:
+        """A model of the recipe at each frame of its file that is asked for."""
+        timing = self.timings[self._position[spec.key]] if self.timings else None
+        return tuple(at_frame(spec, step.model) for step in (timing.steps if timing else ()) if step.model is not None)
+
+    def _moments_of_scenery(self, spec: ModelSpec) -> Iterator[ModelSpec]:
+        if self.blend is not None and spec.parts is not None:
+            yield from (self.blend.model_at(spec, frame, self._scene_frames) for frame in self._scene_frames)
+
+    @cached_property
+    def _scene_frames(self) -> tuple[int, ...]:
+        """Frames of the scene's file that are asked for."""
+        steps = (step.scene for timing in self.timings if timing for step in timing.steps)
+        return tuple(sorted({frame for frame in steps if frame is not None}))
 
     @property
     def splits(self) -> tuple[str, ...]:
@@ -103,13 +171,14 @@ class Plan:
         by = self.recipe.splits.by
         if by == "model":
             found = Counter({s: 0 for s in self.splits})
-            for spec in self.model_specs:
-                found[self.split(spec, 0)] += self.poses
-        elif by == "pose":
+            for spec, schedule in zip(self.model_specs, self.schedules, strict=True):
+                found[self.split(spec, 0)] += schedule.count
+        elif by == "pose" and not self.timings:
             found = Counter(self.split(self.model_specs[0], i) for i in range(self.poses))
             found = Counter({name: count * self.models for name, count in found.items()})
         else:
-            found = Counter(self.split(m, i) for m in self.model_specs for i in range(self.poses))
+            both = zip(self.model_specs, self.schedules, strict=True)
+            found = Counter(self.split(spec, i) for spec, schedule in both for i in schedule.poses)
         return {name: found[name] for name in self.splits}
 
     @cached_property
@@ -130,6 +199,8 @@ class Plan:
         if any(is_night(sun) for sun in alternatives(scene.sun)):
             found.append("scene.sun: at this date, time and place the sun is below the horizon: there is none, and no daylight")
         doubts = chain(no_light(scene), hidden_by_exposure(scene), out_of_view(scene, self.pose_list, self.intrinsics))
+        if self.blend is not None:
+            found += self.blend.warnings
         return tuple(map(self.recipe.locate, (*found, *doubts)))
 
     def split(self, spec: ModelSpec, pose: int) -> str:
@@ -138,7 +209,7 @@ class Plan:
             return self._listed[spec.key]
         names = {
             "model": (spec.key,),
-            "pose": (self.pose_list.name(pose),),
+            "pose": (self.pose_list.place(pose),),
             "frame": (spec.key, self.pose_list.name(pose)),
         }
         by = self.recipe.splits.by
@@ -157,43 +228,60 @@ class Plan:
         return tuple(accumulate(shares.values())), tuple(shares)
 
     @cached_property
-    def _chunks(self) -> tuple[int, ...]:
-        """First pose of each shot of a model, and the number of poses: chunks of sizes that differ by one at most."""
-        parts = math.ceil(self.poses / self.shot_frames)
-        return tuple(i * self.poses // parts for i in range(parts + 1))
+    def _chunks(self) -> tuple[tuple[tuple[int, int], ...], ...]:
+        """Of each model, the poses [first, stop) of its shots."""
+        known = {id(schedule): schedule.chunks(self.shot_frames) for schedule in self.schedules}
+        return tuple(known[id(schedule)] for schedule in self.schedules)
+
+    @cached_property
+    def _shots(self) -> tuple[int, ...]:
+        """First shot of each model, and the number of all shots."""
+        return tuple(accumulate(map(len, self._chunks), initial=0))
 
     @property
     def shot_count(self) -> int:
         """Number of shots."""
-        return self.models * (len(self._chunks) - 1)
+        return self._shots[-1]
+
+    def shots_of(self, model: int) -> range:
+        """Indices of a model's shots."""
+        return range(self._shots[model], self._shots[model + 1])
+
+    def shot_model(self, index: int) -> int:
+        """Index of the model of a shot."""
+        return bisect_right(self._shots, index) - 1
+
+    def _shot_poses(self, index: int) -> tuple[int, int]:
+        model = self.shot_model(index)
+        return self._chunks[model][index - self._shots[model]]
 
     def shot_key(self, index: int) -> str:
         """`<model key>-<first pose>`: stable, unique, fit for a folder's name."""
-        model, chunk = divmod(index, len(self._chunks) - 1)
-        return f"{self.model_specs[model].key}-{self._chunks[chunk]:06d}"
+        return f"{self.model_specs[self.shot_model(index)].key}-{self._shot_poses(index)[0]:06d}"
 
     def shot_table(self) -> Iterator[tuple[str, int, int]]:
         """Key, first frame and number of frames of every shot, in order."""
-        parts = len(self._chunks) - 1
+        frame = 0
         for index in range(self.shot_count):
-            model, chunk = divmod(index, parts)
-            first, last = self._chunks[chunk], self._chunks[chunk + 1]
-            yield self.shot_key(index), model * self.poses + first, last - first
+            first, stop = self._shot_poses(index)
+            yield self.shot_key(index), frame, stop - first
+            frame += stop - first
 
     def shot(self, index: int, box_of: BoxOf | None = None) -> Shot:
         """One shot; raises IndexError past the end.
 
         `box_of` is needed where the recipe has a place, company or planes, as what stands on the floor depends on its size, and
-        where what the camera looks at is moved.
+        where what the camera looks at is moved, or moves.
         Raises RecipeError where there is no room for all that is to stand there, and what `box_of` raises.
         """
         if not 0 <= index < self.shot_count:
             raise IndexError(f"expected a shot of 0..{self.shot_count - 1}, got {index}")
-        model, chunk = divmod(index, len(self._chunks) - 1)
-        return self.take(model, range(self._chunks[chunk], self._chunks[chunk + 1]), box_of, self.shot_key(index))
+        return self.take(self.shot_model(index), range(*self._shot_poses(index)), box_of, self.shot_key(index))
 
     def take(self, model: int, chosen: Sequence[int], box_of: BoxOf | None = None, key: str = "") -> Shot:
-        """A shot of some poses of a model (their indices): of one pose where the recipe draws scenes for each frame."""
+        """A shot of some poses of a model (their indices), of one time step: of one pose where the recipe draws scenes for each
+        frame.
+        """
         spec, pose = self.model_specs[model], self.pose_list.name(chosen[0])
         placements, target = (Placement(id=1, model=spec),), None
         if self.composition is not None:
@@ -203,13 +291,13 @@ class Plan:
             target = self.composition.center(placements[: 1 + (company.number if company else 0)], _known(box_of))
         if self.recipe.scene.materials:
             placements = tuple(self._repainted(p, spec, pose) for p in placements)
-        if target is None and self.scenes.is_target_moved:
-            target = center(placements[0], _known(box_of))
+        run = self.schedules[model].run_of(chosen[0])
+        target = self._target(placements[0], run, target, box_of)
         return Shot(
             key=key or spec.key,
-            placements=placements,
+            placements=self._at(placements, run),
             intrinsics=self.intrinsics,
-            scene=self.scenes.scene(spec.key, pose),
+            scene=self._scene(spec, pose, run).model_copy(update=self._floor(spec, placements, box_of)),
             frames=tuple(self.frame(model, i, target) for i in chosen),
             engine=self.recipe.engine.name,
             engine_options=self.recipe.engine.options,
@@ -218,6 +306,54 @@ class Plan:
             label_alpha=self.recipe.label_alpha,
             category_deg=self.recipe.viewpoints.bins,
         )
+
+    def _target(self, first: Placement, run: Run, target: Vector | None, box_of: BoxOf | None) -> Vector | None:
+        """What cameras look at that have no target of their own, None for the first object's centre: where that stands at the
+        first frame, or follows it.
+        """
+        moves = run.step is not None and run.step.model is not None
+        if moves and self.recipe.viewpoints.target == "follow":
+            target, first = None, self._at((first,), run)[0]
+        elif target is None and moves:
+            return center(first, _known(box_of))
+        if target is None and self.scenes.is_target_moved:
+            target = center(first, _known(box_of))
+        return target
+
+    def _floor(self, spec: ModelSpec, placements: Sequence[Placement], box_of: BoxOf | None) -> dict[str, float]:
+        """How high the ground is at most, in a scene's field: at the lowest that a model comes at its time steps."""
+        moments = self.moments_of(spec)
+        if not moments or self.recipe.scene.ground == "off":
+            return {}
+        world = placements[0].world_from_object
+        return {"floor": min(float(transform(world, _known(box_of)(moment))[:, 2].min()) for moment in moments)}
+
+    def _at(self, placements: Sequence[Placement], run: Run) -> tuple[Placement, ...]:
+        """What is placed, as it is at a time step; company is at its own of the same number."""
+        if run.step is None:
+            return tuple(placements)
+        timing_of = self._timing_of
+        found: list[Placement] = []
+        for placement in placements:
+            model = at_step(timing_of.get(placement.model.key), placement.model, run.number)
+            moved = placement if model is placement.model else placement.model_copy(update={"model": model})
+            if self.blend is not None and run.step.scene is not None:
+                moved = self.blend.at_frame(moved, run.step.scene, self._scene_frames)
+            found.append(moved)
+        return tuple(found)
+
+    @cached_property
+    def _timing_of(self) -> dict[str, Timing | None]:
+        return {spec.key: timing for spec, timing in zip(self.model_specs, self.timings, strict=True)}
+
+    def _scene(self, spec: ModelSpec, pose: str, run: Run) -> Scene:
+        scene = self.scenes.scene(spec.key, pose)
+        if self.blend is None:
+            return scene
+        blend = self.blend.scene(spec.key, pose)
+        if run.step is not None and run.step.scene is not None:
+            blend = blend.model_copy(update={"frame": run.step.scene})
+        return scene.model_copy(update={"blend": blend, "sun": None if blend.is_lit else scene.sun})
 
     def _repainted(self, placement: Placement, spec: ModelSpec, pose: str) -> Placement:
         repaints = () if placement.scenery else self.scenes.repaints(placement.model, spec.key, pose)
@@ -246,7 +382,7 @@ class Plan:
         if self.scenes.has_finish_per_frame:
             finish = self.scenes.finish(spec.key, self.pose_list.name(pose))
         return Frame(
-            index=model * self.poses + pose,
+            index=self._firsts[model] + self.schedules[model].position(pose),
             pose=self._pose(spec, pose, target),
             split=self.split(spec, pose),
             finish=finish,
@@ -257,7 +393,7 @@ class Plan:
         pose = self.pose_list[index]
         if target is not None and pose.target is None:
             pose = pose.model_copy(update={"target": target})
-        return self.scenes.jittered(pose, spec.key, self.pose_list.name(index)) if self.scenes.is_jittered else pose
+        return self.scenes.jittered(pose, spec.key, self.pose_list.place(index)) if self.scenes.is_jittered else pose
 
     def distance_problem(self, spec: ModelSpec, box_of: BoxOf) -> RecipeError | None:
         """The first pose whose camera would stand inside a target's box, in words; None if there is none.
@@ -268,27 +404,38 @@ class Plan:
         if self.composition is not None and not self.recipe.scene.is_moved_each_frame:
             placements = self.composition.targets(spec, None, box_of)
             target = self.composition.center(placements, box_of)
-        if target is None and self.scenes.is_target_moved:
-            target = center(placements[0], box_of)
-        cameras = self.cameras(placements, box_of)
-        for placement in placements:
-            box = transform(placement.world_from_object, box_of(placement.model))
-            inside = inside_box(box, cameras)
-            if inside.any():
-                pose = self._pose(spec, int(np.flatnonzero(inside)[0]), target)
-                problem = distance_problem(pose, box)
-                return RecipeError(f"viewpoints.distance: {problem} (model {placement.model.key})")
+        fixed = None if self.timings else self.cameras(placements, box_of)
+        for run in self.schedules[self._position[spec.key]].runs:
+            at = self._target(placements[0], run, target, box_of)
+            moved = self._at(placements, run)
+            cameras = fixed if fixed is not None else self.cameras(moved, box_of, at)
+            for placement in moved:
+                box = transform(placement.world_from_object, box_of(placement.model))
+                inside = inside_box(box, cameras[run.first : run.stop])
+                if inside.any():
+                    pose = self._pose(spec, run.first + int(np.flatnonzero(inside)[0]), at)
+                    problem = distance_problem(pose, box)
+                    return RecipeError(f"viewpoints.distance: {problem} (model {placement.model.key})")
         return None
 
-    def cameras(self, placements: Sequence[Placement], box_of: BoxOf) -> NDArray[np.float64]:
-        """Where the cameras of all poses stand, (poses, 3) world metres, when these are placed."""
+    @cached_property
+    def _position(self) -> dict[str, int]:
+        return {spec.key: i for i, spec in enumerate(self.model_specs)}
+
+    def cameras(self, placements: Sequence[Placement], box_of: BoxOf, target: Vector | None = None) -> NDArray[np.float64]:
+        """Where the cameras of all poses stand, (poses, 3) world metres, when these are placed; they look at `target`, by
+        default at the middle of what is placed.
+        """
         targets = [p for p in placements if p.id and not p.scenery]
         corners = np.concatenate([transform(t.world_from_object, box_of(t.model)) for t in targets])
         middle = corners.mean(axis=0) if len(targets) == 1 else (corners.min(axis=0) + corners.max(axis=0)) / 2
+        middle = middle if target is None else np.array(target)
         if not self.scenes.is_jittered:
             return self._offsets + np.where(np.isnan(self._targets), middle, self._targets)
         x, y, z = middle.tolist()
-        moved = (self._pose(targets[0].model, i, (x, y, z)) for i in range(self.poses))
+        spec = targets[0].model
+        base = self.model_specs[self._position[spec.track or spec.key]]
+        moved = (self._pose(base, i, (x, y, z)) for i in range(self.poses))
         return np.array([_stand(pose) for pose in moved])
 
     @cached_property
@@ -317,6 +464,7 @@ class Plan:
         planes = () if self.composition is None else self.composition.images
         images = [Path(i).name for files in (self.images, *planes) for i in files]
         value = [self.recipe.digest, models, self.pose_list.digest, images, self._chunks]
+        value += [] if self.blend is None else [self.blend.digest]
         return hashlib.sha256(json.dumps(value, separators=(",", ":")).encode()).hexdigest()
 
 
@@ -328,19 +476,23 @@ def plan(recipe: Recipe, shot_frames: int | None = None) -> Plan:
     """
     with recipe.located():
         _check_names(recipe)
+        _check_blend(recipe)
         views = poses(recipe.viewpoints, recipe.seed, recipe.folder)
         _lens(recipe, views)
         _check_frames(recipe, views)
-        specs = model_specs(recipe)
+        specs, timings, views = timed(recipe, numbered_specs(recipe), views)
         _check_listed(recipe, specs)
         _check_materials(recipe, specs)
         frames = 1 if recipe.scene.is_new_each_frame else recipe.shot_frames or shot_frames or SHOT_FRAMES
-        planned = Plan(recipe, specs, views, categories(recipe), scene_pictures(recipe), frames)
+        timings = timings if any(timings) else ()
+        planned = Plan(recipe, specs, views, categories(recipe), scene_pictures(recipe), frames, timings=timings)
+        if timings:
+            _check_moments(planned)
         if not recipe.scene.is_composed:
             return planned
         apart = recipe.splits.by == "model"
         splits = [planned.split(spec, 0) if apart else "" for spec in specs]
-        composition = compose(recipe, specs, planned.categories, splits)
+        composition = compose(recipe, specs, planned.categories, splits, views)
         return replace(planned, categories=composition.categories, composition=composition)
 
 
@@ -389,6 +541,14 @@ def _check_names(recipe: Recipe) -> None:
             raise RecipeError(f"formats[{i}]: {one_of(name, formats)}")
 
 
+def _check_blend(recipe: Recipe) -> None:
+    if recipe.scene.blend is not None and not getattr(plugins.load("engines", recipe.engine.name), "OPENS_SCENES", False):
+        raise RecipeError(
+            f"scene.blend: expected engine: cycles, which renders the file as it is; found {recipe.engine.name}: "
+            "name cycles, or take the file's meshes alone by scene.place"
+        )
+
+
 def _lens(recipe: Recipe, views: Poses) -> Intrinsics:
     if not recipe.camera.of_viewpoints:
         return recipe.camera.intrinsics
@@ -405,6 +565,15 @@ def _check_frames(recipe: Recipe, views: Poses) -> None:
             f"viewpoints: expected at most {recipe.max_frames:,} frames; found {models * count:,} ({factors}): "
             f"set max_frames: {models * count} in the recipe if that is meant"
         )
+
+
+def _check_moments(planned: Plan) -> None:
+    if planned.frames > planned.recipe.max_frames:
+        raise RecipeError(
+            f"models: expected at most {planned.recipe.max_frames:,} frames; found {planned.frames:,}, with all time steps: "
+            f"set max_frames: {planned.frames} in the recipe if that is meant"
+        )
+    check_keys(planned.kept_specs)
 
 
 def _check_listed(recipe: Recipe, specs: tuple[ModelSpec, ...]) -> None:

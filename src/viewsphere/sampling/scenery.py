@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere import plugins
-from viewsphere.errors import RecipeError, UserError
+from viewsphere.assets.inside import split_source
+from viewsphere.errors import ModelError, RecipeError, UserError
 from viewsphere.geometry.box import box_vertices
 from viewsphere.geometry.rotation import compose
 from viewsphere.model.mistakes import one_of
@@ -112,10 +113,14 @@ def _composed(a: Matrix4, b: Matrix4) -> Matrix4:
 
 def _place_file(recipe: Recipe, entry: PlaceEntry, world_from_place: Matrix4, category_id: Naming) -> Piece:
     path = recipe.folder / Path(entry.source).expanduser()
-    if not path.is_file():
-        raise RecipeError(f"scene.place: expected zoo:<place> or a model file; found none at {path}")
+    try:
+        file, inside = split_source(path)
+    except ModelError as error:
+        raise RecipeError(f"scene.place: {error}") from None
+    if not file.is_file():
+        raise RecipeError(f"scene.place: expected zoo:<place> or a model file; found none at {file}")
     spec = ModelSpec(
-        key=scenery_key(path.stem, path.name),
+        key=scenery_key(path.stem, "/".join((file.name, *inside))),
         source=str(path),
         category=entry.category,
         category_id=category_id(entry.category, entry.labels),

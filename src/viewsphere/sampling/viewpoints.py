@@ -7,7 +7,7 @@ import math
 from abc import abstractmethod
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple, overload
@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from viewsphere.assets.normalise import rotation as axes_rotation
+from viewsphere.errors import RecipeError
 from viewsphere.geometry.camera import orbit_angles, orbit_center, orbit_rotation
 from viewsphere.geometry.pose_category import pose_category
 from viewsphere.geometry.rotation import transform
@@ -71,7 +72,7 @@ class Poses(Sequence[Pose]):
     def target(self, index: int) -> Vector | None:
         """What the camera looks at, world metres; None: the centre of the model's box."""
         target = self.viewpoints.target
-        return None if target == "center" else target
+        return target if isinstance(target, tuple) else None
 
     @property
     @abstractmethod
@@ -81,6 +82,10 @@ class Poses(Sequence[Pose]):
     @abstractmethod
     def name(self, index: int) -> str:
         """The pose's stable name: equal for the same pose wherever it stands in the list."""
+
+    def place(self, index: int) -> str:
+        """The pose's name whenever it is taken: equal at all time steps of an animation."""
+        return self.name(index)
 
     @abstractmethod
     def view(self, index: int) -> View:
@@ -325,7 +330,7 @@ def poses(viewpoints: Viewpoints, seed: int, folder: Path = Path()) -> Poses:
     match viewpoints:
         case PoseList():
             path = folder / Path(viewpoints.path).expanduser()
-            return ListedPoses(viewpoints, seed, read_poses(path, viewpoints.format, viewpoints.every))
+            return ListedPoses(viewpoints, seed, _file(path, viewpoints))
         case Jitter():
             return JitteredPoses(viewpoints, seed)
         case Sphere():
@@ -334,6 +339,19 @@ def poses(viewpoints: Viewpoints, seed: int, folder: Path = Path()) -> Poses:
             return NormalPoses(viewpoints, seed)
         case Grid():
             return GridPoses(viewpoints, seed)
+
+
+def _file(path: Path, viewpoints: PoseList) -> PoseFile:
+    """What a file of poses, or the camera of a 3D file, says."""
+    from viewsphere.sampling.pose_files import cameras
+
+    is_scene = viewpoints.format == "cameras" or (viewpoints.format == "auto" and path.suffix.lower() in cameras.SUFFIXES)
+    if not is_scene:
+        for name in viewpoints.of_cameras:
+            raise RecipeError(f"viewpoints.{name}: expected a 3D file ({', '.join(cameras.SUFFIXES)}); found {path}")
+        return read_poses(path, viewpoints.format, viewpoints.every)
+    found = cameras.read_cameras(path, viewpoints)
+    return replace(found, entries=found.entries[:: viewpoints.every])
 
 
 def camera_for(intrinsics: Intrinsics, pose: Pose, target: ArrayLike) -> Camera:

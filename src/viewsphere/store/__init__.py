@@ -3,6 +3,7 @@
     OUT/store/plan.json                        what was asked for
     OUT/store/models/<key>/                    the normalised model (OBJ, GLB) and model.json
     OUT/store/shots/<hh>/<shot>/frames.json    records of the shot's frames
+    OUT/store/shots/<hh>/<shot>/shot.json      the scene that they show (what is no object: scenery.json)
     OUT/store/shots/<hh>/<shot>/<channel>/<pose>.png|.tiff|...
     OUT/store/writing/                         what is not whole yet
 
@@ -11,12 +12,14 @@ a file.
 """
 
 from viewsphere.store.channel_files import check_codecs, decode, depth_step, encode
+from viewsphere.store.choice import Choice, frame_ranges
 from viewsphere.store.dataset import Dataset
-from viewsphere.store.folder import Store
+from viewsphere.store.folder import Store, new_folder
 from viewsphere.store.records import Category, ModelInfo, Part, PlanRecord, Row, ShotRow
 
 __all__ = [
     "Category",
+    "Choice",
     "Dataset",
     "ModelInfo",
     "Part",
@@ -28,4 +31,6 @@ __all__ = [
     "decode",
     "depth_step",
     "encode",
+    "frame_ranges",
+    "new_folder",
 ]

@@ -18,6 +18,7 @@ from viewsphere.model.files import Files
 from viewsphere.model.record import sample_from_record
 from viewsphere.model.sample import Sample
 from viewsphere.store.channel_files import decode
+from viewsphere.store.choice import Choice
 from viewsphere.store.folder import Store
 from viewsphere.store.linking import link_file
 from viewsphere.store.records import Category, ModelInfo, ShotRow
@@ -26,19 +27,21 @@ from viewsphere.store.records import Category, ModelInfo, ShotRow
 class Dataset(Sequence[Sample]):
     """The finished frames of a data set, in frame order; what `viewsphere.open` gives.
 
-    `len`, indexing and iteration give samples whose channels are read when asked for. `link` and `path` serve exporters.
+    `len`, indexing and iteration give samples whose channels are read when asked for. `link` and `path` serve exporters. With
+    a choice, only the frames that it means are there.
     """
 
-    def __init__(self, root: str | os.PathLike[str]) -> None:
+    def __init__(self, root: str | os.PathLike[str], choice: Choice | None = None) -> None:
         self.root = Path(root)
+        self.choice = choice or Choice()
         self.store = Store(self.root)
         self.plan = self.store.plan()
         self.link_kinds: set[str] = set()
         self._records = lru_cache(maxsize=8)(self._read_records)
 
-    def __reduce__(self) -> tuple[type[Dataset], tuple[Path]]:
+    def __reduce__(self) -> tuple[type[Dataset], tuple[Path, Choice]]:
         """A data set travels to other processes (data loaders) as its folder."""
-        return Dataset, (self.root,)
+        return Dataset, (self.root, self.choice)
 
     @property
     def name(self) -> str:
@@ -67,20 +70,26 @@ class Dataset(Sequence[Sample]):
 
     @cached_property
     def models(self) -> tuple[ModelInfo, ...]:
-        """The finished models, in the plan's order."""
-        found = (self.store.model_info(key) for key in self.plan.models)
+        """The finished models, in the plan's order; of a choice, those that its frames have."""
+        keys = self.plan.models
+        if self.choice.is_some:
+            seen = {o.key for sample in self for o in sample.objects}
+            keys = tuple(key for key in keys if key in seen)
+        found = (self.store.model_info(key) for key in keys)
         return tuple(m for m in found if m is not None)
 
     @cached_property
-    def _shots(self) -> tuple[list[str], list[int]]:
-        """Keys of the finished shots in frame order, and the number of frames before each."""
-        keys, starts, total = [], [], 0
-        for key, _, count in self.plan.shots:
-            if self.store.has_shot(key):
-                keys.append(key)
+    def _shots(self) -> tuple[list[tuple[str, Sequence[int]]], list[int]]:
+        """Keys of the finished shots in frame order, with the places of their frames, and the number of frames before each."""
+        shots: list[tuple[str, Sequence[int]]] = []
+        starts, total = [0], 0
+        for key, first, count in self.plan.shots:
+            places = self.choice.places(first, count) if self._has_model(key, first) else ()
+            if places and self.store.has_shot(key):
+                shots.append((key, places))
+                total += len(places)
                 starts.append(total)
-                total += count
-        return keys, [*starts, total]
+        return shots, starts
 
     def __len__(self) -> int:
         return self._shots[1][-1]
@@ -96,14 +105,31 @@ class Dataset(Sequence[Sample]):
         i = index + len(self) if index < 0 else index
         if not 0 <= i < len(self):
             raise IndexError(f"{self.root}: expected a frame in 0..{len(self) - 1}, got {index}")
-        keys, starts = self._shots
-        shot = bisect_right(starts, i) - 1
-        return self._sample(keys[shot], self._records(keys[shot])[i - starts[shot]])
+        shots, starts = self._shots
+        number = bisect_right(starts, i) - 1
+        key, places = shots[number]
+        return self._sample(key, self._records(key)[places[i - starts[number]]])
 
     def __iter__(self) -> Iterator[Sample]:
-        for key in self._shots[0]:
-            for record in self._read_records(key):
-                yield self._sample(key, record)
+        for key, places in self._shots[0]:
+            yield from self.samples_of(key, places)
+
+    def shots(self) -> Iterator[tuple[str, Sequence[int]]]:
+        """Key of every finished shot, in frame order, and which of its frames are meant, counted from 0."""
+        yield from self._shots[0]
+
+    def samples_of(self, key: str, places: Sequence[int]) -> Iterator[Sample]:
+        """Some of a finished shot's samples."""
+        records = self._read_records(key)
+        for place in places:
+            yield self._sample(key, records[place])
+
+    def _has_model(self, key: str, frame: int) -> bool:
+        """Whether the choice has the model of a shot, which begins with this frame."""
+        if not self.choice.models:
+            return True
+        part = self.plan.parts[self.plan.part_of(frame)] if self.plan.parts else None
+        return self.choice.has_model((part and part.model_at(frame)) or key.rpartition("-")[0])
 
     @cached_property
     def _frames_of(self) -> dict[str, int]:

@@ -21,6 +21,7 @@ from viewsphere.model.channel import CHANNELS
 from viewsphere.model.files import Files
 from viewsphere.model.record import sample_to_record
 from viewsphere.model.sample import Sample
+from viewsphere.model.shot import Placement, Shot
 from viewsphere.store.channel_files import encode
 from viewsphere.store.records import ModelInfo, PlanRecord, ShotRow
 
@@ -218,10 +219,13 @@ class Store:
         except FileNotFoundError:
             return {}
 
-    def write_shot(self, key: str, samples: Iterable[Sample], scenery: str = "", kinds: Files | None = None) -> int:
+    def write_shot(
+        self, key: str, samples: Iterable[Sample], scenery: str = "", kinds: Files | None = None, shot: Shot | None = None
+    ) -> int:
         """Write all frames of a shot, with the channels their samples hold; gives their number.
 
         `scenery`, if any, is a text that says what stands there that is no object; `kinds` of files are the default ones.
+        What is known of the `shot` besides is kept for those who make its scene anew.
         """
         target = self.shot_folder(key)
         prefix = target.relative_to(self.root).as_posix()
@@ -244,7 +248,29 @@ class Store:
             (folder / "frames.json").write_text(text, "utf-8")
             if scenery:
                 (folder / "scenery.json").write_text(scenery, "utf-8")
+            if shot is not None:
+                labelled = shot.model_copy(update={"placements": shot.objects})  # the others are in scenery.json
+                (folder / "shot.json").write_text(labelled.model_dump_json(), "utf-8")
         return len(records)
+
+    def shot(self, key: str) -> Shot | None:
+        """A finished shot as it was rendered; None where that is not known. Raises StoreError if it cannot be read."""
+        file = self.shot_folder(key) / "shot.json"
+        try:
+            shot = Shot.model_validate_json(file.read_bytes())
+            scenery = json.loads(self.scenery(key) or '{"placements": []}')["placements"]
+            return shot.model_copy(
+                update={"placements": (*shot.placements, *(Placement.model_validate(placement) for placement in scenery))}
+            )
+        except FileNotFoundError:
+            return None
+        except (OSError, LookupError, TypeError, ValueError) as error:
+            raise StoreError(f"{file}: expected the scene of a shot, found {type(error).__name__}: {error}") from None
+
+    def known_of(self, key: str) -> list[Path]:
+        """The files that say what a finished shot's scene was."""
+        files = (self.shot_folder(key) / name for name in ("scenery.json", "shot.json"))
+        return [file for file in files if file.is_file()]
 
     def scenery(self, key: str) -> str:
         """The text that `write_shot` was given of a shot's scenery; empty if none."""
@@ -274,6 +300,25 @@ class Store:
                 f"{file}: expected what is known of a model, found {type(error).__name__}: {error}: "
                 f"delete {file.parent} and render again"
             ) from None
+
+
+@contextmanager
+def new_folder(target: Path) -> Generator[Path]:
+    """A folder to write into that becomes `target` when the block ends well; raises StoreError where files lie there."""
+    aside = target.with_name(f"{_writer()}{target.name}")
+    with _disk_errors(target):
+        if target.exists() and (not target.is_dir() or any(target.iterdir())):
+            raise StoreError(f"{target}: expected an empty or new folder, found other files: choose another, or delete it")
+        shutil.rmtree(aside, ignore_errors=True)
+        aside.mkdir(parents=True)
+    try:
+        with _disk_errors(target):
+            yield aside
+            if target.exists():
+                target.rmdir()
+            aside.rename(target)
+    finally:
+        shutil.rmtree(aside, ignore_errors=True)
 
 
 def channel_path(channel: str, pose: int, kinds: Files | None = None) -> str:

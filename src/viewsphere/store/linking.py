@@ -46,10 +46,10 @@ def link_model(store: Store, info: ModelInfo, files: Iterable[Path]) -> None:
         store.write_model_info(folder, placed)
 
 
-def link_shot(store: Store, key: str, frames: Iterable[ForeignFrame], scenery: str = "") -> int:
+def link_shot(store: Store, key: str, frames: Iterable[ForeignFrame], known: Iterable[Path] = ()) -> int:
     """Write a shot whose channels are files that exist already; gives the number of its frames.
 
-    `scenery` as for `Store.write_shot`.
+    `known` are files that say more of it, as `Store.known_of` has them.
     """
     target = store.shot_folder(key)
     prefix = target.relative_to(store.root).as_posix()
@@ -69,6 +69,6 @@ def link_shot(store: Store, key: str, frames: Iterable[ForeignFrame], scenery: s
             record = sample_to_record(replace(frame.sample, files=files))
             records.append(json.dumps(record, separators=(",", ":"), allow_nan=False))
         (folder / "frames.json").write_text("[\n" + ",\n".join(records) + "\n]\n", "utf-8")
-        if scenery:
-            (folder / "scenery.json").write_text(scenery, "utf-8")
+        for file in known:
+            link_file(file.resolve(), folder / file.name)
     return len(records)

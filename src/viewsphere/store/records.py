@@ -102,6 +102,15 @@ class Part:
         """Number of different poses that it shows."""
         return len({pose for row in self.rows for first, stop in row.poses for pose in range(first, stop)})
 
+    def model_at(self, frame: int) -> str | None:
+        """Key of the model that one of its frames shows, None where that is not known."""
+        start = self.first
+        for row in self.rows:
+            if frame < start + row.frames:
+                return row.models[(frame - start) // row.count]
+            start += row.frames
+        return None
+
     def shots(self, most: int) -> Iterator[ShotRow]:
         """Key, first frame and number of frames of shots of `most` frames at most, of one model each.
 

@@ -101,8 +101,11 @@ def placed_meshes(placements: Sequence[Placement], load: Callable[[ModelSpec], M
     return [loaded[p.model] for p in placements]
 
 
-def build_geometry(placements: Sequence[Placement], meshes: Sequence[Mesh], ground: bool, label_alpha: float) -> Geometry:
-    """Place the meshes in the world and, if asked, lay the ground at their lowest point (z = 0 if there are none).
+def build_geometry(
+    placements: Sequence[Placement], meshes: Sequence[Mesh], ground: bool, label_alpha: float, floor: float | None = None
+) -> Geometry:
+    """Place the meshes in the world and, if asked, lay the ground at their lowest point (z = 0 if there are none), or at
+    `floor` where that is lower: something that jumps leaves it.
 
     `meshes[i]` is the normalised model of `placements[i]`; ids are 1..N in order, then 0 for scenery. The ground is two
     triangles that reach 1,000 scene sizes to every side. A BLEND material is surface where alpha >= label_alpha, a MASK
@@ -117,7 +120,7 @@ def build_geometry(placements: Sequence[Placement], meshes: Sequence[Mesh], grou
     parts = [_placed(tuple(placements[:count]), tuple(meshes[:count]), label_alpha)]
     if count < len(meshes):
         parts.append(_scenery(tuple(placements[count:]), tuple(meshes[count:]), label_alpha))
-    return _stacked([*parts, _ground(parts)] if ground else parts)
+    return _stacked([*parts, _ground(parts, floor)] if ground else parts)
 
 
 def with_blended_colors(geometry: Geometry, meshes: Sequence[Mesh]) -> Geometry:
@@ -184,14 +187,15 @@ def _labels(placement: Placement, mesh: Mesh) -> NDArray[np.int32]:
     return labels
 
 
-def _ground(parts: Sequence[Geometry]) -> Geometry:
-    """Two triangles below all that is placed, counter-clockwise seen from above."""
+def _ground(parts: Sequence[Geometry], floor: float | None) -> Geometry:
+    """Two triangles below all that is placed and not above `floor`, counter-clockwise seen from above."""
     used = np.concatenate([part.vertices[part.is_used] for part in parts])
     low, high = (used.min(axis=0), used.max(axis=0)) if len(used) else (np.zeros(3), np.zeros(3))
     size = float(np.max(high - low)) or 1.0
     x, y = (low[:2] + high[:2]) / 2
+    z = low[2] if floor is None else min(low[2], floor)
     r = GROUND_REACH * size
-    corners = np.array([[x - r, y - r, low[2]], [x + r, y - r, low[2]], [x + r, y + r, low[2]], [x - r, y + r, low[2]]])
+    corners = np.array([[x - r, y - r, z], [x + r, y - r, z], [x + r, y + r, z], [x - r, y + r, z]])
     triangles = np.array([[0, 1, 2], [0, 2, 3]], np.int32)
     up = np.tile(np.array([0, 0, 1], np.float32), (4, 1))
     normals, background = _triangle_normals(corners, triangles), np.full(2, BACKGROUND, np.int32)
@@ -210,7 +214,7 @@ def _ground(parts: Sequence[Geometry]) -> Geometry:
         vertex_start=(0,),
         triangle_start=(0,),
         object_count=0,
-        ground_z=float(low[2]),
+        ground_z=float(z),
     )
 
 

@@ -22,15 +22,17 @@ from pathlib import Path
 from queue import SimpleQueue
 from typing import Any, BinaryIO
 
+from .cores import few_cores
+
 DEVICES = ("CPU", "CUDA", "OPTIX", "HIP", "METAL", "ONEAPI")
 ONLINE = ("socket.connect", "socket.getaddrinfo", "socket.gethostbyname", "socket.sendto", "socket.sendmsg")
 
 
-def main(folder: Path, readable: list[str] | None = None) -> None:
+def main(folder: Path, readable: list[str] | None = None, threads: int = 0) -> None:
     """Answer requests until there are no more; `folder` is where their arrays lie, and does not outlive the other side.
 
     With `readable`, files are read only from these folders and from the system's, and written only to `folder`, where the
-    system can see to that.
+    system can see to that. Blender works with this many `threads`, 0 for one a core.
     """
     if readable is not None:
         _bind(folder, readable)
@@ -39,7 +41,7 @@ def main(folder: Path, readable: list[str] | None = None) -> None:
     faulthandler.enable()
     requests: SimpleQueue[bytes] = SimpleQueue()
     threading.Thread(target=_read, args=(requests, folder), daemon=True).start()
-    with suppress(Exception):  # whoever asks first is told
+    with suppress(Exception), few_cores(threads):  # whoever asks first is told what is wrong
         start_blender()
     while True:
         said = answer(requests.get())
@@ -154,18 +156,53 @@ def _read_model(told: dict[str, Any]) -> Any:
     return read(told)
 
 
+def _read_timeline(told: dict[str, Any]) -> Any:
+    from .reading import read_timeline
+
+    return read_timeline(told)
+
+
+def _read_contents(told: dict[str, Any]) -> Any:
+    from .contents import contents
+
+    return contents(told)
+
+
+def _read_cameras(told: dict[str, Any]) -> Any:
+    from .cameras import read_cameras
+
+    return read_cameras(told)
+
+
+def _read_places(told: dict[str, Any]) -> Any:
+    from .contents import places
+
+    return places(told)
+
+
 def _render(told: dict[str, Any]) -> Any:
     from .rendering import render
 
     return render(told)
 
 
+def _save(told: dict[str, Any]) -> Any:
+    from .saving import save
+
+    return save(told)
+
+
 REQUESTS: dict[str, Callable[[dict[str, Any]], Any]] = {
     "hello": _hello,
     "memory": _memory,
     "read": _read_model,
+    "timeline": _read_timeline,
+    "cameras": _read_cameras,
+    "contents": _read_contents,
+    "places": _read_places,
     "stage": _stage,
     "render": _render,
+    "save": _save,
 }
 
 if __name__ == "__main__":

@@ -43,14 +43,14 @@ class Gathering:
                 continue
             if item.type in LEFT_OUT:
                 left_out.setdefault(LEFT_OUT[item.type], []).append(item.name)
-            elif item.type in SOLID and (not item.visible_camera or item.is_shadow_catcher or item.is_holdout):
-                skipped.append(item.name)
-            elif item.type in SOLID:
+            elif taken(instance, item):
                 self._place(instance, item, owner)
+            elif item.type in SOLID:
+                skipped.append(item.name)
         for what, names in left_out.items():
-            self.warnings.append(f"{what} is left out: {_listed(names)}; convert it to a mesh")
+            self.warnings.append(f"{what} is left out: {listed(names)}; convert it to a mesh")
         if skipped:
-            self.warnings.append(f"not seen by cameras, left out: {_listed(skipped)}")
+            self.warnings.append(f"not seen by cameras, left out: {listed(skipped)}")
         self._sort()
 
     def _sort(self):
@@ -67,9 +67,9 @@ class Gathering:
         self._count += count
         if self._count > self._most:
             raise ValueError(f"expected at most {self._most:,} triangles, found more as evaluated (in {item.name!r})")
-        name = item.name if item.original == owner.original else f"{owner.name}/{item.name}"
         if pieces:
-            self.placed.append({"pieces": list(pieces), "part": name, "matrix": [list(row) for row in instance.matrix_world]})
+            matrix = [list(row) for row in instance.matrix_world]
+            self.placed.append({"pieces": list(pieces), "part": part_of(item, owner), "matrix": matrix})
 
     def _mesh(self, item):
         """Numbers of an object's pieces, and how many triangles they are."""
@@ -146,6 +146,18 @@ class Gathering:
         return str(file)
 
 
+def taken(instance, item):
+    """Whether its triangles are part of what the camera may see."""
+    if not instance.show_self or item.type not in SOLID:
+        return False
+    return item.visible_camera and not item.is_shadow_catcher and not item.is_holdout
+
+
+def part_of(item, owner):
+    """Name of the part that an object is, or that it is where another one instances it."""
+    return item.name if item.original == owner.original else f"{owner.name}/{item.name}"
+
+
 def _layers(mesh, material):
     """Names of the two layers of texture coordinates: the one that is used by default, and another that the material names."""
     main = next((layer.name for layer in mesh.uv_layers if layer.active_render), None)
@@ -208,7 +220,8 @@ def _welded(rows):
     return first[order], rank[inverse]
 
 
-def _listed(names):
+def listed(names):
+    """Names in a message: the first few."""
     names = sorted(set(names))
     more = f" and {len(names) - NAMES_SAID} more" if len(names) > NAMES_SAID else ""
     return ", ".join(map(repr, names[:NAMES_SAID])) + more

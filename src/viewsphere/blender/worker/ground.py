@@ -8,7 +8,7 @@ import bpy
 
 from .graph import Graph
 
-SKY = "sky"
+SKY = "viewsphere sky"
 """Name of the node that says whether the sky is seen."""
 
 BEGIN, OVER = 4.0, 26.0
@@ -16,6 +16,9 @@ BEGIN, OVER = 4.0, 26.0
 
 FLAT = 0.09
 """Sine of the angle between the view and the ground below which it fades, however near."""
+
+FLATTER = 1 / 12
+"""By how much less it has faded altogether."""
 
 
 def fade(material, middle, unit, sky):
@@ -37,25 +40,23 @@ def fade(material, middle, unit, sky):
 def show_sky(is_shown):
     """Whether what has faded is the sky, or nothing."""
     for material in bpy.data.materials:
-        node = material.node_tree.nodes.get(SKY)
+        node = material.node_tree.nodes.get(SKY) if material.node_tree is not None else None
         if node is not None and node.outputs[0].default_value != is_shown:
             node.outputs[0].default_value = is_shown
 
 
 def _gone(graph, middle, unit):
-    """The share that has faded."""
+    """The share that has faded; few nodes, as each sample of the ground works them out."""
     place = graph.node(
         "ShaderNodeVectorTransform", {0: tuple(middle)}, vector_type="POINT", convert_from="WORLD", convert_to="CAMERA"
     )
     middle_away = graph.node("ShaderNodeVectorMath", {0: place.outputs[0]}, operation="LENGTH").outputs["Value"]
-    away = graph.node("ShaderNodeCameraData").outputs["View Distance"]
-    behind = graph.math("DIVIDE", graph.math("SUBTRACT", away, middle_away), unit)
-    far = _between(graph, behind, BEGIN, BEGIN + OVER)
-    far = graph.complement(graph.math("POWER", graph.complement(far), 2.0))
+    behind = graph.math("SUBTRACT", graph.node("ShaderNodeCameraData").outputs["View Distance"], middle_away)
+    near = _between(graph, behind, unit * (BEGIN + OVER), unit * BEGIN)
+    left = _smooth(graph, graph.math("MULTIPLY", near, near), 0.0, 1.0)
     incoming = graph.node("ShaderNodeNewGeometry").outputs["Incoming"]
-    sine = graph.math("ABSOLUTE", graph.dot(incoming, (0.0, 0.0, 1.0)))
-    flat = graph.math("MINIMUM", graph.product(12.0, graph.math("MAXIMUM", graph.math("SUBTRACT", FLAT, sine), 0.0)), 1.0)
-    left = graph.product(graph.complement(_smooth(graph, far)), graph.complement(_smooth(graph, flat)))
+    sine = graph.math("ABSOLUTE", graph.node("ShaderNodeSeparateXYZ", {0: incoming}).outputs["Z"])
+    left = graph.math("MULTIPLY", left, _smooth(graph, sine, FLAT - FLATTER, FLAT))
     return graph.product(graph.node("ShaderNodeLightPath").outputs["Is Camera Ray"], graph.complement(left))
 
 
@@ -72,7 +73,7 @@ def _between(graph, value, low, high):
     return graph.node("ShaderNodeMapRange", {"Value": value, "From Min": low, "From Max": high}, clamp=True).outputs["Result"]
 
 
-def _smooth(graph, value):
-    """3 x^2 - 2 x^3."""
-    inputs = {"Value": value}
+def _smooth(graph, value, low, high):
+    """The same by 3 x^2 - 2 x^3."""
+    inputs = {"Value": value, "From Min": low, "From Max": high}
     return graph.node("ShaderNodeMapRange", inputs, interpolation_type="SMOOTHSTEP").outputs["Result"]

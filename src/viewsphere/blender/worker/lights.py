@@ -59,6 +59,8 @@ def add_world(scene, told):
     tree.nodes.clear()
     output = tree.nodes.new("ShaderNodeOutputWorld")
     place, image = _turned(tree, told["turn_deg"]), _picture(told["picture"])
+    # The picture says where light comes from, texel by texel: a finer map, as Cycles would take, costs more and knows no more.
+    world.cycles.sampling_method, world.cycles.sample_map_resolution = "MANUAL", image.size[0]
     lighting, seen = _background(tree, place, image), image
     if told["seen"] == told["picture"]:
         tree.links.new(lighting, output.inputs["Surface"])

@@ -7,35 +7,42 @@ from pathlib import Path
 
 import bpy
 
+from .addons import needed
+from .playing import play, set_span
+
 IMPORTS = {
-    "abc": lambda file: bpy.ops.wm.alembic_import(filepath=file, as_background_job=False),
-    "fbx": lambda file: bpy.ops.wm.fbx_import(filepath=file),
-    "glb": lambda file: bpy.ops.import_scene.gltf(filepath=file, disable_bone_shape=True),
-    "usd": lambda file: bpy.ops.wm.usd_import(
-        filepath=file, import_cameras=False, import_lights=False, create_world_material=False
+    "abc": lambda file, _: bpy.ops.wm.alembic_import(filepath=file, as_background_job=False),
+    "fbx": lambda file, _: bpy.ops.wm.fbx_import(filepath=file),
+    "glb": lambda file, _: bpy.ops.import_scene.gltf(filepath=file, disable_bone_shape=True),
+    "usd": lambda file, cameras: bpy.ops.wm.usd_import(
+        filepath=file, import_cameras=cameras, import_lights=False, create_world_material=False
     ),
 }
 SAME = {"gltf": "glb", "usda": "usd", "usdc": "usd", "usdz": "usd"}
 NAMES_SAID = 8
 
 
-def open_file(file, kind, root):
-    """Make the file the scene, at its first frame; metres in one of its units, and warnings."""
+def open_file(file, kind, root, cameras=False, clip=None):
+    """Make the file the scene, at its first frame, which becomes the scene's; metres in one of its units, and warnings.
+
+    Of a USD file, its cameras are imported where they are asked for. `clip` names the animation that is played.
+    """
     try:
         if kind == "blend":
             bpy.ops.wm.open_mainfile(filepath=file, load_ui=False, use_scripts=False)
         else:
             bpy.ops.wm.read_factory_settings(use_empty=True)
-            IMPORTS[SAME.get(kind, kind)](file)
+            IMPORTS[SAME.get(kind, kind)](file, cameras)
     except RuntimeError as error:
         raise ValueError(" ".join(str(error).removeprefix("Error: ").split())) from None
     scene = bpy.context.scene
-    if kind != "blend" and bpy.data.actions:
-        scene.frame_start = round(min(action.frame_range[0] for action in bpy.data.actions))
+    if clip is not None or kind != "blend":
+        play(clip)
+    set_span(scene, kind)
     scene.frame_set(scene.frame_start)
     units = scene.unit_settings
     metres = units.scale_length if kind == "blend" and units.system != "NONE" else 1.0
-    return metres, [*_newer(kind), *_libraries(root)]
+    return metres, [*_newer(kind), *_libraries(root), *needed()]
 
 
 def _newer(kind):

@@ -1,7 +1,7 @@
 """A model file that Blender opens or imports, as plain arrays and expressions: what `viewsphere.assets.via_blender` asks for.
 
-The file is evaluated once, as its first frame would be rendered: by a render engine that paints nothing and takes what it is
-given. So modifiers, particles and visibility are those of renders, not of the window.
+The file is evaluated as a frame of it would be rendered: by a render engine that paints nothing and takes what it is given.
+So modifiers, particles and visibility are those of renders, not of the window.
 """
 
 from __future__ import annotations
@@ -10,38 +10,59 @@ from pathlib import Path
 
 import bpy
 
-from .evaluated import Gathering
+from .evaluated import Gathering, listed
 from .opening import choose, open_file
 from .pictures import Pictures
+from .playing import clips, go_to, timeline
+from .scene_file import reveal
 from .weight import check_weight
 
 
 def read(told):
-    """Open `told["file"]`, of a `told["kind"]`, and write its arrays to `told["folder"]`.
+    """Open `told["file"]`, of a `told["kind"]`, and write its arrays at a frame to `told["folder"]`.
 
     `inside` names what of a .blend file is wanted, as Blender writes it: `["Object", name]`, `["Collection", name]` or
-    nothing. `root` is the folder that what the file names has to lie in, None for anywhere; `most` the number of triangles.
+    nothing; `shown` names objects that count although renders do not show them. `root` is the folder that what the file
+    names has to lie in, None for anywhere; `most` the number of triangles.
+    `frame` None is the first; `after` is the frame of the last answer where the file is open since then, else None.
     Raises ValueError in one line for what cannot be read.
     """
-    unit, warnings = open_file(told["file"], told["kind"], told["root"])
+    if told.get("after") is None:
+        unit, warnings = open_file(told["file"], told["kind"], told["root"], clip=told.get("clip"))
+        prepare(bpy.context.scene)
+        reveal(bpy.context.scene, told["shown"])
+    else:
+        unit, warnings = 1.0, []
     scene = bpy.context.scene
     wanted = choose(scene, told["inside"])
     check_weight(scene, wanted, told["most"])
+    frame = scene.frame_start if told.get("frame") is None else told["frame"]
+    go_to(scene, frame, told.get("after"))
     pictures = Pictures(told["folder"], told["root"])
     gathering = Gathering(told["folder"], pictures, wanted, told["most"])
-    _evaluate(scene, gathering)
+    evaluate(scene, gathering)
     return {
+        "frame": frame,
         "unit": unit,
         "pieces": gathering.pieces,
         "placed": gathering.placed,
         "materials": gathering.materials,
         "images": pictures.told,
-        "warnings": warnings + gathering.warnings,
+        "opened": warnings,
+        "warnings": gathering.warnings + _choices(told),
         "files": [str(Path(file).resolve()) for file in bpy.utils.blend_paths(absolute=True)],
     }
 
 
-def _evaluate(scene, gathering):
+def _choices(told):
+    """A warning where a file has several animations and nobody chose one."""
+    names = clips()
+    if told["kind"] == "blend" or told.get("frame") is None or told.get("clip") is not None or len(names) < 2:
+        return []
+    return [f"has {len(names)} animations, of which the first is played: choose one by clip: {listed(names)}"]
+
+
+def evaluate(scene, gathering):
     """Give the scene as it is rendered to `gathering`."""
     failed = []
 
@@ -56,14 +77,21 @@ def _evaluate(scene, gathering):
                 failed.append(error)
 
     bpy.utils.register_class(Taker)
-    _prepare(scene)
     scene.render.engine = Taker.bl_idname
     bpy.ops.render.render(layer=bpy.context.view_layer.name)
+    bpy.utils.unregister_class(Taker)
     if failed:
         raise failed[0]
 
 
-def _prepare(scene):
+def read_timeline(told):
+    """When the file begins and ends; it is opened, but not evaluated."""
+    _, warnings = open_file(told["file"], told["kind"], told["root"], clip=told["clip"])
+    files = [str(Path(file).resolve()) for file in bpy.utils.blend_paths(absolute=True)]
+    return {**timeline(bpy.context.scene), "warnings": warnings, "files": files}
+
+
+def prepare(scene):
     """A picture of a few pixels by a camera of our own, and nothing that happens after rendering."""
     render = scene.render
     render.resolution_x = render.resolution_y = 8

@@ -6,13 +6,14 @@ In a Blender without windows 'Render Result' has no pixels; Cycles' own result d
 from __future__ import annotations
 
 import time
+from pathlib import Path
 
 import bpy
 import cycles
 import numpy as np
 from mathutils import Matrix
 
-from . import ground
+from . import compositing, ground
 
 SENSOR = 36.0
 """Millimetres; any will do."""
@@ -32,20 +33,21 @@ def render(told):
     scene.render.film_transparent = told["transparent"]
     ground.show_sky(not told["transparent"])
     _set_border(scene, told["border"], view)
-    wanted = _switched(scene.view_layers[0], told)
+    wanted = _switched(bpy.context.view_layer, told)
     scene.update_tag()  # else persistent data hides what has changed
     begun, cpu = time.monotonic(), time.process_time()
-    for name, pixels in _rendered(wanted).items():
+    composed = Path(told["out"]).with_suffix(".exr") if compositing.is_used(scene) else None
+    for name, pixels in _rendered(wanted, composed).items():
         np.save(wanted[name], _whole(pixels, told["border"], view))
     return {"seconds": time.monotonic() - begun, "cpu_seconds": time.process_time() - cpu}
 
 
 def _switched(layer, told):
-    """Switch on the passes that are asked for, and no others; the file for each name that one may have."""
+    """Switch on the passes that are asked for; the file for each name that one may have."""
     wanted = {"Combined": told["out"]}
     for name, (switch, names) in PASSES.items():
-        setattr(layer, switch, name in told["passes"])
         if name in told["passes"]:
+            setattr(layer, switch, True)
             wanted |= dict.fromkeys(names, told["out"].replace(".npy", f".{name}.npy"))
     return wanted
 
@@ -77,14 +79,18 @@ def _set_border(scene, border, view):
         scene.render.border_min_y, scene.render.border_max_y = low / view["height"], high / view["height"]
 
 
-def _rendered(names):
-    """Cycles' passes of one render, (H, W, C) float32 each, the first row on top."""
+def _rendered(names, composed):
+    """Cycles' passes of one render, (H, W, C) float32 each, the first row on top; the colours from the file that the
+    compositor writes, if it is used.
+    """
     found = {}
     original = cycles.CyclesRender.render
 
     def watched(self, depsgraph):
         original(self, depsgraph)
         result = self.get_result()
+        if result.layers[0].name != bpy.context.view_layer.name:
+            return
         for name, one in result.layers[0].passes.items():
             if name in names:
                 values = np.empty(result.resolution_x * result.resolution_y * one.channels, np.float32)
@@ -94,11 +100,16 @@ def _rendered(names):
 
     cycles.CyclesRender.render = watched
     try:
-        bpy.ops.render.render()
+        if composed is not None:
+            bpy.context.scene.render.filepath = str(composed)
+        bpy.ops.render.render(write_still=composed is not None)
     finally:
         cycles.CyclesRender.render = original
     if "Combined" not in found:
         raise RuntimeError("Cycles gave no picture")
+    if composed is not None:
+        found["Combined"] = compositing.with_alpha(compositing.read_picture(composed), found["Combined"])
+        composed.unlink()
     return found
 
 

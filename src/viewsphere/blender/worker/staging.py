@@ -8,19 +8,27 @@ import bpy
 from mathutils import Matrix
 
 from . import ground, lights, materials, meshes
+from .scene_file import open_scene
+
+ENOUGH = 8
+"""Samples from which on normals help the denoiser."""
 
 
 def stage(told):
     """Replace whatever there is by the scene that is told; the camera comes with each render."""
-    bpy.ops.wm.read_factory_settings(use_empty=True)
-    scene = bpy.context.scene
+    if told["file"]:
+        scene = open_scene(told["file"])
+    else:
+        bpy.ops.wm.read_factory_settings(use_empty=True)
+        scene = bpy.context.scene
+        scene.view_layers[0].use_pass_z = False
     made = {}  # copies of a model that are painted otherwise share its textures
-    kinds = [_mesh(f"model {i}", mesh, made) for i, mesh in enumerate(told["meshes"])]
+    kinds = [_mesh(mesh["name"], mesh, made) for mesh in told["meshes"]]
     for item in told["objects"]:
         _place(scene, kinds[item["mesh"]], item["matrix"], item["index"])
     for light in told["lights"]:
         lights.add_light(scene, light)
-    sky = lights.add_world(scene, told["world"])
+    sky = lights.add_world(scene, told["world"]) if told["world"] else None
     if told["ground"]:
         _lay_ground(scene, told["ground"], sky, made)
     set_up(scene, told["settings"])
@@ -44,7 +52,7 @@ def set_up(scene, settings):
     cycles.max_bounces = settings["bounces"]
     cycles.transparent_max_bounces = 16
     cycles.seed = 0
-    _denoise(cycles, settings["denoise"])
+    _denoise(cycles, settings["denoise"], settings["samples"])
     _choose_device(cycles, settings["device"])
     for name, value in settings["cycles"].items():
         _set(cycles, name, value)
@@ -60,11 +68,12 @@ def _set(cycles, name, value):
         ) from None
 
 
-def _denoise(cycles, how):
+def _denoise(cycles, how, samples):
+    """Open Image Denoise; normals that are themselves noise, of a few samples, would tell it to keep the noise."""
     cycles.use_denoising = how != "off"
     if how != "off":
         cycles.denoiser = "OPENIMAGEDENOISE"
-        cycles.denoising_input_passes = "RGB_ALBEDO_NORMAL"
+        cycles.denoising_input_passes = "RGB_ALBEDO_NORMAL" if samples >= ENOUGH else "RGB_ALBEDO"
         cycles.denoising_prefilter = "ACCURATE" if how == "best" else "NONE"
         if hasattr(cycles, "denoising_quality"):  # Blender 4.2 and later
             cycles.denoising_quality = "HIGH" if how == "best" else "FAST"
@@ -105,6 +114,6 @@ def _mesh(name, told, known):
 def _place(scene, mesh, matrix, index):
     placed = bpy.data.objects.new(mesh.name, mesh)
     placed.matrix_world = Matrix(matrix)
-    placed.pass_index = index
+    placed.pass_index = placed["id"] = index
     scene.collection.objects.link(placed)
     return placed

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,10 +11,15 @@ if TYPE_CHECKING:
 
     from viewsphere.assets.mesh import Mesh
     from viewsphere.engines.cycles.staging import CyclesStage
+    from viewsphere.model.sample import Sample
+    from viewsphere.model.scene import Finish
     from viewsphere.model.shot import ModelSpec, Shot
 
 PROGRAMS = (Path(__file__).parents[2] / "blender" / "worker",)
 """Sources besides these that pictures depend on."""
+
+OPENS_SCENES = True
+"""It renders .blend files that are the scene."""
 
 
 def check(options: Mapping[str, JsonValue]) -> None:
@@ -33,3 +38,17 @@ def stage(shot: Shot, load: Callable[[ModelSpec], Mesh]) -> CyclesStage:
     from viewsphere.engines.cycles.staging import build_stage
 
     return build_stage(shot, load)
+
+
+def save(shot: Shot, samples: Sequence[Sample], load: Callable[[ModelSpec], Mesh], file: Path, data: str) -> tuple[str, ...]:
+    """Write a shot of any engine as a .blend file, with the cameras of its frames' samples; see `saving.save`."""
+    from viewsphere.engines.cycles import saving
+
+    return saving.save(shot, samples, load, file, data)
+
+
+def shows_sky(shot: Shot, finish: Finish) -> bool:
+    """Whether a picture of a shot has the sky where nothing else is; `save` wants frames that agree in this."""
+    from viewsphere.engines.cycles import saving
+
+    return saving.shows_sky(shot, finish)

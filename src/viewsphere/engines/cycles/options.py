@@ -33,7 +33,7 @@ class Options:
 
 
 PRESETS = {
-    "draft": Options(samples=4, denoise="fast", bounces=2),
+    "draft": Options(samples=3, denoise="fast", bounces=2),
     "good": Options(),
     "final": Options(samples=256, denoise="best", bounces=8),
 }

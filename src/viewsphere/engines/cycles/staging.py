@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from viewsphere.assets.mesh import Mesh
 from viewsphere.blender.interpreter import find_blender
 from viewsphere.blender.process import BlenderProcess
+from viewsphere.engines.cycles.file_frame import FileFrame
 from viewsphere.engines.cycles.lens import resampled, views_of
 from viewsphere.engines.cycles.options import Options, parse_options
 from viewsphere.engines.cycles.told import middle_of, told_scene
@@ -40,6 +41,9 @@ AROUND = 2
 
 Float32 = NDArray[np.float32]
 
+Bounds = tuple[Path, ...] | None
+"""The folders that Blender may read, where it opens a file of a user's; None where it opens none."""
+
 
 @dataclass(eq=False)
 class Keeper:
@@ -47,6 +51,7 @@ class Keeper:
 
     python: Path
     process: BlenderProcess | None = None
+    _started_for: tuple[Bounds, int] | None = None
     _stage: CyclesStage | None = None
     _served: int = 0
 
@@ -54,10 +59,12 @@ class Keeper:
         """A Blender that has this stage's scene."""
         if self.process is not None and self._stage is stage:
             return self.process
-        if stage.options.replace_after and self._served >= stage.options.replace_after:
+        worn = stage.options.replace_after and self._served >= stage.options.replace_after
+        wanted = stage.bounds, stage.options.threads
+        if worn or self._started_for != wanted:
             self.drop()
         if self.process is None:
-            self.process = _started(self.python)
+            self.process, self._started_for = _started(self.python, *wanted), wanted
         self._stage, self._served = None, self._served + 1
         stage.tell(self.process)
         self._stage = stage
@@ -70,8 +77,8 @@ class Keeper:
         self.process, self._stage, self._served = None, None, 0
 
 
-def _started(python: Path) -> BlenderProcess:
-    process = BlenderProcess(python)
+def _started(python: Path, bounds: Bounds, threads: int) -> BlenderProcess:
+    process = BlenderProcess(python, readable=bounds, threads=threads)
     try:
         process.ask("hello")
     except BlenderError as error:
@@ -96,6 +103,14 @@ class CyclesStage:
     options: Options
     keeper: Keeper
     middle: NDArray[np.float64]
+
+    @property
+    def bounds(self) -> Bounds:
+        """What Blender may read for it."""
+        blend = self.shot.scene.blend
+        if blend is None:
+            return None
+        return (Path(blend.file).resolve().parent,) if blend.confined else (Path("/"),)
 
     def color(self, camera: Camera, frame: Frame, visibility: Visibility) -> NDArray[np.uint8]:
         """The picture, (H, W, 3) uint8 sRGB, or (H, W, 4) with straight alpha where the background is transparent.
@@ -133,11 +148,12 @@ class CyclesStage:
         return resampled(camera, views, pictures)
 
     def _picture(self, process: BlenderProcess, camera: Camera, is_open: bool) -> Float32:
-        border = border_of(self.geometry, camera) if is_open and self.shot.scene.ground is None else None
+        is_empty = is_open and self.shot.scene.ground is None and self.shot.scene.blend is None
+        border = border_of(self.geometry, camera) if is_empty else None
         if border is not None and (border[0] >= border[2] or border[1] >= border[3]):
             return np.zeros((camera.height, camera.width, 4), np.float32)
         out = str(process.folder / "picture.npy")
-        told = told_camera(camera)
+        told = FileFrame.of(self.shot.scene.blend).camera(told_camera(camera))
         process.ask("render", FRAME_SECONDS, camera=told, transparent=is_open, border=border, passes=[], out=out)
         return np.load(out)
 
@@ -179,6 +195,6 @@ def build_stage(shot: Shot, load: Callable[[ModelSpec], Mesh]) -> CyclesStage:
     """Geometry and scene of a shot; Blender builds it when the first picture is asked for."""
     options = parse_options(shot.engine_options)
     meshes = placed_meshes(shot.placements, load)
-    geometry = build_geometry(shot.placements, meshes, shot.scene.ground is not None, shot.label_alpha)
+    geometry = build_geometry(shot.placements, meshes, shot.scene.ground is not None, shot.label_alpha, shot.scene.floor)
     keeper = keeper_of(find_blender(options.python))
     return CyclesStage(geometry, shot, meshes, options, keeper, middle_of(geometry, min(len(meshes), 1)))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,8 +13,9 @@ from numpy.typing import NDArray
 
 from viewsphere.assets.mesh import Image, Material, Mesh
 from viewsphere.assets.repaint import repainted
+from viewsphere.engines.cycles.file_frame import FileFrame
 from viewsphere.engines.cycles.options import Options
-from viewsphere.model.scene import AnyLight, Ground, HemisphereLight, Scene
+from viewsphere.model.scene import AnyLight, BlendScene, Ground, HemisphereLight, Scene
 from viewsphere.model.shot import Placement, Repaint
 from viewsphere.surroundings.ground import ground_frame, ground_material, only_scatters
 from viewsphere.surroundings.sky import sky_pictures
@@ -36,23 +38,35 @@ def told_scene(
     told: list[Told] = []
     shared: dict[int, Told] = {}
     objects: list[Told] = []
+    frame, blend = FileFrame.of(scene.blend), scene.blend
     for placement, mesh in zip(placements, meshes, strict=True):
+        if blend is not None and placement.model.parts is not None:
+            continue  # it is in the file
         kind = id(mesh), placement.repaints
         if kind not in kinds:
             kinds[kind] = len(told)
             if id(mesh) not in shared:
                 shared[id(mesh)] = _told_mesh(mesh, put)
-            told.append({**shared[id(mesh)], "materials": [_told_material(m, placement.repaints) for m in mesh.materials]})
-        objects.append({"mesh": kinds[kind], "matrix": placement.world_from_object, "index": placement.id})
+            materials = [_told_material(m, placement.repaints) for m in mesh.materials]
+            told.append({**shared[id(mesh)], "name": placement.model.key, "materials": materials})
+        objects.append({"mesh": kinds[kind], "matrix": frame.placed(placement.world_from_object), "index": placement.id})
+    middle = middle_of(geometry, sum(not p.scenery for p in placements))
     has_scenery = any(p.scenery for p in placements)
     return {
         "meshes": told,
         "objects": objects,
         "ground": None if scene.ground is None else _told_ground(scene.ground, geometry, has_scenery, put),
-        "lights": _told_lights(scene, middle_of(geometry, sum(not p.scenery for p in placements))),
-        "world": _told_world(scene, put),
+        "lights": [frame.light(light) for light in _told_lights(scene, middle)],
+        "world": None if blend is not None and blend.is_lit else _told_world(scene, put),
+        "file": None if blend is None else _told_file(blend),
         "settings": told_settings(options),
     }
+
+
+def _told_file(blend: BlendScene) -> Told:
+    path = Path(blend.file).resolve()
+    told = blend.model_dump(include={"shown", "hidden", "frame"})
+    return {"file": str(path), "root": str(path.parent) if blend.confined else None, **told}
 
 
 def told_settings(options: Options) -> Told:
@@ -131,7 +145,7 @@ def middle_of(geometry: Geometry, count: int) -> NDArray[np.float64]:
 def _told_lights(scene: Scene, middle: NDArray[np.float64]) -> list[Told]:
     """The sun as it arrives, and the lamps; hemispheres are part of the world."""
     told: list[Told] = []
-    sun = sun_light(scene.sky, scene.sun)
+    sun = sun_light(scene.sky, scene.sun) if scene.blend is None or not scene.blend.is_lit else None
     if sun is not None:
         told.append(
             {"kind": "sun", "direction": sun.direction, "irradiance": sun.irradiance, "angle_deg": sun.angle_deg},

@@ -75,7 +75,7 @@ def build_stage(shot: Shot, load: Callable[[ModelSpec], Mesh]) -> RasterStage:
     options = replace(options, shadow_resolution=size)
     meshes = placed_meshes(shot.placements, load)
     scene = shot.scene
-    geometry = build_geometry(shot.placements, meshes, scene.ground is not None, shot.label_alpha)
+    geometry = build_geometry(shot.placements, meshes, scene.ground is not None, shot.label_alpha, scene.floor)
     targets = sum(not p.scenery for p in shot.placements)
     low, high = _bounds(geometry, geometry.triangle_start[1] if len(geometry.triangle_start) > 1 else 0)
     return RasterStage(

@@ -115,6 +115,7 @@ def _pose(dataset: Dataset, sample: Sample) -> dict[str, Any]:
         "azimuth": pose.azimuth_deg,
         "tilt": pose.tilt_deg,
         "pose_category": pose.category,
+        **({"frame": pose.time.frame, "seconds": pose.time.seconds} if pose.time else {}),
         "folder": _pose_folder(dataset, sample),
         "transformation_matrix": transformation_matrix(sample.camera),
     }
@@ -134,6 +135,7 @@ def _rendered(sample: Sample, o: ObjectAnnotation, mask: str, files: Mapping[str
         "visibility": o.visibility,
         "truncation": o.truncation,
         "id_model": o.key,
+        **({"id_track": o.track} if o.track else {}),
         "split": sample.split,
         "transformation_matrix": transformation_matrix(sample.camera),
         **({"distortion": lens.model_dump(mode="json")} if lens else {}),

@@ -1,0 +1,72 @@
+"""Some of the parts of a mesh as a mesh of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.assets.mesh import Mesh
+from viewsphere.assets.piece import used_images
+from viewsphere.errors import ModelError
+from viewsphere.geometry.rotation import transform
+from viewsphere.model.shot import ModelSpec, Parts
+
+VERTEX = ("uv0", "uv1", "colors")
+
+
+def taken(mesh: Mesh, spec: ModelSpec) -> Mesh:
+    """What `spec.parts` says of a whole model's mesh, with the materials and images that it uses.
+
+    Raises ModelError where that is nothing.
+    """
+    assert spec.parts is not None
+    chosen = is_taken(mesh.parts, spec.parts)[mesh.triangle_part]
+    if not chosen.any():
+        wanted = ", ".join(spec.parts.only or ("anything",))
+        raise ModelError(f"{spec.source}: expected triangles of {wanted}, found none that a render would show")
+    used, corners = np.unique(mesh.triangles[chosen], return_inverse=True)
+    parts, part = np.unique(mesh.triangle_part[chosen], return_inverse=True)
+    materials, material = np.unique(mesh.triangle_material[chosen], return_inverse=True)
+    kept, images = used_images([mesh.materials[i] for i in materials], mesh.images)
+    vertices, normals = _turned(mesh.vertices[used], mesh.normals[used], spec.parts)
+    rest = {name: None if values is None else values[used] for name in VERTEX for values in [getattr(mesh, name)]}
+    return replace(
+        mesh,
+        **rest,
+        vertices=vertices,
+        normals=normals,
+        triangles=corners.reshape(-1, 3).astype(np.int32),
+        triangle_part=part.astype(np.int32),
+        triangle_material=material.astype(np.int32),
+        parts=tuple(mesh.parts[i] for i in parts),
+        materials=kept,
+        images=images,
+    )
+
+
+def is_taken(names: Sequence[str], parts: Parts) -> NDArray[np.bool_]:
+    """Whether each part (N,) is one of those."""
+    only = None if parts.only is None else frozenset(parts.only)
+    without = frozenset(parts.without)
+    return np.array([(only is None or _is_of(name, only)) and not _is_of(name, without) for name in names], np.bool_)
+
+
+def _is_of(part: str, objects: frozenset[str]) -> bool:
+    """Whether a part belongs to one of the objects: it is the object, or one that it instances."""
+    pieces = part.split("/")
+    return any("/".join(pieces[: i + 1]) in objects for i in range(len(pieces)))
+
+
+def _turned(
+    vertices: NDArray[np.float32], normals: NDArray[np.float32], parts: Parts
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """In the parts' axes."""
+    axes = np.array(parts.file_from_axes)
+    if (axes == np.eye(4)).all():
+        return vertices, normals
+    turn = axes[:3, :3].T
+    moved = transform(turn, vertices.astype(np.float64) - axes[:3, 3])
+    return moved.astype(np.float32), transform(turn, normals.astype(np.float64)).astype(np.float32)

@@ -1,0 +1,108 @@
+"""What there is in a .blend file that is a scene: asked from Blender once, without reading meshes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from viewsphere.assets import limits
+from viewsphere.blender.interpreter import find_blender
+from viewsphere.blender.process import BlenderProcess
+from viewsphere.errors import BlenderDied, BlenderError, ModelError
+from viewsphere.geometry.rotation import Float, matrix_from_quaternion, rigid
+
+
+@dataclass(frozen=True)
+class SceneObject:
+    """An object of a file: its kind as Blender names it, its `parent`, the names of all collections that it is in, its custom
+    properties, the names of its parts that a render would show, and where it stands: `place` and `turn`, (x, y, z) metres and
+    a quaternion (w, x, y, z), in the file's world.
+    """
+
+    name: str
+    kind: str
+    parent: str | None
+    collections: tuple[str, ...]
+    properties: Mapping[str, str | int | float | bool]
+    parts: tuple[str, ...]
+    place: tuple[float, float, float]
+    turn: tuple[float, float, float, float]
+
+    @property
+    def file_from_object(self) -> Float:
+        """Rigid, (4, 4), metres."""
+        return rigid(matrix_from_quaternion(self.turn), np.array(self.place))
+
+
+@dataclass(frozen=True)
+class SceneFile:
+    """The objects of a file, by name; metres in one of its units; whether it has light; what to tell the user."""
+
+    path: Path
+    objects: tuple[SceneObject, ...]
+    unit: float
+    is_lit: bool
+    warnings: tuple[str, ...]
+
+    @cached_property
+    def by_name(self) -> Mapping[str, SceneObject]:
+        """Objects by their names."""
+        return {one.name: one for one in self.objects}
+
+    def ancestors(self, one: SceneObject) -> tuple[SceneObject, ...]:
+        """Its parent, that one's parent and so on."""
+        found: list[SceneObject] = []
+        while (parent := self.by_name.get(one.parent or "")) is not None and len(found) < len(self.objects):
+            one = parent
+            found.append(one)
+        return tuple(found)
+
+
+@lru_cache(maxsize=64)
+def scene_file(path: Path, confined: bool = True, shown: tuple[str, ...] = (), frame: int | None = None) -> SceneFile:
+    """What the file holds at a frame (None: its first); `shown` are patterns of objects that count although renders do not show
+    them.
+
+    Confined, nothing outside of its folder is read. Raises ModelError in one line for a file that Blender cannot open,
+    MissingExtraError without a Blender.
+    """
+    told = _asked(path, confined, "contents", frame=frame, shown=shown, most=limits.MAX_BLENDER_TRIANGLES)
+    objects = tuple(_object(one, told["unit"]) for one in told["objects"])
+    return SceneFile(path, objects, told["unit"], told["is_lit"], tuple(f"{path.name}: {line}" for line in told["warnings"]))
+
+
+@lru_cache(maxsize=64)
+def places(path: Path, confined: bool, names: tuple[str, ...], frames: tuple[int, ...]) -> Mapping[int, Mapping[str, Float]]:
+    """Where objects stand at each of the frames, which ascend: rigid, (4, 4), metres. Raises as `scene_file` does."""
+    told = _asked(path, confined, "places", names=names, frames=frames)
+    unit = told["unit"]
+    stands = [[_standing(place, turn, unit) for place, turn in at] for at in told["places"]]
+    return {frame: dict(zip(names, at, strict=True)) for frame, at in zip(frames, stands, strict=True)}
+
+
+def _asked(path: Path, confined: bool, do: str, **told: Any) -> Any:
+    place = path.parent.resolve()
+    readable = [place] if confined else [Path("/")]
+    told |= {"file": str(path.resolve()), "root": str(place) if confined else None}
+    try:
+        with BlenderProcess(find_blender(), readable=readable) as process:
+            return process.ask(do, limits.from_environment("MAX_READ_SECONDS"), **told)
+    except (BlenderError, BlenderDied) as error:
+        said = str(error).removeprefix("ValueError: ").partition("; its log")[0]
+        raise ModelError(f"{path}: Blender cannot read it: {said}") from None
+
+
+def _standing(place: Sequence[float], turn: Sequence[float], unit: float) -> Float:
+    return rigid(matrix_from_quaternion(turn), unit * np.array(place))
+
+
+def _object(told: Mapping[str, Any], unit: float) -> SceneObject:
+    x, y, z = (unit * v for v in told["place"])
+    collections, parts = (tuple(told[name]) for name in ("collections", "parts"))
+    fields = {name: told[name] for name in ("name", "kind", "parent", "properties")}
+    return SceneObject(**fields, collections=collections, parts=parts, place=(x, y, z), turn=tuple(told["turn"]))

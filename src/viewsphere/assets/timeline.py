@@ -1,0 +1,79 @@
+"""When a file's animation begins and ends: asked from Blender, once for a file and all that it names."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from viewsphere.assets.cache import kept
+from viewsphere.assets.folder import ModelFolder
+from viewsphere.assets.inside import split_source
+from viewsphere.assets.load import check_animated
+from viewsphere.assets.via_blender import asked, started
+from viewsphere.blender.process import BlenderProcess
+from viewsphere.errors import ModelError
+
+
+@dataclass(frozen=True)
+class Timeline:
+    """First and last frame of a file, its frames a second, whether anything in it moves, and its animations' names."""
+
+    first: int
+    last: int
+    fps: float
+    moves: bool
+    clips: tuple[str, ...] = ()
+
+    def seconds(self, frame: int) -> float:
+        """From the first frame to this one."""
+        return (frame - self.first) / self.fps
+
+
+@dataclass(eq=False)
+class Blenders:
+    """Answers about files; files of one folder are opened by one Blender, one after another. A context manager."""
+
+    _stack: ExitStack
+    _running: dict[tuple[Path, bool], BlenderProcess]
+
+    @staticmethod
+    def none_yet() -> Blenders:
+        """None is started before it is needed."""
+        return Blenders(ExitStack(), {})
+
+    def __enter__(self) -> Blenders:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._stack.close()
+
+    def told(self, path: Path, confined: bool, do: str, about: Mapping[str, Any]) -> dict[str, Any]:
+        """The answer to a request about a file, which may be known; ModelError in one line when there is none."""
+        file = split_source(path)[0]
+        check_animated(file)
+
+        def ask() -> tuple[dict[str, Any], list[Path]]:
+            folder = ModelFolder(file, confined)
+            folder.read_model()
+            answer = self._asked(folder, do, about)
+            return answer, [*folder.files, *map(Path, answer["files"])]
+
+        return kept(file, f"{do} {confined} {sorted(about.items())}", ask)
+
+    def timeline(self, path: Path, confined: bool, clip: str | None = None) -> Timeline:
+        """When the file begins and ends, playing the animation of this name, by default the first."""
+        told = self.told(path, confined, "timeline", {"clip": clip})
+        return Timeline(told["first"], told["last"], told["fps"], told["moves"], tuple(told["clips"]))
+
+    def _asked(self, folder: ModelFolder, do: str, about: Mapping[str, Any]) -> dict[str, Any]:
+        place = folder.model.parent.resolve(), folder.confined
+        if place not in self._running:
+            self._running[place] = self._stack.enter_context(started(folder))
+        try:
+            return asked(folder, self._running[place], do, **about)
+        except ModelError:
+            self._running.pop(place).close()  # it may have died
+            raise

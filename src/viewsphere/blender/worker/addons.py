@@ -1,0 +1,52 @@
+"""What of an open file needs add-ons or scripts, none of which are there."""
+
+from __future__ import annotations
+
+import bpy
+
+NAMES_SAID = 5
+DRIVEN = "objects", "meshes", "curves", "shape_keys", "materials", "armatures", "lights", "cameras", "worlds", "scenes"
+
+
+def needed():
+    """Warnings: nodes, node trees and render engines that no part of Blender makes, and scripts that would run on opening."""
+    said = []
+    strangers = sorted({node.name for tree in _trees() for node in tree.nodes if node.bl_idname == "NodeUndefined"})
+    strangers += sorted(tree.name for tree in bpy.data.node_groups if tree.bl_idname in ("", "NodeTreeUndefined"))
+    if strangers:
+        said.append(f"needs add-ons, which are not loaded, for the nodes {_listed(strangers)}: rendered without them")
+    scripts = sorted(text.name for text in bpy.data.texts if text.use_module)
+    if scripts:
+        said.append(f"scripts that would run on opening do not run: {_listed(scripts)}")
+    drivers = sorted({f"{owner.name}: {curve.data_path}" for owner in _driven() for curve in _of_python(owner)})
+    if drivers:
+        said.append(f"drivers with Python do not run: {_listed(drivers)}")
+    return said
+
+
+def _trees():
+    """All node trees: groups, and those within materials, worlds, lights and scenes."""
+    yield from bpy.data.node_groups
+    for owner in (*bpy.data.materials, *bpy.data.worlds, *bpy.data.lights, *bpy.data.scenes):
+        tree = getattr(owner, "node_tree", None)
+        if tree is not None:
+            yield tree
+
+
+def _driven():
+    """All data-blocks with drivers; shape keys, materials and meshes have their own."""
+    for name in DRIVEN:
+        for owner in getattr(bpy.data, name):
+            if owner.animation_data is not None:
+                yield owner
+
+
+def _of_python(owner):
+    """Its drivers for which Python would have to run: expressions beyond Blender's own arithmetic."""
+    drivers = owner.animation_data.drivers
+    return [one for one in drivers if one.driver.type == "SCRIPTED" and not one.driver.is_simple_expression]
+
+
+def _listed(names):
+    more = f" and {len(names) - NAMES_SAID} more" if len(names) > NAMES_SAID else ""
+    return ", ".join(map(repr, names[:NAMES_SAID])) + more

@@ -1,0 +1,77 @@
+"""The compositor of a file, which acts on the colours alone."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+
+def tree_of(scene):
+    """The nodes of a scene's compositor, None without any."""
+    if not scene.render.use_compositing:
+        return None
+    if hasattr(scene, "compositing_node_group"):  # Blender 5.0 and later
+        return scene.compositing_node_group
+    return scene.node_tree if scene.use_nodes else None
+
+
+def fault(scene):
+    """A warning where a compositor gives no picture, so that the picture is what Cycles gives."""
+    tree = tree_of(scene)
+    if tree is None or not len(tree.nodes) or is_used(scene):
+        return []
+    return ["the compositor has no output that something leads to: pictures are those that Cycles gives"]
+
+
+def is_used(scene):
+    """Whether a compositor gives the picture."""
+    tree = tree_of(scene)
+    return tree is not None and any(_is_output(node) and not node.mute and node.inputs[0].is_linked for node in tree.nodes)
+
+
+def _is_output(node):
+    return node.bl_idname in ("CompositorNodeComposite", "NodeGroupOutput") and len(node.inputs) > 0
+
+
+def stop_writing():
+    """Nothing but pictures that are asked for is written: no file outputs, in no compositor and no group."""
+    trees = [*bpy.data.node_groups, *(tree for s in bpy.data.scenes if (tree := getattr(s, "node_tree", None)) is not None)]
+    for tree in trees:
+        for node in tree.nodes:
+            if node.bl_idname == "CompositorNodeOutputFile":
+                node.mute = True
+
+
+def set_up(scene):
+    """Pictures leave as scene-linear floating point numbers; the compositor is exact, on the processor."""
+    render, image = scene.render, scene.render.image_settings
+    if hasattr(image, "media_type"):  # Blender 5.0 and later
+        image.media_type = "IMAGE"
+    image.file_format, image.color_mode, image.color_depth, image.exr_codec = "OPEN_EXR", "RGBA", "32", "NONE"
+    image.color_management = "FOLLOW_SCENE"
+    image.use_preview = False
+    render.use_file_extension = render.use_render_cache = False
+    render.use_overwrite, render.use_placeholder = True, False
+    for name, value in (("compositor_device", "CPU"), ("compositor_precision", "FULL")):
+        if hasattr(render, name):
+            setattr(render, name, value)
+
+
+def read_picture(file):
+    """The composed picture (H, W, 4) float32, premultiplied, the first row on top."""
+    image = bpy.data.images.load(str(file))
+    try:
+        image.colorspace_settings.name = "Linear Rec.709"
+        width, height = image.size
+        pixels = np.empty(width * height * 4, np.float32)
+        image.pixels.foreach_get(pixels)
+    finally:
+        bpy.data.images.remove(image)
+    return np.ascontiguousarray(pixels.reshape(height, width, 4)[::-1])
+
+
+def with_alpha(composed, rendered):
+    """A composed picture whose compositor dropped the alpha has the rendered one's: else nothing would be seen behind it."""
+    if composed.shape == rendered.shape and (composed[..., 3] == 1).all():
+        composed[..., 3] = rendered[..., 3]
+    return composed

@@ -1,0 +1,110 @@
+"""When a file begins and ends, whether anything moves in it, and how to get to a frame."""
+
+from __future__ import annotations
+
+import bpy
+
+SIMULATED = {"CLOTH", "SOFT_BODY", "FLUID", "DYNAMIC_PAINT", "PARTICLE_SYSTEM", "COLLISION"}
+"""Modifiers whose result follows from the frames before."""
+
+PLAYED = SIMULATED | {"BUILD", "EXPLODE", "MESH_CACHE", "MESH_SEQUENCE_CACHE", "OCEAN", "WAVE"}
+"""Modifiers that change with time by themselves."""
+
+TIME_NODES = {"GeometryNodeInputSceneTime", "GeometryNodeSimulationInput"}
+
+
+def play(clip):
+    """Let everything move as the animation of this name says; None: as the file does, where importers play the first one.
+
+    FBX files call it a take, glTF an animation; importers make it an action, with the name of what it moves before it. What
+    the first one does not move plays the first that moves it.
+    """
+    chosen = [action for action in bpy.data.actions if clip in (action.name, action.name.rpartition("|")[2])]
+    if clip is not None and not chosen:
+        raise ValueError(f"expected an animation {clip!r}, found {', '.join(map(repr, clips())) or 'none at all'}")
+    for one in _animated():
+        data = one.animation_data
+        if data is None:
+            continue
+        strips = [strip.action for track in data.nla_tracks for strip in track.strips if track.mute and strip.action]
+        for action in chosen if clip is not None else strips[:1] if data.action is None else ():
+            kinds = one.id_type, "UNSPECIFIED"
+            slot = next((s for s in action.slots if s.identifier[2:] == one.name and s.target_id_type in kinds), None)
+            if slot is not None:
+                data.action = action
+                data.action_slot = slot
+
+
+def clips():
+    """Names of the animations."""
+    return sorted({action.name.rpartition("|")[2] for action in bpy.data.actions})
+
+
+def set_span(scene, kind):
+    """Make the frames from which to which something moves the scene's own; those of a .blend file stay."""
+    if kind == "blend":
+        return
+    played = {one.animation_data.action for one in _animated() if one.animation_data} - {None}
+    ranges = [action.frame_range for action in played or bpy.data.actions]
+    if bpy.data.cache_files:  # importers have set the scene's frames to theirs
+        ranges.append((scene.frame_start, scene.frame_end))
+    if ranges:
+        scene.frame_start = round(min(first for first, _ in ranges))
+        scene.frame_end = round(max(last for _, last in ranges))
+    else:
+        scene.frame_end = scene.frame_start
+
+
+def timeline(scene):
+    """First and last frame, frames a second, and whether anything moves."""
+    return {
+        "first": scene.frame_start,
+        "last": scene.frame_end,
+        "fps": scene.render.fps / scene.render.fps_base,
+        "moves": scene.frame_end > scene.frame_start and _moves(scene),
+        "clips": clips(),
+    }
+
+
+def go_to(scene, frame, after=None):
+    """Make it this frame; simulations are played up to it, from the first frame or from the one `after` which it comes."""
+    if is_simulated(scene):
+        for between in range(scene.frame_start if after is None else after + 1, frame):
+            scene.frame_set(between)
+    scene.frame_set(frame)
+
+
+def is_simulated(scene):
+    """Whether a frame follows from the frames before."""
+    world = scene.rigidbody_world
+    return bool(
+        (world is not None and world.enabled and world.collection is not None)
+        or any(modifier.type in SIMULATED for modifier in _modifiers(scene))
+        or _has_node({"GeometryNodeSimulationInput"})
+    )
+
+
+def _moves(scene):
+    """Whether there is anything that could change with time."""
+    return bool(
+        len(bpy.data.actions)
+        or len(bpy.data.cache_files)
+        or is_simulated(scene)
+        or any(modifier.type in PLAYED for modifier in _modifiers(scene))
+        or _has_node(TIME_NODES)
+        or any(data.animation_data and data.animation_data.drivers for data in _animated())
+    )
+
+
+def _modifiers(scene):
+    return (modifier for item in scene.objects for modifier in item.modifiers)
+
+
+def _has_node(kinds):
+    return any(node.bl_idname in kinds for tree in bpy.data.node_groups for node in tree.nodes)
+
+
+def _animated():
+    """All that drivers and actions are most often of."""
+    names = "objects", "meshes", "shape_keys", "armatures", "cameras", "lights", "curves", "materials"
+    return (one for name in names for one in getattr(bpy.data, name))

@@ -1,0 +1,170 @@
+"""The staged scene as a .blend file for people to open: whoever renders one of its frames sees that frame's picture."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from pathlib import Path
+
+import bpy
+
+from . import ground
+from .rig import key, make_rig
+
+CURVES = {"standard": "Standard", "raw": "Standard", "filmic": "Filmic", "agx": "AgX"}
+"""Blender's view transform for each of viewsphere's."""
+
+LOOKS = {"Filmic": "Very High Contrast"}
+"""Those that bring a transform nearest to viewsphere's; with one, no picture is shown as it is."""
+
+SHOWN_AS = {"Standard": "sRGB", "Filmic": "Filmic sRGB", "AgX": "AgX Base sRGB"}
+"""Colour spaces of pictures that these transforms show as they are."""
+
+MODELS, SCENERY, LIGHTS, RIG = "models", "scenery", "lights", "rig"
+
+
+def save(told):
+    """Write what is staged to the file `told["file"]`, with the poses' cameras on a rig; gives by how much these are off."""
+    scene = bpy.context.scene
+    scene.name = told["name"]
+    if told["is_users"]:
+        _hold_still()
+    off = make_rig(scene, told["poses"])
+    _describe(scene, told)
+    _show(scene, told)
+    if not told["is_users"]:
+        _sort(scene)
+    _set_output(scene.render, told["transparent"])
+    _pack(told["sequence"])
+    scene.frame_set(1)
+    bpy.ops.wm.save_as_mainfile(filepath=told["file"], compress=True, relative_remap=False)
+    return {"off": off}
+
+
+def _hold_still():
+    """What a file animates stays as it is at the moment that is shown: the timeline is the poses'."""
+    for kind in (p.identifier for p in bpy.data.bl_rna.properties if p.type == "COLLECTION"):
+        for one in getattr(bpy.data, kind):
+            for animated in (one, getattr(one, "node_tree", None)):
+                data = getattr(animated, "animation_data", None)
+                if data is not None:
+                    data.action = None
+                    for track in data.nla_tracks:
+                        track.mute = True
+
+
+def _describe(scene, told):
+    """What viewsphere knows of the frames and the objects, as custom properties, and a text."""
+    for name, value in told["properties"].items():
+        scene[name] = value
+    for one in scene.objects:
+        if "id" not in one:  # a user's file has it
+            one.pass_index = told["members"].get(one.name, 0)
+        for name, value in told["objects"].get(str(one.pass_index), {}).items():
+            one[name] = value
+    bpy.data.texts.new("viewsphere").write(told["text"])
+
+
+def _show(scene, told):
+    """What is seen behind, and how light becomes a picture."""
+    scene.render.film_transparent = told["is_open"]
+    ground.show_sky(not told["is_open"])
+    shown, transform = scene.view_settings, CURVES[told["transform"]]
+    scene.display_settings.display_device = "sRGB"
+    shown.view_transform, shown.gamma = transform, 1.0
+    shown.look = "None" if told["background"] else LOOKS.get(transform, "None")
+    key(scene, "view_settings.exposure", told["exposures"])
+    if told["temperature_k"] is not None:
+        shown.use_white_balance, shown.white_balance_temperature = True, told["temperature_k"]
+    if told["background"] is not None and not told["is_users"]:
+        _lay_behind(scene, told, SHOWN_AS[transform])
+
+
+def _lay_behind(scene, told, space):
+    """Compositor nodes that lay the picture over a background, which is shown as it is whatever the exposure."""
+    tree, out = _compositor(scene)
+    behind, render = tree.nodes.new("CompositorNodeImage"), tree.nodes.new("CompositorNodeRLayers")
+    dim, over = tree.nodes.new("CompositorNodeExposure"), tree.nodes.new("CompositorNodeAlphaOver")
+    behind.image = bpy.data.images.load(told["background"])
+    behind.image.name = "background"
+    behind.image.colorspace_settings.name = space
+    if told["sequence"]:
+        behind.image.source = "SEQUENCE"
+        behind.frame_start, behind.frame_duration, behind.frame_offset = 1, len(told["poses"]), 0
+        behind.use_auto_refresh = True
+    key(tree, f'nodes["{dim.name}"].inputs[1].default_value', [-stops for stops in told["exposures"]])
+    # Blender 5 names these sockets; before, both were called Image, behind the factor.
+    below, above = ("Background", "Foreground") if "Background" in over.inputs else (1, 2)
+    for source, socket in (
+        (behind.outputs["Image"], dim.inputs["Image"]),
+        (dim.outputs[0], over.inputs[below]),
+        (render.outputs["Image"], over.inputs[above]),
+        (over.outputs[0], out.inputs[0]),
+    ):
+        tree.links.new(source, socket)
+    for place, node in enumerate((behind, dim, over, out)):
+        node.location = 250 * place, 0
+    render.location = 250, 300
+
+
+def _compositor(scene):
+    """The scene's compositor, empty, and the node of its result."""
+    if hasattr(scene, "compositing_node_group"):  # Blender 5
+        tree = bpy.data.node_groups.new("picture", "CompositorNodeTree")
+        tree.interface.new_socket("Image", in_out="OUTPUT", socket_type="NodeSocketColor")
+        scene.compositing_node_group = tree
+        return tree, tree.nodes.new("NodeGroupOutput")
+    scene.use_nodes = True
+    scene.node_tree.nodes.clear()
+    return scene.node_tree, scene.node_tree.nodes.new("CompositorNodeComposite")
+
+
+def _sort(scene):
+    """Collections of models, scenery, lights and the rig."""
+    for name in (MODELS, SCENERY, LIGHTS, RIG):
+        scene.collection.children.link(bpy.data.collections.new(name))
+    for one in list(scene.collection.objects):
+        scene.collection.children[_collection_of(one)].objects.link(one)
+        scene.collection.objects.unlink(one)
+
+
+def _collection_of(one):
+    if one.type == "LIGHT":
+        return LIGHTS
+    if one.type != "MESH" or one.hide_render:
+        return RIG
+    return MODELS if one.pass_index else SCENERY
+
+
+def _set_output(render, is_transparent):
+    """Pictures beside the file, computed with all the cores there are."""
+    if hasattr(render.image_settings, "media_type"):  # Blender 5
+        render.image_settings.media_type = "IMAGE"
+    render.image_settings.file_format, render.image_settings.color_mode = "PNG", "RGBA" if is_transparent else "RGB"
+    render.filepath = "//"
+    render.threads_mode = "AUTO"
+    render.use_persistent_data = False
+
+
+def _pack_one(one, is_packed):
+    """What cannot be read, because it is not there, stays out."""
+    with suppress(RuntimeError):
+        if not is_packed:
+            one.pack()
+        if one.filepath and one.filepath != "<builtin>":
+            one.filepath = f"//{Path(one.filepath).name}"
+
+
+def _pack(sequence):
+    """All pictures lie in the file, but those of our sequence, which lie beside it; no path leads out of there."""
+    for image in bpy.data.images:
+        if image.source == "SEQUENCE" and sequence:
+            image.filepath = f"//{sequence}/{Path(image.filepath).name}"
+        elif image.source in ("FILE", "GENERATED", "TILED"):
+            _pack_one(image, image.packed_files)
+    for font in bpy.data.fonts:
+        _pack_one(font, font.packed_file or font.filepath == "<builtin>")
+    for screen in bpy.data.screens:
+        for space in (space for area in screen.areas for space in area.spaces):
+            if space.type == "FILE_BROWSER" and space.params is not None:
+                space.params.directory = b"/" * 1000  # what is shorter leaves the end of what was there
+                space.params.directory = b"//"

@@ -1,0 +1,58 @@
+"""A user's own file as the scene: its world, lights, meshes and compositor as they are."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+
+import bpy
+
+from . import compositing
+from .opening import open_file
+from .playing import go_to
+
+
+def open_scene(told):
+    """Open the file that is told, with what is to be shown and hidden; the scene."""
+    open_file(told["file"], "blend", told["root"])
+    scene = bpy.context.scene
+    go_to(scene, scene.frame_start if told["frame"] is None else told["frame"])
+    reveal(scene, told["shown"])
+    for name in told["hidden"]:
+        if name in bpy.data.objects:
+            bpy.data.objects[name].hide_render = True
+    _only_color(scene)
+    compositing.stop_writing()
+    compositing.set_up(scene)
+    return scene
+
+
+def reveal(scene, names):
+    """Let renders show the objects of these names; one that was hidden is shown with all that is parented to it."""
+    there = set(scene.collection.objects)
+    for one in (bpy.data.objects[name] for name in names if name in bpy.data.objects):
+        for member in (one, *(one.children_recursive if one.hide_render else ())):
+            member.hide_render = member.hide_viewport = False
+            if member not in there:  # its own collections may be hidden
+                scene.collection.objects.link(member)
+                there.add(member)
+
+
+def _only_color(scene):
+    """Leave out what would not fit the labels: they are of one moment, one view and the triangles that modifiers make."""
+    render = scene.render
+    render.use_motion_blur = render.use_multiview = render.use_freestyle = render.use_sequencer = render.use_stamp = False
+    render.use_border = render.use_crop_to_border = False
+    render.dither_intensity = 0.0
+    if not compositing.is_used(scene):
+        for layer in scene.view_layers:
+            layer.use = layer == bpy.context.view_layer
+    for one in bpy.data.objects:
+        with suppress(AttributeError):
+            one.cycles.use_adaptive_subdivision = False  # Blender 4.5
+        for modifier in one.modifiers:
+            if getattr(modifier, "use_adaptive_subdivision", False):
+                modifier.use_adaptive_subdivision = False
+    cycles = scene.cycles
+    cycles.use_auto_tile = False
+    cycles.shading_system = False
+    cycles.film_exposure = 1.0

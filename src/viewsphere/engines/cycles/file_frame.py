@@ -1,0 +1,75 @@
+"""From the shot's world to that of a .blend file that is the scene: another origin, turned, in the file's unit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from viewsphere.geometry.rotation import compose, transform
+from viewsphere.model.scene import BlendScene
+
+Float = NDArray[np.float64]
+Told = dict[str, Any]
+
+
+@dataclass(frozen=True, eq=False)
+class FileFrame:
+    """`file_from_world` (4, 4) is rigid, in metres; `unit` the metres in one unit of the file."""
+
+    file_from_world: Float
+    unit: float
+
+    @classmethod
+    def of(cls, blend: BlendScene | None) -> FileFrame:
+        """The file's; without one the world's own."""
+        if blend is None:
+            return cls(np.eye(4), 1.0)
+        world_from_file = np.array(blend.world_from_file)
+        turn = world_from_file[:3, :3].T
+        inverse = np.eye(4)
+        inverse[:3, :3], inverse[:3, 3] = turn, -transform(turn, world_from_file[:3, 3])
+        return cls(inverse, blend.unit)
+
+    @property
+    def is_same(self) -> bool:
+        """Whether nothing changes."""
+        return self.unit == 1.0 and bool((self.file_from_world == np.eye(4)).all())
+
+    def placed(self, world_from_object: ArrayLike) -> list[list[float]]:
+        """The file's matrix of an object whose mesh is in metres."""
+        matrix = compose(self.file_from_world, world_from_object)
+        matrix[:3] /= self.unit
+        return matrix.tolist()
+
+    def point(self, point: ArrayLike) -> list[float]:
+        """A place, in the file's units."""
+        return (transform(self.file_from_world, point) / self.unit).tolist()
+
+    def direction(self, direction: ArrayLike) -> list[float]:
+        """A direction."""
+        return transform(self.file_from_world[:3, :3], direction).tolist()
+
+    def light(self, told: Told) -> Told:
+        """A light: what it gives falls off with the square of the distance, which is counted in the file's units."""
+        if self.is_same:
+            return told
+        if told["kind"] == "sun":
+            return {**told, "direction": self.direction(told["direction"])}
+        changed = {name: self.point(told[name]) for name in ("position", "toward") if name in told}
+        changed["irradiance"] = [value / self.unit**2 for value in told["irradiance"]]
+        if "radius" in told:
+            changed["radius"] = told["radius"] / self.unit
+        if "size" in told:
+            changed["size"] = [value / self.unit for value in told["size"]]
+        return {**told, **changed}
+
+    def camera(self, told: Told) -> Told:
+        """A camera: the rows of `R` are its axes."""
+        if self.is_same:
+            return told
+        axes = [self.direction(axis) for axis in told["R"]]
+        distances = {name: told[name] / self.unit for name in ("near", "far")}
+        return {**told, "R": axes, "center": self.point(told["center"]), **distances}

@@ -1,0 +1,169 @@
+"""A shot as a .blend file to open in Blender: what the worker's `save` is told (`viewsphere.blender.worker.saving`)."""
+
+from __future__ import annotations
+
+import math
+import shutil
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from viewsphere.assets.mesh import Mesh
+from viewsphere.assets.srgb import encoded
+from viewsphere.engines.cycles.file_frame import FileFrame
+from viewsphere.engines.cycles.staging import STAGE_SECONDS, CyclesStage, build_stage, told_camera
+from viewsphere.errors import BlenderDied, ModelError
+from viewsphere.geometry.camera import orbit_angles
+from viewsphere.geometry.image_files import encode_png
+from viewsphere.imaging.background import display_background
+from viewsphere.imaging.effects import has_effects
+from viewsphere.imaging.view import EXPOSURE
+from viewsphere.imaging.white import NEUTRAL_K
+from viewsphere.model.camera import Camera
+from viewsphere.model.channel import picture_of
+from viewsphere.model.sample import Sample
+from viewsphere.model.scene import Finish
+from viewsphere.model.shot import ModelSpec, Shot
+
+NEAREST, FARTHEST = 1e-3, 1e5
+"""What the camera sees, in distances to its target: with more, surfaces would flicker in Blender's windows."""
+
+SAME = 1e-6
+"""Targets that differ by less, in distances of the camera, are one."""
+
+MOST_OFF = 1e-4
+"""Camera's error that single precision explains, in distances."""
+
+TEXT = """\
+{name}, which viewsphere made from the data set {data}.
+
+Render any frame of the timeline to see that picture: its marker says which frame of the data set it is, and which side the
+camera sees. The camera hangs on the object `viewing sphere`, which stands where `target` is: the sphere's rotation about X is
+90 degrees less the elevation, that about Z the azimuth, its scale the distance; the camera's own rotation about Z is the tilt.
+
+The pass index of an object is its number in the data set's instance maps; its custom properties say what it is.
+"""
+
+
+def save(shot: Shot, samples: Sequence[Sample], load: Callable[[ModelSpec], Mesh], file: Path, data: str) -> tuple[str, ...]:
+    """Write a shot's scene, with the cameras of these samples, which are those of its frames, in order.
+
+    The pictures have one size and shape of pixels, and all or none of them show the sky. A shot of another engine is told as
+    this one would render it. Backgrounds that change lie beside the file, in a folder of its name. `data` is the data set's
+    name. Gives what could not be carried over, a line each. Raises UserError where Blender cannot be used, ModelError where it
+    dies twice.
+    """
+    options = shot.engine_options if shot.engine == "cycles" else {}
+    own = shot.model_copy(update={"engine": "cycles", "engine_options": {**options, "device": "cpu"}})
+    stage = build_stage(own, load)
+    finishes = [frame.finish or shot.scene.finish for frame in shot.frames]
+    told = _told(shot, samples, finishes, file.stem, data)
+    died: BlenderDied | None = None
+    for _ in range(2):
+        try:
+            _ask(stage, told, finishes, samples[0].camera, file)
+            return tuple(_lacking(samples, finishes))
+        except BlenderDied as error:
+            stage.keeper.drop()
+            died = error
+    raise ModelError(f"{file.name}: {died}")
+
+
+def is_clear(shot: Shot) -> bool:
+    """Whether a shot's pictures have no background at all."""
+    return picture_of(shot.channels) == "rgba"
+
+
+def shows_sky(shot: Shot, finish: Finish) -> bool:
+    """Whether a picture of a shot has the sky where nothing else is."""
+    return not is_clear(shot) and finish.background.color is None and finish.background.image is None
+
+
+def _ask(stage: CyclesStage, told: dict[str, Any], finishes: Sequence[Finish], camera: Camera, file: Path) -> None:
+    process = stage.keeper.process_for(stage)
+    background, sequence = None, ""
+    if told["is_open"] and not told["transparent"] and not told["is_users"]:
+        behind = [finish.background for finish in finishes]
+        sequence = file.stem if any(b != behind[0] for b in behind) else ""
+        folder = file.with_suffix("") if sequence else process.folder
+        folder.mkdir(exist_ok=True)
+        background = str(folder.absolute() / "0001.png")
+        for number, one in enumerate(behind if sequence else behind[:1], 1):
+            display = display_background(one, camera.width, camera.height)
+            assert display is not None
+            pixels = np.round(encoded(display) * 255).astype(np.uint8).reshape(camera.height, camera.width, 3)
+            (folder / f"{number:04d}.png").write_bytes(encode_png(pixels))
+    saved = process.folder / "saved.blend"  # Blender may be kept from writing anywhere else
+    answer = process.ask("save", STAGE_SECONDS, **told, file=str(saved), background=background, sequence=sequence)
+    shutil.move(saved, file)
+    assert answer["off"] <= MOST_OFF * max(pose["distance"] for pose in told["poses"]), answer
+
+
+def _told(shot: Shot, samples: Sequence[Sample], finishes: Sequence[Finish], name: str, data: str) -> dict[str, Any]:
+    """All of the worker's request that is not a picture."""
+    views = [finish.view for finish in finishes]
+    temperatures = {view.temperature_k for view in views} - {NEUTRAL_K}
+    return {
+        "name": name,
+        "text": TEXT.format(name=name, data=data),
+        "poses": _told_poses(samples, FileFrame.of(shot.scene.blend)),
+        "objects": _told_objects(samples),
+        "members": {name: p.id for p in shot.objects for name in (p.model.parts and p.model.parts.only) or ()},
+        "properties": {"data set": data, "frames": [sample.index for sample in samples]},
+        "is_users": shot.scene.blend is not None,
+        "is_open": not shows_sky(shot, finishes[0]),
+        "transparent": is_clear(shot),
+        "transform": views[0].transform,
+        "exposures": [math.log2(EXPOSURE) + view.exposure for view in views],
+        "temperature_k": views[0].temperature_k if temperatures else None,
+    }
+
+
+def _told_poses(samples: Sequence[Sample], frame: FileFrame) -> list[dict[str, Any]]:
+    """The rig at every sample, whatever its camera's pose was called: it looks at a point of its axis."""
+    poses: list[dict[str, Any]] = []
+    nearest, farthest = (f(sample.pose.distance for sample in samples) for f in (min, max))
+    still = np.full(3, np.inf)
+    for sample in samples:
+        distance = sample.pose.distance
+        target = sample.camera.center + distance * sample.camera.R[2]
+        still = still if np.abs(target - still).max() <= SAME * distance else target
+        clipped = {"near": NEAREST * nearest, "far": FARTHEST * farthest}
+        camera = frame.camera(told_camera(sample.camera) | clipped)
+        azimuth, elevation, tilt = np.degrees(orbit_angles(camera["R"])).tolist()
+        poses.append(
+            {
+                "name": f"frame {sample.index} {sample.pose.category}".strip(),
+                "target": frame.point(still),
+                "distance": distance / frame.unit,
+                "azimuth": azimuth,
+                "elevation": elevation,
+                "tilt": tilt,
+                "camera": camera,
+            }
+        )
+    return poses
+
+
+def _told_objects(samples: Sequence[Sample]) -> dict[str, dict[str, Any]]:
+    """Custom properties by object id; pose categories by frame of the timeline."""
+    told: dict[str, dict[str, Any]] = {}
+    for number, sample in enumerate(samples, 1):
+        for o in sample.objects:
+            known = {"id": o.id, "category": o.category, "supercategory": o.supercategory, "model": o.key}
+            one = told.setdefault(str(o.id), {**known, "pose categories": {}})
+            one["pose categories"][str(number)] = o.pose_category
+    return told
+
+
+def _lacking(samples: Sequence[Sample], finishes: Sequence[Finish]) -> Iterator[str]:
+    """What Blender's camera and pictures have not."""
+    if any(sample.camera.distortion is not None or sample.camera.intrinsics.skew for sample in samples):
+        yield "Blender's camera has no such distortion or skew: a pinhole of the same focal lengths and centre takes its place"
+    if any(has_effects(f.effects) or f.smoother.kind != "none" or f.effects.jpeg for f in finishes):
+        yield "scene.effects and scene.smoother are not in the file: viewsphere does them to the finished picture"
+    views = [finish.view.model_copy(update={"exposure": 0.0}) for finish in finishes]
+    if any(view != views[0] or view.tint for view in views):
+        yield "a view transform, temperature or tint that changes is not in the file: the first frame's is"

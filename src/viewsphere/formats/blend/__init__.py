@@ -1,0 +1,147 @@
+"""Blender's own files, to open and change: a scene with its models, lights and ground, the camera on the viewing sphere.
+
+    <model>.blend                 the frames of a model, one after another on the timeline
+    <model>-<first frame>.blend   where the model's frames are of several scenes: one of them
+    <the same>/0001.png, ...      the backgrounds of its frames, where they change
+
+Frames share a file as far as they share a scene: models and where they stand, light, ground. Pictures are packed. Blender
+writes memory addresses, so equal data sets give equal scenes but not equal bytes. Frames without a camera are left out.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from viewsphere import plugins
+from viewsphere.assets.cache import load_normalised
+from viewsphere.assets.mesh import Mesh
+from viewsphere.errors import StoreError
+from viewsphere.model.files import Files
+from viewsphere.model.sample import ObjectAnnotation, Sample
+from viewsphere.model.scene import Matrix4, Scene
+from viewsphere.model.shot import Frame, ModelSpec, Placement, Shot
+from viewsphere.zoo import build
+
+if TYPE_CHECKING:
+    from viewsphere.store import Dataset
+
+ENGINE = "cycles"
+"""The engine that has a Blender."""
+
+
+def check() -> None:
+    """Raise UserError where there is no Blender."""
+    plugins.load("engines", ENGINE).check({})
+
+
+def export(dataset: Dataset, folder: Path) -> tuple[str, ...]:
+    """Write the finished frames that have a camera; gives notes on what could not be carried over.
+
+    Raises UserError where Blender cannot be used, ModelError for scenery that cannot be read any more.
+    """
+    groups = list(_groups(dataset))
+    counts = Counter(group.model for group in groups)
+    notes: dict[str, None] = {}
+    for group in groups:
+        frames, samples = zip(*_views(dataset, group), strict=True)
+        name = group.model if counts[group.model] == 1 else f"{group.model}-{samples[0].index:06d}"
+        own = group.shot.model_copy(update={"frames": frames})
+        load = _Models(dataset, {p.model: o.key for p, o in zip(own.objects, samples[0].objects, strict=False)})
+        said = plugins.load("engines", ENGINE).save(own, samples, load, folder / f"{name}.blend", dataset.name)
+        notes |= dict.fromkeys(f"format blend: {note}" for note in said)
+    return tuple(notes)
+
+
+@dataclass(eq=False)
+class _Group:
+    """A model's frames of one scene: of which shots, and their places there. What the shot says of frames does not count."""
+
+    model: str
+    shot: Shot
+    places: dict[str, list[int]] = field(default_factory=dict[str, list[int]])
+
+
+def _groups(dataset: Dataset) -> Iterator[_Group]:
+    """In the order of their first frames."""
+    groups: dict[tuple[object, ...], _Group] = {}
+    for key, places in dataset.shots():
+        known = dataset.store.shot(key)
+        alike = known and _alike(known)
+        for place, sample in zip(places, dataset.samples_of(key, places), strict=True):
+            if not (sample.known_camera and sample.known_pose and sample.objects and all(o.model for o in sample.objects)):
+                continue
+            shot = known or _lit_anyhow(key, sample)
+            scene = alike or _alike(shot), *_seen(shot, shot.frames[place if known else 0], sample)
+            group = groups.setdefault(scene, _Group(sample.objects[0].key, shot))
+            group.places.setdefault(key, []).append(place)
+    return iter(groups.values())
+
+
+def _views(dataset: Dataset, group: _Group) -> Iterator[tuple[Frame, Sample]]:
+    """A group's frames and samples, read once more: those of all groups would be too many to keep."""
+    for key, places in group.places.items():
+        known = dataset.store.shot(key)
+        for place, sample in zip(places, dataset.samples_of(key, places), strict=True):
+            yield known.frames[place] if known else group.shot.frames[0], sample
+
+
+def _alike(shot: Shot) -> str:
+    """Equal for shots of one scene."""
+    return shot.model_copy(update={"key": "", "frames": (), "channels": (), "files": Files()}).model_dump_json()
+
+
+def _seen(shot: Shot, frame: Frame, sample: Sample) -> tuple[object, ...]:
+    """Besides the scene, equal for frames that can share a file."""
+    shows_sky = plugins.load("engines", ENGINE).shows_sky(shot, frame.finish or shot.scene.finish)
+    lens = sample.camera.intrinsics
+    models = tuple(o.key for o in sample.objects)
+    return models, shows_sky, lens.width, lens.height, lens.fx / lens.fy
+
+
+def _lit_anyhow(key: str, sample: Sample) -> Shot:
+    """A shot of which only its objects and cameras are known, in the default light."""
+    return Shot(
+        key=key,
+        placements=tuple(Placement(id=o.id, model=_spec(o.key, ""), world_from_object=_matrix(o)) for o in sample.objects),
+        intrinsics=sample.camera.intrinsics,
+        scene=Scene(),
+        frames=(Frame(index=sample.index, pose=sample.pose, split=sample.split),),
+        channels=("rgb",),
+    )
+
+
+def _matrix(o: ObjectAnnotation) -> Matrix4:
+    a, b, c, d = ((x, y, z, w) for x, y, z, w in o.world_from_object.tolist())
+    return a, b, c, d
+
+
+def _spec(key: str, source: str) -> ModelSpec:
+    """A model file as it is: in metres, where it stands in it."""
+    return ModelSpec(key=key, source=source, category="model", category_id=1, centring="as_is")
+
+
+@dataclass(frozen=True, eq=False)
+class _Models:
+    """Normalised meshes: of objects, by `keys` of the data set, what it keeps of them; of scenery, what its source gives."""
+
+    dataset: Dataset
+    keys: Mapping[ModelSpec, str]
+
+    def __call__(self, spec: ModelSpec) -> Mesh:
+        key = self.keys.get(spec)
+        if key is None:
+            return load_normalised(spec, _from_zoo)
+        info = self.dataset.store.model_info(key)
+        if info is None:
+            raise StoreError(f"{self.dataset.root}: expected model {key!r} in the store, found none: render again")
+        return load_normalised(_spec(key, str(self.dataset.path(info.glb).absolute())))
+
+
+def _from_zoo(spec: ModelSpec) -> Mesh:
+    return build(spec.source.removeprefix("zoo:"), np.random.default_rng(spec.seed))

@@ -1,0 +1,48 @@
+"""A part of a data set: frames by their numbers and by their models."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+
+from viewsphere.errors import UserError
+
+
+@dataclass(frozen=True)
+class Choice:
+    """Frames of models whose keys match one of the patterns, and whose numbers lie in one of the ranges [first, stop);
+    all of them where there is none.
+    """
+
+    models: tuple[str, ...] = ()
+    frames: tuple[tuple[int, int], ...] = ()
+
+    @property
+    def is_some(self) -> bool:
+        """Whether anything is left out."""
+        return bool(self.models or self.frames)
+
+    def has_model(self, key: str) -> bool:
+        """Whether frames of this model are meant."""
+        return not self.models or any(fnmatchcase(key, pattern) for pattern in self.models)
+
+    def places(self, first: int, count: int) -> Sequence[int]:
+        """Which of the frames first, first + 1, ... are meant, counted from 0."""
+        if not self.frames:
+            return range(count)
+        return [i for i in range(count) if any(low <= first + i < stop for low, stop in self.frames)]
+
+
+def frame_ranges(text: str) -> tuple[tuple[int, int], ...]:
+    """Frames as people write them, `0-15,40`, both ends included, as ranges [first, stop).
+
+    Raises UserError for anything else.
+    """
+    found: list[tuple[int, int]] = []
+    for part in filter(None, (part.strip() for part in text.split(","))):
+        first, dash, last = part.partition("-")
+        if not first.isdecimal() or (dash and not (last.isdecimal() and int(last) >= int(first))):
+            raise UserError(f"--frames: expected numbers and ranges, such as 0-15,40; found {part!r}")
+        found.append((int(first), int(last or first) + 1))
+    return tuple(found)

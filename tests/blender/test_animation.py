@@ -1,0 +1,228 @@
+"""Animated files: what is read at a frame, the data sets of time steps, and cameras of files."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from viewsphere import Dataset, Recipe, generate, plan
+from viewsphere.assets import cache
+from viewsphere.assets.cache import load, load_normalised, read_ahead
+from viewsphere.check import check
+from viewsphere.errors import ModelError, RecipeError
+from viewsphere.geometry.camera import project
+from viewsphere.model.shot import ModelSpec
+from viewsphere.run.stages import Stages
+from viewsphere.sampling.viewpoints import camera_for
+
+FRAMES = (1, 13, 25)
+KINDS = {"blend": None, "glb": "cubeAction", "usdc": None, "abc": None, "fbx": "cubeAction"}
+"""What Blender exports has an animation for each object, in formats that may have several."""
+
+
+@pytest.fixture(scope="module")
+def files(blender, tmp_path_factory):
+    """The folder of files that `make_moving` makes, with what it says as seen.json; do not change it."""
+    folder = tmp_path_factory.mktemp("moving") / "files"
+    folder.mkdir()
+    run = subprocess.run([blender, Path(__file__).with_name("make_moving.py"), folder], capture_output=True, text=True)
+    (folder / "seen.json").write_text(run.stdout.splitlines()[-1], "utf-8")
+    return folder
+
+
+def spec_of(path, frame, **fields):
+    return ModelSpec(key="a", source=str(path), category="thing", category_id=1, frame=frame, **fields)
+
+
+def recipe(files, name="jump.blend", frames=FRAMES, viewpoints=None, **fields):
+    entry = {"source": str(files / name), "category": "cube", "frames": frames, "centring": "floor"}
+    own = {key: fields.pop(key) for key in ("poses", "clip", "centring", "name") if key in fields}
+    return Recipe(
+        models=[{**entry, **own}],
+        viewpoints=viewpoints or {"azimuth": [20, 200], "elevation": 15, "distance": 6},
+        **{"camera": {"size": [64, 64], "fov_deg": 50}, **fields},
+    )
+
+
+def refused(files, **fields):
+    with pytest.raises(RecipeError) as caught:
+        plan(recipe(files, **fields))
+    return str(caught.value)
+
+
+def assert_holds(folder):
+    report = check(Dataset(folder))
+    assert report.ok, report
+
+
+# Reading.
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_format_moves_from_where_it_stands_at_the_first_frame(files, kind):
+    specs = [spec_of(files / f"jump.{kind}", frame, centring="floor", clip=KINDS[kind]) for frame in FRAMES]
+    read_ahead(specs)
+    for spec, x, z in zip(specs, (0, 1, 2), (0, 1, 0), strict=True):
+        mesh, facts = load(spec)
+        reach = (np.cos((spec.frame - 1) / 24) + np.sin((spec.frame - 1) / 24)) / 2  # of a square that turns
+        np.testing.assert_allclose(mesh.bounds, [[x - reach, -reach, z], [x + reach, reach, z + 1]], atol=2e-3)
+        assert len(mesh.triangles) == 12
+        assert facts.up == ("+y" if kind == "glb" else "+z")
+    assert load(specs[0])[1].unit == 1
+
+
+def test_frames_are_read_at_once_and_each_is_the_same_alone(files, tmp_path, monkeypatch):
+    specs = [spec_of(files / "bend.blend", frame) for frame in FRAMES]
+    alone = load_normalised(specs[1], folder=tmp_path / "other")
+    read_ahead(specs, tmp_path / "own")
+    monkeypatch.setattr(cache, "read_frames_apart", None)
+    monkeypatch.setattr(cache, "read_apart", None)
+    read_ahead(specs, tmp_path / "own")
+    together = [load_normalised(spec, folder=tmp_path / "own") for spec in specs]
+    np.testing.assert_array_equal(together[1].vertices, alone.vertices)
+    np.testing.assert_array_equal(together[1].normals, alone.normals)
+    # An armature lifts the upper half and a shape key widens all, both by 1 m; the box of the first frame is centred.
+    np.testing.assert_allclose(together[2].bounds, [[-1.5, -0.5, -0.5], [1.5, 0.5, 1.5]], atol=1e-5)
+    np.testing.assert_allclose(together[0].bounds, [[-0.5, -0.5, -0.5], [0.5, 0.5, 0.5]], atol=1e-6)
+
+
+def test_simulations_are_played_up_to_the_frame(files):
+    fallen = load_normalised(spec_of(files / "fall.blend", 13, centring="floor"))
+    seconds = 12 / 24
+    assert fallen.bounds[0, 2] == pytest.approx(-9.81 / 2 * seconds**2, rel=0.15)
+
+
+def test_a_file_of_several_animations_is_warned_of(files):
+    mesh, _ = load(spec_of(files / "jump.fbx", 13))
+    assert "choose one by clip: 'cubeAction', 'eyeAction'" in mesh.warnings[-1]
+    with pytest.raises(ModelError, match=r"expected an animation 'walk', found 'cubeAction', 'eyeAction'"):
+        load(spec_of(files / "jump.fbx", 13, clip="walk"))
+
+
+def test_files_that_cannot_move_are_refused(tmp_path):
+    (tmp_path / "a.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    with pytest.raises(ModelError, match=r"expected a file that can move \(abc, blend, fbx, .*found obj"):
+        load(spec_of(tmp_path / "a.obj", 2))
+
+
+# Recipes.
+
+
+def test_mistakes_cost_one_line(files):
+    assert "models[0].frames: expected a file in which something moves; found no animation in " in refused(
+        files, name="still.blend"
+    )
+    assert "models[0].frames: expected frames of 1 to 25, as " in refused(files, frames=[1, 99])
+    assert "found 99" in refused(files, frames=[1, 99])
+    said = refused(files, poses="moving")
+    assert "models[0].poses: expected as many poses as time steps, for moving; found 2 poses and 3 time steps of jump" in said
+    assert "expected an animation 'walk', found 'cubeAction', 'eyeAction'" in refused(files, name="jump.glb", clip="walk")
+
+
+def test_a_data_set_of_time_steps(files, tmp_path):
+    asked = recipe(files, frames={"step": 12}, channels=["rgb", "instances", "depth"])
+    planned = plan(asked)
+    assert (planned.frames, planned.time_steps, planned.factors) == (6, 3, "1 models x 3 time steps x 2 poses")
+    generate(asked, tmp_path / "out")
+    dataset = Dataset(tmp_path / "out")
+    assert [(s.pose.time.frame, s.pose.time.seconds) for s in dataset] == [(f, (f - 1) / 24) for f in FRAMES for _ in range(2)]
+    assert [(s.objects[0].id, s.objects[0].track, s.objects[0].key) for s in dataset[::2]] == [
+        (1, "jump", f"jump-f{frame:04d}") for frame in FRAMES
+    ]
+    assert len({s.split for s in dataset}) == 1
+    # The camera stands still, and the cube jumps before it, above ground.
+    assert len({s.camera.t.tobytes() for s in dataset[::2]}) == 1
+    lows = [s.objects[0].box3d[:, 2].min() for s in dataset[::2]]
+    np.testing.assert_allclose(lows, [0, 1, 0], atol=1e-5)
+    assert_holds(tmp_path / "out")
+    images = json.loads((tmp_path / "out" / "coco" / "annotations" / f"instances_{dataset[0].split}.json").read_text())
+    assert [(i["frame"], i["seconds"]) for i in images["images"]] == [(f, (f - 1) / 24) for f in FRAMES for _ in range(2)]
+    assert {a["id_track"] for a in images["annotations"]} == {"jump"}
+    poses = json.loads((tmp_path / "out" / "native" / "dataset1.json").read_text())["poses"]
+    assert [pose["frame"] for pose in poses.values()] == [1, 1, 13, 13, 25, 25]
+
+
+def test_time_steps_are_appended(files, tmp_path):
+    generate(recipe(files, frames=[1], formats=[]), tmp_path / "out")
+    before = [s.depth.tobytes() for s in Dataset(tmp_path / "out")]
+    generate(recipe(files, frames=[1, 25], formats=[]), tmp_path / "out", append=True)
+    dataset = Dataset(tmp_path / "out")
+    assert [s.pose.time.frame for s in dataset] == [1, 1, 25, 25]
+    assert [s.depth.tobytes() for s in dataset[:2]] == before
+    assert_holds(tmp_path / "out")
+
+
+def test_a_camera_may_follow(files):
+    asked = recipe(files, viewpoints={"azimuth": 20, "elevation": 15, "distance": 6, "target": "follow"})
+    planned, stages = plan(asked), Stages()
+    shots = [planned.shot(i, stages.box) for i in range(planned.shot_count)]
+    seen = [next(stages.render(shot)).objects[0].box3d_pixels.mean(axis=0) for shot in shots]
+    assert np.ptp([pixel[0] for pixel in seen]) < 2
+    centers = [next(stages.render(shot)).camera.center for shot in shots]
+    np.testing.assert_allclose(np.subtract(centers[2], centers[0]), [2, 0, 0], atol=1e-4)
+
+
+def test_both_engines_have_the_same_labels(files):
+    shots = []
+    for engine in ({"name": "raster"}, {"name": "cycles", "samples": 1}):
+        asked = recipe(files, frames=[13], engine=engine, channels=["rgb", "instances", "depth"])
+        planned, stages = plan(asked), Stages()
+        shots.append(next(stages.render(planned.shot(0, stages.box))))
+    assert shots[0].instances.tobytes() == shots[1].instances.tobytes()
+    assert shots[0].depth.tobytes() == shots[1].depth.tobytes()
+    assert shots[0].instances.any()
+
+
+# Cameras.
+
+
+@pytest.mark.parametrize("kind", ["blend", "usdc", "fbx", "glb"])
+def test_cameras_see_what_blender_sees(files, kind):
+    clip = {"camera": "eye", "size": [160, 120]} if kind != "blend" else {}
+    clip |= {"clip": "eyeAction"} if kind in ("fbx", "glb") else {}
+    viewpoints = {"kind": "file", "path": str(files / f"jump.{kind}"), "frames": FRAMES, **clip}
+    asked = recipe(files, poses="moving", viewpoints=viewpoints, centring="as_is", camera={"of_viewpoints": True})
+    planned, stages = plan(asked), Stages()
+    lens = planned.intrinsics
+    if kind == "glb":  # glTF has no shift
+        lens = lens.model_copy(update={"cx": lens.cx - 8, "cy": lens.cy - 16})
+    assert (lens.width, lens.height) == (160, 120)
+    seen = json.loads((files / "seen.json").read_text())
+    assert planned.frames == planned.shot_count == 3
+    for shot in (planned.shot(i, stages.box) for i in range(3)):
+        camera = camera_for(lens, shot.frames[0].pose, (0, 0, 0))
+        vertices = stages.model(shot.placements[0].model).vertices.astype(float)
+        pixels, _ = project(lens, vertices @ camera.R.T + camera.t)
+        expected = np.array(seen[str(shot.frames[0].pose.time.frame)])
+        gaps = np.linalg.norm(pixels[:, None] - expected, axis=2)
+        assert gaps.min(axis=0).max() < 1e-3
+        assert gaps.min(axis=1).max() < 1e-3
+
+
+def test_an_object_may_be_the_cameras_world(files):
+    def center(**fields):
+        viewpoints = {"kind": "file", "path": str(files / "jump.blend"), **fields}
+        planned = plan(recipe(files, frames=[1], viewpoints=viewpoints, camera={"of_viewpoints": True}))
+        return camera_for(planned.intrinsics, planned.pose_list[0], (0, 0, 0)).center
+
+    np.testing.assert_allclose(center(), (0, -6, 2), atol=1e-5)
+    c, s = np.cos(0.5), np.sin(0.5)
+    expected = np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]]) @ (np.array([0, -6, 2]) - (1, 2, 3))
+    np.testing.assert_allclose(center(at="spot"), expected, atol=1e-5)
+
+
+def test_cameras_that_are_none_cost_one_line(files):
+    def said(**fields):
+        return refused(files, viewpoints={"kind": "file", **fields}, camera={"of_viewpoints": True})
+
+    path = str(files / "jump.blend")
+    assert "expected a camera 'ey', found 'eye', 'orthographic'" in said(path=path, camera="ey")
+    assert "expected a perspective lens, found ortho" in said(path=path, camera="orthographic")
+    assert "viewpoints.frames: expected frames of 1 to 25, as " in said(path=path, frames=[0])
+    assert "expected one camera, found none at all" in said(path=str(files / "still.blend"))
+    (files.parent / "poses.csv").write_text("azimuth,elevation,distance\n1,2,3\n")
+    assert "viewpoints.camera: expected a 3D file" in said(path=str(files.parent / "poses.csv"), camera="eye")

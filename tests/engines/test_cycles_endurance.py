@@ -1,0 +1,100 @@
+"""Runs in which Blender dies again and again: nothing is lost, nothing differs."""
+
+from __future__ import annotations
+
+import os
+import random
+import signal
+import threading
+import time
+from contextlib import suppress
+
+import pytest
+from cycles_scenes import DRAFT, HAIR_DRIER, recipe_of
+
+from viewsphere import generate, render
+from viewsphere.engines.cycles.staging import keeper_of
+
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(900), pytest.mark.usefixtures("blender")]
+
+KILLS = 10
+
+
+def endured():
+    """Two models from many sides."""
+    return recipe_of(
+        DRAFT | {"samples": 2, "replace_after": 0},
+        {"size": [64, 64]},
+        models=[HAIR_DRIER | {"count": 2}],
+        viewpoints={"azimuth": {"start": 0, "stop": 345, "step": 15}, "elevation": [25], "distance": 0.9},
+        channels=["rgb", "instances", "depth"],
+    )
+
+
+class Killer(threading.Thread):
+    """Kills Blender at times drawn from a seed; after each kill it waits for a picture, as no frame may lose two Blenders."""
+
+    def __init__(self, keeper, seed):
+        super().__init__(daemon=True)
+        self.pictures = self.kills = 0
+        self._keeper, self._random = keeper, random.Random(seed)
+        self._done = threading.Event()
+
+    def run(self):
+        seen = 0
+        while self.kills < KILLS and not self._done.is_set():
+            process = self._keeper.process
+            if self.pictures <= seen or process is None:
+                time.sleep(0.005)
+                continue
+            time.sleep(self._random.uniform(0, 0.3))
+            with suppress(ProcessLookupError):
+                os.kill(process.pid, signal.SIGKILL)
+                self.kills += 1
+            seen = self.pictures + 1  # one more may have been finished just now
+
+    def stop(self):
+        self._done.set()
+        self.join()
+        self._keeper.drop()
+
+
+def test_ten_killed_blenders_cost_nothing(blender):
+    expected = [{name: c.tobytes() for name, c in s.channels.items()} for s in render(endured())]
+    killer = Killer(keeper_of(blender), seed=4)
+    killer.start()
+    found = []
+    for sample in render(endured()):
+        killer.pictures += 1
+        found.append({name: c.tobytes() for name, c in sample.channels.items()})
+    killer.stop()
+    assert killer.kills == KILLS
+    assert len(expected) == 48
+    assert found == expected
+
+
+def test_a_run_whose_blender_is_killed_gives_the_same_files(blender, tmp_path, monkeypatch):
+    from viewsphere.engines.cycles.staging import CyclesStage
+
+    generate(endured(), tmp_path / "calm", workers=0)
+    killer = Killer(keeper_of(blender), seed=9)
+    color = CyclesStage.color
+
+    def counted(self, *given):
+        picture = color(self, *given)
+        killer.pictures += 1
+        return picture
+
+    monkeypatch.setattr(CyclesStage, "color", counted)
+    killer.start()
+    generate(endured(), tmp_path / "killed", workers=0)
+    killer.stop()
+    assert killer.kills >= 5
+    assert len(files(tmp_path / "calm")) >= 3 * 48
+    assert files(tmp_path / "killed") == files(tmp_path / "calm")
+
+
+def files(folder):
+    """What all pictures and numbers of a data set are, by place."""
+    kept = (".png", ".tiff")
+    return {str(f.relative_to(folder)): f.read_bytes() for f in sorted(folder.rglob("*")) if f.suffix in kept}

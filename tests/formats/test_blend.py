@@ -1,0 +1,191 @@
+"""Which frames share a .blend file, what of a data set is chosen, and what the store keeps of a scene; no Blender is needed."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from cube_dataset import make
+from small import small_recipe
+from viewsphere import Dataset, generate, plan, plugins
+from viewsphere.assets.cache import load_normalised
+from viewsphere.engines import cycles
+from viewsphere.engines.cycles import saving
+from viewsphere.engines.cycles.file_frame import FileFrame
+from viewsphere.errors import MissingExtraError, StoreError, UserError
+from viewsphere.formats import blend
+from viewsphere.geometry.camera import orbit_center, orbit_rotation
+from viewsphere.model.shot import ModelSpec
+from viewsphere.run.generate import export
+from viewsphere.run.stages import Stages, build_zoo_model
+from viewsphere.store import Choice, frame_ranges
+
+
+@pytest.fixture
+def asked(monkeypatch):
+    """Blender is not there; what it would have been asked, by the name of the file."""
+    files = {}
+
+    def save(shot, samples, load, file, data):
+        files[file.name] = SimpleNamespace(shot=shot, samples=samples, load=load, data=data)
+        return ("lacks a thing",)
+
+    monkeypatch.setattr(cycles, "save", save)
+    return files
+
+
+def test_frames_of_one_scene_share_a_file(asked, small_run, tmp_path):
+    dataset = Dataset(small_run)
+    assert export(small_run, ["blend"], output=tmp_path) == ("format blend: lacks a thing",)
+    assert sorted(asked) == sorted(f"{key}.blend" for key in dataset.plan.models)
+    for name, told in asked.items():
+        expected = [s.index for s in dataset if s.objects[0].key == name.removesuffix(".blend")]
+        assert [s.index for s in told.samples] == [f.index for f in told.shot.frames] == expected
+        assert told.data == dataset.name
+
+
+def test_frames_of_other_scenes_have_other_files(asked, tmp_path):
+    scene = {"draw": "per_frame", "sun": {"azimuth_deg": {"uniform": [0, 360]}}}
+    generate(small_recipe(scene=scene), tmp_path / "out")
+    export(tmp_path / "out", ["blend"])
+    samples = list(Dataset(tmp_path / "out"))
+    assert sorted(asked) == sorted(f"{s.objects[0].key}-{s.index:06d}.blend" for s in samples)
+    suns = {told.shot.scene.sun for told in asked.values()}
+    assert len(suns) == len(samples) == sum(len(told.samples) for told in asked.values())
+
+
+def test_sky_and_colours_behind_have_files_of_their_own(asked, tmp_path):
+    """The shots have several frames; what is behind them is drawn for each."""
+    scene = {"background": {"choice": ["sky", "#ff0000"]}}
+    generate(small_recipe(scene=scene), tmp_path / "out")
+    export(tmp_path / "out", ["blend"])
+    samples = list(Dataset(tmp_path / "out"))
+    assert sorted(s.index for told in asked.values() for s in told.samples) == [s.index for s in samples]
+    assert len(asked) > len({s.objects[0].key for s in samples})
+    for told in asked.values():
+        finishes = [frame.finish or told.shot.scene.finish for frame in told.shot.frames]
+        assert len({finish.background.color is None for finish in finishes}) == 1
+
+
+def test_the_models_are_the_stores(asked, small_run, tmp_path):
+    export(small_run, ["blend"], output=tmp_path)
+    for told in asked.values():
+        (spec,) = {p.model for p in told.shot.placements}
+        found, made = told.load(spec), load_normalised(spec, build_zoo_model)
+        corners = [mesh.vertices[mesh.triangles] for mesh in (found, made)]
+        assert np.array_equal(*corners)
+        assert found.materials == made.materials
+
+
+def test_a_data_set_without_scenes_is_lit_anyhow(asked, tmp_path):
+    dataset = make(tmp_path / "blocks", several=True)
+    assert dataset.store.shot("shot-0") is None
+    export(dataset.root, ["blend"])
+    (told,) = asked.values()
+    assert told.shot.scene.sun is not None
+    assert [p.id for p in told.shot.placements] == [1, 2, 3]
+    for placement, o in zip(told.shot.placements, told.samples[0].objects, strict=True):
+        assert np.array_equal(placement.world_from_object, o.world_from_object)
+        assert told.load(placement.model).triangles.shape == (12, 3)
+
+
+def test_the_store_keeps_the_shots_as_they_were_rendered(small_run):
+    store, planned = Dataset(small_run).store, plan(small_recipe())
+    stages = Stages()
+    for shot in planned.shots(stages.box):
+        kept = store.shot(shot.key)
+        assert kept == shot
+
+
+def test_a_shot_that_cannot_be_read_is_one_line(small_dataset):
+    key, _ = next(small_dataset.shots())
+    (small_dataset.store.shot_folder(key) / "shot.json").write_text('{"key": 3}')
+    with pytest.raises(StoreError, match=r"shot\.json: expected the scene of a shot"):
+        export(small_dataset.root, ["blend"])
+
+
+@pytest.mark.parametrize(
+    ("text", "ranges"), [("", ()), ("7", ((7, 8),)), ("0-15,40", ((0, 16), (40, 41))), (" 3 , 5-5 ", ((3, 4), (5, 6)))]
+)
+def test_frames_as_people_write_them(text, ranges):
+    assert frame_ranges(text) == ranges
+
+
+@pytest.mark.parametrize("text", ["a", "5-3", "-4", "1-2-3", "1..4", "²"])
+def test_frames_that_are_none_are_one_line(text):
+    with pytest.raises(UserError, match="--frames: expected numbers and ranges, such as 0-15,40; found"):
+        frame_ranges(text)
+
+
+@pytest.mark.parametrize("frames", [(), ((0, 3),), ((2, 3), (5, 7)), ((90, 99),)])
+@pytest.mark.parametrize("models", [(), ("nothing",), ("*",), ("FIRST",)])
+def test_a_choice_is_what_it_says(small_run, models, frames):
+    whole = list(Dataset(small_run))
+    first = whole[0].objects[0].key
+    models = tuple(m.replace("FIRST", first) for m in models)
+    chosen = Dataset(small_run, Choice(models, frames))
+    expected = [
+        s.index
+        for s in whole
+        if (not models or models == ("*",) or s.objects[0].key in models)
+        and (not frames or any(a <= s.index < b for a, b in frames))
+    ]
+    assert [s.index for s in chosen] == [chosen[i].index for i in range(len(chosen))] == expected
+    assert len(chosen) == len(expected)
+    assert {m.key for m in chosen.models} == {o.key for s in chosen for o in s.objects}
+
+
+def test_a_choice_needs_a_folder_of_its_own(small_dataset, tmp_path):
+    some = Choice(frames=((0, 2),))
+    for output in (None, small_dataset.root):
+        with pytest.raises(UserError, match="--output: expected another folder"):
+            export(small_dataset.root, ["native"], output=output, choice=some)
+    with pytest.raises(UserError, match="expected finished frames that --models and --frames fit"):
+        export(small_dataset.root, ["native"], output=tmp_path / "part", choice=Choice(("nothing",)))
+    export(small_dataset.root, ["native"], output=tmp_path / "part", choice=some)
+    assert [p.name for p in (tmp_path / "part").iterdir()] == ["native"]
+    assert len(list((tmp_path / "part" / "native").rglob("RGB/*.png"))) == 2
+    with pytest.raises(StoreError, match="expected an empty or new folder"):
+        export(small_dataset.root, ["native"], output=tmp_path / "part", choice=some)
+
+
+def test_without_blender_nothing_is_rendered(monkeypatch, tmp_path):
+    def find_blender(_):
+        raise MissingExtraError("Blender: none")
+
+    monkeypatch.setattr("viewsphere.blender.interpreter.find_blender", find_blender)
+    with pytest.raises(MissingExtraError):
+        generate(small_recipe(formats=["blend"]), tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("tilt", [0.0, -20.0, 110.0])
+@pytest.mark.parametrize("elevation", [-90.0, -30.0, 0.0, 75.0, 90.0])
+def test_the_rig_stands_where_the_camera_does(elevation, tilt, tmp_path):
+    """Blender's rotations, X then Z, and the camera's own about its axis, are the sample's camera."""
+    dataset = make(tmp_path / "blocks")
+    sample = dataset[1]
+    angles = np.radians([200.0, elevation, tilt])
+    rotation = orbit_rotation(*angles)
+    target = np.array([0.3, -2.0, 1.0])
+    center = target + orbit_center(*angles[:2], sample.pose.distance)
+    camera = type(sample.camera)(sample.camera.intrinsics, rotation, -rotation @ center)
+    (pose,) = saving._told_poses([type(sample)(**{**vars(sample), "known_camera": camera})], FileFrame.of(None))
+    np.testing.assert_allclose(pose["target"], target, atol=1e-12)
+    x, z, roll = np.radians([90 - pose["elevation"], pose["azimuth"], -pose["tilt"]])
+    turn = _about("z", z) @ _about("x", x)
+    np.testing.assert_allclose(pose["target"] + pose["distance"] * turn[:, 2], center, atol=1e-12)
+    np.testing.assert_allclose(turn @ _about("z", roll), rotation.T @ np.diag([1, -1, -1]), atol=1e-12)
+
+
+def _about(axis, angle):
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[1, 0, 0], [0, c, -s], [0, s, c]] if axis == "x" else [[c, -s, 0], [s, c, 0], [0, 0, 1]])
+
+
+def test_blend_is_a_format_that_cannot_be_imported():
+    assert "blend" in plugins.names("formats")
+    assert not hasattr(blend, "read")
+    assert blend._spec("a", "a.glb").centring == "as_is" and isinstance(blend._spec("a", "a.glb"), ModelSpec)
