@@ -67,7 +67,8 @@ def compose(scene, folder):
     else:
         file.base_path = str(folder)
         file.file_slots[0].path = "segmap_"
-    file.format.media_type = "IMAGE" if is_five else None
+    if is_five:
+        file.format.media_type = "IMAGE"
     file.format.file_format = "OPEN_EXR"
     tree.links.new(layers.outputs[index], file.inputs[0])
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from viewsphere.assets.mesh import Image, Material, Mesh, Texture
-from viewsphere.assets.parts import taken
+from viewsphere.assets.parts import is_taken, own_part, taken
 from viewsphere.errors import ModelError
 from viewsphere.model.shot import ModelSpec, Parts
 
@@ -40,9 +40,9 @@ def spec(**parts):
     ("parts", "names"),
     [
         ({"only": ("Car",)}, ["Car", "Car/Wheel"]),
-        ({"only": ("Car/Wheel",)}, ["Car/Wheel"]),
+        ({"only": ("Road",)}, ["Road"]),
         ({"without": ("Car",)}, ["Cart", "Road"]),
-        ({"only": ("Car", "Road"), "without": ("Car/Wheel",)}, ["Car", "Road"]),
+        ({"only": ("Car", "Road"), "without": ("Car",)}, ["Road"]),
         ({}, list(NAMES)),
     ],
 )
@@ -67,6 +67,13 @@ def test_parts_stand_in_their_own_axes():
     axes = np.array(TURNED)
     assert np.allclose(found.vertices @ axes[:3, :3].T + axes[:3, 3], mesh.vertices[9:])
     assert np.allclose(found.normals @ axes[:3, :3].T, mesh.normals[9:])
+
+
+def test_a_slash_in_an_objects_name_is_not_that_of_an_instance():
+    parts = ("Car", "Car/Wheel", own_part("Car/Wheel"))
+    assert is_taken(parts, Parts(only=("Car",))).tolist() == [True, True, False]
+    assert is_taken(parts, Parts(only=("Car/Wheel",))).tolist() == [False, False, True]
+    assert is_taken(parts, Parts(without=("Car",))).tolist() == [False, False, True]
 
 
 def test_nothing_taken_is_one_line():

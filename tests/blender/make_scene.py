@@ -179,6 +179,26 @@ def moving():
     save("moving.blend")
 
 
+def appearing():
+    """What appears and what vanishes; a group of which the file itself shows one after another; names with slashes."""
+    anew()
+    world((1, 1, 1))
+    bpy.context.scene.frame_start, bpy.context.scene.frame_end = 1, 9
+    box("Oak", at(-1.5, 1.5, 0), index=12)
+    box("Oak/Floor", at(0, 0, -1, 0, (20, 20, 1)))
+    for name, x, hidden, index in (("Late", -2.8, (1, 0), 11), ("Early", 2.5, (0, 1), 11)):
+        _shown_by_time(box(name, at(x, 1.5), index=index), hidden)
+    for i, hidden in enumerate(((0, 1), (1, 0))):
+        _shown_by_time(box(f"plane{i}", at(i, 2.5, 0), index=13), hidden)
+    save("appearing.blend")
+
+
+def _shown_by_time(one, hidden):
+    for frame, value in zip((1, 5), hidden, strict=True):
+        one.hide_render = bool(value)
+        one.keyframe_insert("hide_render", frame=frame)
+
+
 def _curves(one):
     action = one.animation_data.action
     return action.fcurves if hasattr(action, "fcurves") else action.layers[0].strips[0].channelbags[0].fcurves
@@ -232,6 +252,7 @@ composed()
 dark()
 foggy()
 moving()
+appearing()
 scripted()
 foreign()
 (FOLDER / "made.json").write_text(json.dumps({"version": bpy.app.version_string}))

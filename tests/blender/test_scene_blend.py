@@ -104,6 +104,22 @@ def test_labelled_objects_move(made):
         assert car.id == cars[0].id
 
 
+def test_what_appears_and_vanishes_is_labelled_while_it_is_there(made):
+    """Whichever of a group is shown, the file's own animation does not hide it; what has a slash in its name is no instance."""
+    labels = [{"name": n, "category": c} for n, c in (("Oak", "tree"), ("plane*", "aerial"), ("Late", "car"), ("Early", "car"))]
+    blend = {"labels": labels, "frames": [1, 4, 9], "variants": IN_TURN}
+    recipe = recipe_of(
+        made / "appearing.blend", engine=ENGINE | {"settings": SHARP}, blend=blend, viewpoints={"azimuth": [0], "distance": 7}
+    )
+    assert met_by_cycles(recipe) == {0, 1, 11, 12, 13}
+    planned = plan(recipe)
+    for shot, (late, plane) in zip(planned.shots(Stages().box), ((0, 0), (0, 1), (1, 0)), strict=True):
+        assert [p.id for p in shot.objects] == [1, 2, 3, 4]
+        names = {name for p in shot.objects if p.model.parts for name in p.model.parts.only}
+        assert names == {"Oak", f"plane{plane}", "Late" if late else "Early"}
+        assert {p.model.track for p in shot.objects if p.model.parts} <= {spec.key for spec in planned.kept_specs}
+
+
 def met_by_cycles(recipe):
     """Ids of what is seen, where Cycles' own pass of object indices agrees, looked at through the pixels' middles."""
     stages, met = Stages(), set()

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import json
+import socket
+import subprocess
+import sys
 from types import SimpleNamespace
 
 import numpy as np
@@ -17,8 +21,10 @@ from viewsphere.engines.cycles.file_frame import FileFrame
 from viewsphere.errors import MissingExtraError, StoreError, UserError
 from viewsphere.formats import blend
 from viewsphere.geometry.camera import orbit_center, orbit_rotation
+from viewsphere.model.scene import Scene
 from viewsphere.model.shot import ModelSpec
 from viewsphere.run.generate import export
+from viewsphere.run.importing import import_dataset
 from viewsphere.run.stages import Stages, build_zoo_model
 from viewsphere.store import Choice, frame_ranges
 
@@ -33,6 +39,7 @@ def asked(monkeypatch):
         return ("lacks a thing",)
 
     monkeypatch.setattr(cycles, "save", save)
+    monkeypatch.setattr(cycles, "check", lambda options: None)
     return files
 
 
@@ -149,6 +156,76 @@ def test_a_choice_needs_a_folder_of_its_own(small_dataset, tmp_path):
     assert len(list((tmp_path / "part" / "native").rglob("RGB/*.png"))) == 2
     with pytest.raises(StoreError, match="expected an empty or new folder"):
         export(small_dataset.root, ["native"], output=tmp_path / "part", choice=some)
+
+
+@pytest.fixture(scope="module")
+def foreign(small_run, tmp_path_factory):
+    """A data set that came back from its native files: neither the plan nor the files say where models stand."""
+    folder = tmp_path_factory.mktemp("foreign")
+    export(small_run, ["native"], output=folder)
+    import_dataset("native", folder / "native", folder / "in")
+    return folder / "in"
+
+
+def test_models_of_imported_frames_are_what_they_show(foreign):
+    whole = list(Dataset(foreign))
+    first = whole[0].objects[0].key
+    expected = [s.index for s in whole if s.objects[0].key == first]
+    assert 0 < len(expected) < len(whole)
+    assert [s.index for s in Dataset(foreign, Choice((first,)))] == expected
+    assert [s.index for s in Dataset(foreign, Choice((first,), ((0, expected[-1]),)))] == expected[:-1]
+    assert not len(Dataset(foreign, Choice(("nothing",))))
+
+
+def test_frames_that_cannot_be_staged_are_one_line(asked, foreign, tmp_path):
+    with pytest.raises(UserError, match="expected frames for format blend, with known cameras, models and where they stand"):
+        export(foreign, ["blend"], output=tmp_path)
+    assert not asked and not any(tmp_path.iterdir())
+
+
+def test_frames_that_are_left_out_and_unknown_light_are_notes(asked, tmp_path):
+    dataset = make(tmp_path / "blocks", several=True)
+    file = dataset.store.shot_folder("shot-0") / "frames.json"
+    records = json.loads(file.read_text())
+    for o in records[0]["objects"]:
+        o["model"] = ""
+    file.write_text(json.dumps(records))
+    left_out, unlit, *_ = export(dataset.root, ["blend"])
+    assert f"1 of {len(dataset):,} frames are left out" in left_out
+    assert f"nothing is known of the light of {len(dataset) - 1:,} frames" in unlit
+
+
+def test_a_format_that_cannot_be_written_stops_the_others(monkeypatch, small_run, tmp_path):
+    def find_blender(_):
+        raise MissingExtraError("Blender: none")
+
+    monkeypatch.setattr("viewsphere.blender.interpreter.find_blender", find_blender)
+    with pytest.raises(MissingExtraError):
+        export(small_run, ["coco", "blend"], output=tmp_path / "part")
+    assert not (tmp_path / "part").exists()
+    with pytest.raises(UserError, match="--output: expected a folder outside of the data set's store"):
+        export(small_run, ["coco"], output=small_run / "store" / "models")
+    export(small_run, ["coco", "coco"], output=tmp_path / "part")
+    assert [path.name for path in (tmp_path / "part").iterdir()] == ["coco"]
+
+
+def test_what_a_killed_export_left_is_removed(small_run, tmp_path):
+    over = subprocess.run([sys.executable, "-c", "import os; print(os.getpid())"], capture_output=True, text=True)
+    left, other = (tmp_path / f"{socket.gethostname()}~{over.stdout.strip()}~{name}" for name in ("coco", "native"))
+    foreign = tmp_path / "elsewhere~1~coco"
+    for folder in (left, other, foreign):
+        folder.mkdir()
+        (folder / "half.json").touch()
+    export(small_run, ["coco"], output=tmp_path)
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(["coco", other.name, foreign.name])
+
+
+def test_a_camera_that_single_precision_moves_is_a_note(small_run):
+    samples = list(Dataset(small_run))[:1]
+    finishes = [Scene().finish]
+    assert not list(saving._lacking(samples, finishes, 1e-6))
+    (note,) = saving._lacking(samples, finishes, 2e-3)
+    assert "the camera is off by up to 0.002 of its distance" in note
 
 
 def test_without_blender_nothing_is_rendered(monkeypatch, tmp_path):

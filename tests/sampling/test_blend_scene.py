@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from viewsphere import Recipe, plan
@@ -50,6 +52,22 @@ def test_an_object_is_one_with_what_is_parented_to_it_unless_another_category_be
         "Driver": ("person", {"Driver", "Hat"}),
         "Car toy": ("car", {"Car toy"}),
     }
+
+
+def test_a_rule_that_labels_nothing_that_is_seen_is_told():
+    made = scenery(*CAR, thing("Ghost", shown=False), labels=[{"name": n, "category": "c"} for n in ("Car", "Ghost")])
+    assert made.warnings == ("scene.blend.labels[1]: what it fits is nothing that a render shows",)
+
+
+def test_what_shows_nothing_at_the_first_frame_is_the_model_of_a_later_one():
+    made = scenery(*SIGNS[:2], labels=[{"name": "*", "category": "sign"}])
+    made = replace(made, frames=(1, 5))
+    showing = {1: frozenset({"sign1"}), 5: frozenset({"sign2"})}
+    made.__dict__["file"] = SceneFile(Path("a.blend"), SIGNS[:2], 1.0, True, (), 1, showing)
+    made.__dict__["_stands"] = {frame: {"sign1": np.eye(4), "sign2": np.eye(4)} for frame in (1, 5)}
+    one, other = made.models(lambda category, labels: 1)
+    assert (one.frame, other.frame) == (None, 5)
+    assert [[made.shows(spec, frame) for frame in (1, 5)] for spec in (one, other)] == [[True, False], [False, True]]
 
 
 def test_the_first_rule_counts():

@@ -16,6 +16,9 @@ from viewsphere.model.shot import ModelSpec, Parts
 
 VERTEX = ("uv0", "uv1", "colors")
 
+OWN_SLASH = "\u2215"
+"""Stands for a slash in an object's name, as Blender's worker writes it in names of parts."""
+
 
 def taken(mesh: Mesh, spec: ModelSpec) -> Mesh:
     """What `spec.parts` says of a whole model's mesh, with the materials and images that it uses.
@@ -49,9 +52,14 @@ def taken(mesh: Mesh, spec: ModelSpec) -> Mesh:
 
 def is_taken(names: Sequence[str], parts: Parts) -> NDArray[np.bool_]:
     """Whether each part (N,) is one of those."""
-    only = None if parts.only is None else frozenset(parts.only)
-    without = frozenset(parts.without)
+    only = None if parts.only is None else frozenset(map(own_part, parts.only))
+    without = frozenset(map(own_part, parts.without))
     return np.array([(only is None or _is_of(name, only)) and not _is_of(name, without) for name in names], np.bool_)
+
+
+def own_part(name: str) -> str:
+    """Name of the part that an object of this name is: slashes part it from what it instances."""
+    return name.replace("/", OWN_SLASH)
 
 
 def _is_of(part: str, objects: frozenset[str]) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any
@@ -20,8 +20,8 @@ from viewsphere.geometry.rotation import Float, matrix_from_quaternion, rigid
 @dataclass(frozen=True)
 class SceneObject:
     """An object of a file: its kind as Blender names it, its `parent`, the names of all collections that it is in, its custom
-    properties, the names of its parts that a render would show, and where it stands: `place` and `turn`, (x, y, z) metres and
-    a quaternion (w, x, y, z), in the file's world.
+    properties, the names of its parts that a render would show at any frame that is asked for, and where it stands at the
+    first: `place` and `turn`, (x, y, z) metres and a quaternion (w, x, y, z), in the file's world.
     """
 
     name: str
@@ -41,13 +41,17 @@ class SceneObject:
 
 @dataclass(frozen=True)
 class SceneFile:
-    """The objects of a file, by name; metres in one of its units; whether it has light; what to tell the user."""
+    """The objects of a file, by name; metres in one of its units; whether it has light; what to tell the user; and the names
+    of the objects that show anything at its `first` frame and at each that was asked for.
+    """
 
     path: Path
     objects: tuple[SceneObject, ...]
     unit: float
     is_lit: bool
     warnings: tuple[str, ...]
+    first: int = 1
+    showing: Mapping[int, frozenset[str]] = field(default_factory=dict[int, frozenset[str]])
 
     @cached_property
     def by_name(self) -> Mapping[str, SceneObject]:
@@ -64,16 +68,18 @@ class SceneFile:
 
 
 @lru_cache(maxsize=64)
-def scene_file(path: Path, confined: bool = True, shown: tuple[str, ...] = (), frame: int | None = None) -> SceneFile:
-    """What the file holds at a frame (None: its first); `shown` are patterns of objects that count although renders do not show
-    them.
+def scene_file(path: Path, confined: bool = True, shown: tuple[str, ...] = (), frames: tuple[int, ...] = ()) -> SceneFile:
+    """What the file holds at its first frame and at these; `shown` are patterns of objects that count although renders do not
+    show them.
 
     Confined, nothing outside of its folder is read. Raises ModelError in one line for a file that Blender cannot open,
     MissingExtraError without a Blender.
     """
-    told = _asked(path, confined, "contents", frame=frame, shown=shown, most=limits.MAX_BLENDER_TRIANGLES)
+    told = _asked(path, confined, "contents", frames=frames, shown=shown, most=limits.MAX_BLENDER_TRIANGLES)
     objects = tuple(_object(one, told["unit"]) for one in told["objects"])
-    return SceneFile(path, objects, told["unit"], told["is_lit"], tuple(f"{path.name}: {line}" for line in told["warnings"]))
+    warnings = tuple(f"{path.name}: {line}" for line in told["warnings"])
+    showing = {frame: frozenset(names) for frame, names in told["showing"]}
+    return SceneFile(path, objects, told["unit"], told["is_lit"], warnings, told["first"], showing)
 
 
 @lru_cache(maxsize=64)

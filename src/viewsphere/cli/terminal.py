@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import sys
 from collections import Counter
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -97,6 +98,19 @@ def print_report(report: Report) -> None:
     typer.echo("all proofs hold" if report.ok else f"{len(report.findings):,} findings")
 
 
+def _print_warnings(warnings: Mapping[str, Sequence[str]]) -> None:
+    """Of models by their keys; what is said of several models, such as all that are taken of one file, is said once."""
+    models: dict[str, list[str]] = {}
+    for key, said in warnings.items():
+        for warning in said:
+            models.setdefault(warning, []).append(key)
+    for warning, keys in list(models.items())[:MOST_FINDINGS]:
+        more = f" and {len(keys) - 1:,} more" if len(keys) > 1 else ""
+        typer.echo(f"warning: model {keys[0]}{more}: {warning}", err=True)
+    if len(models) > MOST_FINDINGS:
+        typer.echo(f"and {len(models) - MOST_FINDINGS:,} warnings more; --json lists all", err=True)
+
+
 def print_summary(summary: Summary, as_json: bool) -> None:
     """Print what a run left."""
     if as_json:
@@ -104,11 +118,7 @@ def print_summary(summary: Summary, as_json: bool) -> None:
         return
     for key, why in summary.skipped.items():
         typer.echo(f"left out {key}: {why}", err=True)
-    for key, warnings in list(summary.warnings.items())[:MOST_FINDINGS]:
-        for warning in warnings:
-            typer.echo(f"warning: model {key}: {warning}", err=True)
-    if len(summary.warnings) > MOST_FINDINGS:
-        typer.echo(f"and warnings of {len(summary.warnings) - MOST_FINDINGS:,} models more; --json lists all", err=True)
+    _print_warnings(summary.warnings)
     for note in summary.notes:
         typer.echo(note)
     rate = f", {summary.rendered / summary.seconds:.1f} frames/s" if summary.rendered else ""

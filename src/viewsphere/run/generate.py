@@ -111,15 +111,20 @@ def generate(
 
 def _check_channels(name: str, channels: Sequence[str]) -> None:
     """Raises UserError for a format that is not known, does not work here, or needs a channel which is not kept."""
-    module = plugins.load("formats", name)
-    getattr(module, "check", lambda: None)()
-    needed: Sequence[str] = getattr(module, "CHANNELS", ())
+    needed: Sequence[str] = getattr(_check_writable(name), "CHANNELS", ())
     lacking = missing(needed, channels)
     if lacking:
         raise RecipeError(
             f"channels: expected {lacking[0]}, which format {name} needs; found {', '.join(channels)}: "
             f"add it, or leave {name} out of formats"
         )
+
+
+def _check_writable(name: str) -> plugins.Format:
+    """The format of this name; raises UserError for one that is not known or does not work here."""
+    module: plugins.Format = plugins.load("formats", name)
+    getattr(module, "check", lambda: None)()
+    return module
 
 
 def _unheard(progress: Progress) -> None:
@@ -296,13 +301,18 @@ def export(
     place = dataset.root if output is None else Path(output)
     is_own = place.resolve() == dataset.root.resolve()
     _check_choice(dataset, is_own)
+    if place.resolve().is_relative_to(dataset.store.folder.resolve()):
+        raise UserError(f"--output: expected a folder outside of the data set's store; found {place}")
+    names = tuple(dict.fromkeys(formats))
+    for name in names:  # before the first of them is written
+        _check_writable(name)
     notes: list[str] = []
-    for done, name in enumerate(formats):
-        tell(Progress("exports", done, len(formats)))
+    for done, name in enumerate(names):
+        tell(Progress("exports", done, len(names)))
         writer: plugins.Format = plugins.load("formats", name)
         with dataset.store.replacing(dataset.root / name) if is_own else new_folder(place / name) as folder:
             notes += writer.export(dataset, folder) or ()
-    tell(Progress("exports", len(formats), len(formats)))
+    tell(Progress("exports", len(names), len(names)))
     kinds = dataset.link_kinds - {"hard link"}
     return tuple(dict.fromkeys(notes)) + tuple(
         f"{dataset.root}: files of the exports are made as a {kind}, hard links do not work here" for kind in sorted(kinds)

@@ -43,11 +43,14 @@ class Labelled:
 
 @dataclass(frozen=True, eq=False)
 class BlendScenery:
-    """The .blend file of a recipe's scene. `turn_of` gives the turn of what is shown one after another."""
+    """The .blend file of a recipe's scene, at the `frames` that are asked for (none: its first). `turn_of` gives the turn of
+    what is shown one after another.
+    """
 
     recipe: Recipe
     entry: BlendEntry
     turn_of: Turn
+    frames: tuple[int, ...] = ()
 
     @property
     def path(self) -> Path:
@@ -60,7 +63,8 @@ class BlendScenery:
         if not self.path.is_file():
             raise RecipeError(f"scene.blend.file: expected a .blend file; found none at {self.path}")
         try:
-            return scene_file(self.path, self.entry.confined, tuple(v.one_of for v in self.entry.variants.values()))
+            patterns = tuple(v.one_of for v in self.entry.variants.values())
+            return scene_file(self.path, self.entry.confined, patterns, self.frames)
         except ModelError as error:
             raise RecipeError(f"scene.blend.file: {error}") from None
 
@@ -68,7 +72,12 @@ class BlendScenery:
     def warnings(self) -> tuple[str, ...]:
         """What there is to say of the file."""
         dark = f"{self.path.name}: no light and no world; lit by the default sun and sky"
-        return tuple(f"scene.blend: {line}" for line in (*self.file.warnings, *([] if self.file.is_lit else [dark])))
+        said = [f"scene.blend: {line}" for line in (*self.file.warnings, *([] if self.file.is_lit else [dark]))]
+        seen = {name for one in self.labelled for name in (one.root.name, *one.members)}
+        for i, rule in enumerate(self.entry.labels):
+            if not any(_fits(rule, one) and one.name in seen for one in self.file.objects):
+                said.append(f"scene.blend.labels[{i}]: what it fits is nothing that a render shows")
+        return tuple(said)
 
     @cached_property
     def digest(self) -> str:
@@ -78,7 +87,7 @@ class BlendScenery:
 
     @cached_property
     def labelled(self) -> tuple[Labelled, ...]:
-        """The labelled objects that renders show anything of, by their names."""
+        """The labelled objects that renders show anything of at any time, by their names."""
         category = {one.name: self._category(one) for one in self.file.objects}
         root_of = {one.name: self._root(one, category) for one in self.file.objects}
         members: dict[str, list[str]] = {}
@@ -178,35 +187,45 @@ class BlendScenery:
 
         return pieces
 
-    def at_frame(self, placement: Placement, frame: int, frames: tuple[int, ...]) -> Placement:
-        """What is taken of the file, at one of the `frames` that are asked for; a labelled object moves with its axes."""
+    def shows(self, spec: ModelSpec, frame: int) -> bool:
+        """Whether there is anything of a model that is taken of the file, at one of the frames; True for any other."""
+        if spec.parts is None:
+            return True
+        showing = self.file.showing[frame]
+        if spec.parts.only is None:
+            return not showing.issubset(spec.parts.without)
+        return not showing.isdisjoint(spec.parts.only)
+
+    def at_frame(self, placement: Placement, frame: int) -> Placement:
+        """What is taken of the file, at one of the frames; a labelled object moves with its axes."""
         if placement.model.parts is None:
             return placement
-        model = self.model_at(placement.model, frame, frames)
+        model = self.model_at(placement.model, frame)
         if not placement.id or model.parts is None:
             return placement.model_copy(update={"model": model})
         moved = compose(np.array(self.world_from_file), np.array(model.parts.file_from_axes))
         return placement.model_copy(update={"model": model, "world_from_object": _rows(moved)})
 
-    def model_at(self, spec: ModelSpec, frame: int, frames: tuple[int, ...]) -> ModelSpec:
-        """A model that is taken of the file, at one of the `frames`; anything else as it is."""
+    def model_at(self, spec: ModelSpec, frame: int) -> ModelSpec:
+        """A model that is taken of the file, at one of the frames; anything else as it is."""
         if spec.parts is None:
             return spec
         moved = at_frame(spec, frame)
         if spec.parts.only is None:
             return moved
         root = self._root_of[spec.parts.only]
-        stands = self._stands(frames)[frame][root.name]
+        stands = self._stands[frame][root.name]
         return moved.model_copy(update={"parts": spec.parts.model_copy(update={"file_from_axes": _rows(stands)})})
 
     @cached_property
     def _root_of(self) -> Mapping[tuple[str, ...], SceneObject]:
         return {one.members: one.root for one in self.labelled}
 
-    def _stands(self, frames: tuple[int, ...]) -> Mapping[int, Mapping[str, Float]]:
+    @cached_property
+    def _stands(self) -> Mapping[int, Mapping[str, Float]]:
         names = tuple(one.root.name for one in self.labelled)
         try:
-            return places(self.path, self.entry.confined, names, frames)
+            return places(self.path, self.entry.confined, names, self.frames)
         except ModelError as error:
             raise RecipeError(f"scene.blend.file: {error}") from None
 
@@ -219,6 +238,9 @@ class BlendScenery:
         axes = one.root.file_from_object
         parts = Parts(only=one.members, file_from_axes=_rows(axes))
         spec = self._spec(one.category, one.root.name, parts, category_id(one.category, labels), "")
+        if self.frames and not self.shows(spec, self.file.first):
+            seen = next(frame for frame in self.frames if self.shows(spec, frame))
+            spec = spec.model_copy(update={"frame": seen, "parts": self.model_at(spec, seen).parts})
         return Piece(spec, _rows(compose(np.array(self.world_from_file), axes)), labels)
 
     def _spec(self, category: str, name: str, parts: Parts, category_id: int, rest: str) -> ModelSpec:

@@ -18,6 +18,7 @@ from viewsphere.model.scene import Vector
 from viewsphere.model.shot import ModelSpec, Placement
 from viewsphere.sampling.blend_scene import BlendScenery
 from viewsphere.sampling.company import Names, companions, footprint, layout, standing
+from viewsphere.sampling.moments import TimedPoses
 from viewsphere.sampling.scenery import (
     Piece,
     draw_names,
@@ -221,6 +222,7 @@ def _blend(recipe: Recipe, specs: tuple[ModelSpec, ...], views: Poses) -> BlendS
         models, poses = numbers()
         return models[names[0]] if len(names) == 1 else models[names[0]] * len(poses) + poses[names[1]]
 
-    made = BlendScenery(recipe, entry, turn_of)
+    moments = views.moments if isinstance(views, TimedPoses) and entry.frames is not None else ()
+    made = BlendScenery(recipe, entry, turn_of, tuple(sorted({moment.frame for moment in moments if moment is not None})))
     made.check()
     return made

@@ -152,13 +152,7 @@ class Plan:
 
     def _moments_of_scenery(self, spec: ModelSpec) -> Iterator[ModelSpec]:
         if self.blend is not None and spec.parts is not None:
-            yield from (self.blend.model_at(spec, frame, self._scene_frames) for frame in self._scene_frames)
-
-    @cached_property
-    def _scene_frames(self) -> tuple[int, ...]:
-        """Frames of the scene's file that are asked for."""
-        steps = (step.scene for timing in self.timings if timing for step in timing.steps)
-        return tuple(sorted({frame for frame in steps if frame is not None}))
+            yield from (self.blend.model_at(spec, frame) for frame in self.blend.frames if self.blend.shows(spec, frame))
 
     @property
     def splits(self) -> tuple[str, ...]:
@@ -329,7 +323,9 @@ class Plan:
         return {"floor": min(float(transform(world, _known(box_of)(moment))[:, 2].min()) for moment in moments)}
 
     def _at(self, placements: Sequence[Placement], run: Run) -> tuple[Placement, ...]:
-        """What is placed, as it is at a time step; company is at its own of the same number."""
+        """What is placed, as it is at a time step; company is at its own of the same number. What of the scene's file shows
+        nothing then is left out, so that others have other ids.
+        """
         if run.step is None:
             return tuple(placements)
         timing_of = self._timing_of
@@ -338,9 +334,13 @@ class Plan:
             model = at_step(timing_of.get(placement.model.key), placement.model, run.number)
             moved = placement if model is placement.model else placement.model_copy(update={"model": model})
             if self.blend is not None and run.step.scene is not None:
-                moved = self.blend.at_frame(moved, run.step.scene, self._scene_frames)
+                if not self.blend.shows(moved.model, run.step.scene):
+                    continue
+                moved = self.blend.at_frame(moved, run.step.scene)
             found.append(moved)
-        return tuple(found)
+        if len(found) == len(placements):
+            return tuple(found)
+        return tuple(p.model_copy(update={"id": i}) if p.id else p for i, p in enumerate(found, 1))
 
     @cached_property
     def _timing_of(self) -> dict[str, Timing | None]:

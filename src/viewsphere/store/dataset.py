@@ -84,8 +84,8 @@ class Dataset(Sequence[Sample]):
         shots: list[tuple[str, Sequence[int]]] = []
         starts, total = [0], 0
         for key, first, count in self.plan.shots:
-            places = self.choice.places(first, count) if self._has_model(key, first) else ()
-            if places and self.store.has_shot(key):
+            places = self._places(key, first, count) if self.store.has_shot(key) else ()
+            if places:
                 shots.append((key, places))
                 total += len(places)
                 starts.append(total)
@@ -124,12 +124,19 @@ class Dataset(Sequence[Sample]):
         for place in places:
             yield self._sample(key, records[place])
 
-    def _has_model(self, key: str, frame: int) -> bool:
-        """Whether the choice has the model of a shot, which begins with this frame."""
-        if not self.choice.models:
-            return True
-        part = self.plan.parts[self.plan.part_of(frame)] if self.plan.parts else None
-        return self.choice.has_model((part and part.model_at(frame)) or key.rpartition("-")[0])
+    def _places(self, key: str, first: int, count: int) -> Sequence[int]:
+        """Which of a finished shot's frames the choice means. Where the plan does not know its model, as of data sets made
+        elsewhere, a frame is of all models that it shows.
+        """
+        places = self.choice.places(first, count)
+        if not self.choice.models or not places:
+            return places
+        part = self.plan.parts[self.plan.part_of(first)] if self.plan.parts else None
+        model = part.model_at(first) if part else key.rpartition("-")[0]
+        if model is not None:
+            return places if self.choice.has_model(model) else ()
+        shown = zip(places, self.samples_of(key, places), strict=True)
+        return [place for place, sample in shown if any(self.choice.has_model(o.key) for o in sample.objects)]
 
     @cached_property
     def _frames_of(self) -> dict[str, int]:

@@ -145,12 +145,7 @@ class Store:
 
     def _sweep(self) -> None:
         """Remove what dead writers of this machine left unfinished."""
-        for path in (self.folder / "writing").iterdir():
-            host, _, rest = path.name.partition("~")
-            pid = rest.partition("~")[0]
-            if host == socket.gethostname() and pid.isdigit() and not _alive(int(pid)):
-                shutil.rmtree(path, ignore_errors=True)
-                path.unlink(missing_ok=True)
+        _remove_of_dead((self.folder / "writing").iterdir())
 
     def shot_folder(self, key: str) -> Path:
         """Where a finished shot lies."""
@@ -302,6 +297,16 @@ class Store:
             ) from None
 
 
+def _remove_of_dead(paths: Iterable[Path]) -> None:
+    """Remove those that were written by processes of this machine that are no more."""
+    for path in paths:
+        host, _, rest = path.name.partition("~")
+        pid = rest.partition("~")[0]
+        if host == socket.gethostname() and pid.isdigit() and not _alive(int(pid)):
+            shutil.rmtree(path, ignore_errors=True)
+            path.unlink(missing_ok=True)
+
+
 @contextmanager
 def new_folder(target: Path) -> Generator[Path]:
     """A folder to write into that becomes `target` when the block ends well; raises StoreError where files lie there."""
@@ -311,6 +316,7 @@ def new_folder(target: Path) -> Generator[Path]:
             raise StoreError(f"{target}: expected an empty or new folder, found other files: choose another, or delete it")
         shutil.rmtree(aside, ignore_errors=True)
         aside.mkdir(parents=True)
+        _remove_of_dead(path for path in aside.parent.iterdir() if path.name.endswith(f"~{target.name}"))
     try:
         with _disk_errors(target):
             yield aside

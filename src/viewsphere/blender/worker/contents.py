@@ -20,23 +20,27 @@ PICTURES = ("FILE", "SEQUENCE", "TILED", "MOVIE")
 
 
 def contents(told):
-    """What `viewsphere.assets.scene_file` asks for: `file`, its `root`, the `frame`, patterns of objects that are `shown`
-    although the file hides them, and the `most` triangles.
+    """What `viewsphere.assets.scene_file` asks for: `file`, its `root`, the `frames` that are asked for besides the first,
+    which ascend, patterns of objects that are `shown` although the file hides them, and the `most` triangles.
     """
     unit, warnings = open_file(told["file"], "blend", told["root"])
     scene = bpy.context.scene
-    go_to(scene, scene.frame_start if told["frame"] is None else told["frame"])
     patterns = told["shown"]
     groups = [one for one in bpy.data.objects if any(fnmatchcase(one.name, pattern) for pattern in patterns)]
     reveal(scene, [one.name for one in groups])
-    check_weight(scene, None, told["most"])
-    seeing = _Seeing()
+    seeing, after = _Seeing(), None
     objects, faults = _all(scene, groups), fault(scene)
     prepare(scene)
-    evaluate(scene, seeing)
+    for frame in sorted({scene.frame_start, *told["frames"]}):
+        go_to(scene, frame, after)
+        check_weight(scene, None, told["most"])
+        seeing.frame = after = frame
+        evaluate(scene, seeing)
     return {
         "unit": unit,
         "objects": [_object(one, seeing) for one in objects],
+        "showing": [[frame, sorted(names)] for frame, names in seeing.showing.items()],
+        "first": scene.frame_start,
         "is_lit": seeing.lamps > 0 or _shines(scene.world) or any(map(_shines, bpy.data.materials)),
         "warnings": [*warnings, *seeing.warnings(), *_pictures(told["root"]), *faults],
     }
@@ -62,14 +66,16 @@ def _standing(matrix):
 
 
 class _Seeing:
-    """What a render would show of each object: names of its parts, and where it stands."""
+    """What a render would show of each object: names of its parts, where it stands first, and which show at each `frame`."""
 
     def __init__(self):
         self.parts, self.matrices, self.lamps, self._left_out = {}, {}, 0, {}
+        self.frame, self.showing = None, {}
 
     def take(self, depsgraph):
+        showing = self.showing.setdefault(self.frame, set())
         for one in depsgraph.objects:
-            self.matrices[one.name] = one.matrix_world.copy()
+            self.matrices.setdefault(one.name, one.matrix_world.copy())
         for instance in depsgraph.object_instances:
             item = instance.object
             owner = instance.parent if instance.is_instance else item
@@ -79,6 +85,7 @@ class _Seeing:
                 self._left_out.setdefault(LEFT_OUT[item.type], []).append(item.name)
             elif taken(instance, item) and _has_area(item, instance.matrix_world):
                 self.parts.setdefault(owner.name, {})[part_of(item, owner)] = None
+                showing.add(owner.name)
 
     def warnings(self):
         """What is rendered although no label knows of it."""

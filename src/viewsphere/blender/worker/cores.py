@@ -18,17 +18,28 @@ TASKS = Path("/proc/self/task")
 def few_cores(count: int) -> Iterator[None]:
     """Let what is loaded meanwhile see this many cores, where the system can do that (Linux); 0 for all.
 
-    Afterwards all threads may run on any core again.
+    Which ones depends on the number of this process: several that start at once do not wait for the same cores. Afterwards
+    all threads may run on any core again.
     """
     if not count or not hasattr(os, "sched_setaffinity"):
         yield
         return
     cores = os.sched_getaffinity(0)
     with suppress(OSError):
-        os.sched_setaffinity(0, sorted(cores)[:count])
+        os.sched_setaffinity(0, some_of(cores, count, os.getpid()))
     try:
         yield
     finally:
-        for task in TASKS.iterdir():
-            with suppress(OSError):
-                os.sched_setaffinity(int(task.name), cores)
+        with suppress(OSError):
+            os.sched_setaffinity(0, cores)
+        with suppress(OSError):  # where the system does not list threads, the others stay where they are
+            for task in TASKS.iterdir():
+                with suppress(OSError):
+                    os.sched_setaffinity(int(task.name), cores)
+
+
+def some_of(cores: set[int], count: int, number: int) -> set[int]:
+    """As many of the cores, or all; other ones for the next number, as long as there are others."""
+    line = sorted(cores)
+    first = number * count % len(line)
+    return set((line * 2)[first : first + min(count, len(line))])

@@ -15,6 +15,9 @@ SOLID = ("MESH", "META")
 LEFT_OUT = {"CURVES": "hair", "POINTCLOUD": "points", "VOLUME": "a volume", "GREASEPENCIL": "grease pencil"}
 NAMES_SAID = 5
 
+OWN_SLASH = "\u2215"
+"""Stands for a slash in an object's name."""
+
 
 class Gathering:
     """Takes the triangles of what is rendered.
@@ -154,8 +157,11 @@ def taken(instance, item):
 
 
 def part_of(item, owner):
-    """Name of the part that an object is, or that it is where another one instances it."""
-    return item.name if item.original == owner.original else f"{owner.name}/{item.name}"
+    """Name of the part that an object is, or that it is where another one instances it; their own slashes are written so that
+    they are not taken for that of the instance (`viewsphere.assets.parts.own_part` does the same).
+    """
+    own = [one.name.replace("/", OWN_SLASH) for one in (owner, item)]
+    return own[1] if item.original == owner.original else "/".join(own)
 
 
 def _layers(mesh, material):

@@ -15,11 +15,11 @@ def open_scene(told):
     """Open the file that is told, with what is to be shown and hidden; the scene."""
     open_file(told["file"], "blend", told["root"])
     scene = bpy.context.scene
-    go_to(scene, scene.frame_start if told["frame"] is None else told["frame"])
     reveal(scene, told["shown"])
     for name in told["hidden"]:
         if name in bpy.data.objects:
-            bpy.data.objects[name].hide_render = True
+            _fix(bpy.data.objects[name], "hide_render", True)
+    go_to(scene, scene.frame_start if told["frame"] is None else told["frame"])
     _only_color(scene)
     compositing.stop_writing()
     compositing.set_up(scene)
@@ -27,14 +27,25 @@ def open_scene(told):
 
 
 def reveal(scene, names):
-    """Let renders show the objects of these names; one that was hidden is shown with all that is parented to it."""
+    """Let renders show the objects of these names; one that is hidden at the first frame is shown with all that is parented to
+    it.
+    """
     there = set(scene.collection.objects)
     for one in (bpy.data.objects[name] for name in names if name in bpy.data.objects):
         for member in (one, *(one.children_recursive if one.hide_render else ())):
-            member.hide_render = member.hide_viewport = False
+            _fix(member, "hide_render", False)
+            _fix(member, "hide_viewport", False)
             if member not in there:  # its own collections may be hidden
                 scene.collection.objects.link(member)
                 there.add(member)
+
+
+def _fix(one, name, value):
+    """Set what a driver or an animation of the file would set otherwise; a driver has the last word."""
+    if one.animation_data is not None and one.library is None:
+        one.driver_remove(name)
+        one.driver_add(name).driver.expression = str(int(value))
+    setattr(one, name, value)
 
 
 def _only_color(scene):

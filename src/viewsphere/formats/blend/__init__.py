@@ -5,13 +5,14 @@
     <the same>/0001.png, ...      the backgrounds of its frames, where they change
 
 Frames share a file as far as they share a scene: models and where they stand, light, ground. Pictures are packed. Blender
-writes memory addresses, so equal data sets give equal scenes but not equal bytes. Frames without a camera are left out.
+writes memory addresses, so equal data sets give equal scenes but not equal bytes. Frames of unknown cameras or models, which
+data sets made elsewhere may have, are left out.
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -21,7 +22,7 @@ import numpy as np
 from viewsphere import plugins
 from viewsphere.assets.cache import load_normalised
 from viewsphere.assets.mesh import Mesh
-from viewsphere.errors import StoreError
+from viewsphere.errors import StoreError, UserError
 from viewsphere.model.files import Files
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.model.scene import Matrix4, Scene
@@ -43,11 +44,12 @@ def check() -> None:
 def export(dataset: Dataset, folder: Path) -> tuple[str, ...]:
     """Write the finished frames that have a camera; gives notes on what could not be carried over.
 
-    Raises UserError where Blender cannot be used, ModelError for scenery that cannot be read any more.
+    Raises UserError where Blender cannot be used or no frame can be written, ModelError for scenery that cannot be read any
+    more.
     """
     groups = list(_groups(dataset))
     counts = Counter(group.model for group in groups)
-    notes: dict[str, None] = {}
+    notes = dict.fromkeys(_left_out(dataset, groups))
     for group in groups:
         frames, samples = zip(*_views(dataset, group), strict=True)
         name = group.model if counts[group.model] == 1 else f"{group.model}-{samples[0].index:06d}"
@@ -56,6 +58,20 @@ def export(dataset: Dataset, folder: Path) -> tuple[str, ...]:
         said = plugins.load("engines", ENGINE).save(own, samples, load, folder / f"{name}.blend", dataset.name)
         notes |= dict.fromkeys(f"format blend: {note}" for note in said)
     return tuple(notes)
+
+
+def _left_out(dataset: Dataset, groups: Sequence[_Group]) -> Iterator[str]:
+    """What is said of frames that are not written, or not as they were."""
+    total = len(dataset)
+    written = sum(len(places) for group in groups for places in group.places.values())
+    needs = "cameras, models and where they stand"
+    if total and not written:
+        raise UserError(f"{dataset.root}: expected frames for format blend, with known {needs}; found none")
+    if written < total:
+        yield f"format blend: {total - written:,} of {total:,} frames are left out: their {needs} are not known"
+    unlit = sum(len(group.places[key]) for group in groups for key in group.places if dataset.store.shot(key) is None)
+    if unlit:
+        yield f"format blend: nothing is known of the light of {unlit:,} frames: they have the default sun and sky"
 
 
 @dataclass(eq=False)
