@@ -30,7 +30,7 @@ def read(told):
     if told.get("after") is None:
         unit, warnings = open_file(told["file"], told["kind"], told["root"], clip=told.get("clip"))
         prepare(bpy.context.scene)
-        reveal(bpy.context.scene, told["shown"])
+        reveal(bpy.context.scene, told.get("shown", ()))
     else:
         unit, warnings = 1.0, []
     scene = bpy.context.scene
