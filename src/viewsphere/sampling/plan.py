@@ -9,7 +9,6 @@ from bisect import bisect_right
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from fnmatch import fnmatchcase
 from functools import cached_property
 from itertools import accumulate, chain
 from pathlib import Path
@@ -22,15 +21,15 @@ from viewsphere.errors import RecipeError
 from viewsphere.geometry.camera import orbit_center
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.camera import Intrinsics
-from viewsphere.model.mistakes import nearest, one_of
 from viewsphere.model.recipe import Recipe
 from viewsphere.model.recipe_draws import alternatives, span
 from viewsphere.model.scene import Scene, Vector
 from viewsphere.model.shot import Frame, ModelSpec, Placement, Pose, Shot
 from viewsphere.sampling.blend_scene import BlendScenery
+from viewsphere.sampling.checks import check_blend, check_frames, check_listed, check_materials, check_moments, check_names
 from viewsphere.sampling.composition import BoxOf, Composition, compose
 from viewsphere.sampling.doubts import hidden_by_exposure, no_light, out_of_view
-from viewsphere.sampling.models import categories, count_models, numbered_specs
+from viewsphere.sampling.models import categories, numbered_specs
 from viewsphere.sampling.moments import (
     Run,
     Schedule,
@@ -475,19 +474,20 @@ def plan(recipe: Recipe, shot_frames: int | None = None) -> Plan:
     Raises RecipeError for files that are not there, unknown engines and formats, more frames than `max_frames`.
     """
     with recipe.located():
-        _check_names(recipe)
-        _check_blend(recipe)
+        check_names(recipe)
+        check_blend(recipe)
         views = poses(recipe.viewpoints, recipe.seed, recipe.folder)
         _lens(recipe, views)
-        _check_frames(recipe, views)
+        check_frames(recipe, views)
         specs, timings, views = timed(recipe, numbered_specs(recipe), views)
-        _check_listed(recipe, specs)
-        _check_materials(recipe, specs)
+        check_listed(recipe, specs)
+        check_materials(recipe, specs)
         frames = 1 if recipe.scene.is_new_each_frame else recipe.shot_frames or shot_frames or SHOT_FRAMES
         timings = timings if any(timings) else ()
         planned = Plan(recipe, specs, views, categories(recipe), scene_pictures(recipe), frames, timings=timings)
         if timings:
-            _check_moments(planned)
+            check_moments(recipe, planned.frames)
+            check_keys(planned.kept_specs)
         if not recipe.scene.is_composed:
             return planned
         apart = recipe.splits.by == "model"
@@ -531,71 +531,9 @@ def _known(box_of: BoxOf | None) -> BoxOf:
     return box_of
 
 
-def _check_names(recipe: Recipe) -> None:
-    engines = plugins.names("engines")
-    if recipe.engine.name not in engines:
-        raise RecipeError(f"engine: {one_of(recipe.engine.name, engines)}")
-    formats = plugins.names("formats")
-    for i, name in enumerate(recipe.formats):
-        if name not in formats:
-            raise RecipeError(f"formats[{i}]: {one_of(name, formats)}")
-
-
-def _check_blend(recipe: Recipe) -> None:
-    if recipe.scene.blend is not None and not getattr(plugins.load("engines", recipe.engine.name), "OPENS_SCENES", False):
-        raise RecipeError(
-            f"scene.blend: expected engine: cycles, which renders the file as it is; found {recipe.engine.name}: "
-            "name cycles, or take the file's meshes alone by scene.place"
-        )
-
-
 def _lens(recipe: Recipe, views: Poses) -> Intrinsics:
     if not recipe.camera.of_viewpoints:
         return recipe.camera.intrinsics
     if views.intrinsics is None:
         raise RecipeError("camera.of_viewpoints: expected a file of poses that names a lens; found none: give fov_deg or K")
     return views.intrinsics
-
-
-def _check_frames(recipe: Recipe, views: Poses) -> None:
-    models, count = count_models(recipe), math.prod(views.counts.values())
-    if models * count > recipe.max_frames:
-        factors = " x ".join(f"{n:,} {what}" for what, n in {"models": models, **views.counts}.items())
-        raise RecipeError(
-            f"viewpoints: expected at most {recipe.max_frames:,} frames; found {models * count:,} ({factors}): "
-            f"set max_frames: {models * count} in the recipe if that is meant"
-        )
-
-
-def _check_moments(planned: Plan) -> None:
-    if planned.frames > planned.recipe.max_frames:
-        raise RecipeError(
-            f"models: expected at most {planned.recipe.max_frames:,} frames; found {planned.frames:,}, with all time steps: "
-            f"set max_frames: {planned.frames} in the recipe if that is meant"
-        )
-    check_keys(planned.kept_specs)
-
-
-def _check_listed(recipe: Recipe, specs: tuple[ModelSpec, ...]) -> None:
-    """The models that the splits list have to be there, once; if no split has a share, all have to be listed."""
-    keys, seen = {spec.key for spec in specs}, dict[str, str]()
-    for name, listed in recipe.splits.shares.items():
-        for key in listed if isinstance(listed, tuple) else ():
-            if key not in keys:
-                raise RecipeError(f"splits.{name}: expected keys of models; found {key!r}{nearest(key, keys)}")
-            if key in seen:
-                raise RecipeError(
-                    f"splits.{name}: expected every model in one split; found {key!r}, listed in {seen[key]!r} too"
-                )
-            seen[key] = name
-    if all(isinstance(s, tuple) for s in recipe.splits.shares.values()) and keys - seen.keys():
-        raise RecipeError(f"splits: expected every model to be listed; found no split for {min(keys - seen.keys())!r}")
-
-
-def _check_materials(recipe: Recipe, specs: tuple[ModelSpec, ...]) -> None:
-    for i, entry in enumerate(recipe.scene.materials):
-        if not any(fnmatchcase(spec.key, entry.models) for spec in specs):
-            raise RecipeError(
-                f"scene.materials[{i}].models: expected a pattern of models' keys, such as {specs[0].key}; "
-                f"found {entry.models!r}, which fits none"
-            )

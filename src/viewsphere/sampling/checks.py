@@ -1,0 +1,80 @@
+"""What has to hold of a recipe before it is planned; each check raises RecipeError for the first thing that does not."""
+
+from __future__ import annotations
+
+import math
+from fnmatch import fnmatchcase
+
+from viewsphere import plugins
+from viewsphere.errors import RecipeError
+from viewsphere.model.mistakes import nearest, one_of
+from viewsphere.model.recipe import Recipe
+from viewsphere.model.shot import ModelSpec
+from viewsphere.sampling.models import count_models
+from viewsphere.sampling.viewpoints import Poses
+
+
+def check_names(recipe: Recipe) -> None:
+    """Engines and formats are known."""
+    engines = plugins.names("engines")
+    if recipe.engine.name not in engines:
+        raise RecipeError(f"engine: {one_of(recipe.engine.name, engines)}")
+    formats = plugins.names("formats")
+    for i, name in enumerate(recipe.formats):
+        if name not in formats:
+            raise RecipeError(f"formats[{i}]: {one_of(name, formats)}")
+
+
+def check_blend(recipe: Recipe) -> None:
+    """A .blend file as the scene needs an engine that renders it."""
+    if recipe.scene.blend is not None and not getattr(plugins.load("engines", recipe.engine.name), "OPENS_SCENES", False):
+        raise RecipeError(
+            f"scene.blend: expected engine: cycles, which renders the file as it is; found {recipe.engine.name}: "
+            "name cycles, or take the file's meshes alone by scene.place"
+        )
+
+
+def check_frames(recipe: Recipe, views: Poses) -> None:
+    """Not more frames than are wanted at most."""
+    models, count = count_models(recipe), math.prod(views.counts.values())
+    if models * count > recipe.max_frames:
+        factors = " x ".join(f"{n:,} {what}" for what, n in {"models": models, **views.counts}.items())
+        raise RecipeError(
+            f"viewpoints: expected at most {recipe.max_frames:,} frames; found {models * count:,} ({factors}): "
+            f"set max_frames: {models * count} in the recipe if that is meant"
+        )
+
+
+def check_moments(recipe: Recipe, frames: int) -> None:
+    """Not more frames with all time steps than are wanted at most."""
+    if frames > recipe.max_frames:
+        raise RecipeError(
+            f"models: expected at most {recipe.max_frames:,} frames; found {frames:,}, with all time steps: "
+            f"set max_frames: {frames} in the recipe if that is meant"
+        )
+
+
+def check_listed(recipe: Recipe, specs: tuple[ModelSpec, ...]) -> None:
+    """The models that the splits list have to be there, once; if no split has a share, all have to be listed."""
+    keys, seen = {spec.key for spec in specs}, dict[str, str]()
+    for name, listed in recipe.splits.shares.items():
+        for key in listed if isinstance(listed, tuple) else ():
+            if key not in keys:
+                raise RecipeError(f"splits.{name}: expected keys of models; found {key!r}{nearest(key, keys)}")
+            if key in seen:
+                raise RecipeError(
+                    f"splits.{name}: expected every model in one split; found {key!r}, listed in {seen[key]!r} too"
+                )
+            seen[key] = name
+    if all(isinstance(s, tuple) for s in recipe.splits.shares.values()) and keys - seen.keys():
+        raise RecipeError(f"splits: expected every model to be listed; found no split for {min(keys - seen.keys())!r}")
+
+
+def check_materials(recipe: Recipe, specs: tuple[ModelSpec, ...]) -> None:
+    """Every change of materials is for some model."""
+    for i, entry in enumerate(recipe.scene.materials):
+        if not any(fnmatchcase(spec.key, entry.models) for spec in specs):
+            raise RecipeError(
+                f"scene.materials[{i}].models: expected a pattern of models' keys, such as {specs[0].key}; "
+                f"found {entry.models!r}, which fits none"
+            )
