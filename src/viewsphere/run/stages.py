@@ -19,6 +19,7 @@ from viewsphere.model.channel import PICTURES
 from viewsphere.model.recipe import Recipe
 from viewsphere.model.sample import Float, Sample
 from viewsphere.model.shot import Frame, ModelSpec, Placement, Shot, Size
+from viewsphere.run.allocator import keep_freed_memory
 from viewsphere.sampling.plan import Plan, check_engine, check_images, plan
 from viewsphere.sampling.viewpoints import camera_for, inside_box
 from viewsphere.store import Store, check_codecs
@@ -78,13 +79,16 @@ class StoredBoxes:
 
 @dataclass(eq=False)
 class Stages:
-    """Renders shots; keeps the last shot's stage, and the models used last, warm."""
+    """Renders shots; keeps the last shot's stage, and the models used last, warm, and the memory of a frame for the next."""
 
     _stage: plugins.Stage | None = None
     _stage_key: str = ""
     _models: dict[str, Mesh] = field(default_factory=dict[str, Mesh])
     _boxes: dict[str, Float] = field(default_factory=dict[str, Float])
     _sizes: dict[str, Size] = field(default_factory=dict[str, Size])
+
+    def __post_init__(self) -> None:
+        keep_freed_memory()
 
     def model(self, spec: ModelSpec) -> Mesh:
         """The normalised model; raises ModelError if its file cannot be used."""

@@ -13,12 +13,13 @@ import math
 import numpy as np
 
 from viewsphere.geometry.jit import inner, njit
+from viewsphere.truth.kernels_row import FOUR, draw_four, shows_farther
 
 EPSILON = 1e-5  # pixels a bounding box is widened by: more than the edge functions' rounding
 BEHIND = -(1 << 30)
 ROUNDED_UP = 1.0 + 1e-9  # of 1/z between a triangle's corners
 SLIVER = 1e-5  # twice the area in pixels below which the sign of a triangle's area is not trusted
-SMALL = 8  # pixels: the width up to which testing every pixel beats computing spans
+SMALL = 2 * FOUR  # pixels: the width up to which testing every pixel beats computing spans
 NEVER, CLAMP, MIRROR = -2, 1, 2  # as in cutouts.py
 
 
@@ -122,7 +123,8 @@ def draw(q, cell, triangles, span, canvas, cutout, cutouts, nearest, seen):
         if xa > xb or ya > yb or cutout[ut] == NEVER:
             continue
         most = max(q[i0, d], q[i1, d], q[i2, d]) * ROUNDED_UP
-        if xb - xa < SMALL and _hidden(nearest, xa, ya, xb, yb, most):
+        is_small = xb - xa < SMALL and width >= FOUR
+        if is_small and _hidden(nearest, xa, ya, xb, yb, most):
             continue
         q0, q1, q2 = (q[i0, a], q[i0, b], q[i0, c]), (q[i1, a], q[i1, b], q[i1, c]), (q[i2, a], q[i2, b], q[i2, c])
         crossing = xa == BEHIND
@@ -144,7 +146,7 @@ def draw(q, cell, triangles, span, canvas, cutout, cutouts, nearest, seen):
             e0, e1, e2 = negated(e0), negated(e1), negated(e2)
         inverse = 1.0 / det
         n = (nx * inverse, ny * inverse, nz * inverse)
-        if xb - xa < SMALL:
+        if is_small:
             _draw_small(t, e0, e1, e2, n, box, canvas, nearest, seen)
         else:
             _draw_rows(t, e0, e1, e2, n, box, canvas, nearest, seen)
@@ -152,33 +154,38 @@ def draw(q, cell, triangles, span, canvas, cutout, cutouts, nearest, seen):
 
 @inner
 def _hidden(nearest, xa, ya, xb, yb, most):
-    """Whether all pixels of the box already show something nearer than 1/z = most."""
-    for y in range(max(ya, 0), yb + 1):
-        for x in range(max(xa, 0), xb + 1):
-            if nearest[np.uintp(y), np.uintp(x)] < most:
-                return False
+    """Whether all pixels of a narrow box, and those drawn with them, already show something nearer than 1/z = most."""
+    width = nearest.shape[1]
+    left, right, is_wide = _fours(xa, xb, width)
+    for y in range(ya, yb + 1):
+        if shows_farther(nearest, np.uintp(y * width + left), most):
+            return False
+        if is_wide and shows_farther(nearest, np.uintp(y * width + right), most):
+            return False
     return True
 
 
 @inner
+def _fours(xa, xb, width):
+    """First pixels of the fours that hold a narrow box's columns, and whether it needs the second."""
+    return min(xa, width - FOUR), min(xa + FOUR, width - FOUR), xb - xa >= FOUR
+
+
+@inner
 def _draw_small(t, e0, e1, e2, n, box, canvas, nearest, seen):
-    """Draw a narrow triangle: every pixel of its box is tested."""
+    """Draw a narrow triangle: every pixel of its box is tested, and some beside it, which it does not cover."""
     xa, ya, xb, yb = box
     samples, x0, y0 = canvas
-    step = 1.0 / samples
+    step, width = 1.0 / samples, nearest.shape[1]
+    left, right, is_wide = _fours(xa, xb, width)
+    e = e0[0], e1[0], e2[0]
     for y in range(ya, yb + 1):
         py = (y + y0 + 0.5) * step
-        f0, f1, f2 = e0[1] * py + e0[2], e1[1] * py + e1[2], e2[1] * py + e2[2]
-        uy, s = np.uintp(y), n[1] * py + n[2]
-        for x in range(xa, xb + 1):
-            px = (x + x0 + 0.5) * step
-            inverse = n[0] * px + s
-            ux = np.uintp(x)
-            # one branch for four comparisons: which of them fails is hard to predict
-            inside = (e0[0] * px + f0 >= 0.0) & (e1[0] * px + f1 >= 0.0) & (e2[0] * px + f2 >= 0.0)
-            if inside & (inverse > nearest[uy, ux]):
-                nearest[uy, ux] = inverse
-                seen[uy, ux] = t
+        f = e0[1] * py + e0[2], e1[1] * py + e1[2], e2[1] * py + e2[2]
+        row, s = y * width, n[1] * py + n[2]
+        draw_four(nearest, seen, np.uintp(row + left), t, left + x0 + 0.5, step, e, f, n[0], s)
+        if is_wide:
+            draw_four(nearest, seen, np.uintp(row + right), t, right + x0 + 0.5, step, e, f, n[0], s)
 
 
 @inner

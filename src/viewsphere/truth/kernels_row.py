@@ -1,0 +1,71 @@
+"""Four neighbouring samples of a row at once, on vectors of the processor: the same sums as one by one, bit for bit."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numba as nb
+from llvmlite import ir
+from numba.extending import intrinsic
+
+FOUR = 4
+_REAL, _WHOLE, _FLAGS = ir.DoubleType(), ir.IntType(32), ir.IntType(FOUR)
+_REALS, _WHOLES = ir.VectorType(_REAL, FOUR), ir.VectorType(_WHOLE, FOUR)
+_EDGES = nb.types.UniTuple(nb.float64, 3)
+
+
+def _spread(builder: Any, value: Any) -> Any:
+    """One number in all lanes."""
+    one = builder.insert_element(ir.Constant(ir.VectorType(value.type, FOUR), ir.Undefined), value, _WHOLE(0))
+    return builder.shuffle_vector(one, one, ir.Constant(_WHOLES, [0] * FOUR))
+
+
+def _from(context: Any, builder: Any, kind: Any, array: Any, at: Any, lanes: Any) -> Any:
+    """Where an array's lanes from this flat index on are."""
+    data = context.make_array(kind)(context, builder, array).data
+    return builder.bitcast(builder.gep(data, [at]), lanes.as_pointer())
+
+
+@intrinsic
+def shows_farther(typing: Any, nearest: Any, at: Any, most: Any) -> Any:
+    """Whether one of the samples from flat index `at` on is farther than 1/z = `most`."""
+
+    def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        data, at, most = arguments
+        shown = builder.load(_from(context, builder, signature.args[0], data, at, _REALS), align=8)
+        flags = builder.fcmp_ordered("<", shown, _spread(builder, most))
+        return builder.icmp_unsigned("!=", builder.bitcast(flags, _FLAGS), _FLAGS(0))
+
+    return nb.boolean(nearest, at, nb.float64), code
+
+
+@intrinsic
+def draw_four(
+    typing: Any, nearest: Any, seen: Any, at: Any, t: Any, first: Any, step: Any, e: Any, f: Any, n: Any, s: Any
+) -> Any:
+    """Show triangle t at the samples from flat index `at` on, at (first + i) step along the row, that are inside and nearer.
+
+    Inside is where e x + f is not negative for all three edges; 1/z is n x + s.
+    """
+
+    def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        nearest, seen, at, t, first, step, e, f, n, s = arguments
+        place = _from(context, builder, signature.args[0], nearest, at, _REALS)
+        owner = _from(context, builder, signature.args[1], seen, at, _WHOLES)
+        order = ir.Constant(_REALS, [float(i) for i in range(FOUR)])
+        x = builder.fmul(builder.fadd(_spread(builder, first), order), _spread(builder, step))
+
+        def line(slope: Any, offset: Any) -> Any:
+            return builder.fadd(builder.fmul(_spread(builder, slope), x), _spread(builder, offset))
+
+        shown, inverse = builder.load(place, align=8), line(n, s)
+        flags = builder.fcmp_ordered(">", inverse, shown)
+        for i in range(3):
+            value = line(builder.extract_value(e, i), builder.extract_value(f, i))
+            flags = builder.and_(flags, builder.fcmp_ordered(">=", value, ir.Constant(_REALS, [0.0] * FOUR)))
+        number = _spread(builder, builder.trunc(t, _WHOLE))
+        builder.store(builder.select(flags, inverse, shown), place, align=8)
+        builder.store(builder.select(flags, number, builder.load(owner, align=4)), owner, align=4)
+        return context.get_dummy_value()
+
+    return nb.void(nearest, seen, at, nb.intp, nb.float64, nb.float64, _EDGES, _EDGES, nb.float64, nb.float64), code
