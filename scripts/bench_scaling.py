@@ -17,6 +17,7 @@ from viewsphere.assets.mesh import Image, Material, Mesh, Texture
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.scene import Ground, Scene, Sun
 from viewsphere.model.shot import Frame, ModelSpec, Placement, Pose, Shot
+from viewsphere.run.allocator import keep_freed_memory
 from viewsphere.sampling.viewpoints import camera_for
 from viewsphere.truth.channels import observe
 from viewsphere.truth.visibility import rasterize
@@ -105,6 +106,7 @@ def series() -> Iterator[tuple[str, list[tuple[float, Callable[[], dict[str, flo
 
 def scaling(folder: Path) -> None:
     """Measure, print tables and write `scaling.svg`."""
+    keep_freed_memory()  # as runs do
     frame_cost(ball(1_000))  # compiles, or reads the cache
     results: list[tuple[str, list[float], list[dict[str, float]]]] = []
     for name, runs in series():

@@ -53,6 +53,15 @@ def _alpha(surfaces, textures, t, g, h):
     return alpha * opacity(surfaces, textures, m, u0, v0, u1, v1)
 
 
+@njit
+def see_vertices(vertices, matrix, corners):
+    """(V, 4): a view's matrix times each vertex. No BLAS: its threads wait for one another on busy cores."""
+    for i in range(U(vertices.shape[0])):
+        x, y, z = vertices[i, U(11)], vertices[i, U(12)], vertices[i, U(13)]
+        for k in range(U(4)):
+            corners[i, k] = matrix[k, U(0)] * x + matrix[k, U(1)] * y + matrix[k, U(2)] * z + matrix[k, U(3)]
+
+
 @inner
 def _reach(corners, i, j, k, near, axis):
     """Least and greatest place along an axis of a triangle's part in front of the near plane, in texels from the middle."""

@@ -352,10 +352,9 @@ def draw_views(views: Sequence[View], casters: Casters, opposite: bool = False) 
         form[i] = _form_row(view, i >= len(views))
     result = Views(form, grid, np.empty(texels, np.float32), np.empty((cells, 4), np.float32))
     result.bounds[:] = np.inf, -np.inf, 0, 0
-    points = np.ones((len(casters.surfaces.vertices), 4))
-    points[:, :3] = casters.surfaces.vertices[:, 11:14]
+    corners = np.empty((len(casters.surfaces.vertices), 4))
     for i, view in enumerate(views):
-        corners = points @ view.matrix.T
+        kernels.see_vertices(casters.surfaces.vertices, view.matrix, corners)
         nearest = _level(result, i, view.size)
         nearest.fill(np.inf)
         farthest = _level(result, i + len(views), view.size) if opposite else np.empty((0, 0), np.float32)
