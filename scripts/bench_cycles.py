@@ -34,8 +34,11 @@ from viewsphere.truth.visibility import rasterize
 
 HERE = Path(__file__).parent
 EQUAL = {"samples": 16, "bounces": 3}
+DIFFUSE = {"glossy_bounces": 0, "transmission_bounces": 0, "volume_bounces": 0}
+"""As BlenderProc's: light that was reflected does not go on. Ours lets it, unless told."""
 ENGINES: dict[str, dict[str, Any]] = {
     "equal": {"name": "cycles", **EQUAL},
+    "equal, its bounces": {"name": "cycles", **EQUAL, "settings": DIFFUSE},
     "draft": {"name": "cycles", "quality": "draft"},
     "raster": {"name": "raster"},
 }
@@ -213,8 +216,8 @@ def memory(frames: int, folder: Path) -> list[float]:
     return found
 
 
-def cycles(frames: int, threads: int = 0) -> None:
-    """Print the comparison."""
+def cycles(frames: int, threads: int = 1) -> None:
+    """Print the comparison; `threads` of BlenderProc's Blender, as ours has one unless told."""
     with tempfile.TemporaryDirectory() as name:
         write_scene(Path(name))
         print("\n".join(table(compare(frames, threads, Path(name)))))

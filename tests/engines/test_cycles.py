@@ -32,7 +32,10 @@ LENSES = {
 SHARP = {"pixel_filter_type": "GAUSSIAN", "filter_width": 0.01}
 MODELS = Path(__file__).parents[3] / "shared" / "models"
 FILES = ["car/NormalCar2.glb", "chair/dining_chair_01.glb", "misc/mug.glb", "hair_drier/hair_drier_a.obj"]
-MIRRORED = ["car/NormalCar1.obj", "misc/retro_computer.glb", "chair/wheelchair_01.glb"]
+MIRRORED = ["car/NormalCar1.obj", "misc/retro_computer.glb", "chair/wheelchair_01.glb", "awkward/nested40_negative_scale.glb"]
+EVALUATED = ["car/BasicTaxi.blend", "boat/Viking boat.blend", "car/Taxi.fbx", "chair/OfficeChair.fbx", "awkward/huesitos.fbx"]
+TIMED = ["awkward/CesiumMan.usdz", "awkward/BoxAnimated.usdz"]
+MANY = ["awkward/1500_instances_unicode_names.glb", "misc/Tableware.glb"]
 
 
 def pictures(channel="rgb", **given):
@@ -58,7 +61,7 @@ def test_labels_are_rasters_and_colours_lie_on_them(lens):
     assert np.hypot(*np.mean(shifts, axis=0)) <= 0.05
 
 
-@pytest.mark.parametrize("source", ["zoo:car", "zoo:bicycle", "zoo:chair", *FILES, *MIRRORED])
+@pytest.mark.parametrize("source", ["zoo:car", "zoo:bicycle", "zoo:chair", *FILES, *MIRRORED, *EVALUATED, *TIMED, *MANY])
 def test_truth_is_what_cycles_sees(source):
     if ":" not in source and not (MODELS / source).exists():
         pytest.skip(f"needs {MODELS / source}")
