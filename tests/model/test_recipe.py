@@ -237,7 +237,14 @@ MISTAKES = [
         "choose another, or give a background",
     ),
     ({"scene": {"planes": [{"image": "a", "height": 1e30, "at": [0, 1, 0]}]}}, "scene.planes[0].height: expected", "1e+30"),
-    ({"viewpoints": {"distance": [1, 1e30]}}, "viewpoints.distance: expected distances of at most 1,000,000 m", "found 1e+30"),
+    ({"viewpoints": {"distance": [1, 2e6]}}, "viewpoints.distance: expected distances of at most 1,000,000 m", "found 2e+06"),
+    (
+        {"viewpoints": {"distance": [1, 1e30]}},
+        "viewpoints.distance[1]: expected a number less than or equal to 1000000000",
+        "1e+30",
+    ),
+    ({"viewpoints": {"distance": 9, "target": [0, -1e30, 0]}}, "viewpoints.target[1]: expected a number greater", "-1e+30"),
+    ({"camera": {"size": [9, 9], "focal_px": 1e30}}, "camera.focal_px: expected a number less", "1e+30"),
     (
         {"scene": {"ground": "of"}},
         "scene.ground: expected on, off, auto, catcher, a mapping, a colour name",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal, Self
+from typing import Annotated, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +21,9 @@ class Distortion(Frozen):
     """
 
     model: Literal["brown_conrady", "fisheye"] = Field(description="OpenCV's standard or its fisheye model")
-    coefficients: tuple[float, ...] = Field(description="brown_conrady: 4, 5 or 8 in OpenCV's order; fisheye: 4")
+    coefficients: tuple[Annotated[float, Field(ge=-1e6, le=1e6)], ...] = Field(
+        description="brown_conrady: 4, 5 or 8 in OpenCV's order; fisheye: 4"
+    )
 
     @model_validator(mode="after")
     def _counted(self) -> Self:

@@ -62,8 +62,10 @@ def shape_of(value: object) -> str:
     return "text" if isinstance(value, str) else "number"
 
 
-Number = Annotated[float, Field(strict=True)]
-Positive = Annotated[float, Field(strict=True, gt=0)]
+LARGEST = 1e9
+"""Of any number in a recipe: metres, degrees, pixels; beyond it what is meant is out of every picture."""
+Number = Annotated[float, Field(strict=True, ge=-LARGEST, le=LARGEST)]
+Positive = Annotated[float, Field(strict=True, gt=0, le=LARGEST)]
 Count = Annotated[int, BeforeValidator(_whole), Field(strict=True, ge=1)]
 Natural = Annotated[int, BeforeValidator(_whole), Field(strict=True, ge=0)]
 Point = tuple[Number, Number, Number]

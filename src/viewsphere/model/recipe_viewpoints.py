@@ -9,7 +9,7 @@ from pydantic import Discriminator, Field, Tag, field_validator, model_validator
 from viewsphere.geometry.pose_category import pose_category
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.recipe_time import Frames
-from viewsphere.model.recipe_values import Count, Interval, Number, Point, Positive, Range, Values
+from viewsphere.model.recipe_values import Count, Interval, Number, Point, Positive, Range, Values, shape_of
 from viewsphere.model.shot import Axis
 
 AZIMUTH = "0: the camera faces the model's front; 90: it stands on the model's left, +X"
@@ -57,7 +57,9 @@ def _in_reach(low: float, high: float) -> None:
 class _Aimed(Frozen):
     """What all kinds of viewpoints have."""
 
-    target: Literal["center", "follow"] | Point = Field(
+    target: Annotated[
+        Annotated[Literal["center", "follow"], Tag("text")] | Annotated[Point, Tag("list")], Discriminator(shape_of)
+    ] = Field(
         default="center",
         description="what the camera looks at: the centre of the model's box, or a point [x, y, z] in metres. An animated "
         "model's centre is that of the first frame; follow goes with it",
