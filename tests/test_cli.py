@@ -161,7 +161,9 @@ def test_a_part_is_exported_beside_the_data_set(small_run, tmp_path):
     assert run.returncode == 0 and "wrote part/native" in run.stdout
     assert len(list((tmp_path / "part" / "native").rglob("RGB/*.png"))) == 3
     assert "--output: expected another folder" in fails("export", small_run, "-f", "native", "--models", "*_000")
-    assert "--frames: expected numbers" in fails("export", small_run, "-f", "native", "--frames", "x", "-o", tmp_path / "b")
+    for option, wrong in (("--frames", "x"), ("--frames", ","), ("--models", ",")):
+        assert f"{option}: expected" in fails("export", small_run, "-f", "native", option, wrong, "-o", tmp_path / "b" / "c")
+    assert not (tmp_path / "b").exists()
 
 
 def test_an_export_to_no_format_is_a_mistake(small_run):

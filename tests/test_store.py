@@ -12,7 +12,7 @@ import pytest
 
 from viewsphere.errors import StoreError
 from viewsphere.model.channel import CHANNELS
-from viewsphere.store import Category, Dataset, PlanRecord, Store, decode, encode
+from viewsphere.store import Category, Dataset, PlanRecord, Store, decode, encode, new_folder
 
 
 def plan_record(**changes):
@@ -190,3 +190,17 @@ def test_a_data_set_and_its_samples_travel_to_other_processes(small_run):
     assert np.array_equal(copy[3].depth, sample.depth)
     assert np.array_equal(sample.depth, dataset[3].depth)
     assert sample.objects[0].box2d == dataset[3].objects[0].box2d
+
+
+def test_a_new_folder_that_comes_to_nothing_leaves_nothing(tmp_path):
+    def made(place, fails):
+        with new_folder(place) as folder:
+            (folder / "file").touch()
+            if fails:
+                raise ValueError
+
+    made(tmp_path / "a" / "b", fails=False)
+    for place in ("a/c", "d/e/f"):
+        with pytest.raises(ValueError):
+            made(tmp_path / place, fails=True)
+    assert sorted(str(p.relative_to(tmp_path)) for p in tmp_path.rglob("*")) == ["a", "a/b", "a/b/file"]

@@ -46,7 +46,10 @@ def export(
         from viewsphere import plugins
 
         raise UserError(f"--format: expected one or more of {', '.join(plugins.names('formats'))}; found none")
-    choice = Choice(split(models) or (), frame_ranges(frames or ""))
+    keys = split(models)
+    if keys == ():
+        raise UserError(f"--models: expected keys or patterns; found {models!r}")
+    choice = Choice(keys or (), () if frames is None else frame_ranges(frames))
     notes = write_formats(folder, names, output=output, choice=choice)
     if json_:
         print_json({"formats": list(names), "notes": list(notes)})

@@ -45,4 +45,6 @@ def frame_ranges(text: str) -> tuple[tuple[int, int], ...]:
         if not first.isdecimal() or (dash and not (last.isdecimal() and int(last) >= int(first))):
             raise UserError(f"--frames: expected numbers and ranges, such as 0-15,40; found {part!r}")
         found.append((int(first), int(last or first) + 1))
+    if not found:
+        raise UserError(f"--frames: expected numbers and ranges, such as 0-15,40; found {text!r}")
     return tuple(found)

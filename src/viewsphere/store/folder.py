@@ -311,6 +311,7 @@ def _remove_of_dead(paths: Iterable[Path]) -> None:
 def new_folder(target: Path) -> Generator[Path]:
     """A folder to write into that becomes `target` when the block ends well; raises StoreError where files lie there."""
     aside = target.with_name(f"{_writer()}{target.name}")
+    missing = [parent for parent in aside.parents if not parent.exists()]
     with _disk_errors(target):
         if target.exists() and (not target.is_dir() or any(target.iterdir())):
             raise StoreError(f"{target}: expected an empty or new folder, found other files: choose another, or delete it")
@@ -325,6 +326,9 @@ def new_folder(target: Path) -> Generator[Path]:
             aside.rename(target)
     finally:
         shutil.rmtree(aside, ignore_errors=True)
+        for parent in missing:
+            with suppress(OSError):  # something is in it
+                parent.rmdir()
 
 
 def channel_path(channel: str, pose: int, kinds: Files | None = None) -> str:
