@@ -216,8 +216,8 @@ def memory(frames: int, folder: Path) -> list[float]:
     return found
 
 
-def cycles(frames: int, threads: int = 1) -> None:
-    """Print the comparison; `threads` of BlenderProc's Blender, as ours has one unless told."""
+def cycles(frames: int, threads: int = 0) -> None:
+    """Print the comparison; `threads` of BlenderProc's Blender, 0 for all cores, as it is documented."""
     with tempfile.TemporaryDirectory() as name:
         write_scene(Path(name))
         print("\n".join(table(compare(frames, threads, Path(name)))))
