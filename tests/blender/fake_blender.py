@@ -11,9 +11,15 @@ import os
 from types import SimpleNamespace as Some
 os.write(1, b'{"ok": "noise of a library"}\\n')
 print('{"ok": "noise of Python"}', flush=True)
-app = Some(version_string="9.8.7")
-context = Some(preferences=Some(filepaths=Some(), system=Some()))
+class Thing:
+    def __getattr__(self, name): return Thing()
+    def __call__(self, *given, **named): return Thing()
+app = Some(version_string="9.8.7", version=(9, 8, 7))
+context = Some(preferences=Some(filepaths=Some(), system=Some()), scene=Thing())
+data = ops = Thing()
 """
+DYING = NOISY + "ops = Some(wm=Thing(), render=Some(render=os.abort))"
+GRAPHICS = "from types import SimpleNamespace as Some; platform = Some(renderer_get=lambda: 'A driver')"
 DEVICES = """\
 def available_devices(kind):
     if kind == "METAL":
@@ -45,8 +51,13 @@ def with_modules(folder: Path, modules: dict[str, str]) -> Path:
 
 
 def fake_blender(folder: Path) -> Path:
-    """An interpreter with what `hello` needs; its `stage` and `render` never end."""
-    return with_modules(folder, {"bpy": NOISY, "_cycles": DEVICES, "mathutils": ENDLESS})
+    """An interpreter with what `hello` and `draw` need; its `stage` and `render` never end."""
+    return with_modules(folder, {"bpy": NOISY, "_cycles": DEVICES, "gpu": GRAPHICS, "mathutils": ENDLESS})
+
+
+def blind_blender(folder: Path) -> Path:
+    """The same, but it dies when it is to draw."""
+    return with_modules(folder, {"bpy": DYING, "_cycles": DEVICES})
 
 
 def without_blender(folder: Path) -> Path:

@@ -6,7 +6,7 @@ import json
 import sys
 
 import pytest
-from fake_blender import LACKING, fake_blender, with_modules, without_blender
+from fake_blender import LACKING, blind_blender, fake_blender, with_modules, without_blender
 from typer.testing import CliRunner
 
 from viewsphere import cli
@@ -25,11 +25,21 @@ def doctor(*words):
 def test_a_machine_where_all_works(tmp_path, monkeypatch):
     monkeypatch.setenv(VARIABLE, str(fake_blender(tmp_path)))
     said = doctor().stdout
-    for word in ("viewsphere ", sys.executable, "cores", "kernels", "[codecs]", f"9.8.7, {tmp_path}", "CUDA: A card"):
+    for word in (
+        "viewsphere ",
+        sys.executable,
+        "cores",
+        "kernels",
+        "[codecs]",
+        f"9.8.7, {tmp_path}",
+        "CUDA: A card",
+        "EEVEE, Workbench: drawn by A driver",
+    ):
         assert word in said
     told = json.loads(doctor("--json").stdout)
     assert told["blender"]["problem"] is None
     assert told["blender"]["devices"][0] == {"kind": "CPU", "name": "A processor"}
+    assert told["blender"]["graphics"] == {"driver": "A driver", "problem": None}
     assert told["processor"]["cores"] >= 1
     assert {extra["name"] for extra in told["extras"]} >= {"check", "codecs"}
     assert all((extra["install"] is None) == (None not in extra["packages"].values()) for extra in told["extras"])
@@ -41,6 +51,15 @@ def test_a_machine_without_blender(tmp_path, monkeypatch):
     monkeypatch.setattr(environment, "home", lambda: tmp_path)
     assert "found none: pip install 'viewsphere[blender]' in Python 3.11" in doctor().stdout
     assert json.loads(doctor("--json").stdout)["blender"]["python"] is None
+
+
+def test_a_machine_that_cannot_draw(tmp_path, monkeypatch):
+    """Blender dies of it, and all else is told."""
+    monkeypatch.setenv(VARIABLE, str(blind_blender(tmp_path)))
+    said = doctor().stdout
+    assert "9.8.7" in said and "CPU: A processor" in said
+    (line,) = (line for line in said.splitlines() if "EEVEE, Workbench: cannot draw here, Blender died" in line)
+    assert "apt-get install libegl1 libgl1-mesa-dri" in line and "its log" not in line
 
 
 def test_an_interpreter_that_lacks_bpy(tmp_path, monkeypatch):

@@ -19,7 +19,12 @@ from viewsphere.errors import BlenderDied, BlenderError, MissingExtraError, User
 
 VARIABLE = "VIEWSPHERE_BLENDER_PYTHON"
 INSTALL = "pip install 'viewsphere[blender]' in Python 3.11, or run viewsphere doctor --setup-blender"
+GRAPHICS = (
+    "it needs OpenGL 4.3 through EGL; on Debian and Ubuntu: apt-get install libegl1 libgl1-mesa-dri, which draw without a "
+    "graphics card, or the card's driver"
+)
 PROBE_S = 60.0
+DRAW_S = 60.0
 ASK_S = 20.0
 
 PACKAGES = {
@@ -65,14 +70,23 @@ class Library:
 
 
 @dataclass(frozen=True)
+class Graphics:
+    """What EEVEE and Workbench draw with, where that is known; or why they cannot."""
+
+    driver: str | None = None
+    problem: str | None = None
+
+
+@dataclass(frozen=True)
 class Blender:
-    """The Blender of an interpreter: its version and devices, or what is wrong with it."""
+    """The Blender of an interpreter: its version, devices and graphics, or what is wrong with it."""
 
     python: Path
     version: str | None = None
     devices: tuple[Device, ...] = ()
     problem: str | None = None
     missing: tuple[Library, ...] = ()
+    graphics: Graphics | None = None
 
     @property
     def cure(self) -> str | None:
@@ -100,15 +114,24 @@ def find_blender(python: str | None = None) -> Path:
 
 
 def probe(python: Path) -> Blender:
-    """Start this interpreter's Blender and ask what it is; takes some seconds, a minute at most."""
+    """Start this interpreter's Blender, ask what it is and have it draw a little; takes some seconds, two minutes at most."""
     with tempfile.TemporaryDirectory(prefix="viewsphere-probe-") as folder:
         try:
             with BlenderProcess(python, Path(folder) / "log") as process:
                 told = process.ask("hello", PROBE_S)
+                graphics = _graphics(process)
         except (BlenderError, BlenderDied) as error:
             return _broken(python, str(error))
     devices = tuple(Device(**device) for device in told["devices"])
-    return Blender(python, told["version"], devices)
+    return Blender(python, told["version"], devices, graphics=graphics)
+
+
+def _graphics(process: BlenderProcess) -> Graphics:
+    """Workbench's first picture tells: EEVEE draws by the same means, but compiles its shaders first."""
+    try:
+        return Graphics(process.ask("draw", DRAW_S, renderer="workbench")["driver"])
+    except (BlenderError, BlenderDied) as error:
+        return Graphics(problem=f"{str(error).partition('; its log')[0]}: {GRAPHICS}")
 
 
 def missing_libraries(said: str) -> tuple[Library, ...]:

@@ -110,12 +110,14 @@ def _blender() -> dict[str, Any]:
     try:
         python: Path = find_blender()
     except UserError as error:
-        return {"python": None, "version": None, "devices": [], "problem": str(error), "missing": [], "install": None}
+        nothing = {"python": None, "version": None, "devices": [], "graphics": None}
+        return {**nothing, "problem": str(error), "missing": [], "install": None}
     blender = probe(python)
     return {
         "python": str(python),
         "version": blender.version,
         "devices": [{"kind": device.kind, "name": device.name} for device in blender.devices],
+        "graphics": blender.graphics and {"driver": blender.graphics.driver, "problem": blender.graphics.problem},
         "problem": blender.problem,
         "missing": [{"library": library.name, "package": library.package} for library in blender.missing],
         "install": blender.cure,
@@ -138,6 +140,8 @@ def _lines(found: dict[str, Any]) -> Iterator[tuple[str, str]]:
     yield "Blender", _blender_line(blender)
     for device in blender["devices"]:
         yield "", f"{device['kind']}: {device['name']}"
+    if blender["graphics"]:
+        yield "", f"EEVEE, Workbench: {_graphics_line(blender['graphics'])}"
     if blender["install"]:
         yield "", f"on Debian and Ubuntu: {blender['install']}"
 
@@ -147,3 +151,9 @@ def _blender_line(blender: dict[str, Any]) -> str:
         return blender["problem"].removeprefix("Blender: ")
     state = f"{blender['version'] or 'does not work'}, {blender['python']}"
     return f"{state}: {blender['problem']}" if blender["problem"] else state
+
+
+def _graphics_line(graphics: dict[str, Any]) -> str:
+    if graphics["problem"]:
+        return f"cannot draw here, {graphics['problem']}"
+    return f"drawn by {graphics['driver'] or 'a driver that does not tell its name'}"

@@ -36,6 +36,8 @@ def main(folder: Path, readable: list[str] | None = None, threads: int = 0) -> N
     """
     if readable is not None:
         _bind(folder, readable)
+    if threads:
+        os.environ["LP_NUM_THREADS"] = str(threads)  # of Mesa's software OpenGL
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches all processes of a terminal; the other side decides
     answers = _own_output()
     faulthandler.enable()
@@ -180,6 +182,12 @@ def _read_places(told: dict[str, Any]) -> Any:
     return places(told)
 
 
+def _draw(told: dict[str, Any]) -> Any:
+    from .renderers import try_drawing
+
+    return try_drawing(told)
+
+
 def _render(told: dict[str, Any]) -> Any:
     from .rendering import render
 
@@ -200,6 +208,7 @@ REQUESTS: dict[str, Callable[[dict[str, Any]], Any]] = {
     "cameras": _read_cameras,
     "contents": _read_contents,
     "places": _read_places,
+    "draw": _draw,
     "stage": _stage,
     "render": _render,
     "save": _save,

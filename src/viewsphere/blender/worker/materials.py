@@ -56,7 +56,7 @@ class _Look:
     transmission: Any  # of light that is not mirrored
 
 
-def build_material(told, images, has_uv, has_colors):
+def build_material(told, images, has_uv, has_colors, is_traced=True):
     """A Blender material from a `Material` as a dict and `meshes.build_images` of its mesh.
 
     has_uv: of both sets of coordinates, whether the mesh has them; textures that need others count as absent. Where the dict
@@ -73,8 +73,22 @@ def build_material(told, images, has_uv, has_colors):
         material.cycles.emission_sampling = "NONE"
         surface = _veiled(graph, alpha, _unlit(graph, color))
     else:
-        surface = _lit(graph, told, _look(graph, textures, told, has_colors))
+        surface = _lit(graph, told, _look(graph, textures, told, has_colors), is_traced)
+        if told["transmission"] > 0 and not is_traced:
+            material.surface_render_method = "BLENDED"
     graph.node("ShaderNodeOutputMaterial", {"Surface": surface})
+    return material
+
+
+def build_plain(told, images, has_uv):
+    """What Workbench shows of a material: a picture as it is, without one the factor of its base colour."""
+    material = bpy.data.materials.new(told["name"] or "material")
+    material.diffuse_color = [min(max(c, 0.0), 1.0) for c in told["base_color"]]
+    material.metallic, material.roughness = told["metallic"], told["roughness"]
+    if material.node_tree is None:  # before Blender 5
+        material.use_nodes = True
+    material.node_tree.nodes.clear()  # any texture's node would pass for the base colour's
+    Textures(Graph(material.node_tree), images, tuple(has_uv)).color(told["base_color_texture"])
     return material
 
 
@@ -198,7 +212,7 @@ def _unlit(graph, color):
     return graph.node("ShaderNodeEmission", {"Color": color, "Strength": graph.product(UNEXPOSED, seen)}).outputs[0]
 
 
-def _lit(graph, told, look):
+def _lit(graph, told, look, is_traced):
     """The surface with what shows through it."""
     has_glass, is_blended = look.transmission != 0, told["alpha_mode"] == "BLEND" and look.alpha != 1
     shine = None
@@ -206,7 +220,7 @@ def _lit(graph, told, look):
         shine = _principled(graph, told, look, graph.shades(look.color, look.metallic))
     body = None if look.transmission == 1 else _principled(graph, told, look, look.color)
     if has_glass:
-        body = graph.mix(look.transmission, body, graph.add(shine, _through(graph, told, look)))
+        body = graph.mix(look.transmission, body, graph.add(shine, _through(graph, told, look, is_traced)))
     surface = _veiled(graph, look.alpha, body)
     return graph.add(surface, graph.mix(_more_shine(graph, look.alpha), None, shine)) if is_blended else surface
 
@@ -243,14 +257,14 @@ def _principled(graph, told, look, color):
     return graph.node("ShaderNodeBsdfPrincipled", inputs, distribution="MULTI_GGX").outputs[0]
 
 
-def _through(graph, told, look):
+def _through(graph, told, look, is_traced):
     """What is behind thin glass: what its surface does not mirror, in its colour."""
     reflectance = min(_reflectance(told) * told["specular"], TOTAL)
     left = graph.complement(_fresnel(graph, _ior(reflectance), look.normal)) if reflectance > 0 else 1.0
     if look.coat != 0:
         left = graph.product(left, graph.complement(graph.product(look.coat, _fresnel(graph, 1.5, look.coat_normal))))
     tint = graph.shades(look.color, left)
-    clear = _clear(graph, look.color, left, tint)
+    clear = _clear(graph, look.color, left, tint) if is_traced else _nothing(graph, tint)
     if not isinstance(look.roughness, bpy.types.NodeSocket) and look.roughness <= SHARP:
         return clear
     milky = graph.node("ShaderNodeBsdfTranslucent", {"Color": tint}).outputs[0]

@@ -1,6 +1,7 @@
 """A picture of the staged scene: the camera to the pixel, pixels without a file of Blender's own.
 
-In a Blender without windows 'Render Result' has no pixels; Cycles' own result does while its engine runs.
+In a Blender without windows 'Render Result' has no pixels; Cycles' own result does while its engine runs. What the other
+renderers draw comes by a file, which lies in memory.
 """
 
 from __future__ import annotations
@@ -13,10 +14,21 @@ import cycles
 import numpy as np
 from mathutils import Matrix
 
-from . import compositing, ground
+from . import compositing, ground, renderers
 
 SENSOR = 36.0
 """Millimetres; any will do."""
+
+DRAWN_OFF = {
+    "5": (0.009, -0.127),
+    "8": (-0.121, -0.107),
+    "11": (0.043, 0.043),
+    "16": (0.040, -0.035),
+    "32": (0.031, -0.094),
+}
+"""Pixels, to the right and down, by which Workbench's pictures are off with so many samples, as measured: it moves its samples
+until one of them lies in the middle.
+"""
 
 PASSES = {"index": ("use_pass_object_index", ("Object Index", "IndexOB")), "depth": ("use_pass_z", ("Depth",))}
 """What may be asked for besides the colours: the layer's property, the pass's names in Blender 5 and before."""
@@ -29,15 +41,18 @@ def render(told):
     """
     scene = bpy.context.scene
     view = told["camera"]
-    place_camera(scene, view)
+    place_camera(scene, _straightened(scene, view))
     scene.render.film_transparent = told["transparent"]
     ground.show_sky(not told["transparent"])
     _set_border(scene, told["border"], view)
     wanted = _switched(bpy.context.view_layer, told)
     scene.update_tag()  # else persistent data hides what has changed
     begun, cpu = time.monotonic(), time.process_time()
-    composed = Path(told["out"]).with_suffix(".exr") if compositing.is_used(scene) else None
-    for name, pixels in _rendered(wanted, composed).items():
+    file = Path(told["out"]).with_suffix(".exr")
+    found = (
+        _drawn(scene, file) if renderers.is_drawn(scene) else _rendered(wanted, file if compositing.is_used(scene) else None)
+    )
+    for name, pixels in found.items():
         np.save(wanted[name], _whole(pixels, told["border"], view))
     return {"seconds": time.monotonic() - begun, "cpu_seconds": time.process_time() - cpu}
 
@@ -50,6 +65,13 @@ def _switched(layer, told):
             setattr(layer, switch, True)
             wanted |= dict.fromkeys(names, told["out"].replace(".npy", f".{name}.npy"))
     return wanted
+
+
+def _straightened(scene, view):
+    """The view from which the renderer's picture lies where that of this view should."""
+    is_off = scene.render.engine == "BLENDER_WORKBENCH"
+    across, down = DRAWN_OFF.get(scene.display.render_aa, (0.0, 0.0)) if is_off else (0.0, 0.0)
+    return {**view, "cx": view["cx"] - across, "cy": view["cy"] - down}
 
 
 def place_camera(scene, view):
@@ -111,6 +133,30 @@ def _rendered(names, composed):
         found["Combined"] = compositing.with_alpha(compositing.read_picture(composed), found["Combined"])
         composed.unlink()
     return found
+
+
+def _drawn(scene, file):
+    """The colours of one picture, (H, W, 4) float32, the first row on top.
+
+    Where the compositor drops their alpha the picture is drawn again without it.
+    """
+    drawn = _written(scene, file)
+    if scene.render.film_transparent and compositing.is_used(scene) and (drawn[..., 3] == 1).all():
+        scene.render.use_compositing = False
+        try:
+            drawn = compositing.with_alpha(drawn, _written(scene, file))
+        finally:
+            scene.render.use_compositing = True
+    return {"Combined": drawn}
+
+
+def _written(scene, file):
+    """A picture by way of a file."""
+    scene.render.filepath = str(file)
+    bpy.ops.render.render(write_still=True)
+    pixels = compositing.read_picture(file)
+    file.unlink()
+    return pixels
 
 
 def _whole(pixels, border, view):

@@ -1,4 +1,7 @@
-"""cycles: path-traced pictures by Blender's Cycles, which runs in a process of its own; labels are the same as raster's."""
+"""cycles: path-traced pictures by Blender's Cycles, which runs in a process of its own; labels are the same as raster's.
+
+The engines `eevee` and `workbench` are Blender's other renderers, and this package's work but for their names.
+"""
 
 from __future__ import annotations
 
@@ -18,20 +21,23 @@ if TYPE_CHECKING:
 PROGRAMS = (Path(__file__).parents[2] / "blender" / "worker",)
 """Sources besides these that pictures depend on."""
 
+SOURCES = (Path(__file__).parent, *PROGRAMS)
+"""The same, and these: what the pictures of Blender's other renderers depend on."""
+
 OPENS_SCENES = True
 """It renders .blend files that are the scene."""
 
 
-def check(options: Mapping[str, JsonValue]) -> None:
+def check(options: Mapping[str, JsonValue], renderer: str = "cycles") -> None:
     """Raise UserError for an option that is not known (with the nearest name), out of range, or without a Blender."""
     from viewsphere.blender.interpreter import find_blender
-    from viewsphere.engines.cycles.options import parse_options
+    from viewsphere.engines.cycles.options import options_of
 
-    find_blender(parse_options(options).python)
+    find_blender(options_of(renderer, options).python)
 
 
 def stage(shot: Shot, load: Callable[[ModelSpec], Mesh]) -> CyclesStage:
-    """Build the shot's scene in Blender, and its geometry here.
+    """Build the shot's scene in Blender, and its geometry here; the shot's engine says which renderer paints it.
 
     Raises UserError for an unknown engine option or one out of range, or where Blender cannot be used.
     """

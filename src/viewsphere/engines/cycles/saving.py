@@ -55,8 +55,8 @@ def save(shot: Shot, samples: Sequence[Sample], load: Callable[[ModelSpec], Mesh
     name. Gives what could not be carried over, a line each. Raises UserError where Blender cannot be used, ModelError where it
     dies twice.
     """
-    options = shot.engine_options if shot.engine == "cycles" else {}
-    own = shot.model_copy(update={"engine": "cycles", "engine_options": {**options, "device": "cpu"}})
+    kept = shot.engine_options if shot.engine == "cycles" else {"python": shot.engine_options.get("python")}
+    own = shot.model_copy(update={"engine": "cycles", "engine_options": {**kept, "device": "cpu"}})
     stage = build_stage(own, load)
     finishes = [frame.finish or shot.scene.finish for frame in shot.frames]
     told = _told(shot, samples, finishes, file.stem, data)

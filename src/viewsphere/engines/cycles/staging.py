@@ -1,11 +1,11 @@
-"""The Cycles engine's stage: truth's geometry here, the same triangles in a Blender that paints them."""
+"""The stage of Blender's renderers: truth's geometry here, the same triangles in a Blender that paints them."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from functools import cache
+from dataclasses import dataclass, field
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
 
@@ -13,13 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.assets.mesh import Mesh
-from viewsphere.blender.interpreter import find_blender
+from viewsphere.blender.interpreter import GRAPHICS, find_blender
 from viewsphere.blender.process import BlenderProcess
+from viewsphere.engines.cycles.backdrop import Backdrop
 from viewsphere.engines.cycles.file_frame import FileFrame
 from viewsphere.engines.cycles.lens import resampled, views_of
-from viewsphere.engines.cycles.options import Options, parse_options
+from viewsphere.engines.cycles.options import AnyOptions, options_of
 from viewsphere.engines.cycles.told import middle_of, told_scene
-from viewsphere.errors import BlenderDied, BlenderError, ModelError, UserError
+from viewsphere.errors import BlenderDied, BlenderError, ModelError, RecipeError, UserError
 from viewsphere.imaging.background import display_background
 from viewsphere.imaging.finish import finished
 from viewsphere.imaging.seen import seen_by
@@ -33,13 +34,24 @@ STAGE_SECONDS = 600.0
 
 FRAME_SECONDS = 3600.0
 
+FIRST_SECONDS = 900.0
+"""A renderer that has not drawn its first, tiny picture by then hangs: it compiles its shaders first, which without a graphics
+card takes from seconds to minutes.
+"""
+
 NEAREST, FARTHEST = 1e-3, 1e7
-"""Metres in which the camera sees."""
+"""Metres in which a camera that follows rays sees."""
+
+SPARE = 4.0
+"""How much nearer than what is seen at the centres of pixels a camera that draws sees, and how much farther."""
 
 AROUND = 2
-"""Pixels to which Cycles' filter spreads what is seen."""
+"""Pixels to which Blender's filter spreads what is seen."""
 
 Float32 = NDArray[np.float32]
+
+Clip = tuple[float, float]
+"""Metres to the nearest and the farthest that a camera sees."""
 
 Bounds = tuple[Path, ...] | None
 """The folders that Blender may read, where it opens a file of a user's; None where it opens none."""
@@ -51,6 +63,7 @@ class Keeper:
 
     python: Path
     process: BlenderProcess | None = None
+    _drawing: set[str] = field(default_factory=set[str])
     _started_for: tuple[Bounds, int] | None = None
     _stage: CyclesStage | None = None
     _served: int = 0
@@ -65,10 +78,23 @@ class Keeper:
             self.drop()
         if self.process is None:
             self.process, self._started_for = _started(self.python, *wanted), wanted
+        if stage.options.draws and stage.options.renderer not in self._drawing:
+            self._try_drawing(self.process, stage.options)
         self._stage, self._served = None, self._served + 1
         stage.tell(self.process)
         self._stage = stage
         return self.process
+
+    def _try_drawing(self, process: BlenderProcess, options: AnyOptions) -> None:
+        """See, once, that this renderer draws here at all: Blender does not survive it everywhere."""
+        self._stage = None
+        try:
+            process.ask("draw", FIRST_SECONDS, renderer=options.renderer)
+        except (BlenderError, BlenderDied) as error:
+            self.drop()
+            how = str(error).partition("; its log")[0]
+            raise UserError(f"engine: {options.title} cannot draw on this machine ({how}): {GRAPHICS}, or use cycles") from None
+        self._drawing.add(options.renderer)
 
     def drop(self) -> None:
         """End it; the next picture starts another."""
@@ -100,7 +126,7 @@ class CyclesStage:
     geometry: Geometry
     shot: Shot
     meshes: Sequence[Mesh]
-    options: Options
+    options: AnyOptions
     keeper: Keeper
     middle: NDArray[np.float64]
 
@@ -121,7 +147,7 @@ class CyclesStage:
         finish = frame.finish or self.shot.scene.finish
         background = display_background(finish.background, camera.width, camera.height)
         is_open = background is not None or finish.background.transparent
-        radiance = self._radiance(camera, is_open)
+        radiance = self._drawn(camera, is_open, visibility) if self.options.draws else self._radiance(camera, is_open)
         target = self.middle if frame.pose.target is None else np.array(frame.pose.target)
         return finished(
             radiance,
@@ -130,35 +156,50 @@ class CyclesStage:
             lambda: seen_by(camera, target, visibility.inverse_depth, visibility.triangle, self.geometry.triangle_object),
         )
 
-    def _radiance(self, camera: Camera, is_open: bool) -> Float32:
+    def _drawn(self, camera: Camera, is_open: bool, visibility: Visibility) -> Float32:
+        """What a renderer that draws gives, which tells depths apart that are not too far from one another."""
+        clip = clip_of(visibility)
+        if self.backdrop is None:
+            return self._radiance(camera, is_open, clip)
+        colors = self._radiance(camera, True, clip)
+        return self.backdrop.behind(colors, camera, visibility, is_open)
+
+    @cached_property
+    def backdrop(self) -> Backdrop | None:
+        """The ground's end and the sky, where the renderer has none."""
+        if self.options.renderer != "workbench" or self.shot.scene.blend is not None:
+            return None
+        return Backdrop.of(self.shot, self.geometry)
+
+    def _radiance(self, camera: Camera, is_open: bool, clip: Clip = (NEAREST, FARTHEST)) -> Float32:
         """Scene-linear, premultiplied, (H, W, 4) float32."""
         died: BlenderDied | None = None
         for _ in range(2):
             try:
-                return self._rendered(camera, is_open)
+                return self._rendered(camera, is_open, clip)
             except BlenderDied as error:
                 self.keeper.drop()
                 died = error
         raise ModelError(f"{', '.join(sorted({p.model.key for p in self.shot.placements}))}: {died}")
 
-    def _rendered(self, camera: Camera, is_open: bool) -> Float32:
+    def _rendered(self, camera: Camera, is_open: bool, clip: Clip) -> Float32:
         process = self.keeper.process_for(self)
         views = views_of(camera)
-        pictures = [self._picture(process, view.camera, is_open) for view in views]
+        pictures = [self._picture(process, view.camera, is_open, clip) for view in views]
         return resampled(camera, views, pictures)
 
-    def _picture(self, process: BlenderProcess, camera: Camera, is_open: bool) -> Float32:
+    def _picture(self, process: BlenderProcess, camera: Camera, is_open: bool, clip: Clip) -> Float32:
         is_empty = is_open and self.shot.scene.ground is None and self.shot.scene.blend is None
         border = border_of(self.geometry, camera) if is_empty else None
         if border is not None and (border[0] >= border[2] or border[1] >= border[3]):
             return np.zeros((camera.height, camera.width, 4), np.float32)
         out = str(process.folder / "picture.npy")
-        told = FileFrame.of(self.shot.scene.blend).camera(told_camera(camera))
+        told = FileFrame.of(self.shot.scene.blend).camera(told_camera(camera, clip))
         process.ask("render", FRAME_SECONDS, camera=told, transparent=is_open, border=border, passes=[], out=out)
         return np.load(out)
 
     def tell(self, process: BlenderProcess) -> None:
-        """Build the scene in this Blender. Raises UserError for what Cycles does not know or have."""
+        """Build the scene in this Blender. Raises UserError for what its renderer does not know or have."""
         told = told_scene(self.shot.placements, self.meshes, self.geometry, self.shot.scene, self.options, process.put)
         try:
             process.ask("stage", STAGE_SECONDS, **told)
@@ -166,14 +207,22 @@ class CyclesStage:
             raise UserError(str(error).removeprefix("ValueError: ")) from error
 
 
-def told_camera(camera: Camera) -> dict[str, Any]:
+def clip_of(visibility: Visibility) -> Clip:
+    """Metres between which there is all that is seen."""
+    known = visibility.inverse_depth[visibility.inverse_depth > 0]
+    if not len(known):
+        return NEAREST, 1 / NEAREST
+    return 1 / (SPARE * float(known.max())), SPARE / float(known.min())
+
+
+def told_camera(camera: Camera, clip: Clip = (NEAREST, FARTHEST)) -> dict[str, Any]:
     """A pinhole without skew as the worker's `render` wants it."""
     return {
         **{name: getattr(camera.intrinsics, name) for name in ("width", "height", "fx", "fy", "cx", "cy")},
         "R": camera.R.tolist(),
         "center": camera.center.tolist(),
-        "near": NEAREST,
-        "far": FARTHEST,
+        "near": clip[0],
+        "far": clip[1],
     }
 
 
@@ -192,8 +241,16 @@ def border_of(geometry: Geometry, camera: Camera) -> tuple[int, int, int, int] |
 
 
 def build_stage(shot: Shot, load: Callable[[ModelSpec], Mesh]) -> CyclesStage:
-    """Geometry and scene of a shot; Blender builds it when the first picture is asked for."""
-    options = parse_options(shot.engine_options)
+    """Geometry and scene of a shot; Blender builds it when the first picture is asked for.
+
+    Raises RecipeError for an option, or a ground, that its renderer does not have.
+    """
+    options = options_of(shot.engine, shot.engine_options)
+    if options.draws and shot.scene.ground is not None and shot.scene.ground.catcher:
+        raise RecipeError(
+            f"scene.ground: expected on, off or a material for engine: {options.renderer}, found catcher, which auto is before "
+            "background: environment: set it to off, or take engine: cycles or raster"
+        )
     meshes = placed_meshes(shot.placements, load)
     geometry = build_geometry(shot.placements, meshes, shot.scene.ground is not None, shot.label_alpha, shot.scene.floor)
     keeper = keeper_of(find_blender(options.python))

@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 from viewsphere.assets.mesh import Image, Material, Mesh
 from viewsphere.assets.repaint import repainted
 from viewsphere.engines.cycles.file_frame import FileFrame
-from viewsphere.engines.cycles.options import Options
+from viewsphere.engines.cycles.options import AnyOptions
 from viewsphere.model.scene import AnyLight, BlendScene, Ground, HemisphereLight, Scene
 from viewsphere.model.shot import Placement, Repaint
 from viewsphere.surroundings.ground import ground_frame, ground_material, only_scatters
-from viewsphere.surroundings.sky import sky_pictures
+from viewsphere.surroundings.sky import SURROUNDINGS, SkyPictures, sky_pictures
 from viewsphere.surroundings.sun import sun_light
 from viewsphere.truth.geometry import Geometry
 
@@ -31,7 +31,7 @@ ARRAYS = ("vertices", "triangles", "normals", "triangle_material", "uv0", "uv1",
 
 
 def told_scene(
-    placements: Sequence[Placement], meshes: Sequence[Mesh], geometry: Geometry, scene: Scene, options: Options, put: Put
+    placements: Sequence[Placement], meshes: Sequence[Mesh], geometry: Geometry, scene: Scene, options: AnyOptions, put: Put
 ) -> Told:
     """The worker's `stage` request. Raises UserError for a picture of sky or ground that cannot be read."""
     kinds: dict[tuple[int, tuple[Repaint, ...]], int] = {}
@@ -50,6 +50,9 @@ def told_scene(
             materials = [_told_material(m, placement.repaints) for m in mesh.materials]
             told.append({**shared[id(mesh)], "name": placement.model.key, "materials": materials})
         objects.append({"mesh": kinds[kind], "matrix": frame.placed(placement.world_from_object), "index": placement.id})
+    pictures = None
+    if blend is None or not blend.is_lit:
+        pictures = sky_pictures(scene.sky, scene.sun, scene.lights, scene.ground is not None)
     middle = middle_of(geometry, sum(not p.scenery for p in placements))
     has_scenery = any(p.scenery for p in placements)
     return {
@@ -57,7 +60,8 @@ def told_scene(
         "objects": objects,
         "ground": None if scene.ground is None else _told_ground(scene.ground, geometry, has_scenery, put),
         "lights": [frame.light(light) for light in _told_lights(scene, middle)],
-        "world": None if blend is not None and blend.is_lit else _told_world(scene, put),
+        "world": pictures and _told_world(pictures, put),
+        "hemispheres": pictures and _hemispheres(scene, pictures),
         "file": None if blend is None else _told_file(blend),
         "settings": told_settings(options),
     }
@@ -69,16 +73,11 @@ def _told_file(blend: BlendScene) -> Told:
     return {"file": str(path), "root": str(path.parent) if blend.confined else None, **told}
 
 
-def told_settings(options: Options) -> Told:
-    """The worker's settings of Cycles."""
-    return {
-        "samples": options.samples,
-        "denoise": options.denoise,
-        "bounces": options.bounces,
-        "device": options.device.upper(),
-        "threads": options.threads,
-        "cycles": dict(options.settings),
-    }
+def told_settings(options: AnyOptions) -> Told:
+    """The worker's settings of a renderer."""
+    told = asdict(options)
+    told["own"] = dict(told.pop("settings"))
+    return {"renderer": options.renderer, **told}
 
 
 def _told_mesh(mesh: Mesh, put: Put) -> Told:
@@ -120,11 +119,11 @@ def _told_ground(ground: Ground, geometry: Geometry, has_scenery: bool, put: Put
         "images": _told_images(images, put),
         "materials": [_told_material(replace(material, specular=0.0) if only_scatters(ground) else material, ())],
     }
-    middle, unit = _extent(geometry, has_scenery)
+    middle, unit = extent(geometry, has_scenery)
     return {"mesh": mesh, "catcher": ground.catcher, "middle": middle.tolist(), "unit": unit}
 
 
-def _extent(geometry: Geometry, has_scenery: bool) -> tuple[NDArray[np.float64], float]:
+def extent(geometry: Geometry, has_scenery: bool) -> tuple[NDArray[np.float64], float]:
     """Centre (3,) and half the diagonal of all that is placed; with scenery the world's origin and the next power of two, so
     that they stay when the targets change.
     """
@@ -162,8 +161,21 @@ def _told_lamp(light: AnyLight, middle: NDArray[np.float64]) -> Told:
     return told
 
 
-def _told_world(scene: Scene, put: Put) -> Told:
-    pictures = sky_pictures(scene.sky, scene.sun, scene.lights, scene.ground is not None)
+def _told_world(pictures: SkyPictures, put: Put) -> Told:
     lighting = put(pictures.lighting)
     seen = lighting if pictures.seen is pictures.lighting else put(pictures.seen)
     return {"picture": lighting, "seen": seen, "turn_deg": pictures.turn_deg}
+
+
+def _hemispheres(scene: Scene, pictures: SkyPictures) -> list[list[float]]:
+    """Radiance of a white matt surface that looks up, and of one that looks down, (2, 3), without the sun's own light."""
+    height = len(pictures.lighting)
+    zenith = (np.arange(height) + 0.5) / height * math.pi
+    weight = np.cos(zenith) * np.sin(zenith) * (2 * math.pi / height)
+    around = pictures.lighting.mean(axis=1, dtype=np.float64)
+    above, below = (np.maximum(side * weight, 0) @ around for side in (1, -1))
+    sun = sun_light(scene.sky, scene.sun)
+    if scene.ground is not None:
+        direct = 0 if sun is None else np.array(sun.irradiance) * max(sun.direction[2], 0) / math.pi
+        below = SURROUNDINGS * (above + direct)
+    return [above.tolist(), below.tolist()]

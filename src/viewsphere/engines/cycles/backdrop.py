@@ -1,0 +1,101 @@
+"""The sky, and the ground that fades into it, laid behind pictures of a renderer that has neither."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.engines.cycles.told import extent
+from viewsphere.geometry.camera import pixel_rays
+from viewsphere.model.camera import Camera
+from viewsphere.model.shot import Shot
+from viewsphere.surroundings.sky import SkyPictures, sky_pictures
+from viewsphere.truth.geometry import Geometry
+from viewsphere.truth.visibility import Visibility
+
+BEGIN, OVER, FLAT, FLATTER = 4.0, 26.0, 0.09, 1 / 12
+"""Where the ground fades, as `viewsphere.blender.worker.ground` has it for the others."""
+
+EDGE = 1
+"""Pixels beyond what truth sees in which a smoothed outline still shows it."""
+
+Float = NDArray[np.float64]
+Float32 = NDArray[np.float32]
+
+
+@dataclass(frozen=True, eq=False)
+class Backdrop:
+    """What is behind a shot. middle (3,) and unit: centre and half the extent of what is placed, world metres; ground: the
+    first of the ground's triangles.
+    """
+
+    sky: SkyPictures
+    middle: Float
+    unit: float
+    ground: int
+
+    @classmethod
+    def of(cls, shot: Shot, geometry: Geometry) -> Backdrop:
+        """A shot's. Raises RecipeError for a picture that cannot be read."""
+        scene = shot.scene
+        sky = sky_pictures(scene.sky, scene.sun, scene.lights, scene.ground is not None)
+        middle, unit = extent(geometry, any(p.scenery for p in shot.placements))
+        return cls(sky, middle, unit, int(geometry.triangle_start[-1]))
+
+    def behind(self, picture: Float32, camera: Camera, visibility: Visibility, is_open: bool) -> Float32:
+        """The picture (H, W, 4), premultiplied, with a ground that fades into the sky, or into nothing where it is open."""
+        rays = np.nan_to_num(pixel_rays(camera.intrinsics)) @ camera.R
+        length = np.linalg.norm(rays, axis=2)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            away = length / visibility.inverse_depth
+            directions = np.nan_to_num(rays / length[..., None])
+        shown = picture
+        if (visibility.triangle >= self.ground).any():
+            shown = picture * self._left(away, directions[..., 2], camera, visibility.triangle)[..., None]
+        if is_open:
+            return shown
+        out = np.ones_like(shown)
+        out[..., :3] = shown[..., :3] + (1 - shown[..., 3:]) * self._seen(directions)
+        return out
+
+    def _left(self, away: Float, rise: Float, camera: Camera, triangle: NDArray[np.int32]) -> Float32:
+        """The share (H, W) that has not faded, by distance and the view's rise: all of what stands on the ground, nothing of
+        what is beyond its end.
+        """
+        behind = np.where(np.isfinite(away), away, 0) - np.linalg.norm(self.middle - camera.center)
+        near = np.clip(1 - (behind / self.unit - BEGIN) / OVER, 0, 1)
+        left = _smooth(near * near) * _smooth(np.clip((np.abs(rise) - FLAT + FLATTER) / FLATTER, 0, 1))
+        left[triangle < 0] = 0
+        left[_widened((triangle >= 0) & (triangle < self.ground)) & (triangle < self.ground)] = 1
+        return left.astype(np.float32)
+
+    def _seen(self, directions: Float) -> Float32:
+        """The sky's radiance (H, W, 3) in unit directions of the world, bilinear."""
+        sky, turn = self.sky.seen, np.radians(self.sky.turn_deg)
+        height, width, _ = sky.shape
+        azimuth = np.arctan2(directions[..., 1], directions[..., 0]) - turn
+        x = (0.5 - azimuth / (2 * np.pi)) * width - 0.5
+        y = np.clip(np.arccos(np.clip(directions[..., 2], -1, 1)) / np.pi * height - 0.5, 0, height - 1)
+        column, row = np.floor(x).astype(int), np.minimum(np.floor(y).astype(int), height - 2)
+        across, down = ((v - i)[..., None].astype(np.float32) for v, i in ((x, column), (y, row)))
+        left, right = column % width, (column + 1) % width
+        upper = sky[row, left] * (1 - across) + sky[row, right] * across
+        lower = sky[row + 1, left] * (1 - across) + sky[row + 1, right] * across
+        return upper * (1 - down) + lower * down
+
+
+def _widened(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """With the pixels that are at most `EDGE` from one of the mask's."""
+    height, width = mask.shape
+    padded = np.pad(mask, EDGE)
+    near = np.zeros_like(mask)
+    for down in range(2 * EDGE + 1):
+        for across in range(2 * EDGE + 1):
+            near |= padded[down : down + height, across : across + width]
+    return near
+
+
+def _smooth(x: Float) -> Float:
+    return x * x * (3 - 2 * x)

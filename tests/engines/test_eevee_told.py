@@ -1,0 +1,150 @@
+"""What EEVEE and Workbench need no Blender for: their options, what is refused, the sky behind Workbench's pictures."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from cycles_scenes import recipe_of, stages
+
+from viewsphere import plan, plugins, render
+from viewsphere.blender.interpreter import VARIABLE
+from viewsphere.engines import eevee, workbench
+from viewsphere.engines.cycles.backdrop import Backdrop
+from viewsphere.engines.cycles.options import EEVEE_PRESETS, WORKBENCH_PRESETS, Eevee, Workbench, options_of
+from viewsphere.engines.cycles.staging import SPARE, clip_of
+from viewsphere.engines.cycles.told import told_scene, told_settings
+from viewsphere.errors import RecipeError
+from viewsphere.imaging.finish import finished
+from viewsphere.sampling.look import engine_look
+from viewsphere.sampling.viewpoints import camera_for
+from viewsphere.truth.geometry import build_geometry
+from viewsphere.truth.visibility import rasterize
+
+NAMES = "eevee", "workbench"
+
+
+@pytest.fixture
+def named(monkeypatch, tmp_path):
+    """An interpreter that is there, and would not start."""
+    (tmp_path / "python").touch(mode=0o755)
+    monkeypatch.setenv(VARIABLE, str(tmp_path / "python"))
+
+
+def shot_of(engine, **given):
+    return next(plan(recipe_of(engine, **given)).shots(stages().box))
+
+
+def geometry_of(shot):
+    meshes = [stages().model(p.model) for p in shot.placements]
+    return build_geometry(shot.placements, meshes, shot.scene.ground is not None, shot.label_alpha), meshes
+
+
+def test_they_are_engines_of_their_own():
+    assert {"cycles", *NAMES} <= set(plugins.names("engines"))
+    assert len({engine_look(name) for name in ("cycles", *NAMES)}) == 3
+
+
+def test_presets_differ_and_other_options_change_them():
+    assert options_of("eevee", {}) == Eevee() == EEVEE_PRESETS["good"]
+    assert options_of("workbench", {}) == Workbench() == WORKBENCH_PRESETS["good"]
+    for presets in (EEVEE_PRESETS, WORKBENCH_PRESETS):
+        assert presets["draft"].samples < presets["good"].samples < presets["final"].samples
+    changed = options_of("eevee", {"quality": "draft", "samples": 9, "raytracing": True, "settings": {"gi_diffuse_bounces": 1}})
+    assert changed == Eevee(samples=9, raytracing=True, settings={"gi_diffuse_bounces": 1})
+    assert told_settings(changed) | {"python": None} == {
+        "renderer": "eevee",
+        "samples": 9,
+        "raytracing": True,
+        "threads": 1,
+        "python": None,
+        "replace_after": 100,
+        "own": {"gi_diffuse_bounces": 1},
+    }
+
+
+@pytest.mark.parametrize(
+    ("name", "given", "said"),
+    [
+        ("eevee", {"denoise": "fast"}, "engine.denoise: expected one of samples, "),
+        ("eevee", {"bounces": 2}, "engine.bounces: "),
+        ("eevee", {"raytracing": "yes"}, "engine.raytracing: expected true or false, found 'yes'"),
+        ("eevee", {"samples": 0}, "engine.samples: expected an integer in 1..65536"),
+        ("eevee", {"settings": []}, "engine.settings: expected names of EEVEE settings"),
+        ("workbench", {"device": "cuda"}, "engine.device: "),
+        ("workbench", {"raytracing": True}, "engine.raytracing: "),
+        ("workbench", {"samples": 7}, "engine.samples: expected 1, 5, 8, 11, 16 or 32, found 7"),
+        ("workbench", {"samples": True}, "engine.samples: "),
+        ("workbench", {"quality": "best"}, "engine.quality: expected draft, good or final"),
+    ],
+)
+def test_a_wrong_option_is_one_line(name, given, said):
+    with pytest.raises(RecipeError, match=said) as caught:
+        {"eevee": eevee, "workbench": workbench}[name].check(given)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.usefixtures("named")
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("scene", [{"ground": "catcher"}, {"background": "environment"}])
+def test_a_catcher_is_refused_before_anything_is_rendered(name, scene):
+    recipe = recipe_of({"name": name}, scene=scene)
+    with pytest.raises(RecipeError, match=rf"scene\.ground: .* engine: {name}, found catcher, .* raster") as caught:
+        next(iter(render(recipe)))
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("scene", [{}, {"ground": False}, {"sky": "daylight"}, {"sun": "off"}])
+def test_what_is_told_is_plain_and_light_comes_from_above(scene):
+    shot = shot_of({"name": "workbench"}, scene=scene)
+    geometry, meshes = geometry_of(shot)
+    told = told_scene(shot.placements, meshes, geometry, shot.scene, options_of("workbench", {}), lambda array: "array")
+    assert json.loads(json.dumps(told)).keys() == told.keys()
+    above, below = np.array(told["hemispheres"])
+    assert (above > 0).all() and (below > 0).all()
+    assert above.sum() > 0.8 * below.sum()
+
+
+@pytest.mark.parametrize("scene", [{}, {"ground": False}, {"ground": False, "sky": "daylight"}])
+def test_the_sky_behind_is_rasters(scene):
+    recipe = recipe_of({"name": "raster"}, scene=scene, viewpoints={"azimuth": [130], "elevation": [3], "distance": 0.9})
+    (raster,) = render(recipe)
+    shot = next(plan(recipe).shots(stages().box))
+    geometry, _ = geometry_of(shot)
+    visibility = rasterize(geometry, raster.camera)
+    nothing = np.zeros((96, 96, 4), np.float32)
+    backdrop = Backdrop.of(shot, geometry)
+    behind = backdrop.behind(nothing, raster.camera, visibility, False)
+    assert np.array_equal(behind[..., 3], np.ones((96, 96)))
+    picture = finished(behind, None, shot.scene.finish, lambda: None)
+    sky = visibility.triangle < 0
+    assert sky.sum() > 1000
+    assert np.abs(picture.astype(int) - raster.channels["rgb"])[sky].mean() < 2
+    assert not backdrop.behind(nothing, raster.camera, visibility, True).any()
+
+
+def test_the_ground_fades_and_what_stands_before_it_does_not():
+    shot = shot_of({"name": "raster"}, scene={"background": "transparent", "ground": "on"}, channels=["rgba"])
+    geometry, _ = geometry_of(shot)
+    pose = shot.frames[0].pose.model_copy(update={"elevation_deg": 6})
+    camera = camera_for(shot.intrinsics, pose, np.array((0.0, 0.0, 0.05)))
+    visibility = rasterize(geometry, camera)
+    left = Backdrop.of(shot, geometry).behind(np.ones((96, 96, 4), np.float32), camera, visibility, True)[..., 3]
+    is_object = (visibility.triangle >= 0) & (geometry.triangle_object[visibility.triangle] > 0)
+    is_ground = (visibility.triangle >= 0) & ~is_object
+    assert (left[is_object] == 1).all()
+    assert left[is_ground].min() < 0.1
+    assert left[95].min() > 0.99
+
+
+def test_a_camera_sees_what_there_is_and_little_more():
+    shot = shot_of({"name": "raster"}, viewpoints={"azimuth": [0], "elevation": [10], "distance": 1.5})
+    geometry, _ = geometry_of(shot)
+    camera = camera_for(shot.intrinsics, shot.frames[0].pose, np.zeros(3))
+    near, far = clip_of(rasterize(geometry, camera))
+    away = (geometry.vertices @ camera.R.T + camera.t)[:, 2]
+    assert near < away.min() and far > away.max()
+    assert far / near < 2 * SPARE**2
+    near, far = clip_of(rasterize(geometry, camera_for(shot.intrinsics, shot.frames[0].pose, np.array((50.0, 0, 0)))))
+    assert 0 < near < far
