@@ -137,10 +137,11 @@ _TITLES = {"cycles": "Cycles", "eevee": "EEVEE", "workbench": "Workbench"}
 
 def _set(renderer, owners, name, value):
     """A setting by its name in Python; raises ValueError for one that the renderer does not have, or does not take."""
-    owner = next((one for one in owners if hasattr(one, name)), owners[0])
+    expected = f"engine.settings.{name}: expected a setting of {_TITLES[renderer]} and a value it takes, found {value!r}"
+    owner = next((one for one in owners if name in one.bl_rna.properties), None)
+    if owner is None:  # Blender 4.5 would take it
+        raise ValueError(expected)
     try:
         setattr(owner, name, value)
     except (AttributeError, TypeError) as error:
-        raise ValueError(
-            f"engine.settings.{name}: expected a setting of {_TITLES[renderer]} and a value it takes, found {value!r}: {error}"
-        ) from None
+        raise ValueError(f"{expected}: {error}") from None
