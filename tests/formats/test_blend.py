@@ -114,13 +114,13 @@ def test_a_shot_that_cannot_be_read_is_one_line(small_dataset):
 
 
 @pytest.mark.parametrize(
-    ("text", "ranges"), [("", ()), ("7", ((7, 8),)), ("0-15,40", ((0, 16), (40, 41))), (" 3 , 5-5 ", ((3, 4), (5, 6)))]
+    ("text", "ranges"), [("7", ((7, 8),)), ("0-15,40", ((0, 16), (40, 41))), (" 3 , 5-5 ", ((3, 4), (5, 6)))]
 )
 def test_frames_as_people_write_them(text, ranges):
     assert frame_ranges(text) == ranges
 
 
-@pytest.mark.parametrize("text", ["a", "5-3", "-4", "1-2-3", "1..4", "²"])
+@pytest.mark.parametrize("text", ["a", "5-3", "-4", "1-2-3", "1..4", "²", "", ","])
 def test_frames_that_are_none_are_one_line(text):
     with pytest.raises(UserError, match="--frames: expected numbers and ranges, such as 0-15,40; found"):
         frame_ranges(text)
