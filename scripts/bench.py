@@ -244,6 +244,7 @@ def main() -> None:
     options.add_argument("--workers", action="store_true", help="measure frames a second with one and two workers, too")
     options.add_argument("--scaling", action="store_true", help="measure how cost grows, and draw it")
     options.add_argument("--cycles", type=int, metavar="FRAMES", help="measure the Cycles engine beside BlenderProc's way")
+    options.add_argument("--threads", type=int, default=0, help="of BlenderProc's Blender, beside --cycles; 0: all cores")
     options.add_argument("--endurance", type=int, metavar="FRAMES", help="tell the memory of one Blender over so many frames")
     options.add_argument("--json", type=Path, help="write the figures here too")
     args = options.parse_args()
@@ -257,7 +258,7 @@ def main() -> None:
         from bench_cycles import cycles, endurance
 
         if args.cycles:
-            cycles(args.cycles)
+            cycles(args.cycles, args.threads)
         if args.endurance:
             endurance(args.endurance)
         return

@@ -216,7 +216,7 @@ def memory(frames: int, folder: Path) -> list[float]:
     return found
 
 
-def cycles(frames: int, threads: int = 0) -> None:
+def cycles(frames: int, threads: int) -> None:
     """Print the comparison; `threads` of BlenderProc's Blender, 0 for all cores, as it is documented."""
     with tempfile.TemporaryDirectory() as name:
         write_scene(Path(name))

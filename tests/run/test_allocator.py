@@ -52,6 +52,5 @@ def test_freed_memory_is_kept():
     ],
 )
 def test_who_tells_the_allocator_something_is_obeyed(environment):
-    told, pages = counted(**environment)
+    told, _ = counted(**environment)
     assert not told
-    assert pages > 5000

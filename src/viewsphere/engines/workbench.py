@@ -2,34 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from viewsphere.engines import cycles
+from viewsphere.engines.cycles import OPENS_SCENES, stage
+from viewsphere.engines.cycles import SOURCES as PROGRAMS
 
 if TYPE_CHECKING:
     from pydantic import JsonValue
 
-    from viewsphere.assets.mesh import Mesh
-    from viewsphere.engines.cycles.staging import CyclesStage
-    from viewsphere.model.shot import ModelSpec, Shot
-
-PROGRAMS = cycles.SOURCES
-"""Sources besides these that pictures depend on."""
-
-OPENS_SCENES = True
-"""It renders .blend files that are the scene."""
+__all__ = ["OPENS_SCENES", "PROGRAMS", "check", "stage"]
 
 
 def check(options: Mapping[str, JsonValue]) -> None:
     """Raise UserError for an option that is not known (with the nearest name), out of range, or without a Blender."""
     cycles.check(options, "workbench")
-
-
-def stage(shot: Shot, load: Callable[[ModelSpec], Mesh]) -> CyclesStage:
-    """Build the shot's scene in Blender, and its geometry here.
-
-    Raises UserError for an unknown engine option, one out of range or a shadow catcher, or where Blender cannot be used or
-    cannot draw.
-    """
-    return cycles.stage(shot, load)

@@ -107,7 +107,7 @@ def _inside(a, b, c, px, f0, f1, f2):
 
 @njit
 def draw(q, cell, triangles, span, canvas, cutout, cutouts, nearest, seen):
-    """Draw triangles into nearest (1/z, 0 where none) and seen (triangle, -1 where none).
+    """Draw triangles into nearest (1/z, 0 where none) and seen (triangle, -1 where none), both in C order.
 
     `span` is the first triangle, the one after the last, and the vertex that q[0] stands for; `canvas` the samples of a pixel's
     side and the canvas' first sample (x, y).
