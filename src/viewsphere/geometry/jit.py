@@ -22,7 +22,7 @@ import numba
 import platformdirs
 from numba.core import config
 
-from viewsphere.geometry import compiler
+from viewsphere.geometry import compiler, lowering
 
 _IMPORT = re.compile(r"^from (viewsphere[\w.]*) import", re.MULTILINE)
 _BUILD = (numba.__version__, llvmlite.binding.get_host_cpu_name(), os.environ.get("NUMBA_BOUNDSCHECK"))
@@ -78,7 +78,7 @@ def _sources(file: str) -> frozenset[str]:
 def _cache_folder(sources: frozenset[str]) -> str:
     """A writable folder for these sources: in the user's cache, else in the temporary folder."""
     digest = hashlib.sha256(repr(_BUILD).encode())
-    for source in (__file__, compiler.__file__, *sorted(sources)):
+    for source in (__file__, compiler.__file__, lowering.__file__, *sorted(sources)):
         digest.update(Path(source).read_bytes())
     for root in (kernel_folder(), Path(tempfile.gettempdir()) / f"viewsphere-{Path.home().name}" / "kernels"):
         folder = root / digest.hexdigest()[:16]
