@@ -30,6 +30,7 @@ from numba.core.transforms import canonicalize_cfg
 from numba.core.typed_passes import (
     AnnotateTypes,
     IRLegalization,
+    NativeLowering,
     NoPythonBackend,
     NopythonTypeInference,
     PreLowerStripPhis,
@@ -46,8 +47,6 @@ from numba.core.untyped_passes import (
     TranslateByteCode,
 )
 
-from viewsphere.geometry.lowering import KernelLowering
-
 
 @register_pass(mutates_CFG=True, analysis_only=False)
 class Lifetimes(IRLegalization):
@@ -58,6 +57,20 @@ class Lifetimes(IRLegalization):
     def run_pass(self, state: Any) -> Any:
         """Returns whether anything changed."""
         return state.flags.nrt and super().run_pass(state)
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class KernelLowering(NativeLowering):
+    """Writes what statements are in LLVM's language."""
+
+    _name = "kernel_lowering"
+
+    @property
+    def lowering_class(self) -> Any:
+        """Returns the class that does it, which takes long to load: only those that compile need it."""
+        from viewsphere.geometry.lowering import KernelLower
+
+        return KernelLower
 
 
 PASSES = (

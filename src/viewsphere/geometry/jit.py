@@ -22,9 +22,10 @@ import numba
 import platformdirs
 from numba.core import config
 
-from viewsphere.geometry import compiler, lowering
+from viewsphere.geometry import compiler
 
 _IMPORT = re.compile(r"^from (viewsphere[\w.]*) import", re.MULTILINE)
+_COMPILER = tuple(str(Path(__file__).with_name(f"{name}.py")) for name in ("jit", "compiler", "lowering"))
 _BUILD = (numba.__version__, llvmlite.binding.get_host_cpu_name(), os.environ.get("NUMBA_BOUNDSCHECK"))
 
 
@@ -78,7 +79,7 @@ def _sources(file: str) -> frozenset[str]:
 def _cache_folder(sources: frozenset[str]) -> str:
     """A writable folder for these sources: in the user's cache, else in the temporary folder."""
     digest = hashlib.sha256(repr(_BUILD).encode())
-    for source in (__file__, compiler.__file__, lowering.__file__, *sorted(sources)):
+    for source in (*_COMPILER, *sorted(sources)):
         digest.update(Path(source).read_bytes())
     for root in (kernel_folder(), Path(tempfile.gettempdir()) / f"viewsphere-{Path.home().name}" / "kernels"):
         folder = root / digest.hexdigest()[:16]

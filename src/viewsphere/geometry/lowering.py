@@ -15,10 +15,8 @@ from typing import Any
 from llvmlite import ir as llvm
 from numba.core import cgutils, ir, types
 from numba.core.analysis import compute_cfg_from_blocks
-from numba.core.compiler_machinery import register_pass
 from numba.core.ir_utils import get_definition, guard
 from numba.core.lowering import Lower
-from numba.core.typed_passes import NativeLowering
 from numba.np.arrayobj import fix_integer_index, load_item, store_item
 
 
@@ -150,13 +148,3 @@ class KernelLower(Lower):
         for n, value in enumerate(values):
             made = self.builder.insert_value(made, value, n)
         return made
-
-
-@register_pass(mutates_CFG=True, analysis_only=False)
-class KernelLowering(NativeLowering):
-    """The pass that lowers."""
-
-    @property
-    def lowering_class(self) -> type[Lower]:
-        """Returns the class that does it."""
-        return KernelLower
