@@ -164,6 +164,7 @@ TRIED = {
     "Blender cannot read it",
     "reading it takes more",
     "reading it crashed",
+    "it was killed",
     "(limit MAX_TRIANGLES)",
     "what is finished is kept",
     "expected a finished data set to append to",
@@ -253,13 +254,14 @@ def test_reading_takes_too_much(said, monkeypatch, tmp_path):
     assert_shown("reading it takes more", said("inspect here/ok.obj"))
 
 
-def test_reading_crashes(said, monkeypatch, tmp_path):
+@pytest.mark.parametrize(("how", "words"), [("SEGV", "reading it crashed"), ("KILL", "it was killed")])
+def test_reading_crashes_or_is_killed(said, monkeypatch, tmp_path, how, words):
     program = tmp_path / "crash"
-    program.write_text("#!/bin/sh\nkill -SEGV $$\n")
+    program.write_text(f"#!/bin/sh\nkill -{how} $$\n")
     program.chmod(0o755)
     monkeypatch.setenv("VIEWSPHERE_CACHE", str(tmp_path / "cache"))
     monkeypatch.setattr(sys, "executable", str(program))
-    assert_shown("reading it crashed", said("inspect here/ok.obj"))
+    assert_shown(words, said("inspect here/ok.obj"))
 
 
 def test_a_full_disk(said, monkeypatch):

@@ -49,4 +49,11 @@ class BlenderError(ViewsphereError):
 
 
 class BlenderDied(ViewsphereError):
-    """Blender crashed, or hung and was ended; only another one can be asked."""
+    """Blender crashed, or hung and was ended; only another one can be asked.
+
+    `signal` names what ended it, such as SIGKILL; None where that is not how it ended, or it hung.
+    """
+
+    def __init__(self, message: str, signal: str | None = None) -> None:
+        super().__init__(message)
+        self.signal = signal

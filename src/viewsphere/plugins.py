@@ -46,7 +46,7 @@ class Stage(Protocol):
 
 class Engine(Protocol):
     """A module that paints pictures: `check` its options, `stage` a shot. Only with `OPENS_SCENES = True` it is given shots
-    whose scene is a .blend file (`scene.blend`).
+    whose scene is a .blend file (`scene.blend`); with `CATCHES_SHADOWS = False` none whose ground is a shadow catcher.
     """
 
     def check(self, options: Mapping[str, JsonValue]) -> None:

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from viewsphere.assets import isolated, limits
+from viewsphere.assets import reader as reader_program
 from viewsphere.assets.cache import ASIDE, cache_folder, load, load_normalised
 from viewsphere.assets.isolated import READ_HERE
 from viewsphere.assets.mesh_file import ARRAYS
@@ -105,7 +106,8 @@ def test_a_reader_says_what_is_wrong(spec, write):
     [
         ("import os; os.abort()", "reading it crashed (SIGABRT)"),
         ("import ctypes; ctypes.string_at(0)", "reading it crashed (SIGSEGV)"),
-        ("import os; os.kill(os.getpid(), 9)", "reading it crashed (SIGKILL)"),
+        ("import os; os.kill(os.getpid(), 9)", "reads it ended unexpectedly: it was killed (SIGKILL), perhaps"),
+        ("import os; os.kill(os.getpid(), 15)", "try again with more memory free, or fewer --workers"),
         ("import os; os._exit(3)", "reading it crashed (exit code 3)"),
         ("raise SystemExit('no\\nmore')", "the process that reads it failed (more)"),
         ("raise TypeError('a\\nb')", "its reader failed (TypeError: a b)"),
@@ -137,6 +139,20 @@ def test_a_flood_of_memory_is_stopped(spec, reader, monkeypatch, body):
     reader(body)
     monkeypatch.setattr(limits, "MAX_READ_BYTES", 1 << 30)
     assert "more than 1,073,741,824 bytes of memory (limit MAX_READ_BYTES)" in refusal(spec)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="it has no such limits")
+def test_processor_time_is_bounded_by_the_cores_that_a_reader_uses(monkeypatch):
+    import resource
+
+    given: dict[int, int] = {}
+    monkeypatch.setattr(resource, "setrlimit", lambda kind, limits: given.update({kind: limits[0]}))
+    monkeypatch.setattr(os, "cpu_count", lambda: 8)
+    seconds: list[int] = []
+    for by_blender in (False, True):
+        reader_program._limit(Job({}, "", 10.0, 1 << 30, 0, by_blender))
+        seconds.append(given[resource.RLIMIT_CPU])
+    assert seconds == [21, 161]
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems do not enforce it")

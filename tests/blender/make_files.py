@@ -300,6 +300,37 @@ def _away(_, image):
     image.image = away
 
 
+def occluded():
+    """Materials that hide light from crevices, as Blender's glTF importer puts it."""
+    anew()
+    shade = picture("shade", [[(0, 0.5, 1), (0.25, 1, 1)], [(0.5, 0, 0), (1, 0.5, 0)]], is_data=True)
+    output = bpy.data.node_groups.new("glTF Material Output", "ShaderNodeTree")
+    output.interface.new_socket("Occlusion", socket_type="NodeSocketFloat")
+    for k, name in enumerate(("crevices", "faint crevices", "turned crevices", "no crevices")):
+        one = material(name)
+        put(name, grid(name, one), at(2 * k))
+        links, split = one.node_tree.links, node(one, "ShaderNodeSeparateColor")
+        socket = node(one, "ShaderNodeGroup", node_tree=output).inputs["Occlusion"]
+        links.new(node(one, "ShaderNodeTexImage", image=shade).outputs["Color"], split.inputs[0])
+        red = split.outputs["Red"]
+        if name == "faint crevices":
+            fade = node(one, "ShaderNodeMix", data_type="RGBA")
+            fade.inputs[0].default_value, fade.inputs[6].default_value = 0.4, (1, 1, 1, 1)
+            links.new(red, fade.inputs[7])
+            red = fade.outputs[2]
+        if name == "turned crevices":
+            turned = node(one, "ShaderNodeMath", operation="SUBTRACT")
+            turned.inputs[0].default_value = 1.0
+            links.new(red, turned.inputs[1])
+            red = turned.outputs[0]
+        if name != "no crevices":
+            links.new(red, socket)
+    save("occluded.blend")
+    for name in ("turned crevices", "no crevices"):  # of which glTF has none
+        bpy.data.objects.remove(bpy.data.objects[name])
+    bpy.ops.export_scene.gltf(filepath=str(FOLDER / "occluded.glb"), export_draco_mesh_compression_enable=True)
+
+
 def linked():
     """A file that links one beside it and one outside of its folder."""
     (FOLDER / "in").mkdir()
@@ -346,7 +377,7 @@ def bad():
     bpy.ops.wm.save_as_mainfile(filepath=str(FOLDER / "later.blend"), check_existing=False, compress=False)
 
 
-for make in (exchange, evaluated, posed, painted, linked, bad):
+for make in (exchange, evaluated, posed, painted, occluded, linked, bad):
     make()
 print(json.dumps(sorted(file.name for file in FOLDER.iterdir())), flush=True)
 sys.stdout.flush()

@@ -193,6 +193,18 @@ def appearing():
     save("appearing.blend")
 
 
+def linking():
+    """The same objects, of that file as a library."""
+    anew()
+    world((1, 1, 1))
+    bpy.context.scene.frame_start, bpy.context.scene.frame_end = 1, 9
+    with bpy.data.libraries.load(str(FOLDER / "appearing.blend"), link=True) as (there, here):
+        here.objects = there.objects
+    for one in here.objects:
+        bpy.context.scene.collection.objects.link(one)
+    save("linking.blend")
+
+
 def _shown_by_time(one, hidden):
     for frame, value in zip((1, 5), hidden, strict=True):
         one.hide_render = bool(value)
@@ -253,6 +265,7 @@ dark()
 foggy()
 moving()
 appearing()
+linking()
 scripted()
 foreign()
 (FOLDER / "made.json").write_text(json.dumps({"version": bpy.app.version_string}))

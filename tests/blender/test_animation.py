@@ -12,12 +12,15 @@ import pytest
 from viewsphere import Dataset, Recipe, generate, plan
 from viewsphere.assets import cache
 from viewsphere.assets.cache import load, load_normalised, read_ahead
+from viewsphere.assets.timeline import Blenders
 from viewsphere.check import check
 from viewsphere.errors import ModelError, RecipeError
 from viewsphere.geometry.camera import project
 from viewsphere.model.shot import ModelSpec
+from viewsphere.run.importing import import_dataset
 from viewsphere.run.stages import Stages
 from viewsphere.sampling.viewpoints import camera_for
+from viewsphere.store import Choice
 
 FRAMES = (1, 13, 25)
 KINDS = {"blend": None, "glb": "cubeAction", "usdc": None, "abc": None, "fbx": "cubeAction"}
@@ -109,6 +112,145 @@ def test_files_that_cannot_move_are_refused(tmp_path):
         load(spec_of(tmp_path / "a.obj", 2))
 
 
+# What files name.
+
+USD = """#usda 1.0
+(
+ upAxis = "Z"
+ metersPerUnit = 1
+ startTimeCode = 1
+ endTimeCode = 25
+ {layers}
+)
+def Xform "root" {arc}
+{{
+ {moves}
+ def Mesh "m" {{
+  int[] faceVertexCounts = [3, 3, 3, 3]
+  int[] faceVertexIndices = [0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3]
+  point3f[] points = [(0, 0, 0), (1, 0, 0), (0, 2, 0), (0, 0, 3)]
+ }}
+}}
+"""
+MOVES = """double3 xformOp:translate.timeSamples = {1: (0, 0, 0), 25: (2, 0, 0)}
+ uniform token[] xformOpOrder = ["xformOp:translate"]"""
+
+
+def timeline(path):
+    """What a Blender of its own says, or the cache."""
+    with Blenders.none_yet() as blenders:
+        return blenders.timeline(path, True)
+
+
+@pytest.fixture
+def own_cache(tmp_path, monkeypatch):
+    monkeypatch.setenv("VIEWSPHERE_CACHE", str(tmp_path / "cache"))
+
+
+def usd(path, moves="", **named):
+    path.write_text(USD.format(**{"layers": "", "arc": "", "moves": moves, **named}))
+    return path
+
+
+@pytest.mark.usefixtures("blender", "own_cache")
+@pytest.mark.parametrize(
+    "named",
+    [
+        {"layers": "subLayers = [@./deep/inner.usda@]"},
+        {"arc": "(prepend references = @./deep/inner.usda@</root>)"},
+        {"arc": "(prepend payload = @./deep/inner.usda@</root>)"},
+    ],
+    ids=["sublayer", "reference", "payload"],
+)
+def test_a_changed_layer_is_asked_about_anew(tmp_path, named, monkeypatch):
+    (tmp_path / "deep").mkdir()
+    usd(tmp_path / "deep" / "inner.usda", layers="subLayers = [@./moves.usda@]")
+    top = usd(tmp_path / "top.usda", **named)
+    assert not timeline(top).moves  # a layer is missing
+    usd(tmp_path / "deep" / "moves.usda", MOVES)
+    assert timeline(top).moves
+    with monkeypatch.context() as known:
+        known.setattr("viewsphere.assets.timeline.started", None)
+        assert timeline(top).moves
+    usd(tmp_path / "deep" / "moves.usda")
+    assert not timeline(top).moves
+
+
+@pytest.mark.usefixtures("blender", "own_cache")
+def test_layers_are_each_file_s_own(tmp_path, monkeypatch):
+    """One Blender is asked about both."""
+    first, second = (usd(tmp_path / f"{name}.usda", layers=f"subLayers = [@./in_{name}.usda@]") for name in "ab")
+    inner = [usd(tmp_path / f"in_{name}.usda", MOVES) for name in "ab"]
+    with Blenders.none_yet() as blenders:
+        assert all(blenders.timeline(path, True).moves for path in (first, second))
+    usd(inner[0])
+    assert not timeline(first).moves
+    monkeypatch.setattr("viewsphere.assets.timeline.started", None)
+    assert timeline(second).moves
+
+
+LINK = """
+import os, sys
+import bpy
+bpy.ops.wm.read_factory_settings(use_empty=True)
+kind, folder = sys.argv[1:]
+if kind in ("moving", "still"):
+    item = bpy.data.objects.new("cube", bpy.data.meshes.new("cube"))
+    bpy.context.scene.collection.objects.link(item)
+    if kind == "moving":
+        item.keyframe_insert("location", frame=1)
+    bpy.ops.wm.save_as_mainfile(filepath=f"{folder}/deep/library.blend", check_existing=False)
+else:
+    place, source = ("deep/middle", "deep/library") if kind == "middle" else ("top", "deep/middle")
+    with bpy.data.libraries.load(f"{folder}/{source}.blend", link=True) as (_, wanted):
+        wanted.objects = ["cube"] if kind == "middle" else ["holder"]
+    if kind == "middle":
+        holder = bpy.data.objects.new("holder", None)
+        holder.constraints.new("COPY_LOCATION").target = wanted.objects[0]
+        bpy.context.scene.collection.objects.link(holder)
+    bpy.context.scene.collection.objects.link(wanted.objects[0])
+    bpy.ops.wm.save_as_mainfile(filepath=f"{folder}/{place}.blend", check_existing=False, relative_remap=True)
+os._exit(0)
+"""
+
+
+@pytest.mark.usefixtures("own_cache")
+def test_a_changed_library_is_asked_about_anew(blender, tmp_path):
+    """Of a library, too."""
+
+    def make(kind):
+        subprocess.run([blender, "-c", LINK, kind, tmp_path], check=True, capture_output=True)
+
+    (tmp_path / "deep").mkdir()
+    for kind in ("moving", "middle", "top"):
+        make(kind)
+    assert timeline(tmp_path / "top.blend").moves
+    make("still")
+    assert not timeline(tmp_path / "top.blend").moves
+
+
+@pytest.mark.usefixtures("own_cache")
+def test_a_changed_buffer_is_read_anew(files, blender, tmp_path):
+    (tmp_path / "models").mkdir()
+    export = (
+        "import os, sys; import bpy\n"
+        "bpy.ops.wm.open_mainfile(filepath=sys.argv[1])\n"
+        "bpy.ops.export_scene.gltf(filepath=sys.argv[2], export_format='GLTF_SEPARATE')\nos._exit(0)"
+    )
+    path = tmp_path / "models" / "jump.gltf"
+    subprocess.run([blender, "-c", export, files / "jump.blend", path], check=True, capture_output=True)
+    spec, buffer = spec_of(path, 13), path.with_suffix(".bin")
+    before, data = load(spec)[0].bounds, np.frombuffer(buffer.read_bytes(), np.float32).copy()
+    assert timeline(path).last == 25
+    accessors = json.loads(path.read_text())
+    times = accessors["bufferViews"][accessors["accessors"][accessors["animations"][0]["samplers"][0]["input"]]["bufferView"]]
+    first = times.get("byteOffset", 0) // 4
+    data[first : first + times["byteLength"] // 4] *= 2
+    buffer.write_bytes(data.tobytes())
+    assert timeline(path).last > 25
+    assert abs(load(spec)[0].bounds - before).max() > 0.1
+
+
 # Recipes.
 
 
@@ -144,6 +286,21 @@ def test_a_data_set_of_time_steps(files, tmp_path):
     assert {a["id_track"] for a in images["annotations"]} == {"jump"}
     poses = json.loads((tmp_path / "out" / "native" / "dataset1.json").read_text())["poses"]
     assert [pose["frame"] for pose in poses.values()] == [1, 1, 13, 13, 25, 25]
+
+
+def test_models_are_chosen_with_all_time_steps_or_by_one(files, tmp_path):
+    generate(recipe(files, frames={"step": 12}, channels=["rgb", "instances"], formats=["native"]), tmp_path / "out")
+    import_dataset("native", tmp_path / "out" / "native", tmp_path / "in")
+    for name in ("out", "in"):
+
+        def found(*models, folder=tmp_path / name):
+            return [(s.objects[0].key, s.objects[0].track) for s in Dataset(folder, Choice(models))]
+
+        first, middle, last = ([(f"jump-f{frame:04d}", "jump")] * 2 for frame in FRAMES)
+        assert found() == found("jump") == found("*") == first + middle + last
+        assert found("jump-f0013") == middle
+        assert found("jump-f002*", "jump-f0001") == first + last
+        assert found("jump-f0002") == found("jum") == []
 
 
 def test_time_steps_are_appended(files, tmp_path):

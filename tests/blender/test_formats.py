@@ -240,6 +240,22 @@ def test_vertex_colours_are_kept_where_they_are_used(painted):
         assert material_of(painted, part).base_color == (1, 1, 1, 1)
 
 
+@pytest.mark.parametrize("name", ["occluded.blend", "occluded.glb"])
+def test_occlusion_is_carried(made, name):
+    mesh, _ = load_model(made / name)
+    assert mesh.warnings == ()
+    strengths = {"crevices": 1.0, "faint crevices": 0.4}
+    for part, strength in strengths.items():
+        found = material_of(mesh, part)
+        assert found.occlusion_strength == pytest.approx(strength)
+        np.testing.assert_allclose(image_of(mesh, found.occlusion_texture)[..., 0], [[0, 64], [128, 255]], atol=1)
+    if name.endswith("blend"):
+        turned = material_of(mesh, "turned crevices")
+        np.testing.assert_allclose(image_of(mesh, turned.occlusion_texture)[..., 0], [[255, 191], [127, 0]], atol=1)
+        assert material_of(mesh, "no crevices").occlusion_texture is None
+        assert len({material_of(mesh, part).occlusion_texture for part in strengths}) == 1  # the picture as it stands
+
+
 def test_what_is_lost_is_named(painted):
     said = "\n".join(painted.warnings)
     assert "material 'procedural': the node Noise Texture cannot be carried over" in said

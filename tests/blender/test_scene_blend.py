@@ -104,12 +104,15 @@ def test_labelled_objects_move(made):
         assert car.id == cars[0].id
 
 
-def test_what_appears_and_vanishes_is_labelled_while_it_is_there(made):
-    """Whichever of a group is shown, the file's own animation does not hide it; what has a slash in its name is no instance."""
+@pytest.mark.parametrize("name", ["appearing", "linking"])
+def test_what_appears_and_vanishes_is_labelled_while_it_is_there(made, name):
+    """Whichever of a group is shown, the animation of the file or its library does not hide it; what has a slash in its name
+    is no instance.
+    """
     labels = [{"name": n, "category": c} for n, c in (("Oak", "tree"), ("plane*", "aerial"), ("Late", "car"), ("Early", "car"))]
     blend = {"labels": labels, "frames": [1, 4, 9], "variants": IN_TURN}
     recipe = recipe_of(
-        made / "appearing.blend", engine=ENGINE | {"settings": SHARP}, blend=blend, viewpoints={"azimuth": [0], "distance": 7}
+        made / f"{name}.blend", engine=ENGINE | {"settings": SHARP}, blend=blend, viewpoints={"azimuth": [0], "distance": 7}
     )
     assert met_by_cycles(recipe) == {0, 1, 11, 12, 13}
     planned = plan(recipe)

@@ -83,7 +83,10 @@ def test_truth_is_what_cycles_sees(source):
     assert not (differs & ~at_edges(is_object)).any()
     depth = 1 / np.where(is_object, truth.inverse_depth, 1)
     flat = is_object & ~differs & ~at_edges(depth > 0, depth)
-    assert (np.abs(found["depth"] - depth)[flat] > 1e-3).sum() <= 5  # gaps and ridges narrower than a pixel
+    # Gaps and ridges narrower than a pixel, and steps too low for an edge: one ray meets the zoo's car, by Embree too, 0.0002
+    # pixels inside of the body's end around the windshield, and Cycles' ray, up to a hundredth of a pixel beside it, the pane
+    # 5.7 mm behind.
+    assert (np.abs(found["depth"] - depth)[flat] > 1e-3).sum() <= 5
 
 
 def at_edges(mask, depth=None):
@@ -171,6 +174,21 @@ def test_a_border_changes_no_pixel():
     whole, part = (asked(stage, camera, border=b)["picture"] for b in (None, border))
     assert (whole[..., 3] > 0).sum() > 300
     np.testing.assert_allclose(part, whole, atol=1e-5)
+
+
+def test_pictures_do_not_depend_on_those_before_them():
+    recipe = recipe_of(DRAFT | {"samples": 1, "denoise": "off"}, scene={"ground": True})
+    stage = stage_of(recipe)
+    cameras = [camera_for(stage.shot.intrinsics, frame.pose, stage.middle) for frame in stage.shot.frames]
+    asks = [(0, True, None), (1, False, None), (1, True, None), (0, False, (20, 10, 60, 50))]
+
+    def picture(stage, i, is_open, border):
+        return asked(stage, cameras[i], transparent=is_open, border=border)["picture"]
+
+    alone = [picture(stage_of(recipe), *ask) for ask in asks]
+    assert len({one.tobytes() for one in alone}) == len(asks)
+    for k in (0, 1, 2, 3, 1, 0, 2):
+        assert np.array_equal(picture(stage, *asks[k]), alone[k])
 
 
 def test_nothing_in_view_is_nothing():

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -85,14 +87,38 @@ def test_a_wrong_option_is_one_line(name, given, said):
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.usefixtures("named")
 @pytest.mark.parametrize("name", NAMES)
-@pytest.mark.parametrize("scene", [{"ground": "catcher"}, {"background": "environment"}])
-def test_a_catcher_is_refused_before_anything_is_rendered(name, scene):
-    recipe = recipe_of({"name": name}, scene=scene)
-    with pytest.raises(RecipeError, match=rf"scene\.ground: .* engine: {name}, found catcher, .* raster") as caught:
-        next(iter(render(recipe)))
+@pytest.mark.parametrize(
+    "scene",
+    [
+        {"ground": "catcher"},
+        {"background": "environment"},
+        {"ground": {"catcher": True, "roughness": 0.5}},
+        {"ground": {"choice": ["grey", "catcher"]}},
+    ],
+)
+def test_a_catcher_is_a_mistake_of_the_plan(name, scene):
+    with pytest.raises(RecipeError, match=rf"^scene\.ground: .* engine: {name}; found catcher, .* raster$") as caught:
+        plan(recipe_of({"name": name}, scene=scene))
     assert "\n" not in str(caught.value)
+    plan(recipe_of({"name": "cycles"}, scene=scene))
+
+
+@pytest.mark.parametrize("scene", [{"background": "environment", "ground": "off"}, {"ground": {"choice": ["grey", "off"]}}])
+def test_other_grounds_are_none(scene):
+    plan(recipe_of({"name": "eevee"}, scene=scene))
+
+
+def test_plan_refuses_a_catcher_by_the_recipe_s_line(tmp_path):
+    recipe = (
+        "models: [{source: zoo:chair}]\nviewpoints: {distance: 2}\nengine: workbench\nscene:\n  sun: on\n  ground: catcher\n"
+    )
+    (tmp_path / "recipe.yaml").write_text(recipe)
+    run = subprocess.run(
+        [sys.executable, "-m", "viewsphere", "plan", "recipe.yaml"], cwd=tmp_path, capture_output=True, text=True
+    )
+    assert run.returncode == 2
+    assert "recipe.yaml:6: scene.ground: expected" in run.stderr and len(run.stderr.splitlines()) == 1
 
 
 @pytest.mark.parametrize("scene", [{}, {"ground": False}, {"sky": "daylight"}, {"sun": "off"}])
@@ -104,6 +130,28 @@ def test_what_is_told_is_plain_and_light_comes_from_above(scene):
     above, below = np.array(told["hemispheres"])
     assert (above > 0).all() and (below > 0).all()
     assert above.sum() > 0.8 * below.sum()
+
+
+def test_the_ground_fades_where_blender_is_told_to():
+    """Workbench's, which is faded here, and the others', by Blender's nodes."""
+    shot = shot_of({"name": "workbench"}, scene={"ground": "on"})
+    geometry, meshes = geometry_of(shot)
+    told = told_scene(shot.placements, meshes, geometry, shot.scene, options_of("workbench", {}), lambda array: "array")
+    fading, backdrop = told["ground"]["fading"], Backdrop.of(shot, geometry)
+    camera = camera_for(shot.intrinsics, shot.frames[0].pose, backdrop.middle)
+    before = np.linalg.norm(backdrop.middle - camera.center)
+
+    def left(behind, rise):
+        away, rise = np.broadcast_arrays(before + np.atleast_2d(behind), np.atleast_2d(rise))
+        return backdrop._left(away, rise, camera, np.full(away.shape, backdrop.ground, np.int32))[0]
+
+    begin, end, flat, flattest = (fading[name] for name in ("begin", "end", "flat", "flattest"))
+    assert 0 < begin < end
+    assert 0 < flattest < flat < 1
+    np.testing.assert_allclose(left([0, begin, end, 2 * end], 1.0), [1, 1, 0, 0], atol=1e-6)
+    np.testing.assert_allclose(left(0.0, [1, flat, flattest, 0]), [1, 1, 0, 0], atol=1e-6)
+    for steps in (left(np.linspace(begin, end, 9), 1.0), left(0.0, np.linspace(flat, flattest, 9))):
+        assert (np.diff(steps) < 0).all()
 
 
 @pytest.mark.parametrize("scene", [{}, {"ground": False}, {"ground": False, "sky": "daylight"}])

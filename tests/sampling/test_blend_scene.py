@@ -100,5 +100,5 @@ def test_targets_stand_at_the_spot():
 
 def test_other_engines_are_refused_before_blender_is_asked():
     recipe = Recipe(models=[{"source": "zoo:chair"}], viewpoints={"distance": 5}, scene={"blend": "none.blend"})
-    with pytest.raises(RecipeError, match=r"^scene.blend: expected engine: cycles.*found raster.*scene.place$"):
+    with pytest.raises(RecipeError, match=r"^scene.blend: expected engine: cycles, eevee or workbench.*raster.*scene.place$"):
         plan(recipe)

@@ -91,17 +91,13 @@ def _started(job: Job) -> tuple[subprocess.Popen[bytes], int]:
 def _end(job: Job, code: int, *, late: bool) -> str:
     """Why a child ended without an outcome."""
     if late or (code < 0 and -code == getattr(signal, "SIGXCPU", None)):
-        return (
-            f"expected to be read within {job.seconds:g} s (limit MAX_READ_SECONDS), stopped then; simplify the model, or "
-            "set VIEWSPHERE_MAX_READ_SECONDS higher"
-        )
+        return limits.too_slow(job.seconds)
     if code == 1 and (reason := _last_line(Path(job.folder) / LOG)):
         return f"the process that reads it failed ({reason})"
     how = f"exit code {code}"
     if code < 0:
         how = signal.Signals(-code).name if -code in set(signal.Signals) else f"signal {-code}"
-    memory = f"{job.memory:,} bytes of memory (limit MAX_READ_BYTES)"
-    return f"reading it crashed ({how}), with {memory}: damaged, or larger than that allows"
+    return limits.ended("the process that reads it", how, job.memory)
 
 
 def _last_line(log: Path) -> str:

@@ -34,6 +34,29 @@ MAX_SIZE = 1e5
 """Greatest longest side of a normalised model, metres."""
 
 
+FROM_OUTSIDE = ("SIGKILL", "SIGTERM", "SIGINT", "SIGHUP", "SIGQUIT")
+"""Signals by which others end a process: nothing that a file does makes a reader send them."""
+
+
+def too_slow(seconds: float) -> str:
+    """Of a reader that took longer than it may."""
+    return (
+        f"expected to be read within {seconds:g} s (limit MAX_READ_SECONDS), stopped then; simplify the model, or "
+        "set VIEWSPHERE_MAX_READ_SECONDS higher"
+    )
+
+
+def ended(reader: str, how: str, memory: int) -> str:
+    """Of a reader that ended without an answer: who it was, and the signal that ended it or whatever else is known."""
+    if how in FROM_OUTSIDE:
+        return (
+            f"{reader} ended unexpectedly: it was killed ({how}), perhaps because memory ran out; the file may be whole: "
+            "try again with more memory free, or fewer --workers"
+        )
+    allowed = f"{memory:,} bytes of memory (limit MAX_READ_BYTES)"
+    return f"reading it crashed ({how}), with {allowed}: damaged, or larger than that allows"
+
+
 def from_environment(name: str) -> float:
     """The limit of this name, or what `$VIEWSPHERE_<name>` says instead; UserError when that is no positive number."""
     text = os.environ.get(f"VIEWSPHERE_{name}", "")

@@ -67,6 +67,7 @@ class _Work:
             name=told["name"],
             **rough,
             **self._emissive(),
+            **self._occlusion(),
             normal_texture=normal,
             normal_scale=normal_scale,
             **self._scalar("clearcoat", told["coat"]),
@@ -142,6 +143,18 @@ class _Work:
             "emissive": _floats(np.maximum(constant * greatest, 0)),
             "emissive_texture": self._baked("emission", bright, 1.0),
         }
+
+    def _occlusion(self) -> dict[str, Any]:
+        """The texture, where a picture says how much light from all around arrives, and how far it counts."""
+        shade, strength = _faded(self.told["occlusion"])
+        if not isinstance(self._usable(shade), dict):
+            return {}
+        channel, of = _channel(shade)
+        if channel == 0 and self._is_picture(of, srgb=False):
+            texture = self._texture(of)
+        else:
+            texture = self._baked("occlusion", {"do": "color", "of": [shade]}, 1.0, is_color=False)
+        return {"occlusion_texture": texture, "occlusion_strength": strength}
 
     def _scalar(self, field: str, told: Any) -> dict[str, Any]:
         told = self._usable(told)
@@ -327,6 +340,22 @@ def _channel(told: Any) -> tuple[int | None, Any]:
     if isinstance(told, dict) and cast("Told", told)["do"] == "channel":
         return cast("Told", told)["which"], cast("Told", told)["of"][0]
     return None, told if isinstance(told, dict) else None
+
+
+def _faded(told: Any) -> tuple[Any, float]:
+    """An expression that is mixed with white, as glTF's importer does, without that, and its share; else itself and 1."""
+    mixed = _inside(told, "grey")
+    if isinstance(mixed, dict) and cast("Told", mixed)["do"] == "mix" and cast("Told", mixed)["how"] == "MIX":
+        share, white, shade = cast("Told", mixed)["of"]
+        share = _inside(share, "clamp")
+        if not isinstance(share, dict) and white == [1.0, 1.0, 1.0]:
+            return _inside(shade, "color"), min(max(float(share), 0.0), 1.0)
+    return told, 1.0
+
+
+def _inside(told: Any, do: str) -> Any:
+    """What is in an expression of this kind; another one itself."""
+    return cast("Told", told)["of"][0] if isinstance(told, dict) and cast("Told", told)["do"] == do else told
 
 
 def _plain(value: Float) -> Any:

@@ -132,9 +132,11 @@ def _limit(job: Job) -> None:
         return
     import resource
 
-    # Blender reserves much more memory than it writes to.
+    # Blender reserves much more memory than it writes to, and works on all cores.
     memory = "RLIMIT_DATA" if job.by_blender else "RLIMIT_AS"
-    wanted = {memory: job.memory, "RLIMIT_FSIZE": job.memory, "RLIMIT_CPU": int(2 * job.seconds) + 1, "RLIMIT_CORE": 0}
+    cores = (os.cpu_count() or 1) if job.by_blender else 1
+    seconds = int(2 * job.seconds * cores) + 1
+    wanted = {memory: job.memory, "RLIMIT_FSIZE": job.memory, "RLIMIT_CPU": seconds, "RLIMIT_CORE": 0}
     for name, most in wanted.items():
         with suppress(ValueError, OSError, AttributeError):  # what a platform lacks, or has set lower
             kind = getattr(resource, name)

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from viewsphere.assets import limits
+from viewsphere.assets.via_blender import why_no_answer
 from viewsphere.blender.interpreter import find_blender
 from viewsphere.blender.process import BlenderProcess
 from viewsphere.errors import BlenderDied, BlenderError, ModelError
@@ -95,12 +96,18 @@ def _asked(path: Path, confined: bool, do: str, **told: Any) -> Any:
     place = path.parent.resolve()
     readable = [place] if confined else [Path("/")]
     told |= {"file": str(path.resolve()), "root": str(place) if confined else None}
+    seconds = limits.from_environment("MAX_READ_SECONDS")
     try:
-        with BlenderProcess(find_blender(), readable=readable) as process:
-            return process.ask(do, limits.from_environment("MAX_READ_SECONDS"), **told)
-    except (BlenderError, BlenderDied) as error:
-        said = str(error).removeprefix("ValueError: ").partition("; its log")[0]
-        raise ModelError(f"{path}: Blender cannot read it: {said}") from None
+        process = BlenderProcess(find_blender(), readable=readable)
+    except BlenderDied as error:
+        raise ModelError(f"{path}: {error}") from None
+    try:
+        with process:
+            return process.ask(do, seconds, **told)
+    except BlenderError as error:
+        raise ModelError(f"{path}: Blender cannot read it: {str(error).removeprefix('ValueError: ')}") from None
+    except BlenderDied as error:
+        raise ModelError(f"{path}: {why_no_answer(error, seconds)}") from None
 
 
 def _standing(place: Sequence[float], turn: Sequence[float], unit: float) -> Float:

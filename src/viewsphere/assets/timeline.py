@@ -12,7 +12,7 @@ from viewsphere.assets.cache import kept
 from viewsphere.assets.folder import ModelFolder
 from viewsphere.assets.inside import split_source
 from viewsphere.assets.load import check_animated
-from viewsphere.assets.via_blender import asked, started
+from viewsphere.assets.via_blender import asked, read_named, remember_layers, started
 from viewsphere.blender.process import BlenderProcess
 from viewsphere.errors import ModelError
 
@@ -57,7 +57,7 @@ class Blenders:
 
         def ask() -> tuple[dict[str, Any], list[Path]]:
             folder = ModelFolder(file, confined)
-            folder.read_model()
+            read_named(folder)
             answer = self._asked(folder, do, about)
             return answer, [*folder.files, *map(Path, answer["files"])]
 
@@ -72,8 +72,12 @@ class Blenders:
         place = folder.model.parent.resolve(), folder.confined
         if place not in self._running:
             self._running[place] = self._stack.enter_context(started(folder))
+        process = self._running[place]
+        begun = process.log.stat().st_size
         try:
-            return asked(folder, self._running[place], do, **about)
+            answer = asked(folder, process, do, **about)
         except ModelError:
             self._running.pop(place).close()  # it may have died
             raise
+        remember_layers(folder, process.log, begun)
+        return answer

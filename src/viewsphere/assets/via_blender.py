@@ -6,11 +6,14 @@ network. Textures are read here, like any other model's.
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
+from urllib.parse import unquote
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,7 +69,7 @@ def _read(
 ) -> Iterator[tuple[Mesh, FileFacts]]:
     """The file at each of the frames, turned."""
     kind = folder.model.suffix[1:].lower()
-    _check_beginning(folder, kind, folder.read_model())
+    _check_beginning(folder, kind, read_named(folder))
     with started(folder) as process:
         unit, after = 1.0, None
         for frame in frames:
@@ -88,6 +91,20 @@ def _read(
                 file.unlink()
 
 
+def read_named(folder: ModelFolder) -> bytes:
+    """The model file's bytes, as `read_model` gives them; buffers that a glTF file names are remembered: Blender does not tell
+    of them.
+    """
+    data = folder.read_model()
+    if folder.model.suffix.lower() == ".gltf":
+        with suppress(ValueError, TypeError, AttributeError):  # what is no glTF file, Blender refuses
+            for buffer in json.loads(data)["buffers"]:
+                uri = str(buffer.get("uri", "data:"))
+                if not uri.startswith("data:"):
+                    _remember(folder, folder.model.parent.resolve() / unquote(uri))
+    return data
+
+
 def _check_beginning(folder: ModelFolder, kind: str, data: bytes) -> None:
     """Refuse Alembic files that are none or cut off, at which Blender says nothing or crashes (Ogawa's header: the place of its
     root group, which is written last)."""
@@ -105,7 +122,10 @@ def started(folder: ModelFolder) -> BlenderProcess:
     except UserError as error:
         raise folder.error(str(error)) from None
     readable = [folder.model.parent.resolve()] if folder.confined else [Path("/")]
-    return BlenderProcess(python, readable=readable)
+    try:
+        return BlenderProcess(python, readable=readable)
+    except BlenderDied as error:
+        raise folder.error(str(error)) from None
 
 
 def asked(folder: ModelFolder, process: BlenderProcess, do: str, /, **told: Any) -> dict[str, Any]:
@@ -119,26 +139,23 @@ def asked(folder: ModelFolder, process: BlenderProcess, do: str, /, **told: Any)
         said = str(error).partition(": ")[2].removesuffix(", see console for detail")
         raise folder.error(f"Blender cannot read it: {said}") from None
     except BlenderDied as error:
-        raise folder.error(_end(str(error).partition("; its log")[0], seconds)) from None
+        raise folder.error(why_no_answer(error, seconds)) from None
 
 
-def _end(said: str, seconds: float) -> str:
-    """Why there is no answer."""
-    if said.startswith("Blender hung"):
-        return (
-            f"expected to be read within {seconds:g} s (limit MAX_READ_SECONDS), stopped then; simplify the model, or "
-            "set VIEWSPHERE_MAX_READ_SECONDS higher"
-        )
-    memory = f"{int(limits.from_environment('MAX_READ_BYTES')):,} bytes of memory (limit MAX_READ_BYTES)"
-    return f"reading it crashed ({said}), with {memory}: damaged, or larger than that allows"
+def why_no_answer(died: BlenderDied, seconds: float) -> str:
+    """Of a Blender that had this long to answer about a file, and ended instead."""
+    said = str(died).partition("; its log")[0]
+    if died.signal == "SIGXCPU" or said.startswith("Blender hung"):
+        return limits.too_slow(seconds)
+    how = died.signal if died.signal in limits.FROM_OUTSIDE else said
+    return limits.ended("Blender, which reads it,", how, int(limits.from_environment("MAX_READ_BYTES")))
 
 
 def _check_layers(folder: ModelFolder, log: Path) -> None:
     """Remember the layers of a USD file, by what its library says of them; warn of those that were not read."""
-    said = log.read_text(encoding="utf-8", errors="replace")
-    missing = set(UNOPENED.findall(said))
-    for name in sorted({*OPENED.findall(said), *missing}):
-        path = Path(name.partition("[")[0])
+    opened, missing = _layers(log)
+    for name in sorted({*opened, *missing}):
+        path = _layers_file(name)
         if path.is_absolute() and not _may_read(folder, path):
             if name not in missing:
                 raise folder.error(f"layer {name!r} is outside the model's folder; set confined: false to allow")
@@ -146,6 +163,25 @@ def _check_layers(folder: ModelFolder, log: Path) -> None:
         elif name in missing:
             folder.warn(f"layer {name!r} does not exist, or cannot be read")
         _remember(folder, path)
+
+
+def remember_layers(folder: ModelFolder, log: Path, begun: int) -> None:
+    """Remember the layers of a USD file, missing ones too, by what was said of them after so many bytes of the log."""
+    for name in sorted(set().union(*_layers(log, begun))):
+        _remember(folder, _layers_file(name))
+
+
+def _layers(log: Path, begun: int = 0) -> tuple[set[str], set[str]]:
+    """The layers of USD files that were looked for, and those that could not be opened."""
+    with log.open("rb") as file:
+        file.seek(begun)
+        said = file.read().decode("utf-8", "replace")
+    return set(OPENED.findall(said)), set(UNOPENED.findall(said))
+
+
+def _layers_file(name: str) -> Path:
+    """The file of a layer, which may be an archive."""
+    return Path(name.partition("[")[0])
 
 
 def _remember(folder: ModelFolder, path: Path) -> None:

@@ -46,6 +46,9 @@ ASIDE = "viewsphere-blender-"
 STALE_S = 86_400.0
 TAIL_BYTES, TAIL_LINES = 4096, 6
 
+SHELLS_SIGNALS = 128
+"""What a shell adds to the number of a signal to make an exit status of it (POSIX, "Exit Status for Commands")."""
+
 
 class BlenderProcess:
     """A Blender of one's own, started at once; for one thread at a time.
@@ -157,11 +160,12 @@ class BlenderProcess:
             status = self._process.wait()
         if not self._end.alive:
             return BlenderDied(f"Blender was ended before `{do}` was asked")
-        how = (
-            f"hung (no answer in {timeout_s:g} s)" if seconds >= timeout_s else f"died ({_named(status)}) after {seconds:.1f} s"
-        )
         said = " | ".join(self._last_lines()) or "nothing"
-        return BlenderDied(f"Blender {how} of `{do}`; its log ends with: {said}")
+        if seconds >= timeout_s:
+            return BlenderDied(f"Blender hung (no answer in {timeout_s:g} s) of `{do}`; its log ends with: {said}")
+        by = _signal(status)
+        how = f"exit status {status}" if by is None else f"signal {by}"
+        return BlenderDied(f"Blender died ({how}) after {seconds:.1f} s of `{do}`; its log ends with: {said}", by)
 
     def _last_lines(self) -> list[str]:
         """The end of what this Blender said."""
@@ -198,13 +202,12 @@ def _kill(process: subprocess.Popen[bytes]) -> None:
             os.killpg(process.pid, signal.SIGKILL)
 
 
-def _named(status: int) -> str:
-    """An exit status in words."""
-    if status >= 0:
-        return f"exit status {status}"
+def _signal(status: int) -> str | None:
+    """The signal that ended a process, or what a script started that tells its own end by it (128 and more)."""
+    number = -status if status < 0 else status - SHELLS_SIGNALS
     with suppress(ValueError):
-        return f"signal {signal.Signals(-status).name}"
-    return f"signal {-status}"
+        return signal.Signals(number).name
+    return str(number) if status < 0 else None
 
 
 def _environment(python: Path, folder: Path) -> dict[str, str]:

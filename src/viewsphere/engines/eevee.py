@@ -12,7 +12,10 @@ from viewsphere.engines.cycles import SOURCES as PROGRAMS
 if TYPE_CHECKING:
     from pydantic import JsonValue
 
-__all__ = ["OPENS_SCENES", "PROGRAMS", "check", "stage"]
+__all__ = ["CATCHES_SHADOWS", "OPENS_SCENES", "PROGRAMS", "check", "stage"]
+
+CATCHES_SHADOWS = False
+"""It has no ground of which only the shadows are seen."""
 
 
 def check(options: Mapping[str, JsonValue]) -> None:

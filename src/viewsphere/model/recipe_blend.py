@@ -57,7 +57,7 @@ VariantField = Annotated[VariantEntry, BeforeValidator(_variant), OrShort({"type
 
 
 class BlendEntry(Frozen):
-    """A .blend file whose scene is rendered as it is, by the engine cycles."""
+    """A .blend file whose scene is rendered as it is, by an engine that opens such files (cycles, eevee, workbench)."""
 
     file: str = Field(min_length=1, description="path of a .blend file")
     at: str | None = Field(

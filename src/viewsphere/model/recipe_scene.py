@@ -128,8 +128,8 @@ class SceneEntry(Frozen):
     )
     blend: BlendField = Field(
         default=None,
-        description="a .blend file around the targets, rendered as it is by engine: cycles: its path, or a mapping of file, "
-        "at, labels, variants and more",
+        description="a .blend file around the targets, rendered as it is by engine: cycles, eevee or workbench: its path, or a "
+        "mapping of file, at, labels, variants and more",
     )
     company: CompanyField = Field(
         default=None, description="how many other models of the same split stand beside each, or a mapping of count and layout"

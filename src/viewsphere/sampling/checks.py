@@ -9,6 +9,8 @@ from viewsphere import plugins
 from viewsphere.errors import RecipeError
 from viewsphere.model.mistakes import nearest, one_of
 from viewsphere.model.recipe import Recipe
+from viewsphere.model.recipe_draws import alternatives
+from viewsphere.model.recipe_surface import GroundEntry
 from viewsphere.model.shot import ModelSpec
 from viewsphere.sampling.models import count_models
 from viewsphere.sampling.viewpoints import Poses
@@ -27,11 +29,27 @@ def check_names(recipe: Recipe) -> None:
 
 def check_blend(recipe: Recipe) -> None:
     """A .blend file as the scene needs an engine that renders it."""
-    if recipe.scene.blend is not None and not getattr(plugins.load("engines", recipe.engine.name), "OPENS_SCENES", False):
+    if recipe.scene.blend is not None and not _engine_says(recipe, "OPENS_SCENES", False):
         raise RecipeError(
-            f"scene.blend: expected engine: cycles, which renders the file as it is; found {recipe.engine.name}: "
-            "name cycles, or take the file's meshes alone by scene.place"
+            f"scene.blend: expected engine: cycles, eevee or workbench, which render the file; found {recipe.engine.name}: "
+            "name one of these, or take the file's meshes alone by scene.place"
         )
+
+
+def check_catcher(recipe: Recipe) -> None:
+    """A ground that may be a shadow catcher needs an engine that has one."""
+    scene = recipe.scene
+    grounds = [scene.automatic_ground if ground == "auto" else ground for ground in alternatives(scene.ground)]
+    catches = any(ground == "catcher" or (isinstance(ground, GroundEntry) and ground.catcher) for ground in grounds)
+    if catches and not _engine_says(recipe, "CATCHES_SHADOWS", True):
+        raise RecipeError(
+            f"scene.ground: expected on, off or a material for engine: {recipe.engine.name}; found catcher, which auto is "
+            "before background: environment: set it to off, or take engine: cycles or raster"
+        )
+
+
+def _engine_says(recipe: Recipe, name: str, default: bool) -> bool:
+    return getattr(plugins.load("engines", recipe.engine.name), name, default)
 
 
 def check_frames(recipe: Recipe, views: Poses) -> None:

@@ -26,7 +26,15 @@ from viewsphere.model.recipe_draws import alternatives, span
 from viewsphere.model.scene import Scene, Vector
 from viewsphere.model.shot import Frame, ModelSpec, Placement, Pose, Shot
 from viewsphere.sampling.blend_scene import BlendScenery
-from viewsphere.sampling.checks import check_blend, check_frames, check_listed, check_materials, check_moments, check_names
+from viewsphere.sampling.checks import (
+    check_blend,
+    check_catcher,
+    check_frames,
+    check_listed,
+    check_materials,
+    check_moments,
+    check_names,
+)
 from viewsphere.sampling.composition import BoxOf, Composition, compose
 from viewsphere.sampling.doubts import hidden_by_exposure, no_light, out_of_view
 from viewsphere.sampling.models import categories, numbered_specs
@@ -476,6 +484,7 @@ def plan(recipe: Recipe, shot_frames: int | None = None) -> Plan:
     with recipe.located():
         check_names(recipe)
         check_blend(recipe)
+        check_catcher(recipe)
         views = poses(recipe.viewpoints, recipe.seed, recipe.folder)
         _lens(recipe, views)
         check_frames(recipe, views)

@@ -16,7 +16,7 @@ from viewsphere.errors import StoreError
 from viewsphere.model.channel import CHANNELS
 from viewsphere.model.files import Files
 from viewsphere.model.record import sample_from_record
-from viewsphere.model.sample import Sample
+from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.store.channel_files import decode
 from viewsphere.store.choice import Choice
 from viewsphere.store.folder import Store
@@ -125,18 +125,31 @@ class Dataset(Sequence[Sample]):
             yield self._sample(key, records[place])
 
     def _places(self, key: str, first: int, count: int) -> Sequence[int]:
-        """Which of a finished shot's frames the choice means. Where the plan does not know its model, as of data sets made
-        elsewhere, a frame is of all models that it shows.
+        """Which of a finished shot's frames the choice means, by the model's key, or by that of its moment where it moves.
+        Where the plan does not know the model, as of data sets made elsewhere, a frame is of all models that it shows.
         """
         places = self.choice.places(first, count)
         if not self.choice.models or not places:
             return places
         part = self.plan.parts[self.plan.part_of(first)] if self.plan.parts else None
         model = part.model_at(first) if part else key.rpartition("-")[0]
-        if model is not None:
-            return places if self.choice.has_model(model) else ()
+        if model is not None and self.choice.has_model(model):
+            return places
+        if model is not None and not any(key.startswith(f"{model}-") for key in self._chosen):
+            return ()
         shown = zip(places, self.samples_of(key, places), strict=True)
-        return [place for place, sample in shown if any(self.choice.has_model(o.key) for o in sample.objects)]
+        return [place for place, sample in shown if any(self._is_chosen(o, model) for o in sample.objects)]
+
+    def _is_chosen(self, shown: ObjectAnnotation, model: str | None) -> bool:
+        """Whether an object makes its frame one of those that are meant: where the frame's model is known, only that does."""
+        if model is None:
+            return self.choice.has_model(shown.key) or self.choice.has_model(shown.track)
+        return shown.track == model and self.choice.has_model(shown.key)
+
+    @cached_property
+    def _chosen(self) -> tuple[str, ...]:
+        """Keys of the models that the choice names, moments of models that move among them."""
+        return tuple(key for key in self.plan.models if self.choice.has_model(key))
 
     @cached_property
     def _frames_of(self) -> dict[str, int]:

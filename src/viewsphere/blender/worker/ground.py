@@ -11,21 +11,13 @@ from .graph import Graph
 SKY = "viewsphere sky"
 """Name of the node that says whether the sky is seen."""
 
-BEGIN, OVER = 4.0, 26.0
-"""Behind the scene's middle, in its units: where fading begins, and how long it takes."""
 
-FLAT = 0.09
-"""Sine of the angle between the view and the ground below which it fades, however near."""
-
-FLATTER = 1 / 12
-"""By how much less it has faded altogether."""
-
-
-def fade(material, middle, unit, sky):
+def fade(material, middle, fading, sky):
     """Let the camera see the sky instead of the ground as far as it has faded; light and mirrors meet all of it.
 
-    Transparency would be drawn by lot: a holdout, or the sky's light where the film is not transparent, has no noise. `sky`:
-    picture and turn of what is seen.
+    Transparency would be drawn by lot: a holdout, or the sky's light where the film is not transparent, has no noise. `fading`:
+    metres behind the `middle` at which it begins and ends, and sines of the angle between the view and the ground at which
+    flat views do. `sky`: picture and turn of what is seen.
     """
     graph = Graph(material.node_tree)
     output = next(node for node in material.node_tree.nodes if node.type == "OUTPUT_MATERIAL").inputs["Surface"]
@@ -33,7 +25,7 @@ def fade(material, middle, unit, sky):
     light = graph.node("ShaderNodeEmission", {"Color": _seen(graph, *sky)}).outputs[0]
     nothing = graph.node("ShaderNodeHoldout").outputs[0]
     behind = graph.mix(graph.node("ShaderNodeValue", name=SKY).outputs[0], nothing, light)
-    graph.give(output, graph.mix(_gone(graph, middle, unit), surface, behind))
+    graph.give(output, graph.mix(_gone(graph, middle, fading), surface, behind))
     material.cycles.emission_sampling = "NONE"
 
 
@@ -45,18 +37,18 @@ def show_sky(is_shown):
             node.outputs[0].default_value = is_shown
 
 
-def _gone(graph, middle, unit):
+def _gone(graph, middle, fading):
     """The share that has faded; few nodes, as each sample of the ground works them out."""
     place = graph.node(
         "ShaderNodeVectorTransform", {0: tuple(middle)}, vector_type="POINT", convert_from="WORLD", convert_to="CAMERA"
     )
     middle_away = graph.node("ShaderNodeVectorMath", {0: place.outputs[0]}, operation="LENGTH").outputs["Value"]
     behind = graph.math("SUBTRACT", graph.node("ShaderNodeCameraData").outputs["View Distance"], middle_away)
-    near = _between(graph, behind, unit * (BEGIN + OVER), unit * BEGIN)
+    near = _between(graph, behind, fading["end"], fading["begin"])
     left = _smooth(graph, graph.math("MULTIPLY", near, near), 0.0, 1.0)
     incoming = graph.node("ShaderNodeNewGeometry").outputs["Incoming"]
     sine = graph.math("ABSOLUTE", graph.node("ShaderNodeSeparateXYZ", {0: incoming}).outputs["Z"])
-    left = graph.math("MULTIPLY", left, _smooth(graph, sine, FLAT - FLATTER, FLAT))
+    left = graph.math("MULTIPLY", left, _smooth(graph, sine, fading["flattest"], fading["flat"]))
     return graph.product(graph.node("ShaderNodeLightPath").outputs["Is Camera Ray"], graph.complement(left))
 
 

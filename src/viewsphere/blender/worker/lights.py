@@ -14,6 +14,12 @@ from mathutils import Matrix, Vector
 
 KINDS = {"sun": "SUN", "point": "POINT", "spot": "SPOT", "area": "AREA"}
 
+EVEN = 0.05
+"""By how much of its mean the light within a cell of the map differs at most, by which light from the sky is sampled."""
+
+FEWEST = 32
+"""Columns of that map."""
+
 
 def add_light(scene, told):
     """A lamp that is not seen itself. Its strength is that of its brightest colour, so that colours stay within 1."""
@@ -58,14 +64,15 @@ def add_world(scene, told):
     tree = world.node_tree
     tree.nodes.clear()
     output = tree.nodes.new("ShaderNodeOutputWorld")
-    place, image = _turned(tree, told["turn_deg"]), _picture(told["picture"])
-    # The picture says where light comes from, texel by texel: a finer map, as Cycles would take, costs more and knows no more.
-    world.cycles.sampling_method, world.cycles.sample_map_resolution = "MANUAL", image.size[0]
+    pixels = np.load(told["picture"])
+    place, image = _turned(tree, told["turn_deg"]), _picture(pixels)
+    # A finer map, as Cycles would take, knows no more; each sample of light looks it up, and a small one stays at hand.
+    world.cycles.sampling_method, world.cycles.sample_map_resolution = "MANUAL", _columns(pixels)
     lighting, seen = _background(tree, place, image), image
     if told["seen"] == told["picture"]:
         tree.links.new(lighting, output.inputs["Surface"])
     else:
-        seen = _picture(told["seen"])
+        seen = _picture(np.load(told["seen"]))
         rays, mix = tree.nodes.new("ShaderNodeLightPath"), tree.nodes.new("ShaderNodeMixShader")
         tree.links.new(rays.outputs["Is Camera Ray"], mix.inputs[0])
         tree.links.new(lighting, mix.inputs[1])
@@ -90,8 +97,21 @@ def _background(tree, place, image):
     return light.outputs[0]
 
 
-def _picture(file):
-    pixels = np.load(file)
+def _columns(pixels):
+    """Columns of a map that says where the light of a picture (H, W, 3) comes from: as few as keep each cell even."""
+    light = pixels.mean(axis=2, dtype=np.float64)
+    height, width = light.shape
+    size = 1
+    while width // (2 * size) >= FEWEST and width == 2 * height and height % (2 * size) == 0:
+        size *= 2
+        cells = light.reshape(height // size, size, width // size, size)
+        mean = cells.mean(axis=(1, 3), keepdims=True)
+        if (np.abs(cells - mean) > EVEN * mean).any():
+            return width // size * 2
+    return width // size
+
+
+def _picture(pixels):
     height, width, _ = pixels.shape
     image = bpy.data.images.new("sky", width, height, float_buffer=True, is_data=True)
     rows = np.ones((height, width, 4), np.float32)

@@ -30,6 +30,11 @@ PLAIN = {
 }
 """A surface as expressions; `normal` is None, or what a normal map's colours and strength are."""
 
+GLTF_NODES = ("gltf material output", "gltf settings")
+"""Beginnings of the names of groups, in lower case, by which Blender's glTF importer and exporter keep what no shader has:
+https://docs.blender.org/manual/en/latest/addons/import_export/scene_gltf2.html, "Baked Ambient Occlusion".
+"""
+
 UNSEEN = {"alpha": 0.0}
 """A surface that is not there: nothing but its alpha counts."""
 
@@ -70,7 +75,17 @@ class Reader:
             for name in ("Volume", "Displacement"):
                 if output.inputs[name].is_linked:
                     self._lose(name.lower())
-        return {"name": material.name, **(PLAIN | look), "lost": self.lost}
+        return {"name": material.name, **(PLAIN | look), "occlusion": self._occlusion(tree), "lost": self.lost}
+
+    def _occlusion(self, tree):
+        """The share of the light from all around that arrives, as glTF knows it; None where nothing says it."""
+        for node in tree.nodes if tree else ():
+            group = node.node_tree if node.bl_idname == "ShaderNodeGroup" else None
+            if group is not None and group.name.lower().startswith(GLTF_NODES):
+                socket = node.inputs.get("Occlusion")
+                if socket is not None and socket.is_linked:
+                    return self._number(socket)
+        return None
 
     def _lose(self, what):
         if what not in self.lost:

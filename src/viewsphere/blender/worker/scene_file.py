@@ -41,11 +41,29 @@ def reveal(scene, names):
 
 
 def _fix(one, name, value):
-    """Set what a driver or an animation of the file would set otherwise; a driver has the last word."""
+    """Set what a driver or an animation of the file would set otherwise; a driver has the last word.
+
+    What a library has can be given no driver, but its curves can be silenced.
+    """
     if one.animation_data is not None and one.library is None:
         one.driver_remove(name)
         one.driver_add(name).driver.expression = str(int(value))
+    elif one.animation_data is not None:
+        for curve in _curves(one.animation_data):
+            if curve.data_path == name:
+                curve.mute = True
     setattr(one, name, value)
+
+
+def _curves(animation):
+    """All drivers and curves by which something moves."""
+    yield from animation.drivers
+    strips = (strip for track in animation.nla_tracks for strip in track.strips)
+    for played in (animation, *strips):
+        for layer in played.action.layers if played.action else ():
+            for strip in layer.strips:
+                bag = strip.channelbag(played.action_slot) if played.action_slot else None
+                yield from bag.fcurves if bag else ()
 
 
 def _only_color(scene):

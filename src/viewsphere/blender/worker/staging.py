@@ -41,7 +41,7 @@ def _lay_ground(scene, told, sky, known, renderer):
     floor = _place(scene, _mesh("ground", told["mesh"], known, renderer), Matrix.Identity(4), 0)
     floor.is_shadow_catcher = told["catcher"]
     if not told["catcher"] and renderer != "workbench":
-        ground.fade(floor.data.materials[0], told["middle"], told["unit"], sky)
+        ground.fade(floor.data.materials[0], told["middle"], told["fading"], sky)
 
 
 def _mesh(name, told, known, renderer):

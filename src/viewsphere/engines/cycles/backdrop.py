@@ -7,16 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.engines.cycles.told import extent
+from viewsphere.engines.cycles.told import BEGIN, FLAT, FLATTER, OVER, extent
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.model.camera import Camera
 from viewsphere.model.shot import Shot
 from viewsphere.surroundings.sky import SkyPictures, sky_pictures
 from viewsphere.truth.geometry import Geometry
 from viewsphere.truth.visibility import Visibility
-
-BEGIN, OVER, FLAT, FLATTER = 4.0, 26.0, 0.09, 1 / 12
-"""Where the ground fades, as `viewsphere.blender.worker.ground` has it for the others."""
 
 EDGE = 1
 """Pixels beyond what truth sees in which a smoothed outline still shows it."""

@@ -27,6 +27,12 @@ Put = Callable[[NDArray[Any]], str]
 
 Told = dict[str, Any]
 
+BEGIN, OVER = 4.0, 26.0
+"""Behind the middle of what is placed, in half its extents: where the ground begins to fade into the sky, and how far on."""
+
+FLAT, FLATTER = 0.09, 1 / 12
+"""Sine of the angle between the view and the ground below which it fades, however near, and by how much less it is gone."""
+
 ARRAYS = ("vertices", "triangles", "normals", "triangle_material", "uv0", "uv1", "colors")
 
 
@@ -120,7 +126,8 @@ def _told_ground(ground: Ground, geometry: Geometry, has_scenery: bool, put: Put
         "materials": [_told_material(replace(material, specular=0.0) if only_scatters(ground) else material, ())],
     }
     middle, unit = extent(geometry, has_scenery)
-    return {"mesh": mesh, "catcher": ground.catcher, "middle": middle.tolist(), "unit": unit}
+    fading = {"begin": unit * BEGIN, "end": unit * (BEGIN + OVER), "flat": FLAT, "flattest": FLAT - FLATTER}
+    return {"mesh": mesh, "catcher": ground.catcher, "middle": middle.tolist(), "fading": fading}
 
 
 def extent(geometry: Geometry, has_scenery: bool) -> tuple[NDArray[np.float64], float]:
