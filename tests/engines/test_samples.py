@@ -9,6 +9,7 @@ from truth.truth_scenes import LENSES, cube, lens, mesh_of, orbit_camera, placed
 from viewsphere.assets.mesh import Image, Material, Texture
 from viewsphere.engines.raster.kernels_paint import BRIGHT, GLINT, average_samples, shared_samples
 from viewsphere.engines.raster.kernels_samples import TIE
+from viewsphere.engines.raster.painting import brighten_lines
 from viewsphere.engines.raster.samples import OFFSETS, edge_samples, layers
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.model.camera import Camera
@@ -338,14 +339,36 @@ def test_one_glint_among_four_samples_is_no_white_dot():
     samples = np.full((12, 4), 0.1, np.float32)
     samples[1] = 500, 250, 0, 1
     samples[4:8] = 30, 20, 10, 1
-    samples[8:12, :3] = np.arange(12).reshape(4, 3) / 10
+    samples[8:12, :3] = np.arange(12).reshape(4, 3) / 12
     like = ~np.arange(12, dtype=np.int32)
     found = np.zeros((5, 4), np.float32)
-    average_samples(np.array([3, 0, 4], np.int32), like, samples, found)
+    glints, means = average_samples(np.array([3, 0, 4], np.int32), like, samples, found)
     np.testing.assert_allclose(found[3], [0.3 / 4 + GLINT / 4, 0.3 / 4 + GLINT / 8, 0.3 / 4, 1.3 / 4], rtol=1e-5)
     np.testing.assert_allclose(found[0], [30, 20, 10, 1], rtol=1e-5)
     np.testing.assert_allclose(found[4], samples[8:12].mean(axis=0), rtol=1e-5)
     assert not found[1:3].any()
+    assert glints.tolist() == [0]
+    np.testing.assert_allclose(means, [[500.3 / 4, 250.3 / 4, 0.3 / 4]], rtol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("x", "y"), [((0, 1), (0, 0)), ((8, 0), (2, 1)), ((0, 1), (0, 1)), ((5, 1), (5, -1)), ((3, 1), (2, 0))]
+)
+def test_a_bright_line_is_as_bright_as_it_is(x, y):
+    """Each of its pixels has one bright sample of four: those between two others have all their light, the ends do not.
+
+    x, y: of its first pixel, and a step.
+    """
+    along = np.arange(4, dtype=np.int32)
+    pixels = 9 * (y[0] + y[1] * along) + x[0] + x[1] * along
+    samples, found = np.full((16, 4), 0.1, np.float32), np.zeros((54, 4), np.float32)
+    samples[2::4, :3] = 30, 15, 0
+    glints, means = average_samples(pixels, ~np.arange(16, dtype=np.int32), samples, found)
+    brighten_lines(pixels[glints], means, 9, found)
+    true = np.array([30.3, 15.3, 0.3, 0.4]) / 4
+    np.testing.assert_allclose(found[pixels[1:-1]], np.tile(true, (2, 1)), rtol=1e-5)
+    np.testing.assert_allclose(found[pixels[[0, -1]], 0], (GLINT + 0.3) / 4, rtol=1e-5)
+    assert not np.delete(found, pixels, axis=0).any()
 
 
 def test_a_pixels_mean_is_of_the_centres_as_they_were():

@@ -53,7 +53,7 @@ from viewsphere.geometry.jit import inner, njit
 f4 = nb.float32
 U = nb.uintp
 NOTHING, SOLID, SEE_THROUGH, FLOOR = range(4)
-GLINT = 2.0  # radiance, a little more than what is shown as white
+GLINT = 1.0  # radiance: what a sample of an edge pixel may have that nothing around it has
 BRIGHT = 1.1  # radiance up to which a centre's colour stands for samples beside it: a glint on a crease is narrow
 # From a pixel to the centres nearest to each of its samples (`samples.OFFSETS`), three each.
 STEPS_X = (0, 0, -1, 0, 1, 0, 0, 0, 1, 0, -1, 0)
@@ -272,23 +272,33 @@ def shared_samples(pixels, triangle, depth, seen, inverse_depth, owner, normals,
 def average_samples(pixels, like, samples, radiance):
     """Each pixel becomes the mean of its four samples (premultiplied), whose colours `shared_samples` tells.
 
-    A glint counts no more than GLINT, or than the least of them, else thin things would be dotted.
+    A glint counts no more than GLINT, or than the least of them, else thin things would be dotted. Returns which of `pixels`
+    have one (G,), and their true means (G, 3).
     """
-    means = np.empty((pixels.shape[0], 4), np.float32)
+    means, whole = np.empty((pixels.shape[0], 4), np.float32), np.empty((pixels.shape[0], 3), np.float32)
+    glints, count = np.empty(pixels.shape[0], np.int32), U(0)
     for i in range(pixels.shape[0]):
-        least = f4(1e9)
+        least, bright = f4(1e9), f4(0)
         for k in range(4):
             j = like[4 * i + k]
             own = radiance[U(j)] if j >= 0 else samples[U(~j)]
-            least = min(least, max(own[0], own[1], own[2]))
+            level = max(own[0], own[1], own[2])
+            least, bright = min(least, level), max(bright, level)
         most = max(least, f4(GLINT))
+        if bright > most:
+            glints[count], whole[count, 0], whole[count, 1], whole[count, 2] = i, f4(0), f4(0), f4(0)
         red, green, blue, alpha = f4(0), f4(0), f4(0), f4(0)
         for k in range(4):
             j = like[4 * i + k]
             own = radiance[U(j)] if j >= 0 else samples[U(~j)]
             share = f4(0.25) * min(most / max(own[0], own[1], own[2], f4(1e-6)), f4(1))
             red, green, blue, alpha = red + own[0] * share, green + own[1] * share, blue + own[2] * share, alpha + own[3]
+            if bright > most:
+                for c in range(3):
+                    whole[count, c] += own[c] * f4(0.25)
         means[i, 0], means[i, 1], means[i, 2], means[i, 3] = red, green, blue, alpha * f4(0.25)
+        count += U(bright > most)
     for i in range(pixels.shape[0]):
         for c in range(4):
             radiance[U(pixels[i]), c] = means[i, c]
+    return glints[:count], whole[:count]

@@ -74,6 +74,9 @@ class _Light:
         self.u_to_a, self.v_to_a = where(is_round, 1 - u * u * less, bv * per), where(is_round, -u * v * less, -bu * per)
         self.u_to_b, self.v_to_b = where(is_round, -u * v * less, -av * per), where(is_round, 1 - v * v * less, au * per)
         self.stretch = where(is_round, longer, most(size(au) + size(bu), size(av) + size(bv)))
+        # How much farther than a texel is wide its border may be along an axis that the light is seen against.
+        self.thin_a = most(most(size(self.u_to_a), size(self.v_to_a)) - 1, 0) * 0.5
+        self.thin_b = most(most(size(self.u_to_b), size(self.v_to_b)) - 1, 0) * 0.5
 
         self.q, self.near, self.du, self.dv = b.get(Q_, NEAR, DU, DV)
         # The first search, before which STATE is above 1, is of all that there is.
@@ -150,10 +153,11 @@ def _block(form, b):
     """COUNT of texels that hide part of the light, less at its rim, and the SUM of their distances in q."""
     light, step = _Light(form, b), b[TEXEL]
     soft, per = b[SOFT] + step, 1 / step
+    soft_a, soft_b = soft + light.thin_a * step, soft + light.thin_b * step
 
     def texel(z, x, y):
         is_hit, gap, a, b = light.meet(z, x, y)
-        reach_a, reach_b = light.half_a * gap + soft, light.half_b * gap + soft
+        reach_a, reach_b = light.half_a * gap + soft_a, light.half_b * gap + soft_b
         disc = clamp((reach_a * reach_a - a * a - b * b) * 0.5 * per / reach_a)
         square = clamp((reach_a - a) * per) * clamp((reach_b - b) * per)
         hit = where(is_hit, square + (disc - square) * light.is_round, 0)
@@ -167,16 +171,17 @@ def _filter(form, b):
     """SUM of the weights of texels in a filter as wide as the light is past blockers at MEAN; COUNT: of those it gets past."""
     light, soft, step = _Light(form, b), b[SOFT], b[TEXEL]
     radius_a, radius_b, per = most(light.half_a * b[MEAN], soft), most(light.half_b * b[MEAN], soft), 1 / step
-    soft_a, soft_b = radius_a * per + 0.5, radius_b * per + 0.5
+    soft_a, soft_b = radius_a * per + (light.thin_a + 0.5), radius_b * per + (light.thin_b + 0.5)
     # A disc's edge is one texel wide: near its rim (1 - d^2 / r^2) r / 2 is r - d.
     rim, fall = (soft_a + 0.5) * 0.5, 0.5 * per / radius_a
     # What lies deep behind others that are nearer to the light hides more than its own penumbra tells.
     deep_a, deep_b, soft = light.half_a * 3, light.half_b * 3, soft + step
+    near_a, near_b = soft + light.thin_a * step, soft + light.thin_b * step
     left = 1 - least(b[COUNT], 1)  # blockers come and go little by little
 
     def texel(z, x, y):
         is_hit, gap, a, b = light.meet(z, x, y)
-        reach_a, reach_b, far = deep_a * gap + soft, deep_b * gap + soft, a * a + b * b
+        reach_a, reach_b, far = deep_a * gap + near_a, deep_b * gap + near_b, a * a + b * b
         is_hit = is_hit & (a * a + b * b * light.is_round <= reach_a * reach_a) & (b <= reach_b)
         disc = clamp(rim - far * fall)
         square = clamp(soft_a - a * per) * clamp(soft_b - b * per)
@@ -225,7 +230,9 @@ def _tell_filtered(form, b):
     """STATE: the least share there is; half the REACH, 0 where that was narrow."""
     whole, reach = b[SUM], b[REACH]
     hidden = where(whole > 0, 1 - b[COUNT] / most(whole, 1e-6), 0)
-    b[STATE] = least(b[STATE], most(1 - hidden * form.one(DARKER), 0))
+    # Narrow filters find lit places before a wall most easily; wide penumbrae are darkened but little.
+    darker = 1 + (form.one(DARKER) - 1) * most(clamp(3 - b[RADIUS] / b[SOFT]), 0.15)
+    b[STATE] = least(b[STATE], most(1 - hidden * darker, 0))
     b[REACH] = where(reach > WIDE, reach * 0.5, 0)
 
 

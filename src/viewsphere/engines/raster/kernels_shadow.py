@@ -79,14 +79,16 @@ def _reach(corners, i, j, k, near, axis):
 
 
 @njit
-def draw_depth(corners, surfaces, textures, near, nearest, farthest):  # noqa: PLR0912, PLR0915, one loop
+def draw_depth(corners, surfaces, textures, begin, tilt, nearest, farthest):  # noqa: PLR0912, PLR0915, one loop
     """Draw q of all triangles over the texels' centres: the least into nearest (n, n + GAP), the greatest into farthest.
 
-    corners (V, 4) float64: the vertices seen from a view. Only what has w >= near is drawn, and only where a surface's alpha
-    reaches its material's L_CASTS_FROM. farthest may be (0, 0).
+    corners (V, 4) float64: the vertices seen from a view. Only what has w >= begin is drawn, or, where `tilt` is one over the
+    squared texels per length, what is as far from the eye; and only where a surface's alpha reaches its material's
+    L_CASTS_FROM. farthest may be (0, 0).
     """
     size = nearest.shape[0]
     half, last = 0.5 * size, size - 1.0
+    near = begin / math.sqrt(1.0 + 2.0 * half * half * tilt)
     both = farthest.shape[0] > 0
     triangles, looks, own = surfaces.triangles, surfaces.looks, surfaces.material
     for t in range(triangles.shape[0]):
@@ -127,7 +129,7 @@ def draw_depth(corners, surfaces, textures, near, nearest, farthest):  # noqa: P
                 x = column + 0.5 - half
                 ea, eb, ec = a0 * x + a1 * y + a2, b0 * x + b1 * y + b2, c0 * x + c1 * y + c2
                 total = ea + eb + ec
-                if ea < 0.0 or eb < 0.0 or ec < 0.0 or total * near > 1.0:
+                if ea < 0.0 or eb < 0.0 or ec < 0.0 or (total * begin) * (total * begin) > 1.0 + (x * x + y * y) * tilt:
                     continue
                 q = f4(q0 * x + q1 * y + q2)
                 is_near, is_far = q < nearest[U(row), U(column)], both and q > farthest[U(row), U(column)]

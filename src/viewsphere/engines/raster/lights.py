@@ -28,7 +28,7 @@ _FACE = 1.15  # half width of a cube's face at distance 1; only the middle 1.03 
 _READ = 1.03
 _WIDEST = 2.5  # tangent from which one perspective is too coarse
 _SHARPEST = 1.2  # texels: half the width of a filter, at least
-_TIGHT = 6.0, 4.0  # of a lamp that is shut in: half the width of a filter, and how many times what it hides counts
+_TIGHT = 6.0, 8.0  # of a lamp that is shut in: half the width of a filter, and how many times what it hides counts
 _MANY = 4  # fitted maps from which on all are half as wide
 
 
@@ -77,9 +77,9 @@ class Lights(NamedTuple):
 
 @dataclass(frozen=True)
 class View:
-    """One map to draw: the (4, 4) matrix from the world, from which w on, texels per length (at distance 1), the least
-    distance from the border at which it is read, and half the light's sides (2, 3) along the view's axes (per length), or the
-    radius and zeros if it is round; whether wide penumbrae are filtered finely.
+    """One map to draw: the (4, 4) matrix from the world, from which w on (from which distance on, if round), texels per length
+    (at distance 1), the least distance from the border at which it is read, and half the light's sides (2, 3) along the view's
+    axes (per length), or the radius and zeros if it is round; whether wide penumbrae are filtered finely.
     """
 
     matrix: Float
@@ -359,7 +359,8 @@ def draw_views(views: Sequence[View], casters: Casters, opposite: bool = False) 
         nearest.fill(np.inf)
         farthest = _level(result, i + len(views), view.size) if opposite else np.empty((0, 0), np.float32)
         farthest.fill(-np.inf)
-        kernels.draw_depth(corners, casters.surfaces, casters.textures, view.near, nearest, farthest)
+        tilt = float(form[i, kernels.TILT]) if view.is_round else 0.0
+        kernels.draw_depth(corners, casters.surfaces, casters.textures, view.near, tilt, nearest, farthest)
         np.negative(farthest, out=farthest)
     for i in range(count):
         _thin_out(result, i)

@@ -20,6 +20,7 @@ from viewsphere.truth.visibility import Visibility, lens_rays
 
 _NO_RAYS = np.zeros((0, 3), np.float32)
 _NO_PLACES = np.zeros((0, 2), np.float32)
+_AROUND = np.array([[-1, -1, -1, 0, 0, 1, 1, 1], [-1, 0, 1, -1, 1, -1, 0, 1]], np.int32)[..., None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +82,28 @@ def _smooth(baked: Baked, camera: Camera, visibility: Visibility, samples: Sampl
     if has_sky:
         colors[~is_own, 3] = 1  # the sky need not look there
         sky_behind(view, baked.surrounding, colors)
-    kernels_paint.average_samples(samples.pixels, like, colors, radiance)
+    glints, means = kernels_paint.average_samples(samples.pixels, like, colors, radiance)
+    brighten_lines(samples.pixels[glints], means, camera.width, radiance)
+
+
+def brighten_lines(pixels: Int32, means: Float32, width: int, radiance: Float32) -> None:
+    """Give pixels (G,) whose glints are dimmed so much of their true light (G, 3) that they are as bright as two pixels around:
+    a bright line is as bright as it is.
+    """
+    y, x = np.divmod(pixels, np.int32(width))
+    rows, columns = _AROUND[0] + y, _AROUND[1] + x
+    is_outside = (rows < 0) | (rows >= len(radiance) // width) | (columns < 0) | (columns >= width)
+    dimmed = radiance[pixels, :3]
+    radiance[pixels, :3] = means
+    around = radiance.take(rows * width + columns, axis=0, mode="clip")
+    levels = np.maximum(np.maximum(around[..., 0], around[..., 1]), around[..., 2])
+    levels[is_outside] = 0
+    first = second = np.zeros(len(pixels), np.float32)
+    for level in levels:
+        first, second = np.maximum(first, level), np.maximum(second, np.minimum(first, level))
+    bright, dim = means.max(axis=1), dimmed.max(axis=1)
+    share = np.clip((second - dim) / np.maximum(bright - dim, np.float32(1e-6)), 0, 1)
+    radiance[pixels, :3] = dimmed + (means - dimmed) * share[:, None]
 
 
 def _shade(
