@@ -20,7 +20,7 @@ SIZE = 16
 def compile_kernels(shot: Shot) -> None:
     """Render one tiny frame of two cards with the shot's engine, channels, scene and lens; the picture is thrown away.
 
-    The first time on a machine this takes some 25 CPU-seconds, later one or two.
+    The first time on a machine this takes some 20 CPU-seconds, later one or two.
     """
     lens = shot.intrinsics
     tiny = Intrinsics(width=SIZE, height=SIZE, fx=SIZE, fy=SIZE, cx=SIZE / 2, cy=SIZE / 2, distortion=lens.distortion)
