@@ -11,6 +11,14 @@ settings.register_profile("repeatable", derandomize=True, database=None, deadlin
 settings.load_profile("repeatable")
 
 
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items):
+    """What starts Blender is slow, and in the default suite's five minutes there is no room for hundreds of starts."""
+    for item in items:
+        if "blender" in getattr(item, "fixturenames", ()):
+            item.add_marker(pytest.mark.slow)
+
+
 @pytest.fixture(scope="session")
 def small_run(tmp_path_factory):
     """An undisturbed run of the small recipe in this process; do not change it."""
