@@ -106,6 +106,7 @@ def test_the_store_keeps_the_shots_as_they_were_rendered(small_run):
         assert kept == shot
 
 
+@pytest.mark.usefixtures("asked")
 def test_a_shot_that_cannot_be_read_is_one_line(small_dataset):
     key, _ = next(small_dataset.shots())
     (small_dataset.store.shot_folder(key) / "shot.json").write_text('{"key": 3}')
