@@ -31,7 +31,7 @@ from viewsphere.model.sample import Sample
 from viewsphere.model.shot import Frame, Shot
 from viewsphere.run.stages import Stages
 from viewsphere.sampling.plan import SHOT_FRAMES
-from viewsphere.sampling.viewpoints import camera_for
+from viewsphere.sampling.camera import camera_for
 from viewsphere.store import Store
 from viewsphere.truth.channels import observe
 from viewsphere.truth.visibility import rasterize

@@ -26,7 +26,7 @@ from viewsphere.engines.cycles.staging import CyclesStage
 from viewsphere.geometry.box import box_vertices
 from viewsphere.model.shot import Shot
 from viewsphere.run.stages import Stages
-from viewsphere.sampling.viewpoints import camera_for
+from viewsphere.sampling.camera import camera_for
 from viewsphere.surroundings.sky import sky_pictures
 from viewsphere.surroundings.sun import sun_light
 from viewsphere.truth.channels import observe

@@ -19,7 +19,8 @@ from viewsphere.errors import MissingExtraError
 from viewsphere.model.channel import CHANNELS
 from viewsphere.model.files import Files
 from viewsphere.model.recipe import Recipe
-from viewsphere.run.stages import Stages, prepare
+from viewsphere.run.opening import prepare
+from viewsphere.run.stages import Stages
 from viewsphere.sampling.extension import whole
 from viewsphere.store import encode
 

@@ -18,7 +18,7 @@ from viewsphere.model.camera import Intrinsics
 from viewsphere.model.scene import Ground, Scene, Sun
 from viewsphere.model.shot import Frame, ModelSpec, Placement, Pose, Shot
 from viewsphere.run.allocator import keep_freed_memory
-from viewsphere.sampling.viewpoints import camera_for
+from viewsphere.sampling.camera import camera_for
 from viewsphere.truth.channels import observe
 from viewsphere.truth.visibility import rasterize
 

@@ -31,7 +31,7 @@ from viewsphere.imaging.view import develop
 from viewsphere.model.camera import Camera, Intrinsics
 from viewsphere.model.scene import AreaLight, Environment, Ground, PointLight, Scene, Sky, SpotLight, Sun, View
 from viewsphere.model.shot import Frame, ModelSpec, Placement, Pose, Shot
-from viewsphere.sampling.viewpoints import camera_for
+from viewsphere.sampling.camera import camera_for
 from viewsphere.truth.visibility import rasterize
 from viewsphere.zoo import build
 

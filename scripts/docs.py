@@ -12,7 +12,7 @@ from typing import Any, get_args
 import numpy as np
 from typer.models import ArgumentInfo
 
-from viewsphere import cli
+from viewsphere.cli.commands import app
 from viewsphere.model.channel import CHANNELS
 from viewsphere.model.recipe_file import schema
 
@@ -23,7 +23,7 @@ NOTE = "<!-- written by scripts/docs; do not edit -->\n\n"
 def cli_page() -> str:
     text = NOTE + "# Command line\n\n"
     text += "Exit status: 0 done, 1 a data set failed its check, 2 a mistake that can be mended, 130 stopped with Ctrl-C.\n"
-    for command in cli.app.registered_commands:
+    for command in app.registered_commands:
         function = command.callback
         assert function is not None
         rows = [row(p) for p in inspect.signature(function, eval_str=True).parameters.values()]

@@ -19,7 +19,8 @@ from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.model.scene import Background, Finish, Scene
 from viewsphere.model.shot import Frame, Placement, Pose, Shot
 from viewsphere.preview import INK, PALETTE, PAPER, draw_sample
-from viewsphere.run.stages import Stages, prepare
+from viewsphere.run.opening import prepare
+from viewsphere.run.stages import Stages
 
 ROOT = Path(__file__).parent.parent
 IMAGES = ROOT / "docs" / "images"

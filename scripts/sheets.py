@@ -36,7 +36,7 @@ from viewsphere.model.scene import (
 )
 from viewsphere.model.shot import Frame, ModelSpec, Placement, Pose, Shot
 from viewsphere.run.stages import build_zoo_model
-from viewsphere.sampling.viewpoints import camera_for
+from viewsphere.sampling.camera import camera_for
 from viewsphere.truth.visibility import rasterize
 from viewsphere.zoo import build
 

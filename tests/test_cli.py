@@ -32,7 +32,7 @@ def fails(*words, cwd=None):
 
 def test_import_and_help_do_not_load_the_heavy_packages():
     code = (
-        "import sys, viewsphere, viewsphere.cli\n"
+        "import sys, viewsphere, viewsphere.cli.commands\n"
         "heavy = {'numba', 'trimesh', 'numpy', 'pydantic', 'PIL', 'scipy', 'yaml'} & set(sys.modules)\n"
         "print(sorted(heavy))"
     )

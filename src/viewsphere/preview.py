@@ -17,7 +17,8 @@ from viewsphere.model.recipe import Recipe
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.model.scene import Ground, Scene
 from viewsphere.model.shot import Frame, ModelSpec, Placement, Pose, Shot
-from viewsphere.run.stages import Stages, prepare
+from viewsphere.run.opening import prepare
+from viewsphere.run.stages import Stages
 from viewsphere.sampling.plan import Plan
 from viewsphere.store import Dataset
 

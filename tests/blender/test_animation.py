@@ -19,7 +19,7 @@ from viewsphere.geometry.camera import project
 from viewsphere.model.shot import ModelSpec
 from viewsphere.run.importing import import_dataset
 from viewsphere.run.stages import Stages
-from viewsphere.sampling.viewpoints import camera_for
+from viewsphere.sampling.camera import camera_for
 from viewsphere.store import Choice
 
 FRAMES = (1, 13, 25)

@@ -9,15 +9,15 @@ import pytest
 from fake_blender import LACKING, blind_blender, fake_blender, with_modules, without_blender
 from typer.testing import CliRunner
 
-from viewsphere import cli
 from viewsphere.blender import environment
 from viewsphere.blender.interpreter import VARIABLE
+from viewsphere.cli.commands import app
 
 pytestmark = pytest.mark.timeout(60)
 
 
 def doctor(*words):
-    run = CliRunner().invoke(cli.app, ["doctor", *words])
+    run = CliRunner().invoke(app, ["doctor", *words])
     assert run.exit_code == 0, run.output
     return run
 

@@ -17,7 +17,7 @@ from viewsphere.engines.cycles.staging import told_camera
 from viewsphere.errors import RecipeError
 from viewsphere.model.shot import ModelSpec
 from viewsphere.run.stages import Stages
-from viewsphere.sampling.viewpoints import camera_for
+from viewsphere.sampling.camera import camera_for
 from viewsphere.truth.visibility import rasterize
 
 pytestmark = [pytest.mark.timeout(300), pytest.mark.usefixtures("blender")]

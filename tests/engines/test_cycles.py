@@ -16,7 +16,7 @@ from viewsphere import render
 from viewsphere.assets.srgb import linear
 from viewsphere.engines.cycles.staging import border_of, keeper_of
 from viewsphere.errors import UserError
-from viewsphere.sampling.viewpoints import camera_for
+from viewsphere.sampling.camera import camera_for
 from viewsphere.truth.visibility import rasterize
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(600), pytest.mark.usefixtures("blender")]

@@ -21,7 +21,7 @@ from viewsphere.assets.srgb import linear
 from viewsphere.blender.interpreter import probe
 from viewsphere.engines.cycles.staging import Keeper, border_of, clip_of, keeper_of
 from viewsphere.errors import UserError
-from viewsphere.sampling.viewpoints import camera_for
+from viewsphere.sampling.camera import camera_for
 from viewsphere.truth.visibility import rasterize
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(900), pytest.mark.usefixtures("drawing")]

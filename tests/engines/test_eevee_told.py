@@ -19,8 +19,8 @@ from viewsphere.engines.cycles.staging import SPARE, clip_of
 from viewsphere.engines.cycles.told import told_scene, told_settings
 from viewsphere.errors import RecipeError
 from viewsphere.imaging.finish import finished
+from viewsphere.sampling.camera import camera_for
 from viewsphere.sampling.look import engine_look
-from viewsphere.sampling.viewpoints import camera_for
 from viewsphere.truth.geometry import build_geometry
 from viewsphere.truth.visibility import rasterize
 

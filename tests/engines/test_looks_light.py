@@ -14,7 +14,7 @@ from viewsphere.engines.raster.environment import bake_surrounding, sky_lights
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.scene import AreaLight, Daylight, Ground, PointLight, Scene, Sky, SpotLight, Sun
 from viewsphere.model.shot import Frame, ModelSpec, Placement, Pose, Shot
-from viewsphere.sampling.viewpoints import camera_for
+from viewsphere.sampling.camera import camera_for
 from viewsphere.surroundings.daylight import air, daylight_picture, opening
 from viewsphere.truth.visibility import rasterize
 

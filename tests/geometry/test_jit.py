@@ -51,3 +51,36 @@ def test_a_cached_kernel_is_not_prepared_for_compiling(tmp_path):
         for _ in range(2)
     ]
     assert said == ["True\n", "False\n"]
+
+
+CALLEE = """
+from viewsphere.geometry.jit import njit
+
+@njit
+def tripled(numbers, i):
+    return 3.0 * numbers[i]
+"""
+
+CALLER = """
+import numpy as np
+from callee import tripled
+from viewsphere.geometry.jit import njit
+
+@njit
+def sum_of_two(numbers):
+    return tripled(numbers, 0) + tripled(numbers, 1)
+"""
+
+
+def test_a_cached_kernel_can_become_part_of_one_that_is_compiled(tmp_path):
+    (tmp_path / "callee.py").write_text(CALLEE)
+    (tmp_path / "caller.py").write_text(CALLER)
+    environment = {**os.environ, "VIEWSPHERE_CACHE": str(tmp_path), "PYTHONPATH": str(tmp_path)}
+    first = "import numpy as np; from callee import tripled; print(tripled(np.arange(9.0), 5))"
+    second = f"{first}; from caller import sum_of_two; print(sum_of_two(np.arange(5.0, 9.0)))"
+    said = [
+        subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True).stdout
+        for code in (first, second)
+    ]
+    assert said == ["15.0\n", "15.0\n33.0\n"]
+    assert len(list(tmp_path.rglob("*.nbi"))) == 2

@@ -1,12 +1,16 @@
 """The pool hands out what is warm, keeps everybody busy, and survives the death of its workers."""
 
 import os
+import signal
 from collections import Counter
+from multiprocessing import active_children
 
 import pytest
 
 from viewsphere.errors import UserError, ViewsphereError
-from viewsphere.run.pool import Job, Queue, run_jobs
+from viewsphere.model.shot import ModelSpec
+from viewsphere.run.pool import Crew, Job, Queue
+from viewsphere.run.tasks import MODELS, Task
 
 
 def jobs(**counts):
@@ -62,12 +66,44 @@ class Deadly:
 
 
 def test_a_worker_that_dies_costs_a_retry_then_an_error(tmp_path):
-    outcomes = list(run_jobs([Job("x", "x", Deadly)], tmp_path, 1))
+    with Crew(tmp_path, 1) as crew:
+        outcomes = list(crew.run([Job("x", "x", Deadly)]))
     assert len(outcomes) == 1
     assert "died 2 times (exit code 3)" in str(outcomes[0].error)
 
 
 def test_what_a_worker_cannot_do_ends_the_run_with_its_traceback(tmp_path):
-    with pytest.raises(ViewsphereError, match=r"x: a worker failed\nTraceback(.|\n)*AttributeError") as caught:
-        list(run_jobs([Job("x", "x", dict)], tmp_path, 1))
+    with (
+        pytest.raises(ViewsphereError, match=r"x: a worker failed\nTraceback(.|\n)*AttributeError") as caught,
+        Crew(tmp_path, 1) as crew,
+    ):
+        list(crew.run([Job("x", "x", dict)]))
     assert not isinstance(caught.value, UserError)
+
+
+CHAIR = ModelSpec(key="chair", source="zoo:chair", category="chair", category_id=1, seed=1)
+
+
+def look_at_chair():
+    return Task("same model", "chair", "chair", MODELS.dump_json((CHAIR,)).decode())
+
+
+def test_workers_stay_for_the_next_list_and_one_that_died_meanwhile_is_replaced(tmp_path):
+    def pids():
+        return {child.pid for child in active_children()} - before
+
+    before, job = {child.pid for child in active_children()}, Job("chair", "chair", look_at_chair)
+    with Crew(tmp_path, 1) as crew:
+        first = list(crew.run([job])), pids()
+        second = list(crew.run([job, job])), pids()
+        os.kill(*first[1], signal.SIGKILL)
+        third = list(crew.run([job])), pids()
+    assert [len(outcomes) for outcomes, _ in (first, second, third)] == [1, 2, 1]
+    assert not any(outcome.error for outcomes, _ in (first, second, third) for outcome in outcomes)
+    assert first[1] == second[1] and len(third[1]) == 1 and third[1] != first[1]
+    assert not pids()
+
+
+def test_those_who_have_something_warm_count_before_they_ask():
+    queue = Queue(jobs(a=2, b=2), ["a"])
+    assert queue.next("").affinity == "b"

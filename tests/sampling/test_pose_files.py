@@ -13,9 +13,9 @@ from viewsphere.geometry.camera import orbit_angles, orbit_center, orbit_rotatio
 from viewsphere.geometry.rotation import quaternion_from_matrix
 from viewsphere.model.camera import Distortion, Intrinsics
 from viewsphere.model.recipe import Recipe
+from viewsphere.sampling.camera import camera_for
 from viewsphere.sampling.plan import plan
 from viewsphere.sampling.pose_files import read_poses
-from viewsphere.sampling.viewpoints import camera_for
 
 LENS = Intrinsics(width=64, height=48, fx=60, fy=60, cx=32, cy=24)
 OPENGL = np.diag([1.0, -1.0, -1.0, 1.0])

@@ -13,7 +13,8 @@ from viewsphere.model.camera import Intrinsics
 from viewsphere.model.recipe import Recipe
 from viewsphere.model.recipe_viewpoints import Range, axis_count, axis_value
 from viewsphere.model.shot import Pose
-from viewsphere.sampling.viewpoints import camera_for, distance_problem, poses
+from viewsphere.sampling.camera import camera_for, distance_problem
+from viewsphere.sampling.viewpoints import poses
 
 
 def make(seed=0, **viewpoints):

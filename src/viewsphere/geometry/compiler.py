@@ -5,16 +5,17 @@ Two thirds of the time it takes is Python's own, not LLVM's.
 
 # pyright: reportAttributeAccessIssue=false, reportPrivateUsage=false, reportMissingTypeArgument=false
 # pyright: reportUnknownMemberType=false, reportUnknownVariableType=false, reportUnknownArgumentType=false
+# pyright: reportUnnecessaryComparison=false
 # Only through its internals does numba let others choose what is done when.
 
 from __future__ import annotations
 
-import gc
 from collections.abc import Callable, Generator
 from contextlib import ExitStack, contextmanager
-from functools import cache
+from functools import cache, partial
 from typing import Any
 
+import llvmlite.binding
 import numba
 from numba import _dynfunc
 from numba.core import types
@@ -46,6 +47,8 @@ from numba.core.untyped_passes import (
     RewriteSemanticConstants,
     TranslateByteCode,
 )
+
+from viewsphere.geometry.garbage import pause_collection
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)
@@ -146,18 +149,6 @@ def _quickly() -> Generator[None]:
         yield
 
 
-@contextmanager
-def pause_collection() -> Generator[None]:
-    """No garbage is collected while the context lasts: among millions of living objects that would be a quarter of the time."""
-    collects = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if collects:
-            gc.enable()
-
-
 class _Whole(JITCodeLibrary):
     """Code that is optimized once, with all of its parts: numba's own goes through three times."""
 
@@ -214,14 +205,45 @@ class Part(Kernel):
         return made._replace(entry_point=key)
 
 
+class _Cached(JITCodeLibrary):
+    """Code from the cache. What others link of it is read when they do, and nobody lists its symbols: half of the time."""
+
+    def __init__(self, codegen: Any, name: str, bitcode: bytes) -> None:
+        super().__init__(codegen, name)
+        self._bitcode = bitcode
+
+    @classmethod
+    def _unserialize(cls, codegen: Any, state: Any) -> Any:
+        name, _, (machine_code, bitcode) = state
+        self = cls(codegen, name, bitcode)
+        self.enable_object_caching()
+        self._set_compiled_object(machine_code)
+        self._finalize_final_module()
+        return self
+
+    def _get_module_for_linking(self) -> Any:
+        if self._shared_module is None:
+            self._shared_module = llvmlite.binding.parse_bitcode(self._bitcode)
+        return self._shared_module
+
+    def get_pointer_to_function(self, name: str) -> int:
+        """Returns where the function of this name begins, one that it has."""
+        return self._codegen._engine.get_function_address(name)
+
+
 class KernelCache(FunctionCache):
     """numba's cache of a function, which does not prepare to compile before it looks whether it has to: that takes a second."""
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """The compiled function for these types, None if it has none."""
         rtsys.initialize(target_context)
-        with self._guard_against_spurious_io_errors():
-            return self._load_overload(sig, target_context)
+        codegen = target_context.codegen()
+        codegen.unserialize_library = partial(_Cached._unserialize, codegen)
+        try:
+            with self._guard_against_spurious_io_errors():
+                return self._load_overload(sig, target_context)
+        finally:
+            del codegen.unserialize_library
 
 
 PART: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "pipeline_class": Part}

@@ -17,16 +17,14 @@ from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
-import llvmlite.binding
 import numba
-import platformdirs
 from numba.core import config
 
 from viewsphere.geometry import compiler
+from viewsphere.geometry.kernel_cache import BUILD, kernel_folder
 
 _IMPORT = re.compile(r"^from (viewsphere[\w.]*) import", re.MULTILINE)
 _COMPILER = tuple(str(Path(__file__).with_name(f"{name}.py")) for name in ("jit", "compiler", "lowering"))
-_BUILD = (numba.__version__, llvmlite.binding.get_host_cpu_name(), os.environ.get("NUMBA_BOUNDSCHECK"))
 
 
 def njit(function: Callable[..., Any] | None = None, **options: Any) -> Any:
@@ -56,11 +54,6 @@ def inner(function: Callable[..., Any] | None = None, **options: Any) -> Any:
     return numba.njit(nogil=True, error_model="numpy", **part)(function)
 
 
-def kernel_folder() -> Path:
-    """Where compiled kernels are kept: `$VIEWSPHERE_CACHE/kernels`, else in the user's cache folder."""
-    return Path(os.environ.get("VIEWSPHERE_CACHE") or platformdirs.user_cache_dir("viewsphere")) / "kernels"
-
-
 @cache
 def _sources(file: str) -> frozenset[str]:
     """A kernel's file, the kernels' files within its reach, and the files that those import from here for their constants."""
@@ -78,7 +71,7 @@ def _sources(file: str) -> frozenset[str]:
 @cache
 def _cache_folder(sources: frozenset[str]) -> str:
     """A writable folder for these sources: in the user's cache, else in the temporary folder."""
-    digest = hashlib.sha256(repr(_BUILD).encode())
+    digest = hashlib.sha256(repr(BUILD).encode())
     for source in (*_COMPILER, *sorted(sources)):
         digest.update(Path(source).read_bytes())
     for root in (kernel_folder(), Path(tempfile.gettempdir()) / f"viewsphere-{Path.home().name}" / "kernels"):

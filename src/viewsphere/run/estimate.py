@@ -19,10 +19,9 @@ from tempfile import TemporaryDirectory
 from viewsphere import plugins
 from viewsphere.model.recipe import Recipe
 from viewsphere.model.shot import ModelSpec
-from viewsphere.run.opening import to_render
-from viewsphere.run.stages import prepare
+from viewsphere.run.opening import prepare, to_render
 from viewsphere.run.tasks import Task, Worker
-from viewsphere.run.warm import compile_kernels
+from viewsphere.run.warm import load_kernels
 from viewsphere.sampling.plan import Plan
 from viewsphere.store import Dataset, Store
 
@@ -87,7 +86,7 @@ def _measure_in(planned: Plan, store: Store, stopwatch: _Stopwatch) -> Rates:
     model = stopwatch.mean([_model_work(store, spec) for spec in specs])
     worker = Worker(store.root)  # one that did not make the models: in a run that is seldom the one that renders them
     shots = [planned.shot(index, worker.stages.box) for indices in chosen.values() for index in indices]
-    compile_kernels(shots[0])
+    load_kernels(shots[0])
     begun = frame = 0.0
     for shot in shots:
         begun += stopwatch(lambda shot=shot: next(worker.stages.render(shot)))

@@ -14,10 +14,10 @@ from viewsphere.errors import ModelError, RecipeError, UserError, ViewsphereErro
 from viewsphere.model.channel import missing
 from viewsphere.model.recipe import Recipe
 from viewsphere.model.shot import ModelSpec
-from viewsphere.run.opening import commit, to_append, to_render
-from viewsphere.run.pool import Job, Outcome, run_jobs
+from viewsphere.run.opening import commit, prepare, to_append, to_render
+from viewsphere.run.pool import Crew, Job, Outcome
 from viewsphere.run.skies import check_skies
-from viewsphere.run.stages import Stages, StoredBoxes, prepare
+from viewsphere.run.stages import Stages, StoredBoxes
 from viewsphere.run.tasks import MODELS, Kind, Task
 from viewsphere.run.unpainted import unpainted
 from viewsphere.run.warm import compile_kernels
@@ -94,11 +94,11 @@ def generate(
         store.make_ready()
     else:
         store.open_for(portion.record)
-    with recipe.located(), store.occupied():
+    with recipe.located(), store.occupied(), Crew(store.root, workers) as crew:
         if portion.adds_nothing:
-            _compare_models(portion, store, workers)
+            _compare_models(portion, store, crew)
         notes = () if portion.adds_nothing else _check_skies(portion, store, tell)
-        rendered, skipped = (0, {}) if portion.adds_nothing else _render_part(portion, store, workers, keep_going, tell)
+        rendered, skipped = (0, {}) if portion.adds_nothing else _render_part(portion, store, crew, keep_going, tell)
         notes += export(store.root, wanted, listener=tell)
     if append and not rendered:
         notes += (f"{store.root}: nothing to add, it has all that the recipe asks for",)
@@ -138,30 +138,30 @@ def _check_skies(portion: Portion, store: Store, tell: Listener) -> tuple[str, .
     return check_skies(portion.plan, lambda done, total: tell(Progress("skies", done, total)))
 
 
-def _render_part(portion: Portion, store: Store, workers: int, keep_going: bool, tell: Listener) -> tuple[int, dict[str, str]]:
+def _render_part(portion: Portion, store: Store, crew: Crew, keep_going: bool, tell: Listener) -> tuple[int, dict[str, str]]:
     """Make the part's models, take it into the data set, render its shots; gives the frames made and what was left out."""
     if portion.number:
         store.drop_unnamed_models()  # of appending that ended before it began
     try:
-        skipped = _prepare_models(portion, store, workers, keep_going, tell)
+        skipped = _prepare_models(portion, store, crew, keep_going, tell)
         commit(portion, store)
     except ViewsphereError:
         if portion.number:
             store.drop_unnamed_models()
         raise
-    rendered = _render_shots(portion, store, workers, keep_going, skipped, tell)
+    rendered = _render_shots(portion, store, crew, keep_going, skipped, tell)
     _note_skipped(portion, store, skipped)
     return rendered, skipped
 
 
-def _prepare_models(portion: Portion, store: Store, workers: int, keep_going: bool, tell: Listener) -> dict[str, str]:
+def _prepare_models(portion: Portion, store: Store, crew: Crew, keep_going: bool, tell: Listener) -> dict[str, str]:
     """Normalise and export every model; gives the keys left out, and why."""
     planned = portion.plan
     jobs = _model_jobs("same model" if portion.number else "model", portion.model_specs)
     total = len(jobs)
     failed: dict[str, ViewsphereError] = {}
     tell(Progress("models", 0, total))
-    for done, outcome in enumerate(run_jobs(jobs, store.root, min(workers, total)), 1):
+    for done, outcome in enumerate(crew.run(jobs), 1):
         if outcome.error is not None:
             failed[outcome.key] = outcome.error
         tell(Progress("models", done, total))
@@ -185,11 +185,11 @@ def _model_jobs(kind: Kind, specs: Sequence[ModelSpec]) -> list[Job]:
     ]
 
 
-def _compare_models(portion: Portion, store: Store, workers: int) -> None:
+def _compare_models(portion: Portion, store: Store, crew: Crew) -> None:
     """Raises StoreError where a model is no longer the one that the data set shows."""
     specs = [spec for spec in portion.model_specs if store.model_info(spec.key) is not None]
     jobs = _model_jobs("same model", specs)
-    errors = [outcome.error for outcome in run_jobs(jobs, store.root, min(workers, len(jobs))) if outcome.error]
+    errors = [outcome.error for outcome in crew.run(jobs) if outcome.error]
     if errors:
         raise _joined(errors)
 
@@ -215,9 +215,7 @@ def _joined(errors: Sequence[ViewsphereError]) -> ViewsphereError:
     return kind("\n".join(dict.fromkeys(str(e) for e in errors)))
 
 
-def _render_shots(
-    portion: Portion, store: Store, workers: int, keep_going: bool, skipped: dict[str, str], tell: Listener
-) -> int:
+def _render_shots(portion: Portion, store: Store, crew: Crew, keep_going: bool, skipped: dict[str, str], tell: Listener) -> int:
     """Render the shots that the store lacks; gives the number of frames made. Failed shots land in `skipped`."""
     table = list(_wanted(portion, skipped))
     missing = [row for row in table if not store.has_shot(row[0])]
@@ -231,7 +229,7 @@ def _render_shots(
         compile_kernels(portion.shot(missing[0], box_of))
         tell(Progress("kernels", 1, 1))
     tell(Progress("frames", resumed, total, resumed))
-    for outcome in run_jobs([_shot_job(portion, row, box_of) for row in missing], store.root, workers):
+    for outcome in crew.run([_shot_job(portion, row, box_of) for row in missing]):
         _accept(outcome, keep_going, skipped)
         rendered += outcome.frames
         tell(Progress("frames", resumed + rendered, total, resumed))

@@ -6,7 +6,8 @@ from collections.abc import Iterator
 
 from viewsphere.model.recipe import Recipe
 from viewsphere.model.sample import Sample
-from viewsphere.run.stages import Stages, prepare
+from viewsphere.run.opening import prepare
+from viewsphere.run.stages import Stages
 
 
 def render(recipe: Recipe) -> Iterator[Sample]:

@@ -1,4 +1,4 @@
-"""From a recipe's plan and an output folder to the part of the data set that is to be rendered."""
+"""From a recipe and an output folder to the part of the data set that is to be rendered."""
 
 from __future__ import annotations
 
@@ -6,10 +6,23 @@ from contextlib import suppress
 from importlib.metadata import version
 
 from viewsphere.errors import StoreError
+from viewsphere.model.recipe import Recipe
 from viewsphere.sampling.extension import LOOK, Portion, extend, whole
 from viewsphere.sampling.look import engine_look
-from viewsphere.sampling.plan import Plan
-from viewsphere.store import PlanRecord, Store
+from viewsphere.sampling.plan import Plan, check_engine, check_images, plan
+from viewsphere.store import PlanRecord, Store, check_codecs
+
+
+def prepare(recipe: Recipe) -> Plan:
+    """The recipe's plan, once everything is checked that can be before a model is read.
+
+    Raises UserError for the user's mistakes: files, names, counts, engine options, background images.
+    """
+    planned = plan(recipe)
+    check_engine(recipe)
+    check_images(planned)
+    check_codecs(recipe.channels, recipe.files)
+    return planned
 
 
 def to_render(planned: Plan, store: Store) -> Portion:

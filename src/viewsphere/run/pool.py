@@ -15,9 +15,12 @@ from dataclasses import dataclass
 from multiprocessing import get_context
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from viewsphere.errors import UserError, ViewsphereError
+
+if TYPE_CHECKING:
+    from viewsphere.run.tasks import Worker
 
 LIVES = 2
 """How often a task is tried when its process dies."""
@@ -41,74 +44,95 @@ class Outcome:
     error: ViewsphereError | None = None
 
 
-def run_jobs(jobs: Iterable[Job], root: Path, workers: int) -> Iterator[Outcome]:
-    """Do all jobs, in this process (0 workers) or in so many others; outcomes come as they are ready.
+class Crew:
+    """So many workers for one data set, this process itself if none; those that have come stay until the context ends.
 
-    A UserError is an outcome; anything else a worker raises ends the run with its traceback.
+    A worker comes when there is a job for it, and takes a second.
     """
-    if workers == 0:
-        yield from _run_here(jobs, root)
-        return
-    queue = Queue(jobs)
-    crew: dict[Connection, _Hand] = {}
-    try:
-        for _ in range(min(workers, len(queue))):
-            hand = _Hand(root)
-            crew[hand.pipe] = hand
-            hand.give(queue.next(hand.affinity))
-        while crew:
-            for pipe in wait(list(crew)):
-                assert isinstance(pipe, Connection)
-                yield from _hear(crew, pipe, queue, root)
-    finally:
-        for hand in crew.values():
+
+    def __init__(self, root: Path, workers: int) -> None:
+        self._root = root
+        self._workers = workers
+        self._hands: list[_Hand] = []
+        self._here: Worker | None = None
+
+    def __enter__(self) -> Crew:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for hand in self._hands:
             hand.stop()
+        self._hands.clear()
 
+    def run(self, jobs: Iterable[Job]) -> Iterator[Outcome]:
+        """Do all jobs, one list at a time; outcomes come as they are ready.
 
-def _run_here(jobs: Iterable[Job], root: Path) -> Iterator[Outcome]:
-    from viewsphere.run.tasks import Worker
+        A UserError is an outcome; anything else a worker raises ends the run with its traceback.
+        """
+        if self._workers == 0:
+            yield from self._run_here(jobs)
+            return
+        queue = Queue(jobs, [hand.affinity for hand in self._hands])
+        busy: dict[Connection, _Hand] = {}
+        for hand in self._come(min(self._workers, len(queue))):
+            busy[hand.pipe] = hand
+            hand.give(queue.next(hand.affinity))
+        while busy:
+            for pipe in wait(list(busy)):
+                assert isinstance(pipe, Connection)
+                yield from self._hear(busy, pipe, queue)
 
-    worker = Worker(root)
-    for job in jobs:
+    def _run_here(self, jobs: Iterable[Job]) -> Iterator[Outcome]:
+        from viewsphere.run.tasks import Worker
+
+        self._here = self._here or Worker(self._root)
+        for job in jobs:
+            try:
+                yield Outcome(job.key, self._here.do(job.make()))
+            except UserError as error:
+                yield Outcome(job.key, error=error)
+
+    def _come(self, number: int) -> list[_Hand]:
+        """So many hands, those that are here first."""
+        while len(self._hands) < number:
+            self._hands.append(_Hand(self._root))
+        return self._hands[:number]
+
+    def _hear(self, busy: dict[Connection, _Hand], pipe: Connection, queue: Queue) -> Iterator[Outcome]:
+        """Take one answer, or the news of a death, and hand out the next job."""
+        hand = busy.pop(pipe)
+        job = hand.job
+        assert job is not None
         try:
-            yield Outcome(job.key, worker.do(job.make()))
-        except UserError as error:
-            yield Outcome(job.key, error=error)
-
-
-def _hear(crew: dict[Connection, _Hand], pipe: Connection, queue: Queue, root: Path) -> Iterator[Outcome]:
-    """Take one answer, or the news of a death, and hand out the next job."""
-    hand = crew[pipe]
-    job = hand.job
-    assert job is not None
-    try:
-        answer: Outcome | str = pipe.recv()
-    except EOFError:
-        del crew[pipe]
-        code = hand.stop()
-        if not queue.again(job):
-            yield Outcome(job.key, error=ViewsphereError(f"{job.key}: its worker died {LIVES} times (exit code {code})"))
+            answer: Outcome | str = pipe.recv()
+        except (EOFError, ConnectionResetError):
+            self._hands.remove(hand)
+            code = hand.stop()
+            if not queue.again(job):
+                yield Outcome(job.key, error=ViewsphereError(f"{job.key}: its worker died {LIVES} times (exit code {code})"))
+            if queue:
+                hand = _Hand(self._root)
+                self._hands.append(hand)
+                busy[hand.pipe] = hand
+                hand.give(queue.next(""))
+            return
+        if isinstance(answer, str):
+            raise ViewsphereError(f"{job.key}: a worker failed\n{answer}")
         if queue:
-            fresh = _Hand(root)
-            crew[fresh.pipe] = fresh
-            fresh.give(queue.next(""))
-        return
-    if isinstance(answer, str):
-        raise ViewsphereError(f"{job.key}: a worker failed\n{answer}")
-    if queue:
-        hand.give(queue.next(hand.affinity))
-    else:
-        del crew[pipe]
-        hand.stop()
-    yield answer
+            busy[pipe] = hand
+            hand.give(queue.next(hand.affinity))
+        yield answer
 
 
 class Queue:
-    """Jobs by affinity: a worker is given what it has warm, then what nobody has, then of what most is left."""
+    """Jobs by affinity: a worker is given what it has warm, then what nobody has, then of what most is left.
 
-    def __init__(self, jobs: Iterable[Job]) -> None:
+    `warm`: what those have who have not asked yet.
+    """
+
+    def __init__(self, jobs: Iterable[Job], warm: Iterable[str] = ()) -> None:
         self._left: dict[str, deque[Job]] = {}
-        self._takers: Counter[str] = Counter()
+        self._takers = Counter(warm)
         self._tries: Counter[str] = Counter()
         for job in jobs:
             self._left.setdefault(job.affinity, deque()).append(job)

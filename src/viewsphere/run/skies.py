@@ -6,7 +6,6 @@ from collections.abc import Callable
 from pathlib import Path
 
 from viewsphere.sampling.plan import Plan
-from viewsphere.surroundings.environment_file import read_environment
 
 MOST_SKIES = 64
 """Files that are decoded before rendering, half a second each of 4,096 x 2,048 texels; the others are when their turn comes."""
@@ -21,6 +20,8 @@ def check_skies(planned: Plan, tell: Callable[[int, int], None]) -> tuple[str, .
     chosen = list(files)[:: -(-len(files) // MOST_SKIES) or 1]
     notes: list[str] = []
     for done, file in enumerate(chosen):
+        from viewsphere.surroundings.environment_file import read_environment  # which takes a third of a second to load
+
         tell(done, len(chosen))
         notes += read_environment(Path(file)).notes
         tell(done + 1, len(chosen))

@@ -1,38 +1,84 @@
-"""Compile every kernel a shot needs in this process, so that workers find them in the cache."""
+"""Compile every kernel a shot needs before workers come, which find them in the cache."""
 
 from __future__ import annotations
 
+import hashlib
+import json
+from contextlib import suppress
+from pathlib import Path
+
 import numpy as np
+from pydantic import JsonValue
 
 from viewsphere import plugins
 from viewsphere.assets.mesh import Image, Material, Mesh, Texture
 from viewsphere.geometry.box import box_vertices
-from viewsphere.geometry.compiler import pause_collection
+from viewsphere.geometry.garbage import pause_collection
+from viewsphere.geometry.kernel_cache import kernel_folder, sources_digest
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.channel import CHANNELS
 from viewsphere.model.shot import ModelSpec, Placement, Pose, Shot
 from viewsphere.run.stages import render_frame
+from viewsphere.sampling.look import engine_look
 from viewsphere.store import encode
 
 SIZE = 16
+PACKAGE = Path(plugins.__file__).parent
 
 
 def compile_kernels(shot: Shot) -> None:
-    """Render one tiny frame of two cards with the shot's engine, channels, scene and lens; the picture is thrown away.
+    """See to it that the kernels a shot needs are compiled.
 
-    The first time on a machine this takes some 20 CPU-seconds, later one or two.
+    The first time on a machine this takes some 20 CPU-seconds. It leaves a mark beside the kernels: later, nothing is loaded
+    as long as viewsphere, numba and the processor are the same, and so is what the shot uses, in whatever strength.
     """
+    small = _small(shot)
+    mark = _mark(small)
+    if not mark.is_file():
+        _render(small)
+        with suppress(OSError):  # a folder that others may not write
+            mark.touch()
+
+
+def load_kernels(shot: Shot) -> None:
+    """Render one tiny frame of two cards with the shot's engine, channels, scene and lens; the picture is thrown away."""
+    _render(_small(shot))
+
+
+def _small(shot: Shot) -> Shot:
     lens = shot.intrinsics
     tiny = Intrinsics(width=SIZE, height=SIZE, fx=SIZE, fy=SIZE, cx=SIZE / 2, cy=SIZE / 2, distortion=lens.distortion)
     spec = ModelSpec(key="card", source="card", category="card", category_id=1)
     placements = tuple(Placement(id=i, model=spec) for i in (1, 2))
     frame = shot.frames[0].model_copy(update={"pose": Pose(index=0, azimuth_deg=0, elevation_deg=20, distance=2)})
-    small = shot.model_copy(update={"intrinsics": tiny, "placements": placements, "frames": (frame,)})
-    with pause_collection():
-        _render(small)
+    return shot.model_copy(update={"key": "", "intrinsics": tiny, "placements": placements, "frames": (frame,)})
+
+
+def _mark(small: Shot) -> Path:
+    """The file that is there when this shot's kernels are: named by what they are compiled from and by what it uses."""
+    used = json.dumps(_outline(small.model_dump(mode="json")), sort_keys=True)
+    engine = engine_look(small.engine)
+    named = hashlib.sha256("\0".join((sources_digest(PACKAGE), engine, used)).encode()).hexdigest()[:16]
+    return kernel_folder() / f"{named}.compiled"
+
+
+def _outline(value: JsonValue) -> JsonValue:
+    """The value with signs instead of numbers: they say what is there at all."""
+    if isinstance(value, dict):
+        return {name: _outline(part) for name, part in value.items()}
+    if isinstance(value, list):
+        return [_outline(part) for part in value]
+    if isinstance(value, int | float):
+        return (value > 0) - (value < 0)
+    return value
 
 
 def _render(shot: Shot) -> None:
+    with pause_collection():
+        _render_card(shot)
+
+
+def _render_card(shot: Shot) -> None:
     card = _card()
     engine: plugins.Engine = plugins.load("engines", shot.engine)
     stage = engine.stage(shot, lambda spec: card)

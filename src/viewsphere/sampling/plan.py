@@ -26,6 +26,7 @@ from viewsphere.model.recipe_draws import alternatives, span
 from viewsphere.model.scene import Scene, Vector
 from viewsphere.model.shot import Frame, ModelSpec, Placement, Pose, Shot
 from viewsphere.sampling.blend_scene import BlendScenery
+from viewsphere.sampling.camera import distance_problem, inside_box
 from viewsphere.sampling.checks import (
     check_blend,
     check_catcher,
@@ -52,7 +53,7 @@ from viewsphere.sampling.moments import (
 from viewsphere.sampling.pictures import Pictures, check_pictures, proportions, scene_pictures
 from viewsphere.sampling.scenes import Scenes, is_night
 from viewsphere.sampling.seeds import share
-from viewsphere.sampling.viewpoints import Poses, distance_problem, inside_box, poses
+from viewsphere.sampling.viewpoints import Poses, poses
 from viewsphere.store import Category
 
 SHOT_FRAMES = 16

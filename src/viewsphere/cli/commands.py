@@ -1,0 +1,32 @@
+"""All commands. Heavy modules are imported by the command that needs them."""
+
+from __future__ import annotations
+
+import typer
+
+from viewsphere.cli import datasets, doctor, joining, making
+from viewsphere.cli.next_step import Command
+
+app = typer.Typer(
+    name="viewsphere",
+    help="3D models in, exactly labelled image data sets out.",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+for command in (
+    making.new,
+    making.schema,
+    making.inspect,
+    making.plan,
+    making.preview,
+    making.render,
+    datasets.export,
+    datasets.check,
+    datasets.report,
+    doctor.doctor,
+):
+    app.command(cls=Command)(command)
+app.command("merge", cls=Command)(joining.merge)
+app.command("import", cls=Command)(joining.import_)
