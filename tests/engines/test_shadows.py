@@ -77,7 +77,7 @@ def visible_share(stage, light, samples, count=16):
             right /= np.linalg.norm(right, axis=1, keepdims=True)
             toward = toward + light.radius * (right * x + np.cross(axis, right) * y)
         far = np.linalg.norm(toward, axis=1)
-        total += distances(scene, place, toward / far[:, None]) > far - 0.1
+        total += distances(scene, place, toward / far[:, None]) > far - 1e-3
     return total / count
 
 
@@ -225,6 +225,72 @@ def test_a_handle_has_a_shadow_beneath_what_hangs_over_it(height, top, edge):
     off = np.abs(edge_profile(stage, stage.lights([], [light]), x) - 1 + hidden.mean(axis=1))
     assert off.max() < 0.25
     assert off.mean() < 0.04
+
+
+def chest(overhang):
+    """A box with a ledge around it, and a lid that hangs over both; (the box, how far the ledge reaches)."""
+    reach = 0.3 + 0.8 * min(overhang, 0.01)
+    lid = 0.3 + overhang
+    boxes = (
+        cuboid((-0.3, -0.3, 0), (0.3, 0.3, 0.4)),
+        cuboid((-reach, -reach, 0.25), (reach, reach, 0.3)),
+        cuboid((-lid, -lid, 0.4), (lid, lid, 0.43)),
+    )
+    return LightStage(flat(np.concatenate(boxes))), reach
+
+
+NEAR_A_LID = {
+    "ball": lambda z: PointLight(position=(0.1, 0.05, z), strength=1, radius=0.05),
+    "small ball": lambda z: PointLight(position=(0.1, 0.05, z), strength=1, radius=0.005),
+    "area": lambda z: AreaLight(position=(0, 0, z), toward=(0, 0, 0), strength=1, size=(0.3, 0.2)),
+    "small area": lambda z: AreaLight(position=(0.1, 0.05, z), toward=(0.1, 0.05, 0), strength=1, size=(0.05, 0.05)),
+}
+
+
+@pytest.mark.parametrize("kind", NEAR_A_LID)
+@pytest.mark.parametrize("above", [0.02, 0.06, 0.1, 0.3])
+@pytest.mark.parametrize("overhang", [0.002, 0.005, 0.01, 0.02])
+def test_a_lamp_above_a_lid_leaves_no_light_on_the_ledge_beneath_it(kind, above, overhang):
+    """Also where the lid cuts through the lamp; and hardly any on a bevel whose own plane cuts through the lamp."""
+    stage, reach = chest(overhang)
+    lights = stage.lights([], [NEAR_A_LID[kind](0.215 + above)], 1024)
+    along, out = (a.ravel() for a in np.meshgrid(np.linspace(-0.29, 0.29, 59), np.linspace(0.3, reach, 6)))
+    for turn in range(4):
+        x, y = ((along, -out), (out, along), (along, out), (-out, along))[turn]
+        side = ((0, -1), (1, 0), (0, 1), (-1, 0))[turn]
+        ledge = np.stack([x, y, np.full_like(x, 0.3)], axis=1)
+        assert stage.arrives(lights, 0, points(ledge, (0, 0, 1)))["irradiance"].max() == 0
+        for slope in (0.5, 1) if above >= 0.06 or kind != "area" else ():
+            normal = np.array([*np.multiply(side, slope), 1]) / math.hypot(slope, 1)
+            assert stage.arrives(lights, 0, points(ledge, normal))["share"].max() < 0.05
+
+
+@pytest.mark.parametrize("kind", NEAR_A_LID)
+@pytest.mark.parametrize("above", [0.1, 0.3])
+@pytest.mark.parametrize("overhang", [0.002, 0.02])
+def test_shadows_of_lamps_close_to_a_lid_fall_where_rays_say(kind, above, overhang):
+    pytest.importorskip("embreex")
+    stage, _ = chest(overhang)
+    lamp = NEAR_A_LID[kind](0.215 + above)
+    samples = stage.seen(camera(30, 25, 1.6, stage.origin, focal=240.0))
+    found, truth = stage.arrives(stage.lights([], [lamp]), 0, samples), visible_share(stage, lamp, samples)
+    sure = ((samples.normal * found["toward"]).sum(axis=1) > 0.1) & ((truth == 0) | (truth == 1))
+    assert ((found["share"] > 0.5) == (truth > 0.5))[sure].mean() > 0.995
+    assert (truth[sure] == 0).sum() > 100 < (truth[sure] == 1).sum()
+    assert np.abs(found["share"] - truth)[samples.is_ground].mean() < 0.05
+
+
+def test_a_bulb_does_not_hide_the_lamp_in_it_but_a_table_does():
+    """A ball of light that reaches beyond a bulb shines; what a top cuts off it does not."""
+    lamp = PointLight(position=(0, 0, 0), strength=1, radius=0.05)
+    bulb = cuboid((-0.02, -0.02, 0.48), (0.02, 0.02, 0.52))
+    below = points([[x, y, 0] for x in (-0.2, 0, 0.3) for y in (0.1, 0.4)], (0, 0, 1), is_ground=True)
+    feet = [cuboid((x, x, z), (x + 0.01, x + 0.01, z + 0.01)) for x in (-0.01, 0) for z in (0, 0.99)]
+    stage = LightStage(flat(np.concatenate([bulb, *feet])))
+    assert stage.arrives(stage.lights([], [lamp]), 0, below)["share"].min() > 0.9
+    top = cuboid((-0.6, -0.6, 0.44), (0.6, 0.6, 0.48))
+    stage = LightStage(flat(np.concatenate([top, *feet])))
+    assert stage.arrives(stage.lights([], [lamp]), 0, below)["share"].max() == 0
 
 
 @pytest.fixture(scope="module")

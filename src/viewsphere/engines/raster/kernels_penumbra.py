@@ -3,6 +3,9 @@
 Percentage-closer soft shadows (Fernando 2005), where a texel blocks only if it lies between the sample and some part of the
 light, as in backprojection (Guennebaud et al. 2006); the filter is a window of the map's own texels, on a coarser level the
 wider it is, so that nothing is random. A light has the shape and the size it has seen from the sample.
+
+What hides a lamp often lies aslant: from beneath a table's edge, the top near the lamp would hide far more than the edge. So
+for lights at a place a plane is fitted to the blockers, and the filter is as wide, on each side, as the light past that plane.
 """
 
 # ruff: isort: skip_file
@@ -21,10 +24,10 @@ from viewsphere.engines.raster.kernels_block import (
     BARY2, IB, IG, IR, OPENX, OPENY, OPENZ, T1, T2, T3, T4, T5, T6, T7, U0, U1, V0, V1,
 )  # fmt: skip
 from viewsphere.engines.raster.kernels_lanes import (
-    LANES, REAL, Lanes, Rows, clamp, lanewise, least, load, most, root, size, spread, where,
+    LANES, REAL, WHOLE, Lanes, Rows, clamp, lanewise, least, load, most, root, size, spread, where,
 )  # fmt: skip
 from viewsphere.engines.raster.kernels_shadow import (
-    COARSEST, DARKER, DEPTH_AT, FINE, GAP, MIDDLE, MORE, ROUND, SIDES, SIZE, SPAN_U, SPAN_V, TILT,
+    BIAS_NEAR, COARSEST, DARKER, DEPTH_AT, FINE, GAP, MIDDLE, MORE, ROUND, SIDES, SIZE, SPAN_U, SPAN_V, TILT,
 )  # fmt: skip
 from viewsphere.engines.raster.kernels_texture import FAST
 from viewsphere.geometry.jit import inner
@@ -35,6 +38,8 @@ U = nb.uintp
 U_, V_, Q_, DU, DV, NEAR, SOFT, RADIUS, STATE, FACING = T1, T2, T3, T4, T5, T6, T7, IR, IG, IB
 LEFT, TOP, TEXEL, TALL, REACH = U0, V0, U1, V1, BARY2
 MEAN, SUM, COUNT = OPENX, OPENY, OPENZ
+# Between a search and its filter: how the blockers' distance grows per texel. What else is in these rows is not needed then.
+SLOPE_U, SLOPE_V = SUM, RADIUS
 NARROW, WIDE = 6.5, 9.0
 
 
@@ -98,14 +103,15 @@ class _Sample(Rows):
         return spread(self.builder, self.builder.load(self.builder.gep(self.data, [self._at(row)])))
 
 
-def _over_window(*sums: int) -> Any:
+def _over_window(*rows: int, sums: int = 2) -> Any:
     """A function of a view's form and a sample, as one that kernels call: `(depth, at, stride, form, b, i)`.
 
-    It returns a function of q and place (from the sample, in the map's texels) of texels; what that returns, summed over the
-    window of sample i (uintp), goes to the rows `sums`. The window begins at depth[at], its rows are `stride` apart (uintp).
+    It returns a function of q and place (from the sample, in the map's texels) of texels, which gives as many numbers as `sums`
+    says, and one of their sums over the window of sample i (uintp), which gives what goes to the rows. The window begins at
+    depth[at], its rows are `stride` apart (uintp).
     """
 
-    def decorate(function: Callable[[Rows, Rows], Callable[[Lanes, Lanes, Lanes], tuple[Lanes, ...]]]) -> Any:
+    def decorate(function: Callable[[Rows, Rows], tuple[Callable[..., tuple[Lanes, ...]], ...]]) -> Any:
         @intrinsic
         def summed(typing, depth, at, stride, form, b, i):
             def code(context, builder, signature, arguments):
@@ -114,12 +120,12 @@ def _over_window(*sums: int) -> Any:
                 )
                 first, along, own = (arguments[k] for k in (1, 2, 5))
                 sample = _Sample(builder, block, own, None)
-                texel = function(Rows(builder, numbers, own, None), sample)
+                texel, tell = function(Rows(builder, numbers, own, None), sample)
                 order = Lanes(builder, ir.Constant(ir.VectorType(REAL, LANES), [float(k) for k in range(LANES)]))
                 step = sample[TEXEL]
                 middle = where(step > 1, step * 0.5, 0) + 0.5
                 left, top = sample[LEFT] * step + middle - sample[U_], sample[TOP] * step + middle - sample[V_]
-                kept = [cgutils.alloca_once_value(builder, order.all(0).value) for _ in sums]
+                kept = [cgutils.alloca_once_value(builder, order.all(0).value) for _ in range(sums)]
                 high = builder.fptoui(builder.load(builder.gep(block, [builder.add(own, own.type(TALL))])), own.type)
                 wide = builder.select(builder.icmp_unsigned(">", high, high.type(8)), high.type(16), high.type(8))
                 with cgutils.for_range(builder, high) as row:
@@ -130,9 +136,10 @@ def _over_window(*sums: int) -> Any:
                         found = texel(load(builder, texels, builder.add(start, part)), x, y)
                         for place, value in zip(kept, found, strict=True):
                             builder.store((Lanes(builder, builder.load(place)) + value).value, place)
-                for place, target in zip(kept, sums, strict=True):
-                    value = _total(builder, builder.load(place))
-                    builder.store(value, builder.gep(block, [builder.add(own, own.type(target))]))
+                told = tell(*(spread(builder, _total(builder, builder.load(place))) for place in kept))
+                for row, lanes in zip(rows, told, strict=True):
+                    value = builder.extract_element(lanes.value, WHOLE(0))
+                    builder.store(value, builder.gep(block, [builder.add(own, own.type(row))]))
                 return context.get_dummy_value()
 
             return nb.void(depth, nb.uintp, nb.uintp, form, b, nb.uintp), code
@@ -148,20 +155,79 @@ def _total(builder: Any, lanes: Any) -> Any:
     return builder.call(function, [REAL(-0.0), lanes], fastmath=tuple(sorted(FAST)))
 
 
-@_over_window(COUNT, SUM)
-def _block(form, b):
-    """COUNT of texels that hide part of the light, less at its rim, and the SUM of their distances in q."""
-    light, step = _Light(form, b), b[TEXEL]
+def _as_they_are(*totals: Lanes) -> tuple[Lanes, ...]:
+    return totals
+
+
+def _hiding(light: _Light, b: Rows) -> Callable[[Lanes, Lanes, Lanes], tuple[Lanes, Lanes]]:
+    """A function of texels: whether one hides part of the light, less at its rim; how far it is in q."""
+    step = b[TEXEL]
     soft, per = b[SOFT] + step, 1 / step
     soft_a, soft_b = soft + light.thin_a * step, soft + light.thin_b * step
 
-    def texel(z, x, y):
+    def texel(z: Lanes, x: Lanes, y: Lanes) -> tuple[Lanes, Lanes]:
         is_hit, gap, a, b = light.meet(z, x, y)
         reach_a, reach_b = light.half_a * gap + soft_a, light.half_b * gap + soft_b
         disc = clamp((reach_a * reach_a - a * a - b * b) * 0.5 * per / reach_a)
         square = clamp((reach_a - a) * per) * clamp((reach_b - b) * per)
-        hit = where(is_hit, square + (disc - square) * light.is_round, 0)
+        return where(is_hit, square + (disc - square) * light.is_round, 0), gap
+
+    return texel
+
+
+@_over_window(COUNT, SUM)
+def _block(form, b):
+    """COUNT of texels that hide part of the light, and the SUM of their distances in q."""
+    hiding = _hiding(_Light(form, b), b)
+
+    def texel(z, x, y):
+        hit, gap = hiding(z, x, y)
         return hit, hit * gap
+
+    return texel, _as_they_are
+
+
+@_over_window(COUNT, MEAN, SLOPE_U, SLOPE_V, sums=10)
+def _block_aslant(form, b):
+    """COUNT of texels that hide part of the light, and the plane that fits their distances in q best: MEAN, what it is at the
+    sample's own texel, and its slopes, 0 where no plane fits.
+    """
+    hiding, step = _hiding(_Light(form, b), b), b[TEXEL]
+
+    def texel(z, x, y):
+        hit, gap = hiding(z, x, y)
+        far, right, down = hit * gap, hit * x, hit * y
+        return hit, far, right, down, right * x, right * y, down * y, far * x, far * y, far * gap
+
+    def tell(n, g, x, y, xx, xy, yy, gx, gy, gg):
+        per = 1 / most(n, 1e-6)
+        g, x, y = g * per, x * per, y * per
+        gx, gy, gg, xy = gx * per - g * x, gy * per - g * y, gg * per - g * g, xy * per - x * y
+        # What is but one texel wide has no slope.
+        least_wide = step * step * 0.25
+        xx, yy = xx * per - x * x + least_wide, yy * per - y * y + least_wide
+        scale = 1 / most(xx * yy - xy * xy, 1e-12)
+        u, v = (gx * yy - gy * xy) * scale, (gy * xx - gx * xy) * scale
+        fit = clamp((u * gx + v * gy) / most(gg, 1e-12) * 5 - 3.5)  # 0 where less than 0.7 of the variance is explained
+        change = (u * x + v * y) * fit
+        fit = fit * where(change * 3 > g * 2, g * (2 / 3) / most(change, 1e-12), 1)
+        return n, g - (u * x + v * y) * fit, u * fit, v * fit
+
+    return texel, tell
+
+
+def _passing(light: _Light, b: Rows) -> Callable[..., Lanes]:
+    """A function of texels: which of those that the light meets count in a filter.
+
+    What lies deep behind others that are nearer to the light hides more than its own penumbra tells.
+    """
+    step = b[TEXEL]
+    deep_a, deep_b, soft = light.half_a * 3, light.half_b * 3, b[SOFT] + step
+    near_a, near_b = soft + light.thin_a * step, soft + light.thin_b * step
+
+    def texel(is_hit: Lanes, gap: Lanes, a: Lanes, b: Lanes) -> Lanes:
+        reach_a, reach_b = deep_a * gap + near_a, deep_b * gap + near_b
+        return is_hit & (a * a + b * b * light.is_round <= reach_a * reach_a) & (b <= reach_b)
 
     return texel
 
@@ -174,21 +240,43 @@ def _filter(form, b):
     soft_a, soft_b = radius_a * per + (light.thin_a + 0.5), radius_b * per + (light.thin_b + 0.5)
     # A disc's edge is one texel wide: near its rim (1 - d^2 / r^2) r / 2 is r - d.
     rim, fall = (soft_a + 0.5) * 0.5, 0.5 * per / radius_a
-    # What lies deep behind others that are nearer to the light hides more than its own penumbra tells.
-    deep_a, deep_b, soft = light.half_a * 3, light.half_b * 3, soft + step
-    near_a, near_b = soft + light.thin_a * step, soft + light.thin_b * step
+    passing = _passing(light, b)
     left = 1 - least(b[COUNT], 1)  # blockers come and go little by little
 
     def texel(z, x, y):
         is_hit, gap, a, b = light.meet(z, x, y)
-        reach_a, reach_b, far = deep_a * gap + near_a, deep_b * gap + near_b, a * a + b * b
-        is_hit = is_hit & (a * a + b * b * light.is_round <= reach_a * reach_a) & (b <= reach_b)
-        disc = clamp(rim - far * fall)
+        disc = clamp(rim - (a * a + b * b) * fall)
         square = clamp(soft_a - a * per) * clamp(soft_b - b * per)
         weight = square + (disc - square) * light.is_round
-        return where(is_hit, weight * left, weight), weight
+        return where(passing(is_hit, gap, a, b), weight * left, weight), weight
 
-    return texel
+    return texel, _as_they_are
+
+
+@_over_window(COUNT, SUM)
+def _filter_aslant(form, b):
+    """`_filter` past a plane of blockers, without what part of the light lies below the sample's own plane."""
+    light, soft, step = _Light(form, b), b[SOFT], b[TEXEL]
+    mean, slope_u, slope_v, per = b[MEAN], b[SLOPE_U], b[SLOPE_V], 1 / step
+    soft_a, soft_b = light.thin_a + 0.5, light.thin_b + 0.5
+    nearest, bias = soft / light.half_a, light.q - light.near
+    first, passing = most(mean, nearest), _passing(light, b)
+    left = 1 - least(b[COUNT], 1)
+
+    def texel(z, x, y):
+        is_hit, gap, a, b = light.meet(z, x, y)
+        past = most(mean + slope_u * x + slope_v * y, nearest)
+        is_above = most(past - bias, past * 0.5) + light.du * x + light.dv * y > 0
+        radius_a, radius_b = light.half_a * past * per, most(light.half_b * past, soft) * per
+        disc = clamp((radius_a + soft_a + 0.5) * 0.5 - (a * a + b * b) * (0.5 * per * per) / radius_a)
+        square = clamp(radius_a + soft_a - a * per) * clamp(radius_b + soft_b - b * per)
+        # How much of the light a texel stands for: the nearer to the sample the plane, the more.
+        denser = least(first / past, 2)
+        weight = (square + (disc - square) * light.is_round) * denser * denser * denser
+        weight = where(is_above, weight, 0)
+        return where(passing(is_hit, gap, a, b), weight * left, weight), weight
+
+    return texel, _as_they_are
 
 
 @lanewise
@@ -226,6 +314,13 @@ def _tell_blocked(form, b):
 
 
 @lanewise
+def _tell_width(form, row, b):
+    """Into a row: the radius of the penumbra that blockers at MEAN make."""
+    light = _Light(form, b)
+    b[row] = most(most(light.half_a, light.half_b) * b[MEAN], b[SOFT]) * light.stretch
+
+
+@lanewise
 def _tell_filtered(form, b):
     """STATE: the least share there is; half the REACH, 0 where that was narrow."""
     whole, reach = b[SUM], b[REACH]
@@ -252,7 +347,7 @@ def search(count, form, grid, depth, b):
 
     form, grid: a view's rows of `Views`. RADIUS: within which there may be blockers.
     """
-    side, fine = f4(grid[SIZE]), form[FINE]
+    side, fine, is_near = f4(grid[SIZE]), form[FINE], form[BIAS_NEAR] > f4(0)
     none = f4(0) if fine > f4(0) else f4(math.inf)
     _start(count, fine, b)
     left = 1
@@ -260,16 +355,28 @@ def search(count, form, grid, depth, b):
         left = 0
         _place_windows(count, U(REACH), none + f4(WIDE), f4(0.75), side, b)
         for i in range(U(count)):
-            b[U(COUNT) + i] = f4(0)
+            b[U(COUNT) + i], b[U(SUM) + i] = f4(0), f4(0)
             if b[U(REACH) + i] > f4(0):
                 at, stride = _begin(grid, i, b)
-                _block(depth, at, stride, form, b, i)
+                if is_near:
+                    _block_aslant(depth, at, stride, form, b, i)
+                else:
+                    _block(depth, at, stride, form, b, i)
                 left += 1 if b[U(REACH) + i] > f4(WIDE) else 0
         left = 0 if fine == f4(0) else left
-        _tell_blocked(count, form, b)
-        _place_windows(count, U(RADIUS), none + f4(2.5), f4(0.5), side, b)
+        radius = U(TALL if is_near else RADIUS)
+        if is_near:
+            _tell_width(count, form, radius, b)
+        else:
+            _tell_blocked(count, form, b)
+        _place_windows(count, radius, none + f4(2.5), f4(0.5), side, b)
         for i in range(U(count)):
             if b[U(COUNT) + i] > f4(0):
                 at, stride = _begin(grid, i, b)
-                _filter(depth, at, stride, form, b, i)
+                if is_near:
+                    _filter_aslant(depth, at, stride, form, b, i)
+                else:
+                    _filter(depth, at, stride, form, b, i)
+        if is_near:
+            _tell_width(count, form, U(RADIUS), b)
         _tell_filtered(count, form, b)

@@ -29,6 +29,7 @@ _READ = 1.03
 _WIDEST = 2.5  # tangent from which one perspective is too coarse
 _SHARPEST = 1.2  # texels: half the width of a filter, at least
 _TIGHT = 6.0, 8.0  # of a lamp that is shut in: half the width of a filter, and how many times what it hides counts
+_BULB = 0.75  # of what a lamp sees: from which share on, closer than its own size, that is the lamp
 _MANY = 4  # fitted maps from which on all are half as wide
 
 
@@ -201,10 +202,25 @@ def _views(source: _Source, points: Float, casters: Casters, size: int) -> Views
     if has_scenery or (fitted is None and len(points)):
         views += _all_round(source, max(size // 2, 64))
     drawn = draw_views(views, casters)
+    if source.kind != AREA and source.radius > 0 and fitted is None and _is_in_bulb(views, drawn, source.radius):
+        views = [replace(view, near=source.radius) for view in views]
+        drawn = draw_views(views, casters)
     if fitted is None and not has_scenery and _is_shut_in(views, drawn, casters.extent.ground_z is not None):
         # Beyond a wall the filter would find the lit floor before it.
         drawn.form[:, (kernels.SHARPEST, kernels.DARKER)] = _TIGHT
     return drawn
+
+
+def _is_in_bulb(views: Sequence[View], drawn: Views, radius: float) -> bool:
+    """Whether most of what is seen in these views lies within the ball that shines: a bulb, which would hide all of its light.
+    A table top that cuts through the ball hides half of it at most.
+    """
+    within, count = 0, 0
+    for i, view in enumerate(views):
+        place = ((np.arange(view.size) + 0.5 - view.size / 2) / view.texels) ** 2
+        is_close = _level(drawn, i, view.size)[:, : view.size] * -radius > np.sqrt(1 + place + place[:, None])
+        within, count = within + int(is_close.sum()), count + view.size**2
+    return within > _BULB * count
 
 
 def _is_shut_in(views: Sequence[View], drawn: Views, has_ground: bool) -> bool:
@@ -294,7 +310,7 @@ def _perspective(source: _Source, axes: Float, tangent: float, size: int, guard:
     matrix[:2, :3], matrix[3, :3] = texels * axes[:2], axes[2]
     matrix[:, 3] = -matrix[:, :3] @ source.place
     matrix[2, 3] = -1.0
-    near = max(1e-3, (0.02 if source.kind == AREA else 1.0) * source.radius)
+    near = max(1e-3, 0.02 * source.radius)
     is_round = source.kind != AREA or source.radius == 0
     sides = _ball(source.radius) if is_round else np.stack([source.right, source.up]) @ axes.T
     return View(matrix, near, texels, size, guard, sides, is_round)
