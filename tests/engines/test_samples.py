@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from truth.truth_scenes import LENSES, cube, lens, mesh_of, orbit_camera, placed, random_soup
+from truth.truth_scenes import LENSES, cube, lens, mesh_of, orbit_camera, placed, random_soup, sphere
 from viewsphere.assets.mesh import Image, Material, Texture
 from viewsphere.engines.raster.kernels_paint import BRIGHT, GLINT, average_samples, shared_samples
 from viewsphere.engines.raster.kernels_samples import TIE
@@ -406,3 +406,16 @@ def test_samples_take_the_colour_of_what_they_show(name):
         owner_at(geometry, samples.triangle[own]), owner_at(geometry, samples.triangle[4 * rows[k // 4] + k % 4])
     )
     assert (like[4 * rows[k // 4] + k % 4] == ~k).all()
+
+
+@pytest.mark.parametrize(("subdivisions", "distance"), [(5, 7.0), (6, 4.0)])
+def test_no_sample_shows_the_inside_of_a_closed_ball(subdivisions, distance):
+    """Its triangles are about a pixel in size: many lie between the centres, and what is behind them is the ball's inside."""
+    geometry = placed(sphere(subdivisions))
+    camera = orbit_camera(lens(320, 240, 0.8), 0.4, 0.3, distance)
+    samples = edge_samples(geometry, camera, rasterize(geometry, camera), owner_of(geometry))
+    on_ball = samples.triangle >= 0
+    corners = geometry.vertices[geometry.triangles[samples.triangle[on_ball]]]
+    outward = (geometry.triangle_normals[samples.triangle[on_ball]] * (camera.center - corners.mean(axis=1))).sum(axis=1)
+    assert on_ball.sum() > 400
+    assert (outward > 0).all()

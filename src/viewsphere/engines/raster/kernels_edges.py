@@ -2,7 +2,8 @@
 
 A pixel is numbered (`grid`, -1 elsewhere) if its centre looks different from a neighbour's, or, while drawing, if a surface
 comes between the centres before what they show (a thin wire). A triangle can matter if it is seen around such a pixel, or has a
-corner there that is not hidden, or one anywhere that is before what is shown. `kernels_lines` marks more of both before.
+corner there or beside it that is not hidden, or one anywhere that is before what is shown. `kernels_lines` marks more of both
+before.
 """
 
 from __future__ import annotations
@@ -47,6 +48,18 @@ def begin(pixels, total, triangle, depth, grid, limit, bound, nearest, seen, wan
         grid[U(y), U(x)], limit[U(y), U(x)], bound[k] = k, least, least
         for i in range(U(4)):
             nearest[k, i], seen[k, i] = least, np.int32(-1)
+
+
+@njit
+def spread(pixels, count, limit, around):
+    """Lower around (H, W), a copy of limit, to that of numbered pixels beside, which small triangles reach from here."""
+    height, width = limit.shape
+    for k in range(U(count)):
+        y, x = pixels[k] // width, pixels[k] % width
+        least = limit[U(y), U(x)]
+        for j in range(U(max(y - 1, 0)), U(min(y + 2, height))):
+            for i in range(U(max(x - 1, 0)), U(min(x + 2, width))):
+                around[j, i] = min(around[j, i], least)
 
 
 @njit

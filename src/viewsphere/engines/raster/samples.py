@@ -274,7 +274,9 @@ def _pinhole_edges(
     surfaces = q, geometry.triangles, geometry.triangle_cutout, geometry.cutouts.arrays
     canvas = _room(width), _ROTATED, *shown, grid, limit, pixels, starts
     count = kernels_edges.draw(np.flatnonzero(are_wanted), *surfaces, *canvas, len(bound), nearest, seen)
-    kernels_edges.with_corners_before(q, geometry.triangles, wanted, limit, np.empty(len(q), np.uint8), chosen)
+    around = limit.copy()
+    kernels_edges.spread(pixels, count, limit, around)
+    kernels_edges.with_corners_before(q, geometry.triangles, wanted, around, np.empty(len(q), np.uint8), chosen)
     count = kernels_edges.draw(np.flatnonzero(are_chosen), *surfaces, *canvas, count, nearest, seen)
     return _differing(count, pixels, nearest, seen, bound, _ROTATED, *shown, owner, geometry.triangle_normals)
 
