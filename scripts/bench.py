@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from bench_opengl import NoOpenGL, opengl
 from bench_scene import reference_recipe, write_reference
 
 from viewsphere import generate, plan, plugins
@@ -27,13 +28,15 @@ from viewsphere.annotate import annotate
 from viewsphere.assets.mesh import Mesh
 from viewsphere.engines.raster import painting, staging
 from viewsphere.geometry.box import box_vertices
+from viewsphere.model.camera import Camera
 from viewsphere.model.sample import Sample
 from viewsphere.model.shot import Frame, Shot
 from viewsphere.run.stages import Stages
-from viewsphere.sampling.plan import SHOT_FRAMES
 from viewsphere.sampling.camera import camera_for
+from viewsphere.sampling.plan import SHOT_FRAMES
 from viewsphere.store import Store
 from viewsphere.truth.channels import observe
+from viewsphere.truth.geometry import Geometry
 from viewsphere.truth.visibility import rasterize
 
 ROOT = Path(__file__).parent.parent
@@ -44,9 +47,10 @@ PARTS_OF_COLOUR = (
     (painting, "sky_behind", "colour: sky"),
     (staging, "finished", "colour: view, sRGB"),
 )
-
-
+EMBREE = "Embree, one ray a pixel"
 STAGES = ("truth: raster", "truth: channels", "colour", "annotations", "files")
+Rival = tuple[str, Callable[[Camera], Any]]
+"""A name for the table, and what draws a frame."""
 
 
 class Clock:
@@ -74,49 +78,44 @@ def processor() -> str:
         return platform.processor() or platform.machine()
 
 
-def embree_scene(geometry: Any) -> Any:
+def embree(geometry: Geometry) -> Rival:
+    """One ray a pixel with camera-space z = 1, so that hit distance is z-depth; building the rays is part of the price."""
     from embreex.mesh_construction import TriangleMesh
     from embreex.rtcore_scene import EmbreeScene
 
     scene = EmbreeScene(robust=True)
     TriangleMesh(scene, geometry.vertices[geometry.triangles].astype(np.float32))
-    return scene
+
+    def cast(camera: Camera) -> Any:
+        x = ((np.arange(camera.width) + 0.5 - camera.K[0, 2]) / camera.K[0, 0]).astype(np.float32)
+        y = ((np.arange(camera.height) + 0.5 - camera.K[1, 2]) / camera.K[1, 1]).astype(np.float32)
+        r = camera.R.astype(np.float32)
+        directions = (x[None, :, None] * r[0] + (y[:, None, None] * r[1] + r[2])).reshape(-1, 3)
+        origins = np.tile(camera.center.astype(np.float32), (len(directions), 1))
+        return scene.run(origins, directions, output=True)
+
+    return EMBREE, cast
 
 
-def embree_frame(scene: Any, camera: Any) -> Any:
-    """One ray a pixel with camera-space z = 1, so that hit distance is z-depth; building the rays is part of the price."""
-    x = ((np.arange(camera.width) + 0.5 - camera.K[0, 2]) / camera.K[0, 0]).astype(np.float32)
-    y = ((np.arange(camera.height) + 0.5 - camera.K[1, 2]) / camera.K[1, 1]).astype(np.float32)
-    r = camera.R.astype(np.float32)
-    directions = (x[None, :, None] * r[0] + (y[:, None, None] * r[1] + r[2])).reshape(-1, 3)
-    origins = np.tile(camera.center.astype(np.float32), (len(directions), 1))
-    return scene.run(origins, directions, output=True)
-
-
-def open3d_scene(geometry: Any) -> Any:
+def open3d(geometry: Geometry) -> Rival:
+    """The same rays through Open3D, which hands them to Embree in its own way."""
     import open3d
 
     scene = open3d.t.geometry.RaycastingScene()
     scene.add_triangles(geometry.vertices.astype(np.float32), geometry.triangles.astype(np.uint32))
-    return scene
 
+    def cast(camera: Camera) -> Any:
+        extrinsics = np.eye(4)
+        extrinsics[:3, :3], extrinsics[:3, 3] = camera.R, camera.t
+        rays = scene.create_rays_pinhole(
+            intrinsic_matrix=open3d.core.Tensor(camera.K),
+            extrinsic_matrix=open3d.core.Tensor(extrinsics),
+            width_px=camera.width,
+            height_px=camera.height,
+        )
+        return scene.cast_rays(rays)
 
-def open3d_frame(scene: Any, camera: Any) -> Any:
-    """The same rays through Open3D, which hands them to Embree in its own way."""
-    import open3d
-
-    extrinsics = np.eye(4)
-    extrinsics[:3, :3], extrinsics[:3, 3] = camera.R, camera.t
-    rays = scene.create_rays_pinhole(
-        intrinsic_matrix=open3d.core.Tensor(camera.K),
-        extrinsic_matrix=open3d.core.Tensor(extrinsics),
-        width_px=camera.width,
-        height_px=camera.height,
-    )
-    return scene.cast_rays(rays)
-
-
-RIVALS = {"Embree, one ray a pixel": (embree_scene, embree_frame), "Open3D, one ray a pixel": (open3d_scene, open3d_frame)}
+    return "Open3D, one ray a pixel", cast
 
 
 @contextmanager
@@ -153,32 +152,32 @@ def measure(frames: int, antialias: int, folder: Path) -> tuple[Clock, int]:
     warm_up = engine.stage(shot, lambda spec: mesh)  # compiles, or reads the cache
     one_shot(Clock(), shot, shot.frames[:2], warm_up, mesh, store)
     stage = clock("stage: baked already", lambda: engine.stage(shot, lambda spec: mesh))
-    rivals = rival_scenes(stage.geometry)
+    rivals = installed_rivals(stage.geometry)
     for first in range(0, len(shot.frames), SHOT_FRAMES):
         frames_of_run = shot.frames[first : first + SHOT_FRAMES]
         one_shot(clock, shot, frames_of_run, stage, mesh, store)
-        for name, (scene, cast) in rivals.items():
-            cast_shot(clock, name, lambda camera, scene=scene, cast=cast: cast(scene, camera), shot, frames_of_run, mesh)
+        for name, draw in rivals:
+            rival_shot(clock, name, draw, shot, frames_of_run, mesh)
     frames_parts = zip(*(clock.times[name] for name in STAGES), strict=True)
     clock.times["whole frame"] = [sum(parts) for parts in frames_parts]
     return clock, len(stage.geometry.triangles)
 
 
-def rival_scenes(geometry: Any) -> dict[str, tuple[Any, Callable[..., Any]]]:
-    """The rivals that are installed: each one's scene of this geometry, and what casts a frame's rays at it."""
-    scenes: dict[str, tuple[Any, Callable[..., Any]]] = {}
-    for name, (build, cast) in RIVALS.items():
-        with suppress(ImportError):
-            scenes[name] = (build(geometry), cast)
-    return scenes
+def installed_rivals(geometry: Geometry) -> list[Rival]:
+    """The rivals that are installed and work here, each with its own copy of this geometry."""
+    rivals: list[Rival] = []
+    for rival in (embree, open3d, opengl):
+        with suppress(ImportError, NoOpenGL):
+            rivals.append(rival(geometry))
+    return rivals
 
 
-def cast_shot(clock: Clock, name: str, cast: Callable[..., Any], shot: Shot, frames: Sequence[Frame], mesh: Mesh) -> None:
-    """A rival's rays for the same frames, right after ours: what slows the machine for seconds slows both."""
+def rival_shot(clock: Clock, name: str, draw: Callable[[Camera], Any], shot: Shot, frames: Sequence[Frame], mesh: Mesh) -> None:
+    """The same frames by a rival, right after ours: what slows the machine for seconds slows both."""
     cameras = [camera_for(shot.intrinsics, frame.pose, box_vertices(*mesh.bounds).mean(axis=0)) for frame in frames]
-    cast(cameras[0])  # its scene comes back into the caches, as ours has
+    draw(cameras[0])  # its scene comes back into the caches, as ours has
     for camera in cameras:
-        clock(name, lambda camera=camera: cast(camera))
+        clock(name, lambda camera=camera: draw(camera))
 
 
 def one_frame(clock: Clock, shot: Shot, frame: Frame, stage: plugins.Stage, mesh: Mesh) -> Sample:
@@ -271,7 +270,7 @@ def main() -> None:
             rows = {name: clock.median(name) for name in clock.times}
             rows["truth"] = rows["truth: raster"] + rows["truth: channels"]
             print(f"\n{triangles:,} triangles, {'4x edge anti-aliasing' if antialias == 4 else 'no anti-aliasing'}")
-            print("\n".join(table(rows, rows.get("Embree, one ray a pixel"))))
+            print("\n".join(table(rows, rows.get(EMBREE))))
             figures[f"antialias {antialias}"] = rows
         if args.workers:
             one, two = rates(folder, 4 * args.frames).values()

@@ -1,19 +1,20 @@
 """Beside Blender's Cycles: five scenes with equal lights, rendered by both, shown side by side with FLIP and SSIM.
 
-VIEWSPHERE_BPY names a Python that has `bpy`. Both pictures go through viewsphere's own view transform. FLIP: Andersson et al.,
-*FLIP: A Difference Evaluator for Alternating Images* (2020), 0 is equal; SSIM: Wang et al. 2004, 1 is equal.
+Cycles is that of the Python that viewsphere finds (VIEWSPHERE_BLENDER_PYTHON, or the extra `blender`). Both pictures go
+through viewsphere's own view transform. FLIP: Andersson et al., *FLIP: A Difference Evaluator for Alternating Images* (2020),
+0 is equal, from the package `flip-evaluator`; SSIM: Wang et al. 2004, 1 is equal, from `scikit-image`.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
-import os
 import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +27,8 @@ from viewsphere import plugins
 from viewsphere.assets.export import export_glb
 from viewsphere.assets.mesh import Material, Mesh
 from viewsphere.assets.srgb import linear
+from viewsphere.blender.interpreter import find_blender
+from viewsphere.errors import ViewsphereError
 from viewsphere.geometry.box import box_vertices
 from viewsphere.imaging.view import develop
 from viewsphere.model.camera import Camera, Intrinsics
@@ -36,6 +39,8 @@ from viewsphere.truth.visibility import rasterize
 from viewsphere.zoo import build
 
 WIDTH, HEIGHT = 480, 360
+MEASURES = {"flip_evaluator": "flip-evaluator", "skimage": "scikit-image"}
+"""Modules that measure how pictures differ, and their packages."""
 
 
 @dataclass(frozen=True)
@@ -188,19 +193,23 @@ def compare(case: Case, folder: Path, output: Path) -> tuple[float, float]:
     heat, mean, _ = flip_evaluator.evaluate(a, b, "LDR")
     ssim = float(structural_similarity(a, b, channel_axis=2, data_range=1.0))
     sheet = np.concatenate([own, cycles, np.round(255 * np.asarray(heat)).astype(np.uint8)], axis=1)
-    Image.fromarray(sheet).save(output / f"cycles_{case.name.replace(' ', '_')}.jpg", quality=88)
+    Image.fromarray(sheet).save(output / f"cycles_{case.name.replace(' ', '_')}.jpg", quality=90, subsampling=0)
     return float(mean), ssim
 
 
 def main() -> None:
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    options.add_argument("--samples", type=int, default=128)
+    options.add_argument("--samples", type=int, default=96)
     options.add_argument("--output", type=Path, default=Path(__file__).parent.parent / "docs" / "images")
     options.add_argument("--keep", type=Path, help="folder for what both engines wrote; Cycles' files there are used again")
     args = options.parse_args()
-    python = os.environ.get("VIEWSPHERE_BPY")
-    if not python:
-        sys.exit("compare: expected VIEWSPHERE_BPY to name a Python that has bpy; found nothing")
+    try:
+        python = find_blender()
+    except ViewsphereError as error:
+        sys.exit(f"compare: {error}")
+    lacking = [name for module, name in MEASURES.items() if find_spec(module) is None]
+    if lacking:
+        sys.exit(f"compare: expected {' and '.join(lacking)}, found none: .venv/bin/python -m pip install {' '.join(lacking)}")
     with tempfile.TemporaryDirectory() as name:
         folder = args.keep or Path(name)
         folder.mkdir(parents=True, exist_ok=True)

@@ -1,0 +1,101 @@
+"""A rival for the benchmark: OpenGL draws truth's labels, read back to memory. Without a GPU, that is Mesa's llvmpipe."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from viewsphere.model.camera import Camera
+from viewsphere.truth.geometry import Geometry
+
+NEAR = 0.1
+"""Metres from the camera before which nothing is drawn; there is no far plane."""
+
+VERTEX = """
+#version 330
+uniform mat4 clip_from_world;
+uniform mat3 camera_from_world;
+in vec3 vertex;
+in vec3 normal;
+in float object;
+out vec3 turned;
+flat out float instance;
+void main() {
+    gl_Position = clip_from_world * vec4(vertex, 1.0);
+    turned = camera_from_world * normal;
+    instance = object;
+}
+"""
+
+FRAGMENT = """
+#version 330
+in vec3 turned;
+flat in float instance;
+layout(location = 0) out vec2 ids;
+layout(location = 1) out vec4 surface;
+void main() {
+    vec3 normal = normalize(turned);
+    ids = vec2(instance, float(gl_PrimitiveID + 1));
+    surface = vec4(gl_FrontFacing ? normal : -normal, 1.0 / gl_FragCoord.w);
+}
+"""
+
+
+class NoOpenGL(Exception):
+    """There is no OpenGL 3.3 here that draws without a window."""
+
+
+def opengl(geometry: Geometry) -> tuple[str, Callable[[Camera], tuple[Any, Any]]]:
+    """The driver's name, and what draws a frame: (H, W, 2) float32, instance and triangle + 1 (exact to 2 ** 24), and
+    (H, W, 4) float32, normal and z-depth in metres; 0 where nothing is. The triangles stay with OpenGL.
+    """
+    import moderngl
+
+    context = _context(moderngl)
+    program = context.program(vertex_shader=VERTEX, fragment_shader=FRAGMENT)
+    objects = np.zeros(len(geometry.vertices), np.float32)
+    objects[geometry.triangles] = geometry.triangle_object[:, None]
+    rows = np.column_stack((geometry.vertices, geometry.normals, objects)).astype(np.float32)
+    corners = context.buffer(geometry.triangles.astype(np.uint32))
+    layout = [(context.buffer(rows), "3f 3f 1f", "vertex", "normal", "object")]
+    triangles = context.vertex_array(program, layout, corners)
+    targets: dict[tuple[int, int], Any] = {}
+
+    def draw(camera: Camera) -> tuple[Any, Any]:
+        size = camera.width, camera.height
+        if size not in targets:
+            textures = [context.texture(size, components, dtype="f4") for components in (2, 4)]
+            targets[size] = context.framebuffer(textures, context.depth_renderbuffer(size))
+        target = targets[size]
+        target.use()
+        target.clear()
+        program["clip_from_world"].write(clip_from_world(camera).T.astype(np.float32).tobytes())
+        program["camera_from_world"].write(camera.R.T.astype(np.float32).tobytes())
+        triangles.render()
+        ids, surface = (np.empty((camera.height, camera.width, components), np.float32) for components in (2, 4))
+        target.read_into(ids, components=2, attachment=0, dtype="f4")
+        target.read_into(surface, components=4, attachment=1, dtype="f4")
+        return ids, surface
+
+    return f"OpenGL ({context.info['GL_RENDERER']}): ids, depth, normals", draw
+
+
+def _context(moderngl: Any) -> Any:
+    """Without a window, drawing the nearest surface."""
+    options = {"backend": "egl"} if sys.platform.startswith("linux") else {}
+    try:
+        context = moderngl.create_context(standalone=True, require=330, **options)
+    except Exception as error:  # as the libraries that it loads raise
+        raise NoOpenGL(str(error)) from error
+    context.enable_only(moderngl.DEPTH_TEST)
+    context.front_face = "cw"  # rows run downwards
+    return context
+
+
+def clip_from_world(camera: Camera) -> Any:
+    """(4, 4): OpenGL's clip coordinates, w the z-depth, the picture's top row first in memory."""
+    x, y, w = camera.P
+    return np.stack((2 * x / camera.width - w, 2 * y / camera.height - w, w - [0, 0, 0, 2 * NEAR], w))
