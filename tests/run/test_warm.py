@@ -35,20 +35,24 @@ def test_the_parent_of_a_later_run_loads_no_kernels(tmp_path):
     assert [run("a", 3), run("b", 3), run("c", 4.5)] == ["True\n", "False\n", "False\n"]
 
 
+RECIPE = Recipe(models=[{"source": "zoo:chair"}], viewpoints={"azimuth": [0], "elevation": [20], "distance": 3})
+
+
 def mark(**changes):
-    recipe = Recipe.model_validate(
-        {"models": [{"source": "zoo:chair"}], "viewpoints": {"azimuth": [0], "elevation": [20], "distance": 3}, **changes}
-    )
+    recipe = Recipe.model_validate({**RECIPE.model_dump(mode="json", exclude_unset=True), **changes})
     return warm._mark(warm._small(next(iter(plan(recipe).shots()))))
 
 
-def test_a_mark_is_of_what_a_shot_uses_and_not_how_much_of_it():
+def test_a_mark_is_of_what_a_shot_uses_and_about_how_much_of_it():
     assert mark(seed=4, camera={"size": [64, 48]}) == mark()
     blurred = {"scene": {"effects": {"blur": 0.2}}}
     assert mark(**blurred) == mark(scene={"effects": {"blur": 0.7}})
     marks = [
         mark(),
         mark(**blurred),
+        mark(scene={"effects": {"blur": 0.02}}),
+        mark(engine={"name": "raster", "antialias": 1}),
+        mark(engine={"name": "raster", "antialias": 4}),
         mark(channels=["rgb", "depth"]),
         mark(camera={"fov_deg": 50, "distortion": {"model": "brown_conrady", "coefficients": [-0.1, 0.02, 0, 0]}}),
     ]
@@ -58,11 +62,40 @@ def test_a_mark_is_of_what_a_shot_uses_and_not_how_much_of_it():
 def test_a_mark_is_void_when_a_source_changes(tmp_path):
     (tmp_path / "inside").mkdir()
     source = tmp_path / "inside" / "kernels.py"
+
+    def digest():
+        sources_digest.cache_clear()
+        return sources_digest(tmp_path)
+
     source.write_text("x = 1")
-    before = sources_digest(tmp_path)
+    digests = [digest()]
     source.write_text("x = 2")
-    sources_digest.cache_clear()
-    after = sources_digest(tmp_path)
+    digests.append(digest())
+    os.utime(source, (1, 1))
+    digests.append(digest())
     source.rename(tmp_path / "kernels.py")
-    sources_digest.cache_clear()
-    assert len({before, after, sources_digest(tmp_path)}) == 3
+    digests.append(digest())
+    assert digest() == digests[-1]
+    assert len(set(digests)) == len(digests)
+
+
+def test_a_mark_is_void_when_a_kernel_is_gone(tmp_path, monkeypatch):
+    shot = next(iter(plan(RECIPE).shots()))
+    rendered = []
+
+    def render(small):
+        rendered.append(small)
+        for name in ("a.nbi", "b.nbi"):
+            (tmp_path / "kernels" / "digest").mkdir(parents=True, exist_ok=True)
+            (tmp_path / "kernels" / "digest" / name).touch()
+
+    monkeypatch.setenv("VIEWSPHERE_CACHE", str(tmp_path))
+    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
+    monkeypatch.setattr(warm, "_render", render)
+    warm.compile_kernels(shot)
+    warm.compile_kernels(shot)
+    assert len(rendered) == 1
+    (tmp_path / "kernels" / "digest" / "b.nbi").unlink()
+    warm.compile_kernels(shot)
+    warm.compile_kernels(shot)
+    assert len(rendered) == 2

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import sys
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
@@ -24,8 +25,11 @@ def kernel_folder() -> Path:
 
 @cache
 def sources_digest(folder: Path) -> str:
-    """A digest of all Python sources in a folder, of numba and of the processor: equal ones compile to equal kernels."""
-    digest = hashlib.sha256(repr(BUILD).encode())
+    """A digest of all that says which compiled kernels fit: every Python source in a folder, with its place and time, as numba
+    asks for them too; Python, numba and the processor.
+    """
+    digest = hashlib.sha256(repr((BUILD, sys.implementation.cache_tag)).encode())
     for source in sorted(folder.rglob("*.py")):
-        digest.update(source.relative_to(folder).as_posix().encode() + b"\0" + source.read_bytes())
+        about = source.stat()
+        digest.update(repr((str(source), about.st_mtime_ns, about.st_size)).encode() + source.read_bytes())
     return digest.hexdigest()

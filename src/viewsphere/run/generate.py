@@ -94,11 +94,15 @@ def generate(
         store.make_ready()
     else:
         store.open_for(portion.record)
-    with recipe.located(), store.occupied(), Crew(store.root, workers) as crew:
-        if portion.adds_nothing:
-            _compare_models(portion, store, crew)
-        notes = () if portion.adds_nothing else _check_skies(portion, store, tell)
-        rendered, skipped = (0, {}) if portion.adds_nothing else _render_part(portion, store, crew, keep_going, tell)
+    with recipe.located(), store.occupied():
+        notes: tuple[str, ...] = ()
+        rendered, skipped = 0, dict[str, str]()
+        with Crew(store.root, workers) as crew:
+            if portion.adds_nothing:
+                _compare_models(portion, store, crew)
+            else:
+                notes = _check_skies(portion, store, tell)
+                rendered, skipped = _render_part(portion, store, crew, keep_going, tell)
         notes += export(store.root, wanted, listener=tell)
     if append and not rendered:
         notes += (f"{store.root}: nothing to add, it has all that the recipe asks for",)

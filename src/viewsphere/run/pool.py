@@ -74,7 +74,7 @@ class Crew:
             return
         queue = Queue(jobs, [hand.affinity for hand in self._hands])
         busy: dict[Connection, _Hand] = {}
-        for hand in self._come(min(self._workers, len(queue))):
+        for hand in self._come(queue):
             busy[hand.pipe] = hand
             hand.give(queue.next(hand.affinity))
         while busy:
@@ -92,11 +92,12 @@ class Crew:
             except UserError as error:
                 yield Outcome(job.key, error=error)
 
-    def _come(self, number: int) -> list[_Hand]:
-        """So many hands, those that are here first."""
+    def _come(self, queue: Queue) -> list[_Hand]:
+        """As many hands as there is work for, first those that have some of it warm."""
+        number = min(self._workers, len(queue))
         while len(self._hands) < number:
             self._hands.append(_Hand(self._root))
-        return self._hands[:number]
+        return sorted(self._hands, key=lambda hand: hand.affinity not in queue)[:number]
 
     def _hear(self, busy: dict[Connection, _Hand], pipe: Connection, queue: Queue) -> Iterator[Outcome]:
         """Take one answer, or the news of a death, and hand out the next job."""
@@ -141,9 +142,12 @@ class Queue:
     def __len__(self) -> int:
         return self._count
 
+    def __contains__(self, affinity: str) -> bool:
+        return affinity in self._left
+
     def next(self, warm: str) -> Job:
         """The next job for a worker that has this affinity warm."""
-        affinity = warm if warm in self._left else self._coldest()
+        affinity = warm if warm in self else self._coldest()
         line = self._left[affinity]
         job = line.popleft()
         if not line:
@@ -183,8 +187,9 @@ class _Hand:
 
     def give(self, job: Job) -> None:
         self.job, self.affinity = job, job.affinity
+        task = job.make()
         with suppress(OSError):  # a dead worker is noticed when its answer is awaited
-            self.pipe.send(job.make())
+            self.pipe.send(task)
 
     def stop(self) -> int | None:
         """End the process; what it had not finished is lost, what it had is not."""

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
+import os
 from contextlib import suppress
 from pathlib import Path
 
@@ -29,15 +31,17 @@ PACKAGE = Path(plugins.__file__).parent
 def compile_kernels(shot: Shot) -> None:
     """See to it that the kernels a shot needs are compiled.
 
-    The first time on a machine this takes some 20 CPU-seconds. It leaves a mark beside the kernels: later, nothing is loaded
-    as long as viewsphere, numba and the processor are the same, and so is what the shot uses, in whatever strength.
+    The first time on a machine this takes some 20 CPU-seconds. It leaves a mark beside the kernels, the list of their files.
+    Later nothing is loaded, as long as these are there, and viewsphere, numba, Python, the processor and what the shot uses,
+    about as strongly, are the same.
     """
     small = _small(shot)
     mark = _mark(small)
-    if not mark.is_file():
+    if not _is_true(mark):
         _render(small)
         with suppress(OSError):  # a folder that others may not write
-            mark.touch()
+            kernels = (file.relative_to(mark.parent).as_posix() for file in mark.parent.rglob("*.nbi"))
+            mark.write_text("\n".join(sorted(kernels)), encoding="utf-8")
 
 
 def load_kernels(shot: Shot) -> None:
@@ -56,20 +60,30 @@ def _small(shot: Shot) -> Shot:
 
 def _mark(small: Shot) -> Path:
     """The file that is there when this shot's kernels are: named by what they are compiled from and by what it uses."""
-    used = json.dumps(_outline(small.model_dump(mode="json")), sort_keys=True)
+    scene = _outline(small.model_dump(mode="json", exclude={"engine_options"}))
+    used = json.dumps([scene, small.engine_options], sort_keys=True)
     engine = engine_look(small.engine)
     named = hashlib.sha256("\0".join((sources_digest(PACKAGE), engine, used)).encode()).hexdigest()[:16]
     return kernel_folder() / f"{named}.compiled"
 
 
+def _is_true(mark: Path) -> bool:
+    """Whether the kernels it lists are there, where this user's workers look for them."""
+    try:
+        kernels = mark.read_text(encoding="utf-8").splitlines()
+    except OSError:
+        return False
+    return bool(kernels) and os.access(mark.parent, os.W_OK) and all((mark.parent / file).is_file() for file in kernels)
+
+
 def _outline(value: JsonValue) -> JsonValue:
-    """The value with signs instead of numbers: they say what is there at all."""
+    """The value with signs and powers of ten for its numbers: they say what is there at all."""
     if isinstance(value, dict):
         return {name: _outline(part) for name, part in value.items()}
     if isinstance(value, list):
         return [_outline(part) for part in value]
-    if isinstance(value, int | float):
-        return (value > 0) - (value < 0)
+    if isinstance(value, int | float) and value and not isinstance(value, bool):
+        return [value > 0, math.floor(math.log10(abs(value)))]
     return value
 
 
