@@ -152,6 +152,12 @@ def _stage(told: dict[str, Any]) -> Any:
     return stage(told)
 
 
+def _paint(told: dict[str, Any]) -> Any:
+    from .staging import paint
+
+    return paint(told)
+
+
 def _read_model(told: dict[str, Any]) -> Any:
     from .reading import read
 
@@ -210,6 +216,7 @@ REQUESTS: dict[str, Callable[[dict[str, Any]], Any]] = {
     "places": _read_places,
     "draw": _draw,
     "stage": _stage,
+    "paint": _paint,
     "render": _render,
     "save": _save,
 }

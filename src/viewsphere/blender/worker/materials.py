@@ -65,6 +65,12 @@ def build_material(told, images, has_uv, has_colors, is_traced=True):
     material = bpy.data.materials.new(told["name"] or "material")
     if material.node_tree is None:  # before Blender 5
         material.use_nodes = True
+    fill_material(material, told, images, has_uv, has_colors, is_traced)
+    return material
+
+
+def fill_material(material, told, images, has_uv, has_colors, is_traced=True):
+    """Give a material the nodes of `build_material`, in place of those that it has."""
     material.node_tree.nodes.clear()
     graph = Graph(material.node_tree)
     textures = Textures(graph, images, tuple(has_uv))
@@ -77,7 +83,6 @@ def build_material(told, images, has_uv, has_colors, is_traced=True):
         if told["transmission"] > 0 and not is_traced:
             material.surface_render_method = "BLENDED"
     graph.node("ShaderNodeOutputMaterial", {"Surface": surface})
-    return material
 
 
 def build_plain(told, images, has_uv):

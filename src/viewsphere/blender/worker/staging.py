@@ -8,6 +8,9 @@ from mathutils import Matrix
 from . import ground, lights, materials, meshes, renderers, studio
 from .scene_file import open_scene
 
+NUMBER = "number"
+"""Property of a model's mesh: its place among those that are told."""
+
 
 def stage(told):
     """Replace whatever there is by the scene that is told; the camera comes with each render."""
@@ -20,6 +23,8 @@ def stage(told):
     renderer = told["settings"]["renderer"]
     made = {}  # copies of a model that are painted otherwise share its textures
     kinds = [_mesh(mesh["name"], mesh, made, renderer) for mesh in told["meshes"]]
+    for number, kind in enumerate(kinds):
+        kind[NUMBER] = number
     for item in told["objects"]:
         _place(scene, kinds[item["mesh"]], item["matrix"], item["index"])
     for light in told["lights"]:
@@ -33,6 +38,20 @@ def stage(told):
     camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
     scene.collection.objects.link(camera)
     scene.camera = camera
+    return {}
+
+
+def paint(told):
+    """Fill the materials of models anew; their pictures are coarser, or finer, than they were. All else stays."""
+    numbered = {mesh[NUMBER]: mesh for mesh in bpy.data.meshes if NUMBER in mesh}
+    made = {}
+    before = set(bpy.data.images)
+    for look in told["looks"]:
+        mesh, images = numbered[look["mesh"]], meshes.build_images(look["images"], made)
+        has_uv = [name in mesh.uv_layers for name in meshes.UV_LAYERS]
+        for material, one in zip(mesh.materials, look["materials"], strict=True):
+            materials.fill_material(material, one, images, has_uv, meshes.COLORS in mesh.color_attributes)
+    bpy.data.batch_remove([image for image in before if not image.users])
     return {}
 
 

@@ -19,7 +19,8 @@ from viewsphere.engines.cycles.backdrop import Backdrop
 from viewsphere.engines.cycles.file_frame import FileFrame
 from viewsphere.engines.cycles.lens import resampled, views_of
 from viewsphere.engines.cycles.options import AnyOptions, options_of
-from viewsphere.engines.cycles.told import middle_of, told_scene
+from viewsphere.engines.cycles.texels import Kind, Levels
+from viewsphere.engines.cycles.told import kinds_of, middle_of, told_looks, told_scene
 from viewsphere.errors import BlenderDied, BlenderError, ModelError, RecipeError, UserError
 from viewsphere.imaging.background import display_background
 from viewsphere.imaging.finish import finished
@@ -53,6 +54,9 @@ Float32 = NDArray[np.float32]
 Clip = tuple[float, float]
 """Metres to the nearest and the farthest that a camera sees."""
 
+AllLevels = tuple[Levels, ...]
+"""Of each kind of model."""
+
 Bounds = tuple[Path, ...] | None
 """The folders that Blender may read, where it opens a file of a user's; None where it opens none."""
 
@@ -66,11 +70,16 @@ class Keeper:
     _drawing: set[str] = field(default_factory=set[str])
     _started_for: tuple[Bounds, int] | None = None
     _stage: CyclesStage | None = None
+    _levels: AllLevels | None = None
     _served: int = 0
 
-    def process_for(self, stage: CyclesStage) -> BlenderProcess:
-        """A Blender that has this stage's scene."""
+    def process_for(self, stage: CyclesStage, levels: AllLevels | None = None) -> BlenderProcess:
+        """A Blender that has this stage's scene, its pictures as coarse as `levels` says; None: as they are, or were."""
         if self.process is not None and self._stage is stage:
+            if levels is not None and levels != self._levels:
+                self._stage = None
+                stage.paint(self.process, levels, self._levels)
+                self._stage, self._levels = stage, levels
             return self.process
         worn = stage.options.replace_after and self._served >= stage.options.replace_after
         wanted = stage.bounds, stage.options.threads
@@ -81,8 +90,8 @@ class Keeper:
         if stage.options.draws and stage.options.renderer not in self._drawing:
             self._try_drawing(self.process, stage.options)
         self._stage, self._served = None, self._served + 1
-        stage.tell(self.process)
-        self._stage = stage
+        stage.tell(self.process, levels)
+        self._stage, self._levels = stage, levels
         return self.process
 
     def _try_drawing(self, process: BlenderProcess, options: AnyOptions) -> None:
@@ -183,8 +192,8 @@ class CyclesStage:
         raise ModelError(f"{', '.join(sorted({p.model.key for p in self.shot.placements}))}: {died}")
 
     def _rendered(self, camera: Camera, is_open: bool, clip: Clip) -> Float32:
-        process = self.keeper.process_for(self)
         views = views_of(camera)
+        process = self.keeper.process_for(self, self._levels([view.camera for view in views]))
         pictures = [self._picture(process, view.camera, is_open, clip) for view in views]
         return resampled(camera, views, pictures)
 
@@ -198,9 +207,29 @@ class CyclesStage:
         process.ask("render", FRAME_SECONDS, camera=told, transparent=is_open, border=border, passes=[], out=out)
         return np.load(out)
 
-    def tell(self, process: BlenderProcess) -> None:
+    @cached_property
+    def kinds(self) -> tuple[Kind, ...]:
+        """The models in the scene."""
+        return kinds_of(self.shot.placements, self.meshes, self.shot.scene)
+
+    def _levels(self, cameras: Sequence[Camera]) -> AllLevels | None:
+        """How coarse pictures may be; None for as they are: OpenGL has mip levels, and what a user's own scene has in it, and
+        does with its picture, may magnify.
+        """
+        if self.options.draws or self.shot.scene.blend is not None:
+            return None
+        return tuple(kind.levels(cameras) for kind in self.kinds)
+
+    def paint(self, process: BlenderProcess, levels: AllLevels, before: AllLevels | None) -> None:
+        """Make the materials anew of the models whose pictures are to be finer or coarser."""
+        changed = [i for i, level in enumerate(levels) if before is None or level != before[i]]
+        looks = told_looks([self.kinds[i] for i in changed], process.put, [levels[i] for i in changed])
+        process.ask("paint", STAGE_SECONDS, looks=[{"mesh": i, **look} for i, look in zip(changed, looks, strict=True)])
+
+    def tell(self, process: BlenderProcess, levels: AllLevels | None = None) -> None:
         """Build the scene in this Blender. Raises UserError for what its renderer does not know or have."""
-        told = told_scene(self.shot.placements, self.meshes, self.geometry, self.shot.scene, self.options, process.put)
+        shot = self.shot
+        told = told_scene(shot.placements, self.meshes, self.geometry, shot.scene, self.options, process.put, levels)
         try:
             process.ask("stage", STAGE_SECONDS, **told)
         except BlenderError as error:

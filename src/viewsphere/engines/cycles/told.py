@@ -15,6 +15,7 @@ from viewsphere.assets.mesh import Image, Material, Mesh
 from viewsphere.assets.repaint import repainted
 from viewsphere.engines.cycles.file_frame import FileFrame
 from viewsphere.engines.cycles.options import AnyOptions
+from viewsphere.engines.cycles.texels import Kind, Levels
 from viewsphere.model.scene import AnyLight, BlendScene, Ground, HemisphereLight, Scene
 from viewsphere.model.shot import Placement, Repaint
 from viewsphere.surroundings.ground import ground_frame, ground_material, only_scatters
@@ -37,25 +38,32 @@ ARRAYS = ("vertices", "triangles", "normals", "triangle_material", "uv0", "uv1",
 
 
 def told_scene(
-    placements: Sequence[Placement], meshes: Sequence[Mesh], geometry: Geometry, scene: Scene, options: AnyOptions, put: Put
+    placements: Sequence[Placement],
+    meshes: Sequence[Mesh],
+    geometry: Geometry,
+    scene: Scene,
+    options: AnyOptions,
+    put: Put,
+    levels: Sequence[Levels] | None = None,
 ) -> Told:
-    """The worker's `stage` request. Raises UserError for a picture of sky or ground that cannot be read."""
-    kinds: dict[tuple[int, tuple[Repaint, ...]], int] = {}
-    told: list[Told] = []
-    shared: dict[int, Told] = {}
-    objects: list[Told] = []
+    """The worker's `stage` request; `levels`: how coarse each kind's pictures are, None for as they are.
+
+    Raises UserError for a picture of sky or ground that cannot be read.
+    """
     frame, blend = FileFrame.of(scene.blend), scene.blend
-    for placement, mesh in zip(placements, meshes, strict=True):
-        if blend is not None and placement.model.parts is not None:
-            continue  # it is in the file
-        kind = id(mesh), placement.repaints
-        if kind not in kinds:
-            kinds[kind] = len(told)
-            if id(mesh) not in shared:
-                shared[id(mesh)] = _told_mesh(mesh, put)
-            materials = [_told_material(m, placement.repaints) for m in mesh.materials]
-            told.append({**shared[id(mesh)], "name": placement.model.key, "materials": materials})
-        objects.append({"mesh": kinds[kind], "matrix": frame.placed(placement.world_from_object), "index": placement.id})
+    kinds = kinds_of(placements, meshes, scene)
+    shared: dict[int, Told] = {}
+    told: list[Told] = []
+    for kind, look in zip(kinds, told_looks(kinds, put, levels), strict=True):
+        if id(kind.mesh) not in shared:
+            shared[id(kind.mesh)] = _told_mesh(kind.mesh, put)
+        told.append({**shared[id(kind.mesh)], **look, "name": kind.placements[0].model.key})
+    numbers = {id(placement): number for number, kind in enumerate(kinds) for placement in kind.placements}
+    objects = [
+        {"mesh": numbers[id(p)], "matrix": frame.placed(p.world_from_object), "index": p.id}
+        for p in placements
+        if id(p) in numbers
+    ]
     pictures = None
     if blend is None or not blend.is_lit:
         pictures = sky_pictures(scene.sky, scene.sun, scene.lights, scene.ground is not None)
@@ -73,6 +81,38 @@ def told_scene(
     }
 
 
+def kinds_of(placements: Sequence[Placement], meshes: Sequence[Mesh], scene: Scene) -> tuple[Kind, ...]:
+    """The models that are put into the scene, each with its changes to materials; without what a .blend scene brings."""
+    found: dict[tuple[int, tuple[Repaint, ...]], tuple[Mesh, list[Placement]]] = {}
+    for placement, mesh in zip(placements, meshes, strict=True):
+        if scene.blend is None or placement.model.parts is None:
+            found.setdefault((id(mesh), placement.repaints), (mesh, []))[1].append(placement)
+    return tuple(Kind(mesh, repaints, tuple(own)) for (_, repaints), (mesh, own) in found.items())
+
+
+def told_looks(kinds: Sequence[Kind], put: Put, levels: Sequence[Levels] | None) -> list[Told]:
+    """Pictures and materials of each kind; pictures that kinds have in common are put once."""
+    paths: dict[int, str] = {}
+
+    def put_once(pixels: NDArray[Any]) -> str:
+        if id(pixels) not in paths:
+            paths[id(pixels)] = put(pixels)
+        return paths[id(pixels)]
+
+    told: list[Told] = []
+    for number, kind in enumerate(kinds):
+        materials, images = kind.mesh.materials, kind.mesh.images
+        if levels is not None:
+            materials, images = kind.pictured(levels[number])
+        told.append(
+            {
+                "images": _told_images(images, put_once),
+                "materials": [_told_material(material, kind.repaints) for material in materials],
+            }
+        )
+    return told
+
+
 def _told_file(blend: BlendScene) -> Told:
     path = Path(blend.file).resolve()
     told = blend.model_dump(include={"shown", "hidden", "frame"})
@@ -88,10 +128,7 @@ def told_settings(options: AnyOptions) -> Told:
 
 def _told_mesh(mesh: Mesh, put: Put) -> Told:
     arrays = {name: getattr(mesh, name) for name in ARRAYS}
-    return {
-        **{name: None if array is None else put(array) for name, array in arrays.items()},
-        "images": _told_images(mesh.images, put),
-    }
+    return {name: None if array is None else put(array) for name, array in arrays.items()}
 
 
 def _told_images(images: Sequence[Image], put: Put) -> list[Told]:
