@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import os
+
 import pytest
 from hypothesis import settings
 
 from small import small_recipe
 
-settings.register_profile("repeatable", derandomize=True, database=None, deadline=None)
+EXAMPLES = 100 if os.environ.get("CI") == "true" else 25
+"""That each property is tried with, but where it says so itself; CI has the time for more."""
+
+settings.register_profile("repeatable", derandomize=True, database=None, deadline=None, max_examples=EXAMPLES)
 settings.load_profile("repeatable")
 
 

@@ -9,13 +9,13 @@ ROOT = Path(__file__).parent.parent
 
 
 def small_recipe(**changes):
-    """Two hair driers from six sides on 96 x 72 pixels, with ground and all channels."""
+    """Two post boxes from six sides on 96 x 72 pixels, with ground and all channels."""
     from viewsphere import Recipe
     from viewsphere.model.channel import CHANNELS
 
     values = {
         "name": "small",
-        "models": [{"source": "zoo:hair_drier", "category": "hair drier", "count": 2, "scale": {"length": 0.3}}],
+        "models": [{"source": "zoo:post_box", "category": "post box", "count": 2, "scale": {"length": 0.18}}],
         "viewpoints": {"azimuth": [0, 120, 240], "elevation": [15, 50], "distance": 1.0},
         "camera": {"size": [96, 72], "fov_deg": 35},
         "scene": {"ground": True},

@@ -14,7 +14,7 @@ import yaml
 from PIL import Image
 
 import viewsphere as vs
-from small import ROOT, small_recipe
+from small import ROOT
 from viewsphere.check import check
 from viewsphere.cli.arguments import load_recipe
 from viewsphere.model.recipe_file import read
@@ -90,13 +90,6 @@ def test_table_1_has_the_paper_s_ticks():
     assert (ticks[19] == ticks[20]).all() and ticks[20].sum() == 8
 
 
-@pytest.fixture(scope="module")
-def exported(tmp_path_factory):
-    out = tmp_path_factory.mktemp("page") / "OUT"
-    vs.generate(small_recipe(), out)
-    return out
-
-
 def found(values, path):
     """What a path such as `poses.*.azimuth` leads to."""
     for step in path:
@@ -110,9 +103,9 @@ def found(values, path):
     return values
 
 
-def test_every_field_that_the_page_names_is_in_the_exports(exported):
-    native = json.loads((exported / "native" / "dataset1.json").read_text())
-    coco = json.loads((exported / "coco" / "annotations" / "instances_train.json").read_text())
+def test_every_field_that_the_page_names_is_in_the_exports(small_run):
+    native = json.loads((small_run / "native" / "dataset1.json").read_text())
+    coco = json.loads((small_run / "coco" / "annotations" / "instances_train.json").read_text())
     spans = set(re.findall(r"`([^`\n]+)`", "\n".join(map(str, table(PAGE, "| annotation | native")))))
     fields = [span.split(".") for span in spans if re.match(r"(poses|vehicles|images|annotations|models)\.\*\.", span)]
     assert len(fields) >= 24
@@ -123,8 +116,8 @@ def test_every_field_that_the_page_names_is_in_the_exports(exported):
     globs = [span for span in spans if re.match(r"(native|coco)/", span)]
     assert len(globs) >= 7
     for pattern in globs:
-        assert any(exported.glob(pattern)), pattern
-    sample = vs.open(exported)[0]
+        assert any(small_run.glob(pattern)), pattern
+    sample = vs.open(small_run)[0]
     names = [span.split(".")[1] for span in spans if re.fullmatch(r"o\.\w+", span)]
     assert len(names) >= 15 and isinstance(sample.objects[0], ObjectAnnotation)
     for name in names:

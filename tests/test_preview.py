@@ -17,7 +17,7 @@ def samples():
 
 
 def test_a_preview_spreads_over_models_and_poses(samples):
-    assert {s.objects[0].key for s in samples} == {"hair_drier_000", "hair_drier_001"}
+    assert {s.objects[0].key for s in samples} == {"post_box_000", "post_box_001"}
     assert len({s.pose.index for s in samples}) == 4
 
 

@@ -1,9 +1,7 @@
 """Troubleshooting shows messages as they are: each is provoked where that is cheap, else found in the source."""
 
 import ast
-import contextlib
 import errno
-import io
 import json
 import os
 import re
@@ -15,14 +13,14 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
+from command_line import viewsphere
 from small import ROOT
-from viewsphere import cli
 
 PAGE = (ROOT / "docs" / "troubleshooting.md").read_text("utf-8")
 HEADINGS = re.findall(r"^### `(.+)`$", PAGE, re.MULTILINE)
 
 RECIPE = """\
-models: [{source: zoo:hair_drier, count: 2, scale: {length: 0.3}}]
+models: [{source: zoo:post_box, count: 2, scale: {length: 0.3}}]
 viewpoints: {azimuth: [0, 180], distance: 1}
 camera: {size: [32, 24], fov_deg: 35}
 channels: [rgb, instances]
@@ -79,11 +77,8 @@ def said(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
 
     def run(line):
-        monkeypatch.setattr(sys, "argv", ["viewsphere", *shlex.split(line)])
-        text = io.StringIO()
-        with contextlib.redirect_stdout(text), contextlib.redirect_stderr(text), contextlib.suppress(SystemExit):
-            cli.main()
-        return text.getvalue()
+        answer = viewsphere(*shlex.split(line))
+        return answer.stdout + answer.stderr
 
     return run
 

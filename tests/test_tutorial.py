@@ -1,7 +1,5 @@
 """The tutorial is true: its files are written, its commands run in order in one folder, and say what the page shows."""
 
-import contextlib
-import io
 import os
 import re
 import shlex
@@ -12,8 +10,8 @@ from typing import NamedTuple
 
 import pytest
 
+from command_line import viewsphere
 from small import ROOT
-from viewsphere import cli
 
 PAGE = (ROOT / "docs" / "tutorial.md").read_text("utf-8")
 TORCH = """
@@ -54,19 +52,6 @@ def blocks(page=PAGE):
     return found
 
 
-def run_here(words, monkeypatch):
-    """A viewsphere command in this process: its exit status and all it printed."""
-    monkeypatch.setattr(sys, "argv", words)
-    said = io.StringIO()
-    with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
-        try:
-            cli.main()
-            status = 0
-        except SystemExit as end:
-            status = end.code or 0
-    return status, said.getvalue()
-
-
 def run_outside(words):
     run = subprocess.run(words, capture_output=True, text=True, timeout=200)
     return run.returncode, run.stdout + run.stderr
@@ -103,6 +88,7 @@ def test_the_page_has_what_it_promises():
     assert saved[4:] == ["toys/village.yaml", "toys/street.yaml", "toys/walk.csv", "toys/walk.yaml", "photos.py"]
 
 
+@pytest.mark.slow
 def test_from_top_to_bottom(empty_folder, monkeypatch):
     monkeypatch.setattr("viewsphere.cli.making.cores", lambda: 0)
     monkeypatch.setattr("viewsphere.cli.datasets.cores", lambda: 1)
@@ -116,7 +102,8 @@ def test_from_top_to_bottom(empty_folder, monkeypatch):
             for line in block.text.splitlines():
                 words = shlex.split(line)
                 if words[0] == "viewsphere":
-                    status, answer = run_here(words, monkeypatch)
+                    status, *printed = viewsphere(*words[1:])
+                    answer = "".join(printed)
                 else:
                     status, answer = run_outside([sys.executable if words[0] == "python" else words[0], *words[1:]])
                 said += answer

@@ -2,10 +2,19 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 
+from viewsphere import zoo
 from viewsphere.assets.mesh import Mesh
+
+
+@cache
+def drawn(family: str, seed: int) -> Mesh:
+    """A draw of a family, made once; do not change it."""
+    return zoo.build(family, np.random.default_rng(seed))
 
 
 def part_vertices(mesh: Mesh, *prefixes: str) -> np.ndarray:

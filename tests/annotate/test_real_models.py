@@ -18,13 +18,18 @@ LENS = Intrinsics(width=320, height=240, fx=330, fy=330, cx=160, cy=120)
 STILL = ((1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1))
 
 
+@pytest.fixture(scope="module")
+def cache(tmp_path_factory):
+    return tmp_path_factory.mktemp("cache")
+
+
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("distance", [2.5, 1.1])
-def test_labels_of_a_real_model(name, distance, tmp_path):
+def test_labels_of_a_real_model(name, distance, cache):
     if not (MODELS / name).is_file():
         pytest.skip("no real models here")
     spec = ModelSpec(key="m", source=str(MODELS / name), category="c", category_id=1, scale=1.5)
-    mesh = load_normalised(spec, folder=tmp_path)
+    mesh = load_normalised(spec, folder=cache)
     for azimuth, elevation in ((35, 20), (200, -10), (0, 90)):
         pose = Pose(index=0, azimuth_deg=azimuth, elevation_deg=elevation, distance=distance)
         (o,), camera, geometry, *_ = scene([mesh], [STILL], pose, LENS, ground=elevation > 0)

@@ -65,7 +65,7 @@ def file(tmp_path):
 
 
 @pytest.mark.parametrize("read", READERS)
-@pytest.mark.parametrize("how", ["KILL", "TERM"])
+@pytest.mark.parametrize("how", ["KILL", pytest.param("TERM", marks=pytest.mark.slow)])
 def test_it_is_said_to_be_killed_and_not_the_file_to_be_damaged(dying, file, read, how):
     dying(how)
     said = refused(read, file)

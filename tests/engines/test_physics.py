@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -124,7 +125,9 @@ def test_white_furnace_of_a_ball(tmp_path, material, occlusion):
     assert np.abs(light - 1).max() < 0.01
 
 
-@pytest.mark.parametrize("material", MATERIALS)
+@pytest.mark.parametrize(
+    "material", [m if i in {0, 3, 7} else pytest.param(m, marks=pytest.mark.slow) for i, m in enumerate(MATERIALS)]
+)
 def test_white_furnace_of_a_box(tmp_path, material):
     """The shading loses nothing, nor does occlusion, though it comes from depths on a grid; nothing is gained."""
     box = flat(cuboid((-0.5, -0.4, -0.3), (0.5, 0.4, 0.3)))
@@ -135,7 +138,7 @@ def test_white_furnace_of_a_box(tmp_path, material):
     assert np.mean(np.abs(occluded - 1) < 0.01) > 0.99
 
 
-@pytest.mark.parametrize("material", [MATERIALS[0], MATERIALS[4], MATERIALS[-2]])
+@pytest.mark.parametrize("material", [MATERIALS[0], MATERIALS[4], pytest.param(MATERIALS[-2], marks=pytest.mark.slow)])
 def test_white_furnace_of_a_car(tmp_path, material):
     """Dents of shading normals that look away from what is seen may darken single pixels; occlusion only ever darkens."""
     from viewsphere.zoo import build
@@ -175,6 +178,7 @@ def ggx_metal(normal_light, normal_view, normal_half, view_half, alpha, color):
     return d * fresnel / (4 * normal_light * normal_view * (1 + lam(normal_light) + lam(normal_view)))
 
 
+@cache
 def lost_light(normal_view, alpha, n=500):
     """Share of a white facet's light that one bounce leaves out, by the midpoint rule over the hemisphere."""
     cosine, phi = (np.arange(n) + 0.5) / n, (np.arange(n) + 0.5) / n * math.pi

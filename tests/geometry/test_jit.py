@@ -7,6 +7,7 @@ import subprocess
 import sys
 
 import numpy as np
+import pytest
 
 from viewsphere.geometry.jit import inner, njit
 
@@ -43,6 +44,7 @@ print("numba.np.arraymath" in sys.modules)
 """
 
 
+@pytest.mark.slow
 def test_a_cached_kernel_is_not_prepared_for_compiling(tmp_path):
     """numba prepares for a second, which each of a run's processes would pay."""
     environment = {**os.environ, "VIEWSPHERE_CACHE": str(tmp_path)}

@@ -21,13 +21,13 @@ ARGUMENTS = (
 
 @pytest.fixture(scope="session")
 def small_dataset(tmp_path_factory):
-    """Two hair driers x six poses; one of a category whose name would end a script."""
+    """Two post boxes x six poses; one of a category whose name would end a script."""
     from viewsphere.run.generate import generate
     from viewsphere.store import Dataset
 
     models = [
-        {"source": "zoo:hair_drier", "category": "hair drier", "scale": {"length": 0.3}},
-        {"source": "zoo:hair_drier", "category": "</script><!--<b>", "name": "odd", "scale": {"length": 0.3}},
+        {"source": "zoo:post_box", "category": "post box", "scale": {"length": 0.18}},
+        {"source": "zoo:post_box", "category": "</script><!--<b>", "name": "odd", "scale": {"length": 0.18}},
     ]
     root = tmp_path_factory.mktemp("report") / "out"
     generate(small_recipe(models=models, formats=[]), root)

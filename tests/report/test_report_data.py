@@ -31,7 +31,7 @@ def test_counts_of_the_small_recipe(small_dataset):
     assert (found["frames"], found["planned"], found["objects"], found["seen"], found["empty"]) == (12, 12, 12, 12, 0)
     assert found["sizes"] == [[96, 72, 12]]
     assert [(c["name"], c["objects"], c["frames"], c["hue"]) for c in found["categories"]] == [
-        ("hair drier", 6, 6, 0),
+        ("post box", 6, 6, 0),
         ("</script><!--<b>", 6, 6, 1),
     ]
     assert sum(s["frames"] for s in found["splits"]) == 12

@@ -7,10 +7,9 @@ import subprocess
 import sys
 
 import pytest
-from typer.testing import CliRunner
 
+from command_line import viewsphere
 from small import ROOT, small_recipe
-from viewsphere.cli import app
 from viewsphere.cli.terminal import print_estimate
 from viewsphere.errors import ModelError
 from viewsphere.run.estimate import Estimate, Rates, disk_bytes, estimate, extrapolate, measure
@@ -54,20 +53,20 @@ def test_the_bytes_are_those_of_a_real_run(tmp_path):
 
 def test_the_command_says_it_in_one_line(tmp_path):
     (tmp_path / "recipe.yaml").write_text(
-        "models: [{source: zoo:hair_drier}]\nviewpoints: {azimuth: [0, 90], distance: 1}\n"
+        "models: [{source: zoo:post_box}]\nviewpoints: {azimuth: [0, 90], distance: 1}\n"
         "camera: {size: [64, 48], fov_deg: 35}\nsplits: {by: frame}\n"
     )
     arguments = ["plan", str(tmp_path / "recipe.yaml"), "--estimate", "--workers", "2"]
-    lines = CliRunner().invoke(app, arguments).stdout.splitlines()
+    lines = viewsphere(*arguments).stdout.splitlines()
     assert lines[0].startswith("dataset: 1 models x 2 poses = 2 frames")
     assert re.fullmatch(r"about \d+ s with 2 workers, \d+ MB on disk", lines[-1])
-    printed = json.loads(CliRunner().invoke(app, [*arguments, "--json"]).stdout)["estimate"]
+    printed = json.loads(viewsphere(*arguments, "--json").stdout)["estimate"]
     assert printed.keys() == {"seconds", "bytes", "workers"} and printed["workers"] == 2
 
 
 def test_a_plan_without_an_estimate_touches_no_model():
     recipe = ROOT / "recipes" / "car_poses.yaml"
-    code = "import sys; from viewsphere.cli import app; app(['plan', sys.argv[1]], standalone_mode=False)\n"
+    code = "import sys; from viewsphere.cli.commands import app; app(['plan', sys.argv[1]], standalone_mode=False)\n"
     code += "assert not {'numba', 'trimesh', 'viewsphere.run.stages', 'viewsphere.zoo.car'} & sys.modules.keys()"
     run = subprocess.run([sys.executable, "-c", code, recipe], capture_output=True, text=True)
     assert run.returncode == 0, run.stderr

@@ -107,7 +107,7 @@ def test_rendered_frames_join_a_real_data_set(tmp_path, small_run):
     with pytest.raises(UserError, match="expected the channels of"):
         merge([tmp_path / "opened", small_run], tmp_path / "joined")
     joined = merge([tmp_path / "opened", small_run], tmp_path / "joined", mixed=True)
-    assert {c.id: c.name for c in joined.categories} == {3: "car", 17: "cat", 1: "hair drier"}
+    assert {c.id: c.name for c in joined.categories} == {3: "car", 17: "cat", 1: "post box"}
     assert len(joined) == 3 + len(Dataset(small_run))
     export(tmp_path / "joined", ["coco", "native"])
     report = check(Dataset(tmp_path / "joined"))
@@ -240,10 +240,10 @@ def test_imported_categories_of_one_name_stay_two_when_others_are_added(tmp_path
         data["categories"][0]["name"] = "car"
 
     import_dataset("coco", coco(tmp_path / "real", change), tmp_path / "out")
-    models = [{"source": "zoo:hair_drier", "category": name} for name in ("drier", "car")]
+    models = [{"source": "zoo:post_box", "category": name} for name in ("box", "car")]
     planned = plan(small_recipe(models=[models[0], {**models[1], "supercategory": "vehicle", "name": "a"}]))
     portion = extend(planned, Dataset(tmp_path / "out").plan)
-    assert [(c.id, c.name) for c in portion.record.categories] == [(3, "car"), (17, "car"), (18, "drier")]
+    assert [(c.id, c.name) for c in portion.record.categories] == [(3, "car"), (17, "car"), (18, "box")]
     assert [spec.category_id for spec in portion.model_specs] == [18, 3]
 
 
@@ -270,14 +270,14 @@ def test_a_native_frame_without_its_mask_is_named(small_run, tmp_path):
 
     source = shutil.copytree(small_run / "native", tmp_path / "native")
     next((source / "Pose-2" / "MASK").iterdir()).unlink()
-    with pytest.raises(StoreError, match=r"pose 2, hair_drier_00\d: expected a frame that can be read; found no .*MASK"):
+    with pytest.raises(StoreError, match=r"pose 2, post_box_00\d: expected a frame that can be read; found no .*MASK"):
         import_dataset("native", source, tmp_path / "out")
     foreign = import_dataset("native", source, tmp_path / "out", keep_going=True)
     assert (foreign.count, len(foreign.left_out)) == (11, 1)
 
 
 def elsewhere(data):
-    data["vehicles"]["../../../../evil"] = data["vehicles"].pop("hair_drier_000")
+    data["vehicles"]["../../../../evil"] = data["vehicles"].pop("post_box_000")
 
 
 def entry(name, value):
@@ -297,7 +297,7 @@ HOSTILE = [
     (entry("bbox_3D_pxs", {"front": {"99": [1, 2]}}), r"pose 2, .*out of bounds"),
     (lambda data: data["poses"].update({"8": [1]}), r"pose 8: expected mappings of what was rendered"),
     (lambda data: data["poses"].update({"999999999999": data["poses"].pop("2")}), r"found pose 999999999999"),
-    (lambda data: data["vehicles"]["hair_drier_000"].update(bbox3D_model=3), r"vehicle hair_drier_000: expected its bbox3D"),
+    (lambda data: data["vehicles"]["post_box_000"].update(bbox3D_model=3), r"vehicle post_box_000: expected its bbox3D"),
 ]
 
 

@@ -1,6 +1,7 @@
 """A data set does not get frames that the engine of another day painted."""
 
 import json
+import shutil
 
 import pytest
 
@@ -14,15 +15,24 @@ from viewsphere.store import Store
 RECIPE = {"channels": ["rgb"], "formats": [], "shot_frames": 3}
 
 
-@pytest.fixture
-def half(tmp_path):
-    """A data set that lacks a shot."""
-    out = tmp_path / "out"
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    out = tmp_path_factory.mktemp("whole") / "out"
     generate(small_recipe(**RECIPE), out)
-    store = Store(out)
-    folder = store.shot_folder(store.plan().shots[-1][0])
-    folder.rename(tmp_path / "taken")
     return out
+
+
+@pytest.fixture
+def finished(whole, tmp_path):
+    return shutil.copytree(whole, tmp_path / "out")
+
+
+@pytest.fixture
+def half(finished):
+    """A data set that lacks a shot."""
+    store = Store(finished)
+    shutil.rmtree(store.shot_folder(store.plan().shots[-1][0]))
+    return finished
 
 
 def painted_by(out, look):
@@ -56,15 +66,13 @@ def test_resuming_with_the_same_goes_on(half, look):
     assert generate(small_recipe(**RECIPE), half).rendered == 3
 
 
-def test_a_finished_data_set_is_exported_whatever_painted_it(half):
-    generate(small_recipe(**RECIPE), half)
-    painted_by(half, "0" * 16)
-    assert generate(small_recipe(**RECIPE), half, formats=["native"]).rendered == 0
+def test_a_finished_data_set_is_exported_whatever_painted_it(finished):
+    painted_by(finished, "0" * 16)
+    assert generate(small_recipe(**RECIPE), finished, formats=["native"]).rendered == 0
 
 
-def test_appending_with_another_engine_is_refused(half):
-    generate(small_recipe(**RECIPE), half)
-    painted_by(half, "0" * 16)
+def test_appending_with_another_engine_is_refused(finished):
+    painted_by(finished, "0" * 16)
     more = small_recipe(**RECIPE, viewpoints={"azimuth": [0, 90, 120, 240], "elevation": [15, 50], "distance": 1.0})
     with pytest.raises(RecipeError, match="the engine's program: expected what the data set has; found another"):
-        generate(more, half, append=True)
+        generate(more, finished, append=True)

@@ -19,16 +19,16 @@ def recipe(**changes):
     return small_recipe(**{"channels": ["rgb", "depth", "instances", "categories"], "formats": ["coco"], **changes})
 
 
-CAR = {"source": "zoo:car", "category": "car", "scale": {"length": 0.3}}
+BIN = {"source": "zoo:wheelie_bin", "category": "bin", "scale": {"length": 0.2}}
 
 
 @pytest.fixture(scope="module")
 def sources(tmp_path_factory):
-    """Two data sets: hair driers; and cars before hair driers, one of which is a hair drier of the first, by its key."""
+    """Two data sets: post boxes; and a bin before a post box, which is one of the first, by its key."""
     folder = tmp_path_factory.mktemp("sources")
     generate(recipe(name="first"), folder / "a")
-    driers = {"source": "zoo:hair_drier", "category": "hair drier", "count": 1, "scale": {"length": 0.3}}
-    generate(recipe(name="second", seed=5, models=[CAR, driers]), folder / "b")
+    boxes = {"source": "zoo:post_box", "category": "post box", "count": 1, "scale": {"length": 0.18}}
+    generate(recipe(name="second", seed=5, models=[BIN, boxes]), folder / "b")
     return folder / "a", folder / "b"
 
 
@@ -61,7 +61,7 @@ def test_every_frame_is_there_once_with_its_pixels_and_numbers(sources, merged):
 def test_categories_are_one_by_name_and_the_pixels_say_so(merged):
     joined = Dataset(merged)
     ids = {c.name: c.id for c in joined.categories}
-    assert ids == {"hair drier": 1, "car": 2}
+    assert ids == {"post box": 1, "bin": 2}
     for sample in joined:
         by_id = np.array([0, *(ids[o.category] for o in sample.objects)])
         assert np.array_equal(sample.categories, by_id[sample.instances])
@@ -69,7 +69,7 @@ def test_categories_are_one_by_name_and_the_pixels_say_so(merged):
 
 def test_models_of_one_key_and_other_content_are_two(sources, merged):
     keys = [info.key for info in Dataset(merged).models]
-    assert keys == ["hair_drier_000", "hair_drier_001", "car_000", "hair_drier_000-2"]
+    assert keys == ["post_box_000", "post_box_001", "wheelie_bin_000", "post_box_000-2"]
     digests = [info.digest for info in Dataset(merged).models]
     assert len(set(digests)) == 4
 
@@ -94,7 +94,7 @@ def test_pose_and_annotation_numbers_stay_unique(merged):
 def test_the_same_model_is_kept_once(sources, tmp_path):
     generate(recipe(name="other poses", viewpoints={"azimuth": 30, "elevation": 15, "distance": 1.0}), tmp_path / "d")
     joined = merge([sources[0], tmp_path / "d"], tmp_path / "e")
-    assert [info.key for info in joined.models] == ["hair_drier_000", "hair_drier_001"]
+    assert [info.key for info in joined.models] == ["post_box_000", "post_box_001"]
     assert joined.plan.poses == 7
 
 
@@ -173,17 +173,17 @@ def test_channels_that_were_not_added_to_the_end_are_an_unfinished_data_set(sour
 
 
 def test_one_model_in_two_categories_is_two_models(sources, tmp_path):
-    blower = {"source": "zoo:hair_drier", "category": "blower", "count": 1, "scale": {"length": 0.3}}
+    letter_box = {"source": "zoo:post_box", "category": "letter box", "count": 1, "scale": {"length": 0.18}}
     viewpoints = {"azimuth": 30, "elevation": 15, "distance": 1.0}
-    generate(recipe(name="other category", models=[blower], viewpoints=viewpoints), tmp_path / "d")
-    generate(recipe(name="capitals", models=[{**blower, "category": "Hair Drier"}], viewpoints=viewpoints), tmp_path / "f")
+    generate(recipe(name="other category", models=[letter_box], viewpoints=viewpoints), tmp_path / "d")
+    generate(recipe(name="capitals", models=[{**letter_box, "category": "Post Box"}], viewpoints=viewpoints), tmp_path / "f")
     joined = merge([sources[0], tmp_path / "d", tmp_path / "f"], tmp_path / "e")
     assert [(info.key, info.category) for info in joined.models] == [
-        ("hair_drier_000", "hair drier"),
-        ("hair_drier_001", "hair drier"),
-        ("hair_drier_000-2", "blower"),
+        ("post_box_000", "post box"),
+        ("post_box_001", "post box"),
+        ("post_box_000-2", "letter box"),
     ]
-    assert [o.category for s in joined for o in s.objects][12:] == ["blower", "hair drier"]
+    assert [o.category for s in joined for o in s.objects][12:] == ["letter box", "post box"]
     report = check(joined)
     assert report.ok, report.findings
 

@@ -91,7 +91,8 @@ def whole(pictures, tmp_path_factory):
     return out
 
 
-@pytest.mark.parametrize("workers", [2, pytest.param(4, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("workers", [2, 4])
 def test_any_number_of_workers_makes_the_same_pictures(workers, pictures, whole, tmp_path):
     file = tmp_path / "recipe.yaml"
     file.write_text(recipe(pictures).to_yaml())

@@ -92,10 +92,10 @@ def test_labelled_scenery_becomes_objects_with_models(files, tmp_path):
     assert summary.frames == 4
     report = check(dataset)
     assert report.ok, [str(f) for f in report.findings]
-    assert [c.name for c in dataset.categories] == ["hair drier", "yard", "poster"]
+    assert [c.name for c in dataset.categories] == ["post box", "yard", "poster"]
     names = {o.category for s in dataset for o in s.objects}
-    assert names == {"hair drier", "yard", "poster"}
-    assert len(dataset.models) == 5  # two driers, the yard, two pictures
+    assert names == {"post box", "yard", "poster"}
+    assert len(dataset.models) == 5  # two boxes, the yard, two pictures
     assert dataset.max_objects == 2 + 1 + 2
     sample = dataset[0]
     assert set(np.unique(sample.categories)) - {0} == {o.category_id for o in sample.objects if o.area}
@@ -156,8 +156,8 @@ def test_what_cannot_stand_there_is_refused_in_one_line(files, tmp_path):
     picture = str(files / "pictures" / "a.png")
     assert "planes[0].at" in problem({"planes": {"image": picture, "height": 1, "at": [0, 0, 0]}})
     assert "inside its box" in problem({"company": {"layout": [[2, 0, 0]]}}, {"azimuth": 90, "elevation": 0, "distance": 1})
-    around = {"azimuth": {"start": 0, "stop": 360, "step": 10}, "elevation": 0, "distance": 0.3}
-    company = {"count": 1, "gap": 0.1, "draw": "per_frame"}
+    around = {"azimuth": {"start": 0, "stop": 360, "step": 10}, "elevation": 0, "distance": 0.2}
+    company = {"count": 1, "gap": 0.05, "draw": "per_frame"}
     assert "outside of all that is placed; found it at (" in problem({"company": company}, around)
     (tmp_path / "bad.glb").write_text("no model")
     with pytest.raises(ModelError, match=r"bad.glb"):

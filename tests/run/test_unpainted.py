@@ -6,17 +6,17 @@ from viewsphere.model.shot import ModelSpec
 from viewsphere.run.generate import generate
 from viewsphere.run.stages import build_zoo_model
 
-DRIERS = [{"source": "zoo:hair_drier", "category": "drier", "count": 2, "scale": {"length": 0.3}}]
-CHAIR = {"source": "zoo:chair", "category": "chair", "scale": {"length": 0.3}}
+BOXES = [{"source": "zoo:post_box", "category": "box", "count": 2, "scale": {"length": 0.18}}]
+BENCH = {"source": "zoo:bench", "category": "bench", "scale": {"length": 0.18}}
 
 
 def test_the_names_are_read_back_from_a_glb(tmp_path):
-    mesh = build_zoo_model(ModelSpec(key="a", source="zoo:hair_drier", seed=3, category="a", category_id=1))
+    mesh = build_zoo_model(ModelSpec(key="a", source="zoo:post_box", seed=3, category="a", category_id=1))
     (tmp_path / "a.glb").write_bytes(glb_bytes(mesh))
     assert material_names(tmp_path / "a.glb") == tuple(material.name for material in mesh.materials)
 
 
-def said(out, *materials, models=DRIERS):
+def said(out, *materials, models=BOXES):
     recipe = small_recipe(
         models=models, scene={"materials": materials}, channels=["rgb"], viewpoints={"azimuth": 0, "distance": 1}
     )
@@ -24,17 +24,17 @@ def said(out, *materials, models=DRIERS):
 
 
 def test_a_change_that_fits_no_material_is_said(tmp_path):
-    found = said(tmp_path / "a", {"material": "laquer*", "tint": "red"}, {"material": "shell", "tint": "red"}, {"metallic": 1})
-    assert found.keys() == {"hair_drier_000", "hair_drier_001"}
+    found = said(tmp_path / "a", {"material": "laquer*", "tint": "red"}, {"material": "plate", "tint": "red"}, {"metallic": 1})
+    assert found.keys() == {"post_box_000", "post_box_001"}
     for (warning,) in found.values():
         assert warning.startswith("scene.materials[0].material: expected a pattern of its materials' names (")
-        assert "shell" in warning and warning.endswith("; found 'laquer*', which fits none: it changes nothing")
-    again = said(tmp_path / "a", {"material": "laquer*", "tint": "red"}, {"material": "shell", "tint": "red"}, {"metallic": 1})
+        assert "plate" in warning and warning.endswith("; found 'laquer*', which fits none: it changes nothing")
+    again = said(tmp_path / "a", {"material": "laquer*", "tint": "red"}, {"material": "plate", "tint": "red"}, {"metallic": 1})
     assert again == found
 
 
 def test_a_change_for_all_that_fits_some_is_meant_so(tmp_path):
-    models = [DRIERS[0] | {"count": 1}, CHAIR]
-    assert said(tmp_path / "a", {"material": "shell", "tint": "red"}, models=models) == {}
-    found = said(tmp_path / "b", {"models": "*_000", "material": "shell", "tint": "red"}, models=models)
-    assert found.keys() == {"chair_000"}
+    models = [BOXES[0] | {"count": 1}, BENCH]
+    assert said(tmp_path / "a", {"material": "plate", "tint": "red"}, models=models) == {}
+    found = said(tmp_path / "b", {"models": "*_000", "material": "plate", "tint": "red"}, models=models)
+    assert found.keys() == {"bench_000"}

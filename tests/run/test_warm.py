@@ -6,6 +6,8 @@ import os
 import subprocess
 import sys
 
+import pytest
+
 from viewsphere import Recipe, plan
 from viewsphere.geometry.kernel_cache import sources_digest
 from viewsphere.run import warm
@@ -23,6 +25,7 @@ if __name__ == "__main__":
 """
 
 
+@pytest.mark.slow
 def test_the_parent_of_a_later_run_loads_no_kernels(tmp_path):
     (tmp_path / "run.py").write_text(RUN)
     environment = {**os.environ, "VIEWSPHERE_CACHE": str(tmp_path / "cache")}

@@ -61,7 +61,6 @@ sizes = st.floats(0.05, 6)
 boxes_strategy = st.lists(st.tuples(sizes, sizes, st.floats(-1, 1), st.floats(-1, 1)), min_size=2, max_size=6)
 
 
-@settings(max_examples=60, deadline=None)
 @given(boxes_strategy, st.integers(0, 2**32), st.sampled_from(["random", "row"]), st.floats(0, 1))
 def test_no_two_stand_in_one_another(measures, seed, how, gap):
     boxes = [box(w, n, x=x * w, y=y * n, z=0.3 * i) for i, (w, n, x, y) in enumerate(measures)]
@@ -77,7 +76,7 @@ def test_no_two_stand_in_one_another(measures, seed, how, gap):
     assert moves == layout(entry, seed, specs, boxes, ("m0",))
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=2 * settings.default.max_examples)
 @given(*[st.tuples(sizes, sizes, st.floats(-5, 5), st.floats(-5, 5), st.floats(0, 360))] * 2)
 def test_apart_never_says_more_than_there_is(one, other):
     """An axis that separates is a proof; where there is none, the two are nearer than the largest gap it was asked for."""

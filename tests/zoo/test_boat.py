@@ -13,7 +13,7 @@ from viewsphere.zoo.boat import Boat, MotorBoat, RowingBoat, SailingBoat, boat, 
 from viewsphere.zoo.shapes.cut import cut
 from viewsphere.zoo.shapes.sheets import bar, moulding, sheet
 from viewsphere.zoo.shapes.solids import Solid, rounded_box
-from zoo_mesh import assert_sound, faces, outward_share, part_vertices
+from zoo_mesh import assert_sound, drawn, faces, outward_share, part_vertices
 
 BOATS: tuple[Boat, ...] = (
     RowingBoat(),
@@ -139,10 +139,11 @@ def test_sails_fill_to_leeward_and_are_closed(lee: float) -> None:
     assert 0.3 < (sides > 0).mean() < 0.7
 
 
-def test_the_tiller_stands_on_something() -> None:
+@pytest.mark.parametrize(("count", "least"), [(8, 2), pytest.param(30, 6, marks=pytest.mark.slow)])
+def test_the_tiller_stands_on_something(count: int, least: int) -> None:
     tillers = 0
-    for seed in range(30):
-        mesh = zoo.build("boat", np.random.default_rng(seed))
+    for seed in range(count):
+        mesh = drawn("boat", seed)
         if "rudder_stock" in mesh.parts:
             stock, *bases = (
                 mesh.vertices[np.unique(mesh.triangles[mesh.triangle_part == mesh.parts.index(name)])]
@@ -151,11 +152,11 @@ def test_the_tiller_stands_on_something() -> None:
             aft, floor = bases[0][:, 1].max(), bases[0][:, 2].min()
             assert stock[:, 2].min() < (floor if stock[:, 1].mean() < aft else bases[1][:, 2].max())
             tillers += 1
-    assert tillers > 5
+    assert tillers >= least
 
 
 def test_one_seed_gives_one_boat() -> None:
-    a, b, other = (zoo.build("boat", np.random.default_rng(seed)) for seed in (5, 5, 6))
+    a, b, other = drawn("boat", 4), zoo.build("boat", np.random.default_rng(4)), drawn("boat", 3)
     for name in ("vertices", "triangles", "normals", "triangle_material", "triangle_part"):
         assert getattr(a, name).tobytes() == getattr(b, name).tobytes()
     assert a.materials == b.materials and a.parts == b.parts
@@ -163,7 +164,7 @@ def test_one_seed_gives_one_boat() -> None:
 
 
 def test_draws_are_sound_and_differ() -> None:
-    meshes = [zoo.build("boat", np.random.default_rng(seed)) for seed in range(6)]
+    meshes = [drawn("boat", seed) for seed in range(6)]
     for mesh in meshes:
         assert_sound(mesh, 60_000)
     sizes = np.array([zoo.real_size(m) for m in meshes])

@@ -13,7 +13,7 @@ from scipy.spatial import KDTree
 from viewsphere import zoo
 from viewsphere.assets.mesh import Mesh
 from viewsphere.zoo.chair import Armchair, Chair, Dining, Folding, Office, Shell, Stool, Windsor, chair, draw
-from zoo_mesh import assert_sound, faces, outward_share, part_vertices
+from zoo_mesh import assert_sound, drawn, faces, outward_share, part_vertices
 
 MOST = 46_000
 CHAIRS: dict[str, Chair] = {
@@ -183,15 +183,16 @@ def _slats(mesh: Mesh) -> int:
 
 
 def test_one_seed_gives_one_chair() -> None:
-    a, b, other = (zoo.build("chair", np.random.default_rng(seed)) for seed in (5, 5, 6))
+    a, b, other = drawn("chair", 4), zoo.build("chair", np.random.default_rng(4)), drawn("chair", 3)
     for name in ("vertices", "triangles", "normals", "triangle_material", "triangle_part"):
         assert getattr(a, name).tobytes() == getattr(b, name).tobytes()
     assert a.materials == b.materials and a.parts == b.parts
     assert a.vertices.tobytes() != other.vertices.tobytes()
 
 
-def test_forty_draws_are_sound_and_differ() -> None:
-    meshes = [zoo.build("chair", np.random.default_rng(seed)) for seed in range(40)]
+@pytest.mark.parametrize("count", [10, pytest.param(40, marks=pytest.mark.slow)])
+def test_draws_are_sound_and_differ(count: int) -> None:
+    meshes = [drawn("chair", seed) for seed in range(count)]
     for mesh in meshes:
         assert_sound(mesh, MOST)
     sizes = np.array([zoo.real_size(m) for m in meshes])
@@ -200,7 +201,7 @@ def test_forty_draws_are_sound_and_differ() -> None:
     assert (np.ptp(sizes, axis=0) > 0.3 * sizes.mean(axis=0)).all()
     colors = np.array([_main_color(mesh) for mesh in meshes]) ** (1 / 2.2)
     looks = np.concatenate([colors, sizes / sizes.std(axis=0) / 10], axis=1)
-    assert (np.linalg.norm(looks[:, None] - looks[None], axis=2) + np.eye(40) * 9).min() > 0.01
+    assert (np.linalg.norm(looks[:, None] - looks[None], axis=2) + np.eye(count) * 9).min() > 0.01
     assert np.median(np.linalg.norm(colors[:, None] - colors[None], axis=2)) > 0.2
 
 
