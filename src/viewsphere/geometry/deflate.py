@@ -8,8 +8,18 @@ import numpy as np
 from isal import isal_zlib
 from numpy.typing import NDArray
 
-LEVEL = 1
-"""ISA-L's: an order of magnitude faster than zlib's usual level, and hardly larger."""
+FAST, STEADY = 1, 3
+"""ISA-L's levels: an order of magnitude faster than zlib's usual one, and hardly larger; the other takes twice as long."""
+
+SMALL_BYTES = 1 << 16
+"""Of some short inputs, small masks among them, ISA-L's levels 1 and 2 make something else one time in some thousand: that
+depends on where in memory its own state lies (measured with isal 1.9.1). Level 3 does not, nor was it seen with longer ones.
+"""
+
+
+def level_for(size: int) -> int:
+    """The level for so many bytes."""
+    return STEADY if size < SMALL_BYTES else FAST
 
 
 def deflate(array: NDArray[Any]) -> bytes | memoryview:
@@ -20,7 +30,7 @@ def deflate(array: NDArray[Any]) -> bytes | memoryview:
     step = 1 if array.ndim == 2 else array.shape[-1]
     array = np.ascontiguousarray(array)
     if array.dtype.newbyteorder("=") != np.float32 or step not in (1, 3):
-        return isal_zlib.compress(array, LEVEL, -15)
+        return isal_zlib.compress(array, level_for(array.nbytes), -15)
     from viewsphere.geometry.kernels_deflate import STORED, deflate_runs, match_codes
 
     data = array.reshape(-1).view(np.uint8)

@@ -13,7 +13,7 @@ from isal import isal_zlib
 from numpy.typing import NDArray
 
 from viewsphere.errors import UserError
-from viewsphere.geometry.deflate import LEVEL
+from viewsphere.geometry.deflate import FAST
 
 _MAGIC = struct.pack("<II", 20000630, 2)
 _ZIP, _LINES = 3, 16
@@ -39,7 +39,7 @@ def encode_exr(array: NDArray[Any]) -> bytes:
     blocks: list[bytes] = []
     for y in range(0, height, _LINES):
         raw = rows[y : y + _LINES].reshape(-1)
-        packed = isal_zlib.compress(_mixed(raw), LEVEL)
+        packed = isal_zlib.compress(_mixed(raw), FAST)
         body = packed if len(packed) < raw.size else raw.tobytes()
         blocks.append(struct.pack("<iI", y, len(body)) + body)
     places = np.cumsum([len(head) + 8 * len(blocks), *map(len, blocks[:-1])]).astype("<u8")

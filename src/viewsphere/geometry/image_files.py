@@ -1,6 +1,6 @@
 """Arrays to image files and back, in memory: lossless PNG and TIFF, fast and always the same bytes.
 
-Deflate is ISA-L's at level 1, an order of magnitude faster than zlib at PNG's usual level. The readers take
+Deflate is ISA-L's (`deflate`), an order of magnitude faster than zlib at PNG's usual level. The readers take
 what the writers make; other tools read the files too (Pillow, OpenCV, tifffile, imageio).
 PNG: https://www.w3.org/TR/png-3/; TIFF 6.0 with deflate:
 https://www.loc.gov/preservation/digital/formats/fdd/fdd000022.shtml.
@@ -17,7 +17,7 @@ from isal import isal_zlib
 from numpy.typing import NDArray
 
 from viewsphere.errors import UserError
-from viewsphere.geometry.deflate import LEVEL, deflate
+from viewsphere.geometry.deflate import deflate, level_for
 
 _SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _COLOR_TYPES = {1: 0, 3: 2, 4: 6}  # components -> PNG colour type
@@ -49,7 +49,8 @@ def encode_png(array: NDArray[Any], *, palette: NDArray[np.uint8] | None = None,
     more = b"" if palette is None else _chunk(b"PLTE", palette.tobytes())
     if unit is not None:
         more += _chunk(b"pCAL", struct.pack(">6siiBB2s", b"depth", 0, 65535, 0, 2, b"m") + f"0\0{65535 * unit!r}".encode())
-    body = isal_zlib.compress(_filtered(array, components), LEVEL)
+    lines = _filtered(array, components)
+    body = isal_zlib.compress(lines, level_for(lines.nbytes))
     return b"".join((_SIGNATURE, _chunk(b"IHDR", header), more, _chunk(b"IDAT", body), _chunk(b"IEND", b"")))
 
 
