@@ -145,6 +145,7 @@ def test_obj(write, case):
     assert said in outcome(write("a.obj", TRIANGLE + text))
 
 
+@pytest.mark.slow
 def test_many_names_cost_no_quadratic_time(write, gltf, cube):
     faces = "".join(f"usemtl m{i}\ng g{i}\nf 1 2 3\n" for i in range(8_000))
     write("a.mtl", "newmtl other\n")
@@ -163,6 +164,7 @@ def test_a_name_that_looks_numbered_stays_unique(gltf, cube):
     assert outcome(gltf.write()).parts == ("a", "a_2", "a_3", "a_4", "a_2_2")
 
 
+@pytest.mark.slow
 def test_a_polygon_of_very_many_corners(write):
     angle = np.linspace(0, 2 * np.pi, 100_000, endpoint=False)
     radius = np.where(np.arange(len(angle)) % 2, 1.0, 0.5)

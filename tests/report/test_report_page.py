@@ -17,6 +17,7 @@ def changed(before, after):
     return float((np.abs(before - after).max(axis=-1) > 12).mean())
 
 
+@pytest.mark.slow
 def test_every_toggle_changes_the_picture_and_back(open_page):
     page = open_page()
     plain = pixels(page, ".card .picture")
@@ -31,6 +32,7 @@ def test_every_toggle_changes_the_picture_and_back(open_page):
         assert changed(plain, pixels(page, ".card .picture")) < 0.002, name
 
 
+@pytest.mark.slow
 def test_surface_layers_exclude_one_another(open_page):
     page = open_page()
     page.click("#layers [data-layer=depth]")
@@ -55,6 +57,7 @@ def test_the_mask_is_the_stored_one(open_page, small_dataset):
     assert mask.any()
 
 
+@pytest.mark.slow
 def test_filters_and_reset(open_page):
     page = open_page()
     cards = page.locator(".card")
@@ -77,6 +80,7 @@ def test_filters_and_reset(open_page):
     assert cards.count() == 12
 
 
+@pytest.mark.slow
 def test_cells_and_sides_filter_the_pictures(open_page):
     page = open_page()
     page.locator(".map rect.cell").first.click()
@@ -87,6 +91,7 @@ def test_cells_and_sides_filter_the_pictures(open_page):
     assert page.locator(".card").count() == 2
 
 
+@pytest.mark.slow
 def test_pages_turn(browser, small_dataset, tmp_path, open_page):
     import json
     import re

@@ -186,7 +186,7 @@ def test_watertight_on_pixel_centres():
         assert alone.sum() == (16 * step + 1) ** 2  # one more: the far border's centres lie on the grid's own border
 
 
-@pytest.mark.parametrize("width, height", [(16, 16), (4096, 4096)])
+@pytest.mark.parametrize("width, height", [(16, 16), pytest.param(4096, 4096, marks=pytest.mark.slow)])
 def test_image_sizes(width, height):
     geometry = placed(sphere(3), ground=True)
     seen = rasterize(geometry, orbit_camera(lens(width, height, 0.8), elevation=math.pi / 2))
