@@ -161,5 +161,6 @@ def deflated(count, level):
 
 
 def test_a_small_mask_is_deflated_to_the_same_bytes_wherever_that_is_done():
+    """At level 1 each of six processes found at least two results in so many places."""
     lines = zlib.decompress(base64.b64decode(SMALL_MASK))
-    assert len(deflated(1500, level_for(len(lines)))) == 1
+    assert len(deflated(8000, level_for(len(lines)))) == 1

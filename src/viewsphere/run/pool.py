@@ -63,6 +63,7 @@ class Crew:
         for hand in self._hands:
             hand.stop()
         self._hands.clear()
+        self._here = None
 
     def run(self, jobs: Iterable[Job]) -> Iterator[Outcome]:
         """Do all jobs, one list at a time; outcomes come as they are ready.

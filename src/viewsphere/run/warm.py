@@ -87,12 +87,8 @@ def _outline(value: JsonValue) -> JsonValue:
     return value
 
 
+@pause_collection()
 def _render(shot: Shot) -> None:
-    with pause_collection():
-        _render_card(shot)
-
-
-def _render_card(shot: Shot) -> None:
     card = _card()
     engine: plugins.Engine = plugins.load("engines", shot.engine)
     stage = engine.stage(shot, lambda spec: card)
