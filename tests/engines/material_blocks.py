@@ -99,9 +99,9 @@ def made(surfaces, textures, given, seen=0, which=0, view=FRONT) -> dict[str, np
         b = np.zeros(block.ROWS * block.BLOCK, np.float32)
         for name, value in rows.items():
             b[getattr(block, name) :][:size] = value[part]
-        own = np.zeros(block.BLOCK, np.int32), np.zeros(block.BLOCK, np.int32)
-        own[0][:size], own[1][:size] = seen[part], which[part]
-        shown(size, view, surfaces, textures, b, *own)
+        own = np.zeros(block.BLOCK, np.int32)
+        own[:size] = which[part]
+        shown(size, view, surfaces, textures, b, own)
         for name in names:
             found[name][part] = b[getattr(block, name) :][:size]
     return found

@@ -31,6 +31,7 @@ _SMALLEST = 32  # width of a map
 _SKY_WIDTH = 256  # of the sharpest map of a sky that has no detail
 _PICTURE_WIDTH = 512  # and of a photographed one
 _SKY_HEIGHT = 256  # of the picture of a made sky
+_STEPS = np.array([2.0 ** (k - 24) for k in range(32)], np.float32)  # of a packed colour, by its exponent
 _DISC = 60.0  # greatest radiance of the sun as seen: all of it is white
 
 # A photographed sun: a bright spot this far from its middle at most, so much above the mean and of so much of all light.
@@ -196,7 +197,7 @@ def sky_behind(view: View, surrounding: Surrounding, radiance: Float32) -> None:
     numbers = np.vstack([to_map, turn @ sun[0], light, sun[1:], disc]).astype(np.float32)
     kernels.lay_over_sky(
         view.rays if has_rays else view.places, np.int32(view.columns), numbers.ravel(), surrounding.picture,
-        *surrounding.picture_levels[level], np.empty(6 * kernels.CHUNK, np.float32), radiance,
+        *surrounding.picture_levels[level], np.empty(kernels.ROWS * kernels.CHUNK, np.float32), radiance,
     )  # fmt: skip
 
 
@@ -387,8 +388,8 @@ def _packed(picture: Float32) -> NDArray[np.uint32]:
     most = np.maximum(np.maximum(colors[0], colors[1]), colors[2])
     # float32's own exponent is 126 more than that of a mantissa below 1; 511.5 steps are no longer 511.
     shared = np.maximum((most.view(np.int32) >> 23) - (126 - 15), 0)
-    shared += most >= np.float32(511.5) * kernels.STEP[shared]
-    scale = 1 / kernels.STEP[shared]
+    shared += most >= np.float32(511.5) * _STEPS[shared]
+    scale = 1 / _STEPS[shared]
     red, green, blue = ((c * scale + np.float32(0.5)).astype(np.int32) for c in colors)
     return (red | green << 9 | blue << 18 | shared << 27).view(np.uint32)
 

@@ -41,17 +41,13 @@ def _seen(row, first, x, y, z):
     return row.one(first) * x + row.one(first + 1) * y + row.one(first + 2) * z + row.one(first + 3)
 
 
-@inner(fastmath=FAST)
-def _is_seen(count, row, b):
-    """Whether any sample that has light is on a view's map."""
-    x0, x1, x2, x3, y0, y1, y2, y3 = row[0], row[1], row[2], row[3], row[4], row[5], row[6], row[7]
-    w0, w1, w2, w3, read, found = row[12], row[13], row[14], row[15], row[READ], f4(0)
-    for i in range(U(count)):
-        x, y, z = b[U(PX) + i], b[U(PY) + i], b[U(PZ) + i]
-        u, v = abs(x0 * x + x1 * y + x2 * z + x3), abs(y0 * x + y1 * y + y2 * z + y3)
-        edge = read * (w0 * x + w1 * y + w2 * z + w3)
-        found += f4(1) if (u <= edge) & (v <= edge) & (b[U(FACING) + i] > f4(0)) else f4(0)
-    return found > f4(0)
+@inner
+def _count_on(count, b):
+    """How many samples that have light are on a view's map."""
+    found = 0
+    for i in range(count):
+        found += 1 if b[STATE + i] == f4(-1) else 0
+    return found
 
 
 @lanewise
@@ -116,13 +112,18 @@ def _judge(row, b):
 
 @inner
 def _gather_on(count, b):
-    """Move the samples on the map together, OWN being what they were; gives their number."""
+    """Move the samples on the map together, OWN being what they were."""
     left = U(0)
     for i in range(U(count)):
         if b[U(STATE) + i] == f4(-1):
             b[U(OWN) + left] = f4(i)
             left = _move(i, left, b)
-    return left
+
+
+@inner
+def _all_on(count, b):
+    for i in range(count):
+        b[OWN + i] = f4(i)
 
 
 @inner
@@ -248,11 +249,15 @@ def look(count, form, grid, depth, bounds, k, b):
     this view has told; where it is not above 0, nothing changes. (GX, GY, GZ) may be zero where there is no surface.
     """
     row, places = form[k], grid[k]
-    if not _is_seen(count, row, b):
-        return
     _see(count, row, b)
+    left = _count_on(count, b)
+    if left == 0:
+        return
     _project(count, row, b)
-    left = nb.intp(_gather_on(count, b))
+    if left < count:
+        _gather_on(count, b)
+    else:
+        _all_on(count, b)
     for _ in range(3):
         if left > 0:
             _find_cells(left, f4(places[CELLS]), b)

@@ -19,12 +19,12 @@ f4 = nb.float32
 i4 = nb.int32
 U = nb.uintp
 CHUNK = 128
-RX, RY, RZ, RU, RV, TOWARD = range(0, 6 * CHUNK, CHUNK)
+# Directions, then colours; places in the picture; cosines to the sun; four texels around, packed, and how far from the first.
+RX, RY, RZ, RU, RV, TOWARD, P, Q, R, S, FX, FY = range(0, 12 * CHUNK, CHUNK)
+ROWS = 12
 # Rows of `Surrounding.light`.
 SCALE, ABOVE, BELOW, LAMPS, TURN, BEHIND = range(6)
 SOFT_HORIZON = 0.025  # sine of the elevation within which the ground turns into sky, as mirrored
-# Shared exponents (as OpenGL's RGB9_E5): nine bits a colour, five for their exponent.
-STEP = np.array([2.0 ** (k - 24) for k in range(32)], np.float32)
 
 
 @inner(fastmath=FAST)
@@ -156,37 +156,33 @@ def _angle(y, x):
 
 
 @inner(fastmath=FAST)
-def _read(t):
-    """Red, green and blue of a packed texel."""
-    step = STEP[U(t >> nb.uint32(27))]
-    red, green, blue = t & nb.uint32(511), (t >> nb.uint32(9)) & nb.uint32(511), (t >> nb.uint32(18)) & nb.uint32(511)
-    return f4(i4(red)) * step, f4(i4(green)) * step, f4(i4(blue)) * step
-
-
-@inner(fastmath=FAST)
-def _look_up(texels, first, width, height, count, w):
-    """RX, RY, RZ: the picture's colours at column RU and row RV; bilinear."""
-    zero, one = f4(0), f4(1)
-    p, q, r, s = (zero, zero, zero), (zero, zero, zero), (zero, zero, zero), (zero, zero, zero)
-    last_column, last_row = i4(-2), i4(-2)
-    for i in range(count):
-        u, v = w[RU + i], min(max(w[RV + i], zero), f4(height - 1))
+def _read_texels(texels, first, width, height, count, w):
+    """P to S: the four texels around column RU and row RV; FX, FY: how far that is from the first of them."""
+    zero, one, packed = f4(0), f4(1), w.view(np.uint32)
+    for i in range(U(count)):
+        u, v = w[U(RU) + i], min(max(w[U(RV) + i], zero), f4(height - 1))
         c0, r0 = min(max(i4(u + one), i4(0)), width) - i4(1), min(max(i4(v), i4(0)), height - i4(1))
-        fx, fy = u - f4(c0), v - f4(r0)
-        if c0 != last_column or r0 != last_row:  # neighbouring pixels often lie between the same four texels
-            last_column, last_row = c0, r0
-            c1 = c0 + i4(1) if c0 + i4(1) < width else i4(0)
-            c0 = c0 if c0 >= 0 else width - i4(1)
-            upper = first + r0 * width
-            lower = first + min(r0 + i4(1), height - i4(1)) * width
-            p, q = _read(texels[U(upper + c0)]), _read(texels[U(upper + c1)])
-            r, s = _read(texels[U(lower + c0)]), _read(texels[U(lower + c1)])
-        ws = fx * fy
-        wq, wr = fx - ws, fy - ws
-        wp = one - fx - wr
-        w[RX + i] = p[0] * wp + q[0] * wq + r[0] * wr + s[0] * ws
-        w[RY + i] = p[1] * wp + q[1] * wq + r[1] * wr + s[1] * ws
-        w[RZ + i] = p[2] * wp + q[2] * wq + r[2] * wr + s[2] * ws
+        w[U(FX) + i], w[U(FY) + i] = u - f4(c0), v - f4(r0)
+        c1 = c0 + i4(1) if c0 + i4(1) < width else i4(0)
+        c0 = c0 if c0 >= 0 else width - i4(1)
+        upper = first + r0 * width
+        lower = upper + (width if r0 + i4(1) < height else i4(0))
+        packed[U(P) + i], packed[U(Q) + i] = texels[U(upper + c0)], texels[U(upper + c1)]
+        packed[U(R) + i], packed[U(S) + i] = texels[U(lower + c0)], texels[U(lower + c1)]
+
+
+@lanewise
+def _blend_texels(w):
+    """RX, RY, RZ: the picture's colours, bilinear. A texel is nine bits a colour, five for the exponent they share."""
+    fx, fy = w[FX], w[FY]
+    both = fx * fy
+    totals = None
+    for row, weight in ((P, 1 - fx - fy + both), (Q, fx - both), (R, fy - both), (S, both)):
+        texel = w[row].bits()
+        share = weight * (((texel >> 27) & 31) + 103).exponent()  # 2 ** (k - 24)
+        colors = [((texel >> 9 * k) & 511).real() * share for k in range(3)]
+        totals = colors if totals is None else [t + c for t, c in zip(totals, colors, strict=True)]
+    w.put((RX, RY, RZ), totals)
 
 
 @inner(fastmath=FAST)
@@ -237,7 +233,7 @@ def lay_over_sky(listed, columns, numbers, picture, first, width, height, w, rad
     """Lay radiance (N, 4), scene-linear and premultiplied, over the sky, in place; no sky where the lens has no ray.
 
     listed: rays (N, 3) or places (N, 2) of the samples, or none (0, 2) for a grid of so many columns. numbers: (26,)
-    `environment.sky_behind`. picture: `Surrounding.picture`; first, width, height: its level. w: scratch of 6 * CHUNK.
+    `environment.sky_behind`. picture: `Surrounding.picture`; first, width, height: its level. w: scratch of ROWS * CHUNK.
     """
     count, is_listed, one = i4(radiance.shape[0]), listed.shape[0] > 0, f4(1)
     start = i4(0)
@@ -250,7 +246,8 @@ def lay_over_sky(listed, columns, numbers, picture, first, width, height, w, rad
         if open_ > 0:
             _rays(listed, columns, start, n, w)
             _aim(n, numbers, f4(width), f4(height), w)
-            _look_up(picture, first, width, height, n, w)
+            _read_texels(picture, first, width, height, n, w)
+            _blend_texels(n, w)
             _add_sun(n, numbers, w)
             for i in range(n):
                 if not math.isnan(w[TOWARD + i]):

@@ -46,7 +46,20 @@ from viewsphere.engines.raster.kernels_block import (
     VY,
     VZ,
 )  # fmt: skip
-from viewsphere.engines.raster.kernels_lanes import clamp, dot, lanewise, least, load, most, root, scatter, sign, size, spread
+from viewsphere.engines.raster.kernels_lanes import (
+    clamp,
+    dot,
+    lanewise,
+    least,
+    load,
+    most,
+    root,
+    scatter,
+    sign,
+    size,
+    spread,
+    where,
+)
 from viewsphere.engines.raster.kernels_material import L_SCENERY
 from viewsphere.engines.raster.kernels_texture import FAST
 from viewsphere.geometry.jit import inner
@@ -60,37 +73,49 @@ DIFFERENCES = {3: UA0, 4: VA0, 5: UA1, 6: VA1, 11: AX, 12: AY, 13: AZ}
 
 
 @inner(fastmath=FAST)
-def _rays(view, start, count, slots, b):
+def _rays(view, count, own, b):
     """Unnormalised directions in the camera's axes, into VX, VY, VZ: each ends where 1 / inverse depth says."""
-    one, half = f4(1), f4(0.5)
     if view.rays.shape[0] > 0:
-        for i in range(count):
-            ray = view.rays[U(slots[start + i])]
-            b[VX + i], b[VY + i], b[VZ + i] = ray[0], ray[1], ray[2]
+        for i in range(U(count)):
+            ray = view.rays[U(own[i])]
+            b[U(VX) + i], b[U(VY) + i], b[U(VZ) + i] = ray[0], ray[1], ray[2]
         return
     if view.places.shape[0] > 0:
-        for i in range(count):
-            place = view.places[U(slots[start + i])]
-            b[T0 + i], b[T1 + i] = place[0], place[1]
+        for i in range(U(count)):
+            place = view.places[U(own[i])]
+            b[U(T0) + i], b[U(T1) + i] = place[0], place[1]
     else:
-        columns, per = nb.int32(view.columns), 1.0 / view.columns
-        for i in range(count):
-            k = slots[start + i]
-            row = nb.int32((k + 0.5) * per)  # exact in float64, and without a division
-            b[T0 + i], b[T1 + i] = f4(k - row * columns) + half, f4(row) + half
-    a0, a1, a2 = view.lens[0, 0], view.lens[0, 1], view.lens[0, 2]
-    c0, c1, c2 = view.lens[1, 0], view.lens[1, 1], view.lens[1, 2]
-    for i in range(count):
-        x, y = b[T0 + i], b[T1 + i]
-        b[VX + i], b[VY + i], b[VZ + i] = a0 * x + a1 * y + a2, c0 * x + c1 * y + c2, one
+        _find_centers(count, nb.intp(view.columns), f4(1) / f4(view.columns), own, b)
+    _look_through_pinhole(count, view.lens, b)
+
+
+@lanewise
+def _find_centers(columns, per, own, b):
+    """T0, T1: column and row of the pixels' centres."""
+    k = own[0]
+    row = (k.real() * per).whole()
+    column = k - row * columns
+    # A product of float32 may be one too small or too large.
+    row, column = where(column < 0, row - 1, row), where(column < 0, column + columns, column)
+    is_next = column >= columns
+    row, column = where(is_next, row + 1, row), where(is_next, column - columns, column)
+    b[T0], b[T1] = column.real() + 0.5, row.real() + 0.5
+
+
+@lanewise
+def _look_through_pinhole(lens, b):
+    x, y = b[T0], b[T1]
+    b[VX], b[VY] = (lens.one(3 * k) * x + lens.one(3 * k + 1) * y + lens.one(3 * k + 2) for k in range(2))
+    b[VZ] = 1
 
 
 @inner(fastmath=FAST)
-def locate(view, start, count, slots, depth, b):
-    """Positions, directions and pixel sizes."""
-    _rays(view, start, count, slots, b)
-    for i in range(count):
-        b[T0 + i] = depth[U(slots[start + i])]
+def locate(view, start, count, slots, depth, b, own):
+    """Positions, directions and pixel sizes; own: the samples' slots."""
+    for i in range(U(count)):
+        own[i] = slots[U(start) + i]
+        b[U(T2) + i] = depth[U(own[i])]
+    _rays(view, count, own, b)
     _aim(count, view.eye, view.rotation, view.scale, view.pixel, b)
 
 
@@ -99,7 +124,7 @@ def _aim(eye, rotation, scale, pixel, b):
     """Turn the rays from the camera's axes into the world's."""
     ray = b.get(VX, VY, VZ)
     way = tuple(dot(tuple(rotation.one(3 * row + k) for row in range(3)), ray) for k in range(3))
-    along = scale / b[T0]
+    along = scale / b[T2]
     for k, row in enumerate((PX, PY, PZ)):
         b[row] = eye.one(k) + along * way[k]
     b[PIXEL] = along * pixel
@@ -139,12 +164,14 @@ def _vertex(builder, vertices, row):
 
 
 @inner(fastmath=FAST)
-def gather(surfaces, start, count, slots, triangle, b, seen, material):
-    """Vertex attributes of located samples, their triangles and materials; normals on the viewer's side; edges."""
+def gather(surfaces, count, triangle, b, own, material):
+    """Vertex attributes of located samples, their triangles, in place of their slots, and materials; normals on the viewer's
+    side; edges.
+    """
     vertices, triangles, normals = surfaces.vertices, surfaces.triangles, surfaces.normals
     for i in range(U(count)):
-        t = U(triangle[U(slots[U(start) + i])])
-        seen[i], m = t, surfaces.material[t]
+        t = U(triangle[U(own[i])])
+        own[i], m = t, surfaces.material[t]
         material[i] = m
         first = U(triangles[t, U(0)])
         _differ(vertices, first, U(triangles[t, U(1)]), b, i)
@@ -155,7 +182,7 @@ def gather(surfaces, start, count, slots, triangle, b, seen, material):
         b[U(SCENERY) + i] = surfaces.looks[U(m), U(L_SCENERY)]
     _find(count, b)
     for i in range(U(count)):
-        t = U(seen[i])
+        t = U(own[i])
         g, h = b[U(BARY1) + i], b[U(BARY2) + i]
         _blend(vertices, U(triangles[t, U(0)]), U(triangles[t, U(1)]), U(triangles[t, U(2)]), g, h, b, i)
     _face_viewer(count, b)
@@ -189,14 +216,13 @@ def _face_viewer(b):
 
 
 @inner(fastmath=FAST)
-def gather_ground(view, floor, start, count, slots, triangle, b, seen, material):
+def gather_ground(view, floor, count, b, material):
     """The same for samples of the ground: its texture repeats in the world, and it fades into the sky far behind the origin.
 
     floor: uv per length, u and v at the origin, its material.
     """
     own = nb.int32(floor[3])
     for i in range(U(count)):
-        seen[i] = triangle[U(slots[U(start) + i])]
         material[i] = own
     _stand(count, view.eye, floor, b)
 

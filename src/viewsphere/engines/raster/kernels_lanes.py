@@ -131,6 +131,10 @@ class Lanes:
         """The bits of float32 as int32."""
         return Lanes(self.builder, self.builder.bitcast(self.value, self._as(WHOLE)))
 
+    def exponent(self) -> Lanes:
+        """Two to these int32 less 127, as float32: they become its exponents."""
+        return Lanes(self.builder, self.builder.bitcast((self * (1 << 23)).value, self._as(REAL)))
+
     def _call(self, name: str) -> Lanes:
         suffix = f"v{self.value.type.count}f32"
         kind = ir.FunctionType(self.value.type, [self.value.type])

@@ -106,7 +106,7 @@ SECOND_SET = U1 - U0  # from a row of the first uv set to that of the second
 
 
 @inner(fastmath=FAST, _nrt=True)
-def material(count, view, surfaces, textures, b, seen, which):
+def material(count, view, surfaces, textures, b, which):
     """Fill the rows that say what the samples are made of; normals become those of the normal maps.
 
     `which` are the samples' materials. Rows read: V, N, PIXEL, uv, vertex colour in RED to ALPHA, of textured ones AX to SIDE.

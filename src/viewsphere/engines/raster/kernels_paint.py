@@ -176,19 +176,19 @@ def shade(view, surfaces, textures, floor, surrounding, lights, occlusion, is_gr
     floor: see `painting.Baked`.
     """
     b = np.zeros(ROWS * BLOCK, np.float32)
-    seen, which = np.empty(BLOCK, np.int32), np.empty(BLOCK, np.int32)
+    own, which = np.empty(BLOCK, np.int32), np.empty(BLOCK, np.int32)
     is_matte = is_ground and floor[4] == f4(1)
     for start in range(0, slots.shape[0], BLOCK):
         count = min(slots.shape[0] - start, BLOCK)
-        locate(view, start, count, slots, depth, b)
+        locate(view, start, count, slots, depth, b, own)
         if is_ground:
-            gather_ground(view, floor, start, count, slots, triangle, b, seen, which)
+            gather_ground(view, floor, count, b, which)
         else:
-            gather(surfaces, start, count, slots, triangle, b, seen, which)
+            gather(surfaces, count, triangle, b, own, which)
         if is_matte:
             _start_matte(count, floor, b)
         else:
-            material(count, view, surfaces, textures, b, seen, which)
+            material(count, view, surfaces, textures, b, which)
             weigh(count, surrounding.albedo, b)
         occlude(count, occlusion, b)
         for k in range(lights.kind.shape[0]):
@@ -207,11 +207,11 @@ def shade(view, surfaces, textures, floor, surrounding, lights, occlusion, is_gr
 def catch(view, floor, surrounding, lights, occlusion, slots, triangle, depth, radiance):
     """As `shade`, of ground that is a shadow catcher."""
     b = np.zeros(ROWS * BLOCK, np.float32)
-    seen, which = np.empty(BLOCK, np.int32), np.empty(BLOCK, np.int32)
+    own, which = np.empty(BLOCK, np.int32), np.empty(BLOCK, np.int32)
     for start in range(0, slots.shape[0], BLOCK):
         count = min(slots.shape[0] - start, BLOCK)
-        locate(view, start, count, slots, depth, b)
-        gather_ground(view, floor, start, count, slots, triangle, b, seen, which)
+        locate(view, start, count, slots, depth, b, own)
+        gather_ground(view, floor, count, b, which)
         _start_catcher(count, b)
         occlude(count, occlusion, b)
         for k in range(lights.kind.shape[0]):

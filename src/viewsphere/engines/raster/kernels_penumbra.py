@@ -54,9 +54,24 @@ def power(x: Lanes) -> Lanes:
     return Lanes(x.builder, x.builder.bitcast((x.bits() & 0x7F800000).value, x.value.type))
 
 
+class _Disc:
+    """A distant light, which looks the same from everywhere: half its size in texels per q."""
+
+    def __init__(self, form: Rows, b: Rows) -> None:
+        self.half = most(form.one(SIDES), 1e-3)
+        self.q, self.near, self.du, self.dv = b.get(Q_, NEAR, DU, DV)
+        # The first search, before which STATE is above 1, is of all that there is.
+        self.farthest = where(b[STATE] > 1, math.inf, b[REACH] / self.half)
+
+    def meet(self, z: Lanes, x: Lanes, y: Lanes) -> tuple[Lanes, Lanes, Lanes]:
+        """As `_Light.meet`; how far away a place is, squared."""
+        gap = most(self.q - z, 0)
+        return (z < self.near + self.du * x + self.dv * y) & (gap <= self.farthest), gap, x * x + y * y
+
+
 class _Light:
-    """As samples see it: half its sizes along two axes, in texels per q, the matrix from texels to those axes, and how many
-    times as wide or high as its half sizes it is.
+    """A light at a place, as samples see it: half its sizes along two axes, in texels per q, the matrix from texels to those
+    axes, and how many times as wide or high as its half sizes it is.
     """
 
     def __init__(self, form: Rows, b: Rows) -> None:
@@ -159,43 +174,58 @@ def _as_they_are(*totals: Lanes) -> tuple[Lanes, ...]:
     return totals
 
 
-def _hiding(light: _Light, b: Rows) -> Callable[[Lanes, Lanes, Lanes], tuple[Lanes, Lanes]]:
-    """A function of texels: whether one hides part of the light, less at its rim; how far it is in q."""
-    step = b[TEXEL]
-    soft, per = b[SOFT] + step, 1 / step
-    soft_a, soft_b = soft + light.thin_a * step, soft + light.thin_b * step
+@_over_window(COUNT, SUM)
+def _block(form, b):
+    """COUNT of texels that hide part of a distant light, less at its rim, and the SUM of their distances in q."""
+    disc, step = _Disc(form, b), b[TEXEL]
+    soft, half_per = b[SOFT] + step, 0.5 / step
 
-    def texel(z: Lanes, x: Lanes, y: Lanes) -> tuple[Lanes, Lanes]:
-        is_hit, gap, a, b = light.meet(z, x, y)
-        reach_a, reach_b = light.half_a * gap + soft_a, light.half_b * gap + soft_b
-        disc = clamp((reach_a * reach_a - a * a - b * b) * 0.5 * per / reach_a)
-        square = clamp((reach_a - a) * per) * clamp((reach_b - b) * per)
-        return where(is_hit, square + (disc - square) * light.is_round, 0), gap
+    def texel(z, x, y):
+        is_hit, gap, squared = disc.meet(z, x, y)
+        reach = disc.half * gap + soft
+        hit = where(is_hit, clamp((reach - squared / reach) * half_per), 0)
+        return hit, hit * gap
 
-    return texel
+    return texel, _as_they_are
 
 
 @_over_window(COUNT, SUM)
-def _block(form, b):
-    """COUNT of texels that hide part of the light, and the SUM of their distances in q."""
-    hiding = _hiding(_Light(form, b), b)
+def _filter(form, b):
+    """SUM of the weights of texels in a filter as wide as a distant light is past blockers at MEAN; COUNT: of those it gets
+    past.
+
+    What lies deep behind others that are nearer to the light hides more than its own penumbra tells.
+    """
+    disc, soft, step = _Disc(form, b), b[SOFT], b[TEXEL]
+    radius, per = most(disc.half * b[MEAN], soft), 1 / step
+    # A disc's edge is one texel wide: near its rim (1 - d^2 / r^2) r / 2 is r - d.
+    rim, fall = radius * per * 0.5 + 0.5, 0.5 * per / radius
+    deep, near = disc.half * 3, soft + step
+    left = 1 - least(b[COUNT], 1)  # blockers come and go little by little
 
     def texel(z, x, y):
-        hit, gap = hiding(z, x, y)
-        return hit, hit * gap
+        is_hit, gap, squared = disc.meet(z, x, y)
+        weight, reach = clamp(rim - squared * fall), deep * gap + near
+        return where(is_hit & (squared <= reach * reach), weight * left, weight), weight
 
     return texel, _as_they_are
 
 
 @_over_window(COUNT, MEAN, SLOPE_U, SLOPE_V, sums=10)
 def _block_aslant(form, b):
-    """COUNT of texels that hide part of the light, and the plane that fits their distances in q best: MEAN, what it is at the
-    sample's own texel, and its slopes, 0 where no plane fits.
+    """COUNT of texels that hide part of the light, less at its rim, and the plane that fits their distances in q best: MEAN,
+    what it is at the sample's own texel, and its slopes, 0 where no plane fits.
     """
-    hiding, step = _hiding(_Light(form, b), b), b[TEXEL]
+    light, step = _Light(form, b), b[TEXEL]
+    soft, per = b[SOFT] + step, 1 / step
+    soft_a, soft_b = soft + light.thin_a * step, soft + light.thin_b * step
 
     def texel(z, x, y):
-        hit, gap = hiding(z, x, y)
+        is_hit, gap, a, b = light.meet(z, x, y)
+        reach_a, reach_b = light.half_a * gap + soft_a, light.half_b * gap + soft_b
+        disc = clamp((reach_a * reach_a - a * a - b * b) * 0.5 * per / reach_a)
+        square = clamp((reach_a - a) * per) * clamp((reach_b - b) * per)
+        hit = where(is_hit, square + (disc - square) * light.is_round, 0)
         far, right, down = hit * gap, hit * x, hit * y
         return hit, far, right, down, right * x, right * y, down * y, far * x, far * y, far * gap
 
@@ -216,43 +246,6 @@ def _block_aslant(form, b):
     return texel, tell
 
 
-def _passing(light: _Light, b: Rows) -> Callable[..., Lanes]:
-    """A function of texels: which of those that the light meets count in a filter.
-
-    What lies deep behind others that are nearer to the light hides more than its own penumbra tells.
-    """
-    step = b[TEXEL]
-    deep_a, deep_b, soft = light.half_a * 3, light.half_b * 3, b[SOFT] + step
-    near_a, near_b = soft + light.thin_a * step, soft + light.thin_b * step
-
-    def texel(is_hit: Lanes, gap: Lanes, a: Lanes, b: Lanes) -> Lanes:
-        reach_a, reach_b = deep_a * gap + near_a, deep_b * gap + near_b
-        return is_hit & (a * a + b * b * light.is_round <= reach_a * reach_a) & (b <= reach_b)
-
-    return texel
-
-
-@_over_window(COUNT, SUM)
-def _filter(form, b):
-    """SUM of the weights of texels in a filter as wide as the light is past blockers at MEAN; COUNT: of those it gets past."""
-    light, soft, step = _Light(form, b), b[SOFT], b[TEXEL]
-    radius_a, radius_b, per = most(light.half_a * b[MEAN], soft), most(light.half_b * b[MEAN], soft), 1 / step
-    soft_a, soft_b = radius_a * per + (light.thin_a + 0.5), radius_b * per + (light.thin_b + 0.5)
-    # A disc's edge is one texel wide: near its rim (1 - d^2 / r^2) r / 2 is r - d.
-    rim, fall = (soft_a + 0.5) * 0.5, 0.5 * per / radius_a
-    passing = _passing(light, b)
-    left = 1 - least(b[COUNT], 1)  # blockers come and go little by little
-
-    def texel(z, x, y):
-        is_hit, gap, a, b = light.meet(z, x, y)
-        disc = clamp(rim - (a * a + b * b) * fall)
-        square = clamp(soft_a - a * per) * clamp(soft_b - b * per)
-        weight = square + (disc - square) * light.is_round
-        return where(passing(is_hit, gap, a, b), weight * left, weight), weight
-
-    return texel, _as_they_are
-
-
 @_over_window(COUNT, SUM)
 def _filter_aslant(form, b):
     """`_filter` past a plane of blockers, without what part of the light lies below the sample's own plane."""
@@ -260,8 +253,9 @@ def _filter_aslant(form, b):
     mean, slope_u, slope_v, per = b[MEAN], b[SLOPE_U], b[SLOPE_V], 1 / step
     soft_a, soft_b = light.thin_a + 0.5, light.thin_b + 0.5
     nearest, bias = soft / light.half_a, light.q - light.near
-    first, passing = most(mean, nearest), _passing(light, b)
-    left = 1 - least(b[COUNT], 1)
+    first, left = most(mean, nearest), 1 - least(b[COUNT], 1)
+    deep_a, deep_b = light.half_a * 3, light.half_b * 3
+    near_a, near_b = soft + step + light.thin_a * step, soft + step + light.thin_b * step
 
     def texel(z, x, y):
         is_hit, gap, a, b = light.meet(z, x, y)
@@ -274,7 +268,9 @@ def _filter_aslant(form, b):
         denser = least(first / past, 2)
         weight = (square + (disc - square) * light.is_round) * denser * denser * denser
         weight = where(is_above, weight, 0)
-        return where(passing(is_hit, gap, a, b), weight * left, weight), weight
+        reach_a, reach_b = deep_a * gap + near_a, deep_b * gap + near_b
+        passes = is_hit & (a * a + b * b * light.is_round <= reach_a * reach_a) & (b <= reach_b)
+        return where(passes, weight * left, weight), weight
 
     return texel, _as_they_are
 
@@ -307,10 +303,9 @@ def _place_windows(radius, wide_from, margin, side, b):
 @lanewise
 def _tell_blocked(form, b):
     """MEAN distance of blockers, and RADIUS of the penumbra that things so far away make."""
-    light = _Light(form, b)
     mean = b[SUM] / most(b[COUNT], 1)
     b[MEAN], b[SUM] = mean, 0
-    b[RADIUS] = most(most(light.half_a, light.half_b) * mean, b[SOFT]) * light.stretch
+    b[RADIUS] = most(_Disc(form, b).half * mean, b[SOFT])
 
 
 @lanewise
