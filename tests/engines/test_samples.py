@@ -10,7 +10,7 @@ from viewsphere.assets.mesh import Image, Material, Texture
 from viewsphere.engines.raster.kernels_paint import BRIGHT, GLINT, average_samples, shared_samples
 from viewsphere.engines.raster.kernels_samples import TIE
 from viewsphere.engines.raster.painting import brighten_lines
-from viewsphere.engines.raster.samples import OFFSETS, edge_samples, layers
+from viewsphere.engines.raster.samples import NOWHERE, OFFSETS, edge_samples, layers
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.model.camera import Camera
 from viewsphere.truth.visibility import rasterize
@@ -389,7 +389,7 @@ def test_samples_take_the_colour_of_what_they_show(name):
     radiance = np.full((160 * 120, 4), 0.5, np.float32)
     radiance[::7] = 2 * BRIGHT
     shown, centres = (samples.triangle, samples.inverse_depth), (visibility.triangle, visibility.inverse_depth)
-    like, rows = shared_samples(samples.pixels, *shown, *centres, owner, normals, radiance)
+    like, rows = shared_samples(samples.pixels, *shown, *centres, owner, normals, NOWHERE, radiance)
     taken = np.flatnonzero(like >= 0)
     source = like[taken]
     assert len(taken) > 0.5 * len(like)

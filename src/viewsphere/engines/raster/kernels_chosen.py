@@ -13,11 +13,12 @@ import numpy as np
 from llvmlite import ir
 
 from viewsphere.engines.raster.kernels_lanes import LANES, Lanes, Rows, lanewise, size, store
-from viewsphere.geometry.jit import njit
+from viewsphere.geometry.jit import inner, njit
 
 f4 = nb.float32
 U = nb.uintp
 BYTES = ir.VectorType(ir.IntType(8), LANES)
+VISIBLE = f4(0.02)  # relative difference of radiance: at most about two steps of 8 bits
 TILE = 8  # pixels of a tile's side
 CLOSED = np.int32(2**31 - 1)
 
@@ -63,6 +64,47 @@ def _differ(reals: Rows, p: Any, q: Any, wholes: Rows, k: Any, m: Any, stride: A
     same = wholes[k,].equals(wholes[m,]) & (bend >= 0.94)
     flag = (same ^ 1 | apart) & (wholes[k, stride].equals(wholes[m, stride]) ^ 1)
     store(flags.data, flags.builder.add(flags.i, at), Lanes(flag.builder, flag.builder.zext(flag.value, BYTES)))
+
+
+@njit
+def compare_behind(slots, behind, behind_depth, triangle, depth, owner, normals, radiance, marks):
+    """Mark in marks (H * W,) pairs of neighbours, one at least in `slots`, that look alike but differ in a layer behind, and in
+    colour, since hardly anything may show of that layer.
+
+    behind, behind_depth (H * W,): what all pixels have in this layer; triangle, depth (H, W): what they show; radiance
+    (H * W, 4).
+    """
+    height, width, one = U(triangle.shape[0]), U(triangle.shape[1]), U(1)
+    shown, level = triangle.reshape(-1), depth.reshape(-1)
+    for i in range(U(slots.shape[0])):
+        p = U(slots[i])
+        y, x = p // width, p % width
+        sides = (p - one, x > 0), (p + one, x + one < width), (p - width, y > 0), (p + width, y + one < height)
+        for q, is_there in sides:
+            if not is_there or _passes(behind[p], behind[q], behind_depth[p], behind_depth[q], owner, normals):
+                continue
+            if _is_step(radiance, p, q) and _passes(shown[p], shown[q], level[p], level[q], owner, normals):
+                marks[p], marks[q] = 1, 1
+
+
+@inner
+def _is_step(radiance, p, q):
+    """Whether two pixels' colours or alphas differ visibly."""
+    differs = False
+    for c in range(U(4)):
+        one, other = radiance[p, c], radiance[q, c]
+        differs |= abs(one - other) > VISIBLE * max(one, other)
+    return differs
+
+
+@inner
+def _passes(t, s, depth, other, owner, normals):
+    """Whether two pixels pass for the same surface, as in `_differ`."""
+    if t == s or t < 0 or s < 0:
+        return t == s
+    a, b, c, t, s = U(0), U(1), U(2), U(t), U(s)
+    bend = normals[t, a] * normals[s, a] + normals[t, b] * normals[s, b] + normals[t, c] * normals[s, c]
+    return (owner[t] == owner[s]) & (abs(bend) >= f4(0.94)) & (max(depth, other) <= min(depth, other) * f4(1.01))
 
 
 @njit(_nrt=True)

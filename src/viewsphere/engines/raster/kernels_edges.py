@@ -196,9 +196,12 @@ def span(edges, y, xa, xb, lowest, highest):
 
 
 @njit
-def finish(count, pixels, nearest, seen, bound, offsets, triangle, depth, owner, normals, kept, position, shown, inverses):
+def finish(
+    count, pixels, nearest, seen, bound, offsets, triangle, depth, owner, normals, behind, kept, position, shown, inverses
+):
     """Of the pixels whose samples do not all look like the centre: pixels, position, triangle, 1/z, as `samples.Samples`.
 
+    Pixels marked in behind (H * W,), if that is not empty, are kept, too.
     A sample at which nothing was drawn, though all centres around show something, shows what the centre does. The last four
     arrays have room for all; returns how many pixels there are.
     """
@@ -212,10 +215,12 @@ def finish(count, pixels, nearest, seen, bound, offsets, triangle, depth, owner,
         is_filled = k < U(bound.shape[0]) and bound[k] > f4(0)
         none = np.int32(-1) if is_filled else centre
         s0, s1, s2, s3 = seen[k, a], seen[k, b], seen[k, c], seen[k, d]
+        is_deep = behind.shape[0] != 0 and behind[U(p)] != 0
         is_even = ((s0 == centre) | (s0 == none)) & ((s1 == centre) | (s1 == none))
-        if is_even & ((s2 == centre) | (s2 == none)) & ((s3 == centre) | (s3 == none)):
+        is_even &= ((s2 == centre) | (s2 == none)) & ((s3 == centre) | (s3 == none))
+        if is_even and not is_deep:
             continue
-        differs = False
+        differs = is_deep
         u = U(max(centre, np.int32(0)))
         o = owner[u] if centre >= 0 else np.int32(-1)
         for i in range(U(4)):

@@ -233,9 +233,10 @@ def _alike(t, s, depth, other, owner, normals):
 
 
 @njit(_nrt=True)
-def shared_samples(pixels, triangle, depth, seen, inverse_depth, owner, normals, radiance):
+def shared_samples(pixels, triangle, depth, seen, inverse_depth, owner, normals, behind, radiance):
     """Whose colour each of the samples, four a pixel, has: of the nearest pixel's centre that looks like it, or its own.
 
+    In pixels marked in behind (H * W,), if that is not empty, each has its own: what is behind its surface may differ.
     seen, inverse_depth (H, W), radiance (H * W, 4): at the centres. Returns like (4N,): the centre's pixel, or ~k; rows (R,):
     the pixels (indices in `pixels`) that have samples of their own: sample k % 4 of row k // 4.
     """
@@ -245,6 +246,11 @@ def shared_samples(pixels, triangle, depth, seen, inverse_depth, owner, normals,
     for n in range(pixels.shape[0]):
         y, x = pixels[n] // width, pixels[n] % width
         rows[count], own = n, 0
+        if behind.shape[0] != 0 and behind[U(pixels[n])] != 0:
+            for i in range(4):
+                like[4 * n + i] = ~(4 * count + i)
+            count += 1
+            continue
         for i in range(4):
             m = U(4 * n + i)
             like[m] = -1

@@ -12,7 +12,7 @@ from viewsphere.engines.raster.environment import Surrounding, sky_behind
 from viewsphere.engines.raster.lights import Lights
 from viewsphere.engines.raster.occlusion import Occlusion
 from viewsphere.engines.raster.records import Float32, Int32, Surfaces, Textures, View
-from viewsphere.engines.raster.samples import Samples, edge_samples, layers
+from viewsphere.engines.raster.samples import Layer, Marks, Samples, differs_behind, edge_samples, layers
 from viewsphere.geometry.camera import inverse_camera_matrix
 from viewsphere.model.camera import Camera
 from viewsphere.truth.geometry import Geometry
@@ -54,19 +54,26 @@ def paint(baked: Baked, camera: Camera, visibility: Visibility, antialias: bool,
     """
     view = view_of(baked, camera)
     triangle, depth = visibility.triangle.reshape(-1), visibility.inverse_depth.reshape(-1)
-    _shade(baked, camera, view, visibility, triangle, depth, radiance)
+    stack = _shade(baked, camera, view, visibility, triangle, depth, radiance)
     if has_sky:
         sky_behind(view, baked.surrounding, radiance)
-    samples = edge_samples(baked.geometry, camera, visibility, baked.owner) if antialias else None
+    if not antialias:
+        return
+    behind = differs_behind(visibility, stack, baked.owner, baked.geometry.triangle_normals, radiance)
+    samples = edge_samples(baked.geometry, camera, visibility, baked.owner, behind)
     if samples is not None:
-        _smooth(baked, camera, visibility, samples, has_sky, radiance)
+        _smooth(baked, camera, visibility, samples, behind, has_sky, radiance)
 
 
-def _smooth(baked: Baked, camera: Camera, visibility: Visibility, samples: Samples, has_sky: bool, radiance: Float32) -> None:
-    """Edge pixels: the mean of their samples. Only those that look like no pixel's centre around are shaded."""
+def _smooth(
+    baked: Baked, camera: Camera, visibility: Visibility, samples: Samples, behind: Marks, has_sky: bool, radiance: Float32
+) -> None:
+    """Edge pixels: the mean of their samples. Only those that look like no pixel's centre around are shaded, and those of
+    pixels marked in `behind`.
+    """
     shown, centres = (samples.triangle, samples.inverse_depth), (visibility.triangle, visibility.inverse_depth)
     normals = baked.geometry.triangle_normals
-    like, rows = kernels_paint.shared_samples(samples.pixels, *shown, *centres, baked.owner, normals, radiance)
+    like, rows = kernels_paint.shared_samples(samples.pixels, *shown, *centres, baked.owner, normals, behind, radiance)
     at = (4 * rows[:, None] + np.arange(4, dtype=np.int32)).reshape(-1)
     is_own = like[at] == ~np.arange(len(at))
     own = Samples(
@@ -115,8 +122,8 @@ def _shade(
     depth: Float32,
     radiance: Float32,
     samples: Samples | None = None,
-) -> None:
-    """Fill `radiance` (S, 4) with what the samples show; what is behind see-through surfaces first."""
+) -> list[Layer]:
+    """Fill `radiance` (S, 4) with what the samples show; what is behind see-through surfaces first. Returns the layers."""
     solid, ground = np.empty((2, len(triangle)), np.int32)
     materials = baked.surfaces.material, np.zeros(len(baked.surfaces.looks) + 1, np.uint64)
     solids, grounds = kernels_paint.sorted_samples(triangle, baked.kind, *materials, radiance, solid, ground)
@@ -124,12 +131,14 @@ def _shade(
     _shade_some(baked, view, ground[:grounds], True, triangle, depth, radiance)
     # Also where no see-through surface is in front: a decal may lie on what is.
     pixels = None if samples is None else samples.pixels
-    for layer in layers(baked.blended, camera, triangle, depth, baked.see_through, pixels, visibility.corners):
+    stack = layers(baked.blended, camera, triangle, depth, baked.see_through, pixels, visibility.corners)
+    for layer in stack:
         behind, behind_depth = triangle.copy(), depth.copy()
         behind[layer.slot], behind_depth[layer.slot] = layer.triangle, layer.inverse_depth
         is_ground = baked.kind[layer.triangle] == kernels_paint.FLOOR
         for which in (False, True):
             _shade_some(baked, view, layer.slot[is_ground == which], which, behind, behind_depth, radiance)
+    return stack
 
 
 def _shade_some(

@@ -28,10 +28,13 @@ _CENTER = np.full((2, 4), 0.5)
 _ROTATED = np.array(OFFSETS).T.copy()
 _CENTER_REACH, _ROTATED_REACH = (0.5, 0.5), (0.125, 0.875)
 _NO_PIXELS = np.zeros(0, np.int32)
+NOWHERE = np.zeros(0, np.uint8)
+"""Marks where no pixel is marked."""
 
 Int32 = NDArray[np.int32]
 Float32 = NDArray[np.float32]
 Bool = NDArray[np.bool_]
+Marks = NDArray[np.uint8]
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,29 +62,52 @@ class Layer:
     inverse_depth: Float32
 
 
-def edge_samples(geometry: Geometry, camera: Camera, visibility: Visibility, owner: Int32) -> Samples | None:
+def edge_samples(
+    geometry: Geometry, camera: Camera, visibility: Visibility, owner: Int32, behind: Marks = NOWHERE
+) -> Samples | None:
     """The pixels whose samples do not all show the surface at the centre, with their samples; None if there are none.
 
     `visibility` is truth's buffer for this camera; owner (T,): equal where neighbouring triangles look alike. Looked at are the
     pixels that differ from a neighbour and, with a pinhole, those in which something comes between the centres: nearer (thin
-    wires), or as far (thin lines on a surface, `kernels_lines`). With a distorted lens each sample shows exactly what truth's
-    rasteriser would see there; with a pinhole nearly all do: a triangle that no centre around sees and that has no corner in
-    such a pixel is left out (`kernels_edges`), and what is behind it, or at the centre, is shown instead.
+    wires), or as far (thin lines on a surface, `kernels_lines`). Those marked in behind (H * W,), if that is not empty, are
+    among them whatever their samples show. With a distorted lens each sample shows exactly what truth's rasteriser would see
+    there; with a pinhole nearly all do: a triangle that no centre around sees and that has no corner in such a pixel is left
+    out (`kernels_edges`), and what is behind it, or at the centre, is shown instead.
     """
     look = visibility.triangle, visibility.inverse_depth, owner, geometry.triangle_normals
     marks = _differs_from_neighbour(*look)
+    marks[: len(behind)] |= behind
     q = homogeneous(geometry, camera) if visibility.corners is None else visibility.corners
     if camera.distortion is None:
-        pixels, position, triangle, inverse = _pinhole_edges(geometry, visibility, marks, q, owner)
+        pixels, position, triangle, inverse = _pinhole_edges(geometry, visibility, marks, q, owner, behind)
         samples = Samples(pixels, position, np.zeros((0, 3), np.float32), triangle, inverse)
     else:
         points = _Points.of(camera, marks[: visibility.triangle.size].reshape(visibility.triangle.shape), 4, 1)
         points.draw(geometry, q, np.zeros(len(geometry.triangles) + 1, np.bool_), np.arange(len(geometry.triangles)))
         known = np.zeros(0, np.float32)
         found = points.pixels[:-1], points.nearest.astype(np.float32), points.seen, known, _ROTATED
-        pixels, position, triangle, inverse = _differing(len(points.seen), *found, *look)
+        pixels, position, triangle, inverse = _differing(len(points.seen), *found, *look, behind)
         samples = Samples(pixels, position, _sample_rays(camera, pixels), triangle, inverse)
     return samples if len(samples.pixels) else None
+
+
+def differs_behind(visibility: Visibility, stack: Sequence[Layer], owner: Int32, normals: Float32, radiance: Float32) -> Marks:
+    """The pixels that look like a neighbour in front, but not behind what is seen through: (H * W,), empty if nothing is.
+
+    `stack` is what `layers` gives for the pixels' centres, radiance (H * W, 4) their colours: where these are the same, nothing
+    shows of the difference.
+    """
+    if not stack:
+        return NOWHERE
+    marks = np.zeros(visibility.triangle.size, np.uint8)
+    shown = visibility.triangle, visibility.inverse_depth
+    behind, depth = shown[0].flatten(), shown[1].flatten()  # without a solid surface, what is seen through
+    for i, layer in enumerate(stack):
+        if i > 0:
+            behind[:] = -1  # where a see-through surface ends, there is none
+        behind[layer.slot], depth[layer.slot] = layer.triangle, layer.inverse_depth
+        kernels_chosen.compare_behind(layer.slot, behind, depth, *shown, owner, normals, radiance, marks)
+    return marks
 
 
 def layers(
@@ -255,7 +281,7 @@ def _differs_from_neighbour(triangle: Int32, depth: Float32, owner: Int32, norma
 
 
 def _pinhole_edges(
-    geometry: Geometry, visibility: Visibility, marks: NDArray[np.uint8], q: NDArray[np.float64], owner: Int32
+    geometry: Geometry, visibility: Visibility, marks: Marks, q: NDArray[np.float64], owner: Int32, behind: Marks
 ) -> tuple[Int32, Float32, Int32, Float32]:
     """pixels, position, triangle and inverse depth of `Samples`."""
     shown, (height, width) = (visibility.triangle, visibility.inverse_depth), visibility.triangle.shape
@@ -278,7 +304,7 @@ def _pinhole_edges(
     kernels_edges.spread(pixels, count, limit, around)
     kernels_edges.with_corners_before(q, geometry.triangles, wanted, around, np.empty(len(q), np.uint8), chosen)
     count = kernels_edges.draw(np.flatnonzero(are_chosen), *surfaces, *canvas, count, nearest, seen)
-    return _differing(count, pixels, nearest, seen, bound, _ROTATED, *shown, owner, geometry.triangle_normals)
+    return _differing(count, pixels, nearest, seen, bound, _ROTATED, *shown, owner, geometry.triangle_normals, behind)
 
 
 def _room(width: int) -> tuple[NDArray[np.uint32], Float32]:
