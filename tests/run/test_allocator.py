@@ -13,34 +13,60 @@ pytestmark = [
     pytest.mark.timeout(60),
     pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="glibc's allocator is told"),
 ]
-SCRIPT = """
+NEW_PAGES = """
 import resource, sys
 import numpy as np
 from viewsphere.run.allocator import keep_freed_memory
 
-def pages():
+def pages(shape, count):
     before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt
-    kept = [np.ones((480, 640, 3), np.float32) for _ in range(16)]
+    kept = [np.ones(shape, np.float32) for _ in range(count)]
     return resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before
 
 told = keep_freed_memory()
-pages()
-print(told, pages(), pages())
+shape, count = eval(sys.argv[1])
+pages(shape, count)
+print(told, pages(shape, count), pages(shape, count))
 """
+GIVEN_BACK = """
+import resource
+import numpy as np
+from viewsphere.run import allocator
+
+def held():
+    return int(open("/proc/self/statm").read().split()[1]) * resource.getpagesize()
+
+allocator.KEPT_BYTES = 1 << 26
+told = allocator.keep_freed_memory()
+before = held()
+kept = [np.ones(1 << 24, np.float32) for _ in range(4)]
+most = held()
+kept.clear()
+print(told, most - before, held() - before)
+"""
+FRAME, LARGE = "(480, 640, 3), 16", "(4096, 4096), 4"  # 59 MB in all; 268 MB, each more than glibc puts on the heap by itself
 
 
-def counted(**environment):
-    """Whether the allocator was told; pages that were new when 59 MB were asked for a second and a third time."""
+def answered(script, *arguments, **environment):
+    """Whether the allocator was told, and the script's two numbers."""
     kept = {name: value for name, value in os.environ.items() if not name.startswith(("MALLOC_", "GLIBC_"))}
-    run = subprocess.run([sys.executable, "-c", SCRIPT], env=kept | environment, capture_output=True, text=True, check=True)
-    told, *pages = run.stdout.split()
-    return told == "True", sum(map(int, pages))
+    command = [sys.executable, "-c", script, *arguments]
+    told, *numbers = subprocess.run(command, env=kept | environment, capture_output=True, text=True, check=True).stdout.split()
+    return told == "True", list(map(int, numbers))
 
 
-def test_freed_memory_is_kept():
-    told, pages = counted()
+@pytest.mark.parametrize("arrays", [FRAME, LARGE])
+def test_freed_memory_is_kept(arrays):
+    told, pages = answered(NEW_PAGES, arrays)
     assert told
-    assert pages < 100
+    assert sum(pages) < 100
+
+
+def test_what_is_beyond_the_kept_bytes_is_given_back():
+    told, (most, left) = answered(GIVEN_BACK)
+    assert told
+    assert most > 3 << 26
+    assert left <= 1 << 26
 
 
 @pytest.mark.parametrize(
@@ -48,9 +74,10 @@ def test_freed_memory_is_kept():
     [
         {"MALLOC_TRIM_THRESHOLD_": "1000000"},
         {"MALLOC_MMAP_THRESHOLD_": "100000"},
+        {"MALLOC_MMAP_MAX_": "65536"},
         {"GLIBC_TUNABLES": "glibc.malloc.trim_threshold=1"},
     ],
 )
 def test_who_tells_the_allocator_something_is_obeyed(environment):
-    told, _ = counted(**environment)
+    told, _ = answered(NEW_PAGES, FRAME, **environment)
     assert not told

@@ -5,10 +5,12 @@ together, texel by texel, so that one look-up reads them all.
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cache
-from itertools import pairwise
+from functools import cache, cached_property
+from heapq import heapify, heapreplace
+from itertools import accumulate, pairwise
+from weakref import WeakValueDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +32,7 @@ SHARPEST = 4096
 MOST_WORDS = 1 << 28
 """Words of all bundles of a stage, half a gigabyte: beyond, the largest are reduced."""
 KEPT_BYTES = 1 << 27
-"""Bundles that are kept for the next stage, which often shows the same model."""
+"""Of texels that are kept for the next stage, which often shows the same model."""
 
 
 @dataclass(frozen=True)
@@ -77,11 +79,22 @@ class _Content:
         height, width = self.uses[0][0].pixels.shape[:2]
         return -(-height // self.factor), -(-width // self.factor)
 
+    @cached_property
+    def levels(self) -> Int32:
+        """Each level's first word, width and height."""
+        height, width = self.shape
+        found = [(0, width, height)]
+        while max(width, height) > 1 and len(found) < LEVELS:
+            first = found[-1][0] + width * height * 4 * len(self.kinds)
+            width, height = max(width // 2, 1), max(height // 2, 1)
+            found.append((first, width, height))
+        return np.array(found, np.int32)
+
     @property
     def words(self) -> int:
-        """About as many as there are, all levels."""
-        height, width = self.shape
-        return height * width * 4 * len(self.kinds) * 4 // 3
+        """As many as there are, all levels."""
+        first, width, height = self.levels[-1].tolist()
+        return first + width * height * 4 * len(self.kinds)
 
 
 @dataclass(eq=False)
@@ -107,29 +120,24 @@ class BundlePacker:
         return found + [-1] * (MOST - len(found))
 
     def pack(self) -> Textures:
-        """All bundles."""
+        """All bundles; not to be written to, as the next stage of the same textures has the same array."""
         count = max(len(self._slots), 1)
         levels = np.zeros((count, LEVELS, 3), np.int32)
         modes = np.zeros((count, 14), np.int32)
         transforms = np.zeros((count, 6), np.float32)
-        contents = _affordable({content for content, _ in self._slots})
-        built: dict[_Content, tuple[int, Words, Int32]] = {}
-        start = 0
+        contents = _affordable(content for content, _ in self._slots)
+        texels = _kept().get(tuple(contents.values()))
+        firsts = dict(zip(contents, _firsts(contents.values()), strict=True))
         for (content, texture), slot in self._slots.items():
-            if content not in built:
-                words, own = _kept().get(contents[content])
-                built[content] = start, words, own
-                start += len(words)
-            first, _, own = built[content]
+            own = contents[content].levels
             levels[slot, : len(own)] = own
-            levels[slot, : len(own), 0] += first
+            levels[slot, : len(own), 0] += firsts[content]
             kinds, names = content.kinds, {name for _, name in content.uses}
             wraps = WRAPS.index(texture.wrap_s), WRAPS.index(texture.wrap_t)
             modes[slot, :6] = len(own), *wraps, texture.nearest, texture.texcoord, len(kinds)
             modes[slot, 6 : 6 + len(kinds)] = kinds
             modes[slot, 12:] = "normal_texture" in names, "clearcoat_normal_texture" in names
             transforms[slot] = texture.matrix.reshape(-1)
-        texels = np.concatenate([*(words for _, words, _ in built.values()), np.zeros(4 * PLANES, np.uint16)])
         return Textures(texels, levels, modes, transforms)
 
 
@@ -145,30 +153,60 @@ def _is_idle(material: Material, name: str) -> bool:
     }.get(name, name.startswith("clearcoat") and material.clearcoat == 0)
 
 
-def _affordable(contents: set[_Content]) -> dict[_Content, _Content]:
-    """Each content reduced as far as its size and the room for all of them ask."""
+def _affordable(contents: Iterable[_Content]) -> dict[_Content, _Content]:
+    """Each content reduced as far as its size and the room for all of them ask; of equally large ones the first."""
     reduced = {content: replace(content, factor=-(-max(content.shape) // SHARPEST)) for content in contents}
-    while sum(content.words for content in reduced.values()) > MOST_WORDS:
-        largest = max(reduced, key=lambda content: reduced[content].words)
-        reduced[largest] = replace(reduced[largest], factor=reduced[largest].factor * 2)
+    total = sum(content.words for content in reduced.values())
+    largest = [(-content.words, i, original) for i, (original, content) in enumerate(reduced.items())]
+    heapify(largest)
+    while total > MOST_WORDS:
+        words, i, original = largest[0]
+        reduced[original] = replace(reduced[original], factor=reduced[original].factor * 2)
+        heapreplace(largest, (-reduced[original].words, i, original))
+        total += words + reduced[original].words
     return reduced
 
 
+def _firsts(contents: Iterable[_Content]) -> list[int]:
+    """Each content's first word, where they are stored one behind the other."""
+    return list(accumulate((content.words for content in contents), initial=0))[:-1]
+
+
 class _Kept:
-    """The last bundles built, up to KEPT_BYTES of them."""
+    """The texels of stages: of the last ones, up to KEPT_BYTES of them, and of those that somebody still holds."""
 
     def __init__(self) -> None:
-        self._kept: OrderedDict[_Content, tuple[Words, Int32]] = OrderedDict()
+        self._last: OrderedDict[tuple[_Content, ...], Words] = OrderedDict()
+        self._held: WeakValueDictionary[tuple[_Content, ...], Words] = WeakValueDictionary()
 
-    def get(self, content: _Content) -> tuple[Words, Int32]:
-        """Words of all levels, and each level's first word, width and height."""
-        if content not in self._kept:
-            self._kept[content] = _build(content)
-        self._kept.move_to_end(content)
-        found = self._kept[content]
-        while sum(words.nbytes for words, _ in self._kept.values()) > KEPT_BYTES:
-            self._kept.popitem(last=False)
-        return found
+    def get(self, contents: tuple[_Content, ...]) -> Words:
+        """All levels of these contents one behind the other, and room for reading PLANES at once."""
+        texels = self._held.get(contents)
+        if texels is None:
+            texels = self._held[contents] = self._packed(contents)
+        if texels.nbytes <= KEPT_BYTES:
+            self._last[contents] = texels
+            self._last.move_to_end(contents)
+        while sum(texels.nbytes for texels in self._last.values()) > KEPT_BYTES:
+            self._last.popitem(last=False)
+        return texels
+
+    def _packed(self, contents: tuple[_Content, ...]) -> Words:
+        """Built where they stay: there is no second copy, whose memory would cost more than the texels."""
+        known = {
+            content: texels[first:]
+            for others, texels in self._held.items()
+            for content, first in zip(others, _firsts(others), strict=True)
+        }
+        texels = np.empty(sum(content.words for content in contents) + 4 * PLANES, np.uint16)
+        texels[-4 * PLANES :] = 0
+        for content, first in zip(contents, _firsts(contents), strict=True):
+            words = texels[first : first + content.words]
+            if content in known:
+                words[:] = known[content][: content.words]
+            else:
+                _build(content, words)
+        return texels
 
 
 @cache
@@ -182,30 +220,25 @@ def _tables() -> tuple[Words, Words]:
     return np.arange(256, dtype=np.uint16) * np.uint16(257), np.round(linear(np.arange(256) / 255) * 65535).astype(np.uint16)
 
 
-def _build(content: _Content) -> tuple[Words, Int32]:
-    height, width = content.shape
-    kinds = content.kinds
+def _build(content: _Content, words: Words) -> None:
+    """Write all levels."""
+    kinds, levels = content.kinds, content.levels
     channels = 4 * len(kinds)
-    sizes = [(width, height)]
-    while max(sizes[-1]) > 1 and len(sizes) < LEVELS:
-        sizes.append((max(sizes[-1][0] // 2, 1), max(sizes[-1][1] // 2, 1)))
-    starts = np.cumsum([0, *(w * h * channels for w, h in sizes)])
-    words = np.empty(int(starts[-1]), np.uint16)
-    first = words[: starts[1]].reshape(height, width, channels)
-    for i, kind in enumerate(kinds):
-        neutral = ZERO_NORMAL if kind in (BUMP, COAT_BUMP) else 65535
-        first[..., 4 * i : 4 * i + 3] = neutral
-        first[..., 4 * i + 3] = 65535
+    first = words[: levels[0, 1] * levels[0, 2] * channels].reshape(*content.shape, channels)
     plain, light = _tables()
+    filled: set[int] = set()
     for image, name in content.uses:
         use = USES[name]
         at = 4 * kinds.index(use.kind)
         if use.is_normal:
             fill_normals(first, at, image.pixels, content.factor)
+            filled |= {at, at + 1, at + 2}
         for source, target in use.channels:
             table = light if use.is_color and source < 3 else plain
             fill(first, at + target, image.pixels, source, table, content.factor)
-    levels = np.array([(start, *size) for start, size in zip(starts, sizes, strict=False)], np.int32)
+            filled.add(at + target)
+    for channel in set(range(channels)) - filled:
+        is_normal = kinds[channel // 4] in (BUMP, COAT_BUMP) and channel % 4 < 3
+        first[..., channel] = ZERO_NORMAL if is_normal else 65535
     for before, after in pairwise(levels):
         halve(words, before, after, channels, content.weighted)
-    return words, levels

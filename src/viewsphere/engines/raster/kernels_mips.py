@@ -34,15 +34,22 @@ def fill_normals(texels, channel, pixels, factor):
     """Put an image's normals, made unit, into three channels, each the mean of a `factor` square; no direction means level."""
     for y in range(texels.shape[0]):
         for x in range(texels.shape[1]):
+            if factor == 1:
+                _put_normal(texels, y, x, channel, _direction(pixels[y, x, 0], pixels[y, x, 1], pixels[y, x, 2]), f4(32767))
+                continue
             a, b, c, count = f4(0), f4(0), f4(0), f4(0)
             for j in range(y * factor, min(y * factor + factor, pixels.shape[0])):
                 for i in range(x * factor, min(x * factor + factor, pixels.shape[1])):
                     da, db, dc = _direction(pixels[j, i, 0], pixels[j, i, 1], pixels[j, i, 2])
                     a, b, c, count = a + da, b + db, c + dc, count + f4(1)
-            scale = f4(32767) / count
-            texels[y, x, channel] = nb.uint16(a * scale + f4(ZERO_NORMAL + 0.5))
-            texels[y, x, channel + 1] = nb.uint16(b * scale + f4(ZERO_NORMAL + 0.5))
-            texels[y, x, channel + 2] = nb.uint16(c * scale + f4(ZERO_NORMAL + 0.5))
+            _put_normal(texels, y, x, channel, (a, b, c), f4(32767) / count)
+
+
+@inner
+def _put_normal(texels, y, x, channel, direction, scale):
+    texels[y, x, channel] = nb.uint16(direction[0] * scale + f4(ZERO_NORMAL + 0.5))
+    texels[y, x, channel + 1] = nb.uint16(direction[1] * scale + f4(ZERO_NORMAL + 0.5))
+    texels[y, x, channel + 2] = nb.uint16(direction[2] * scale + f4(ZERO_NORMAL + 0.5))
 
 
 @inner
@@ -71,34 +78,46 @@ def halve(texels, source, target, channels, weighted):
     is_even = columns * 2 == width and rows * 2 == height
     for y in range(rows):
         top = f4(y) * down
-        bottom = top + down
-        y0, y1 = int(top + f4(1e-3)), min(math.ceil(bottom - f4(1e-3)), height)
+        covered_rows = int(top + f4(1e-3)), min(math.ceil(top + down - f4(1e-3)), height)
         for x in range(columns):
             at = U(start + (y * columns + x) * channels)
-            plain = U(0)
+            plane = U(0)
             if is_even:
                 a = U(first + (2 * y * width + 2 * x) * channels)
                 b, below = a + U(channels), U(width * channels)
-                for c in range(U(3) if weighted else U(0), U(channels)):
+                plane = U(4) if weighted else U(0)
+                for c in range(plane, U(channels)):
                     four = nb.uint32(texels[a + c]) + nb.uint32(texels[b + c]) + nb.uint32(texels[a + below + c])
                     four += nb.uint32(texels[b + below + c]) + nb.uint32(2)
                     texels[at + c] = nb.uint16(four >> nb.uint32(2))
                 if not weighted:
                     continue
-                plain = U(3)
             left = f4(x) * across
-            right = left + across
-            x0, x1 = int(left + f4(1e-3)), min(math.ceil(right - f4(1e-3)), width)
-            for c in range(plain if is_even else U(channels)):
-                by_alpha = weighted and c < U(3)
-                total, weight = f4(0), f4(0)
-                for j in range(y0, y1):
-                    h = min(f4(j + 1), bottom) - max(f4(j), top)
-                    for i in range(x0, x1):
-                        w = h * (min(f4(i + 1), right) - max(f4(i), left)) * area
-                        source_at = U(first + (j * width + i) * channels)
-                        if by_alpha:
-                            w *= f4(texels[source_at + U(3)]) + f4(1)
-                        total += w * f4(texels[source_at + c])
-                        weight += w
-                texels[at + c] = nb.uint16(min(total / weight + f4(0.5), f4(65535)))
+            covered = int(left + f4(1e-3)), min(math.ceil(left + across - f4(1e-3)), width)
+            sides = left, left + across, top, top + down, area
+            for c in range(U(0), U(4) if is_even else U(channels), U(4)):
+                _mean(texels, at + c, U(first) + c, U(width), U(channels), covered, covered_rows, sides, weighted and c == U(0))
+
+
+@inner
+def _mean(texels, at, first, width, channels, columns, rows, sides, by_alpha):
+    """Write the means of four channels of one texel, which covers these columns and rows in part."""
+    left, right, top, bottom, area = sides
+    r, g, b, a, weight, whole = f4(0), f4(0), f4(0), f4(0), f4(0), f4(0)
+    for j in range(rows[0], rows[1]):
+        h = min(f4(j + 1), bottom) - max(f4(j), top)
+        for i in range(columns[0], columns[1]):
+            w = h * (min(f4(i + 1), right) - max(f4(i), left)) * area
+            near = first + (U(j) * width + U(i)) * channels
+            alpha = f4(texels[near + U(3)])
+            a += w * alpha
+            whole += w
+            w *= alpha + f4(1) if by_alpha else f4(1)
+            weight += w
+            r += w * f4(texels[near])
+            g += w * f4(texels[near + U(1)])
+            b += w * f4(texels[near + U(2)])
+    texels[at] = nb.uint16(min(r / weight + f4(0.5), f4(65535)))
+    texels[at + U(1)] = nb.uint16(min(g / weight + f4(0.5), f4(65535)))
+    texels[at + U(2)] = nb.uint16(min(b / weight + f4(0.5), f4(65535)))
+    texels[at + U(3)] = nb.uint16(min(a / whole + f4(0.5), f4(65535)))
