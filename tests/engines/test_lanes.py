@@ -20,6 +20,14 @@ def _arithmetic(scale, b):
     b[3 * ROW] = (a.whole() + 3 & 5).real() + b.one(3)
 
 
+@lanewise
+def _unpacked(b):
+    texel = b[0].bits()
+    b[ROW] = (texel >> 27 & 31).real()
+    b[2 * ROW] = ((texel >> 27 & 31) + 103).exponent()
+    b[3 * ROW] = (texel & 511).real()
+
+
 @lanewise(exact=True)
 def _double(row, b):
     b[row] = b[row] * 2
@@ -37,6 +45,11 @@ def arithmetic(count, scale, b):
 
 
 @njit
+def unpacked(count, b):
+    _unpacked(count, b)
+
+
+@njit
 def double(count, row, b):
     _double(count, row, b)
 
@@ -50,6 +63,16 @@ def rows(first):
     b = np.zeros(4 * ROW, np.float32)
     b[:ROW] = first
     return b
+
+
+def test_lanes_unpack_bits_whatever_their_sign():
+    k = np.arange(ROW, dtype=np.uint32)
+    b = np.zeros(4 * ROW, np.float32)
+    b[:ROW] = (k << 27 | 341 + k).view(np.float32)
+    unpacked(ROW, b)
+    np.testing.assert_array_equal(b[ROW : 2 * ROW], k)
+    np.testing.assert_array_equal(b[2 * ROW : 3 * ROW], 2.0 ** (k.astype(float) - 24))
+    np.testing.assert_array_equal(b[3 * ROW :], 341 + k)
 
 
 def test_lanes_compute_what_numpy_does():

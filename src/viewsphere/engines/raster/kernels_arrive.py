@@ -122,6 +122,7 @@ def _gather_on(count, b):
 
 @inner
 def _all_on(count, b):
+    """`_gather_on` where all of them are."""
     for i in range(count):
         b[OWN + i] = f4(i)
 

@@ -18,7 +18,10 @@ from viewsphere.geometry.jit import inner, njit
 f4 = nb.float32
 U = nb.uintp
 BYTES = ir.VectorType(ir.IntType(8), LANES)
-VISIBLE = f4(0.02)  # relative difference of radiance: at most about two steps of 8 bits
+ALIKE = 0.94  # cosine of 20 degrees between the planes of what passes for one surface
+LEVEL = 1.01  # greatest ratio of its depths in neighbouring pixels
+VISIBLE = f4(0.05)  # relative difference of radiance: about five steps of 8 bits
+DARK = f4(0.02)  # radiance below which differences count as little as there
 TILE = 8  # pixels of a tile's side
 CLOSED = np.int32(2**31 - 1)
 
@@ -54,14 +57,14 @@ def compare(triangle, depth, owner, normals, room, owners, beside, above):
 def _differ(reals: Rows, p: Any, q: Any, wholes: Rows, k: Any, m: Any, stride: Any, flags: Rows, at: Any) -> None:
     """Where the pixels of which `compare` has put what they show at p and k show another surface than those at q and m.
 
-    It is the same if owners are, the planes differ by less than 20 degrees, and the depths by less than 1 %.
+    It is the same if owners are, and planes and depths differ by less than ALIKE and LEVEL say.
     """
     to = reals[p,] * reals[q,] + reals[p, stride] * reals[q, stride]
     bend = size(to + reals[p, stride, stride] * reals[q, stride, stride])
     z, far = reals[p, stride, stride, stride], reals[q, stride, stride, stride]
     # one is farther by 1 %
-    apart = (z > far * 1.01) | (far > z * 1.01)
-    same = wholes[k,].equals(wholes[m,]) & (bend >= 0.94)
+    apart = (z > far * LEVEL) | (far > z * LEVEL)
+    same = wholes[k,].equals(wholes[m,]) & (bend >= ALIKE)
     flag = (same ^ 1 | apart) & (wholes[k, stride].equals(wholes[m, stride]) ^ 1)
     store(flags.data, flags.builder.add(flags.i, at), Lanes(flag.builder, flag.builder.zext(flag.value, BYTES)))
 
@@ -93,7 +96,7 @@ def _is_step(radiance, p, q):
     differs = False
     for c in range(U(4)):
         one, other = radiance[p, c], radiance[q, c]
-        differs |= abs(one - other) > VISIBLE * max(one, other)
+        differs |= abs(one - other) > VISIBLE * max(one, other, DARK)
     return differs
 
 
@@ -104,7 +107,7 @@ def _passes(t, s, depth, other, owner, normals):
         return t == s
     a, b, c, t, s = U(0), U(1), U(2), U(t), U(s)
     bend = normals[t, a] * normals[s, a] + normals[t, b] * normals[s, b] + normals[t, c] * normals[s, c]
-    return (owner[t] == owner[s]) & (abs(bend) >= f4(0.94)) & (max(depth, other) <= min(depth, other) * f4(1.01))
+    return (owner[t] == owner[s]) & (abs(bend) >= f4(ALIKE)) & (max(depth, other) <= min(depth, other) * f4(LEVEL))
 
 
 @njit(_nrt=True)

@@ -13,6 +13,7 @@ import math
 import numba as nb
 import numpy as np
 
+from viewsphere.engines.raster.kernels_chosen import ALIKE, LEVEL
 from viewsphere.engines.raster.kernels_four import nearer, put_before
 from viewsphere.geometry.jit import inner, njit
 from viewsphere.truth.kernels import EPSILON, NEVER, crossing_at, edge, hits_surface, negated, plane
@@ -233,7 +234,7 @@ def finish(
             s = U(max(t, np.int32(0)))
             bend = normals[u, a] * normals[s, a] + normals[u, b] * normals[s, b] + normals[u, c] * normals[s, c]
             other = owner[s] if t >= 0 else np.int32(-1)
-            differs |= (o != other) | (abs(bend) < f4(0.94)) | (max(level, z) > min(level, z) * f4(1.01))
+            differs |= (o != other) | (abs(bend) < f4(ALIKE)) | (max(level, z) > min(level, z) * f4(LEVEL))
         if differs:
             kept[n] = p
             for i in range(U(4)):

@@ -173,7 +173,7 @@ def _read_texels(texels, first, width, height, count, w):
 
 @lanewise
 def _blend_texels(w):
-    """RX, RY, RZ: the picture's colours, bilinear. A texel is nine bits a colour, five for the exponent they share."""
+    """RX, RY, RZ: the picture's colours, bilinear. Its texels are packed as RGB9_E5, see `environment._packed`."""
     fx, fy = w[FX], w[FY]
     both = fx * fy
     totals = None

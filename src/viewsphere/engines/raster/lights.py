@@ -80,7 +80,8 @@ class Lights(NamedTuple):
 class View:
     """One map to draw: the (4, 4) matrix from the world, from which w on (from which distance on, if round), texels per length
     (at distance 1), the least distance from the border at which it is read, and half the light's sides (2, 3) along the view's
-    axes (per length), or the radius and zeros if it is round; whether wide penumbrae are filtered finely.
+    axes (per length), or the radius and zeros if it is round, as every distant light is; whether wide penumbrae are filtered
+    finely.
     """
 
     matrix: Float
