@@ -145,7 +145,7 @@ def measure(frames: int, antialias: int, folder: Path) -> tuple[Clock, int]:
     """The reference frame stage by stage; also how many triangles it has."""
     clock = Clock()
     shot = next(iter(plan(reference_recipe(frames, antialias, folder), shot_frames=frames).shots()))
-    mesh = Stages().model(shot.placements[0].model)
+    mesh = Stages().model(shot.things[0].model)
     engine: plugins.Engine = plugins.load("engines", "raster")
     store = Store(folder / f"store{antialias}")
     (store.root / "store" / "writing").mkdir(parents=True)

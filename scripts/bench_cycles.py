@@ -90,7 +90,7 @@ def cpu_of(pid: int) -> float:
 
 def ours(shot: Shot, stages: Stages, pictures: Path | None = None) -> Costs:
     """A shot's frames by the engine that it names."""
-    mesh = stages.model(shot.placements[0].model)
+    mesh = stages.model(shot.things[0].model)
     engine: plugins.Engine = plugins.load("engines", shot.engine)
 
     def spent() -> float:
@@ -127,19 +127,19 @@ def save(path: Path, picture: Any) -> None:
 
 def told(shot: Shot, stages: Stages, folder: Path, threads: int) -> dict[str, Any]:
     """What the other program needs: the same model, lights and cameras."""
-    placement, scene = shot.placements[0], shot.scene
-    mesh = stages.model(placement.model)
+    thing, scene = shot.things[0], shot.scene
+    mesh = stages.model(thing.model)
     middle = box_vertices(*mesh.bounds).mean(axis=0)
     cameras = [camera_for(shot.intrinsics, frame.pose, middle) for frame in shot.frames]
     sun = sun_light(scene.sky, scene.sun)
     assert sun is not None
     write_exr(folder / "world.exr", sky_pictures(scene.sky, scene.sun, scene.lights, scene.ground is not None).lighting)
-    lowest = float((mesh.vertices @ np.array(placement.world_from_object)[:3, :3].T)[:, 2].min())
-    z = lowest + placement.world_from_object[2][3]
+    lowest = float((mesh.vertices @ np.array(thing.world_from_object)[:3, :3].T)[:, 2].min())
+    z = lowest + thing.world_from_object[2][3]
     ground = None if scene.ground is None else {"size": 2000.0, "z": z, "color": list(scene.ground.color)}
     return {
         "model": str(folder / "model.glb"),
-        "matrix": placement.world_from_object,
+        "matrix": thing.world_from_object,
         "ground": ground,
         "transparent": scene.ground is None,
         "sun": {"energy": max(sun.irradiance), "angle": np.deg2rad(sun.angle_deg), "direction": list(sun.direction)},
@@ -162,7 +162,7 @@ def theirs(shot: Shot, stages: Stages, python: Path, folder: Path, threads: int)
     from viewsphere.assets.export import export_glb
 
     folder.mkdir(parents=True, exist_ok=True)
-    export_glb(stages.model(shot.placements[0].model), folder / "model.glb")
+    export_glb(stages.model(shot.things[0].model), folder / "model.glb")
     (folder / "told.json").write_text(json.dumps(told(shot, stages, folder, threads)))
     with (folder / "log").open("wb") as log:
         subprocess.run([python, HERE / "bench_blenderproc.py", folder], check=True, stdout=log, stderr=log)

@@ -18,7 +18,7 @@ from PIL import Image
 from viewsphere.errors import MissingExtraError
 from viewsphere.model.channel import CHANNELS
 from viewsphere.model.files import Files
-from viewsphere.model.recipe import Recipe
+from viewsphere.recipe.recipe import Recipe
 from viewsphere.run.opening import prepare
 from viewsphere.run.stages import Stages
 from viewsphere.sampling.extension import whole

@@ -16,7 +16,7 @@ from viewsphere import plugins
 from viewsphere.assets.mesh import Image, Material, Mesh, Texture
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.scene import Ground, Scene, Sun
-from viewsphere.model.shot import Frame, ModelSpec, Placement, Pose, Shot
+from viewsphere.model.shot import Frame, ModelSpec, Pose, Shot, Thing
 from viewsphere.run.allocator import keep_freed_memory
 from viewsphere.sampling.camera import camera_for
 from viewsphere.truth.channels import observe
@@ -81,7 +81,7 @@ def frame_cost(mesh: Mesh, side: tuple[int, int] = (640, 480), copies: int = 1) 
     poses = [Pose(index=i, azimuth_deg=20 + 70 * i, elevation_deg=25, distance=distance) for i in range(FRAMES)]
     shot = Shot(
         key="scaling",
-        placements=tuple(Placement(id=i, model=spec, world_from_object=w) for i, w in enumerate(rows, 1)),
+        things=tuple(Thing(id=i, model=spec, world_from_object=w) for i, w in enumerate(rows, 1)),
         intrinsics=Intrinsics(width=width, height=height, fx=1.2 * width, fy=1.2 * width, cx=width / 2, cy=height / 2),
         scene=Scene(sun=Sun(), ground=Ground()),
         frames=tuple(Frame(index=p.index, pose=p, split="train") for p in poses),

@@ -33,7 +33,7 @@ from viewsphere.geometry.box import box_vertices
 from viewsphere.imaging.view import develop
 from viewsphere.model.camera import Camera, Intrinsics
 from viewsphere.model.scene import AreaLight, Environment, Ground, PointLight, Scene, Sky, SpotLight, Sun, View
-from viewsphere.model.shot import Frame, ModelSpec, Placement, Pose, Shot
+from viewsphere.model.shot import Frame, ModelSpec, Pose, Shot, Thing
 from viewsphere.sampling.camera import camera_for
 from viewsphere.truth.visibility import rasterize
 from viewsphere.zoo import build
@@ -109,8 +109,8 @@ def cases(folder: Path) -> Iterator[Case]:
 
 def shot_of(case: Case) -> tuple[Shot, dict[str, Mesh]]:
     meshes = {f"model{i}": mesh for i, (mesh, _) in enumerate(case.models)}
-    placements = tuple(
-        Placement(
+    things = tuple(
+        Thing(
             id=i,
             model=ModelSpec(key=key, source=key, category="model", category_id=1),
             world_from_object=((1, 0, 0, x), (0, 1, 0, y), (0, 0, 1, z), (0, 0, 0, 1)),
@@ -128,9 +128,7 @@ def shot_of(case: Case) -> tuple[Shot, dict[str, Mesh]]:
     )
     lens = Intrinsics(width=WIDTH, height=HEIGHT, fx=WIDTH * 1.25, fy=WIDTH * 1.25, cx=WIDTH / 2, cy=HEIGHT / 2)
     frame = Frame(index=0, pose=pose, split="train")
-    return Shot(
-        key=case.name, placements=placements, intrinsics=lens, scene=case.scene, frames=(frame,), channels=("rgb",)
-    ), meshes
+    return Shot(key=case.name, things=things, intrinsics=lens, scene=case.scene, frames=(frame,), channels=("rgb",)), meshes
 
 
 def describe(case: Case, folder: Path) -> None:
@@ -138,9 +136,9 @@ def describe(case: Case, folder: Path) -> None:
     shot, meshes = shot_of(case)
     camera = camera_of(shot)
     models: list[dict[str, Any]] = []
-    for placement in shot.placements:
-        file = export_glb(meshes[placement.model.key], folder / f"{case.name}_{placement.model.key}.glb")
-        models.append({"file": str(file), "matrix": placement.world_from_object})
+    for thing in shot.things:
+        file = export_glb(meshes[thing.model.key], folder / f"{case.name}_{thing.model.key}.glb")
+        models.append({"file": str(file), "matrix": thing.world_from_object})
     scene = case.scene
     sun = [{"kind": "sun", **scene.sun.model_dump()}] if scene.sun else []
     low = min(mesh.bounds[0, 2] + at[2] for mesh, at in case.models)

@@ -14,7 +14,7 @@ from typer.models import ArgumentInfo
 
 from viewsphere.cli.commands import app
 from viewsphere.model.channel import CHANNELS
-from viewsphere.model.recipe_file import schema
+from viewsphere.recipe.file import schema
 
 DOCS = Path(__file__).parent.parent / "docs"
 NOTE = "<!-- written by scripts/docs; do not edit -->\n\n"

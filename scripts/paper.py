@@ -17,7 +17,7 @@ from viewsphere.geometry.box import EDGES, FACES
 from viewsphere.model.camera import Camera, Intrinsics
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.model.scene import Background, Finish, Scene
-from viewsphere.model.shot import Frame, Placement, Pose, Shot
+from viewsphere.model.shot import Frame, Pose, Shot, Thing
 from viewsphere.preview import INK, PALETTE, PAPER, draw_sample
 from viewsphere.run.opening import prepare
 from viewsphere.run.stages import Stages
@@ -316,15 +316,15 @@ def pose_sphere(made_of: Recipe, size: int) -> Picture:
     pose = Pose(index=0, azimuth_deg=30, elevation_deg=17, distance=24.5)
     shot = Shot(
         key="sphere",
-        placements=(Placement(id=1, model=spec),),
+        things=(Thing(id=1, model=spec),),
         intrinsics=lens,
         scene=Scene(finish=Finish(background=Background(color=(1.0, 1.0, 1.0)))),
         frames=(Frame(index=0, pose=pose, split=""),),
         channels=("rgb", "depth", "instances"),
     )
     (sample,) = stages.render(shot)
-    placements = (Placement(id=1, model=spec),)
-    cameras = planned.cameras(placements, stages.box)
+    things = (Thing(id=1, model=spec),)
+    cameras = planned.cameras(things, stages.box)
     return bigger(_dots(sample, cameras), size)
 
 

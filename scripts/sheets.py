@@ -34,7 +34,7 @@ from viewsphere.model.scene import (
     SpotLight,
     Sun,
 )
-from viewsphere.model.shot import Frame, ModelSpec, Placement, Pose, Shot
+from viewsphere.model.shot import Frame, ModelSpec, Pose, Shot, Thing
 from viewsphere.run.stages import build_zoo_model
 from viewsphere.sampling.camera import camera_for
 from viewsphere.truth.visibility import rasterize
@@ -91,8 +91,8 @@ def tile(mesh: Mesh, scene: Scene, azimuth_deg: float = 35, elevation_deg: float
     size = float(np.linalg.norm(np.ptp(mesh.bounds, axis=0)))
     pose = Pose(index=0, azimuth_deg=azimuth_deg, elevation_deg=elevation_deg, distance=2.2 * size)
     frame = Frame(index=0, pose=pose, split="train")
-    placement = Placement(id=1, model=SPEC)
-    shot = Shot(key="sheet", placements=(placement,), intrinsics=LENS, scene=scene, frames=(frame,), channels=("rgb",))
+    thing = Thing(id=1, model=SPEC)
+    shot = Shot(key="sheet", things=(thing,), intrinsics=LENS, scene=scene, frames=(frame,), channels=("rgb",))
     engine: plugins.Engine = plugins.load("engines", "raster")
     stage = engine.stage(shot, lambda spec: mesh)
     camera = camera_for(LENS, pose, box_vertices(*mesh.bounds).mean(axis=0))

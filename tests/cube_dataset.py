@@ -14,7 +14,7 @@ from viewsphere.model.camera import Camera, Intrinsics
 from viewsphere.model.channel import CHANNELS, PICTURES
 from viewsphere.model.sample import Sample
 from viewsphere.model.scene import Ground, Scene
-from viewsphere.model.shot import Frame, ModelSpec, Placement, Pose, Shot
+from viewsphere.model.shot import Frame, ModelSpec, Pose, Shot, Thing
 from viewsphere.store import Category, Dataset, ModelInfo, PlanRecord, Store
 from viewsphere.truth.channels import observe
 from viewsphere.truth.geometry import build_geometry
@@ -51,18 +51,18 @@ def spec(index: int) -> ModelSpec:
     )  # fmt: skip
 
 
-def placed(offsets: dict[int, tuple[float, float, float]]) -> tuple[Placement, ...]:
+def placed(offsets: dict[int, tuple[float, float, float]]) -> tuple[Thing, ...]:
     return tuple(
-        Placement(id=i, model=spec(m), world_from_object=((1, 0, 0, x), (0, 1, 0, y), (0, 0, 1, z), (0, 0, 0, 1)))
+        Thing(id=i, model=spec(m), world_from_object=((1, 0, 0, x), (0, 1, 0, y), (0, 0, 1, z), (0, 0, 0, 1)))
         for i, (m, (x, y, z)) in enumerate(offsets.items(), 1)
     )
 
 
 def render(shot: Shot):
-    meshes = [MESHES[int(p.model.key[-1])] for p in shot.placements]
-    geometry = build_geometry(shot.placements, meshes, shot.scene.ground is not None, shot.label_alpha)
+    meshes = [MESHES[int(p.model.key[-1])] for p in shot.things]
+    geometry = build_geometry(shot.things, meshes, shot.scene.ground is not None, shot.label_alpha)
     boxes = [box_vertices(*m.bounds) for m in meshes]
-    files = [f"store/models/{p.model.key}/{p.model.key}.obj" for p in shot.placements]
+    files = [f"store/models/{p.model.key}/{p.model.key}.obj" for p in shot.things]
     for frame in shot.frames:
         angles = np.radians([frame.pose.azimuth_deg, frame.pose.elevation_deg, frame.pose.tilt_deg])
         rotation = orbit_rotation(*angles)
@@ -88,7 +88,7 @@ def shots(several: bool, channels: tuple[str, ...], intrinsics: Intrinsics, grou
         )
         made.append(
             Shot(
-                key=f"shot-{s}", placements=placed(offsets), intrinsics=intrinsics, channels=channels, frames=frames,
+                key=f"shot-{s}", things=placed(offsets), intrinsics=intrinsics, channels=channels, frames=frames,
                 scene=Scene(ground=Ground() if ground else None),
             )
         )  # fmt: skip

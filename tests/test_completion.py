@@ -76,7 +76,7 @@ def test_models_are_offered_beside_the_zoo(tmp_path):
 
 
 def test_the_fields_offered_for_set_are_the_recipe_s():
-    from viewsphere.model.recipe_file import schema
+    from viewsphere.recipe.file import schema
 
     definitions = schema()["$defs"]
     known = set(schema()["properties"])

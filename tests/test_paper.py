@@ -17,8 +17,8 @@ import viewsphere as vs
 from small import ROOT
 from viewsphere.check import check
 from viewsphere.cli.arguments import load_recipe
-from viewsphere.model.recipe_file import read
 from viewsphere.model.sample import ObjectAnnotation
+from viewsphere.recipe.file import read
 
 PAGE = (ROOT / "docs" / "paper.md").read_text("utf-8")
 SETS = ("car_poses", "bike_poses", "chair_poses", "boat_poses", "hairdryer_poses")

@@ -17,7 +17,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from viewsphere.model.recipe import Recipe
+    from viewsphere.recipe.recipe import Recipe
     from viewsphere.run.generate import export, generate
     from viewsphere.run.memory import render
     from viewsphere.sampling.plan import plan
@@ -28,7 +28,7 @@ __all__ = ["Dataset", "Recipe", "export", "generate", "open", "plan", "render"]
 
 _HOMES = {
     "Dataset": "store.Dataset",
-    "Recipe": "model.recipe.Recipe",
+    "Recipe": "recipe.recipe.Recipe",
     "export": "run.generate.export",
     "generate": "run.generate.generate",
     "open": "store.Dataset",

@@ -13,10 +13,10 @@ from PIL import Image, ImageDraw, ImageFont
 from viewsphere.geometry.box import EDGES, FACES
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.channel import picture_of
-from viewsphere.model.recipe import Recipe
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.model.scene import Ground, Scene
-from viewsphere.model.shot import Frame, ModelSpec, Placement, Pose, Shot
+from viewsphere.model.shot import Frame, ModelSpec, Pose, Shot, Thing
+from viewsphere.recipe.recipe import Recipe
 from viewsphere.run.opening import prepare
 from viewsphere.run.stages import Stages
 from viewsphere.sampling.plan import Plan
@@ -107,7 +107,7 @@ def four_sides(spec: ModelSpec, size: int = 320) -> Picture:
     )
     shot = Shot(
         key=spec.key,
-        placements=(Placement(id=1, model=spec),),
+        things=(Thing(id=1, model=spec),),
         intrinsics=Intrinsics(width=size, height=size, fx=focal, fy=focal, cx=size / 2, cy=size / 2),
         scene=Scene(ground=Ground()),
         frames=frames,

@@ -14,7 +14,7 @@ from viewsphere.model.camera import Camera, Distortion, Intrinsics
 from viewsphere.model.record import sample_from_record, sample_to_record
 from viewsphere.model.sample import Sample
 from viewsphere.model.scene import Scene
-from viewsphere.model.shot import Frame, ModelSpec, Placement, Pose, Shot
+from viewsphere.model.shot import Frame, ModelSpec, Pose, Shot, Thing
 from viewsphere.truth.geometry import build_geometry
 from viewsphere.truth.visibility import rasterize, silhouette
 
@@ -47,15 +47,13 @@ def scene(meshes, motions, pose=None, intrinsics=LENS, ground=False, category_de
     specs = [
         ModelSpec(key=f"m{i}", source="x.obj", category="cube", category_id=1, real_size=(1, 2, 3)) for i in range(len(meshes))
     ]
-    placements = tuple(
-        Placement(id=i + 1, model=s, world_from_object=m) for i, (s, m) in enumerate(zip(specs, motions, strict=True))
-    )
+    things = tuple(Thing(id=i + 1, model=s, world_from_object=m) for i, (s, m) in enumerate(zip(specs, motions, strict=True)))
     frame = Frame(index=5, pose=pose, split="train")
     shot = Shot(
-        key="shot", placements=placements, intrinsics=intrinsics, scene=Scene(), frames=(frame,),
+        key="shot", things=things, intrinsics=intrinsics, scene=Scene(), frames=(frame,),
         channels=("instances",), category_deg=category_deg,
     )  # fmt: skip
-    geometry = build_geometry(placements, meshes, ground, 0.01)
+    geometry = build_geometry(things, meshes, ground, 0.01)
     visibility = rasterize(geometry, camera)
     boxes = [box_vertices(*m.bounds) for m in meshes]
     objects = annotate(shot, frame, camera, geometry, visibility, boxes, [f"MODELS/{s.key}.glb" for s in specs])
@@ -226,7 +224,7 @@ def test_lens_distortion_is_followed():
 def test_wrong_numbers_of_models_are_refused():
     objects, camera, geometry, visibility, pose = scene([UNIT], [at()])
     frame = Frame(index=5, pose=pose, split="train")
-    shot = Shot(key="s", placements=(), intrinsics=LENS, scene=Scene(), frames=(frame,), channels=())
+    shot = Shot(key="s", things=(), intrinsics=LENS, scene=Scene(), frames=(frame,), channels=())
     with pytest.raises(ValueError, match="frame 5: expected 1 objects"):
         annotate(shot, frame, camera, geometry, visibility, [objects[0].box3d_object], ["m"])
 

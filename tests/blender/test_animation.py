@@ -352,7 +352,7 @@ def test_cameras_see_what_blender_sees(files, kind):
     assert planned.frames == planned.shot_count == 3
     for shot in (planned.shot(i, stages.box) for i in range(3)):
         camera = camera_for(lens, shot.frames[0].pose, (0, 0, 0))
-        vertices = stages.model(shot.placements[0].model).vertices.astype(float)
+        vertices = stages.model(shot.things[0].model).vertices.astype(float)
         pixels, _ = project(lens, vertices @ camera.R.T + camera.t)
         expected = np.array(seen[str(shot.frames[0].pose.time.frame)])
         gaps = np.linalg.norm(pixels[:, None] - expected, axis=2)

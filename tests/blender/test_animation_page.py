@@ -14,8 +14,8 @@ import yaml
 from small import ROOT
 from viewsphere import Dataset, Recipe, plan
 from viewsphere.assets.timeline import Blenders, Timeline
-from viewsphere.model.recipe_models import ModelEntry
-from viewsphere.model.recipe_viewpoints import PoseList
+from viewsphere.recipe.models import ModelEntry
+from viewsphere.recipe.viewpoints import PoseList
 
 PAGE = (ROOT / "docs" / "animation.md").read_text("utf-8")
 WALK, CAMERA = re.findall(r"```yaml\n(.*?)```", PAGE, re.DOTALL)

@@ -15,8 +15,8 @@ from blender_scenes import UPRIGHT, Scene, ball, camera, card, flat_image, raste
 
 from viewsphere.assets.mesh import WRAPS, Image, Material, Texture
 from viewsphere.assets.srgb import encoded
+from viewsphere.codecs.exr import encode_exr
 from viewsphere.engines.raster.painting import paint
-from viewsphere.geometry.exr_files import encode_exr
 from viewsphere.imaging.view import EXPOSURE
 from viewsphere.model import scene as model
 from viewsphere.truth.visibility import rasterize

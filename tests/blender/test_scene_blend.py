@@ -287,7 +287,7 @@ def test_a_place_may_be_a_part_of_a_file(made, part, height):
     recipe = Recipe(**(recipe_of("none").model_dump() | {"scene": scene, "engine": "raster", "channels": ["depth"]}))
     stages = Stages()
     shot = plan(recipe).shot(0, stages.box)
-    (placed,) = [p for p in shot.placements if p.scenery]
+    (placed,) = [p for p in shot.things if p.scenery]
     assert stages.box(placed.model)[:, 2].max() == pytest.approx(height, abs=1e-5)
     assert len(list(render(recipe))) == 3
 

@@ -13,7 +13,7 @@ import yaml
 
 from small import ROOT
 from viewsphere import Dataset, Recipe
-from viewsphere.model.recipe_blend import LabelRule
+from viewsphere.recipe.blend import LabelRule
 
 PAGE = (ROOT / "docs" / "scenes-in-blender.md").read_text("utf-8")
 (RECIPE,) = re.findall(r"```yaml\n(.*?)```", PAGE, re.DOTALL)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from viewsphere.geometry.jit import njit
+from viewsphere.kernels.jit import njit
 
 
 def called(kernel: Any) -> Callable[..., Any]:

@@ -18,7 +18,7 @@ from viewsphere.engines.raster.occlusion import Occlusion
 from viewsphere.engines.raster.surface import pack_surfaces
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.model.camera import Camera
-from viewsphere.model.shot import ModelSpec, Placement
+from viewsphere.model.shot import ModelSpec, Thing
 from viewsphere.truth.geometry import build_geometry
 from viewsphere.truth.visibility import rasterize
 
@@ -64,11 +64,9 @@ class LightStage:
 
     def __init__(self, *meshes: Mesh, ground: bool = True, scenery: Mesh | None = None):
         everything = [*meshes, *([scenery] if scenery else [])]
-        placements = [
-            Placement(id=(i + 1) * (i < len(meshes)), model=SPEC, scenery=i >= len(meshes)) for i in range(len(everything))
-        ]
+        things = [Thing(id=(i + 1) * (i < len(meshes)), model=SPEC, scenery=i >= len(meshes)) for i in range(len(everything))]
         self.ground = ground
-        self.geometry = build_geometry(placements, everything, ground, 0.5)
+        self.geometry = build_geometry(things, everything, ground, 0.5)
         stop = self.geometry.triangle_start[len(meshes)]
         used = self.geometry.vertices[self.geometry.triangles[:stop]].reshape(-1, 3)
         low, high = used.min(axis=0), used.max(axis=0)

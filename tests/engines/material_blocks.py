@@ -11,7 +11,7 @@ from viewsphere.engines.raster.kernels_material import material
 from viewsphere.engines.raster.records import View
 from viewsphere.engines.raster.surface import pack_surfaces
 from viewsphere.model.scene import Ground
-from viewsphere.model.shot import ModelSpec, Placement
+from viewsphere.model.shot import ModelSpec, Thing
 from viewsphere.truth.geometry import build_geometry
 
 shown = called(material)
@@ -42,9 +42,9 @@ def card(used: Material, images=(), uv=((0, 1), (1, 1), (1, 0), (0, 0)), **field
 
 def packed(mesh: Mesh, ground: Ground | None = None, repaints=()):
     """Surfaces and textures of the mesh alone, in metres from the world's origin."""
-    placement = Placement(id=1, model=SPEC, repaints=repaints)
-    geometry = build_geometry((placement,), (mesh,), ground is not None, 0.01)
-    return pack_surfaces(geometry, (mesh,), ground, np.zeros(3), 1.0, 1, (placement,))
+    thing = Thing(id=1, model=SPEC, repaints=repaints)
+    geometry = build_geometry((thing,), (mesh,), ground is not None, 0.01)
+    return pack_surfaces(geometry, (mesh,), ground, np.zeros(3), 1.0, 1, (thing,))
 
 
 def view_of(rotation, rays=None) -> View:

@@ -8,7 +8,7 @@ import pytest
 
 from viewsphere.engines.raster.kernels_block import BLOCK, T0, T1
 from viewsphere.engines.raster.kernels_gather import _find_centers
-from viewsphere.geometry.jit import njit
+from viewsphere.kernels.jit import njit
 
 
 @njit

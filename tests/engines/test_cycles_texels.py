@@ -16,14 +16,14 @@ from viewsphere.engines.cycles.texels import BUMPED, CONTENTS, FINEST, Kind, hal
 from viewsphere.geometry.camera import orbit_center, orbit_rotation
 from viewsphere.model.camera import Camera, Intrinsics
 from viewsphere.model.scene import Scene
-from viewsphere.model.shot import Frame, ModelSpec, Placement, Pose, Repaint, Shot
+from viewsphere.model.shot import Frame, ModelSpec, Pose, Repaint, Shot, Thing
 from viewsphere.sampling.camera import camera_for
 from viewsphere.truth.visibility import rasterize
 
 RNG = np.random.default_rng(5)
 SPEC = ModelSpec(key="model", source="memory", category="thing", category_id=1)
-PLACED = Placement(id=1, model=SPEC)
-TURNED = Placement(id=2, model=SPEC, world_from_object=((0, -1, 0, 3), (1, 0, 0, 1), (0, 0, 1, 2), (0, 0, 0, 1)))
+PLACED = Thing(id=1, model=SPEC)
+TURNED = Thing(id=2, model=SPEC, world_from_object=((0, -1, 0, 3), (1, 0, 0, 1), (0, 0, 1, 2), (0, 0, 0, 1)))
 SIDE, RADIUS = 2.0, math.sqrt(2)
 CORNERS = np.array([(-1, 0, -1), (1, 0, -1), (1, 0, 1), (-1, 0, 1)], np.float32)
 UPRIGHT = np.array([(0, 1), (1, 1), (1, 0), (0, 0)], np.float32)
@@ -60,8 +60,8 @@ def view(distance: float, focal=100.0, size=2, placed=PLACED) -> Camera:
     return Camera(lens, rotation, -rotation @ (middle + orbit_center(0.4, 0.3, distance)))
 
 
-def level(mesh: Mesh, camera: Camera, name="base_color_texture", placements=(PLACED,), repaints=()) -> int:
-    (row,) = Kind(mesh, repaints, placements).levels([camera])
+def level(mesh: Mesh, camera: Camera, name="base_color_texture", things=(PLACED,), repaints=()) -> int:
+    (row,) = Kind(mesh, repaints, things).levels([camera])
     return row[list(CONTENTS).index(name)]
 
 
@@ -85,9 +85,9 @@ def test_as_many_texels_are_left_as_a_pixel_shows(distance):
     assert expected == 8 or left < 2 * FINEST
 
 
-def test_the_nearest_of_the_placements_counts():
+def test_the_nearest_of_the_things_counts():
     mesh = square(COLORED, picture())
-    both = level(mesh, view(9.0), placements=(PLACED, TURNED))
+    both = level(mesh, view(9.0), things=(PLACED, TURNED))
     near = np.linalg.norm(view(9.0).center - np.array((3, 1, 2)))
     assert both == halvings(256 / SIDE, min(9.0, near))
     assert level(mesh, view(1.4)) == 0  # within the ball around it
@@ -227,7 +227,7 @@ def stage_with(mesh: Mesh, distances, **engine):
     ]
     shot = Shot(
         key="shot",
-        placements=(PLACED,),
+        things=(PLACED,),
         intrinsics=Intrinsics(width=48, height=48, fx=80, fy=80, cx=24, cy=24),
         scene=Scene(ground=None),
         frames=tuple(frames),

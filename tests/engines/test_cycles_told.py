@@ -80,8 +80,8 @@ def shot_of(**given):
 def told_of(**given):
     """What Blender is told of a recipe's first shot, and the arrays by the names they were given."""
     shot = shot_of(**given)
-    meshes = [stages().model(p.model) for p in shot.placements]
-    geometry = build_geometry(shot.placements, meshes, shot.scene.ground is not None, shot.label_alpha)
+    meshes = [stages().model(p.model) for p in shot.things]
+    geometry = build_geometry(shot.things, meshes, shot.scene.ground is not None, shot.label_alpha)
     arrays: dict[str, np.ndarray] = {}
 
     def put(array):
@@ -89,7 +89,7 @@ def told_of(**given):
         return f"{len(arrays) - 1}"
 
     options = parse_options(shot.engine_options)
-    return told_scene(shot.placements, meshes, geometry, shot.scene, options, put), arrays, geometry
+    return told_scene(shot.things, meshes, geometry, shot.scene, options, put), arrays, geometry
 
 
 def test_what_is_told_is_plain_and_truths_own():
@@ -155,7 +155,7 @@ def test_views_hold_every_ray_where_the_lens_has_it(lens):
 
 def test_a_border_holds_all_that_is_seen():
     shot = shot_of(viewpoints={"azimuth": [0], "elevation": [10], "distance": 1.5})
-    geometry = build_geometry(shot.placements, [stages().model(shot.placements[0].model)], False, shot.label_alpha)
+    geometry = build_geometry(shot.things, [stages().model(shot.things[0].model)], False, shot.label_alpha)
     pose = Camera(shot.intrinsics, np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]]), np.array([0.1, 0.0, 1.0]))
     x0, y0, x1, y1 = border_of(geometry, pose)
     seen = (geometry.vertices @ pose.R.T + pose.t) @ pose.K.T

@@ -39,8 +39,8 @@ def shot_of(engine, **given):
 
 
 def geometry_of(shot):
-    meshes = [stages().model(p.model) for p in shot.placements]
-    return build_geometry(shot.placements, meshes, shot.scene.ground is not None, shot.label_alpha), meshes
+    meshes = [stages().model(p.model) for p in shot.things]
+    return build_geometry(shot.things, meshes, shot.scene.ground is not None, shot.label_alpha), meshes
 
 
 def test_they_are_engines_of_their_own():
@@ -125,7 +125,7 @@ def test_plan_refuses_a_catcher_by_the_recipe_s_line(tmp_path):
 def test_what_is_told_is_plain_and_light_comes_from_above(scene):
     shot = shot_of({"name": "workbench"}, scene=scene)
     geometry, meshes = geometry_of(shot)
-    told = told_scene(shot.placements, meshes, geometry, shot.scene, options_of("workbench", {}), lambda array: "array")
+    told = told_scene(shot.things, meshes, geometry, shot.scene, options_of("workbench", {}), lambda array: "array")
     assert json.loads(json.dumps(told)).keys() == told.keys()
     above, below = np.array(told["hemispheres"])
     assert (above > 0).all() and (below > 0).all()
@@ -136,7 +136,7 @@ def test_the_ground_fades_where_blender_is_told_to():
     """Workbench's, which is faded here, and the others', by Blender's nodes."""
     shot = shot_of({"name": "workbench"}, scene={"ground": "on"})
     geometry, meshes = geometry_of(shot)
-    told = told_scene(shot.placements, meshes, geometry, shot.scene, options_of("workbench", {}), lambda array: "array")
+    told = told_scene(shot.things, meshes, geometry, shot.scene, options_of("workbench", {}), lambda array: "array")
     fading, backdrop = told["ground"]["fading"], Backdrop.of(shot, geometry)
     camera = camera_for(shot.intrinsics, shot.frames[0].pose, backdrop.middle)
     before = np.linalg.norm(backdrop.middle - camera.center)

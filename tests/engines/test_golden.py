@@ -30,7 +30,7 @@ from viewsphere.model.scene import (
     Sun,
     View,
 )
-from viewsphere.model.shot import Frame, ModelSpec, Placement, Pose, Shot
+from viewsphere.model.shot import Frame, ModelSpec, Pose, Shot, Thing
 from viewsphere.run.stages import Stages
 
 GOLDEN = Path(__file__).parent / "golden"
@@ -93,7 +93,7 @@ def rendered(name: str) -> np.ndarray:
     pose = Pose(index=0, azimuth_deg=azimuth, elevation_deg=elevation, distance=distance)
     shot = Shot(
         key=name,
-        placements=(Placement(id=1, model=ModelSpec(key=name, source=source, seed=seed, category=name, category_id=1)),),
+        things=(Thing(id=1, model=ModelSpec(key=name, source=source, seed=seed, category=name, category_id=1)),),
         intrinsics=lens,
         scene=scene,
         frames=(Frame(index=0, pose=pose, split="train"),),

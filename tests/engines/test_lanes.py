@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from viewsphere.engines.raster.kernels_lanes import clamp, lanewise, least, most, root, sign, size, where
-from viewsphere.geometry.jit import njit
+from viewsphere.kernels.jit import njit
 
 ROW = 32
 A = np.random.default_rng(1).normal(0, 3, ROW).astype(np.float32)

@@ -16,7 +16,7 @@ from viewsphere.engines import raster
 from viewsphere.geometry.camera import pixel_rays, project
 from viewsphere.model.camera import Camera, Distortion, Intrinsics
 from viewsphere.model.scene import Background, Finish, Scene, View
-from viewsphere.model.shot import Frame, ModelSpec, Placement, Pose, Shot
+from viewsphere.model.shot import Frame, ModelSpec, Pose, Shot, Thing
 from viewsphere.truth.channels import observe
 from viewsphere.truth.visibility import rasterize
 
@@ -70,16 +70,16 @@ def painted_balls(rng):
 def stage():
     rng = np.random.default_rng(5)
     meshes = painted_balls(rng)
-    placements = []
+    things = []
     for i in range(len(meshes)):
         z, turn = 1 - 2 * (i + 0.5) / len(meshes), 2.4 * i
         x, y = (3 * math.sqrt(1 - z * z) * f(turn) for f in (math.cos, math.sin))
         spec = ModelSpec(key=f"{i}", source="memory", category="ball", category_id=1)
         move = ((1, 0, 0, x), (0, 1, 0, y), (0, 0, 1, 3 * z), (0, 0, 0, 1))
-        placements.append(Placement(id=i + 1, model=spec, world_from_object=move))
+        things.append(Thing(id=i + 1, model=spec, world_from_object=move))
     shot = Shot(
         key="shot",
-        placements=tuple(placements),
+        things=tuple(things),
         intrinsics=lens("barrel"),
         scene=Scene(sun=None, finish=Finish(background=Background(color=(0, 0, 0)), view=View(transform="raw"))),
         frames=(frame(),),

@@ -13,7 +13,7 @@ from viewsphere.engines import raster
 from viewsphere.engines.raster.environment import bake_surrounding, sky_lights
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.scene import AreaLight, Daylight, Ground, PointLight, Scene, Sky, SpotLight, Sun
-from viewsphere.model.shot import Frame, ModelSpec, Placement, Pose, Shot
+from viewsphere.model.shot import Frame, ModelSpec, Pose, Shot, Thing
 from viewsphere.sampling.camera import camera_for
 from viewsphere.surroundings.daylight import air, daylight_picture, opening
 from viewsphere.truth.visibility import rasterize
@@ -34,7 +34,7 @@ def picture(
     )
     shot = Shot(
         key="s",
-        placements=(Placement(id=1, model=SPEC),),
+        things=(Thing(id=1, model=SPEC),),
         intrinsics=lens,
         scene=scene,
         frames=(frame,),

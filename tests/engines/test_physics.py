@@ -33,7 +33,7 @@ from viewsphere.model.scene import (
     Sun,
     View,
 )
-from viewsphere.model.shot import Frame, ModelSpec, Placement, Pose, Shot
+from viewsphere.model.shot import Frame, ModelSpec, Pose, Shot, Thing
 from viewsphere.truth.visibility import rasterize
 
 SPEC = ModelSpec(key="model", source="memory", category="thing", category_id=1)
@@ -53,7 +53,7 @@ def camera(width, height, focal, azimuth=0.0, elevation=0.0, distance=1.0, targe
 def stage_of(meshes: list[Mesh], scene: Scene, **options):
     shot = Shot(
         key="shot",
-        placements=tuple(Placement(id=i + 1, model=SPEC.model_copy(update={"key": f"m{i}"})) for i in range(len(meshes))),
+        things=tuple(Thing(id=i + 1, model=SPEC.model_copy(update={"key": f"m{i}"})) for i in range(len(meshes))),
         intrinsics=Intrinsics(width=8, height=8, fx=8, fy=8, cx=4, cy=4),
         scene=scene,
         frames=(FRAME,),

@@ -17,7 +17,7 @@ from viewsphere.geometry.camera import orbit_center, orbit_rotation
 from viewsphere.imaging.view import EXPOSURE, KNEE
 from viewsphere.model.camera import Camera, Distortion, Intrinsics
 from viewsphere.model.scene import Background, Finish, Ground, Scene, Sky, Sun, View
-from viewsphere.model.shot import Frame, ModelSpec, Placement, Pose, Shot
+from viewsphere.model.shot import Frame, ModelSpec, Pose, Shot, Thing
 from viewsphere.truth.visibility import rasterize
 
 DARK = Sky(strength=0.0)
@@ -92,7 +92,7 @@ def camera(
 def stage_of(mesh: Mesh, scene: Scene, **options):
     shot = Shot(
         key="shot",
-        placements=(Placement(id=1, model=SPEC),),
+        things=(Thing(id=1, model=SPEC),),
         intrinsics=Intrinsics(width=8, height=8, fx=8, fy=8, cx=4, cy=4),
         scene=scene,
         frames=(FRAME,),
@@ -368,7 +368,7 @@ def test_size_does_not_change_the_picture(size):
 def test_ground_without_objects_and_nothing_at_all():
     shot = Shot(
         key="shot",
-        placements=(),
+        things=(),
         intrinsics=Intrinsics(width=16, height=16, fx=16, fy=16, cx=8, cy=8),
         scene=Scene(ground=Ground(), finish=Finish(background=Background(color=(0, 0, 1)))),
         frames=(FRAME,),

@@ -10,7 +10,7 @@ from viewsphere.assets.mesh import Material
 from viewsphere.engines import raster
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.scene import Finish, Scene, Sky, Sun
-from viewsphere.model.shot import ModelSpec, Placement, Shot
+from viewsphere.model.shot import ModelSpec, Shot, Thing
 from viewsphere.truth.visibility import rasterize
 
 SUN = Sun(azimuth_deg=90, elevation_deg=45, strength=3.0)
@@ -30,10 +30,10 @@ def moved(x, y, z=0.0):
 def stage_of(target, scenery, scene=SCENE, **options):
     """A target on scenery: (mesh, world from object) each."""
     meshes = {"target": target, **{f"piece{i}": mesh for i, (mesh, _) in enumerate(scenery)}}
-    placements = (
-        Placement(id=1, model=SPEC.model_copy(update={"key": "target"})),
+    things = (
+        Thing(id=1, model=SPEC.model_copy(update={"key": "target"})),
         *(
-            Placement(
+            Thing(
                 id=0,
                 model=ModelSpec(key=f"piece{i}", source="memory", category="", category_id=0),
                 world_from_object=move,
@@ -43,7 +43,7 @@ def stage_of(target, scenery, scene=SCENE, **options):
         ),
     )
     shot = Shot(
-        key="shot", placements=placements, intrinsics=Intrinsics(width=8, height=8, fx=8, fy=8, cx=4, cy=4), scene=scene,
+        key="shot", things=things, intrinsics=Intrinsics(width=8, height=8, fx=8, fy=8, cx=4, cy=4), scene=scene,
         frames=(FRAME,), channels=("rgb",), engine_options=options,
     )  # fmt: skip
     return raster.stage(shot, lambda spec: meshes[spec.key])

@@ -13,7 +13,7 @@ from viewsphere.engines.raster import kernels_block as block
 from viewsphere.engines.raster import kernels_filter as kf
 from viewsphere.engines.raster import kernels_material as km
 from viewsphere.engines.raster.bundles import BundlePacker
-from viewsphere.geometry.jit import njit
+from viewsphere.kernels.jit import njit
 
 RNG = np.random.default_rng(4)
 NOISE = Image("noise", RNG.integers(0, 256, (16, 16, 4)).astype(np.uint8))

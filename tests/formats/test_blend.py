@@ -79,7 +79,7 @@ def test_sky_and_colours_behind_have_files_of_their_own(asked, tmp_path):
 def test_the_models_are_the_stores(asked, small_run, tmp_path):
     export(small_run, ["blend"], output=tmp_path)
     for told in asked.values():
-        (spec,) = {p.model for p in told.shot.placements}
+        (spec,) = {p.model for p in told.shot.things}
         found, made = told.load(spec), load_normalised(spec, build_zoo_model)
         corners = [mesh.vertices[mesh.triangles] for mesh in (found, made)]
         assert np.array_equal(*corners)
@@ -92,10 +92,10 @@ def test_a_data_set_without_scenes_is_lit_anyhow(asked, tmp_path):
     export(dataset.root, ["blend"])
     (told,) = asked.values()
     assert told.shot.scene.sun is not None
-    assert [p.id for p in told.shot.placements] == [1, 2, 3]
-    for placement, o in zip(told.shot.placements, told.samples[0].objects, strict=True):
-        assert np.array_equal(placement.world_from_object, o.world_from_object)
-        assert told.load(placement.model).triangles.shape == (12, 3)
+    assert [p.id for p in told.shot.things] == [1, 2, 3]
+    for thing, o in zip(told.shot.things, told.samples[0].objects, strict=True):
+        assert np.array_equal(thing.world_from_object, o.world_from_object)
+        assert told.load(thing.model).triangles.shape == (12, 3)
 
 
 def test_the_store_keeps_the_shots_as_they_were_rendered(small_run):

@@ -11,12 +11,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from viewsphere.codecs.deflate import deflate
+from viewsphere.codecs.exr import decode_exr, encode_exr
+from viewsphere.codecs.kernels_deflate import STORED
+from viewsphere.codecs.npz import decode_npz, encode_npz
+from viewsphere.codecs.png_tiff import encode_tiff
 from viewsphere.errors import UserError
-from viewsphere.geometry.deflate import deflate
-from viewsphere.geometry.exr_files import decode_exr, encode_exr
-from viewsphere.geometry.image_files import encode_tiff
-from viewsphere.geometry.kernels_deflate import STORED
-from viewsphere.geometry.npz_files import decode_npz, encode_npz
 
 SHAPES = [(1, 1), (1, 9), (7, 1), (16, 5), (17, 13), (1, 1, 3), (5, 1, 3), (33, 40, 3)]
 ODD = np.array([np.inf, -np.inf, np.nan, -0.0, 1e-42, 3.4e38, 1 / 3], np.float32)

@@ -9,9 +9,9 @@ import pytest
 from isal import isal_zlib
 from PIL import Image
 
+from viewsphere.codecs.deflate import level_for
+from viewsphere.codecs.png_tiff import decode_png, decode_tiff, encode_png, encode_tiff
 from viewsphere.errors import UserError
-from viewsphere.geometry.deflate import level_for
-from viewsphere.geometry.image_files import decode_png, decode_tiff, encode_png, encode_tiff
 
 SIZES = [(1, 1), (1, 9), (7, 1), (13, 17), (32, 40)]
 

@@ -9,7 +9,7 @@ import sys
 import numpy as np
 import pytest
 
-from viewsphere.geometry.jit import inner, njit
+from viewsphere.kernels.jit import inner, njit
 
 
 @inner
@@ -56,7 +56,7 @@ def test_a_cached_kernel_is_not_prepared_for_compiling(tmp_path):
 
 
 CALLEE = """
-from viewsphere.geometry.jit import njit
+from viewsphere.kernels.jit import njit
 
 @njit
 def tripled(numbers, i):
@@ -66,7 +66,7 @@ def tripled(numbers, i):
 CALLER = """
 import numpy as np
 from callee import tripled
-from viewsphere.geometry.jit import njit
+from viewsphere.kernels.jit import njit
 
 @njit
 def sum_of_two(numbers):

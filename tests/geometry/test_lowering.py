@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from viewsphere.geometry.jit import njit
+from viewsphere.kernels.jit import njit
 
 RANDOM = np.random.default_rng(5)
 

@@ -10,19 +10,6 @@ import pytest
 from pydantic import ValidationError
 
 from viewsphere.errors import RecipeError
-from viewsphere.model.recipe import Recipe
-from viewsphere.model.recipe_finish import BackgroundEntry, EffectsEntry, SmootherEntry, ViewEntry
-from viewsphere.model.recipe_light import (
-    AreaEntry,
-    DaylightEntry,
-    GradientEntry,
-    HdriSky,
-    HemisphereEntry,
-    PointEntry,
-    SpotEntry,
-    SunEntry,
-)
-from viewsphere.model.recipe_surface import GroundEntry, MaterialEntry
 from viewsphere.model.scene import (
     AreaLight,
     Background,
@@ -39,6 +26,19 @@ from viewsphere.model.scene import (
     View,
 )
 from viewsphere.model.shot import Repaint
+from viewsphere.recipe.finish import BackgroundEntry, EffectsEntry, SmootherEntry, ViewEntry
+from viewsphere.recipe.light import (
+    AreaEntry,
+    DaylightEntry,
+    GradientEntry,
+    HdriSky,
+    HemisphereEntry,
+    PointEntry,
+    SpotEntry,
+    SunEntry,
+)
+from viewsphere.recipe.recipe import Recipe
+from viewsphere.recipe.surface import GroundEntry, MaterialEntry
 
 MODELS = [{"source": "zoo:car", "count": 3}]
 VIEWS = {"distance": 5}

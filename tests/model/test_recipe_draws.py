@@ -9,8 +9,7 @@ from pydantic import Field, ValidationError
 
 from viewsphere.errors import RecipeError
 from viewsphere.model.frozen import Frozen
-from viewsphere.model.recipe import Recipe
-from viewsphere.model.recipe_draws import (
+from viewsphere.recipe.draws import (
     Amount,
     Drawn,
     LinearDrawn,
@@ -21,7 +20,8 @@ from viewsphere.model.recipe_draws import (
     drawn,
     is_random,
 )
-from viewsphere.model.recipe_extends import assemble
+from viewsphere.recipe.extends import assemble
+from viewsphere.recipe.recipe import Recipe
 
 
 class Entry(Frozen):

@@ -3,8 +3,8 @@
 import pytest
 
 from viewsphere.errors import RecipeError
-from viewsphere.model.recipe import Recipe
-from viewsphere.model.recipe_extends import parse_change
+from viewsphere.recipe.extends import parse_change
+from viewsphere.recipe.recipe import Recipe
 
 BASE = """\
 name: base

@@ -10,8 +10,8 @@ import pytest
 import yaml
 
 from viewsphere.errors import RecipeError
-from viewsphere.model.recipe import Recipe
-from viewsphere.model.recipe_file import read, schema, template
+from viewsphere.recipe.file import read, schema, template
+from viewsphere.recipe.recipe import Recipe
 
 ROOT = Path(__file__).parents[2]
 GOOD = """\

@@ -546,7 +546,7 @@ def test_poses_that_a_merged_data_set_has_twice_are_there():
     rows = [row for row, _ in supplied.record.supplements]
     assert [supplied.shot(row).frames[0].index for row in rows] == [row[1] for row in rows] == list(range(0, 18, 2))
     last = supplied.shot(rows[-1])
-    assert (last.placements[0].model.key, last.channels) == ("post_box_002", ("normals",))
+    assert (last.things[0].model.key, last.channels) == ("post_box_002", ("normals",))
     assert [(f.pose.index, f.pose.azimuth_deg, f.pose.elevation_deg) for f in last.frames] == [(10, 120, 50), (11, 240, 50)]
 
 

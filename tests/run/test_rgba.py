@@ -10,7 +10,7 @@ from viewsphere.assets.srgb import encoded, linear
 from viewsphere.imaging.background import display_background
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.scene import Background, Finish, Ground, Scene
-from viewsphere.model.shot import Frame, ModelSpec, Placement, Pose, Shot
+from viewsphere.model.shot import Frame, ModelSpec, Pose, Shot, Thing
 from viewsphere.run.stages import Stages
 
 WIDTH, HEIGHT = 128, 96
@@ -30,7 +30,7 @@ def samples_of(stages: Stages, scene: Scene, channels=("rgb", "rgba", "instances
     frames = tuple(Frame(index=p.index, pose=p, split="train", finish=finish) for p in POSES)
     shot = Shot(
         key="car",
-        placements=(Placement(id=1, model=CAR),),
+        things=(Thing(id=1, model=CAR),),
         intrinsics=Intrinsics(width=WIDTH, height=HEIGHT, fx=150, fy=150, cx=WIDTH / 2, cy=HEIGHT / 2),
         scene=scene,
         frames=frames,

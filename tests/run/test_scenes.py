@@ -11,8 +11,8 @@ from small import small_recipe, tree_hash
 from viewsphere.assets.glb import glb_bytes
 from viewsphere.check import check
 from viewsphere.errors import ModelError, UserError
-from viewsphere.model.recipe import Recipe
 from viewsphere.preview import preview_samples
+from viewsphere.recipe.recipe import Recipe
 from viewsphere.run.generate import generate
 from viewsphere.run.memory import render
 from viewsphere.store import Dataset

@@ -6,7 +6,7 @@ import pytest
 
 from small import small_recipe
 from viewsphere.errors import RecipeError
-from viewsphere.model.recipe import Recipe
+from viewsphere.recipe.recipe import Recipe
 from viewsphere.run.generate import generate
 
 PIXELS = np.random.default_rng(0).random((64, 128, 3)).astype(np.float32)

@@ -9,7 +9,7 @@ import sys
 import pytest
 
 from viewsphere import Recipe, plan
-from viewsphere.geometry.kernel_cache import sources_digest
+from viewsphere.kernels.kernel_cache import sources_digest
 from viewsphere.run import warm
 
 RUN = """

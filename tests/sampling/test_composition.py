@@ -9,8 +9,8 @@ from place_files import write_picture, write_place
 from viewsphere import plugins
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.box import box_vertices
-from viewsphere.model.recipe import Recipe
 from viewsphere.model.shot import Shot
+from viewsphere.recipe.recipe import Recipe
 from viewsphere.sampling.plan import check_images, plan
 from viewsphere.zoo.places import Piece, Place, standing
 
@@ -60,8 +60,8 @@ def tiny(monkeypatch):
 def test_a_recipe_without_any_of_it_needs_no_boxes():
     planned = plan(recipe())
     shot = planned.shot(0)
-    assert planned.composition is None and len(shot.placements) == 1 and shot.frames[0].pose.target is None
-    assert shot.placements[0].world_from_object[2][3] == 0
+    assert planned.composition is None and len(shot.things) == 1 and shot.frames[0].pose.target is None
+    assert shot.things[0].world_from_object[2][3] == 0
 
 
 def test_one_with_it_asks_for_them(tiny):
@@ -72,7 +72,7 @@ def test_one_with_it_asks_for_them(tiny):
 def test_the_target_stands_on_the_floor_and_the_place_is_background(tiny):
     planned = plan(recipe(scene={"place": tiny}))
     shot = planned.shot(0, box_of)
-    own, *rest = shot.placements
+    own, *rest = shot.things
     np.testing.assert_allclose(np.array(own.world_from_object)[:3, 3], [0, 0, -box_of(own.model)[2, 2]])
     assert [p.id for p in rest] == [0] * len(rest) and all(p.scenery for p in rest) and not own.scenery
     assert all(p.model.category_id == 0 and p.model.centring == "as_is" for p in rest)
@@ -80,7 +80,7 @@ def test_the_target_stands_on_the_floor_and_the_place_is_background(tiny):
     assert planned.max_objects == 1 and [c.name for c in planned.categories] == ["car"]
     assert shot.frames[0].pose.target is None
     assert Shot.model_validate_json(shot.model_dump_json()) == shot
-    assert len({s.placements[1:] for s in planned.shots(box_of)}) == 1
+    assert len({s.things[1:] for s in planned.shots(box_of)}) == 1
     assert planned.kept_specs == planned.model_specs
 
 
@@ -89,7 +89,7 @@ def test_instances_of_one_mesh_share_a_model(tiny):
     trees = [
         p.model
         for shot in plan(recipe(scene={"place": place})).shots(box_of)
-        for p in shot.placements
+        for p in shot.things
         if p.model.category == "tree"
     ]
     assert len({t.key for t in trees}) == len({t.seed for t in trees}) < len(trees)
@@ -98,7 +98,7 @@ def test_instances_of_one_mesh_share_a_model(tiny):
 @pytest.mark.parametrize(("draw", "different"), [("fixed", 1), ("per_model", 6), ("per_frame", 18)])
 def test_places_are_drawn_as_often_as_is_said(tiny, draw, different):
     planned = plan(recipe(scene={"place": {"source": tiny, "draw": draw}}))
-    houses = [p.model.seed for s in planned.shots(box_of) for p in s.placements if p.model.category == "house"]
+    houses = [p.model.seed for s in planned.shots(box_of) for p in s.things if p.model.category == "house"]
     assert len(set(houses)) == different
     assert all(len(s.frames) == (1 if draw == "per_frame" else 3) for s in planned.shots(box_of))
 
@@ -109,22 +109,22 @@ def test_labelled_scenery_has_ids_and_categories_behind_the_recipe_s(tiny):
     assert names["car"] == 1 and sorted(names) == ["car", "house", "street", "tree"] and sorted(names.values()) == [1, 2, 3, 4]
     shots = list(planned.shots(box_of))
     for shot in shots:
-        assert [p.id for p in shot.placements] == list(range(1, len(shot.placements) + 1))
-        assert [p.scenery for p in shot.placements] == [False] * 2 + [True] * (len(shot.placements) - 2)
-        assert all(p.model.category_id == names[p.model.category] for p in shot.placements)
-    assert planned.max_objects == max(len(s.placements) for s in shots)
+        assert [p.id for p in shot.things] == list(range(1, len(shot.things) + 1))
+        assert [p.scenery for p in shot.things] == [False] * 2 + [True] * (len(shot.things) - 2)
+        assert all(p.model.category_id == names[p.model.category] for p in shot.things)
+    assert planned.max_objects == max(len(s.things) for s in shots)
     kept = {spec.key for spec in planned.kept_specs}
-    assert kept == {p.model.key for s in shots for p in s.placements}
+    assert kept == {p.model.key for s in shots for p in s.things}
     assert len(planned.kept_specs) == len(kept)
 
 
 def test_a_place_turned_turns_all_of_it_and_its_free_floor(tiny):
     straight = plan(recipe(scene={"place": tiny})).shot(0, box_of)
     turned = plan(recipe(scene={"place": {"source": tiny, "turn": 90}, "company": 2})).shot(0, box_of)
-    for a, b in zip(straight.placements[1:], turned.placements[3:], strict=True):
+    for a, b in zip(straight.things[1:], turned.things[3:], strict=True):
         x, y = np.array(a.world_from_object)[:2, 3]
         np.testing.assert_allclose(np.array(b.world_from_object)[:2, 3], [-y, x], atol=1e-12)
-    for target in turned.placements[1:3]:
+    for target in turned.things[1:3]:
         assert abs(target.world_from_object[1][3]) < 3  # the road runs along X now
 
 
@@ -133,8 +133,8 @@ def test_on_a_road_that_runs_aslant_there_is_as_much_room(tiny):
     place = {"source": tiny, "turn": 33}
     spots = [[*(far * along), 33 if far > 0 else 213] for far in (20.0, -20.0)]
     shot = plan(recipe(scene={"place": place, "company": {"layout": [[float(v) for v in s] for s in spots]}})).shot(0, box_of)
-    for placement, spot in zip(shot.placements[1:3], spots, strict=True):
-        np.testing.assert_allclose(np.array(placement.world_from_object)[:2, 3], spot[:2])
+    for thing, spot in zip(shot.things[1:3], spots, strict=True):
+        np.testing.assert_allclose(np.array(thing.world_from_object)[:2, 3], spot[:2])
     across = [[4 * float(along[1]), -4 * float(along[0]), 0.0]]
     with pytest.raises(RecipeError, match="free part of the place"):
         plan(recipe(scene={"place": place, "company": {"layout": across}})).shot(0, box_of)
@@ -144,10 +144,7 @@ def test_the_orbit_s_centre_is_that_of_all_targets():
     planned = plan(recipe(scene={"company": {"layout": [[4, 0, 0]], "gap": 0}}))
     shot = planned.shot(0, box_of)
     corners = np.concatenate(
-        [
-            box_of(p.model) @ np.array(p.world_from_object)[:3, :3].T + np.array(p.world_from_object)[:3, 3]
-            for p in shot.placements
-        ]
+        [box_of(p.model) @ np.array(p.world_from_object)[:3, :3].T + np.array(p.world_from_object)[:3, 3] for p in shot.things]
     )
     np.testing.assert_allclose(shot.frames[0].pose.target, (corners.min(axis=0) + corners.max(axis=0)) / 2)
     own = plan(recipe(scene={"company": 1}, viewpoints={"distance": 9, "target": [1, 2, 3]})).shot(0, box_of)
@@ -161,10 +158,10 @@ def test_company_comes_from_the_same_split_and_follows_from_names_alone(draw):
     planned = plan(recipe(12, splits=splits, scene=scene))
     by_model: dict[str, set[tuple[str, ...]]] = {}
     for shot in planned.shots(box_of):
-        keys = tuple(p.model.key for p in shot.placements)
+        keys = tuple(p.model.key for p in shot.things)
         by_model.setdefault(keys[0], set()).add(keys[1:])
         assert keys[0] not in keys[1:]
-        splits_there = {planned.split(p.model, 0) for p in shot.placements}
+        splits_there = {planned.split(p.model, 0) for p in shot.things}
         assert len(splits_there) == 1 == len({f.split for f in shot.frames} | splits_there)
     counts = {len(found) for found in by_model.values()}
     assert counts == {1} if draw != "per_frame" else max(counts) > 1
@@ -173,7 +170,7 @@ def test_company_comes_from_the_same_split_and_follows_from_names_alone(draw):
     same = 0
     for shot in planned.shots(box_of):
         other = next(s for s in more.shots(box_of) if s.key == shot.key)
-        if new not in {p.model.key for p in other.placements} and draw != "fixed":
+        if new not in {p.model.key for p in other.things} and draw != "fixed":
             assert other == shot.model_copy(update={"frames": other.frames})
             same += 1
     assert same > planned.shot_count // 3 or draw == "fixed"
@@ -185,8 +182,8 @@ def test_shots_do_not_depend_on_the_order_they_are_asked_for():
     again = plan(recipe(scene={"company": {"count": 3, "draw": "per_frame"}}))
     assert [again.shot(i, box_of) for i in reversed(range(again.shot_count))] == shots[::-1]
     for shot in shots:
-        beside = planned.cast(shot.placements[0].model, shot.frames[0].pose.index)
-        assert [m.key for m in beside] == [p.model.key for p in shot.placements]
+        beside = planned.cast(shot.things[0].model, shot.frames[0].pose.index)
+        assert [m.key for m in beside] == [p.model.key for p in shot.things]
 
 
 def test_planes_stand_upright_face_the_origin_and_keep_clear(tmp_path):
@@ -202,9 +199,9 @@ def test_planes_stand_upright_face_the_origin_and_keep_clear(tmp_path):
     planned = plan(recipe(scene={"planes": planes, "company": 1}))
     seen = set()
     for shot in planned.shots(box_of):
-        *targets, _, _, _ = shot.placements
+        *targets, _, _, _ = shot.things
         assert len(targets) == 2
-        for plane in shot.placements[2:]:
+        for plane in shot.things[2:]:
             m = np.array(plane.world_from_object)
             front, spot = m[:3, :3] @ [0, -1, 0], m[:3, 3]
             np.testing.assert_allclose(front, -spot / np.linalg.norm(spot), atol=1e-12)
@@ -224,7 +221,7 @@ def test_a_share_of_the_planes_is_shown(tmp_path, share):
         "share": share,
         "draw": "per_model",
     }
-    shown = [len(s.placements) - 1 for s in plan(recipe(scene={"planes": planes})).shots(box_of)]
+    shown = [len(s.things) - 1 for s in plan(recipe(scene={"planes": planes})).shots(box_of)]
     assert abs(np.mean(shown) - 20 * share) < 3 and (share in (0, 1)) == (len(set(shown)) == 1)
 
 
@@ -233,7 +230,7 @@ def test_a_place_file_stands_with_its_origin_under_the_target(tmp_path):
     place = {"source": "yard.glb", "origin": [1, 2, 0.5], "turn": 90, "labels": "own", "category": "yard", "unit": "cm"}
     made = Recipe.model_validate(recipe(scene={"place": place}).model_dump(mode="json"), context={"folder": tmp_path})
     planned = plan(made)
-    piece = planned.shot(0, box_of).placements[1]
+    piece = planned.shot(0, box_of).things[1]
     np.testing.assert_allclose(np.array(piece.world_from_object) @ [1, 2, 0.5, 1], [0, 0, 0, 1], atol=1e-12)
     np.testing.assert_allclose(np.array(piece.world_from_object) @ [2, 2, 0.5, 1], [0, 1, 0, 1], atol=1e-12)
     assert (piece.model.source, piece.model.unit, piece.model.category, piece.id) == (str(path), 0.01, "yard", 2)
@@ -303,5 +300,5 @@ def test_the_digest_follows_the_pictures_on_the_planes(tmp_path):
 @pytest.mark.parametrize(("draw", "turns"), [("fixed", 1), ("per_model", 6), ("per_frame", 18)])
 def test_a_place_may_be_turned_at_random(tiny, draw, turns):
     shots = list(plan(recipe(scene={"place": {"source": tiny, "turn": [0, 360], "draw": draw}})).shots(box_of))
-    streets = {p.world_from_object for s in shots for p in s.placements if p.model.category == "street"}
+    streets = {p.world_from_object for s in shots for p in s.things if p.model.category == "street"}
     assert len(streets) == turns

@@ -2,7 +2,7 @@
 
 import pytest
 
-from viewsphere.model.recipe import Recipe
+from viewsphere.recipe.recipe import Recipe
 from viewsphere.sampling.plan import plan
 
 VIEWS = {"azimuth": [0, 90, 180, 270], "elevation": 10, "distance": 2}

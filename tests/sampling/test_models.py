@@ -3,7 +3,7 @@
 import pytest
 
 from viewsphere.errors import RecipeError
-from viewsphere.model.recipe import Recipe
+from viewsphere.recipe.recipe import Recipe
 from viewsphere.sampling.models import categories, count_models, model_specs
 
 

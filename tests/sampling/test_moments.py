@@ -8,7 +8,7 @@ import pytest
 from viewsphere.assets.timeline import Blenders, Timeline
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.box import box_vertices
-from viewsphere.model.recipe import Recipe
+from viewsphere.recipe.recipe import Recipe
 from viewsphere.sampling.extension import extend, whole
 from viewsphere.sampling.plan import plan
 
@@ -54,7 +54,7 @@ def test_every_pose_at_every_time_step():
     assert (planned.models, planned.time_steps, planned.frames) == (1, 4, 12)
     shots = list(planned.shots(box_of))
     assert [f.index for s in shots for f in s.frames] == list(range(12))
-    assert [(s.placements[0].model.frame, s.placements[0].model.key) for s in shots] == [
+    assert [(s.things[0].model.frame, s.things[0].model.key) for s in shots] == [
         (frame, f"walk-f{frame:04d}") for frame in (1, 13, 25, 37)
     ]
     assert [[f.pose.azimuth_deg for f in s.frames] for s in shots] == [[0, 90, 180]] * 4
@@ -63,7 +63,7 @@ def test_every_pose_at_every_time_step():
     # The cameras look where the model's centre is at the first frame.
     assert {f.pose.target for s in shots for f in s.frames} == {tuple(box_of(planned.model_specs[0]).mean(axis=0).tolist())}
     assert [row[0] for row in planned.shot_table()] == [s.key for s in shots]
-    assert [spec.key for spec in planned.kept_specs] == ["walk", *(s.placements[0].model.key for s in shots)]
+    assert [spec.key for spec in planned.kept_specs] == ["walk", *(s.things[0].model.key for s in shots)]
 
 
 def test_a_camera_that_moves_takes_a_pose_a_time_step():
@@ -80,7 +80,7 @@ def test_models_of_other_time_steps_and_none_stand_side_by_side():
     assert (planned.frames, planned.time_steps) == (12 + 6 + 3, None)
     alone = plan(recipe({"source": "zoo:car"}))
     car, same = planned.shot(planned.shot_count - 1, box_of), alone.shot(0)
-    assert (car.key, car.scene, car.placements[0].model.seed) == (same.key, same.scene, same.placements[0].model.seed)
+    assert (car.key, car.scene, car.things[0].model.seed) == (same.key, same.scene, same.things[0].model.seed)
     assert [f.pose.model_copy(update={"index": 0}) for f in car.frames] == [
         f.pose.model_copy(update={"index": 0}) for f in same.frames
     ]
@@ -94,20 +94,20 @@ def test_all_time_steps_of_a_model_share_a_split_a_scene_and_a_camera():
     for by in ("model", "pose"):
         splits = {"train": 0.5, "val": 0.5, "by": by}
         planned = plan(recipe(walker(), {"source": "run.fbx", "category": "x", "frames": "all"}, scene=scene, splits=splits))
-        frames = [(s.placements[0].model.track, f) for s in planned.shots(box_of) for f in s.frames]
+        frames = [(s.things[0].model.track, f) for s in planned.shots(box_of) for f in s.frames]
         groups = {}
         for number, (track, frame) in enumerate(frames):
             groups.setdefault((track, number % 3), set()).add((frame.split, frame.pose.azimuth_deg))
         assert all(len(found) == 1 for found in groups.values())
         assert sum(planned.split_counts.values()) == planned.frames == 3 * (4 + 24)
-    suns = {(s.placements[0].model.track, s.scene.sun.azimuth_deg) for s in planned.shots(box_of)}
+    suns = {(s.things[0].model.track, s.scene.sun.azimuth_deg) for s in planned.shots(box_of)}
     assert len(suns) == 2
 
 
 def test_company_is_at_its_own_time_step_of_the_same_number():
     models = walker(), {"source": "run.fbx", "category": "person", "frames": [1, 24]}
     planned = plan(recipe(*models, scene={"company": {"count": 1}}, splits={"train": 1}))
-    pairs = [tuple(p.model.key for p in s.placements) for s in planned.shots(box_of)]
+    pairs = [tuple(p.model.key for p in s.things) for s in planned.shots(box_of)]
     assert pairs[:4] == [
         ("walk-f0001", "run-f0001"),
         ("walk-f0013", "run-f0024"),
@@ -156,7 +156,7 @@ def test_a_camera_inside_at_any_time_step_is_found():
     assert problem is not None
     assert "walk-f0037" in str(problem)
     assert planned.distance_problem(planned.model_specs[0], box_of) is None
-    assert np.isfinite(planned.cameras(planned.shot(0, box_of).placements, box_of)).all()
+    assert np.isfinite(planned.cameras(planned.shot(0, box_of).things, box_of)).all()
 
 
 @pytest.mark.parametrize(

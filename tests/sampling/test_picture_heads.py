@@ -10,7 +10,7 @@ from PIL import Image
 
 from viewsphere.assets import limits
 from viewsphere.errors import RecipeError
-from viewsphere.model.recipe import Recipe
+from viewsphere.recipe.recipe import Recipe
 from viewsphere.sampling.plan import check_images, plan
 
 FIELDS = {

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from viewsphere.errors import RecipeError
-from viewsphere.model.recipe import Recipe
 from viewsphere.model.shot import Shot
+from viewsphere.recipe.recipe import Recipe
 from viewsphere.sampling.plan import SHOT_FRAMES, plan
 
 ROOT = Path(__file__).parents[2]
@@ -62,8 +62,8 @@ def test_shots_are_even_chunks_in_index_order():
     assert [s.key for s in shots[:4]] == ["car_000-000000", "car_000-000012", "car_000-000024", "car_001-000000"]
     assert shots[3] == planned.shot(3)
     assert list(planned.shot_table()) == [(s.key, s.frames[0].index, len(s.frames)) for s in shots]
-    assert [s.key.rpartition("-")[0] for s in shots] == [s.placements[0].model.key for s in shots]
-    assert planned.max_objects == max(len(s.placements) for s in shots) == 1
+    assert [s.key.rpartition("-")[0] for s in shots] == [s.things[0].model.key for s in shots]
+    assert planned.max_objects == max(len(s.things) for s in shots) == 1
     with pytest.raises(IndexError):
         planned.shot(9)
 
@@ -81,7 +81,7 @@ def test_a_shot_is_plain_json_and_comes_back_the_same():
     assert shot.intrinsics.width == 640
     assert shot.scene.ground is not None
     assert shot.scene.finish.background.color is None
-    assert shot.placements[0].id == 1
+    assert shot.things[0].id == 1
 
 
 def test_shots_of_one_model_share_a_stage():
@@ -128,7 +128,7 @@ def test_splits_have_their_shares_and_keep_together_what_they_should(by, units):
     found = {}
     for shot in (planned.shot(i) for i in range(0, 300)):
         for frame in shot.frames:
-            unit = {"model": shot.placements[0].model.key, "pose": frame.pose.index, "frame": frame.index}[by]
+            unit = {"model": shot.things[0].model.key, "pose": frame.pose.index, "frame": frame.index}[by]
             assert found.setdefault(unit, frame.split) == frame.split
     assert len(set(found.values())) == 3
 
@@ -138,7 +138,7 @@ def test_adding_models_and_poses_moves_nothing_to_another_split():
         planned = plan(
             recipe(models=models, viewpoints={"azimuth": azimuths, "distance": 5}, splits={"by": by, "a": 0.5, "b": 0.5})
         )
-        return {(s.placements[0].model.key, f.pose.azimuth_deg): f.split for s in planned.shots() for f in s.frames}
+        return {(s.things[0].model.key, f.pose.azimuth_deg): f.split for s in planned.shots() for f in s.frames}
 
     cars = {"source": "zoo:car", "count": 20}
     for by in ("model", "pose", "frame"):
@@ -189,9 +189,7 @@ def backgrounds(folder, models, azimuths=(0, 10, 20), **background):
     }
     planned = plan(Recipe.model_validate(data, context={"folder": folder}))
     return planned, {
-        (s.placements[0].model.key, f.pose.azimuth_deg): f.finish and f.finish.background
-        for s in planned.shots()
-        for f in s.frames
+        (s.things[0].model.key, f.pose.azimuth_deg): f.finish and f.finish.background for s in planned.shots() for f in s.frames
     }
 
 

@@ -12,7 +12,7 @@ from viewsphere.errors import RecipeError
 from viewsphere.geometry.camera import orbit_angles, orbit_center, orbit_rotation
 from viewsphere.geometry.rotation import quaternion_from_matrix
 from viewsphere.model.camera import Distortion, Intrinsics
-from viewsphere.model.recipe import Recipe
+from viewsphere.recipe.recipe import Recipe
 from viewsphere.sampling.camera import camera_for
 from viewsphere.sampling.plan import plan
 from viewsphere.sampling.pose_files import read_poses

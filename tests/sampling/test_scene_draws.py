@@ -10,7 +10,6 @@ from PIL import Image
 
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.box import box_vertices
-from viewsphere.model.recipe import Recipe
 from viewsphere.model.scene import (
     AreaLight,
     Background,
@@ -29,6 +28,7 @@ from viewsphere.model.scene import (
     View,
 )
 from viewsphere.model.shot import Shot
+from viewsphere.recipe.recipe import Recipe
 from viewsphere.sampling.plan import check_images, plan
 
 CARS = [{"source": "zoo:car", "count": 3}]
@@ -61,7 +61,7 @@ def scene_of(scene, folder=Path()) -> Scene:
 def finishes(scene, folder=Path(), **fields):
     found = planned(scene, folder, **fields)
     return {
-        (shot.placements[0].model.key, frame.pose.azimuth_deg): frame.finish or shot.scene.finish
+        (shot.things[0].model.key, frame.pose.azimuth_deg): frame.finish or shot.scene.finish
         for shot in found.shots()
         for frame in shot.frames
     }
@@ -76,7 +76,7 @@ def test_a_recipe_without_a_word_on_its_scene_has_the_default_one():
     shot = found.shot(0)
     assert shot.scene == Scene(ground=Ground())
     assert {f.finish for f in shot.frames} == {None}
-    assert shot.placements[0].repaints == ()
+    assert shot.things[0].repaints == ()
 
 
 CONCRETE = [
@@ -206,7 +206,7 @@ def test_the_stage_is_drawn_once_a_model_by_default():
     found = planned(RANDOM, shot_frames=2)
     scenes = {}
     for shot in found.shots():
-        scenes.setdefault(shot.placements[0].model.key, set()).add(shot.scene.model_dump_json())
+        scenes.setdefault(shot.things[0].model.key, set()).add(shot.scene.model_dump_json())
         assert len(shot.frames) == 2
     assert [len(s) for s in scenes.values()] == [1, 1, 1]
     assert len(set.union(*scenes.values())) == 3
@@ -228,7 +228,7 @@ def test_same_seed_same_draw_and_another_seed_another():
 
 def test_more_models_poses_and_fields_change_nobody_else_s_draw():
     def scenes(**fields):
-        return {s.placements[0].model.key: s.scene for s in planned(**fields).shots()}
+        return {s.things[0].model.key: s.scene for s in planned(**fields).shots()}
 
     few = scenes(scene=RANDOM)
     more = scenes(scene=RANDOM, models=[{"source": "zoo:boat"}, {"source": "zoo:car", "count": 5}])
@@ -309,22 +309,22 @@ def test_materials_are_drawn_for_the_models_they_fit():
             {"roughness": [0.2, 0.6]},
         ]
     }
-    paints = {s.placements[0].model.key: s.placements[0].repaints for s in planned(scene).shots()}
+    paints = {s.things[0].model.key: s.things[0].repaints for s in planned(scene).shots()}
     assert [len(p) for p in paints.values()] == [2, 2, 1]
     assert paints["car_000"][0].material == "paint*"
     assert len({p[0].tint for p in list(paints.values())[:2]}) == 2
     assert all(0.2 <= p[-1].roughness <= 0.6 for p in paints.values())
-    fixed = [s.placements[0].repaints for s in planned({**scene, "draw": "fixed"}).shots()]
+    fixed = [s.things[0].repaints for s in planned({**scene, "draw": "fixed"}).shots()]
     assert fixed[0] == fixed[1] == (*fixed[0][:1], *fixed[2])
 
 
 def test_company_is_painted_too_and_looks_alike_beside_others():
     scene = {"materials": [{"tint": {"uniform": ["#404040", "#ffffff"]}}], "company": 2}
     shots = list(planned(scene, splits={"by": "model", "all": 1}).shots(box_of))
-    paints = {(p.model.key, p.repaints) for s in shots for p in s.placements}
+    paints = {(p.model.key, p.repaints) for s in shots for p in s.things}
     assert len(paints) == 3
     per_frame = planned({**scene, "draw": "per_frame"}, splits={"by": "model", "all": 1}).shots(box_of)
-    assert len({p.repaints for s in per_frame for p in s.placements}) == 24 * 3
+    assert len({p.repaints for s in per_frame for p in s.things}) == 24 * 3
 
 
 def test_jitter_moves_every_pose_a_little_and_keeps_its_index_and_name():

@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 
 from viewsphere.geometry.box import box_vertices
 from viewsphere.model.camera import Intrinsics
-from viewsphere.model.recipe import Recipe
-from viewsphere.model.recipe_viewpoints import Range, axis_count, axis_value
 from viewsphere.model.shot import Pose
+from viewsphere.recipe.recipe import Recipe
+from viewsphere.recipe.viewpoints import Range, axis_count, axis_value
 from viewsphere.sampling.camera import camera_for, distance_problem
 from viewsphere.sampling.viewpoints import poses
 

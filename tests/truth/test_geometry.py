@@ -61,14 +61,14 @@ def test_ground_lies_at_the_lowest_used_vertex():
 
 
 def test_ids_must_be_in_order():
-    from viewsphere.model.shot import ModelSpec, Placement
+    from viewsphere.model.shot import ModelSpec, Thing
     from viewsphere.truth.geometry import build_geometry
 
     spec = ModelSpec(key="m", source="m", category="thing", category_id=1)
     with pytest.raises(ValueError, match=r"expected ids 1\.\.N in order, then 0, got \[2\]"):
-        build_geometry([Placement(id=2, model=spec)], [cube()], False, 0.01)
+        build_geometry([Thing(id=2, model=spec)], [cube()], False, 0.01)
     with pytest.raises(ValueError, match=r"got \[0, 1\]"):
-        build_geometry([Placement(id=0, model=spec), Placement(id=1, model=spec)], [cube()] * 2, False, 0.01)
+        build_geometry([Thing(id=0, model=spec), Thing(id=1, model=spec)], [cube()] * 2, False, 0.01)
 
 
 def test_scenery_comes_after_the_objects_and_is_background():

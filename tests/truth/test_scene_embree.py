@@ -11,7 +11,7 @@ from viewsphere.annotate import annotate
 from viewsphere.geometry.box import box_vertices
 from viewsphere.model.camera import Camera
 from viewsphere.model.scene import Scene
-from viewsphere.model.shot import Frame, ModelSpec, Placement, Pose, Shot
+from viewsphere.model.shot import Frame, ModelSpec, Pose, Shot, Thing
 from viewsphere.truth.channels import observe
 from viewsphere.truth.geometry import build_geometry
 from viewsphere.truth.visibility import rasterize
@@ -46,8 +46,8 @@ def scene():
         (post(), turned(0, 2.4, 4.0)),
         (cube(3.0), turned(0.2, -8, 2, 2.95)),  # its foot in the ground, below the road
     ]
-    placements = tuple(
-        Placement(
+    things = tuple(
+        Thing(
             id=i + 1 if i < 3 else 0,
             model=ModelSpec(key=f"m{i}", source="m", category="thing", category_id=i + 1 if i < 3 else 0),
             world_from_object=tuple(map(tuple, np.asarray(m, float).tolist())),
@@ -56,7 +56,7 @@ def scene():
         for i, (_, m) in enumerate(parts)
     )
     meshes = [m for m, _ in parts]
-    return placements, meshes, build_geometry(placements, meshes, True, 0.01)
+    return things, meshes, build_geometry(things, meshes, True, 0.01)
 
 
 def cameras(lens_name, count, width=320, height=240):
@@ -103,12 +103,12 @@ def alone(geometry, camera, object_id):
 
 
 def test_masks_boxes_and_visible_shares_of_a_whole_scene():
-    placements, meshes, geometry = scene()
+    things, meshes, geometry = scene()
     whole = embree(geometry)
     hidden, cut, clear = 0, 0, 0
     for camera in cameras("pinhole", 8, 200, 150):
         frame = Frame(index=0, pose=Pose(index=0, azimuth_deg=0, elevation_deg=0, distance=3), split="train")
-        shot = Shot(key="s", placements=placements, intrinsics=camera.intrinsics, scene=Scene(), frames=(frame,), channels=())
+        shot = Shot(key="s", things=things, intrinsics=camera.intrinsics, scene=Scene(), frames=(frame,), channels=())
         boxes = [box_vertices(*m.bounds) for m in meshes[:3]]
         found = annotate(shot, frame, camera, geometry, rasterize(geometry, camera), boxes, ["m"] * 3)
         assert [o.id for o in found] == [1, 2, 3]
@@ -142,9 +142,9 @@ def test_scenery_hides_and_is_not_labelled():
     geometry = placed(cube(), wall, moves=[np.eye(4), move], scenery=1)
     camera = orbit_camera(lens(64, 48), 0.0, 0.0, 5.0)
     spec = ModelSpec(key="m", source="m", category="thing", category_id=1)
-    placements = (Placement(id=1, model=spec), Placement(id=0, model=spec, scenery=True))
+    things = (Thing(id=1, model=spec), Thing(id=0, model=spec, scenery=True))
     frame = Frame(index=0, pose=Pose(index=0, azimuth_deg=0, elevation_deg=0, distance=5), split="train")
-    shot = Shot(key="s", placements=placements, intrinsics=camera.intrinsics, scene=Scene(), frames=(frame,), channels=())
+    shot = Shot(key="s", things=things, intrinsics=camera.intrinsics, scene=Scene(), frames=(frame,), channels=())
     boxes = [box_vertices(*cube().bounds)]
     (o,) = annotate(shot, frame, camera, geometry, rasterize(geometry, camera), boxes, ["m"])
     assert (o.visibility, o.truncation) == (0.5, 0.0)

@@ -9,7 +9,7 @@ import numpy as np
 from viewsphere.assets.mesh import Mesh
 from viewsphere.geometry.camera import orbit_center, orbit_rotation, pixel_rays
 from viewsphere.model.camera import Camera, Distortion, Intrinsics
-from viewsphere.model.shot import ModelSpec, Placement
+from viewsphere.model.shot import ModelSpec, Thing
 from viewsphere.truth.geometry import Geometry, build_geometry
 
 BARREL = Distortion(model="brown_conrady", coefficients=(-0.21, 0.06, 0.001, -0.002, -0.004))
@@ -32,15 +32,15 @@ def mesh_of(vertices, triangles, normals=None, parts=None, **fields) -> Mesh:
 def placed(*meshes: Mesh, moves=None, ground=False, label_alpha=0.01, scenery=0) -> Geometry:
     """A geometry of these meshes; the last `scenery` of them are."""
     moves = moves or [np.eye(4)] * len(meshes)
-    placements = [
-        Placement(
+    things = [
+        Thing(
             id=i + 1 if i < len(moves) - scenery else 0,
             model=ModelSpec(key=f"m{i}", source=f"m{i}", category="thing", category_id=i + 10),
             world_from_object=tuple(map(tuple, np.asarray(m, float).tolist())),
         )
         for i, m in enumerate(moves)
     ]
-    return build_geometry(placements, meshes, ground, label_alpha)
+    return build_geometry(things, meshes, ground, label_alpha)
 
 
 def lens(width=64, height=48, fov=math.radians(60), distortion=None, **fields) -> Intrinsics:

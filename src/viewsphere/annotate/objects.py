@@ -18,7 +18,7 @@ from viewsphere.geometry.pose_category import pose_category
 from viewsphere.geometry.rotation import compose, quaternion_from_matrix, rigid, transform
 from viewsphere.model.camera import Camera
 from viewsphere.model.sample import Box, ObjectAnnotation, Rle
-from viewsphere.model.shot import Frame, ModelSpec, Placement, Shot, Size
+from viewsphere.model.shot import Frame, ModelSpec, Shot, Size, Thing
 from viewsphere.truth.geometry import Geometry
 from viewsphere.truth.visibility import Visibility
 
@@ -35,17 +35,17 @@ def annotate(
     models: Sequence[str],
     real_sizes: Sequence[Size | None] | None = None,
 ) -> tuple[ObjectAnnotation, ...]:
-    """Annotations of all objects (placements of an id), seen or not, in the order of their ids.
+    """Annotations of all objects (things of an id), seen or not, in the order of their ids.
 
     `boxes[i]` is the 3D box (8, 3) of object i + 1's model in the object's axes, `models[i]` the path of that model in the data
     set and `real_sizes[i]` its true size (by default the one its spec gives in numbers); `geometry` is the shot's stage and
     `visibility` what this camera sees of it. An object that covers no pixel has an empty mask, no `box2d` and visibility 0.
     """
-    count, placements = geometry.object_count, shot.objects
-    if not len(placements) == len(boxes) == len(models) == count:
+    count, things = geometry.object_count, shot.objects
+    if not len(things) == len(boxes) == len(models) == count:
         raise ValueError(
             f"annotate: frame {frame.index}: expected {count} objects, boxes and models, "
-            f"got {len(placements)}, {len(boxes)}, {len(models)}"
+            f"got {len(things)}, {len(boxes)}, {len(models)}"
         )
     seen = visibility.instances(geometry)
     parts = pairwise(geometry.triangle_start[: count + 1])
@@ -56,26 +56,26 @@ def annotate(
     ]
     bounds, whole = [b for b, _ in projections], [w for _, w in projections]
     annotations: list[ObjectAnnotation] = []
-    for i, placement in enumerate(placements):
+    for i, thing in enumerate(things):
         area = int(seen.area[i + 1])
         x0, y0, x1, y1 = seen.box[i + 1].tolist() if area else (0, 0, 0, 0)
         visible, truncated = visible_and_cut(geometry, camera, i + 1, area, bounds, whole)
         annotations.append(
             ObjectAnnotation(
-                id=placement.id,
-                category=placement.model.category,
-                supercategory=placement.model.supercategory,
-                category_id=placement.model.category_id,
-                key=placement.model.key,
+                id=thing.id,
+                category=thing.model.category,
+                supercategory=thing.model.supercategory,
+                category_id=thing.model.category_id,
+                key=thing.model.key,
                 model=models[i],
-                real_size=real_sizes[i] if real_sizes else _real_size(placement.model),
+                real_size=real_sizes[i] if real_sizes else _real_size(thing.model),
                 rle=Rle(camera.height, camera.width, rle_of_id(seen.ids, i + 1, (x0, y0, x1, y1))),
                 area=area,
-                track=placement.model.track,
+                track=thing.model.track,
                 visibility=visible,
                 truncation=truncated,
                 **_flat_boxes(camera, (float(x0), float(y0), float(x1), float(y1)), bounds[i], whole[i]),
-                **_placed(camera, placement, boxes[i], shot.category_deg),
+                **_placed(camera, thing, boxes[i], shot.category_deg),
             )
         )
     return tuple(annotations)
@@ -95,9 +95,9 @@ def _flat_boxes(camera: Camera, tight: Box, bounds: Bounds | None, whole: bool) 
     return {"box2d": box2d, "box2d_projected": projected, "box2d_unclipped": bounds if whole else None}
 
 
-def _placed(camera: Camera, placement: Placement, box: Float, category_deg: float) -> dict[str, Any]:
+def _placed(camera: Camera, thing: Thing, box: Float, category_deg: float) -> dict[str, Any]:
     """The 3D box in every frame of reference, the pose, and the view of one object."""
-    world_from_object = np.array(placement.world_from_object, np.float64)
+    world_from_object = np.array(thing.world_from_object, np.float64)
     camera_from_world = rigid(camera.R, camera.t)
     camera_from_object = compose(camera_from_world, world_from_object)
     in_world = transform(world_from_object, box)

@@ -14,7 +14,7 @@ from viewsphere.assets.glb import glb_bytes
 from viewsphere.assets.mesh import Material, Mesh, Texture
 from viewsphere.assets.runs import runs
 from viewsphere.assets.srgb import encoded
-from viewsphere.geometry.image_files import encode_png
+from viewsphere.codecs.png_tiff import encode_png
 
 
 def export_glb(mesh: Mesh, path: Path) -> Path:

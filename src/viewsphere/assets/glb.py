@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from viewsphere.assets.mesh import Material, Mesh, Texture
 from viewsphere.assets.runs import Run, runs
-from viewsphere.geometry.image_files import encode_png
+from viewsphere.codecs.png_tiff import encode_png
 
 WRAP_CODES = {"clamp": 33071, "mirror": 33648, "repeat": 10497}
 NEAREST, LINEAR, LINEAR_MIPMAP_LINEAR = 9728, 9729, 9987

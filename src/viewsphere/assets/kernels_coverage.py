@@ -2,7 +2,7 @@
 
 import math
 
-from viewsphere.geometry.jit import inner, njit
+from viewsphere.kernels.jit import inner, njit
 
 
 @njit

@@ -126,7 +126,7 @@ class RayCaster:
         placed = [(o.id, o.world_from_object, self._exported(o.key)) for o in sample.objects]
         self._complete = True
         if scenery is not None:
-            remade = [(p.world_from_object, self._remade(scenery, p.model.key)) for p in scenery.placements]
+            remade = [(p.world_from_object, self._remade(scenery, p.model.key)) for p in scenery.things]
             self._complete = all(soup is not None for _, soup in remade)
             placed += [(0, np.array(world), soup) for world, soup in remade if soup is not None]
         corners = np.concatenate([transform(world, soup.corners) - self._middle for _, world, soup in placed])
@@ -160,7 +160,7 @@ class RayCaster:
         """A piece of scenery, None where it is not what it was. Merged data sets have several of one key."""
         digest = record.digests[key]
         if digest not in self._scenery_known:
-            spec = next(p.model for p in record.placements if p.model.key == key)
+            spec = next(p.model for p in record.things if p.model.key == key)
             self._scenery_known[digest] = None
             try:
                 mesh = self._stages.model(spec)

@@ -12,7 +12,7 @@ import typer
 from viewsphere.cli import completion
 
 if TYPE_CHECKING:
-    from viewsphere.model.recipe import Recipe
+    from viewsphere.recipe.recipe import Recipe
 
 RecipeFile = Annotated[Path, typer.Argument(help="Recipe (YAML).", show_default=False)]
 DataFolder = Annotated[Path, typer.Argument(help="Folder that `render` wrote.", show_default=False)]
@@ -34,8 +34,8 @@ Formats = Annotated[
 
 def load_recipe(file: Path, changes: Sequence[str] | None = None) -> Recipe:
     """The recipe of a file with some fields set; RecipeError names every mistake."""
-    from viewsphere.model.recipe import Recipe
-    from viewsphere.model.recipe_extends import parse_change
+    from viewsphere.recipe.extends import parse_change
+    from viewsphere.recipe.recipe import Recipe
 
     return Recipe.load(file, dict(map(parse_change, changes or ())))
 

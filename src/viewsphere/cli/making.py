@@ -16,7 +16,7 @@ from viewsphere.cli.terminal import ProgressBar, print_estimate, print_json, pri
 from viewsphere.errors import StoreError, UserError
 
 if TYPE_CHECKING:
-    from viewsphere.model.recipe import Recipe
+    from viewsphere.recipe.recipe import Recipe
     from viewsphere.run.estimate import Estimate
 
 
@@ -33,7 +33,7 @@ def new(
     folder: Annotated[Path, typer.Argument(help="Folder to make the recipe in.", show_default=False)],
 ) -> None:
     """Write a commented recipe to start from."""
-    from viewsphere.model.recipe_file import template
+    from viewsphere.recipe.file import template
 
     file = folder if folder.suffix in {".yaml", ".yml"} else folder / "recipe.yaml"
     if file.exists():
@@ -46,7 +46,7 @@ def schema() -> None:
     """Print the recipe's JSON schema, for editors."""
     import json
 
-    from viewsphere.model.recipe_file import schema as recipe_schema
+    from viewsphere.recipe.file import schema as recipe_schema
 
     typer.echo(json.dumps(recipe_schema(), indent=2))
 
@@ -213,7 +213,7 @@ def _estimate(recipe: Recipe, workers: int | None) -> Estimate:
 
 def _announce_compilation() -> None:
     """Say why the first picture on a machine takes longer."""
-    from viewsphere.geometry.jit import kernel_folder
+    from viewsphere.kernels.jit import kernel_folder
 
     if not kernel_folder().is_dir():
         typer.echo("compiling kernels, once on this machine: about 20 seconds", err=True)

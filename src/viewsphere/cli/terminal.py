@@ -40,7 +40,7 @@ def write(file: Path, data: bytes) -> None:
 
 def write_picture(file: Path, picture: Any) -> None:
     """Write (H, W, 3) uint8 as PNG."""
-    from viewsphere.geometry.image_files import encode_png
+    from viewsphere.codecs.png_tiff import encode_png
 
     write(file, encode_png(picture))
 

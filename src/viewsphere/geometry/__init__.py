@@ -1,1 +1,1 @@
-"""Pure functions on arrays: cameras, rotations, boxes, masks, picture files."""
+"""Pure functions on arrays: cameras, rotations, boxes, masks."""

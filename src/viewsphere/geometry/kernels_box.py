@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from viewsphere.geometry.jit import njit
+from viewsphere.kernels.jit import njit
 
 U = np.uintp
 

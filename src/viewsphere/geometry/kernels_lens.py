@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from viewsphere.geometry.jit import njit
+from viewsphere.kernels.jit import njit
 
 TOLERANCE = 1e-14
 

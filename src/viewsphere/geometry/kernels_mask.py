@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from viewsphere.geometry.jit import inner, njit
+from viewsphere.kernels.jit import inner, njit
 
 # Headings: 0 right, 1 down, 2 left, 3 up. The foreground lies on the right hand of the walk.
 STEP_X = (1, 0, -1, 0)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numba as nb
 
-from viewsphere.geometry.jit import njit
 from viewsphere.imaging.kernels_view import FAST
+from viewsphere.kernels.jit import njit
 
 U = nb.uintp
 

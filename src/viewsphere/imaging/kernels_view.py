@@ -8,7 +8,7 @@ from __future__ import annotations
 import numba as nb
 import numpy as np
 
-from viewsphere.geometry.jit import inner, njit
+from viewsphere.kernels.jit import inner, njit
 
 f4 = nb.float32
 U = nb.uintp

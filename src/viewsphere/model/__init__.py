@@ -1,1 +1,1 @@
-"""The nouns: recipe, shot, camera, channel, sample. Plain data, no behaviour that touches the outside world."""
+"""The nouns: shot, camera, channel, sample. Plain data, no behaviour that touches the outside world."""

@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 
 from viewsphere.model.channel import Channel
 from viewsphere.model.frozen import Frozen
-from viewsphere.model.recipe_values import Count, Positive
+from viewsphere.model.numbers import Count, Positive
 
 Encoding = Literal["png", "png8", "png16", "jpeg", "webp", "qoi", "jxl", "tiff", "exr", "npz"]
 

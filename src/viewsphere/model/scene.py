@@ -194,7 +194,7 @@ class Finish(Frozen):
 
 
 class BlendScene(Frozen):
-    """A .blend file whose scene is rendered as it is; what of it is labelled are placements of the shot.
+    """A .blend file whose scene is rendered as it is; what of it is labelled are things of the shot.
 
     `world_from_file` is rigid and in metres on both sides; `unit` is the metres in one unit of the file. `shown` are objects
     that are rendered although the file hides them, `hidden` those that are not. Without light of its own (`is_lit`) the

@@ -72,10 +72,10 @@ class Repaint(Frozen):
     roughness: float | None = Field(default=None, ge=0, le=1)
 
 
-class Placement(Frozen):
+class Thing(Frozen):
     """One thing of a scene: an object with an id of 1..N, or with id 0 scenery that is background to every label.
 
-    `world_from_object` is rigid. Placements of one model are instances. `scenery` marks what the targets stand in front of,
+    `world_from_object` is rigid. Things of one model are instances. `scenery` marks what the targets stand in front of,
     labelled or not.
     """
 
@@ -116,10 +116,10 @@ class Frame(Frozen):
 
 
 class Shot(Frozen):
-    """One scene and the frames to take of it: all an engine needs, a few hundred bytes a placement and a pose a frame."""
+    """One scene and the frames to take of it: all an engine needs, a few hundred bytes a thing and a pose a frame."""
 
     key: str  # stable, unique, fit for a folder's name
-    placements: tuple[Placement, ...]  # ids 1..N in order, then those of id 0
+    things: tuple[Thing, ...]  # ids 1..N in order, then those of id 0
     intrinsics: Intrinsics
     scene: Scene
     frames: tuple[Frame, ...]
@@ -131,9 +131,9 @@ class Shot(Frozen):
     category_deg: float = Field(default=45.0, gt=0)  # angular resolution of the pose categories
 
     @property
-    def objects(self) -> tuple[Placement, ...]:
+    def objects(self) -> tuple[Thing, ...]:
         """What is labelled, in the order of the ids."""
-        return tuple(p for p in self.placements if p.id)
+        return tuple(p for p in self.things if p.id)
 
     @property
     def stage_key(self) -> str:

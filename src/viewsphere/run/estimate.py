@@ -17,8 +17,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from viewsphere import plugins
-from viewsphere.model.recipe import Recipe
 from viewsphere.model.shot import ModelSpec
+from viewsphere.recipe.recipe import Recipe
 from viewsphere.run.opening import prepare, to_render
 from viewsphere.run.tasks import Task, Worker
 from viewsphere.run.warm import load_kernels

@@ -12,8 +12,8 @@ from pathlib import Path
 from viewsphere import plugins
 from viewsphere.errors import ModelError, RecipeError, UserError, ViewsphereError
 from viewsphere.model.channel import missing
-from viewsphere.model.recipe import Recipe
 from viewsphere.model.shot import ModelSpec
+from viewsphere.recipe.recipe import Recipe
 from viewsphere.run.opening import commit, prepare, to_append, to_render
 from viewsphere.run.pool import Crew, Job, Outcome
 from viewsphere.run.skies import check_skies

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from viewsphere.model.recipe import Recipe
 from viewsphere.model.sample import Sample
+from viewsphere.recipe.recipe import Recipe
 from viewsphere.run.opening import prepare
 from viewsphere.run.stages import Stages
 

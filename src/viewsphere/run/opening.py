@@ -6,7 +6,7 @@ from contextlib import suppress
 from importlib.metadata import version
 
 from viewsphere.errors import StoreError
-from viewsphere.model.recipe import Recipe
+from viewsphere.recipe.recipe import Recipe
 from viewsphere.sampling.extension import LOOK, Portion, extend, whole
 from viewsphere.sampling.look import engine_look
 from viewsphere.sampling.plan import Plan, check_engine, check_images, plan

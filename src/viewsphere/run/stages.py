@@ -18,7 +18,7 @@ from viewsphere.geometry.box import box_size, box_vertices
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.channel import PICTURES
 from viewsphere.model.sample import Float, Sample
-from viewsphere.model.shot import Frame, ModelSpec, Placement, Shot, Size
+from viewsphere.model.shot import Frame, ModelSpec, Shot, Size, Thing
 from viewsphere.run.allocator import keep_freed_memory
 from viewsphere.sampling.camera import camera_for, inside_box
 from viewsphere.store import Store
@@ -134,34 +134,34 @@ class Stages:
         if planned.composition is None or not scene.has_fixed_scenery:
             return
         spec = planned.model_specs[0]
-        placements = planned.composition.placements(spec, None, self.box)
-        cameras = planned.cameras(placements, self.box)
+        things = planned.composition.things(spec, None, self.box)
+        cameras = planned.cameras(things, self.box)
         with planned.recipe.located():
-            self._check_cameras(placements, cameras[:: -(-len(cameras) // MOST_CAMERAS)])
+            self._check_cameras(things, cameras[:: -(-len(cameras) // MOST_CAMERAS)])
 
-    def _check_cameras(self, placements: Sequence[Placement], cameras: Float) -> None:
+    def _check_cameras(self, things: Sequence[Thing], cameras: Float) -> None:
         """Raise RecipeError for the first of the cameras (N, 3) that is inside of something.
 
         Inside of a target means its box. Inside of scenery means that it hides the sky from the camera, but not from the
         frame's model: under a tree, among hills or in the room where the model stands a camera may well be.
         """
-        own = placements[0]
+        own = things[0]
         model = transform(own.world_from_object, self.box(own.model)).mean(axis=0)
-        for placement in placements:
-            box = transform(placement.world_from_object, self.box(placement.model))
+        for thing in things:
+            box = transform(thing.world_from_object, self.box(thing.model))
             for i in np.flatnonzero(inside_box(box, cameras)):
-                if not placement.scenery or (self._roofs(placement, cameras[i]) and not self._roofs(placement, model)):
-                    what = f"{placement.model.category or 'piece'} {placement.model.key}"
-                    x, y = np.array(placement.world_from_object)[:2, 3]
+                if not thing.scenery or (self._roofs(thing, cameras[i]) and not self._roofs(thing, model)):
+                    what = f"{thing.model.category or 'piece'} {thing.model.key}"
+                    x, y = np.array(thing.world_from_object)[:2, 3]
                     raise RecipeError(
                         f"viewpoints: expected the camera outside of all that is placed; found it at "
                         f"({', '.join(f'{v:.3g}' for v in cameras[i])}) inside {what}, which stands at ({x:.3g}, {y:.3g})"
                     )
 
-    def _roofs(self, placement: Placement, point: Float) -> bool:
+    def _roofs(self, thing: Thing, point: Float) -> bool:
         """Whether scenery hides most of the sky from a point in the world."""
-        mesh = self.model(placement.model)
-        inside = transform(np.linalg.inv(np.array(placement.world_from_object)), point)
+        mesh = self.model(thing.model)
+        inside = transform(np.linalg.inv(np.array(thing.world_from_object)), point)
         return sky_hidden(mesh.vertices.astype(np.float64), mesh.triangles, inside) > MOST_SKY
 
     def stage(self, shot: Shot) -> plugins.Stage:
@@ -177,9 +177,9 @@ class Stages:
         stage = self.stage(shot)
         boxes = [self.box(p.model) for p in shot.objects]
         sizes = [self.real_size(p.model) for p in shot.objects]
-        if len(shot.placements) > 1:
+        if len(shot.things) > 1:
             cameras = [camera_for(shot.intrinsics, f.pose, _target(shot, boxes)).center for f in shot.frames]
-            self._check_cameras(shot.placements, np.array(cameras))
+            self._check_cameras(shot.things, np.array(cameras))
         for frame in shot.frames:
             yield render_frame(shot, frame, stage, boxes, sizes)
 
@@ -219,4 +219,4 @@ def _finished(shot: Shot, frame: Frame, transparent: bool) -> Frame:
 
 def _target(shot: Shot, boxes: Sequence[Float]) -> Float:
     """Box centre of object 1 in the world: what a pose without a target of its own looks at."""
-    return transform(shot.placements[0].world_from_object, boxes[0].mean(axis=0))
+    return transform(shot.things[0].world_from_object, boxes[0].mean(axis=0))

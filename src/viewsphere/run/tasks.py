@@ -16,7 +16,7 @@ from viewsphere.assets.mesh import Mesh
 from viewsphere.errors import StoreError
 from viewsphere.geometry.box import box_size, box_vertices
 from viewsphere.model.frozen import Frozen
-from viewsphere.model.shot import ModelSpec, Placement, Shot
+from viewsphere.model.shot import ModelSpec, Shot, Thing
 from viewsphere.run.stages import Stages, model_files
 from viewsphere.store import ModelInfo, Store
 
@@ -38,9 +38,9 @@ class Task:
 
 
 class SceneryRecord(Frozen):
-    """What is background in a shot: placements of id 0, and the digest of each model's mesh by its key."""
+    """What is background in a shot: things of id 0, and the digest of each model's mesh by its key."""
 
-    placements: tuple[Placement, ...]
+    things: tuple[Thing, ...]
     digests: dict[str, str]
 
 
@@ -62,12 +62,12 @@ class Worker:
 
     def _scenery(self, shot: Shot) -> str:
         """What is background in a shot, and digests of its meshes, as `SceneryRecord` reads it; empty if nothing is."""
-        placements = tuple(p for p in shot.placements if p.id == 0)
-        for spec in {p.model.key: p.model for p in placements}.values():
+        things = tuple(p for p in shot.things if p.id == 0)
+        for spec in {p.model.key: p.model for p in things}.values():
             if spec.key not in self._digests:
                 self._digests[spec.key] = mesh_digest(self.stages.model(spec))
-        digests = {p.model.key: self._digests[p.model.key] for p in placements}
-        return SceneryRecord(placements=placements, digests=digests).model_dump_json() if placements else ""
+        digests = {p.model.key: self._digests[p.model.key] for p in things}
+        return SceneryRecord(things=things, digests=digests).model_dump_json() if things else ""
 
     def make_models(self, specs: Sequence[ModelSpec], trusted: bool = True) -> None:
         """Make a model, and its moments behind it, as `make_model` does."""

@@ -15,11 +15,11 @@ from pydantic import JsonValue
 from viewsphere import plugins
 from viewsphere.assets.mesh import Image, Material, Mesh, Texture
 from viewsphere.geometry.box import box_vertices
-from viewsphere.geometry.garbage import pause_collection
-from viewsphere.geometry.kernel_cache import kernel_folder, sources_digest
+from viewsphere.kernels.garbage import pause_collection
+from viewsphere.kernels.kernel_cache import kernel_folder, sources_digest
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.channel import CHANNELS
-from viewsphere.model.shot import ModelSpec, Placement, Pose, Shot
+from viewsphere.model.shot import ModelSpec, Pose, Shot, Thing
 from viewsphere.run.stages import render_frame
 from viewsphere.sampling.look import engine_look
 from viewsphere.store import encode
@@ -53,9 +53,9 @@ def _small(shot: Shot) -> Shot:
     lens = shot.intrinsics
     tiny = Intrinsics(width=SIZE, height=SIZE, fx=SIZE, fy=SIZE, cx=SIZE / 2, cy=SIZE / 2, distortion=lens.distortion)
     spec = ModelSpec(key="card", source="card", category="card", category_id=1)
-    placements = tuple(Placement(id=i, model=spec) for i in (1, 2))
+    things = tuple(Thing(id=i, model=spec) for i in (1, 2))
     frame = shot.frames[0].model_copy(update={"pose": Pose(index=0, azimuth_deg=0, elevation_deg=20, distance=2)})
-    return shot.model_copy(update={"key": "", "intrinsics": tiny, "placements": placements, "frames": (frame,)})
+    return shot.model_copy(update={"key": "", "intrinsics": tiny, "things": things, "frames": (frame,)})
 
 
 def _mark(small: Shot) -> Path:
@@ -92,7 +92,7 @@ def _render(shot: Shot) -> None:
     card = _card()
     engine: plugins.Engine = plugins.load("engines", shot.engine)
     stage = engine.stage(shot, lambda spec: card)
-    boxes = [box_vertices(*card.bounds)] * len(shot.placements)
+    boxes = [box_vertices(*card.bounds)] * len(shot.things)
     sample = render_frame(shot, shot.frames[0], stage, boxes, [None] * len(boxes))
     for name, array in sample.channels.items():
         encode(CHANNELS[name], array, shot.files)

@@ -16,11 +16,11 @@ from viewsphere.assets.scene_file import SceneFile, SceneObject, places, scene_f
 from viewsphere.errors import ModelError, RecipeError
 from viewsphere.geometry.rotation import Float, compose, transform
 from viewsphere.model.mistakes import nearest
-from viewsphere.model.recipe import Recipe
-from viewsphere.model.recipe_blend import VALUE, BlendEntry, LabelRule, VariantEntry
-from viewsphere.model.recipe_scenery import Labels
 from viewsphere.model.scene import BlendScene, Matrix4
-from viewsphere.model.shot import ModelSpec, Parts, Placement
+from viewsphere.model.shot import ModelSpec, Parts, Thing
+from viewsphere.recipe.blend import VALUE, BlendEntry, LabelRule, VariantEntry
+from viewsphere.recipe.recipe import Recipe
+from viewsphere.recipe.scenery import Labels
 from viewsphere.sampling.company import Names
 from viewsphere.sampling.moments import at_frame
 from viewsphere.sampling.scenery import Naming, Piece, draw_names, scenery_key
@@ -196,15 +196,15 @@ class BlendScenery:
             return not showing.issubset(spec.parts.without)
         return not showing.isdisjoint(spec.parts.only)
 
-    def at_frame(self, placement: Placement, frame: int) -> Placement:
+    def at_frame(self, thing: Thing, frame: int) -> Thing:
         """What is taken of the file, at one of the frames; a labelled object moves with its axes."""
-        if placement.model.parts is None:
-            return placement
-        model = self.model_at(placement.model, frame)
-        if not placement.id or model.parts is None:
-            return placement.model_copy(update={"model": model})
+        if thing.model.parts is None:
+            return thing
+        model = self.model_at(thing.model, frame)
+        if not thing.id or model.parts is None:
+            return thing.model_copy(update={"model": model})
         moved = compose(np.array(self.world_from_file), np.array(model.parts.file_from_axes))
-        return placement.model_copy(update={"model": model, "world_from_object": _rows(moved)})
+        return thing.model_copy(update={"model": model, "world_from_object": _rows(moved)})
 
     def model_at(self, spec: ModelSpec, frame: int) -> ModelSpec:
         """A model that is taken of the file, at one of the frames; anything else as it is."""

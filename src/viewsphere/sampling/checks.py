@@ -8,10 +8,10 @@ from fnmatch import fnmatchcase
 from viewsphere import plugins
 from viewsphere.errors import RecipeError
 from viewsphere.model.mistakes import nearest, one_of
-from viewsphere.model.recipe import Recipe
-from viewsphere.model.recipe_draws import alternatives
-from viewsphere.model.recipe_surface import GroundEntry
 from viewsphere.model.shot import ModelSpec
+from viewsphere.recipe.draws import alternatives
+from viewsphere.recipe.recipe import Recipe
+from viewsphere.recipe.surface import GroundEntry
 from viewsphere.sampling.models import count_models
 from viewsphere.sampling.viewpoints import Poses
 

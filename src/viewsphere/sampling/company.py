@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.errors import RecipeError
-from viewsphere.model.recipe_scenery import CompanyEntry
 from viewsphere.model.shot import Matrix4, ModelSpec
+from viewsphere.recipe.scenery import CompanyEntry
 from viewsphere.sampling.seeds import generator, share
 
 Float = NDArray[np.float64]

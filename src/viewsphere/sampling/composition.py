@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.rotation import transform
-from viewsphere.model.recipe import Recipe
-from viewsphere.model.recipe_scenery import Labels
 from viewsphere.model.scene import Vector
-from viewsphere.model.shot import ModelSpec, Placement
+from viewsphere.model.shot import ModelSpec, Thing
+from viewsphere.recipe.recipe import Recipe
+from viewsphere.recipe.scenery import Labels
 from viewsphere.sampling.blend_scene import BlendScenery
 from viewsphere.sampling.company import Names, companions, footprint, layout, standing
 from viewsphere.sampling.moments import TimedPoses
@@ -38,7 +38,7 @@ BoxOf = Callable[[ModelSpec], NDArray[np.float64]]
 
 @dataclass(frozen=True, eq=False)
 class Composition:
-    """What a recipe with a place, company or planes puts into its frames; no mesh is touched before `placements`.
+    """What a recipe with a place, company or planes puts into its frames; no mesh is touched before `things`.
 
     `groups` are the models that may meet: those of one split where splits are by model.
     """
@@ -121,7 +121,7 @@ class Composition:
         names = draw_names(entry.draw, spec.key, pose)
         return (spec, *companions(self.recipe.seed, spec, self.groups[spec.key], entry.number, names))
 
-    def targets(self, spec: ModelSpec, pose: str | None, box_of: BoxOf) -> tuple[Placement, ...]:
+    def targets(self, spec: ModelSpec, pose: str | None, box_of: BoxOf) -> tuple[Thing, ...]:
         """The targets where they stand, the frame's model at the origin; raises RecipeError where there is no room."""
         cast = self.cast(spec, pose)
         boxes = [box_of(member) for member in cast]
@@ -131,9 +131,9 @@ class Composition:
             names = draw_names(entry.draw, spec.key, pose)
             free = free_floor(self.recipe, place, draw_names(place.draw, spec.key, pose)) if place else None
             moves = layout(entry, self.recipe.seed, cast, boxes, names, free)
-        return tuple(Placement(id=i, model=m, world_from_object=w) for i, (m, w) in enumerate(zip(cast, moves, strict=True), 1))
+        return tuple(Thing(id=i, model=m, world_from_object=w) for i, (m, w) in enumerate(zip(cast, moves, strict=True), 1))
 
-    def placements(self, spec: ModelSpec, pose: str | None, box_of: BoxOf) -> tuple[Placement, ...]:
+    def things(self, spec: ModelSpec, pose: str | None, box_of: BoxOf) -> tuple[Thing, ...]:
         """All that is placed: targets, labelled scenery, then the scenery that is background."""
         targets = self.targets(spec, pose, box_of)
         pieces = self._pieces(targets, pose, box_of)
@@ -141,11 +141,11 @@ class Composition:
         rest = [p for p in pieces if p.labels != "own"]
         ids = [*range(len(targets) + 1, len(targets) + len(labelled) + 1), *[0] * len(rest)]
         return targets + tuple(
-            Placement(id=i, model=p.model, world_from_object=p.world_from_piece, scenery=True)
+            Thing(id=i, model=p.model, world_from_object=p.world_from_piece, scenery=True)
             for i, p in zip(ids, labelled + rest, strict=True)
         )
 
-    def _pieces(self, targets: Sequence[Placement], pose: str | None, box_of: BoxOf) -> list[Piece]:
+    def _pieces(self, targets: Sequence[Thing], pose: str | None, box_of: BoxOf) -> list[Piece]:
         spec, place = targets[0].model, self.recipe.scene.place
         pieces: list[Piece] = []
         if place is not None:
@@ -167,7 +167,7 @@ class Composition:
 
         return pieces
 
-    def center(self, targets: Sequence[Placement], box_of: BoxOf) -> Vector | None:
+    def center(self, targets: Sequence[Thing], box_of: BoxOf) -> Vector | None:
         """What the camera looks at: the centre of the box around all targets; None, which says the same, for one."""
         if len(targets) == 1:
             return None

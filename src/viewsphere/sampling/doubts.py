@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 
 from viewsphere.geometry.camera import orbit_center
 from viewsphere.model.camera import Intrinsics
-from viewsphere.model.recipe_draws import alternatives, component, span
-from viewsphere.model.recipe_light import DaylightSky, HdriSky, SunEntry
-from viewsphere.model.recipe_scene import SceneEntry
 from viewsphere.model.scene import Sun
+from viewsphere.recipe.draws import alternatives, component, span
+from viewsphere.recipe.light import DaylightSky, HdriSky, SunEntry
+from viewsphere.recipe.scene import SceneEntry
 from viewsphere.sampling.scenes import is_night
 from viewsphere.sampling.viewpoints import Poses
 

@@ -22,8 +22,8 @@ from numpy.typing import NDArray
 
 from viewsphere.errors import RecipeError
 from viewsphere.model.mistakes import shown
-from viewsphere.model.recipe import Splits
 from viewsphere.model.shot import Frame, ModelSpec, Shot
+from viewsphere.recipe.recipe import Splits
 from viewsphere.sampling.composition import BoxOf
 from viewsphere.sampling.look import engine_look
 from viewsphere.sampling.plan import Plan
@@ -93,7 +93,7 @@ class Portion:
         made = self.plan.take(self._position[model], self._of_recipe[poses].tolist(), box_of, key)
         return made.model_copy(
             update={
-                "placements": tuple(p.model_copy(update={"model": self._numbered(p.model)}) for p in made.placements),
+                "things": tuple(p.model_copy(update={"model": self._numbered(p.model)}) for p in made.things),
                 "frames": tuple(_numbered(f, first + i, int(poses[i])) for i, f in enumerate(made.frames)),
                 "channels": self._channels(first),
             }

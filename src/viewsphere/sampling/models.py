@@ -19,9 +19,9 @@ from viewsphere.assets.inside import split_source
 from viewsphere.assets.load import BLENDER_SUFFIXES
 from viewsphere.errors import RecipeError
 from viewsphere.model.mistakes import nearest
-from viewsphere.model.recipe import Recipe
-from viewsphere.model.recipe_models import ZOO, Dimensions, Length, ModelEntry, SizeTable, unit_metres
 from viewsphere.model.shot import ModelSpec, Size
+from viewsphere.recipe.models import ZOO, Dimensions, Length, ModelEntry, SizeTable, unit_metres
+from viewsphere.recipe.recipe import Recipe
 from viewsphere.sampling.seeds import generator
 from viewsphere.store import Category
 

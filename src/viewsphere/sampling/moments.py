@@ -13,11 +13,11 @@ from pathlib import Path
 from viewsphere.assets.timeline import Blenders, Timeline
 from viewsphere.errors import ModelError, RecipeError
 from viewsphere.model.camera import Intrinsics
-from viewsphere.model.recipe import Recipe
-from viewsphere.model.recipe_models import ModelEntry
-from viewsphere.model.recipe_time import Frames, Steps, chosen_frames
 from viewsphere.model.scene import Vector
 from viewsphere.model.shot import ModelSpec, Moment, Pose
+from viewsphere.recipe.models import ModelEntry
+from viewsphere.recipe.recipe import Recipe
+from viewsphere.recipe.time import Frames, Steps, chosen_frames
 from viewsphere.sampling.viewpoints import Poses, View
 
 

@@ -15,9 +15,9 @@ from viewsphere.assets.folder import UnreadableError
 from viewsphere.assets.sphere import read_head
 from viewsphere.errors import RecipeError
 from viewsphere.model.mistakes import nearest
-from viewsphere.model.recipe import Recipe
-from viewsphere.model.recipe_draws import alternatives
-from viewsphere.model.recipe_light import SKY_SUFFIXES
+from viewsphere.recipe.draws import alternatives
+from viewsphere.recipe.light import SKY_SUFFIXES
+from viewsphere.recipe.recipe import Recipe
 
 if TYPE_CHECKING:
     from PIL.Image import Image

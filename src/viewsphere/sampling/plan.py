@@ -21,10 +21,10 @@ from viewsphere.errors import RecipeError
 from viewsphere.geometry.camera import orbit_center
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.camera import Intrinsics
-from viewsphere.model.recipe import Recipe
-from viewsphere.model.recipe_draws import alternatives, span
 from viewsphere.model.scene import Scene, Vector
-from viewsphere.model.shot import Frame, ModelSpec, Placement, Pose, Shot
+from viewsphere.model.shot import Frame, ModelSpec, Pose, Shot, Thing
+from viewsphere.recipe.draws import alternatives, span
+from viewsphere.recipe.recipe import Recipe
 from viewsphere.sampling.blend_scene import BlendScenery
 from viewsphere.sampling.camera import distance_problem, inside_box
 from viewsphere.sampling.checks import (
@@ -285,21 +285,21 @@ class Plan:
         frame.
         """
         spec, pose = self.model_specs[model], self.pose_list.name(chosen[0])
-        placements, target = (Placement(id=1, model=spec),), None
+        things, target = (Thing(id=1, model=spec),), None
         if self.composition is not None:
             with self.recipe.located():
-                placements = self.composition.placements(spec, self._scene_pose(chosen[0]), _known(box_of))
+                things = self.composition.things(spec, self._scene_pose(chosen[0]), _known(box_of))
             company = self.recipe.scene.company
-            target = self.composition.center(placements[: 1 + (company.number if company else 0)], _known(box_of))
+            target = self.composition.center(things[: 1 + (company.number if company else 0)], _known(box_of))
         if self.recipe.scene.materials:
-            placements = tuple(self._repainted(p, spec, pose) for p in placements)
+            things = tuple(self._repainted(p, spec, pose) for p in things)
         run = self.schedules[model].run_of(chosen[0])
-        target = self._target(placements[0], run, target, box_of)
+        target = self._target(things[0], run, target, box_of)
         return Shot(
             key=key or spec.key,
-            placements=self._at(placements, run),
+            things=self._at(things, run),
             intrinsics=self.intrinsics,
-            scene=self._scene(spec, pose, run).model_copy(update=self._floor(spec, placements, box_of)),
+            scene=self._scene(spec, pose, run).model_copy(update=self._floor(spec, things, box_of)),
             frames=tuple(self.frame(model, i, target) for i in chosen),
             engine=self.recipe.engine.name,
             engine_options=self.recipe.engine.options,
@@ -309,7 +309,7 @@ class Plan:
             category_deg=self.recipe.viewpoints.bins,
         )
 
-    def _target(self, first: Placement, run: Run, target: Vector | None, box_of: BoxOf | None) -> Vector | None:
+    def _target(self, first: Thing, run: Run, target: Vector | None, box_of: BoxOf | None) -> Vector | None:
         """What cameras look at that have no target of their own, None for the first object's centre: where that stands at the
         first frame, or follows it.
         """
@@ -322,31 +322,31 @@ class Plan:
             target = center(first, _known(box_of))
         return target
 
-    def _floor(self, spec: ModelSpec, placements: Sequence[Placement], box_of: BoxOf | None) -> dict[str, float]:
+    def _floor(self, spec: ModelSpec, things: Sequence[Thing], box_of: BoxOf | None) -> dict[str, float]:
         """How high the ground is at most, in a scene's field: at the lowest that a model comes at its time steps."""
         moments = self.moments_of(spec)
         if not moments or self.recipe.scene.ground == "off":
             return {}
-        world = placements[0].world_from_object
+        world = things[0].world_from_object
         return {"floor": min(float(transform(world, _known(box_of)(moment))[:, 2].min()) for moment in moments)}
 
-    def _at(self, placements: Sequence[Placement], run: Run) -> tuple[Placement, ...]:
+    def _at(self, things: Sequence[Thing], run: Run) -> tuple[Thing, ...]:
         """What is placed, as it is at a time step; company is at its own of the same number. What of the scene's file shows
         nothing then is left out, so that others have other ids.
         """
         if run.step is None:
-            return tuple(placements)
+            return tuple(things)
         timing_of = self._timing_of
-        found: list[Placement] = []
-        for placement in placements:
-            model = at_step(timing_of.get(placement.model.key), placement.model, run.number)
-            moved = placement if model is placement.model else placement.model_copy(update={"model": model})
+        found: list[Thing] = []
+        for thing in things:
+            model = at_step(timing_of.get(thing.model.key), thing.model, run.number)
+            moved = thing if model is thing.model else thing.model_copy(update={"model": model})
             if self.blend is not None and run.step.scene is not None:
                 if not self.blend.shows(moved.model, run.step.scene):
                     continue
                 moved = self.blend.at_frame(moved, run.step.scene)
             found.append(moved)
-        if len(found) == len(placements):
+        if len(found) == len(things):
             return tuple(found)
         return tuple(p.model_copy(update={"id": i}) if p.id else p for i, p in enumerate(found, 1))
 
@@ -363,9 +363,9 @@ class Plan:
             blend = blend.model_copy(update={"frame": run.step.scene})
         return scene.model_copy(update={"blend": blend, "sun": None if blend.is_lit else scene.sun})
 
-    def _repainted(self, placement: Placement, spec: ModelSpec, pose: str) -> Placement:
-        repaints = () if placement.scenery else self.scenes.repaints(placement.model, spec.key, pose)
-        return placement.model_copy(update={"repaints": repaints}) if repaints else placement
+    def _repainted(self, thing: Thing, spec: ModelSpec, pose: str) -> Thing:
+        repaints = () if thing.scenery else self.scenes.repaints(thing.model, spec.key, pose)
+        return thing.model_copy(update={"repaints": repaints}) if repaints else thing
 
     def _scene_pose(self, pose: int) -> str | None:
         """Name of the pose, where what stands around is drawn for each frame."""
@@ -408,33 +408,33 @@ class Plan:
 
         Company that is drawn for each frame is not looked at: that is left to whoever renders the frame.
         """
-        placements, target = (Placement(id=1, model=spec),), None
+        things, target = (Thing(id=1, model=spec),), None
         if self.composition is not None and not self.recipe.scene.is_moved_each_frame:
-            placements = self.composition.targets(spec, None, box_of)
-            target = self.composition.center(placements, box_of)
-        fixed = None if self.timings else self.cameras(placements, box_of)
+            things = self.composition.targets(spec, None, box_of)
+            target = self.composition.center(things, box_of)
+        fixed = None if self.timings else self.cameras(things, box_of)
         for run in self.schedules[self._position[spec.key]].runs:
-            at = self._target(placements[0], run, target, box_of)
-            moved = self._at(placements, run)
+            at = self._target(things[0], run, target, box_of)
+            moved = self._at(things, run)
             cameras = fixed if fixed is not None else self.cameras(moved, box_of, at)
-            for placement in moved:
-                box = transform(placement.world_from_object, box_of(placement.model))
+            for thing in moved:
+                box = transform(thing.world_from_object, box_of(thing.model))
                 inside = inside_box(box, cameras[run.first : run.stop])
                 if inside.any():
                     pose = self._pose(spec, run.first + int(np.flatnonzero(inside)[0]), at)
                     problem = distance_problem(pose, box)
-                    return RecipeError(f"viewpoints.distance: {problem} (model {placement.model.key})")
+                    return RecipeError(f"viewpoints.distance: {problem} (model {thing.model.key})")
         return None
 
     @cached_property
     def _position(self) -> dict[str, int]:
         return {spec.key: i for i, spec in enumerate(self.model_specs)}
 
-    def cameras(self, placements: Sequence[Placement], box_of: BoxOf, target: Vector | None = None) -> NDArray[np.float64]:
+    def cameras(self, things: Sequence[Thing], box_of: BoxOf, target: Vector | None = None) -> NDArray[np.float64]:
         """Where the cameras of all poses stand, (poses, 3) world metres, when these are placed; they look at `target`, by
         default at the middle of what is placed.
         """
-        targets = [p for p in placements if p.id and not p.scenery]
+        targets = [p for p in things if p.id and not p.scenery]
         corners = np.concatenate([transform(t.world_from_object, box_of(t.model)) for t in targets])
         middle = corners.mean(axis=0) if len(targets) == 1 else (corners.min(axis=0) + corners.max(axis=0)) / 2
         middle = middle if target is None else np.array(target)
@@ -523,9 +523,9 @@ def check_images(planned: Plan) -> None:
                 proportions(path, f"scene.planes[{i}].{field}")
 
 
-def center(placement: Placement, box_of: BoxOf) -> Vector:
+def center(thing: Thing, box_of: BoxOf) -> Vector:
     """What a camera looks at that has no target of its own: the centre of the first object's box, world metres."""
-    x, y, z = transform(placement.world_from_object, box_of(placement.model).mean(axis=0)).tolist()
+    x, y, z = transform(thing.world_from_object, box_of(thing.model).mean(axis=0)).tolist()
     return x, y, z
 
 

@@ -19,11 +19,11 @@ from viewsphere.errors import ModelError, RecipeError, UserError
 from viewsphere.geometry.box import box_vertices
 from viewsphere.geometry.rotation import compose
 from viewsphere.model.mistakes import one_of
-from viewsphere.model.recipe import Recipe
-from viewsphere.model.recipe_draws import drawn
-from viewsphere.model.recipe_models import ZOO, unit_metres
-from viewsphere.model.recipe_scenery import Labels, PlaceEntry, PlaneEntry
 from viewsphere.model.shot import Matrix4, ModelSpec
+from viewsphere.recipe.draws import drawn
+from viewsphere.recipe.models import ZOO, unit_metres
+from viewsphere.recipe.recipe import Recipe
+from viewsphere.recipe.scenery import Labels, PlaceEntry, PlaneEntry
 from viewsphere.sampling.company import Footprint, Names, footprint, standing
 from viewsphere.sampling.pictures import IMAGE_SUFFIXES, files_in, proportions
 from viewsphere.sampling.seeds import generator, scene_generators, share

@@ -16,21 +16,6 @@ from typing import Any, TypeVar
 from viewsphere.geometry.camera import orbit_center
 from viewsphere.geometry.pose_category import pose_category
 from viewsphere.model.frozen import Frozen
-from viewsphere.model.recipe import Recipe
-from viewsphere.model.recipe_draws import RngOf, drawn, is_random
-from viewsphere.model.recipe_finish import BackgroundEntry, JitterEntry, PerFrame
-from viewsphere.model.recipe_light import (
-    AreaEntry,
-    At,
-    DaylightSky,
-    HdriSky,
-    HemisphereEntry,
-    LampEntry,
-    PointEntry,
-    SpotEntry,
-    SunEntry,
-)
-from viewsphere.model.recipe_surface import GroundEntry
 from viewsphere.model.scene import (
     WHITE,
     AnyLight,
@@ -53,6 +38,21 @@ from viewsphere.model.scene import (
     View,
 )
 from viewsphere.model.shot import ModelSpec, Pose, Repaint
+from viewsphere.recipe.draws import RngOf, drawn, is_random
+from viewsphere.recipe.finish import BackgroundEntry, JitterEntry, PerFrame
+from viewsphere.recipe.light import (
+    AreaEntry,
+    At,
+    DaylightSky,
+    HdriSky,
+    HemisphereEntry,
+    LampEntry,
+    PointEntry,
+    SpotEntry,
+    SunEntry,
+)
+from viewsphere.recipe.recipe import Recipe
+from viewsphere.recipe.surface import GroundEntry
 from viewsphere.sampling.company import Names
 from viewsphere.sampling.pictures import Kind, Pictures
 from viewsphere.sampling.scenery import draw_names

@@ -21,10 +21,10 @@ from viewsphere.geometry.camera import orbit_angles
 from viewsphere.geometry.pose_category import pose_category
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.camera import Intrinsics
-from viewsphere.model.recipe_values import Range
-from viewsphere.model.recipe_viewpoints import Grid, Jitter, Normal, PoseList, Sphere, Viewpoints, axis_value
 from viewsphere.model.scene import Vector
 from viewsphere.model.shot import Pose
+from viewsphere.recipe.values import Range
+from viewsphere.recipe.viewpoints import Grid, Jitter, Normal, PoseList, Sphere, Viewpoints, axis_value
 from viewsphere.sampling.pose_files import Motion, PoseFile, read_poses
 from viewsphere.sampling.seeds import generator
 

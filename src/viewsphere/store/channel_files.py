@@ -24,7 +24,7 @@ def encode(channel: Channel, array: NDArray[Any], files: Files | None = None) ->
     Raises ValueError for an array that is not as the channel's row says, StoreError for ids above 65535, MissingExtraError
     where a codec is not installed. Ids above 255 do not fit a palette: such a frame's masks are 16-bit.
     """
-    from viewsphere.geometry import exr_files, image_files, npz_files, picture_files
+    from viewsphere.codecs import exr, npz, pictures, png_tiff
 
     files = files or Files()
     height, width = array.shape[:2]
@@ -34,19 +34,19 @@ def encode(channel: Channel, array: NDArray[Any], files: Files | None = None) ->
         )
     match files.encoding(channel):
         case "tiff":
-            return image_files.encode_tiff(array)
+            return png_tiff.encode_tiff(array)
         case "exr":
-            return exr_files.encode_exr(array)
+            return exr.encode_exr(array)
         case "npz":
-            return npz_files.encode_npz(array, channel.name)
+            return npz.encode_npz(array, channel.name)
         case "png":
-            return image_files.encode_png(array)
+            return png_tiff.encode_png(array)
         case "png16" if channel.name == "depth":
-            return image_files.encode_png(_steps(array, files.step), unit=files.step)
+            return png_tiff.encode_png(_steps(array, files.step), unit=files.step)
         case "png16" | "png8" as kind:
             return _masks(channel, array, kind == "png8")
         case kind:
-            return picture_files.encode_picture(array, kind, files.quality)
+            return pictures.encode_picture(array, kind, files.quality)
 
 
 def _steps(depth: NDArray[np.float32], unit: float) -> NDArray[np.uint16]:
@@ -57,18 +57,18 @@ def _steps(depth: NDArray[np.float32], unit: float) -> NDArray[np.uint16]:
 
 def depth_step(file: Path) -> float:
     """Metres by which neighbouring numbers of a depth file differ; 0 where it is exact. Errors as for `decode`."""
-    from viewsphere.geometry import image_files
+    from viewsphere.codecs import png_tiff
 
     try:
         data = file.read_bytes()
-        return (image_files.png_unit(data) or 0.0) if data[:4] == b"\x89PNG" else 0.0
+        return (png_tiff.png_unit(data) or 0.0) if data[:4] == b"\x89PNG" else 0.0
     except (OSError, UserError) as error:
         raise StoreError(f"{file}: expected a readable file, found: {error}") from None
 
 
 def check_codecs(channels: Container[str], files: Files) -> None:
     """Raises MissingExtraError where a channel is to be written with a codec that is not installed."""
-    from viewsphere.geometry.picture_files import codecs
+    from viewsphere.codecs.pictures import codecs
 
     for name, kind in (("rgb", files.rgb), ("rgba", files.rgba)):
         if name in channels and kind in {"qoi", "jxl"}:
@@ -76,14 +76,14 @@ def check_codecs(channels: Container[str], files: Files) -> None:
 
 
 def _masks(channel: Channel, array: NDArray[np.int32], indexed: bool) -> bytes:
-    from viewsphere.geometry import image_files
+    from viewsphere.codecs import png_tiff
 
     most = int(array.view(np.uint32).max(initial=0))  # what is negative counts as large
     if most > MOST_STEPS:
         raise StoreError(f"channel {channel.name}: expected ids in 0..65535, found {array.min()}..{array.max()}")
     if indexed and most < MOST_COLORS:
-        return image_files.encode_png(array.astype(np.uint8), palette=palette())
-    return image_files.encode_png(array.astype(np.uint16))
+        return png_tiff.encode_png(array.astype(np.uint8), palette=palette())
+    return png_tiff.encode_png(array.astype(np.uint16))
 
 
 def palette() -> NDArray[np.uint8]:
@@ -117,33 +117,33 @@ def decode(channel: Channel, file: Path) -> NDArray[Any]:
 
 def _decoded(channel: Channel, data: bytes) -> NDArray[Any]:
     """The array in a file's bytes, whose first ones say what it is."""
-    from viewsphere.geometry import exr_files, image_files, npz_files, picture_files
+    from viewsphere.codecs import exr, npz, pictures, png_tiff
 
     if channel.name in {"rgb", "rgba"}:
         if _is_own_png(data, channel.components):
             with suppress(UserError):
-                return image_files.decode_png(data)
-        return picture_files.decode_picture(data, channel.components)
+                return png_tiff.decode_png(data)
+        return pictures.decode_picture(data, channel.components)
     match data[:4]:
         case b"\x76\x2f\x31\x01":
-            return exr_files.decode_exr(data)
+            return exr.decode_exr(data)
         case b"PK\x03\x04":
-            return npz_files.decode_npz(data, channel.name)
+            return npz.decode_npz(data, channel.name)
         case b"\x89PNG" if channel.name == "depth":
             return _metres(data)
         case b"\x89PNG":
-            return image_files.decode_png(data)
+            return png_tiff.decode_png(data)
         case _:
-            return image_files.decode_tiff(data)
+            return png_tiff.decode_tiff(data)
 
 
 def _metres(data: bytes) -> NDArray[np.float32]:
-    from viewsphere.geometry import image_files
+    from viewsphere.codecs import png_tiff
 
-    unit = image_files.png_unit(data)
+    unit = png_tiff.png_unit(data)
     if unit is None:
         raise UserError("PNG: expected the metres in a step (chunk pCAL), found none")
-    steps = image_files.decode_png(data)
+    steps = png_tiff.decode_png(data)
     return np.where(steps == 0, np.inf, steps * unit).astype(np.float32)
 
 

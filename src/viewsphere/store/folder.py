@@ -21,7 +21,7 @@ from viewsphere.model.channel import CHANNELS
 from viewsphere.model.files import Files
 from viewsphere.model.record import sample_to_record
 from viewsphere.model.sample import Sample
-from viewsphere.model.shot import Placement, Shot
+from viewsphere.model.shot import Shot, Thing
 from viewsphere.store.channel_files import encode
 from viewsphere.store.records import ModelInfo, PlanRecord, ShotRow
 
@@ -244,7 +244,7 @@ class Store:
             if scenery:
                 (folder / "scenery.json").write_text(scenery, "utf-8")
             if shot is not None:
-                labelled = shot.model_copy(update={"placements": shot.objects})  # the others are in scenery.json
+                labelled = shot.model_copy(update={"things": shot.objects})  # the others are in scenery.json
                 (folder / "shot.json").write_text(labelled.model_dump_json(), "utf-8")
         return len(records)
 
@@ -253,10 +253,8 @@ class Store:
         file = self.shot_folder(key) / "shot.json"
         try:
             shot = Shot.model_validate_json(file.read_bytes())
-            scenery = json.loads(self.scenery(key) or '{"placements": []}')["placements"]
-            return shot.model_copy(
-                update={"placements": (*shot.placements, *(Placement.model_validate(placement) for placement in scenery))}
-            )
+            scenery = json.loads(self.scenery(key) or '{"things": []}')["things"]
+            return shot.model_copy(update={"things": (*shot.things, *(Thing.model_validate(thing) for thing in scenery))})
         except FileNotFoundError:
             return None
         except (OSError, LookupError, TypeError, ValueError) as error:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from viewsphere.geometry.jit import inner, njit
+from viewsphere.kernels.jit import inner, njit
 
 
 @njit(_nrt=True)

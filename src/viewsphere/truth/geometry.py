@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from viewsphere.assets.mesh import Mesh
-from viewsphere.model.shot import ModelSpec, Placement
+from viewsphere.model.shot import ModelSpec, Thing
 from viewsphere.truth.cutouts import NO_CUTOUTS, SURFACE, Cutouts, mesh_cutouts, stack_cutouts
 
 BACKGROUND = 0
@@ -48,8 +48,8 @@ class Geometry:
     triangle's own; triangle_object, triangle_part, triangle_category (T,) int32, 0 for scenery and ground; triangle_cutout
     (T,) int32: -1 all surface, -2 never seen, else a row of `cutouts.corners`.
 
-    Placement i owns vertices [vertex_start[i], vertex_start[i + 1]) and triangles [triangle_start[i], triangle_start[i + 1]);
-    both have one entry more than there are placements. The first `object_count` of them are the objects 1, 2, ...
+    Thing i owns vertices [vertex_start[i], vertex_start[i + 1]) and triangles [triangle_start[i], triangle_start[i + 1]);
+    both have one entry more than there are things. The first `object_count` of them are the objects 1, 2, ...
     """
 
     vertices: NDArray[np.float64]
@@ -95,31 +95,31 @@ class Geometry:
         return tuple(found)
 
 
-def placed_meshes(placements: Sequence[Placement], load: Callable[[ModelSpec], Mesh]) -> list[Mesh]:
-    """The model of each placement; each is loaded once."""
-    loaded = {spec: load(spec) for spec in dict.fromkeys(p.model for p in placements)}
-    return [loaded[p.model] for p in placements]
+def placed_meshes(things: Sequence[Thing], load: Callable[[ModelSpec], Mesh]) -> list[Mesh]:
+    """The model of each thing; each is loaded once."""
+    loaded = {spec: load(spec) for spec in dict.fromkeys(p.model for p in things)}
+    return [loaded[p.model] for p in things]
 
 
 def build_geometry(
-    placements: Sequence[Placement], meshes: Sequence[Mesh], ground: bool, label_alpha: float, floor: float | None = None
+    things: Sequence[Thing], meshes: Sequence[Mesh], ground: bool, label_alpha: float, floor: float | None = None
 ) -> Geometry:
     """Place the meshes in the world and, if asked, lay the ground at their lowest point (z = 0 if there are none), or at
     `floor` where that is lower: something that jumps leaves it.
 
-    `meshes[i]` is the normalised model of `placements[i]`; ids are 1..N in order, then 0 for scenery. The ground is two
+    `meshes[i]` is the normalised model of `things[i]`; ids are 1..N in order, then 0 for scenery. The ground is two
     triangles that reach 1,000 scene sizes to every side. A BLEND material is surface where alpha >= label_alpha, a MASK
     material where alpha >= its cutoff; transmission always counts as surface. Fully transparent triangles (no texel is
     surface) are kept but never seen. Raises ValueError for other ids.
 
     The last scenery is kept: where only objects change, it is not placed again.
     """
-    count = sum(p.id > 0 for p in placements)
-    if [p.id for p in placements] != [*range(1, count + 1), *[BACKGROUND] * (len(meshes) - count)]:
-        raise ValueError(f"placements: expected ids 1..N in order, then 0, got {[p.id for p in placements]}")
-    parts = [_placed(tuple(placements[:count]), tuple(meshes[:count]), label_alpha)]
+    count = sum(p.id > 0 for p in things)
+    if [p.id for p in things] != [*range(1, count + 1), *[BACKGROUND] * (len(meshes) - count)]:
+        raise ValueError(f"things: expected ids 1..N in order, then 0, got {[p.id for p in things]}")
+    parts = [_placed(tuple(things[:count]), tuple(meshes[:count]), label_alpha)]
     if count < len(meshes):
-        parts.append(_scenery(tuple(placements[count:]), tuple(meshes[count:]), label_alpha))
+        parts.append(_scenery(tuple(things[count:]), tuple(meshes[count:]), label_alpha))
     return _stacked([*parts, _ground(parts, floor)] if ground else parts)
 
 
@@ -132,13 +132,13 @@ def with_blended_colors(geometry: Geometry, meshes: Sequence[Mesh]) -> Geometry:
     return replace(geometry, cutouts=cutouts, triangle_cutout=rows)
 
 
-def _placed(placements: tuple[Placement, ...], meshes: tuple[Mesh, ...], label_alpha: float) -> Geometry:
-    moves = [p.world_from_object for p in placements]
+def _placed(things: tuple[Thing, ...], meshes: tuple[Mesh, ...], label_alpha: float) -> Geometry:
+    moves = [p.world_from_object for p in things]
     vertex_start = (0, *accumulate(len(m.vertices) for m in meshes))
     vertices = _joined([_moved(w, m.vertices, 1.0) for w, m in zip(moves, meshes, strict=True)], (0, 3), np.float64)
     triangles = _joined([m.triangles + s for m, s in zip(meshes, vertex_start, strict=False)], (0, 3), np.int32)
     normals = _joined([_moved(w, m.normals, 0.0) for w, m in zip(moves, meshes, strict=True)], (0, 3), np.float32)
-    labels = _joined([_labels(p, m) for p, m in zip(placements, meshes, strict=True)], (0, 3), np.int32)
+    labels = _joined([_labels(p, m) for p, m in zip(things, meshes, strict=True)], (0, 3), np.int32)
     cutouts, rows = stack_cutouts([mesh_cutouts(m, label_alpha) for m in meshes])
     triangle_normals = _triangle_normals(vertices, triangles)
     return Geometry(
@@ -155,7 +155,7 @@ def _placed(placements: tuple[Placement, ...], meshes: tuple[Mesh, ...], label_a
         cutouts=cutouts,
         vertex_start=vertex_start,
         triangle_start=(0, *accumulate(len(m.triangles) for m in meshes)),
-        object_count=sum(p.id > 0 for p in placements),
+        object_count=sum(p.id > 0 for p in things),
         ground_z=None,
     )
 
@@ -180,10 +180,10 @@ def _stacked(parts: Sequence[Geometry]) -> Geometry:
     )
 
 
-def _labels(placement: Placement, mesh: Mesh) -> NDArray[np.int32]:
+def _labels(thing: Thing, mesh: Mesh) -> NDArray[np.int32]:
     labels = np.full((len(mesh.triangles), 3), BACKGROUND, np.int32)
-    if placement.id:
-        labels[:, 0], labels[:, 1], labels[:, 2] = placement.id, mesh.triangle_part + 1, placement.model.category_id
+    if thing.id:
+        labels[:, 0], labels[:, 1], labels[:, 2] = thing.id, mesh.triangle_part + 1, thing.model.category_id
     return labels
 
 

@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from viewsphere.geometry.jit import inner, njit
+from viewsphere.kernels.jit import inner, njit
 
 ONE = np.float32(1)
 NONE = -2  # no triangle, nor the background's -1

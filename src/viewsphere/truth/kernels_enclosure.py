@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from viewsphere.geometry.jit import njit
+from viewsphere.kernels.jit import njit
 
 
 @njit

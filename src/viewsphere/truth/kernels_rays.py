@@ -13,8 +13,8 @@ import math
 
 import numpy as np
 
-from viewsphere.geometry.jit import inner, njit
-from viewsphere.truth.kernels import NEVER, edge, hits_surface, negated, plane
+from viewsphere.kernels.jit import inner, njit
+from viewsphere.truth.kernels_draw import NEVER, edge, hits_surface, negated, plane
 
 LEAF = 8  # pixels of a leaf's side
 MANY_CELLS, MANY_PIXELS = 64, 1024  # of a triangle's box: beyond them the tree is faster

@@ -98,7 +98,7 @@ def homogeneous(geometry: Geometry, camera: Camera, base: int = 0, stop: int | N
 
     K (R X + t) for a pinhole; camera axes, R X + t, for a distorted lens. The inverse is infinite unless positive.
     """
-    from viewsphere.truth import kernels
+    from viewsphere.truth import kernels_draw as kernels
 
     stop = len(geometry.vertices) if stop is None else stop
     q = np.empty((stop - base, 4))
@@ -170,7 +170,8 @@ def _draw(
     geometry: Geometry, camera: Camera, samples: int, part: tuple[int, int, int, int], window: Window | None
 ) -> tuple[NDArray[np.float64], NDArray[np.int32], NDArray[np.float64]]:
     """1/s (0 where none) and triangle (-1 where none) over the window, of the part's triangles; its `homogeneous` vertices."""
-    from viewsphere.truth import kernels, kernels_rays
+    from viewsphere.truth import kernels_draw as kernels
+    from viewsphere.truth import kernels_rays
 
     window = window or (0, 0, camera.width, camera.height)
     x0, y0, x1, y1 = (samples * edge for edge in window)

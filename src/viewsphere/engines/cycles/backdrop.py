@@ -38,7 +38,7 @@ class Backdrop:
         """A shot's. Raises RecipeError for a picture that cannot be read."""
         scene = shot.scene
         sky = sky_pictures(scene.sky, scene.sun, scene.lights, scene.ground is not None)
-        middle, unit = extent(geometry, any(p.scenery for p in shot.placements))
+        middle, unit = extent(geometry, any(p.scenery for p in shot.things))
         return cls(sky, middle, unit, int(geometry.triangle_start[-1]))
 
     def behind(self, picture: Float32, camera: Camera, visibility: Visibility, is_open: bool) -> Float32:

@@ -12,11 +12,11 @@ import numpy as np
 
 from viewsphere.assets.mesh import Mesh
 from viewsphere.assets.srgb import encoded
+from viewsphere.codecs.png_tiff import encode_png
 from viewsphere.engines.cycles.file_frame import FileFrame
 from viewsphere.engines.cycles.staging import STAGE_SECONDS, CyclesStage, build_stage, told_camera
 from viewsphere.errors import BlenderDied, ModelError
 from viewsphere.geometry.camera import orbit_angles
-from viewsphere.geometry.image_files import encode_png
 from viewsphere.imaging.background import display_background
 from viewsphere.imaging.effects import has_effects
 from viewsphere.imaging.view import EXPOSURE

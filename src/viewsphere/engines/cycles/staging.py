@@ -189,7 +189,7 @@ class CyclesStage:
             except BlenderDied as error:
                 self.keeper.drop()
                 died = error
-        raise ModelError(f"{', '.join(sorted({p.model.key for p in self.shot.placements}))}: {died}")
+        raise ModelError(f"{', '.join(sorted({p.model.key for p in self.shot.things}))}: {died}")
 
     def _rendered(self, camera: Camera, is_open: bool, clip: Clip) -> Float32:
         views = views_of(camera)
@@ -210,7 +210,7 @@ class CyclesStage:
     @cached_property
     def kinds(self) -> tuple[Kind, ...]:
         """The models in the scene."""
-        return kinds_of(self.shot.placements, self.meshes, self.shot.scene)
+        return kinds_of(self.shot.things, self.meshes, self.shot.scene)
 
     def _levels(self, cameras: Sequence[Camera]) -> AllLevels | None:
         """How coarse pictures may be; None for as they are: OpenGL has mip levels, and what a user's own scene has in it, and
@@ -229,7 +229,7 @@ class CyclesStage:
     def tell(self, process: BlenderProcess, levels: AllLevels | None = None) -> None:
         """Build the scene in this Blender. Raises UserError for what its renderer does not know or have."""
         shot = self.shot
-        told = told_scene(shot.placements, self.meshes, self.geometry, shot.scene, self.options, process.put, levels)
+        told = told_scene(shot.things, self.meshes, self.geometry, shot.scene, self.options, process.put, levels)
         try:
             process.ask("stage", STAGE_SECONDS, **told)
         except BlenderError as error:
@@ -280,7 +280,7 @@ def build_stage(shot: Shot, load: Callable[[ModelSpec], Mesh]) -> CyclesStage:
             f"scene.ground: expected on, off or a material for engine: {options.renderer}, found catcher, which auto is before "
             "background: environment: set it to off, or take engine: cycles or raster"
         )
-    meshes = placed_meshes(shot.placements, load)
-    geometry = build_geometry(shot.placements, meshes, shot.scene.ground is not None, shot.label_alpha, shot.scene.floor)
+    meshes = placed_meshes(shot.things, load)
+    geometry = build_geometry(shot.things, meshes, shot.scene.ground is not None, shot.label_alpha, shot.scene.floor)
     keeper = keeper_of(find_blender(options.python))
     return CyclesStage(geometry, shot, meshes, options, keeper, middle_of(geometry, min(len(meshes), 1)))

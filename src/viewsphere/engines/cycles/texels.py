@@ -24,7 +24,7 @@ from viewsphere.assets.repaint import repainted
 from viewsphere.assets.srgb import encoded, linear
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.camera import Camera
-from viewsphere.model.shot import Placement, Repaint
+from viewsphere.model.shot import Repaint, Thing
 
 FINEST = 2.0
 """Texels of a halved picture in a pixel, along a line, at least."""
@@ -132,7 +132,7 @@ class Kind:
 
     mesh: Mesh
     repaints: tuple[Repaint, ...]
-    placements: tuple[Placement, ...]
+    things: tuple[Thing, ...]
     _densities: dict[tuple[int, Texture, tuple[int, int]], Density] = field(default_factory=dict)
     _made: dict[Key, Image] = field(default_factory=dict)
     _read: dict[tuple[int, int, str], Float] = field(default_factory=dict)
@@ -142,7 +142,7 @@ class Kind:
     def balls(self) -> tuple[Float, float]:
         """Centres (N, 3) of balls around it where it stands, and their radius."""
         low, high = self.mesh.bounds
-        middles = [transform(placement.world_from_object, (low + high) / 2) for placement in self.placements]
+        middles = [transform(thing.world_from_object, (low + high) / 2) for thing in self.things]
         return np.array(middles), float(np.linalg.norm(high - low)) / 2
 
     def levels(self, cameras: Sequence[Camera]) -> Levels:

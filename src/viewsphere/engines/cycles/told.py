@@ -17,7 +17,7 @@ from viewsphere.engines.cycles.file_frame import FileFrame
 from viewsphere.engines.cycles.options import AnyOptions
 from viewsphere.engines.cycles.texels import Kind, Levels
 from viewsphere.model.scene import AnyLight, BlendScene, Ground, HemisphereLight, Scene
-from viewsphere.model.shot import Placement, Repaint
+from viewsphere.model.shot import Repaint, Thing
 from viewsphere.surroundings.ground import ground_frame, ground_material, only_scatters
 from viewsphere.surroundings.sky import SURROUNDINGS, SkyPictures, sky_pictures
 from viewsphere.surroundings.sun import sun_light
@@ -38,7 +38,7 @@ ARRAYS = ("vertices", "triangles", "normals", "triangle_material", "uv0", "uv1",
 
 
 def told_scene(
-    placements: Sequence[Placement],
+    things: Sequence[Thing],
     meshes: Sequence[Mesh],
     geometry: Geometry,
     scene: Scene,
@@ -51,24 +51,22 @@ def told_scene(
     Raises UserError for a picture of sky or ground that cannot be read.
     """
     frame, blend = FileFrame.of(scene.blend), scene.blend
-    kinds = kinds_of(placements, meshes, scene)
+    kinds = kinds_of(things, meshes, scene)
     shared: dict[int, Told] = {}
     told: list[Told] = []
     for kind, look in zip(kinds, told_looks(kinds, put, levels), strict=True):
         if id(kind.mesh) not in shared:
             shared[id(kind.mesh)] = _told_mesh(kind.mesh, put)
-        told.append({**shared[id(kind.mesh)], **look, "name": kind.placements[0].model.key})
-    numbers = {id(placement): number for number, kind in enumerate(kinds) for placement in kind.placements}
+        told.append({**shared[id(kind.mesh)], **look, "name": kind.things[0].model.key})
+    numbers = {id(thing): number for number, kind in enumerate(kinds) for thing in kind.things}
     objects = [
-        {"mesh": numbers[id(p)], "matrix": frame.placed(p.world_from_object), "index": p.id}
-        for p in placements
-        if id(p) in numbers
+        {"mesh": numbers[id(p)], "matrix": frame.placed(p.world_from_object), "index": p.id} for p in things if id(p) in numbers
     ]
     pictures = None
     if blend is None or not blend.is_lit:
         pictures = sky_pictures(scene.sky, scene.sun, scene.lights, scene.ground is not None)
-    middle = middle_of(geometry, sum(not p.scenery for p in placements))
-    has_scenery = any(p.scenery for p in placements)
+    middle = middle_of(geometry, sum(not p.scenery for p in things))
+    has_scenery = any(p.scenery for p in things)
     return {
         "meshes": told,
         "objects": objects,
@@ -81,12 +79,12 @@ def told_scene(
     }
 
 
-def kinds_of(placements: Sequence[Placement], meshes: Sequence[Mesh], scene: Scene) -> tuple[Kind, ...]:
+def kinds_of(things: Sequence[Thing], meshes: Sequence[Mesh], scene: Scene) -> tuple[Kind, ...]:
     """The models that are put into the scene, each with its changes to materials; without what a .blend scene brings."""
-    found: dict[tuple[int, tuple[Repaint, ...]], tuple[Mesh, list[Placement]]] = {}
-    for placement, mesh in zip(placements, meshes, strict=True):
-        if scene.blend is None or placement.model.parts is None:
-            found.setdefault((id(mesh), placement.repaints), (mesh, []))[1].append(placement)
+    found: dict[tuple[int, tuple[Repaint, ...]], tuple[Mesh, list[Thing]]] = {}
+    for thing, mesh in zip(things, meshes, strict=True):
+        if scene.blend is None or thing.model.parts is None:
+            found.setdefault((id(mesh), thing.repaints), (mesh, []))[1].append(thing)
     return tuple(Kind(mesh, repaints, tuple(own)) for (_, repaints), (mesh, own) in found.items())
 
 
@@ -180,7 +178,7 @@ def extent(geometry: Geometry, has_scenery: bool) -> tuple[NDArray[np.float64], 
 
 
 def middle_of(geometry: Geometry, count: int) -> NDArray[np.float64]:
-    """Centre (3,) of the box around the first so many placements, world metres."""
+    """Centre (3,) of the box around the first so many things, world metres."""
     seen = geometry.vertices[geometry.triangles[: geometry.triangle_start[count]].reshape(-1)]
     return (seen.min(axis=0) + seen.max(axis=0)) / 2 if len(seen) else np.zeros(3)
 

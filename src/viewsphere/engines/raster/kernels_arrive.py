@@ -24,7 +24,7 @@ from viewsphere.engines.raster.kernels_shadow import (
     ACROSS, BIAS_FAR, BIAS_NEAR, BOUNDS_AT, CELLS, DOWN, HIGH, LOW, MIDDLE, NEAREST, READ, SHARPEST, STEP, TEXELS,
 )  # fmt: skip
 from viewsphere.engines.raster.kernels_texture import FAST
-from viewsphere.geometry.jit import inner, njit
+from viewsphere.kernels.jit import inner, njit
 
 f4 = nb.float32
 U = nb.uintp

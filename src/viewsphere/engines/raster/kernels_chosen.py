@@ -13,7 +13,7 @@ import numpy as np
 from llvmlite import ir
 
 from viewsphere.engines.raster.kernels_lanes import LANES, Lanes, Rows, lanewise, size, store
-from viewsphere.geometry.jit import inner, njit
+from viewsphere.kernels.jit import inner, njit
 
 f4 = nb.float32
 U = nb.uintp

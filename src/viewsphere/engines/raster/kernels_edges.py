@@ -15,8 +15,8 @@ import numpy as np
 
 from viewsphere.engines.raster.kernels_chosen import ALIKE, LEVEL
 from viewsphere.engines.raster.kernels_four import nearer, put_before
-from viewsphere.geometry.jit import inner, njit
-from viewsphere.truth.kernels import EPSILON, NEVER, crossing_at, edge, hits_surface, negated, plane
+from viewsphere.kernels.jit import inner, njit
+from viewsphere.truth.kernels_draw import EPSILON, NEVER, crossing_at, edge, hits_surface, negated, plane
 
 f4 = nb.float32
 U = nb.uintp

@@ -13,7 +13,7 @@ import numpy as np
 
 from viewsphere.engines.raster.kernels_lanes import clamp, dot, lanewise, least, most, root, size, where
 from viewsphere.engines.raster.kernels_texture import FAST
-from viewsphere.geometry.jit import inner, njit
+from viewsphere.kernels.jit import inner, njit
 
 f4 = nb.float32
 i4 = nb.int32

@@ -30,7 +30,7 @@ from viewsphere.engines.raster.kernels_lanes import (
     where,
 )
 from viewsphere.engines.raster.kernels_texture import CLAMP, FAST, MIRROR, REPEAT
-from viewsphere.geometry.jit import inner
+from viewsphere.kernels.jit import inner
 
 f4 = nb.float32
 i4 = nb.int32

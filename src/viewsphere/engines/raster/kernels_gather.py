@@ -62,7 +62,7 @@ from viewsphere.engines.raster.kernels_lanes import (
 )
 from viewsphere.engines.raster.kernels_material import L_SCENERY
 from viewsphere.engines.raster.kernels_texture import FAST
-from viewsphere.geometry.jit import inner
+from viewsphere.kernels.jit import inner
 
 f4 = nb.float32
 U = nb.uintp

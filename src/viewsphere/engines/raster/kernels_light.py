@@ -24,7 +24,7 @@ from viewsphere.engines.raster.kernels_block import (
 from viewsphere.engines.raster.kernels_environment import ABOVE, BELOW, LAMPS, SCALE, TURN
 from viewsphere.engines.raster.kernels_lanes import clamp, cross, dot, lanewise, least, most, root, size, where
 from viewsphere.engines.raster.kernels_texture import FAST
-from viewsphere.geometry.jit import inner
+from viewsphere.kernels.jit import inner
 from viewsphere.imaging.view import EXPOSURE
 
 f4 = nb.float32

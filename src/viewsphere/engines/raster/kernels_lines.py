@@ -12,8 +12,8 @@ import numba as nb
 import numpy as np
 
 from viewsphere.engines.raster.kernels_edges import span
-from viewsphere.geometry.jit import inner, njit
-from viewsphere.truth.kernels import NEVER, plane
+from viewsphere.kernels.jit import inner, njit
+from viewsphere.truth.kernels_draw import NEVER, plane
 
 f4 = nb.float32
 U = nb.uintp

@@ -77,7 +77,7 @@ from viewsphere.engines.raster.kernels_filter import VX as VXX
 from viewsphere.engines.raster.kernels_filter import VY as VYY
 from viewsphere.engines.raster.kernels_lanes import clamp, cross, dot, lanewise, least, most, root, sign, where
 from viewsphere.engines.raster.kernels_texture import FAST
-from viewsphere.geometry.jit import inner
+from viewsphere.kernels.jit import inner
 
 f4 = nb.float32
 U = nb.uintp

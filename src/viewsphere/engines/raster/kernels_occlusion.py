@@ -39,7 +39,7 @@ from viewsphere.engines.raster.kernels_block import (
     T7,
 )  # fmt: skip
 from viewsphere.engines.raster.kernels_lanes import clamp, dot, lanewise, least, most, size, where
-from viewsphere.geometry.jit import inner, njit
+from viewsphere.kernels.jit import inner, njit
 
 f4 = nb.float32
 i4 = nb.int32

@@ -48,7 +48,7 @@ from viewsphere.engines.raster.kernels_light import (
 from viewsphere.engines.raster.kernels_material import material
 from viewsphere.engines.raster.kernels_occlusion import occlude
 from viewsphere.engines.raster.kernels_texture import FAST
-from viewsphere.geometry.jit import inner, njit
+from viewsphere.kernels.jit import inner, njit
 
 f4 = nb.float32
 U = nb.uintp

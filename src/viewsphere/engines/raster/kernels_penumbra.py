@@ -30,7 +30,7 @@ from viewsphere.engines.raster.kernels_shadow import (
     BIAS_NEAR, COARSEST, DARKER, DEPTH_AT, FINE, GAP, MIDDLE, MORE, ROUND, SIDES, SIZE, SPAN_U, SPAN_V, TILT,
 )  # fmt: skip
 from viewsphere.engines.raster.kernels_texture import FAST
-from viewsphere.geometry.jit import inner
+from viewsphere.kernels.jit import inner
 
 f4 = nb.float32
 U = nb.uintp

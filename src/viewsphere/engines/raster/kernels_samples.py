@@ -14,8 +14,19 @@ import numba as nb
 import numpy as np
 
 from viewsphere.engines.raster.kernels_chosen import CLOSED, TILE, level
-from viewsphere.geometry.jit import inner, njit
-from viewsphere.truth.kernels import BEHIND, EPSILON, NEVER, ROUNDED_UP, SLIVER, crossing_at, edge, hits_surface, negated, plane
+from viewsphere.kernels.jit import inner, njit
+from viewsphere.truth.kernels_draw import (
+    BEHIND,
+    EPSILON,
+    NEVER,
+    ROUNDED_UP,
+    SLIVER,
+    crossing_at,
+    edge,
+    hits_surface,
+    negated,
+    plane,
+)
 from viewsphere.truth.kernels_rays import LEAF, leaf_list, limits, pixel_box, touched
 
 U = nb.uintp

@@ -25,7 +25,7 @@ from viewsphere.imaging.finish import finished
 from viewsphere.imaging.seen import Seen, seen_by
 from viewsphere.model.camera import Camera
 from viewsphere.model.scene import Ground, Scene
-from viewsphere.model.shot import Frame, ModelSpec, Placement, Shot
+from viewsphere.model.shot import Frame, ModelSpec, Shot, Thing
 from viewsphere.surroundings.ground import ground_albedo, ground_frame, ground_material, only_scatters
 from viewsphere.surroundings.sky import even_light
 from viewsphere.truth.geometry import Geometry, build_geometry, placed_meshes, with_blended_colors
@@ -73,20 +73,20 @@ def build_stage(shot: Shot, load: Callable[[ModelSpec], Mesh]) -> RasterStage:
     options = parse_options(shot.engine_options)
     size = options.for_width(max(shot.intrinsics.width, shot.intrinsics.height))
     options = replace(options, shadow_resolution=size)
-    meshes = placed_meshes(shot.placements, load)
+    meshes = placed_meshes(shot.things, load)
     scene = shot.scene
-    geometry = build_geometry(shot.placements, meshes, scene.ground is not None, shot.label_alpha, scene.floor)
-    targets = sum(not p.scenery for p in shot.placements)
+    geometry = build_geometry(shot.things, meshes, scene.ground is not None, shot.label_alpha, scene.floor)
+    targets = sum(not p.scenery for p in shot.things)
     low, high = _bounds(geometry, geometry.triangle_start[1] if len(geometry.triangle_start) > 1 else 0)
     return RasterStage(
-        geometry, scene, options, _baked(geometry, meshes, shot.placements, targets, scene, options), (low + high) / 2
+        geometry, scene, options, _baked(geometry, meshes, shot.things, targets, scene, options), (low + high) / 2
     )
 
 
 def _baked(
     geometry: Geometry,
     meshes: Sequence[Mesh],
-    placements: Sequence[Placement],
+    things: Sequence[Thing],
     targets: int,
     scene: Scene,
     options: Options,
@@ -94,13 +94,13 @@ def _baked(
     """Lengths are in units of all there is; where there is scenery, from the world's origin, so that they stay the same when
     the targets change.
     """
-    scenery = tuple(placements[targets:])
+    scenery = tuple(things[targets:])
     low, high = _bounds(geometry, geometry.triangle_start[-1])
     origin, unit = (low + high) / 2, float(np.linalg.norm(high - low)) / 2 or 1.0
     ground_z = geometry.ground_z
     if scenery:
         origin, unit = np.zeros(3), 2.0 ** math.ceil(math.log2(unit))
-    surfaces, textures = pack_surfaces(geometry, meshes, scene.ground, origin, unit, targets, placements)
+    surfaces, textures = pack_surfaces(geometry, meshes, scene.ground, origin, unit, targets, things)
     reach = float(np.abs(np.stack([low, high]) - origin).max()) / unit
     if scenery:
         low, high = _bounds(geometry, geometry.triangle_start[targets])
@@ -113,7 +113,7 @@ def _baked(
         textures,
         extent,
         (scenery, tuple(meshes[targets:]), unit) if scenery else None,
-        (tuple(placements[:targets]), tuple(meshes[:targets]), has_ground, unit),
+        (tuple(things[:targets]), tuple(meshes[:targets]), has_ground, unit),
     )
     distant = sky_lights(scene.sky, scene.sun, has_ground)
     lights = bake_lights(distant, scene.lights, casters, unit, has_ground, options.shadow_resolution)

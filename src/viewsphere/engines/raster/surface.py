@@ -13,7 +13,7 @@ from viewsphere.engines.raster.bundles import BundlePacker
 from viewsphere.engines.raster.looks import look
 from viewsphere.engines.raster.records import Surfaces, Textures
 from viewsphere.model.scene import Ground
-from viewsphere.model.shot import Placement, Repaint
+from viewsphere.model.shot import Repaint, Thing
 from viewsphere.surroundings.ground import ground_frame, ground_material
 from viewsphere.truth.geometry import Geometry
 
@@ -25,11 +25,11 @@ def pack_surfaces(
     origin: NDArray[np.float64],
     unit: float,
     targets: int,
-    placements: Sequence[Placement] = (),
+    things: Sequence[Thing] = (),
 ) -> tuple[Surfaces, Textures]:
     """Arrays for all triangles of a geometry and of the meshes it was built from; positions from `origin` in `unit`s.
 
-    The first `targets` meshes are what the picture is about, the others scenery. `placements[i].repaints` change the materials
+    The first `targets` meshes are what the picture is about, the others scenery. `things[i].repaints` change the materials
     of `meshes[i]`. The ground's material is the last. Raises UserError for a picture of the ground that cannot be read.
     """
     vertices = np.zeros((len(geometry.vertices), 16), np.float32)
@@ -49,7 +49,7 @@ def pack_surfaces(
         if mesh.colors is not None:
             vertices[own, 7:11] = mesh.colors
         vertices[own] = np.nan_to_num(vertices[own], nan=0.0, posinf=0.0, neginf=0.0)  # a face without normals is flat
-        repaints = placements[i].repaints if placements else ()
+        repaints = things[i].repaints if things else ()
         kind = id(mesh), i >= targets, repaints
         if kind not in first_row:
             first_row[kind] = len(looks)

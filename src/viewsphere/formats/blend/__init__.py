@@ -26,7 +26,7 @@ from viewsphere.errors import StoreError, UserError
 from viewsphere.model.files import Files
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.model.scene import Matrix4, Scene
-from viewsphere.model.shot import Frame, ModelSpec, Placement, Shot
+from viewsphere.model.shot import Frame, ModelSpec, Shot, Thing
 from viewsphere.zoo import build
 
 if TYPE_CHECKING:
@@ -124,7 +124,7 @@ def _lit_anyhow(key: str, sample: Sample) -> Shot:
     """A shot of which only its objects and cameras are known, in the default light."""
     return Shot(
         key=key,
-        placements=tuple(Placement(id=o.id, model=_spec(o.key, ""), world_from_object=_matrix(o)) for o in sample.objects),
+        things=tuple(Thing(id=o.id, model=_spec(o.key, ""), world_from_object=_matrix(o)) for o in sample.objects),
         intrinsics=sample.camera.intrinsics,
         scene=Scene(),
         frames=(Frame(index=sample.index, pose=sample.pose, split=sample.split),),

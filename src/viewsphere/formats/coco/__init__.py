@@ -21,9 +21,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from viewsphere.codecs.png_tiff import encode_png
 from viewsphere.errors import UserError
 from viewsphere.formats.coco.reading import read as read
-from viewsphere.geometry.image_files import encode_png
 from viewsphere.geometry.mask import mask_polygons
 from viewsphere.model.channel import missing
 from viewsphere.model.paper_json import faces, json_bytes, transformation_matrix, vehicles

@@ -18,8 +18,8 @@ from pathlib import Path
 from tempfile import TemporaryFile
 from typing import IO, TYPE_CHECKING, Any
 
+from viewsphere.codecs.png_tiff import encode_png
 from viewsphere.formats.native.reading import read as read
-from viewsphere.geometry.image_files import encode_png
 from viewsphere.model.channel import picture_of
 from viewsphere.model.paper_json import faces, json_bytes, transformation_matrix, vehicles
 from viewsphere.model.sample import ObjectAnnotation, Sample

@@ -10,8 +10,8 @@ import math
 import numba as nb
 import numpy as np
 
-from viewsphere.geometry.jit import inner, njit
 from viewsphere.imaging.kernels_view import FAST
+from viewsphere.kernels.jit import inner, njit
 
 f4 = nb.float32
 U = nb.uintp

@@ -10,8 +10,8 @@ import numpy as np
 from viewsphere.assets.timeline import Blenders
 from viewsphere.errors import ModelError, RecipeError
 from viewsphere.model.camera import Intrinsics
-from viewsphere.model.recipe_time import chosen_frames
-from viewsphere.model.recipe_viewpoints import PoseList
+from viewsphere.recipe.time import chosen_frames
+from viewsphere.recipe.viewpoints import PoseList
 from viewsphere.sampling.pose_files.entries import Motion, PoseFile
 from viewsphere.sampling.pose_files.lens import one_lens
 from viewsphere.sampling.pose_files.motions import motion

@@ -9,10 +9,11 @@ from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
 
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.mistakes import shown
-from viewsphere.model.recipe_draws import FARTHEST, Drawn, Length, is_random
-from viewsphere.model.recipe_models import ZOO, Unit
-from viewsphere.model.recipe_values import Count, Interval, Number, OrShort, Point, shape_of
+from viewsphere.model.numbers import Count, Number
 from viewsphere.model.shot import Axis
+from viewsphere.recipe.draws import FARTHEST, Drawn, Length, is_random
+from viewsphere.recipe.models import ZOO, Unit
+from viewsphere.recipe.values import Interval, OrShort, Point, shape_of
 
 Draw = Literal["fixed", "per_model", "per_frame"]
 Labels = Literal["background", "own"]

@@ -7,9 +7,9 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, model_validator
 
 from viewsphere.model.frozen import Frozen
-from viewsphere.model.recipe_scenery import DRAWS, Draw
-from viewsphere.model.recipe_time import STEPS, Frames, Steps
-from viewsphere.model.recipe_values import OrShort
+from viewsphere.recipe.scenery import DRAWS, Draw
+from viewsphere.recipe.time import STEPS, Frames, Steps
+from viewsphere.recipe.values import OrShort
 
 Pattern = Annotated[str, Field(min_length=1)]
 VALUE = "*"

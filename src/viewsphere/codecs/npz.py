@@ -13,8 +13,8 @@ import numpy as np
 from isal import isal_zlib
 from numpy.typing import NDArray
 
+from viewsphere.codecs.deflate import deflate
 from viewsphere.errors import UserError
-from viewsphere.geometry.deflate import deflate
 
 _DEFLATED, _VERSION, _DATE = 8, 20, 33  # ZIP 2.0; 1 January 1980, so that equal arrays make equal files
 

@@ -22,6 +22,7 @@ from pydantic_core import CoreSchema
 
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.mistakes import nearest, shown
+from viewsphere.model.numbers import Number, Positive
 
 
 class OrShort:
@@ -32,10 +33,6 @@ class OrShort:
 
     def __get_pydantic_json_schema__(self, core: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
         return {"anyOf": [*self.forms, handler(core)]}
-
-
-def _whole(value: object) -> object:
-    return int(value) if isinstance(value, float) and value.is_integer() else value
 
 
 def pair(value: object) -> object:
@@ -62,12 +59,6 @@ def shape_of(value: object) -> str:
     return "text" if isinstance(value, str) else "number"
 
 
-LARGEST = 1e9
-"""Of any number in a recipe: metres, degrees, pixels; beyond it what is meant is out of every picture."""
-Number = Annotated[float, Field(strict=True, ge=-LARGEST, le=LARGEST)]
-Positive = Annotated[float, Field(strict=True, gt=0, le=LARGEST)]
-Count = Annotated[int, BeforeValidator(_whole), Field(strict=True, ge=1)]
-Natural = Annotated[int, BeforeValidator(_whole), Field(strict=True, ge=0)]
 Point = tuple[Number, Number, Number]
 
 

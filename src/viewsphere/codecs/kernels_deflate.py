@@ -10,7 +10,7 @@ from functools import cache
 
 import numpy as np
 
-from viewsphere.geometry.jit import inner, njit
+from viewsphere.kernels.jit import inner, njit
 
 U = np.uintp
 SHORTEST = 64  # bytes of a run that is worth two blocks

@@ -29,7 +29,8 @@ from pydantic_core import CoreSchema, core_schema
 
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.mistakes import at, nearest, shown
-from viewsphere.model.recipe_values import COLOR_FORMS, Number, OrShort, parse_color
+from viewsphere.model.numbers import Number
+from viewsphere.recipe.values import COLOR_FORMS, OrShort, parse_color
 
 if TYPE_CHECKING:
     from numpy.random import Generator

@@ -31,7 +31,7 @@ def deflate(array: NDArray[Any]) -> bytes | memoryview:
     array = np.ascontiguousarray(array)
     if array.dtype.newbyteorder("=") != np.float32 or step not in (1, 3):
         return isal_zlib.compress(array, level_for(array.nbytes), -15)
-    from viewsphere.geometry.kernels_deflate import STORED, deflate_runs, match_codes
+    from viewsphere.codecs.kernels_deflate import STORED, deflate_runs, match_codes
 
     data = array.reshape(-1).view(np.uint8)
     out = np.empty(data.size + 5 * (data.size // STORED) + 64, np.uint8)

@@ -9,9 +9,10 @@ from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
 
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.mistakes import nearest, shown
-from viewsphere.model.recipe_time import STEPS, Frames, Steps
-from viewsphere.model.recipe_values import Count, OrShort, Positive, shape_of
+from viewsphere.model.numbers import Count, Positive
 from viewsphere.model.shot import Axis
+from viewsphere.recipe.time import STEPS, Frames, Steps
+from viewsphere.recipe.values import OrShort, shape_of
 
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
 ZOO = "zoo:"

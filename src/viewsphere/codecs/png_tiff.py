@@ -16,8 +16,8 @@ import numpy as np
 from isal import isal_zlib
 from numpy.typing import NDArray
 
+from viewsphere.codecs.deflate import deflate, level_for
 from viewsphere.errors import UserError
-from viewsphere.geometry.deflate import deflate, level_for
 
 _SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _COLOR_TYPES = {1: 0, 3: 2, 4: 6}  # components -> PNG colour type

@@ -183,7 +183,7 @@ def dump(data: dict[str, Any]) -> str:
 
 def schema() -> dict[str, Any]:
     """JSON schema (draft 2020-12) of recipe files, with a description of every field."""
-    from viewsphere.model.recipe import Recipe
+    from viewsphere.recipe.recipe import Recipe
 
     whole = Recipe.model_json_schema()
     path = {"type": "string", "minLength": 1}

@@ -8,9 +8,10 @@ from pydantic import Discriminator, Field, Tag, field_validator, model_validator
 
 from viewsphere.geometry.pose_category import pose_category
 from viewsphere.model.frozen import Frozen
-from viewsphere.model.recipe_time import Frames
-from viewsphere.model.recipe_values import Count, Interval, Number, Point, Positive, Range, Values, shape_of
+from viewsphere.model.numbers import Count, Number, Positive
 from viewsphere.model.shot import Axis
+from viewsphere.recipe.time import Frames
+from viewsphere.recipe.values import Interval, Point, Range, Values, shape_of
 
 AZIMUTH = "0: the camera faces the model's front; 90: it stands on the model's left, +X"
 ELEVATION = "above the horizon, -90 to 90"

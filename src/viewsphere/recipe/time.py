@@ -10,7 +10,8 @@ from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
 
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.mistakes import shown
-from viewsphere.model.recipe_values import Count, shape_of
+from viewsphere.model.numbers import Count
+from viewsphere.recipe.values import shape_of
 
 FrameNumber = Annotated[int, Field(strict=True, ge=-1_000_000, le=1_000_000)]
 

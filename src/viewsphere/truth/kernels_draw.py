@@ -12,7 +12,7 @@ import math
 
 import numpy as np
 
-from viewsphere.geometry.jit import inner, njit
+from viewsphere.kernels.jit import inner, njit
 from viewsphere.truth.kernels_row import FOUR, draw_four, shows_farther
 
 EPSILON = 1e-5  # pixels a bounding box is widened by: more than the edge functions' rounding

@@ -13,9 +13,9 @@ from typing import Any, cast
 from viewsphere.errors import RecipeError
 from viewsphere.model.mistakes import Marks, Place, dotted, shown
 from viewsphere.model.mistakes import Path as Steps
-from viewsphere.model.recipe_draws import KINDS
-from viewsphere.model.recipe_file import parse, read
-from viewsphere.model.recipe_models import ZOO
+from viewsphere.recipe.draws import KINDS
+from viewsphere.recipe.file import parse, read
+from viewsphere.recipe.models import ZOO
 
 PATHS: tuple[tuple[str, ...], ...] = (
     ("models", "*", "source"),

@@ -7,9 +7,9 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
 
 from viewsphere.model.frozen import Frozen
-from viewsphere.model.recipe_draws import Drawn, Length, LinearDrawn, Portion, SrgbDrawn, is_drawn_color
-from viewsphere.model.recipe_values import COLOR_FORMS, OrShort, parse_color, shape_of, switch
 from viewsphere.model.scene import Ground
+from viewsphere.recipe.draws import Drawn, Length, LinearDrawn, Portion, SrgbDrawn, is_drawn_color
+from viewsphere.recipe.values import COLOR_FORMS, OrShort, parse_color, shape_of, switch
 
 Picture = Annotated[str, Field(min_length=1)]
 _GROUND = Ground()

@@ -31,10 +31,11 @@ from viewsphere.model.channel import CHANNELS, DEFAULT_CHANNELS
 from viewsphere.model.files import Files
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.mistakes import Marks, one_of, report, shown
-from viewsphere.model.recipe_models import ModelEntry
-from viewsphere.model.recipe_scene import CameraEntry, EngineEntry, SceneEntry, engine_entry
-from viewsphere.model.recipe_values import Count, Natural, Number, OrShort, shape_of
-from viewsphere.model.recipe_viewpoints import Viewpoints
+from viewsphere.model.numbers import Count, Natural, Number
+from viewsphere.recipe.models import ModelEntry
+from viewsphere.recipe.scene import CameraEntry, EngineEntry, SceneEntry, engine_entry
+from viewsphere.recipe.values import OrShort, shape_of
+from viewsphere.recipe.viewpoints import Viewpoints
 
 BEFORE_RENDERING = {"name", "formats", "max_frames", "shot_frames"}
 """Fields that change neither a picture nor a label."""
@@ -193,7 +194,7 @@ class Recipe(Frozen):
 
         Raises RecipeError with file, line and field of every mistake.
         """
-        from viewsphere.model.recipe_extends import assemble
+        from viewsphere.recipe.extends import assemble
 
         data, marks = assemble(Path(path), _plain(changes))
         return cls.model_validate(data, context={"marks": marks, "folder": Path(path).parent})
@@ -206,7 +207,7 @@ class Recipe(Frozen):
 
     def to_yaml(self) -> str:
         """The recipe as the text of a file, without what equals the defaults; paths stay as they were written."""
-        from viewsphere.model.recipe_file import dump
+        from viewsphere.recipe.file import dump
 
         return dump(self.model_dump(mode="json", exclude_defaults=True))
 

@@ -48,7 +48,7 @@ from numba.core.untyped_passes import (
     TranslateByteCode,
 )
 
-from viewsphere.geometry.garbage import pause_collection
+from viewsphere.kernels.garbage import pause_collection
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)
@@ -71,7 +71,7 @@ class KernelLowering(NativeLowering):
     @property
     def lowering_class(self) -> Any:
         """Returns the class that does it, which takes long to load: only those that compile need it."""
-        from viewsphere.geometry.lowering import KernelLower
+        from viewsphere.kernels.lowering import KernelLower
 
         return KernelLower
 

@@ -14,7 +14,9 @@ from viewsphere.geometry.camera import orbit_center
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.mistakes import at as standing_at
 from viewsphere.model.mistakes import nearest, one_of, shown
-from viewsphere.model.recipe_draws import (
+from viewsphere.model.numbers import Natural
+from viewsphere.model.scene import WHITE, AreaLight, Daylight, PointLight, Sky, SpotLight, Sun, Vector
+from viewsphere.recipe.draws import (
     Amount,
     Coordinate,
     Drawn,
@@ -26,8 +28,7 @@ from viewsphere.model.recipe_draws import (
     alternatives,
     is_random,
 )
-from viewsphere.model.recipe_values import Natural, OrShort, shape_of, switch
-from viewsphere.model.scene import WHITE, AreaLight, Daylight, PointLight, Sky, SpotLight, Sun, Vector
+from viewsphere.recipe.values import OrShort, shape_of, switch
 
 SWITCH: list[Any] = [True, False, "on", "off"]
 _SUN, _SKY, _DAYLIGHT = Sun(), Sky(), Daylight()

@@ -11,9 +11,10 @@ from viewsphere.geometry.camera import focal_from_fov, focal_from_sensor
 from viewsphere.model.camera import Distortion, Intrinsics
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.mistakes import at, shown
-from viewsphere.model.recipe_blend import BlendField
-from viewsphere.model.recipe_draws import Drawn, alternatives, is_random
-from viewsphere.model.recipe_finish import (
+from viewsphere.model.numbers import Count, Number, Positive
+from viewsphere.recipe.blend import BlendField
+from viewsphere.recipe.draws import Drawn, alternatives, is_random
+from viewsphere.recipe.finish import (
     BackgroundEntry,
     BackgroundField,
     EffectsEntry,
@@ -23,10 +24,10 @@ from viewsphere.model.recipe_finish import (
     ViewEntry,
     ViewField,
 )
-from viewsphere.model.recipe_light import SKY_SUFFIXES, GradientEntry, HdriSky, HemisphereEntry, LightsField, SkyField, SunField
-from viewsphere.model.recipe_scenery import CompanyField, Draw, PlaceField, PlanesField
-from viewsphere.model.recipe_surface import GroundEntry, GroundField, MaterialEntry
-from viewsphere.model.recipe_values import Count, Number, OrShort, Positive, pair
+from viewsphere.recipe.light import SKY_SUFFIXES, GradientEntry, HdriSky, HemisphereEntry, LightsField, SkyField, SunField
+from viewsphere.recipe.scenery import CompanyField, Draw, PlaceField, PlanesField
+from viewsphere.recipe.surface import GroundEntry, GroundField, MaterialEntry
+from viewsphere.recipe.values import OrShort, pair
 
 LARGEST_IMAGE = 16384
 OF_FILE = ("place", "sun", "sky", "ground")

@@ -12,8 +12,8 @@ import numpy as np
 from isal import isal_zlib
 from numpy.typing import NDArray
 
+from viewsphere.codecs.deflate import FAST
 from viewsphere.errors import UserError
-from viewsphere.geometry.deflate import FAST
 
 _MAGIC = struct.pack("<II", 20000630, 2)
 _ZIP, _LINES = 3, 16

@@ -20,8 +20,8 @@ from typing import Any
 import numba
 from numba.core import config
 
-from viewsphere.geometry import compiler
-from viewsphere.geometry.kernel_cache import BUILD, kernel_folder
+from viewsphere.kernels import compiler
+from viewsphere.kernels.kernel_cache import BUILD, kernel_folder
 
 _IMPORT = re.compile(r"^from (viewsphere[\w.]*) import", re.MULTILINE)
 _COMPILER = tuple(str(Path(__file__).with_name(f"{name}.py")) for name in ("jit", "compiler", "lowering"))

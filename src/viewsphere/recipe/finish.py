@@ -7,7 +7,8 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, model_validator
 
 from viewsphere.model.frozen import Frozen
-from viewsphere.model.recipe_draws import (
+from viewsphere.model.scene import Background, Smoother, View
+from viewsphere.recipe.draws import (
     Coordinate,
     Distribution,
     Drawn,
@@ -19,10 +20,9 @@ from viewsphere.model.recipe_draws import (
     is_drawn_color,
     is_random,
 )
-from viewsphere.model.recipe_scenery import Draw
-from viewsphere.model.recipe_surface import Picture
-from viewsphere.model.recipe_values import COLOR_FORMS, OrShort, parse_color
-from viewsphere.model.scene import Background, Smoother, View
+from viewsphere.recipe.scenery import Draw
+from viewsphere.recipe.surface import Picture
+from viewsphere.recipe.values import COLOR_FORMS, OrShort, parse_color
 
 _BACKGROUND, _SMOOTHER, _VIEW = Background(), Smoother(), View()
 

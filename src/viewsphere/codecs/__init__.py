@@ -1,0 +1,1 @@
+"""Pixels to bytes and back: PNG, TIFF, OpenEXR, NPZ, and what Pillow and imagecodecs write."""

@@ -1,0 +1,1 @@
+"""How numba is used: jit, its cache, faster compilation. Nothing about pictures."""

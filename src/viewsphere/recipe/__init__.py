@@ -1,0 +1,1 @@
+"""What a user writes: fields, distributions, files, mistakes."""
