@@ -29,8 +29,9 @@ from viewsphere.assets.mesh import Mesh
 from viewsphere.engines.raster import painting, staging
 from viewsphere.geometry.box import box_vertices
 from viewsphere.model.camera import Camera
+from viewsphere.model.instant import Instant
 from viewsphere.model.sample import Sample
-from viewsphere.model.shot import Frame, Shot
+from viewsphere.model.shot import Shot
 from viewsphere.run.stages import Stages
 from viewsphere.sampling.camera import camera_for
 from viewsphere.sampling.plan import SHOT_FRAMES
@@ -172,7 +173,9 @@ def installed_rivals(geometry: Geometry) -> list[Rival]:
     return rivals
 
 
-def rival_shot(clock: Clock, name: str, draw: Callable[[Camera], Any], shot: Shot, frames: Sequence[Frame], mesh: Mesh) -> None:
+def rival_shot(
+    clock: Clock, name: str, draw: Callable[[Camera], Any], shot: Shot, frames: Sequence[Instant], mesh: Mesh
+) -> None:
     """The same frames by a rival, right after ours: what slows the machine for seconds slows both."""
     cameras = [camera_for(shot.intrinsics, frame.pose, box_vertices(*mesh.bounds).mean(axis=0)) for frame in frames]
     draw(cameras[0])  # its scene comes back into the caches, as ours has
@@ -180,7 +183,7 @@ def rival_shot(clock: Clock, name: str, draw: Callable[[Camera], Any], shot: Sho
         clock(name, lambda camera=camera: draw(camera))
 
 
-def one_frame(clock: Clock, shot: Shot, frame: Frame, stage: plugins.Stage, mesh: Mesh) -> Sample:
+def one_frame(clock: Clock, shot: Shot, frame: Instant, stage: plugins.Stage, mesh: Mesh) -> Sample:
     """One frame stage by stage, but for its files."""
     boxes = [box_vertices(*mesh.bounds)]
     camera = camera_for(shot.intrinsics, frame.pose, boxes[0].mean(axis=0))
@@ -192,7 +195,7 @@ def one_frame(clock: Clock, shot: Shot, frame: Frame, stage: plugins.Stage, mesh
     return Sample(frame.index, "train", camera, frame.pose, objects, observed, {})
 
 
-def one_shot(clock: Clock, shot: Shot, frames: Sequence[Frame], stage: plugins.Stage, mesh: Mesh, store: Store) -> None:
+def one_shot(clock: Clock, shot: Shot, frames: Sequence[Instant], stage: plugins.Stage, mesh: Mesh, store: Store) -> None:
     """As many frames as a run has in a shot, stage by stage. Each has its share of what a shot writes beside them."""
     inside: list[float] = []
     files: list[float] = []

@@ -15,8 +15,11 @@ from bench_scene import texture_set
 from viewsphere import plugins
 from viewsphere.assets.mesh import Image, Material, Mesh, Texture
 from viewsphere.model.camera import Intrinsics
+from viewsphere.model.instant import Instant, Viewpoint
+from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Ground, Scene, Sun
-from viewsphere.model.shot import Frame, ModelSpec, Pose, Shot, Thing
+from viewsphere.model.shot import Shot
+from viewsphere.model.thing import Motion, Thing
 from viewsphere.run.allocator import keep_freed_memory
 from viewsphere.sampling.camera import camera_for
 from viewsphere.truth.channels import observe
@@ -78,13 +81,13 @@ def frame_cost(mesh: Mesh, side: tuple[int, int] = (640, 480), copies: int = 1) 
     rows = [((1, 0, 0, x), (0, 1, 0, y), (0, 0, 1, 0.5), (0, 0, 0, 1)) for x, y in places]
     width, height = side
     distance = 1.0 + 1.6 * across
-    poses = [Pose(index=i, azimuth_deg=20 + 70 * i, elevation_deg=25, distance=distance) for i in range(FRAMES)]
+    poses = [Viewpoint(index=i, azimuth_deg=20 + 70 * i, elevation_deg=25, distance=distance) for i in range(FRAMES)]
     shot = Shot(
         key="scaling",
-        things=tuple(Thing(id=i, model=spec, world_from_object=w) for i, w in enumerate(rows, 1)),
+        things=tuple(Thing(id=i, model=spec, motion=Motion.still(w)) for i, w in enumerate(rows, 1)),
         intrinsics=Intrinsics(width=width, height=height, fx=1.2 * width, fy=1.2 * width, cx=width / 2, cy=height / 2),
         scene=Scene(sun=Sun(), ground=Ground()),
-        frames=tuple(Frame(index=p.index, pose=p, split="train") for p in poses),
+        frames=tuple(Instant(index=p.index, pose=p, split="train") for p in poses),
         channels=("rgb", "depth", "instances", "normals"),
     )
     engine: plugins.Engine = plugins.load("engines", "raster")

@@ -32,8 +32,11 @@ from viewsphere.errors import ViewsphereError
 from viewsphere.geometry.box import box_vertices
 from viewsphere.imaging.view import develop
 from viewsphere.model.camera import Camera, Intrinsics
+from viewsphere.model.instant import Instant, Viewpoint
+from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import AreaLight, Environment, Ground, PointLight, Scene, Sky, SpotLight, Sun, View
-from viewsphere.model.shot import Frame, ModelSpec, Pose, Shot, Thing
+from viewsphere.model.shot import Shot
+from viewsphere.model.thing import Motion, Thing
 from viewsphere.sampling.camera import camera_for
 from viewsphere.truth.visibility import rasterize
 from viewsphere.zoo import build
@@ -113,13 +116,13 @@ def shot_of(case: Case) -> tuple[Shot, dict[str, Mesh]]:
         Thing(
             id=i,
             model=ModelSpec(key=key, source=key, category="model", category_id=1),
-            world_from_object=((1, 0, 0, x), (0, 1, 0, y), (0, 0, 1, z), (0, 0, 0, 1)),
+            motion=Motion.still(((1, 0, 0, x), (0, 1, 0, y), (0, 0, 1, z), (0, 0, 0, 1))),
         )
         for i, (key, (_, (x, y, z))) in enumerate(zip(meshes, case.models, strict=True), 1)
     )
     corners = np.concatenate([box_vertices(*mesh.bounds) + np.array(at) for mesh, at in case.models])
     middle = (corners.min(axis=0) + corners.max(axis=0)) / 2
-    pose = Pose(
+    pose = Viewpoint(
         index=0,
         azimuth_deg=case.azimuth_deg,
         elevation_deg=case.elevation_deg,
@@ -127,7 +130,7 @@ def shot_of(case: Case) -> tuple[Shot, dict[str, Mesh]]:
         target=(float(middle[0]), float(middle[1]), float(middle[2])),
     )
     lens = Intrinsics(width=WIDTH, height=HEIGHT, fx=WIDTH * 1.25, fy=WIDTH * 1.25, cx=WIDTH / 2, cy=HEIGHT / 2)
-    frame = Frame(index=0, pose=pose, split="train")
+    frame = Instant(index=0, pose=pose, split="train")
     return Shot(key=case.name, things=things, intrinsics=lens, scene=case.scene, frames=(frame,), channels=("rgb",)), meshes
 
 

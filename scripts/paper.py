@@ -15,9 +15,11 @@ from PIL import Image, ImageDraw, ImageFont
 from viewsphere import Recipe
 from viewsphere.geometry.box import EDGES, FACES
 from viewsphere.model.camera import Camera, Intrinsics
+from viewsphere.model.instant import Instant, Viewpoint
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.model.scene import Background, Finish, Scene
-from viewsphere.model.shot import Frame, Pose, Shot, Thing
+from viewsphere.model.shot import Shot
+from viewsphere.model.thing import Thing
 from viewsphere.preview import INK, PALETTE, PAPER, draw_sample
 from viewsphere.run.opening import prepare
 from viewsphere.run.stages import Stages
@@ -313,13 +315,13 @@ def pose_sphere(made_of: Recipe, size: int) -> Picture:
     planned, stages = prepare(made_of), Stages()
     spec = planned.model_specs[17].model_copy(update={"scale": 3.6})  # twice its length, to be seen among the cameras
     lens = Intrinsics(width=2 * size, height=2 * size, fx=3.0 * size, fy=3.0 * size, cx=size, cy=1.24 * size)
-    pose = Pose(index=0, azimuth_deg=30, elevation_deg=17, distance=24.5)
+    pose = Viewpoint(index=0, azimuth_deg=30, elevation_deg=17, distance=24.5)
     shot = Shot(
         key="sphere",
         things=(Thing(id=1, model=spec),),
         intrinsics=lens,
         scene=Scene(finish=Finish(background=Background(color=(1.0, 1.0, 1.0)))),
-        frames=(Frame(index=0, pose=pose, split=""),),
+        frames=(Instant(index=0, pose=pose, split=""),),
         channels=("rgb", "depth", "instances"),
     )
     (sample,) = stages.render(shot)

@@ -21,6 +21,8 @@ from viewsphere.assets.mesh import Mesh
 from viewsphere.errors import ViewsphereError
 from viewsphere.geometry.box import box_vertices
 from viewsphere.model.camera import Intrinsics
+from viewsphere.model.instant import Instant, Viewpoint
+from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import (
     AreaLight,
     Background,
@@ -34,7 +36,8 @@ from viewsphere.model.scene import (
     SpotLight,
     Sun,
 )
-from viewsphere.model.shot import Frame, ModelSpec, Pose, Shot, Thing
+from viewsphere.model.shot import Shot
+from viewsphere.model.thing import Thing
 from viewsphere.run.stages import build_zoo_model
 from viewsphere.sampling.camera import camera_for
 from viewsphere.truth.visibility import rasterize
@@ -89,8 +92,8 @@ def models(files: Sequence[Path], families: Sequence[str]) -> Iterator[tuple[str
 def tile(mesh: Mesh, scene: Scene, azimuth_deg: float = 35, elevation_deg: float = 20) -> Image.Image:
     """The model in this light, all of it in the picture."""
     size = float(np.linalg.norm(np.ptp(mesh.bounds, axis=0)))
-    pose = Pose(index=0, azimuth_deg=azimuth_deg, elevation_deg=elevation_deg, distance=2.2 * size)
-    frame = Frame(index=0, pose=pose, split="train")
+    pose = Viewpoint(index=0, azimuth_deg=azimuth_deg, elevation_deg=elevation_deg, distance=2.2 * size)
+    frame = Instant(index=0, pose=pose, split="train")
     thing = Thing(id=1, model=SPEC)
     shot = Shot(key="sheet", things=(thing,), intrinsics=LENS, scene=scene, frames=(frame,), channels=("rgb",))
     engine: plugins.Engine = plugins.load("engines", "raster")

@@ -12,9 +12,12 @@ from viewsphere.geometry.camera import orbit_center, orbit_rotation
 from viewsphere.geometry.pose_category import pose_category
 from viewsphere.model.camera import Camera, Intrinsics
 from viewsphere.model.channel import CHANNELS, PICTURES
+from viewsphere.model.instant import Instant, Viewpoint
+from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.sample import Sample
 from viewsphere.model.scene import Ground, Scene
-from viewsphere.model.shot import Frame, ModelSpec, Pose, Shot, Thing
+from viewsphere.model.shot import Shot
+from viewsphere.model.thing import Motion, Thing
 from viewsphere.store import Category, Dataset, ModelInfo, PlanRecord, Store
 from viewsphere.truth.channels import observe
 from viewsphere.truth.geometry import build_geometry
@@ -36,7 +39,7 @@ def block(width: float, length: float, height: float) -> Mesh:
 
 MESHES = (block(0.6, 1.0, 0.5), block(1.0, 0.3, 0.9), block(0.2, 1.4, 0.2))
 POSES = tuple(
-    Pose(
+    Viewpoint(
         index=i, azimuth_deg=a, elevation_deg=e, distance=2.2, tilt_deg=t, target=(0, 0, 0), category=pose_category(a, e)
     )
     for i, (a, e, t) in enumerate([(0, 10, 0), (70, 35, 12), (200, 60, 0), (300, -20, 0)])
@@ -53,7 +56,7 @@ def spec(index: int) -> ModelSpec:
 
 def placed(offsets: dict[int, tuple[float, float, float]]) -> tuple[Thing, ...]:
     return tuple(
-        Thing(id=i, model=spec(m), world_from_object=((1, 0, 0, x), (0, 1, 0, y), (0, 0, 1, z), (0, 0, 0, 1)))
+        Thing(id=i, model=spec(m), motion=Motion.still(((1, 0, 0, x), (0, 1, 0, y), (0, 0, 1, z), (0, 0, 0, 1))))
         for i, (m, (x, y, z)) in enumerate(offsets.items(), 1)
     )
 
@@ -83,7 +86,7 @@ def shots(several: bool, channels: tuple[str, ...], intrinsics: Intrinsics, grou
     made = []
     for s, offsets in enumerate(scenes):
         frames = tuple(
-            Frame(index=s * len(POSES) + p.index, pose=p, split="val" if (p.index if several else s) == 2 else "train")
+            Instant(index=s * len(POSES) + p.index, pose=p, split="val" if (p.index if several else s) == 2 else "train")
             for p in POSES
         )
         made.append(

@@ -7,7 +7,7 @@ import pytest
 
 from small import small_recipe
 from viewsphere.geometry.box import EDGES
-from viewsphere.model.shot import ModelSpec
+from viewsphere.model.model_spec import ModelSpec
 from viewsphere.preview import PALETTE, contact_sheet, depth_picture, draw_sample, four_sides, preview_samples
 
 

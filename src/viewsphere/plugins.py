@@ -1,4 +1,4 @@
-"""The seams: what an engine and a format must offer, and how a name finds its module.
+"""How a name finds its module; what a plug-in must offer stands in its package (`Engine` in `viewsphere.engines`, ...).
 
 A plug-in is one module; its name is its file's name, listed without importing it. Third parties use the entry-point
 groups `viewsphere.engines` and `viewsphere.formats`. What is found by name is imported here and nowhere else.
@@ -8,68 +8,12 @@ from __future__ import annotations
 
 import importlib
 import pkgutil
-from collections.abc import Callable, Mapping, Sequence
 from importlib.metadata import entry_points
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, Protocol
+from typing import Any, Literal
 
 from viewsphere.errors import UserError
 
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-    from pydantic import JsonValue
-
-    from viewsphere.assets.mesh import Mesh
-    from viewsphere.model.camera import Camera
-    from viewsphere.model.shot import Frame, ModelSpec, Shot
-    from viewsphere.store import Dataset
-    from viewsphere.truth.geometry import Geometry
-    from viewsphere.truth.visibility import Visibility
-
 Kind = Literal["engines", "formats"]
-
-
-class Stage(Protocol):
-    """What an engine built for a shot and keeps warm while the camera moves."""
-
-    geometry: Geometry
-
-    def color(self, camera: Camera, frame: Frame, visibility: Visibility) -> NDArray[np.uint8]:
-        """The picture, (H, W, 3) uint8 sRGB; `visibility` is truth's buffer for this camera.
-
-        Where the frame's finish (or else the scene's) has a transparent background, (H, W, 4) with straight alpha: black where
-        nothing is seen. Over any plain background it gives the picture with that background.
-        """
-        ...
-
-
-class Engine(Protocol):
-    """A module that paints pictures: `check` its options, `stage` a shot. Only with `OPENS_SCENES = True` it is given shots
-    whose scene is a .blend file (`scene.blend`); with `CATCHES_SHADOWS = False` none whose ground is a shadow catcher.
-    """
-
-    def check(self, options: Mapping[str, JsonValue]) -> None:
-        """Raise UserError for an option that is not known, or out of range; asked before anything is rendered."""
-        ...
-
-    def stage(self, shot: Shot, load: Callable[[ModelSpec], Mesh]) -> Stage:
-        """Build what all frames of the shot share; `load` gives a model's normalised mesh."""
-        ...
-
-
-class Format(Protocol):
-    """A module that writes a data set in one format: `export`; with `CHANNELS`, the names of the channels it needs, a run
-    that does not keep them is refused before it begins; with `check()`, one that cannot be written here, by a UserError. One
-    that has `read(path, *, keep_going) -> ForeignDataset` (`viewsphere.store.foreign`) can be imported, too.
-    """
-
-    def export(self, dataset: Dataset, folder: Path) -> Sequence[str] | None:
-        """Write the finished frames of the data set into this empty folder; images by `dataset.link`.
-
-        May give notes for the user, a line each.
-        """
-        ...
 
 
 def names(kind: Kind) -> tuple[str, ...]:

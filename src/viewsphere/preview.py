@@ -13,12 +13,17 @@ from PIL import Image, ImageDraw, ImageFont
 from viewsphere.geometry.box import EDGES, FACES
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.channel import picture_of
+from viewsphere.model.instant import Viewpoint
+from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.rig import Rig
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.model.scene import Ground, Scene
-from viewsphere.model.shot import Frame, ModelSpec, Pose, Shot, Thing
+from viewsphere.model.shot import Shot
+from viewsphere.model.thing import Thing
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.run.opening import prepare
 from viewsphere.run.stages import Stages
+from viewsphere.sampling.camera import looking
 from viewsphere.sampling.plan import Plan
 from viewsphere.store import Dataset
 
@@ -45,7 +50,7 @@ def preview_samples(recipe: Recipe, count: int = 12, width: int = 320) -> Iterat
         for group in groups:
             shot = planned.take(model, group, stages.box)
             channels = tuple(dict.fromkeys((*shot.channels, picture_of(shot.channels) or "rgb", "depth", "instances")))
-            small = shot.model_copy(update={"intrinsics": _scaled(shot.intrinsics, width), "channels": channels})
+            small = shot.model_copy(update={"rig": _scaled(shot.rig, width), "channels": channels})
             yield from stages.render(small)
 
 
@@ -70,7 +75,13 @@ def _spread(planned: Plan, count: int) -> list[tuple[int, list[int]]]:
     return list(chosen.items())
 
 
-def _scaled(lens: Intrinsics, width: int) -> Intrinsics:
+def _scaled(rig: Rig, width: int) -> Rig:
+    """The same cameras with narrower pictures."""
+    sensors = (s.model_copy(update={"intrinsics": _narrowed(s.intrinsics, width)}) for s in rig.sensors)
+    return rig.model_copy(update={"sensors": tuple(sensors)})
+
+
+def _narrowed(lens: Intrinsics, width: int) -> Intrinsics:
     """The same view at another width; wider is never needed for a preview."""
     k = min(1.0, width / lens.width)
     sizes = {"width": max(1, round(lens.width * k)), "height": max(1, round(lens.height * k))}
@@ -97,20 +108,17 @@ def four_sides(spec: ModelSpec, size: int = 320) -> Picture:
     radius = float(np.linalg.norm(high - low)) / 2
     focal = 1.6 * size
     distance = radius / math.sin(math.atan(0.5 * size / focal)) * 1.02
-    frames = tuple(
-        Frame(
-            index=i,
-            split="",
-            pose=Pose(index=i, azimuth_deg=a, elevation_deg=15, distance=distance, category=name),
-        )
+    x, y, z = ((low + high) / 2).tolist()
+    sides = (
+        Viewpoint(index=i, azimuth_deg=a, elevation_deg=15, distance=distance, category=name)
         for i, (name, a) in enumerate(SIDES)
     )
     shot = Shot(
         key=spec.key,
         things=(Thing(id=1, model=spec),),
-        intrinsics=Intrinsics(width=size, height=size, fx=focal, fy=focal, cx=size / 2, cy=size / 2),
+        rig=Rig.of(Intrinsics(width=size, height=size, fx=focal, fy=focal, cx=size / 2, cy=size / 2)),
         scene=Scene(ground=Ground()),
-        frames=frames,
+        instants=tuple(looking(side, (x, y, z), index=side.index) for side in sides),
         channels=("rgb", "instances"),
     )
     tiles = [(s.rgb, f"{s.pose.category} (azimuth {s.pose.azimuth_deg:g})") for s in stages.render(shot)]

@@ -11,10 +11,13 @@ from viewsphere.geometry.box import FACES, box_vertices
 from viewsphere.geometry.camera import orbit_center, orbit_rotation
 from viewsphere.geometry.rotation import matrix_from_quaternion, rigid
 from viewsphere.model.camera import Camera, Distortion, Intrinsics
+from viewsphere.model.instant import Instant, Viewpoint
+from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.record import sample_from_record, sample_to_record
 from viewsphere.model.sample import Sample
 from viewsphere.model.scene import Scene
-from viewsphere.model.shot import Frame, ModelSpec, Pose, Shot, Thing
+from viewsphere.model.shot import Shot
+from viewsphere.model.thing import Motion, Thing
 from viewsphere.truth.geometry import build_geometry
 from viewsphere.truth.visibility import rasterize, silhouette
 
@@ -40,15 +43,17 @@ def at(x=0.0, y=0.0, z=0.0, turn=0.0):
 
 def scene(meshes, motions, pose=None, intrinsics=LENS, ground=False, category_deg=45.0):
     """Annotations of a frame, and all that they came from; the camera looks at the world's origin."""
-    pose = pose or Pose(index=0, azimuth_deg=0, elevation_deg=0, distance=4)
+    pose = pose or Viewpoint(index=0, azimuth_deg=0, elevation_deg=0, distance=4)
     angles = np.radians([pose.azimuth_deg, pose.elevation_deg, pose.tilt_deg])
     rotation = orbit_rotation(*angles)
     camera = Camera(intrinsics, rotation, -rotation @ orbit_center(*angles[:2], pose.distance))
     specs = [
         ModelSpec(key=f"m{i}", source="x.obj", category="cube", category_id=1, real_size=(1, 2, 3)) for i in range(len(meshes))
     ]
-    things = tuple(Thing(id=i + 1, model=s, world_from_object=m) for i, (s, m) in enumerate(zip(specs, motions, strict=True)))
-    frame = Frame(index=5, pose=pose, split="train")
+    things = tuple(
+        Thing(id=i + 1, model=s, motion=Motion.still(m)) for i, (s, m) in enumerate(zip(specs, motions, strict=True))
+    )
+    frame = Instant(index=5, pose=pose, split="train")
     shot = Shot(
         key="shot", things=things, intrinsics=intrinsics, scene=Scene(), frames=(frame,),
         channels=("instances",), category_deg=category_deg,
@@ -85,7 +90,7 @@ def test_a_cube_seen_head_on():
 def test_p_times_the_box_is_the_box_in_pixels(seed):
     rng = np.random.default_rng(seed)
     azimuth, elevation, tilt, distance = rng.uniform((0, -90, -180, 1.2), (360, 90, 180, 9))
-    pose = Pose(index=0, azimuth_deg=azimuth, elevation_deg=elevation, distance=distance, tilt_deg=tilt)
+    pose = Viewpoint(index=0, azimuth_deg=azimuth, elevation_deg=elevation, distance=distance, tilt_deg=tilt)
     turns = [matrix_from_quaternion(rng.normal(size=4)) for _ in range(3)]
     motions = [rigid(turn, rng.uniform(-2, 2, 3)).tolist() for turn in turns]
     meshes = [block(-rng.uniform(0.1, 1, 3), rng.uniform(0.1, 1, 3)) for _ in range(3)]
@@ -125,7 +130,7 @@ POSES = list(itertools.product((0, 30, 135, 359), (-90, -35, 0, 60, 90), (0, 25,
 
 @pytest.mark.parametrize(("azimuth", "elevation", "tilt"), POSES)
 def test_the_view_of_an_object_at_the_target_is_the_pose(azimuth, elevation, tilt):
-    pose = Pose(index=0, azimuth_deg=azimuth, elevation_deg=elevation, distance=4, tilt_deg=tilt)
+    pose = Viewpoint(index=0, azimuth_deg=azimuth, elevation_deg=elevation, distance=4, tilt_deg=tilt)
     (cube,), *_ = scene([UNIT], [at()], pose)
     view = cube.view
     assert view.distance == pytest.approx(4)
@@ -203,7 +208,7 @@ def test_a_model_that_crosses_the_camera_plane():
 
 @pytest.mark.parametrize("elevation", [30, 5, -5])
 def test_the_ground_hides_only_from_below(elevation):
-    pose = Pose(index=0, azimuth_deg=20, elevation_deg=elevation, distance=4)
+    pose = Viewpoint(index=0, azimuth_deg=20, elevation_deg=elevation, distance=4)
     (cube,), camera, geometry, *_ = scene([UNIT], [at()], pose, ground=True)
     alone = silhouette(geometry, camera, 1, (0, 0, 160, 120)).sum()
     assert cube.visibility == cube.area / alone
@@ -223,14 +228,14 @@ def test_lens_distortion_is_followed():
 
 def test_wrong_numbers_of_models_are_refused():
     objects, camera, geometry, visibility, pose = scene([UNIT], [at()])
-    frame = Frame(index=5, pose=pose, split="train")
+    frame = Instant(index=5, pose=pose, split="train")
     shot = Shot(key="s", things=(), intrinsics=LENS, scene=Scene(), frames=(frame,), channels=())
     with pytest.raises(ValueError, match="frame 5: expected 1 objects"):
         annotate(shot, frame, camera, geometry, visibility, [objects[0].box3d_object], ["m"])
 
 
 def test_a_record_gives_back_every_bit():
-    tilted = Pose(index=3, azimuth_deg=0.1, elevation_deg=1 / 3, distance=4, tilt_deg=7, target=(0, 0, 0.1))
+    tilted = Viewpoint(index=3, azimuth_deg=0.1, elevation_deg=1 / 3, distance=4, tilt_deg=7, target=(0, 0, 0.1))
     lens = LENS.model_copy(update={"distortion": Distortion(model="fisheye", coefficients=(0.1, 0, 0, 0))})
     motions = [at(turn=0.3), at(y=-9), at(x=3)]
     objects, camera, _, visibility, pose = scene([UNIT] * 3, motions, tilted, lens)
@@ -257,7 +262,7 @@ def test_a_record_gives_back_every_bit():
 
 def test_an_object_that_fills_the_whole_field_of_a_lens():
     narrow = LENS.model_copy(update={"distortion": Distortion(model="brown_conrady", coefficients=(-50, 0, 0, 0))})
-    pose = Pose(index=0, azimuth_deg=0, elevation_deg=0, distance=1.5)
+    pose = Viewpoint(index=0, azimuth_deg=0, elevation_deg=0, distance=1.5)
     (cube,), *_ = scene([UNIT], [at()], pose, narrow)  # no edge of it is where the lens sees
     assert cube.area > 100
     assert (cube.visibility, cube.truncation) == (1, 0)

@@ -9,7 +9,8 @@ from test_annotate import scene
 
 from viewsphere.assets.cache import load_normalised
 from viewsphere.model.camera import Intrinsics
-from viewsphere.model.shot import ModelSpec, Pose
+from viewsphere.model.instant import Viewpoint
+from viewsphere.model.model_spec import ModelSpec
 from viewsphere.truth.visibility import silhouette
 
 MODELS = Path(__file__).parents[2].parent / "shared" / "models"
@@ -31,7 +32,7 @@ def test_labels_of_a_real_model(name, distance, cache):
     spec = ModelSpec(key="m", source=str(MODELS / name), category="c", category_id=1, scale=1.5)
     mesh = load_normalised(spec, folder=cache)
     for azimuth, elevation in ((35, 20), (200, -10), (0, 90)):
-        pose = Pose(index=0, azimuth_deg=azimuth, elevation_deg=elevation, distance=distance)
+        pose = Viewpoint(index=0, azimuth_deg=azimuth, elevation_deg=elevation, distance=distance)
         (o,), camera, geometry, *_ = scene([mesh], [STILL], pose, LENS, ground=elevation > 0)
         large = silhouette(geometry, camera, 1, (-320, -240, 640, 480))
         assert o.visibility == o.area / large.sum()

@@ -11,7 +11,7 @@ from viewsphere.assets.cache import cache_folder, load_normalised
 from viewsphere.assets.mesh import Mesh
 from viewsphere.assets.mesh_file import ARRAYS
 from viewsphere.errors import ModelError
-from viewsphere.model.shot import ModelSpec
+from viewsphere.model.model_spec import ModelSpec
 
 CUBE = "v 0 0 0\nv 1 0 0\nv 0 2 0\nv 0 0 3\n"
 FACES = "vt 0 0\nusemtl m\ng base\nf 1/1 3/1 2/1\nf 1/1 2/1 4/1\ng top\nf 2/1 3/1 4/1\nf 3/1 1/1 4/1\n"

@@ -10,7 +10,7 @@ from viewsphere.assets.export import export_glb, export_obj
 from viewsphere.assets.load import load_model
 from viewsphere.assets.mesh import Image, Material, Mesh, Texture
 from viewsphere.assets.normalise import normalise
-from viewsphere.model.shot import ModelSpec
+from viewsphere.model.model_spec import ModelSpec
 
 EVERYTHING = Material(
     name="every thing",

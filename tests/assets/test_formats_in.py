@@ -19,7 +19,7 @@ from viewsphere.assets.isolated import READ_HERE
 from viewsphere.assets.load import BLENDER_SUFFIXES, KNOWN, PICTURE_SUFFIXES, SUFFIXES, load_model
 from viewsphere.blender.interpreter import find_blender
 from viewsphere.errors import MissingExtraError, ModelError
-from viewsphere.model.shot import ModelSpec
+from viewsphere.model.model_spec import ModelSpec
 
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "formats-in.md"

@@ -16,7 +16,7 @@ from PIL import Image
 from viewsphere.assets.cache import load_normalised
 from viewsphere.assets.load import load_model
 from viewsphere.errors import ModelError
-from viewsphere.model.shot import ModelSpec
+from viewsphere.model.model_spec import ModelSpec
 
 LAUGHS = "<!DOCTYPE x [<!ENTITY a0 'haha'>" + "".join(
     f"<!ENTITY a{i} '{f'&a{i - 1};' * 10}'>" for i in range(1, 20)

@@ -4,7 +4,7 @@ import pytest
 
 from viewsphere.assets.inspect import describe
 from viewsphere.errors import ModelError
-from viewsphere.model.shot import ModelSpec
+from viewsphere.model.model_spec import ModelSpec
 
 WIDE = "v 0 0 0\nv 300 0 0\nv 0 20 0\nv 0 0 100\n"
 

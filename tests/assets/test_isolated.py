@@ -17,7 +17,7 @@ from viewsphere.assets.isolated import READ_HERE
 from viewsphere.assets.mesh_file import ARRAYS
 from viewsphere.assets.reader import Job
 from viewsphere.errors import ModelError
-from viewsphere.model.shot import ModelSpec
+from viewsphere.model.model_spec import ModelSpec
 
 CUBE = "".join(f"v {x} {y} {z}\n" for x in (0, 1) for y in (0, 2) for z in (0, 3)) + "f 1 2 4 3\nf 5 7 8 6\nf 1 5 6 2\n"
 
@@ -191,7 +191,7 @@ def test_what_was_left_behind_is_swept(spec):
 PARENT = """
 import sys
 from viewsphere.assets.cache import load_normalised
-from viewsphere.model.shot import ModelSpec
+from viewsphere.model.model_spec import ModelSpec
 load_normalised(ModelSpec(key="a", source=sys.argv[1], category="x", category_id=1))
 """
 

@@ -14,7 +14,7 @@ from viewsphere.assets import limits
 from viewsphere.assets.cache import load_normalised
 from viewsphere.assets.load import load_model
 from viewsphere.errors import ModelError, UserError
-from viewsphere.model.shot import ModelSpec
+from viewsphere.model.model_spec import ModelSpec
 
 LIMITS = {name for name in vars(limits) if name.startswith(("MAX_", "MIN_"))}
 TESTED = {

@@ -9,7 +9,7 @@ from viewsphere.assets.mesh import Mesh
 from viewsphere.assets.normalise import normalise, rotation
 from viewsphere.assets.piece import FileFacts
 from viewsphere.errors import ModelError
-from viewsphere.model.shot import ModelSpec
+from viewsphere.model.model_spec import ModelSpec
 
 AXES = ("+x", "-x", "+y", "-y", "+z", "-z")
 VECTORS = dict(zip(AXES, [s * e for e in np.eye(3) for s in (1, -1)], strict=True))

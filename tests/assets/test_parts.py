@@ -8,7 +8,7 @@ import pytest
 from viewsphere.assets.mesh import Image, Material, Mesh, Texture
 from viewsphere.assets.parts import is_taken, own_part, taken
 from viewsphere.errors import ModelError
-from viewsphere.model.shot import ModelSpec, Parts
+from viewsphere.model.model_spec import ModelSpec, Parts
 
 NAMES = ("Car", "Car/Wheel", "Cart", "Road")
 TURNED = ((0, -1, 0, 5), (1, 0, 0, 0), (0, 0, 1, 2), (0, 0, 0, 1))

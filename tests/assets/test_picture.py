@@ -9,7 +9,7 @@ from PIL import Image
 from viewsphere.assets.cache import load_normalised
 from viewsphere.assets.load import PICTURE_SUFFIXES, load_model
 from viewsphere.errors import ModelError
-from viewsphere.model.shot import ModelSpec
+from viewsphere.model.model_spec import ModelSpec
 
 KINDS = {"bmp": "BMP", "jpg": "JPEG", "jpeg": "JPEG", "png": "PNG", "tif": "TIFF", "tiff": "TIFF", "webp": "WEBP"}
 

@@ -13,7 +13,7 @@ from viewsphere.assets.export import export_glb, export_obj
 from viewsphere.assets.load import SUFFIXES, load_model
 from viewsphere.assets.normalise import normalise
 from viewsphere.errors import ModelError
-from viewsphere.model.shot import ModelSpec
+from viewsphere.model.model_spec import ModelSpec
 
 MODELS = Path(__file__).parents[3] / "shared" / "models"
 FOLDERS = ("car", "chair", "bicycle", "boat", "hair_drier", "misc", "scene", "awkward")

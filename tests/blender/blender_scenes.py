@@ -19,7 +19,10 @@ from viewsphere.engines import raster
 from viewsphere.geometry.camera import orbit_center, orbit_rotation
 from viewsphere.model import scene as model
 from viewsphere.model.camera import Camera, Intrinsics
-from viewsphere.model.shot import Frame, ModelSpec, Pose, Shot, Thing
+from viewsphere.model.instant import Instant, Viewpoint
+from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.shot import Shot
+from viewsphere.model.thing import Thing
 
 VARIABLE = "VIEWSPHERE_BLENDER_PYTHON"
 UPRIGHT = ((0, 1), (1, 1), (1, 0), (0, 0))
@@ -147,7 +150,7 @@ def raster_stage(mesh: Mesh, scene: model.Scene):
         things=(Thing(id=1, model=ModelSpec(key="model", source="memory", category="thing", category_id=1)),),
         intrinsics=Intrinsics(width=8, height=8, fx=8, fy=8, cx=4, cy=4),
         scene=scene,
-        frames=(Frame(index=0, pose=Pose(index=0, azimuth_deg=0, elevation_deg=0, distance=1), split="train"),),
+        frames=(Instant(index=0, pose=Viewpoint(index=0, azimuth_deg=0, elevation_deg=0, distance=1), split="train"),),
         channels=("rgb",),
         engine_options={},
     )

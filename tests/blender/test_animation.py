@@ -16,7 +16,7 @@ from viewsphere.assets.timeline import Blenders
 from viewsphere.check import check
 from viewsphere.errors import ModelError, RecipeError
 from viewsphere.geometry.camera import project
-from viewsphere.model.shot import ModelSpec
+from viewsphere.model.model_spec import ModelSpec
 from viewsphere.run.importing import import_dataset
 from viewsphere.run.stages import Stages
 from viewsphere.sampling.camera import camera_for

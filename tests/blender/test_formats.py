@@ -23,7 +23,7 @@ from viewsphere.assets.load import load_model
 from viewsphere.assets.srgb import linear
 from viewsphere.blender.interpreter import VARIABLE
 from viewsphere.errors import ModelError
-from viewsphere.model.shot import ModelSpec
+from viewsphere.model.model_spec import ModelSpec
 from viewsphere.sampling.models import model_specs
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(180)]

@@ -14,7 +14,7 @@ from viewsphere.assets.scene_file import scene_file
 from viewsphere.assets.timeline import Blenders
 from viewsphere.blender.interpreter import VARIABLE
 from viewsphere.errors import ModelError
-from viewsphere.model.shot import ModelSpec
+from viewsphere.model.model_spec import ModelSpec
 
 pytestmark = [pytest.mark.timeout(60), pytest.mark.skipif(sys.platform == "win32", reason="signals")]
 

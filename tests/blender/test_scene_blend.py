@@ -15,7 +15,7 @@ from viewsphere.engines import cycles
 from viewsphere.engines.cycles.file_frame import FileFrame
 from viewsphere.engines.cycles.staging import told_camera
 from viewsphere.errors import RecipeError
-from viewsphere.model.shot import ModelSpec
+from viewsphere.model.model_spec import ModelSpec
 from viewsphere.run.stages import Stages
 from viewsphere.sampling.camera import camera_for
 from viewsphere.truth.visibility import rasterize

@@ -18,7 +18,8 @@ from viewsphere.engines.raster.occlusion import Occlusion
 from viewsphere.engines.raster.surface import pack_surfaces
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.model.camera import Camera
-from viewsphere.model.shot import ModelSpec, Thing
+from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.thing import Thing
 from viewsphere.truth.geometry import build_geometry
 from viewsphere.truth.visibility import rasterize
 

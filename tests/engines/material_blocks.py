@@ -10,8 +10,9 @@ from viewsphere.engines.raster import kernels_block as block
 from viewsphere.engines.raster.kernels_material import material
 from viewsphere.engines.raster.records import View
 from viewsphere.engines.raster.surface import pack_surfaces
+from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Ground
-from viewsphere.model.shot import ModelSpec, Thing
+from viewsphere.model.thing import Thing
 from viewsphere.truth.geometry import build_geometry
 
 shown = called(material)

@@ -15,15 +15,18 @@ from viewsphere.engines import cycles
 from viewsphere.engines.cycles.texels import BUMPED, CONTENTS, FINEST, Kind, halved, spread_of
 from viewsphere.geometry.camera import orbit_center, orbit_rotation
 from viewsphere.model.camera import Camera, Intrinsics
+from viewsphere.model.instant import Instant, Viewpoint
+from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Scene
-from viewsphere.model.shot import Frame, ModelSpec, Pose, Repaint, Shot, Thing
+from viewsphere.model.shot import Shot
+from viewsphere.model.thing import Motion, Repaint, Thing
 from viewsphere.sampling.camera import camera_for
 from viewsphere.truth.visibility import rasterize
 
 RNG = np.random.default_rng(5)
 SPEC = ModelSpec(key="model", source="memory", category="thing", category_id=1)
 PLACED = Thing(id=1, model=SPEC)
-TURNED = Thing(id=2, model=SPEC, world_from_object=((0, -1, 0, 3), (1, 0, 0, 1), (0, 0, 1, 2), (0, 0, 0, 1)))
+TURNED = Thing(id=2, model=SPEC, motion=Motion.still(((0, -1, 0, 3), (1, 0, 0, 1), (0, 0, 1, 2), (0, 0, 0, 1))))
 SIDE, RADIUS = 2.0, math.sqrt(2)
 CORNERS = np.array([(-1, 0, -1), (1, 0, -1), (1, 0, 1), (-1, 0, 1)], np.float32)
 UPRIGHT = np.array([(0, 1), (1, 1), (1, 0), (0, 0)], np.float32)
@@ -222,7 +225,7 @@ def _opaque(values) -> np.ndarray:
 
 def stage_with(mesh: Mesh, distances, **engine):
     frames = [
-        Frame(index=i, pose=Pose(index=i, azimuth_deg=15, elevation_deg=10, distance=d), split="train")
+        Instant(index=i, pose=Viewpoint(index=i, azimuth_deg=15, elevation_deg=10, distance=d), split="train")
         for i, d in enumerate(distances)
     ]
     shot = Shot(

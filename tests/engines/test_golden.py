@@ -16,6 +16,8 @@ import pytest
 from PIL import Image
 
 from viewsphere.model.camera import Distortion, Intrinsics
+from viewsphere.model.instant import Instant, Viewpoint
+from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import (
     AreaLight,
     Background,
@@ -30,7 +32,8 @@ from viewsphere.model.scene import (
     Sun,
     View,
 )
-from viewsphere.model.shot import Frame, ModelSpec, Pose, Shot, Thing
+from viewsphere.model.shot import Shot
+from viewsphere.model.thing import Thing
 from viewsphere.run.stages import Stages
 
 GOLDEN = Path(__file__).parent / "golden"
@@ -90,13 +93,13 @@ def rendered(name: str) -> np.ndarray:
     source, seed, (azimuth, elevation, distance), distortion, scene = SCENES[name]
     focal = WIDTH * (0.9 if distortion else 1.2)
     lens = Intrinsics(width=WIDTH, height=HEIGHT, fx=focal, fy=focal, cx=WIDTH / 2, cy=HEIGHT / 2, distortion=distortion)
-    pose = Pose(index=0, azimuth_deg=azimuth, elevation_deg=elevation, distance=distance)
+    pose = Viewpoint(index=0, azimuth_deg=azimuth, elevation_deg=elevation, distance=distance)
     shot = Shot(
         key=name,
         things=(Thing(id=1, model=ModelSpec(key=name, source=source, seed=seed, category=name, category_id=1)),),
         intrinsics=lens,
         scene=scene,
-        frames=(Frame(index=0, pose=pose, split="train"),),
+        frames=(Instant(index=0, pose=pose, split="train"),),
         channels=("rgb",),
     )
     return next(iter(Stages().render(shot))).rgb

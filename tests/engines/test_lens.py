@@ -15,8 +15,11 @@ from viewsphere.assets.srgb import encoded, linear
 from viewsphere.engines import raster
 from viewsphere.geometry.camera import pixel_rays, project
 from viewsphere.model.camera import Camera, Distortion, Intrinsics
+from viewsphere.model.instant import Instant, Viewpoint
+from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Background, Finish, Scene, View
-from viewsphere.model.shot import Frame, ModelSpec, Pose, Shot, Thing
+from viewsphere.model.shot import Shot
+from viewsphere.model.thing import Motion, Thing
 from viewsphere.truth.channels import observe
 from viewsphere.truth.visibility import rasterize
 
@@ -76,7 +79,7 @@ def stage():
         x, y = (3 * math.sqrt(1 - z * z) * f(turn) for f in (math.cos, math.sin))
         spec = ModelSpec(key=f"{i}", source="memory", category="ball", category_id=1)
         move = ((1, 0, 0, x), (0, 1, 0, y), (0, 0, 1, 3 * z), (0, 0, 0, 1))
-        things.append(Thing(id=i + 1, model=spec, world_from_object=move))
+        things.append(Thing(id=i + 1, model=spec, motion=Motion.still(move)))
     shot = Shot(
         key="shot",
         things=tuple(things),
@@ -89,8 +92,8 @@ def stage():
     return raster.stage(shot, lambda spec: meshes[int(spec.key)]), meshes
 
 
-def frame() -> Frame:
-    return Frame(index=0, pose=Pose(index=0, azimuth_deg=0, elevation_deg=0, distance=1), split="train")
+def frame() -> Instant:
+    return Instant(index=0, pose=Viewpoint(index=0, azimuth_deg=0, elevation_deg=0, distance=1), split="train")
 
 
 def camera(name: str, rng) -> Camera:

@@ -12,8 +12,11 @@ from light_stage import cuboid, flat
 from viewsphere.engines import raster
 from viewsphere.engines.raster.environment import bake_surrounding, sky_lights
 from viewsphere.model.camera import Intrinsics
+from viewsphere.model.instant import Instant, Viewpoint
+from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import AreaLight, Daylight, Ground, PointLight, Scene, Sky, SpotLight, Sun
-from viewsphere.model.shot import Frame, ModelSpec, Pose, Shot, Thing
+from viewsphere.model.shot import Shot
+from viewsphere.model.thing import Thing
 from viewsphere.sampling.camera import camera_for
 from viewsphere.surroundings.daylight import air, daylight_picture, opening
 from viewsphere.truth.visibility import rasterize
@@ -27,9 +30,9 @@ def picture(
     """From azimuth 30, 40 pixels wide for each metre at the target."""
     focal = 40 * distance
     lens = Intrinsics(width=width, height=height, fx=focal, fy=focal, cx=width / 2, cy=height / 2)
-    frame = Frame(
+    frame = Instant(
         index=0,
-        pose=Pose(index=0, azimuth_deg=30, elevation_deg=elevation_deg, distance=distance, target=(0, 0, 0)),
+        pose=Viewpoint(index=0, azimuth_deg=30, elevation_deg=elevation_deg, distance=distance, target=(0, 0, 0)),
         split="train",
     )
     shot = Shot(

@@ -11,7 +11,7 @@ from material_blocks import FRONT, card, flat_image, made, packed, view_of
 from viewsphere.assets.mesh import Image, Material, Texture
 from viewsphere.assets.srgb import linear
 from viewsphere.model.scene import Ground
-from viewsphere.model.shot import Repaint
+from viewsphere.model.thing import Repaint
 
 NOISE = np.random.default_rng(2).integers(0, 256, (32, 32, 4)).astype(np.uint8)
 

@@ -20,6 +20,8 @@ from viewsphere.engines.raster.painting import paint
 from viewsphere.geometry.camera import orbit_center, orbit_rotation, pixel_rays
 from viewsphere.imaging.view import EXPOSURE
 from viewsphere.model.camera import Camera, Intrinsics
+from viewsphere.model.instant import Instant, Viewpoint
+from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import (
     AreaLight,
     Background,
@@ -33,11 +35,12 @@ from viewsphere.model.scene import (
     Sun,
     View,
 )
-from viewsphere.model.shot import Frame, ModelSpec, Pose, Shot, Thing
+from viewsphere.model.shot import Shot
+from viewsphere.model.thing import Thing
 from viewsphere.truth.visibility import rasterize
 
 SPEC = ModelSpec(key="model", source="memory", category="thing", category_id=1)
-FRAME = Frame(index=0, pose=Pose(index=0, azimuth_deg=0, elevation_deg=0, distance=1), split="train")
+FRAME = Instant(index=0, pose=Viewpoint(index=0, azimuth_deg=0, elevation_deg=0, distance=1), split="train")
 DARK = Sky(strength=0.0)
 AS_IT_IS = View(transform="raw", exposure=math.log2(1 / EXPOSURE))
 """A radiance of 1 is white."""

@@ -16,14 +16,17 @@ from viewsphere.errors import UserError
 from viewsphere.geometry.camera import orbit_center, orbit_rotation
 from viewsphere.imaging.view import EXPOSURE, KNEE
 from viewsphere.model.camera import Camera, Distortion, Intrinsics
+from viewsphere.model.instant import Instant, Viewpoint
+from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Background, Finish, Ground, Scene, Sky, Sun, View
-from viewsphere.model.shot import Frame, ModelSpec, Pose, Shot, Thing
+from viewsphere.model.shot import Shot
+from viewsphere.model.thing import Thing
 from viewsphere.truth.visibility import rasterize
 
 DARK = Sky(strength=0.0)
 BLACK = Background(color=(0, 0, 0))
 SPEC = ModelSpec(key="model", source="memory", category="thing", category_id=1)
-FRAME = Frame(index=0, pose=Pose(index=0, azimuth_deg=0, elevation_deg=0, distance=1), split="train")
+FRAME = Instant(index=0, pose=Viewpoint(index=0, azimuth_deg=0, elevation_deg=0, distance=1), split="train")
 
 
 def mesh_of(triangles: np.ndarray, material: Material | None = None, **fields) -> Mesh:
@@ -106,7 +109,7 @@ AS_IT_IS = Finish(background=BLACK, view=View(transform="raw"))
 """Unlit colours are shown as they are, also those above the shoulder of the standard view."""
 
 
-def picture(mesh: Mesh, scene: Scene, view: Camera, frame: Frame = FRAME, **options) -> np.ndarray:
+def picture(mesh: Mesh, scene: Scene, view: Camera, frame: Instant = FRAME, **options) -> np.ndarray:
     stage = stage_of(mesh, scene, **options)
     return stage.color(view, frame, rasterize(stage.geometry, view))
 

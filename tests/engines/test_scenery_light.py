@@ -9,8 +9,10 @@ from test_raster import BLACK, DARK, FRAME, SPEC, box, camera, mesh_of, rectangl
 from viewsphere.assets.mesh import Material
 from viewsphere.engines import raster
 from viewsphere.model.camera import Intrinsics
+from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Finish, Scene, Sky, Sun
-from viewsphere.model.shot import ModelSpec, Shot, Thing
+from viewsphere.model.shot import Shot
+from viewsphere.model.thing import Motion, Thing
 from viewsphere.truth.visibility import rasterize
 
 SUN = Sun(azimuth_deg=90, elevation_deg=45, strength=3.0)
@@ -36,7 +38,7 @@ def stage_of(target, scenery, scene=SCENE, **options):
             Thing(
                 id=0,
                 model=ModelSpec(key=f"piece{i}", source="memory", category="", category_id=0),
-                world_from_object=move,
+                motion=Motion.still(move),
                 scenery=True,
             )
             for i, (_, move) in enumerate(scenery)

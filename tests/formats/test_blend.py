@@ -21,8 +21,8 @@ from viewsphere.engines.cycles.file_frame import FileFrame
 from viewsphere.errors import MissingExtraError, StoreError, UserError
 from viewsphere.formats import blend
 from viewsphere.geometry.camera import orbit_center, orbit_rotation
+from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Scene
-from viewsphere.model.shot import ModelSpec
 from viewsphere.run.generate import export
 from viewsphere.run.importing import import_dataset
 from viewsphere.run.stages import Stages, build_zoo_model

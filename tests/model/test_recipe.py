@@ -25,7 +25,7 @@ from viewsphere.model.scene import (
     Sun,
     View,
 )
-from viewsphere.model.shot import Repaint
+from viewsphere.model.thing import Repaint
 from viewsphere.recipe.finish import BackgroundEntry, EffectsEntry, SmootherEntry, ViewEntry
 from viewsphere.recipe.light import (
     AreaEntry,

@@ -8,7 +8,7 @@ from multiprocessing import active_children
 import pytest
 
 from viewsphere.errors import UserError, ViewsphereError
-from viewsphere.model.shot import ModelSpec
+from viewsphere.model.model_spec import ModelSpec
 from viewsphere.run.pool import Crew, Job, Queue
 from viewsphere.run.tasks import MODELS, Task
 

@@ -9,15 +9,18 @@ from pictures import photograph, write
 from viewsphere.assets.srgb import encoded, linear
 from viewsphere.imaging.background import display_background
 from viewsphere.model.camera import Intrinsics
+from viewsphere.model.instant import Instant, Viewpoint
+from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Background, Finish, Ground, Scene
-from viewsphere.model.shot import Frame, ModelSpec, Pose, Shot, Thing
+from viewsphere.model.shot import Shot
+from viewsphere.model.thing import Thing
 from viewsphere.run.stages import Stages
 
 WIDTH, HEIGHT = 128, 96
 CAR = ModelSpec(key="car", source="zoo:car", seed=1, category="car", category_id=1)
 POSES = [
-    Pose(index=0, azimuth_deg=35, elevation_deg=12, distance=9),
-    Pose(index=1, azimuth_deg=200, elevation_deg=50, distance=11),
+    Viewpoint(index=0, azimuth_deg=35, elevation_deg=12, distance=9),
+    Viewpoint(index=1, azimuth_deg=200, elevation_deg=50, distance=11),
 ]
 
 
@@ -27,7 +30,7 @@ def stages():
 
 
 def samples_of(stages: Stages, scene: Scene, channels=("rgb", "rgba", "instances"), finish=None, **options):
-    frames = tuple(Frame(index=p.index, pose=p, split="train", finish=finish) for p in POSES)
+    frames = tuple(Instant(index=p.index, pose=p, split="train", finish=finish) for p in POSES)
     shot = Shot(
         key="car",
         things=(Thing(id=1, model=CAR),),

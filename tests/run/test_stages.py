@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from viewsphere.model.shot import ModelSpec
+from viewsphere.model.model_spec import ModelSpec
 from viewsphere.run import stages
 from viewsphere.run.stages import Stages
 

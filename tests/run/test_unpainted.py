@@ -2,7 +2,7 @@
 
 from small import small_recipe
 from viewsphere.assets.glb import glb_bytes, material_names
-from viewsphere.model.shot import ModelSpec
+from viewsphere.model.model_spec import ModelSpec
 from viewsphere.run.generate import generate
 from viewsphere.run.stages import build_zoo_model
 

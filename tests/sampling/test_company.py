@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.box import box_vertices
 from viewsphere.geometry.rotation import transform
-from viewsphere.model.shot import ModelSpec
+from viewsphere.model.model_spec import ModelSpec
 from viewsphere.recipe.scenery import CompanyEntry
 from viewsphere.sampling.company import companions, footprint, layout, standing
 

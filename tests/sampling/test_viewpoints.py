@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from viewsphere.geometry.box import box_vertices
 from viewsphere.model.camera import Intrinsics
-from viewsphere.model.shot import Pose
+from viewsphere.model.instant import Viewpoint
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.viewpoints import Range, axis_count, axis_value
 from viewsphere.sampling.camera import camera_for, distance_problem
@@ -182,21 +182,21 @@ LENS = Intrinsics(width=64, height=48, fx=50, fy=50, cx=32, cy=24)
 
 
 def test_the_camera_stands_where_the_pose_says_and_looks_at_the_target():
-    pose = Pose(index=0, azimuth_deg=90, elevation_deg=0, distance=5)
+    pose = Viewpoint(index=0, azimuth_deg=90, elevation_deg=0, distance=5)
     camera = camera_for(LENS, pose, (1, 2, 3))
     assert np.allclose(camera.center, [6, 2, 3], atol=1e-14)
     assert np.allclose(camera.R @ [1, 2, 3] + camera.t, [0, 0, 5], atol=1e-14)
-    above = camera_for(LENS, Pose(index=0, azimuth_deg=0, elevation_deg=90, distance=2), (0, 0, 0))
+    above = camera_for(LENS, Viewpoint(index=0, azimuth_deg=0, elevation_deg=90, distance=2), (0, 0, 0))
     assert np.allclose(above.R, [[1, 0, 0], [0, -1, 0], [0, 0, -1]], atol=1e-15)
 
 
 def test_a_pose_s_own_target_wins():
-    pose = Pose(index=0, azimuth_deg=0, elevation_deg=0, distance=5, target=(1, 1, 1))
+    pose = Viewpoint(index=0, azimuth_deg=0, elevation_deg=0, distance=5, target=(1, 1, 1))
     assert np.allclose(camera_for(LENS, pose, (0, 0, 0)).center, [1, -4, 1])
 
 
 def test_a_tilt_rolls_the_camera_clockwise_seen_from_behind():
-    pose = Pose(index=0, azimuth_deg=0, elevation_deg=0, distance=5, tilt_deg=90)
+    pose = Viewpoint(index=0, azimuth_deg=0, elevation_deg=0, distance=5, tilt_deg=90)
     camera = camera_for(LENS, pose, (0, 0, 0))
     assert np.allclose(camera.R @ [0, 0, 1], [-1, 0, 0], atol=1e-15)  # up in the world is left in the picture
 
@@ -205,7 +205,7 @@ def test_a_camera_inside_the_model_is_a_problem():
     box = box_vertices(np.array([-1.0, -2.0, -0.5]), np.array([1.0, 2.0, 0.5]))
 
     def problem(**values):
-        return distance_problem(Pose(**{"index": 7, "azimuth_deg": 0, "elevation_deg": 0, "distance": 1.5, **values}), box)
+        return distance_problem(Viewpoint(**{"index": 7, "azimuth_deg": 0, "elevation_deg": 0, "distance": 1.5, **values}), box)
 
     found = problem()
     assert found is not None
@@ -215,4 +215,4 @@ def test_a_camera_inside_the_model_is_a_problem():
     assert problem(azimuth_deg=90, distance=0.99) is not None
     assert problem(elevation_deg=90, distance=0.51) is None
     assert problem(target=(0, 3, 0), distance=1.5) is not None
-    assert distance_problem(Pose(index=0, azimuth_deg=0, elevation_deg=0, distance=0.1), box * [1, 1, 0]) is None
+    assert distance_problem(Viewpoint(index=0, azimuth_deg=0, elevation_deg=0, distance=0.1), box * [1, 1, 0]) is None

@@ -158,7 +158,7 @@ def real_models(count):
     from viewsphere.assets.load import SUFFIXES, load_model
     from viewsphere.assets.normalise import normalise
     from viewsphere.errors import ModelError
-    from viewsphere.model.shot import ModelSpec
+    from viewsphere.model.model_spec import ModelSpec
 
     found = {f: sorted(p for p in (MODELS / f).rglob("*") if p.suffix[1:].lower() in SUFFIXES) for f in FOLDERS}
     meshes = {}

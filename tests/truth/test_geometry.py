@@ -61,7 +61,8 @@ def test_ground_lies_at_the_lowest_used_vertex():
 
 
 def test_ids_must_be_in_order():
-    from viewsphere.model.shot import ModelSpec, Thing
+    from viewsphere.model.model_spec import ModelSpec
+    from viewsphere.model.thing import Thing
     from viewsphere.truth.geometry import build_geometry
 
     spec = ModelSpec(key="m", source="m", category="thing", category_id=1)

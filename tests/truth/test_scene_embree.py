@@ -10,8 +10,11 @@ from truth_scenes import LENSES, cube, lens, mesh_of, orbit_camera, placed, sphe
 from viewsphere.annotate import annotate
 from viewsphere.geometry.box import box_vertices
 from viewsphere.model.camera import Camera
+from viewsphere.model.instant import Instant, Viewpoint
+from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Scene
-from viewsphere.model.shot import Frame, ModelSpec, Pose, Shot, Thing
+from viewsphere.model.shot import Shot
+from viewsphere.model.thing import Motion, Thing
 from viewsphere.truth.channels import observe
 from viewsphere.truth.geometry import build_geometry
 from viewsphere.truth.visibility import rasterize
@@ -50,7 +53,7 @@ def scene():
         Thing(
             id=i + 1 if i < 3 else 0,
             model=ModelSpec(key=f"m{i}", source="m", category="thing", category_id=i + 1 if i < 3 else 0),
-            world_from_object=tuple(map(tuple, np.asarray(m, float).tolist())),
+            motion=Motion.still(tuple(map(tuple, np.asarray(m, float).tolist()))),
             scenery=i >= 2,
         )
         for i, (_, m) in enumerate(parts)
@@ -107,7 +110,7 @@ def test_masks_boxes_and_visible_shares_of_a_whole_scene():
     whole = embree(geometry)
     hidden, cut, clear = 0, 0, 0
     for camera in cameras("pinhole", 8, 200, 150):
-        frame = Frame(index=0, pose=Pose(index=0, azimuth_deg=0, elevation_deg=0, distance=3), split="train")
+        frame = Instant(index=0, pose=Viewpoint(index=0, azimuth_deg=0, elevation_deg=0, distance=3), split="train")
         shot = Shot(key="s", things=things, intrinsics=camera.intrinsics, scene=Scene(), frames=(frame,), channels=())
         boxes = [box_vertices(*m.bounds) for m in meshes[:3]]
         found = annotate(shot, frame, camera, geometry, rasterize(geometry, camera), boxes, ["m"] * 3)
@@ -143,7 +146,7 @@ def test_scenery_hides_and_is_not_labelled():
     camera = orbit_camera(lens(64, 48), 0.0, 0.0, 5.0)
     spec = ModelSpec(key="m", source="m", category="thing", category_id=1)
     things = (Thing(id=1, model=spec), Thing(id=0, model=spec, scenery=True))
-    frame = Frame(index=0, pose=Pose(index=0, azimuth_deg=0, elevation_deg=0, distance=5), split="train")
+    frame = Instant(index=0, pose=Viewpoint(index=0, azimuth_deg=0, elevation_deg=0, distance=5), split="train")
     shot = Shot(key="s", things=things, intrinsics=camera.intrinsics, scene=Scene(), frames=(frame,), channels=())
     boxes = [box_vertices(*cube().bounds)]
     (o,) = annotate(shot, frame, camera, geometry, rasterize(geometry, camera), boxes, ["m"])

@@ -9,7 +9,8 @@ import numpy as np
 from viewsphere.assets.mesh import Mesh
 from viewsphere.geometry.camera import orbit_center, orbit_rotation, pixel_rays
 from viewsphere.model.camera import Camera, Distortion, Intrinsics
-from viewsphere.model.shot import ModelSpec, Thing
+from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.thing import Motion, Thing
 from viewsphere.truth.geometry import Geometry, build_geometry
 
 BARREL = Distortion(model="brown_conrady", coefficients=(-0.21, 0.06, 0.001, -0.002, -0.004))
@@ -36,7 +37,7 @@ def placed(*meshes: Mesh, moves=None, ground=False, label_alpha=0.01, scenery=0)
         Thing(
             id=i + 1 if i < len(moves) - scenery else 0,
             model=ModelSpec(key=f"m{i}", source=f"m{i}", category="thing", category_id=i + 10),
-            world_from_object=tuple(map(tuple, np.asarray(m, float).tolist())),
+            motion=Motion.still(tuple(map(tuple, np.asarray(m, float).tolist()))),
         )
         for i, m in enumerate(moves)
     ]

@@ -17,8 +17,10 @@ from viewsphere.geometry.mask import rle_of_id
 from viewsphere.geometry.pose_category import pose_category
 from viewsphere.geometry.rotation import compose, quaternion_from_matrix, rigid, transform
 from viewsphere.model.camera import Camera
+from viewsphere.model.model_spec import ModelSpec, Size
 from viewsphere.model.sample import Box, ObjectAnnotation, Rle
-from viewsphere.model.shot import Frame, ModelSpec, Shot, Size, Thing
+from viewsphere.model.shot import Shot
+from viewsphere.model.thing import Thing
 from viewsphere.truth.geometry import Geometry
 from viewsphere.truth.visibility import Visibility
 
@@ -27,7 +29,7 @@ Float = NDArray[np.float64]
 
 def annotate(
     shot: Shot,
-    frame: Frame,
+    instant: int,
     camera: Camera,
     geometry: Geometry,
     visibility: Visibility,
@@ -35,16 +37,17 @@ def annotate(
     models: Sequence[str],
     real_sizes: Sequence[Size | None] | None = None,
 ) -> tuple[ObjectAnnotation, ...]:
-    """Annotations of all objects (things of an id), seen or not, in the order of their ids.
+    """Annotations of all objects (things of an id) that are there at an instant (counted from 0 in the shot), seen or not, in
+    the order of their ids.
 
     `boxes[i]` is the 3D box (8, 3) of object i + 1's model in the object's axes, `models[i]` the path of that model in the data
     set and `real_sizes[i]` its true size (by default the one its spec gives in numbers); `geometry` is the shot's stage and
     `visibility` what this camera sees of it. An object that covers no pixel has an empty mask, no `box2d` and visibility 0.
     """
-    count, things = geometry.object_count, shot.objects
+    count, things = geometry.object_count, [thing for thing in shot.things_at(instant) if thing.id]
     if not len(things) == len(boxes) == len(models) == count:
         raise ValueError(
-            f"annotate: frame {frame.index}: expected {count} objects, boxes and models, "
+            f"annotate: shot {shot.key}: expected {count} objects, boxes and models, "
             f"got {len(things)}, {len(boxes)}, {len(models)}"
         )
     seen = visibility.instances(geometry)
@@ -57,6 +60,8 @@ def annotate(
     bounds, whole = [b for b, _ in projections], [w for _, w in projections]
     annotations: list[ObjectAnnotation] = []
     for i, thing in enumerate(things):
+        if not thing.is_there:
+            continue
         area = int(seen.area[i + 1])
         x0, y0, x1, y1 = seen.box[i + 1].tolist() if area else (0, 0, 0, 0)
         visible, truncated = visible_and_cut(geometry, camera, i + 1, area, bounds, whole)

@@ -33,7 +33,7 @@ from viewsphere.assets.normalise import normalise
 from viewsphere.assets.parts import taken
 from viewsphere.assets.piece import FileFacts, extents
 from viewsphere.errors import ModelError
-from viewsphere.model.shot import ModelSpec
+from viewsphere.model.model_spec import ModelSpec
 
 SETTINGS = ("up", "forward", "unit", "centring", "scale", "real_size", "confined", "frame", "clip", "shown")
 ZOO = "zoo:"

@@ -13,7 +13,7 @@ from viewsphere.assets.cache import load
 from viewsphere.assets.load import PICTURE_SUFFIXES
 from viewsphere.assets.mesh import Material, Mesh
 from viewsphere.assets.piece import FileFacts
-from viewsphere.model.shot import Axis, ModelSpec, Size
+from viewsphere.model.model_spec import Axis, ModelSpec, Size
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from viewsphere.assets import limits
 from viewsphere.assets.load import BLENDER_SUFFIXES, check_source
 from viewsphere.assets.reader import OUTCOME, Job, mesh_name, read
 from viewsphere.errors import ModelError
-from viewsphere.model.shot import ModelSpec
+from viewsphere.model.model_spec import ModelSpec
 
 LOG = "log.txt"
 READ_HERE = "VIEWSPHERE_READ_HERE"

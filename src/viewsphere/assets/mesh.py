@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal, get_args
 
 import numpy as np
@@ -134,6 +134,15 @@ class Mesh:
             array = getattr(self, name)
             if array.size and (array.min() < 0 or array.max() >= limit):
                 raise ValueError(f"Mesh.{name}: expected indices in [0, {limit}), got {array.min()}..{array.max()}")
+
+    def emptied(self) -> Mesh:
+        """The same model without any triangle."""
+        return replace(
+            self,
+            triangles=self.triangles[:0],
+            triangle_material=self.triangle_material[:0],
+            triangle_part=self.triangle_part[:0],
+        )
 
     @property
     def bounds(self) -> NDArray[np.float64]:

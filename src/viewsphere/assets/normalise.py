@@ -10,7 +10,7 @@ from viewsphere.assets import limits
 from viewsphere.assets.mesh import Mesh
 from viewsphere.assets.piece import FileFacts, Float, face_normals, unit_normals
 from viewsphere.errors import ModelError
-from viewsphere.model.shot import Axis, ModelSpec, Size
+from viewsphere.model.model_spec import Axis, ModelSpec, Size
 
 PROPORTION_TOLERANCE = 0.1
 

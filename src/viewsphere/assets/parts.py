@@ -12,7 +12,7 @@ from viewsphere.assets.mesh import Mesh
 from viewsphere.assets.piece import used_images
 from viewsphere.errors import ModelError
 from viewsphere.geometry.rotation import transform
-from viewsphere.model.shot import ModelSpec, Parts
+from viewsphere.model.model_spec import ModelSpec, Parts
 
 VERTEX = ("uv0", "uv1", "colors")
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from viewsphere.assets.folder import ModelFolder
 from viewsphere.assets.mesh import Image, Material, Mesh, Texture
-from viewsphere.model.shot import Axis
+from viewsphere.model.model_spec import Axis
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]

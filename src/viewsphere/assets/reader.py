@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any
 from viewsphere.errors import ModelError
 
 if TYPE_CHECKING:
-    from viewsphere.model.shot import ModelSpec
+    from viewsphere.model.model_spec import ModelSpec
 
 MESH, OUTCOME = "mesh.npz", "outcome.json"
 
@@ -62,7 +62,7 @@ def read(job: Job) -> dict[str, Any]:
 
     Whatever goes wrong in a reader becomes one line that names the model.
     """
-    from viewsphere.model.shot import ModelSpec
+    from viewsphere.model.model_spec import ModelSpec
 
     spec = ModelSpec.model_validate(job.spec)
     try:

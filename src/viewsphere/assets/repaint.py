@@ -7,7 +7,7 @@ from dataclasses import replace
 from fnmatch import fnmatchcase
 
 from viewsphere.assets.mesh import Material
-from viewsphere.model.shot import Repaint
+from viewsphere.model.thing import Repaint
 
 
 def repainted(material: Material, repaints: Sequence[Repaint]) -> tuple[Material, Repaint | None]:

@@ -25,7 +25,7 @@ from viewsphere.assets.smoothing import creased, split
 from viewsphere.assets.srgb import linear
 from viewsphere.assets.transform import moved
 from viewsphere.errors import ModelError
-from viewsphere.model.shot import Axis
+from viewsphere.model.model_spec import Axis
 
 UNITS = {
     "micron": 1e-6, "millimeter": 1e-3, "centimeter": 1e-2, "inch": 0.0254, "foot": 0.3048, "meter": 1.0,

@@ -1,1 +1,52 @@
-"""Engines: each paints pictures of a stage; labels never come from them."""
+"""Painters of pictures: what an engine must offer."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Protocol, Self
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    import numpy as np
+    from numpy.typing import NDArray
+    from pydantic import JsonValue
+
+    from viewsphere.assets.mesh import Mesh
+    from viewsphere.model.model_spec import ModelSpec
+    from viewsphere.model.shot import Shot
+    from viewsphere.truth.geometry import Geometry
+    from viewsphere.truth.visibility import Visibility
+
+
+class Stage(Protocol):
+    """What an engine built for a shot and keeps warm while time and camera move; instants and sensors count from 0."""
+
+    def at(self, instant: int) -> Geometry:
+        """The world-space triangles at an instant."""
+        ...
+
+    def color(self, instant: int, sensor: int, visibility: Visibility, transparent: bool) -> NDArray[np.uint8]:
+        """The picture of a sensor at an instant, (H, W, 3) uint8 sRGB; `visibility` is truth's buffer of `at(instant)`.
+
+        With `transparent`, (H, W, 4) with straight alpha and no background: black where nothing is seen. Over any plain
+        background it gives the picture with that background.
+        """
+        ...
+
+    def of(self, shot: Shot) -> Self:
+        """The same for another shot, one of an equal `stage_key`: nothing that stands still is built again."""
+        ...
+
+
+class Engine(Protocol):
+    """A module that paints pictures: `check` its options, `stage` a shot. Only with `OPENS_SCENES = True` it is given shots
+    whose scene is a .blend file (`scene.blend`); with `CATCHES_SHADOWS = False` none whose ground is a shadow catcher.
+    """
+
+    def check(self, options: Mapping[str, JsonValue]) -> None:
+        """Raise UserError for an option that is not known, or out of range; asked before anything is rendered."""
+        ...
+
+    def stage(self, shot: Shot, load: Callable[[ModelSpec], Mesh]) -> Stage:
+        """Build what all frames of the shot share; `load` gives a model's normalised mesh."""
+        ...

@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.model.camera import Camera, Intrinsics
+from viewsphere.model.instant import Viewpoint
+from viewsphere.model.rig import CAMERA
 from viewsphere.model.sample import ObjectAnnotation, Rle, Sample, View
-from viewsphere.model.shot import Pose
 
 _ARRAYS = (
     "box3d_object",
@@ -34,6 +35,10 @@ def sample_to_record(sample: Sample) -> dict[str, Any]:
     return {
         "index": sample.index,
         "split": sample.split,
+        **({"sequence": sample.sequence} if sample.sequence else {}),
+        **({"sensor": sample.sensor} if sample.sensor != CAMERA else {}),
+        "instant": sample.instant,
+        **({"time": sample.time} if sample.time else {}),
         "pose": pose and pose.model_dump(mode="json"),
         "camera": camera
         and {
@@ -60,12 +65,16 @@ def sample_from_record(record: Mapping[str, Any], channels: Mapping[str, NDArray
             np.array(camera["R"], np.float64),
             np.array(camera["t"], np.float64),
         ),
-        known_pose=pose and Pose.model_validate(pose),
+        known_pose=pose and Viewpoint.model_validate(pose),
         image_size=size and (int(size[0]), int(size[1])),
         source=record.get("source"),
         objects=tuple(_object_from_record(o) for o in record["objects"]),
         channels=channels,
         files=files,
+        sequence=record.get("sequence", ""),
+        sensor=record.get("sensor", CAMERA),
+        instant=record["instant"],
+        time=record.get("time", 0.0),
     )
 
 

@@ -13,7 +13,9 @@ from numpy.typing import NDArray
 from viewsphere.errors import StoreError
 from viewsphere.model.camera import Camera
 from viewsphere.model.channel import CHANNELS, picture_of
-from viewsphere.model.shot import Pose, Size
+from viewsphere.model.instant import Viewpoint
+from viewsphere.model.model_spec import Size
+from viewsphere.model.rig import CAMERA
 
 Float = NDArray[np.float64]
 Box = tuple[float, float, float, float]
@@ -121,12 +123,16 @@ class Sample:
     index: int
     split: str
     known_camera: Camera | None
-    known_pose: Pose | None
+    known_pose: Viewpoint | None
     objects: tuple[ObjectAnnotation, ...]
     channels: Mapping[str, NDArray[Any]]
     files: Mapping[str, str]  # channel -> path relative to the data set's root; empty in memory
     image_size: tuple[int, int] | None = None  # (width, height) where there is no camera to say it
     source: Mapping[str, Any] | None = None  # what the imported data set says of the picture
+    sequence: str = ""  # of still pictures none
+    sensor: str = CAMERA
+    instant: int = 0  # counted from 0 in the sequence; of still pictures in the data set
+    time: float = 0.0  # seconds from the sequence's first instant
 
     @property
     def camera(self) -> Camera:
@@ -138,7 +144,7 @@ class Sample:
         return self.known_camera
 
     @property
-    def pose(self) -> Pose:
+    def pose(self) -> Viewpoint:
         """Raises StoreError for an imported picture of which nobody knows the pose."""
         if self.known_pose is None:
             raise StoreError(f"frame {self.index}: expected a pose, found an imported picture: nobody knows where it was taken")

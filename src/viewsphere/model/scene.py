@@ -14,6 +14,7 @@ from viewsphere.model.frozen import Frozen
 Vector = tuple[float, float, float]
 Row = tuple[float, float, float, float]
 Matrix4 = tuple[Row, Row, Row, Row]
+IDENTITY: Matrix4 = ((1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0), (0.0, 0.0, 0.0, 1.0))
 Component = Annotated[float, Field(ge=0)]
 Color = tuple[Component, Component, Component]
 Share = Annotated[float, Field(ge=0, le=1)]
@@ -192,6 +193,11 @@ class Finish(Frozen):
     view: View = View()
     effects: Effects = Effects()
 
+    def with_background(self, transparent: bool) -> Finish:
+        """The same with its background, or with none at all."""
+        background = self.background.model_copy(update={"transparent": transparent})
+        return self.model_copy(update={"background": background})
+
 
 class BlendScene(Frozen):
     """A .blend file whose scene is rendered as it is; what of it is labelled are things of the shot.
@@ -202,7 +208,7 @@ class BlendScene(Frozen):
     """
 
     file: str  # absolute path
-    world_from_file: Matrix4 = ((1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1))
+    world_from_file: Matrix4 = IDENTITY
     unit: float = Field(default=1.0, gt=0)
     shown: tuple[str, ...] = ()
     hidden: tuple[str, ...] = ()

@@ -1,128 +1,36 @@
-"""A shot: one concrete scene, nothing random left, and the poses to take it from. Plain JSON."""
+"""A shot: one concrete world and everything that is recorded of it, nothing random left. Plain JSON."""
 
 from __future__ import annotations
 
-from typing import Literal
+from collections.abc import Iterator
 
-from pydantic import Field, JsonValue
+import numpy as np
+from pydantic import Field, JsonValue, model_validator
 
-from viewsphere.model.camera import Intrinsics
+from viewsphere.geometry.rotation import compose, transform
+from viewsphere.model.camera import Camera
 from viewsphere.model.files import Files
 from viewsphere.model.frozen import Frozen
-from viewsphere.model.scene import Color, Finish, Matrix4, Scene, Vector
-
-Axis = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
-Size = tuple[float, float, float]  # width along X, height along Z, length along Y, metres
-
-
-class Parts(Frozen):
-    """What is taken of a model that was read: the parts of the objects in `only` (None: all) but for those in `without`.
-
-    An object's parts are its own and those that it instances: of `Car` these are `Car` and `Car/Wheel`. They stand in the
-    rigid axes `file_from_axes` (metres) of the whole model's.
-    """
-
-    only: tuple[str, ...] | None = None
-    without: tuple[str, ...] = ()
-    file_from_axes: Matrix4 = ((1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1))
-
-
-class ModelSpec(Frozen):
-    """Which model, and how its file is turned into an object that faces -Y with +Z up, in metres.
-
-    `source` is a file's absolute path, or `zoo:<family>` with `seed` naming the draw. None for `up`, `forward` or
-    `unit` means what the file (or its format's specification) says. At a later `frame` a model is turned, scaled and
-    centred as it is at its file's first.
-    """
-
-    key: str  # unique and stable in the data set: also the name of its folder
-    source: str
-    seed: int | None = None
-    category: str
-    supercategory: str = ""
-    category_id: int = Field(ge=0)  # 0: background, which only scenery is
-    up: Axis | None = None
-    forward: Axis | None = None
-    unit: float | None = None  # metres in one unit of the file
-    centring: Literal["box", "area", "floor", "as_is"] = "box"
-    scale: Literal["as_is", "real_size"] | float = "as_is"  # a number: metres from front to back
-    real_size: Size | Literal["file"] | None = None  # "file": the size the file has, before any scaling
-    confined: bool = True  # texture and buffer paths may not leave the model's folder
-    frame: int | None = None  # of an animated file, which Blender then reads; None: the first, by which it is also placed
-    clip: str | None = None  # name of the animation that is played, where the file has several; with a frame
-    track: str = ""  # key of the animated model that this is at a moment: what stays itself over time
-    shown: tuple[str, ...] = ()  # objects of a .blend file that are read although renders do not show them
-    parts: Parts | None = None  # what is taken of it, when it is read and normalised
-
-    @property
-    def whole(self) -> ModelSpec:
-        """The model that this one is a part of: equal for all parts of one."""
-        unnamed = {"key": "", "category": "", "supercategory": "", "category_id": 0, "track": "", "parts": None}
-        return self.model_copy(update=unnamed)
-
-
-class Repaint(Frozen):
-    """A change to the materials whose names match `material`, a pattern of fnmatch: `tint` (linear) multiplies the base colour,
-    the others replace what the file says and its textures say.
-    """
-
-    material: str = "*"
-    tint: Color | None = None
-    metallic: float | None = Field(default=None, ge=0, le=1)
-    roughness: float | None = Field(default=None, ge=0, le=1)
-
-
-class Thing(Frozen):
-    """One thing of a scene: an object with an id of 1..N, or with id 0 scenery that is background to every label.
-
-    `world_from_object` is rigid. Things of one model are instances. `scenery` marks what the targets stand in front of,
-    labelled or not.
-    """
-
-    id: int = Field(ge=0)
-    model: ModelSpec
-    world_from_object: Matrix4 = ((1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1))
-    scenery: bool = False
-    repaints: tuple[Repaint, ...] = ()  # the last that matches a material counts
-
-
-class Moment(Frozen):
-    """A time step: a frame of an animated file, and the seconds since that file's first frame."""
-
-    frame: int
-    seconds: float
-
-
-class Pose(Frozen):
-    """One viewpoint: camera on a sphere around `target` (world metres; None: the box centre of object 1), and when."""
-
-    index: int
-    azimuth_deg: float
-    elevation_deg: float
-    distance: float = Field(gt=0)
-    tilt_deg: float = 0.0
-    target: Vector | None = None
-    category: str = ""  # named bin: front, front-left, ..., top
-    time: Moment | None = None  # where something is animated
-
-
-class Frame(Frozen):
-    """One picture of a shot. `index` counts all frames of the data set from 0; `finish` replaces the scene's."""
-
-    index: int
-    pose: Pose
-    split: str
-    finish: Finish | None = None
+from viewsphere.model.instant import Instant
+from viewsphere.model.rig import Rig
+from viewsphere.model.scene import IDENTITY, Finish, Matrix4, Scene
+from viewsphere.model.thing import Motion, Thing
 
 
 class Shot(Frozen):
-    """One scene and the frames to take of it: all an engine needs, a few hundred bytes a thing and a pose a frame."""
+    """Things, a rig, instants and a scene: all an engine needs. It is the unit of work, of resuming and of distribution.
+
+    A sample is one sensor's picture at one instant: those of an instant follow one another in the rig's order, and `first` is
+    the number of the first one in the data set.
+    """
 
     key: str  # stable, unique, fit for a folder's name
     things: tuple[Thing, ...]  # ids 1..N in order, then those of id 0
-    intrinsics: Intrinsics
+    rig: Rig
+    instants: tuple[Instant, ...]
     scene: Scene
-    frames: tuple[Frame, ...]
+    first: int = 0
+    sequence: str = ""  # of still pictures none
     engine: str = "raster"
     engine_options: dict[str, JsonValue] = Field(default_factory=dict)
     channels: tuple[str, ...]
@@ -130,12 +38,59 @@ class Shot(Frozen):
     label_alpha: float = 0.01
     category_deg: float = Field(default=45.0, gt=0)  # angular resolution of the pose categories
 
+    @model_validator(mode="after")
+    def _as_many_poses_as_instants(self) -> Shot:
+        for thing in self.things:
+            if not thing.motion.is_still and len(thing.motion.poses) != len(self.instants):
+                raise ValueError(
+                    f"expected one pose of thing {thing.id}, or one an instant ({len(self.instants)}); "
+                    f"found {len(thing.motion.poses)}"
+                )
+        return self
+
     @property
     def objects(self) -> tuple[Thing, ...]:
         """What is labelled, in the order of the ids."""
-        return tuple(p for p in self.things if p.id)
+        return tuple(thing for thing in self.things if thing.id)
+
+    @property
+    def samples(self) -> Iterator[tuple[int, int, int]]:
+        """Number in the data set, instant and sensor (both counted from 0 here) of every sample, in order."""
+        sensors = len(self.rig.sensors)
+        for instant in range(len(self.instants)):
+            for sensor in range(sensors):
+                yield self.first + instant * sensors + sensor, instant, sensor
+
+    def things_at(self, instant: int) -> tuple[Thing, ...]:
+        """All things as they are at an instant, counted from 0 in the shot: standing still there, or not there."""
+        return tuple(
+            thing if thing.motion.is_still else thing.model_copy(update={"motion": Motion(poses=(thing.motion.at(instant),))})
+            for thing in self.things
+        )
+
+    def poses_at(self, instant: int) -> tuple[Matrix4 | None, ...]:
+        """Where all that moves is at an instant, counted from 0 in the shot: equal where the world is."""
+        return tuple(thing.motion.at(instant) for thing in self.things if not thing.motion.is_still)
+
+    def camera(self, instant: int, sensor: int = 0) -> Camera:
+        """The camera of a sensor at an instant, both counted from 0 in the shot."""
+        pose, mounted = self.instants[instant].world_from_rig, self.rig.sensors[sensor]
+        world_from_sensor = np.array(pose, np.float64)
+        if mounted.rig_from_sensor != IDENTITY:
+            world_from_sensor = compose(world_from_sensor, np.array(mounted.rig_from_sensor))
+        rotation = np.ascontiguousarray(world_from_sensor[:3, :3].T)
+        return Camera(mounted.intrinsics, rotation, -transform(rotation, world_from_sensor[:3, 3]))
+
+    def finish(self, instant: int) -> Finish:
+        """How light becomes a picture at an instant."""
+        return self.instants[instant].finish or self.scene.finish
 
     @property
     def stage_key(self) -> str:
-        """Equal for shots that can share a warm stage: all but the frames."""
-        return self.model_copy(update={"key": "", "frames": ()}).model_dump_json()
+        """Equal for shots that can share a warm stage: all but their instants, and where what moves is then."""
+        things = tuple(
+            thing if thing.motion.is_still else thing.model_copy(update={"motion": Motion(poses=(None,))})
+            for thing in self.things
+        )
+        alike = {"key": "", "first": 0, "sequence": "", "instants": (), "things": things}
+        return self.model_copy(update=alike).model_dump_json()

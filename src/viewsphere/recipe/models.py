@@ -9,8 +9,8 @@ from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
 
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.mistakes import nearest, shown
+from viewsphere.model.model_spec import Axis
 from viewsphere.model.numbers import Count, Positive
-from viewsphere.model.shot import Axis
 from viewsphere.recipe.time import STEPS, Frames, Steps
 from viewsphere.recipe.values import OrShort, shape_of
 

@@ -9,8 +9,8 @@ from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
 
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.mistakes import shown
+from viewsphere.model.model_spec import Axis
 from viewsphere.model.numbers import Count, Number
-from viewsphere.model.shot import Axis
 from viewsphere.recipe.draws import FARTHEST, Drawn, Length, is_random
 from viewsphere.recipe.models import ZOO, Unit
 from viewsphere.recipe.values import Interval, OrShort, Point, shape_of

@@ -8,8 +8,8 @@ from pydantic import Discriminator, Field, Tag, field_validator, model_validator
 
 from viewsphere.geometry.pose_category import pose_category
 from viewsphere.model.frozen import Frozen
+from viewsphere.model.model_spec import Axis
 from viewsphere.model.numbers import Count, Number, Positive
-from viewsphere.model.shot import Axis
 from viewsphere.recipe.time import Frames
 from viewsphere.recipe.values import Interval, Point, Range, Values, shape_of
 

@@ -8,8 +8,8 @@ import numpy as np
 
 from viewsphere.geometry.box import FACES
 from viewsphere.model.camera import Camera
+from viewsphere.model.instant import Viewpoint
 from viewsphere.model.sample import ObjectAnnotation, Sample
-from viewsphere.model.shot import Pose
 from viewsphere.report.unknown import number, numbers
 
 
@@ -27,7 +27,7 @@ def frame_data(sample: Sample) -> dict[str, Any]:
     }
 
 
-def _pose_data(pose: Pose) -> dict[str, Any]:
+def _pose_data(pose: Viewpoint) -> dict[str, Any]:
     return {
         "azimuth": number(pose.azimuth_deg),
         "elevation": number(pose.elevation_deg),

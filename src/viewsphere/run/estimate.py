@@ -17,7 +17,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from viewsphere import plugins
-from viewsphere.model.shot import ModelSpec
+from viewsphere.formats import Format
+from viewsphere.model.model_spec import ModelSpec
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.run.opening import prepare, to_render
 from viewsphere.run.tasks import Task, Worker
@@ -92,7 +93,7 @@ def _measure_in(planned: Plan, store: Store, stopwatch: _Stopwatch) -> Rates:
         begun += stopwatch(lambda shot=shot: next(worker.stages.render(shot)))
         task = Task("shot", shot.key, shot.key, shot.model_dump_json())
         frame += stopwatch(lambda task=task: worker.do(task))
-    frames = sum(len(shot.frames) for shot in shots)
+    frames = sum(len(shot.instants) * len(shot.rig.sensors) for shot in shots)
     frame /= frames
     scenes = len({shot.stage_key for shot in shots})
     scene = max(begun - len(shots) * frame, 0.0) / scenes  # what a first frame takes beyond others
@@ -113,7 +114,7 @@ def _export(store: Store, formats: Sequence[str], stopwatch: _Stopwatch) -> floa
     assert len(dataset) > 0
     seconds = 0.0
     for name in formats:
-        writer: plugins.Format = plugins.load("formats", name)
+        writer: Format = plugins.load("formats", name)
         folder = store.root / name
         folder.mkdir()
         seconds += stopwatch(lambda writer=writer, folder=folder: writer.export(dataset, folder))

@@ -11,8 +11,9 @@ from pathlib import Path
 
 from viewsphere import plugins
 from viewsphere.errors import ModelError, RecipeError, UserError, ViewsphereError
+from viewsphere.formats import Format
 from viewsphere.model.channel import missing
-from viewsphere.model.shot import ModelSpec
+from viewsphere.model.model_spec import ModelSpec
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.run.opening import commit, prepare, to_append, to_render
 from viewsphere.run.pool import Crew, Job, Outcome
@@ -124,9 +125,9 @@ def _check_channels(name: str, channels: Sequence[str]) -> None:
         )
 
 
-def _check_writable(name: str) -> plugins.Format:
+def _check_writable(name: str) -> Format:
     """The format of this name; raises UserError for one that is not known or does not work here."""
-    module: plugins.Format = plugins.load("formats", name)
+    module: Format = plugins.load("formats", name)
     getattr(module, "check", lambda: None)()
     return module
 
@@ -311,7 +312,7 @@ def export(
     notes: list[str] = []
     for done, name in enumerate(names):
         tell(Progress("exports", done, len(names)))
-        writer: plugins.Format = plugins.load("formats", name)
+        writer: Format = plugins.load("formats", name)
         with dataset.store.replacing(dataset.root / name) if is_own else new_folder(place / name) as folder:
             notes += writer.export(dataset, folder) or ()
     tell(Progress("exports", len(names), len(names)))

@@ -8,7 +8,7 @@ from typing import cast, get_args
 
 from viewsphere.assets.inspect import ModelReport, describe
 from viewsphere.errors import UserError
-from viewsphere.model.shot import Axis, ModelSpec
+from viewsphere.model.model_spec import Axis, ModelSpec
 from viewsphere.run.stages import build_zoo_model
 
 

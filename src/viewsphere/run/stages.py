@@ -17,17 +17,20 @@ from viewsphere.errors import ModelError, RecipeError
 from viewsphere.geometry.box import box_size, box_vertices
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.channel import PICTURES
+from viewsphere.model.model_spec import ModelSpec, Size
 from viewsphere.model.sample import Float, Sample
-from viewsphere.model.shot import Frame, ModelSpec, Shot, Size, Thing
+from viewsphere.model.shot import Shot
+from viewsphere.model.thing import Thing
 from viewsphere.run.allocator import keep_freed_memory
-from viewsphere.sampling.camera import camera_for, inside_box
+from viewsphere.sampling.camera import inside_box
 from viewsphere.store import Store
 from viewsphere.truth.channels import observe
 from viewsphere.truth.enclosure import sky_hidden
 from viewsphere.truth.visibility import rasterize
 from viewsphere.zoo import build
 
-if TYPE_CHECKING:  # which takes a third of a worker's start
+if TYPE_CHECKING:
+    from viewsphere.engines import Engine, Stage  # which takes a third of a worker's start
     from viewsphere.sampling.plan import Plan
 
 WARM_BYTES = 400_000_000
@@ -71,7 +74,7 @@ class StoredBoxes:
 class Stages:
     """Renders shots; keeps the last shot's stage, and the models used last, warm, and the memory of a frame for the next."""
 
-    _stage: plugins.Stage | None = None
+    _stage: Stage | None = None
     _stage_key: str = ""
     _models: dict[str, Mesh] = field(default_factory=dict[str, Mesh])
     _boxes: dict[str, Float] = field(default_factory=dict[str, Float])
@@ -164,12 +167,14 @@ class Stages:
         inside = transform(np.linalg.inv(np.array(thing.world_from_object)), point)
         return sky_hidden(mesh.vertices.astype(np.float64), mesh.triangles, inside) > MOST_SKY
 
-    def stage(self, shot: Shot) -> plugins.Stage:
+    def stage(self, shot: Shot) -> Stage:
         """The engine's stage for this shot, built anew only when the scene is another one."""
         if self._stage is None or self._stage_key != shot.stage_key:
-            engine: plugins.Engine = plugins.load("engines", shot.engine)
+            engine: Engine = plugins.load("engines", shot.engine)
             self._stage = engine.stage(shot, self.model)
             self._stage_key = shot.stage_key
+        else:
+            self._stage = self._stage.of(shot)
         return self._stage
 
     def render(self, shot: Shot) -> Iterator[Sample]:
@@ -178,10 +183,11 @@ class Stages:
         boxes = [self.box(p.model) for p in shot.objects]
         sizes = [self.real_size(p.model) for p in shot.objects]
         if len(shot.things) > 1:
-            cameras = [camera_for(shot.intrinsics, f.pose, _target(shot, boxes)).center for f in shot.frames]
-            self._check_cameras(shot.things, np.array(cameras))
-        for frame in shot.frames:
-            yield render_frame(shot, frame, stage, boxes, sizes)
+            for instant in range(len(shot.instants)):
+                cameras = [shot.camera(instant, sensor).center for sensor in range(len(shot.rig.sensors))]
+                self._check_cameras([thing for thing in shot.things_at(instant) if thing.is_there], np.array(cameras))
+        for sample in shot.samples:
+            yield render_sample(shot, sample, stage, boxes, sizes)
 
 
 def _size(mesh: Mesh) -> int:
@@ -190,33 +196,33 @@ def _size(mesh: Mesh) -> int:
     return per_vertex + 5 * mesh.triangles.nbytes // 3 + sum(i.pixels.nbytes for i in mesh.images)
 
 
-def render_frame(
-    shot: Shot, frame: Frame, stage: plugins.Stage, boxes: Sequence[Float], sizes: Sequence[Size | None]
+def render_sample(
+    shot: Shot, sample: tuple[int, int, int], stage: Stage, boxes: Sequence[Float], sizes: Sequence[Size | None]
 ) -> Sample:
-    """One frame: colour from the engine, every label from truth.
+    """One of `shot.samples`: colour from the engine, every label from truth.
 
     `boxes` and `sizes`: each object's 3D box in its own axes, and its real size if known.
     """
-    camera = camera_for(shot.intrinsics, frame.pose, _target(shot, boxes))
-    visibility = rasterize(stage.geometry, camera)
+    number, instant, sensor = sample
+    now, camera, geometry = shot.instants[instant], shot.camera(instant, sensor), stage.at(instant)
+    visibility = rasterize(geometry, camera)
     names = [name for name in shot.channels if name not in PICTURES]
-    observed = observe(stage.geometry, camera, visibility, names)
+    observed = observe(geometry, camera, visibility, names)
     for name in PICTURES:
         if name in shot.channels:
-            observed[name] = stage.color(camera, _finished(shot, frame, name == "rgba"), visibility)
+            observed[name] = stage.color(instant, sensor, visibility, name == "rgba")
     files = [model_files(p.model.key)[0] for p in shot.objects]
-    objects = annotate(shot, frame, camera, stage.geometry, visibility, boxes, files, sizes)
-    channels = {name: observed[name] for name in shot.channels}
-    return Sample(frame.index, frame.split, camera, frame.pose, objects, channels, {})
-
-
-def _finished(shot: Shot, frame: Frame, transparent: bool) -> Frame:
-    """The frame with its background, or without."""
-    finish = frame.finish or shot.scene.finish
-    background = finish.background.model_copy(update={"transparent": transparent})
-    return frame.model_copy(update={"finish": finish.model_copy(update={"background": background})})
-
-
-def _target(shot: Shot, boxes: Sequence[Float]) -> Float:
-    """Box centre of object 1 in the world: what a pose without a target of its own looks at."""
-    return transform(shot.things[0].world_from_object, boxes[0].mean(axis=0))
+    objects = annotate(shot, instant, camera, geometry, visibility, boxes, files, sizes)
+    return Sample(
+        index=number,
+        split=now.split,
+        known_camera=camera,
+        known_pose=now.viewpoint,
+        objects=objects,
+        channels={name: observed[name] for name in shot.channels},
+        files={},
+        sequence=shot.sequence,
+        sensor=shot.rig.sensors[sensor].name,
+        instant=now.index,
+        time=now.seconds,
+    )

@@ -16,7 +16,9 @@ from viewsphere.assets.mesh import Mesh
 from viewsphere.errors import StoreError
 from viewsphere.geometry.box import box_size, box_vertices
 from viewsphere.model.frozen import Frozen
-from viewsphere.model.shot import ModelSpec, Shot, Thing
+from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.shot import Shot
+from viewsphere.model.thing import Thing
 from viewsphere.run.stages import Stages, model_files
 from viewsphere.store import ModelInfo, Store
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from fnmatch import fnmatchcase
 
 from viewsphere.assets.glb import material_names
-from viewsphere.model.shot import ModelSpec
+from viewsphere.model.model_spec import ModelSpec
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.run.stages import model_files
 from viewsphere.store import Store

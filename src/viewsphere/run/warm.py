@@ -14,13 +14,19 @@ from pydantic import JsonValue
 
 from viewsphere import plugins
 from viewsphere.assets.mesh import Image, Material, Mesh, Texture
+from viewsphere.engines import Engine
 from viewsphere.geometry.box import box_vertices
 from viewsphere.kernels.garbage import pause_collection
 from viewsphere.kernels.kernel_cache import kernel_folder, sources_digest
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.channel import CHANNELS
-from viewsphere.model.shot import ModelSpec, Pose, Shot, Thing
-from viewsphere.run.stages import render_frame
+from viewsphere.model.instant import Viewpoint
+from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.rig import Rig, Sensor
+from viewsphere.model.shot import Shot
+from viewsphere.model.thing import Thing
+from viewsphere.run.stages import render_sample
+from viewsphere.sampling.camera import looking
 from viewsphere.sampling.look import engine_look
 from viewsphere.store import encode
 
@@ -50,12 +56,16 @@ def load_kernels(shot: Shot) -> None:
 
 
 def _small(shot: Shot) -> Shot:
-    lens = shot.intrinsics
-    tiny = Intrinsics(width=SIZE, height=SIZE, fx=SIZE, fy=SIZE, cx=SIZE / 2, cy=SIZE / 2, distortion=lens.distortion)
+    tiny = Intrinsics(width=SIZE, height=SIZE, fx=SIZE, fy=SIZE, cx=SIZE / 2, cy=SIZE / 2)
+    lenses = dict.fromkeys(sensor.intrinsics.distortion for sensor in shot.rig.sensors)
+    bent = (tiny.model_copy(update={"distortion": lens}) for lens in lenses)
+    sensors = (Sensor(name=f"{i}", intrinsics=lens) for i, lens in enumerate(bent))
     spec = ModelSpec(key="card", source="card", category="card", category_id=1)
     things = tuple(Thing(id=i, model=spec) for i in (1, 2))
-    frame = shot.frames[0].model_copy(update={"pose": Pose(index=0, azimuth_deg=0, elevation_deg=20, distance=2)})
-    return shot.model_copy(update={"key": "", "intrinsics": tiny, "things": things, "frames": (frame,)})
+    above = Viewpoint(index=0, azimuth_deg=0, elevation_deg=20, distance=2)
+    first = looking(above, (0.0, 0.0, 0.0), index=0, finish=shot.finish(0))
+    alike = {"key": "", "first": 0, "sequence": "", "rig": Rig(sensors=tuple(sensors)), "things": things, "instants": (first,)}
+    return shot.model_copy(update=alike)
 
 
 def _mark(small: Shot) -> Path:
@@ -90,12 +100,13 @@ def _outline(value: JsonValue) -> JsonValue:
 @pause_collection()
 def _render(shot: Shot) -> None:
     card = _card()
-    engine: plugins.Engine = plugins.load("engines", shot.engine)
+    engine: Engine = plugins.load("engines", shot.engine)
     stage = engine.stage(shot, lambda spec: card)
     boxes = [box_vertices(*card.bounds)] * len(shot.things)
-    sample = render_frame(shot, shot.frames[0], stage, boxes, [None] * len(boxes))
-    for name, array in sample.channels.items():
-        encode(CHANNELS[name], array, shot.files)
+    for number in shot.samples:
+        sample = render_sample(shot, number, stage, boxes, [None] * len(boxes))
+        for name, array in sample.channels.items():
+            encode(CHANNELS[name], array, shot.files)
 
 
 def _card() -> Mesh:

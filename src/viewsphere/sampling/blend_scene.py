@@ -16,8 +16,9 @@ from viewsphere.assets.scene_file import SceneFile, SceneObject, places, scene_f
 from viewsphere.errors import ModelError, RecipeError
 from viewsphere.geometry.rotation import Float, compose, transform
 from viewsphere.model.mistakes import nearest
+from viewsphere.model.model_spec import ModelSpec, Parts
 from viewsphere.model.scene import BlendScene, Matrix4
-from viewsphere.model.shot import ModelSpec, Parts, Thing
+from viewsphere.model.thing import Thing
 from viewsphere.recipe.blend import VALUE, BlendEntry, LabelRule, VariantEntry
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.scenery import Labels

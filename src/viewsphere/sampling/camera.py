@@ -2,24 +2,27 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from viewsphere.geometry.camera import orbit_center, orbit_rotation
-from viewsphere.geometry.rotation import transform
-from viewsphere.model.camera import Camera, Intrinsics
-from viewsphere.model.shot import Pose
+from viewsphere.model.instant import Instant, Viewpoint
+from viewsphere.model.scene import IDENTITY, Vector
 
 Float = NDArray[np.float64]
 
 
-def camera_for(intrinsics: Intrinsics, pose: Pose, target: ArrayLike) -> Camera:
-    """The camera of a pose; `target` (3,) world metres is looked at unless the pose has a target of its own."""
-    azimuth, elevation, tilt = np.radians([pose.azimuth_deg, pose.elevation_deg, pose.tilt_deg])
-    at = np.asarray(target if pose.target is None else pose.target, np.float64)
-    rotation = orbit_rotation(azimuth, elevation, tilt)
-    center = at + orbit_center(azimuth, elevation, pose.distance)
-    return Camera(intrinsics, rotation, -transform(rotation, center))
+def looking(viewpoint: Viewpoint, focus: Vector, **more: Any) -> Instant:
+    """The instant at which a camera stands at a viewpoint; it looks at `focus` unless the viewpoint has a target of its own."""
+    azimuth, elevation, tilt = np.radians([viewpoint.azimuth_deg, viewpoint.elevation_deg, viewpoint.tilt_deg])
+    at = viewpoint.target or focus
+    center = np.array(at) + orbit_center(azimuth, elevation, viewpoint.distance)
+    rows = np.column_stack([orbit_rotation(azimuth, elevation, tilt).T, center]).tolist()
+    a, b, c = ((x, y, z, w) for x, y, z, w in rows)
+    seconds = viewpoint.time.seconds if viewpoint.time else 0.0
+    return Instant(world_from_rig=(a, b, c, IDENTITY[3]), focus=at, seconds=seconds, viewpoint=viewpoint, **more)
 
 
 def inside_box(box: Float, points: Float) -> NDArray[np.bool_]:
@@ -31,7 +34,7 @@ def inside_box(box: Float, points: Float) -> NDArray[np.bool_]:
     return np.all((lengths > 0) & (along > 0) & (along < lengths), axis=1)
 
 
-def distance_problem(pose: Pose, box: Float) -> str | None:
+def distance_problem(pose: Viewpoint, box: Float) -> str | None:
     """Why the camera of this pose cannot stand where it does, inside the model's box (8, 3) in world metres; or None."""
     target = box.mean(axis=0) if pose.target is None else np.array(pose.target)
     azimuth, elevation = np.radians([pose.azimuth_deg, pose.elevation_deg])

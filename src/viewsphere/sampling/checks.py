@@ -8,7 +8,7 @@ from fnmatch import fnmatchcase
 from viewsphere import plugins
 from viewsphere.errors import RecipeError
 from viewsphere.model.mistakes import nearest, one_of
-from viewsphere.model.shot import ModelSpec
+from viewsphere.model.model_spec import ModelSpec
 from viewsphere.recipe.draws import alternatives
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.surface import GroundEntry

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.errors import RecipeError
-from viewsphere.model.shot import Matrix4, ModelSpec
+from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.scene import Matrix4
 from viewsphere.recipe.scenery import CompanyEntry
 from viewsphere.sampling.seeds import generator, share
 

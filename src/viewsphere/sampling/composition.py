@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.rotation import transform
+from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Vector
-from viewsphere.model.shot import ModelSpec, Thing
+from viewsphere.model.thing import Motion, Thing
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.scenery import Labels
 from viewsphere.sampling.blend_scene import BlendScenery
@@ -131,7 +132,7 @@ class Composition:
             names = draw_names(entry.draw, spec.key, pose)
             free = free_floor(self.recipe, place, draw_names(place.draw, spec.key, pose)) if place else None
             moves = layout(entry, self.recipe.seed, cast, boxes, names, free)
-        return tuple(Thing(id=i, model=m, world_from_object=w) for i, (m, w) in enumerate(zip(cast, moves, strict=True), 1))
+        return tuple(Thing(id=i, model=m, motion=Motion.still(w)) for i, (m, w) in enumerate(zip(cast, moves, strict=True), 1))
 
     def things(self, spec: ModelSpec, pose: str | None, box_of: BoxOf) -> tuple[Thing, ...]:
         """All that is placed: targets, labelled scenery, then the scenery that is background."""
@@ -141,7 +142,7 @@ class Composition:
         rest = [p for p in pieces if p.labels != "own"]
         ids = [*range(len(targets) + 1, len(targets) + len(labelled) + 1), *[0] * len(rest)]
         return targets + tuple(
-            Thing(id=i, model=p.model, world_from_object=p.world_from_piece, scenery=True)
+            Thing(id=i, model=p.model, motion=Motion.still(p.world_from_piece), scenery=True)
             for i, p in zip(ids, labelled + rest, strict=True)
         )
 

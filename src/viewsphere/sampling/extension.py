@@ -21,8 +21,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.errors import RecipeError
+from viewsphere.model.instant import Instant
 from viewsphere.model.mistakes import shown
-from viewsphere.model.shot import Frame, ModelSpec, Shot
+from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.shot import Shot
 from viewsphere.recipe.recipe import Splits
 from viewsphere.sampling.composition import BoxOf
 from viewsphere.sampling.look import engine_look
@@ -94,7 +96,8 @@ class Portion:
         return made.model_copy(
             update={
                 "things": tuple(p.model_copy(update={"model": self._numbered(p.model)}) for p in made.things),
-                "frames": tuple(_numbered(f, first + i, int(poses[i])) for i, f in enumerate(made.frames)),
+                "first": first,
+                "instants": tuple(_numbered(now, first + i, int(poses[i])) for i, now in enumerate(made.instants)),
                 "channels": self._channels(first),
             }
         )
@@ -145,8 +148,9 @@ class Portion:
         return spec.model_copy(update={"category_id": self._category_ids[spec.category]})
 
 
-def _numbered(frame: Frame, index: int, pose: int) -> Frame:
-    return frame.model_copy(update={"index": index, "pose": frame.pose.model_copy(update={"index": pose})})
+def _numbered(now: Instant, index: int, pose: int) -> Instant:
+    viewpoint = now.viewpoint and now.viewpoint.model_copy(update={"index": pose})
+    return now.model_copy(update={"index": index, "viewpoint": viewpoint})
 
 
 def whole(planned: Plan) -> Portion:

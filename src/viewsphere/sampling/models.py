@@ -19,7 +19,7 @@ from viewsphere.assets.inside import split_source
 from viewsphere.assets.load import BLENDER_SUFFIXES
 from viewsphere.errors import RecipeError
 from viewsphere.model.mistakes import nearest
-from viewsphere.model.shot import ModelSpec, Size
+from viewsphere.model.model_spec import ModelSpec, Size
 from viewsphere.recipe.models import ZOO, Dimensions, Length, ModelEntry, SizeTable, unit_metres
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.sampling.seeds import generator

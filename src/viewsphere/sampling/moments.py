@@ -13,8 +13,9 @@ from pathlib import Path
 from viewsphere.assets.timeline import Blenders, Timeline
 from viewsphere.errors import ModelError, RecipeError
 from viewsphere.model.camera import Intrinsics
+from viewsphere.model.instant import Moment, Viewpoint
+from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Vector
-from viewsphere.model.shot import ModelSpec, Moment, Pose
 from viewsphere.recipe.models import ModelEntry
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.time import Frames, Steps, chosen_frames
@@ -94,7 +95,7 @@ class TimedPoses(Poses):
         """The pose's."""
         return self.base.view(index % len(self.base))
 
-    def _pose(self, index: int) -> Pose:
+    def _pose(self, index: int) -> Viewpoint:
         number, pose = divmod(index, len(self.base))
         return self.base[pose].model_copy(update={"index": index, "time": self.moments[number]})
 

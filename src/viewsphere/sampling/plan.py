@@ -21,12 +21,16 @@ from viewsphere.errors import RecipeError
 from viewsphere.geometry.camera import orbit_center
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.camera import Intrinsics
+from viewsphere.model.instant import Instant, Viewpoint
+from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.rig import Rig
 from viewsphere.model.scene import Scene, Vector
-from viewsphere.model.shot import Frame, ModelSpec, Pose, Shot, Thing
+from viewsphere.model.shot import Shot
+from viewsphere.model.thing import Thing
 from viewsphere.recipe.draws import alternatives, span
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.sampling.blend_scene import BlendScenery
-from viewsphere.sampling.camera import distance_problem, inside_box
+from viewsphere.sampling.camera import distance_problem, inside_box, looking
 from viewsphere.sampling.checks import (
     check_blend,
     check_catcher,
@@ -294,13 +298,15 @@ class Plan:
         if self.recipe.scene.materials:
             things = tuple(self._repainted(p, spec, pose) for p in things)
         run = self.schedules[model].run_of(chosen[0])
-        target = self._target(things[0], run, target, box_of)
+        target, placed = self._target(things[0], run, target, box_of), self._at(things, run)
+        focus = target or center(placed[0], _known(box_of))
         return Shot(
             key=key or spec.key,
-            things=self._at(things, run),
-            intrinsics=self.intrinsics,
+            things=placed,
+            rig=Rig.of(self.intrinsics),
             scene=self._scene(spec, pose, run).model_copy(update=self._floor(spec, things, box_of)),
-            frames=tuple(self.frame(model, i, target) for i in chosen),
+            first=self._firsts[model] + self.schedules[model].position(chosen[0]),
+            instants=tuple(self.instant(model, i, target, focus) for i in chosen),
             engine=self.recipe.engine.name,
             engine_options=self.recipe.engine.options,
             channels=self.recipe.channels,
@@ -384,19 +390,17 @@ class Plan:
         """All shots in order, made one by one."""
         return (self.shot(i, box_of) for i in range(self.shot_count))
 
-    def frame(self, model: int, pose: int, target: Vector | None = None) -> Frame:
-        """The frame of a model (its index) and a pose, which looks at `target` unless it has a target of its own."""
+    def instant(self, model: int, pose: int, target: Vector | None, focus: Vector) -> Instant:
+        """The instant of a model (its index) and a pose; the camera looks at `target` unless the pose has its own, and where
+        there is neither at `focus`.
+        """
         spec, finish = self.model_specs[model], None
         if self.scenes.has_finish_per_frame:
             finish = self.scenes.finish(spec.key, self.pose_list.name(pose))
-        return Frame(
-            index=self._firsts[model] + self.schedules[model].position(pose),
-            pose=self._pose(spec, pose, target),
-            split=self.split(spec, pose),
-            finish=finish,
-        )
+        number = self._firsts[model] + self.schedules[model].position(pose)
+        return looking(self._pose(spec, pose, target), focus, index=number, split=self.split(spec, pose), finish=finish)
 
-    def _pose(self, spec: ModelSpec, index: int, target: Vector | None) -> Pose:
+    def _pose(self, spec: ModelSpec, index: int, target: Vector | None) -> Viewpoint:
         """The pose of a model's frame, which looks at `target` unless it has a target of its own."""
         pose = self.pose_list[index]
         if target is not None and pose.target is None:
@@ -508,7 +512,7 @@ def plan(recipe: Recipe, shot_frames: int | None = None) -> Plan:
 
 def check_engine(recipe: Recipe) -> None:
     """See that the engine takes its options; raises UserError where it does not, or lacks its extra."""
-    engine: plugins.Engine = plugins.load("engines", recipe.engine.name)
+    engine = plugins.load("engines", recipe.engine.name)
     with recipe.located():
         engine.check(recipe.engine.options)
 
@@ -529,7 +533,7 @@ def center(thing: Thing, box_of: BoxOf) -> Vector:
     return x, y, z
 
 
-def _stand(pose: Pose) -> NDArray[np.float64]:
+def _stand(pose: Viewpoint) -> NDArray[np.float64]:
     """Where the camera of a pose with a target stands, (3,) world metres."""
     assert pose.target is not None
     return np.array(pose.target) + orbit_center(math.radians(pose.azimuth_deg), math.radians(pose.elevation_deg), pose.distance)

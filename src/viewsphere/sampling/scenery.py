@@ -19,7 +19,8 @@ from viewsphere.errors import ModelError, RecipeError, UserError
 from viewsphere.geometry.box import box_vertices
 from viewsphere.geometry.rotation import compose
 from viewsphere.model.mistakes import one_of
-from viewsphere.model.shot import Matrix4, ModelSpec
+from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.scene import Matrix4
 from viewsphere.recipe.draws import drawn
 from viewsphere.recipe.models import ZOO, unit_metres
 from viewsphere.recipe.recipe import Recipe

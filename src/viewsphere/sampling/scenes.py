@@ -16,6 +16,8 @@ from typing import Any, TypeVar
 from viewsphere.geometry.camera import orbit_center
 from viewsphere.geometry.pose_category import pose_category
 from viewsphere.model.frozen import Frozen
+from viewsphere.model.instant import Viewpoint
+from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import (
     WHITE,
     AnyLight,
@@ -37,7 +39,7 @@ from viewsphere.model.scene import (
     Vector,
     View,
 )
-from viewsphere.model.shot import ModelSpec, Pose, Repaint
+from viewsphere.model.thing import Repaint
 from viewsphere.recipe.draws import RngOf, drawn, is_random
 from viewsphere.recipe.finish import BackgroundEntry, JitterEntry, PerFrame
 from viewsphere.recipe.light import (
@@ -113,7 +115,7 @@ class Scenes:
             if fnmatchcase(spec.key, material.models)
         )
 
-    def jittered(self, pose: Pose, model: str, name: str) -> Pose:
+    def jittered(self, pose: Viewpoint, model: str, name: str) -> Viewpoint:
         """The pose moved at random; it keeps its index. One without a target of its own keeps to the models' centre."""
         entry = self.recipe.scene.jitter
         by = drawn(entry, self._rng_of(draw_names(entry.draw, model, name)), ("jitter",))

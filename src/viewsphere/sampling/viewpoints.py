@@ -21,8 +21,8 @@ from viewsphere.geometry.camera import orbit_angles
 from viewsphere.geometry.pose_category import pose_category
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.camera import Intrinsics
+from viewsphere.model.instant import Viewpoint
 from viewsphere.model.scene import Vector
-from viewsphere.model.shot import Pose
 from viewsphere.recipe.values import Range
 from viewsphere.recipe.viewpoints import Grid, Jitter, Normal, PoseList, Sphere, Viewpoints, axis_value
 from viewsphere.sampling.pose_files import Motion, PoseFile, read_poses
@@ -41,7 +41,7 @@ class View(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Poses(Sequence[Pose]):
+class Poses(Sequence[Viewpoint]):
     """The poses of a recipe, in index order, made one by one when asked for: a million of them take no memory.
 
     `counts` are the factors of their number, outermost loop first.
@@ -99,10 +99,10 @@ class Poses(Sequence[Pose]):
         return self._length
 
     @overload
-    def __getitem__(self, index: int) -> Pose: ...
+    def __getitem__(self, index: int) -> Viewpoint: ...
     @overload
-    def __getitem__(self, index: slice) -> Sequence[Pose]: ...
-    def __getitem__(self, index: int | slice) -> Pose | Sequence[Pose]:
+    def __getitem__(self, index: slice) -> Sequence[Viewpoint]: ...
+    def __getitem__(self, index: int | slice) -> Viewpoint | Sequence[Viewpoint]:
         if isinstance(index, slice):
             return tuple(self._pose(i) for i in range(*index.indices(len(self))))
         i = index + len(self) if index < 0 else index
@@ -110,9 +110,9 @@ class Poses(Sequence[Pose]):
             raise IndexError(f"expected a pose of 0..{len(self) - 1}, got {index}")
         return self._pose(i)
 
-    def _pose(self, index: int) -> Pose:
+    def _pose(self, index: int) -> Viewpoint:
         view = self.view(index)
-        return Pose(
+        return Viewpoint(
             index=index,
             azimuth_deg=view.azimuth,
             elevation_deg=view.elevation,

@@ -179,7 +179,7 @@ class Dataset(Sequence[Sample]):
             at = bisect_right(firsts, record["index"]) - 1
             (key, first, count), channels = rows[at] if at >= 0 else (("", 0, 0), ())
             if record["index"] < first + count:
-                files |= {name: self.store.channel_file(key, name, record["pose"]["index"], kinds) for name in channels}
+                files |= {name: self.store.channel_file(key, name, record["index"], kinds) for name in channels}
         return files
 
     @cached_property

@@ -21,7 +21,8 @@ from viewsphere.model.channel import CHANNELS
 from viewsphere.model.files import Files
 from viewsphere.model.record import sample_to_record
 from viewsphere.model.sample import Sample
-from viewsphere.model.shot import Shot, Thing
+from viewsphere.model.shot import Shot
+from viewsphere.model.thing import Thing
 from viewsphere.store.channel_files import encode
 from viewsphere.store.records import ModelInfo, PlanRecord, ShotRow
 
@@ -151,9 +152,9 @@ class Store:
         """Where a finished shot lies."""
         return self.folder / "shots" / hashlib.sha256(key.encode()).hexdigest()[:2] / key
 
-    def channel_file(self, key: str, channel: str, pose: int, kinds: Files | None = None) -> str:
-        """Where a finished shot's channel of a pose, written as `kinds` say, lies; relative to the data set's root."""
-        return f"{self.shot_folder(key).relative_to(self.root).as_posix()}/{channel_path(channel, pose, kinds)}"
+    def channel_file(self, key: str, channel: str, sample: int, kinds: Files | None = None) -> str:
+        """Where a finished shot's channel of a sample, written as `kinds` say, lies; relative to the data set's root."""
+        return f"{self.shot_folder(key).relative_to(self.root).as_posix()}/{channel_path(channel, sample, kinds)}"
 
     def model_folder(self, key: str) -> Path:
         """Where a normalised model lies."""
@@ -231,7 +232,7 @@ class Store:
             for sample in samples:
                 files: dict[str, str] = {}
                 for name, array in sample.channels.items():
-                    inside = channel_path(name, sample.pose.index, kinds)
+                    inside = channel_path(name, sample.index, kinds)
                     if name not in made:
                         (folder / name).mkdir()
                         made.add(name)
@@ -329,9 +330,9 @@ def new_folder(target: Path) -> Generator[Path]:
                 parent.rmdir()
 
 
-def channel_path(channel: str, pose: int, kinds: Files | None = None) -> str:
-    """Where a channel of a pose, written as `kinds` say, lies in its shot's folder."""
-    return f"{channel}/{pose:06d}{(kinds or Files()).suffix(CHANNELS[channel])}"
+def channel_path(channel: str, sample: int, kinds: Files | None = None) -> str:
+    """Where a channel of a sample (its number in the data set), written as `kinds` say, lies in its shot's folder."""
+    return f"{channel}/{sample:08d}{(kinds or Files()).suffix(CHANNELS[channel])}"
 
 
 def _write(file: str, data: bytes) -> None:

@@ -59,7 +59,7 @@ def link_shot(store: Store, key: str, frames: Iterable[ForeignFrame], known: Ite
             files: dict[str, str] = {}
             for name, source in frame.files.items():
                 suffix = CHANNELS[name].suffix if isinstance(source, bytes) else source.suffix.lower()
-                inside = f"{name}/{frame.sample.index:06d}{suffix}"
+                inside = f"{name}/{frame.sample.index:08d}{suffix}"
                 (folder / name).mkdir(exist_ok=True)
                 if isinstance(source, bytes):
                     (folder / inside).write_bytes(source)

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.model.shot import Size
+from viewsphere.model.model_spec import Size
 
 STORE_VERSION = 1
 

@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from viewsphere.assets.mesh import Mesh
-from viewsphere.model.shot import ModelSpec, Thing
+from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.thing import Thing
 from viewsphere.truth.cutouts import NO_CUTOUTS, SURFACE, Cutouts, mesh_cutouts, stack_cutouts
 
 BACKGROUND = 0
@@ -99,6 +100,11 @@ def placed_meshes(things: Sequence[Thing], load: Callable[[ModelSpec], Mesh]) ->
     """The model of each thing; each is loaded once."""
     loaded = {spec: load(spec) for spec in dict.fromkeys(p.model for p in things)}
     return [loaded[p.model] for p in things]
+
+
+def present(things: Sequence[Thing], meshes: Sequence[Mesh]) -> list[Mesh]:
+    """The meshes of things that stand still; of those that are not there one without triangles, but with all materials."""
+    return [mesh if thing.is_there else mesh.emptied() for thing, mesh in zip(things, meshes, strict=True)]
 
 
 def build_geometry(

@@ -14,9 +14,10 @@ if TYPE_CHECKING:
 
     from viewsphere.assets.mesh import Mesh
     from viewsphere.engines.cycles.staging import CyclesStage
+    from viewsphere.model.model_spec import ModelSpec
     from viewsphere.model.sample import Sample
     from viewsphere.model.scene import Finish
-    from viewsphere.model.shot import ModelSpec, Shot
+    from viewsphere.model.shot import Shot
 
 PROGRAMS = (Path(__file__).parents[2] / "blender" / "worker",)
 """Sources besides these that pictures depend on."""

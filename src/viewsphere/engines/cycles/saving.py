@@ -14,7 +14,7 @@ from viewsphere.assets.mesh import Mesh
 from viewsphere.assets.srgb import encoded
 from viewsphere.codecs.png_tiff import encode_png
 from viewsphere.engines.cycles.file_frame import FileFrame
-from viewsphere.engines.cycles.staging import STAGE_SECONDS, CyclesStage, build_stage, told_camera
+from viewsphere.engines.cycles.staging import STAGE_SECONDS, Arrangement, build_stage, told_camera
 from viewsphere.errors import BlenderDied, ModelError
 from viewsphere.geometry.camera import orbit_angles
 from viewsphere.imaging.background import display_background
@@ -23,9 +23,10 @@ from viewsphere.imaging.view import EXPOSURE
 from viewsphere.imaging.white import NEUTRAL_K
 from viewsphere.model.camera import Camera
 from viewsphere.model.channel import picture_of
+from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.sample import Sample
 from viewsphere.model.scene import Finish
-from viewsphere.model.shot import ModelSpec, Shot
+from viewsphere.model.shot import Shot
 
 NEAREST, FARTHEST = 1e-3, 1e5
 """What the camera sees, in distances to its target: with more, surfaces would flicker in Blender's windows."""
@@ -57,8 +58,8 @@ def save(shot: Shot, samples: Sequence[Sample], load: Callable[[ModelSpec], Mesh
     """
     kept = shot.engine_options if shot.engine == "cycles" else {"python": shot.engine_options.get("python")}
     own = shot.model_copy(update={"engine": "cycles", "engine_options": {**kept, "device": "cpu"}})
-    stage = build_stage(own, load)
-    finishes = [frame.finish or shot.scene.finish for frame in shot.frames]
+    stage = build_stage(own, load).arrangement(0)
+    finishes = [shot.finish(instant) for instant in range(len(shot.instants))]
     told = _told(shot, samples, finishes, file.stem, data)
     died: BlenderDied | None = None
     for _ in range(2):
@@ -81,7 +82,7 @@ def shows_sky(shot: Shot, finish: Finish) -> bool:
     return not is_clear(shot) and finish.background.color is None and finish.background.image is None
 
 
-def _ask(stage: CyclesStage, told: dict[str, Any], finishes: Sequence[Finish], camera: Camera, file: Path) -> float:
+def _ask(stage: Arrangement, told: dict[str, Any], finishes: Sequence[Finish], camera: Camera, file: Path) -> float:
     """Have it written; gives by how much its camera is off at most."""
     process = stage.keeper.process_for(stage)
     background, sequence = None, ""

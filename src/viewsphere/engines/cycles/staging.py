@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
-from functools import cache, cached_property
+from dataclasses import dataclass, field, replace
+from functools import cache, cached_property, partial
 from pathlib import Path
 from typing import Any
 
@@ -20,14 +20,17 @@ from viewsphere.engines.cycles.file_frame import FileFrame
 from viewsphere.engines.cycles.lens import resampled, views_of
 from viewsphere.engines.cycles.options import AnyOptions, options_of
 from viewsphere.engines.cycles.texels import Kind, Levels
-from viewsphere.engines.cycles.told import kinds_of, middle_of, told_looks, told_scene
+from viewsphere.engines.cycles.told import kinds_of, told_looks, told_scene
 from viewsphere.errors import BlenderDied, BlenderError, ModelError, RecipeError, UserError
 from viewsphere.imaging.background import display_background
 from viewsphere.imaging.finish import finished
 from viewsphere.imaging.seen import seen_by
 from viewsphere.model.camera import Camera
-from viewsphere.model.shot import Frame, ModelSpec, Shot
-from viewsphere.truth.geometry import Geometry, build_geometry, placed_meshes
+from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.scene import Matrix4
+from viewsphere.model.shot import Shot
+from viewsphere.model.thing import Thing
+from viewsphere.truth.geometry import Geometry, build_geometry, placed_meshes, present
 from viewsphere.truth.visibility import Visibility, homogeneous
 
 STAGE_SECONDS = 600.0
@@ -57,6 +60,9 @@ Clip = tuple[float, float]
 AllLevels = tuple[Levels, ...]
 """Of each kind of model."""
 
+Poses = tuple[Matrix4 | None, ...]
+"""Of all that moves."""
+
 Bounds = tuple[Path, ...] | None
 """The folders that Blender may read, where it opens a file of a user's; None where it opens none."""
 
@@ -69,11 +75,11 @@ class Keeper:
     process: BlenderProcess | None = None
     _drawing: set[str] = field(default_factory=set[str])
     _started_for: tuple[Bounds, int] | None = None
-    _stage: CyclesStage | None = None
+    _stage: Arrangement | None = None
     _levels: AllLevels | None = None
     _served: int = 0
 
-    def process_for(self, stage: CyclesStage, levels: AllLevels | None = None) -> BlenderProcess:
+    def process_for(self, stage: Arrangement, levels: AllLevels | None = None) -> BlenderProcess:
         """A Blender that has this stage's scene, its pictures as coarse as `levels` says; None: as they are, or were."""
         if self.process is not None and self._stage is stage:
             if levels is not None and levels != self._levels:
@@ -130,14 +136,61 @@ def keeper_of(python: Path) -> Keeper:
 
 @dataclass(frozen=True, eq=False)
 class CyclesStage:
-    """A scene in Blender; `color` renders it."""
+    """A shot's scene for Blender."""
 
-    geometry: Geometry
     shot: Shot
     meshes: Sequence[Mesh]
     options: AnyOptions
     keeper: Keeper
-    middle: NDArray[np.float64]
+    _arranged: dict[Poses, Arrangement] = field(default_factory=dict[Poses, "Arrangement"])
+
+    def of(self, shot: Shot) -> CyclesStage:
+        """The same for another shot, one of an equal `stage_key`."""
+        return replace(self, shot=shot)
+
+    def at(self, instant: int) -> Geometry:
+        """The world-space triangles at an instant, counted from 0 in the shot."""
+        return self.arrangement(instant).geometry
+
+    def arrangement(self, instant: int) -> Arrangement:
+        """All things as they stand at an instant; the last one is kept."""
+        poses = self.shot.poses_at(instant)
+        if poses not in self._arranged:
+            things = self.shot.things_at(instant)
+            self._arranged.clear()
+            self._arranged[poses] = Arrangement(self.shot, things, present(things, self.meshes), self.options, self.keeper)
+        return self._arranged[poses]
+
+    def color(self, instant: int, sensor: int, visibility: Visibility, transparent: bool) -> NDArray[np.uint8]:
+        """The picture of a sensor at an instant, (H, W, 3) uint8 sRGB; with `transparent` (H, W, 4) with straight alpha.
+
+        A Blender that dies or hangs is started again, once. Raises ModelError when it dies again, UserError for an
+        unreadable background image.
+        """
+        camera, arranged = self.shot.camera(instant, sensor), self.arrangement(instant)
+        finish = self.shot.finish(instant).with_background(transparent)
+        background = display_background(finish.background, camera.width, camera.height)
+        radiance = arranged.radiance(camera, background is not None or transparent, visibility)
+        focus, owner = np.array(self.shot.instants[instant].focus), arranged.geometry.triangle_object
+        seen = partial(seen_by, camera, focus, visibility.inverse_depth, visibility.triangle, owner)
+        return finished(radiance, background, finish, seen)
+
+
+@dataclass(frozen=True, eq=False)
+class Arrangement:
+    """Things of a shot as they stand at some instant: what Blender has of a scene."""
+
+    shot: Shot
+    things: Sequence[Thing]
+    meshes: Sequence[Mesh]
+    options: AnyOptions
+    keeper: Keeper
+
+    @cached_property
+    def geometry(self) -> Geometry:
+        """Truth's triangles."""
+        scene = self.shot.scene
+        return build_geometry(self.things, self.meshes, scene.ground is not None, self.shot.label_alpha, scene.floor)
 
     @property
     def bounds(self) -> Bounds:
@@ -147,23 +200,9 @@ class CyclesStage:
             return None
         return (Path(blend.file).resolve().parent,) if blend.confined else (Path("/"),)
 
-    def color(self, camera: Camera, frame: Frame, visibility: Visibility) -> NDArray[np.uint8]:
-        """The picture, (H, W, 3) uint8 sRGB, or (H, W, 4) with straight alpha where the background is transparent.
-
-        A Blender that dies or hangs is started again, once. Raises ModelError when it dies again, UserError for an
-        unreadable background image.
-        """
-        finish = frame.finish or self.shot.scene.finish
-        background = display_background(finish.background, camera.width, camera.height)
-        is_open = background is not None or finish.background.transparent
-        radiance = self._drawn(camera, is_open, visibility) if self.options.draws else self._radiance(camera, is_open)
-        target = self.middle if frame.pose.target is None else np.array(frame.pose.target)
-        return finished(
-            radiance,
-            background,
-            finish,
-            lambda: seen_by(camera, target, visibility.inverse_depth, visibility.triangle, self.geometry.triangle_object),
-        )
+    def radiance(self, camera: Camera, is_open: bool, visibility: Visibility) -> Float32:
+        """Scene-linear, premultiplied, (H, W, 4) float32; where `is_open` nothing is behind the scene."""
+        return self._drawn(camera, is_open, visibility) if self.options.draws else self._radiance(camera, is_open)
 
     def _drawn(self, camera: Camera, is_open: bool, visibility: Visibility) -> Float32:
         """What a renderer that draws gives, which tells depths apart that are not too far from one another."""
@@ -189,7 +228,7 @@ class CyclesStage:
             except BlenderDied as error:
                 self.keeper.drop()
                 died = error
-        raise ModelError(f"{', '.join(sorted({p.model.key for p in self.shot.things}))}: {died}")
+        raise ModelError(f"{', '.join(sorted({p.model.key for p in self.things}))}: {died}")
 
     def _rendered(self, camera: Camera, is_open: bool, clip: Clip) -> Float32:
         views = views_of(camera)
@@ -210,7 +249,7 @@ class CyclesStage:
     @cached_property
     def kinds(self) -> tuple[Kind, ...]:
         """The models in the scene."""
-        return kinds_of(self.shot.things, self.meshes, self.shot.scene)
+        return kinds_of(self.things, self.meshes, self.shot.scene)
 
     def _levels(self, cameras: Sequence[Camera]) -> AllLevels | None:
         """How coarse pictures may be; None for as they are: OpenGL has mip levels, and what a user's own scene has in it, and
@@ -229,7 +268,7 @@ class CyclesStage:
     def tell(self, process: BlenderProcess, levels: AllLevels | None = None) -> None:
         """Build the scene in this Blender. Raises UserError for what its renderer does not know or have."""
         shot = self.shot
-        told = told_scene(shot.things, self.meshes, self.geometry, shot.scene, self.options, process.put, levels)
+        told = told_scene(self.things, self.meshes, self.geometry, shot.scene, self.options, process.put, levels)
         try:
             process.ask("stage", STAGE_SECONDS, **told)
         except BlenderError as error:
@@ -270,7 +309,7 @@ def border_of(geometry: Geometry, camera: Camera) -> tuple[int, int, int, int] |
 
 
 def build_stage(shot: Shot, load: Callable[[ModelSpec], Mesh]) -> CyclesStage:
-    """Geometry and scene of a shot; Blender builds it when the first picture is asked for.
+    """The stage of a shot; Blender builds the scene when the first picture is asked for.
 
     Raises RecipeError for an option, or a ground, that its renderer does not have.
     """
@@ -281,6 +320,4 @@ def build_stage(shot: Shot, load: Callable[[ModelSpec], Mesh]) -> CyclesStage:
             "background: environment: set it to off, or take engine: cycles or raster"
         )
     meshes = placed_meshes(shot.things, load)
-    geometry = build_geometry(shot.things, meshes, shot.scene.ground is not None, shot.label_alpha, shot.scene.floor)
-    keeper = keeper_of(find_blender(options.python))
-    return CyclesStage(geometry, shot, meshes, options, keeper, middle_of(geometry, min(len(meshes), 1)))
+    return CyclesStage(shot, meshes, options, keeper_of(find_blender(options.python)))

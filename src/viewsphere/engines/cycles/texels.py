@@ -24,7 +24,7 @@ from viewsphere.assets.repaint import repainted
 from viewsphere.assets.srgb import encoded, linear
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.camera import Camera
-from viewsphere.model.shot import Repaint, Thing
+from viewsphere.model.thing import Repaint, Thing
 
 FINEST = 2.0
 """Texels of a halved picture in a pixel, along a line, at least."""

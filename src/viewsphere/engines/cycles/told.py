@@ -17,7 +17,7 @@ from viewsphere.engines.cycles.file_frame import FileFrame
 from viewsphere.engines.cycles.options import AnyOptions
 from viewsphere.engines.cycles.texels import Kind, Levels
 from viewsphere.model.scene import AnyLight, BlendScene, Ground, HemisphereLight, Scene
-from viewsphere.model.shot import Repaint, Thing
+from viewsphere.model.thing import Repaint, Thing
 from viewsphere.surroundings.ground import ground_frame, ground_material, only_scatters
 from viewsphere.surroundings.sky import SURROUNDINGS, SkyPictures, sky_pictures
 from viewsphere.surroundings.sun import sun_light

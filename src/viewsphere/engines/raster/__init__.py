@@ -10,7 +10,8 @@ if TYPE_CHECKING:
 
     from viewsphere.assets.mesh import Mesh
     from viewsphere.engines.raster.staging import RasterStage
-    from viewsphere.model.shot import ModelSpec, Shot
+    from viewsphere.model.model_spec import ModelSpec
+    from viewsphere.model.shot import Shot
 
 
 def check(options: Mapping[str, JsonValue]) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from viewsphere.assets.mesh import Material
 from viewsphere.engines.raster import kernels_material as column
-from viewsphere.model.shot import Repaint
+from viewsphere.model.thing import Repaint
 
 ALWAYS, HALF, NEVER = 0.0, 0.5, 2.0
 """Alpha from which a surface casts a shadow."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,39 +23,61 @@ from viewsphere.engines.raster.records import Float32
 from viewsphere.engines.raster.surface import pack_surfaces
 from viewsphere.imaging.background import display_background
 from viewsphere.imaging.finish import finished
-from viewsphere.imaging.seen import Seen, seen_by
-from viewsphere.model.camera import Camera
-from viewsphere.model.scene import Ground, Scene
-from viewsphere.model.shot import Frame, ModelSpec, Shot, Thing
+from viewsphere.imaging.seen import seen_by
+from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.scene import Ground, Matrix4, Scene
+from viewsphere.model.shot import Shot
+from viewsphere.model.thing import Thing
 from viewsphere.surroundings.ground import ground_albedo, ground_frame, ground_material, only_scatters
 from viewsphere.surroundings.sky import even_light
-from viewsphere.truth.geometry import Geometry, build_geometry, placed_meshes, with_blended_colors
+from viewsphere.truth.geometry import Geometry, build_geometry, placed_meshes, present, with_blended_colors
 from viewsphere.truth.visibility import Visibility
+
+Poses = tuple[Matrix4 | None, ...]
+"""Of all that moves."""
 
 
 @dataclass(frozen=True, eq=False)
 class RasterStage:
-    """A scene baked for shading; `color` paints it."""
+    """A shot's scene baked for shading, as it was at the last instant that was asked for."""
 
-    geometry: Geometry
-    scene: Scene
+    shot: Shot
+    meshes: tuple[Mesh, ...]
     options: Options
-    baked: Baked
-    middle: NDArray[np.float64]
+    _baked: dict[Poses, Baked] = field(default_factory=dict[Poses, Baked])
     _canvases: dict[int, Float32] = field(default_factory=dict[int, Float32])
 
-    def color(self, camera: Camera, frame: Frame, visibility: Visibility) -> NDArray[np.uint8]:
-        """The picture, (H, W, 3) uint8 sRGB, or (H, W, 4) with straight alpha where the background is transparent.
+    def of(self, shot: Shot) -> RasterStage:
+        """The same for another shot, one of an equal `stage_key`."""
+        return replace(self, shot=shot)
 
-        `visibility` is truth's buffer for this camera. Raises UserError for an unreadable background image.
+    def at(self, instant: int) -> Geometry:
+        """The world-space triangles at an instant, counted from 0 in the shot."""
+        return self.baked(instant).geometry
+
+    def baked(self, instant: int) -> Baked:
+        """What pictures of an instant are painted from."""
+        poses = self.shot.poses_at(instant)
+        if poses not in self._baked:
+            self._baked.clear()
+            self._baked[poses] = _bake(self.shot, self.shot.things_at(instant), self.meshes, self.options)
+        return self._baked[poses]
+
+    def color(self, instant: int, sensor: int, visibility: Visibility, transparent: bool) -> NDArray[np.uint8]:
+        """The picture of a sensor at an instant, (H, W, 3) uint8 sRGB; with `transparent` (H, W, 4) with straight alpha.
+
+        `visibility` is truth's buffer of this instant and camera. Raises UserError for an unreadable background image.
         """
-        finish = frame.finish or self.scene.finish
+        camera, finish, baked = self.shot.camera(instant, sensor), self.shot.finish(instant), self.baked(instant)
+        finish = finish.with_background(transparent)
         background = display_background(finish.background, camera.width, camera.height)
-        has_sky = background is None and not finish.background.transparent
+        has_sky = background is None and not transparent
         radiance = self._canvas(camera.width * camera.height)
-        paint(self.baked, camera, visibility, self.options.antialias == 4, has_sky, radiance)
-        shape = camera.height, camera.width, 4
-        return finished(radiance.reshape(shape), background, finish, lambda: self._seen(camera, frame, visibility))
+        paint(baked, camera, visibility, self.options.antialias == 4, has_sky, radiance)
+        shape, focus = (camera.height, camera.width, 4), np.array(self.shot.instants[instant].focus)
+        owner = baked.geometry.triangle_object
+        seen = partial(seen_by, camera, focus, visibility.inverse_depth, visibility.triangle, owner)
+        return finished(radiance.reshape(shape), background, finish, seen)
 
     def _canvas(self, pixels: int) -> Float32:
         """Room for the light of a picture, the same one every time: fresh memory costs as much as the sky."""
@@ -63,24 +86,21 @@ class RasterStage:
             self._canvases[pixels] = np.empty((pixels, 4), np.float32)
         return self._canvases[pixels]
 
-    def _seen(self, camera: Camera, frame: Frame, visibility: Visibility) -> Seen:
-        target = self.middle if frame.pose.target is None else np.array(frame.pose.target)
-        return seen_by(camera, target, visibility.inverse_depth, visibility.triangle, self.geometry.triangle_object)
-
 
 def build_stage(shot: Shot, load: Callable[[ModelSpec], Mesh]) -> RasterStage:
-    """Build everything that the shot's frames share."""
+    """The stage of a shot, with all models loaded."""
     options = parse_options(shot.engine_options)
-    size = options.for_width(max(shot.intrinsics.width, shot.intrinsics.height))
-    options = replace(options, shadow_resolution=size)
-    meshes = placed_meshes(shot.things, load)
+    lenses = [sensor.intrinsics for sensor in shot.rig.sensors]
+    size = options.for_width(max(max(lens.width, lens.height) for lens in lenses))
+    return RasterStage(shot, tuple(placed_meshes(shot.things, load)), replace(options, shadow_resolution=size))
+
+
+def _bake(shot: Shot, things: Sequence[Thing], meshes: Sequence[Mesh], options: Options) -> Baked:
+    """What pictures of these things, as they stand, are painted from."""
     scene = shot.scene
-    geometry = build_geometry(shot.things, meshes, scene.ground is not None, shot.label_alpha, scene.floor)
-    targets = sum(not p.scenery for p in shot.things)
-    low, high = _bounds(geometry, geometry.triangle_start[1] if len(geometry.triangle_start) > 1 else 0)
-    return RasterStage(
-        geometry, scene, options, _baked(geometry, meshes, shot.things, targets, scene, options), (low + high) / 2
-    )
+    meshes = present(things, meshes)
+    geometry = build_geometry(things, meshes, scene.ground is not None, shot.label_alpha, scene.floor)
+    return _baked(geometry, meshes, things, sum(not thing.scenery for thing in things), scene, options)
 
 
 def _baked(

@@ -13,7 +13,7 @@ from viewsphere.engines.raster.bundles import BundlePacker
 from viewsphere.engines.raster.looks import look
 from viewsphere.engines.raster.records import Surfaces, Textures
 from viewsphere.model.scene import Ground
-from viewsphere.model.shot import Repaint, Thing
+from viewsphere.model.thing import Repaint, Thing
 from viewsphere.surroundings.ground import ground_frame, ground_material
 from viewsphere.truth.geometry import Geometry
 

@@ -23,10 +23,15 @@ from viewsphere import plugins
 from viewsphere.assets.cache import load_normalised
 from viewsphere.assets.mesh import Mesh
 from viewsphere.errors import StoreError, UserError
+from viewsphere.geometry.rotation import rigid
 from viewsphere.model.files import Files
+from viewsphere.model.instant import Instant
+from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.rig import Rig
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.model.scene import Matrix4, Scene
-from viewsphere.model.shot import Frame, ModelSpec, Shot, Thing
+from viewsphere.model.shot import Shot
+from viewsphere.model.thing import Motion, Thing
 from viewsphere.zoo import build
 
 if TYPE_CHECKING:
@@ -53,7 +58,7 @@ def export(dataset: Dataset, folder: Path) -> tuple[str, ...]:
     for group in groups:
         frames, samples = zip(*_views(dataset, group), strict=True)
         name = group.model if counts[group.model] == 1 else f"{group.model}-{samples[0].index:06d}"
-        own = group.shot.model_copy(update={"frames": frames})
+        own = group.shot.model_copy(update={"instants": frames})
         load = _Models(dataset, {p.model: o.key for p, o in zip(own.objects, samples[0].objects, strict=False)})
         said = plugins.load("engines", ENGINE).save(own, samples, load, folder / f"{name}.blend", dataset.name)
         notes |= dict.fromkeys(f"format blend: {note}" for note in said)
@@ -93,28 +98,28 @@ def _groups(dataset: Dataset) -> Iterator[_Group]:
             if not (sample.known_camera and sample.known_pose and sample.objects and all(o.model for o in sample.objects)):
                 continue
             shot = known or _lit_anyhow(key, sample)
-            scene = alike or _alike(shot), *_seen(shot, shot.frames[place if known else 0], sample)
+            scene = alike or _alike(shot), *_seen(shot, place if known else 0, sample)
             group = groups.setdefault(scene, _Group(sample.objects[0].key, shot))
             group.places.setdefault(key, []).append(place)
     return iter(groups.values())
 
 
-def _views(dataset: Dataset, group: _Group) -> Iterator[tuple[Frame, Sample]]:
+def _views(dataset: Dataset, group: _Group) -> Iterator[tuple[Instant, Sample]]:
     """A group's frames and samples, read once more: those of all groups would be too many to keep."""
     for key, places in group.places.items():
         known = dataset.store.shot(key)
         for place, sample in zip(places, dataset.samples_of(key, places), strict=True):
-            yield known.frames[place] if known else group.shot.frames[0], sample
+            yield known.instants[place] if known else group.shot.instants[0], sample
 
 
 def _alike(shot: Shot) -> str:
     """Equal for shots of one scene."""
-    return shot.model_copy(update={"key": "", "frames": (), "channels": (), "files": Files()}).model_dump_json()
+    return shot.model_copy(update={"key": "", "first": 0, "instants": (), "channels": (), "files": Files()}).model_dump_json()
 
 
-def _seen(shot: Shot, frame: Frame, sample: Sample) -> tuple[object, ...]:
+def _seen(shot: Shot, instant: int, sample: Sample) -> tuple[object, ...]:
     """Besides the scene, equal for frames that can share a file."""
-    shows_sky = plugins.load("engines", ENGINE).shows_sky(shot, frame.finish or shot.scene.finish)
+    shows_sky = plugins.load("engines", ENGINE).shows_sky(shot, shot.finish(instant))
     lens = sample.camera.intrinsics
     models = tuple(o.key for o in sample.objects)
     return models, shows_sky, lens.width, lens.height, lens.fx / lens.fy
@@ -124,12 +129,20 @@ def _lit_anyhow(key: str, sample: Sample) -> Shot:
     """A shot of which only its objects and cameras are known, in the default light."""
     return Shot(
         key=key,
-        things=tuple(Thing(id=o.id, model=_spec(o.key, ""), world_from_object=_matrix(o)) for o in sample.objects),
-        intrinsics=sample.camera.intrinsics,
+        things=tuple(Thing(id=o.id, model=_spec(o.key, ""), motion=Motion.still(_matrix(o))) for o in sample.objects),
+        rig=Rig.of(sample.camera.intrinsics),
         scene=Scene(),
-        frames=(Frame(index=sample.index, pose=sample.pose, split=sample.split),),
+        instants=(_as_taken(sample),),
         channels=("rgb",),
     )
+
+
+def _as_taken(sample: Sample) -> Instant:
+    """The instant of a sample whose camera is known."""
+    camera = sample.camera
+    a, b, c, d = ((x, y, z, w) for x, y, z, w in rigid(camera.R.T, camera.center).tolist())
+    x, y, z = (camera.center + sample.pose.distance * camera.R[2]).tolist()
+    return Instant(index=sample.index, world_from_rig=(a, b, c, d), focus=(x, y, z), viewpoint=sample.pose, split=sample.split)
 
 
 def _matrix(o: ObjectAnnotation) -> Matrix4:

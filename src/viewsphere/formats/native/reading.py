@@ -19,8 +19,8 @@ from viewsphere.geometry.box import box_size
 from viewsphere.geometry.mask import mask_box, mask_polygons
 from viewsphere.model.camera import Camera, Distortion, Intrinsics
 from viewsphere.model.channel import CHANNELS
+from viewsphere.model.instant import Viewpoint
 from viewsphere.model.sample import ObjectAnnotation, Sample
-from viewsphere.model.shot import Pose
 from viewsphere.store import Category, ModelInfo, decode
 from viewsphere.store.foreign import ForeignDataset, ForeignFrame, ForeignModel, foreign_object, refuse_broken
 
@@ -68,7 +68,7 @@ class _Frame:
     """What one picture of the data set shows; every object is (model key, category, mask file, entry)."""
 
     split: str
-    pose: Pose
+    pose: Viewpoint
     camera: Camera
     rgb: Path
     depth: Path | None
@@ -178,7 +178,7 @@ def _frame(
     depth = folder / "DEPTH" / str(first.get("path_depth"))
     return _Frame(
         split=split,
-        pose=Pose(
+        pose=Viewpoint(
             index=int(number),
             azimuth_deg=pose["azimuth"],
             elevation_deg=pose["elevation"],

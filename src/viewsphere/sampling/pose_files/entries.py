@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from viewsphere.model.camera import Intrinsics
-from viewsphere.model.shot import Axis
+from viewsphere.model.model_spec import Axis
 
 Row = tuple[float, float, float]
 

@@ -10,7 +10,7 @@ import math
 from dataclasses import dataclass
 
 from viewsphere import plugins
-from viewsphere.model.shot import Matrix4
+from viewsphere.model.scene import Matrix4
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,59 @@
+"""Which model, and how its file is turned into an object."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from viewsphere.model.frozen import Frozen
+from viewsphere.model.scene import IDENTITY, Matrix4
+
+Axis = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
+Size = tuple[float, float, float]  # width along X, height along Z, length along Y, metres
+
+
+class Parts(Frozen):
+    """What is taken of a model that was read: the parts of the objects in `only` (None: all) but for those in `without`.
+
+    An object's parts are its own and those that it instances: of `Car` these are `Car` and `Car/Wheel`. They stand in the
+    rigid axes `file_from_axes` (metres) of the whole model's.
+    """
+
+    only: tuple[str, ...] | None = None
+    without: tuple[str, ...] = ()
+    file_from_axes: Matrix4 = IDENTITY
+
+
+class ModelSpec(Frozen):
+    """Which model, and how its file is turned into an object that faces -Y with +Z up, in metres.
+
+    `source` is a file's absolute path, or `zoo:<family>` with `seed` naming the draw. None for `up`, `forward` or
+    `unit` means what the file (or its format's specification) says. At a later `frame` a model is turned, scaled and
+    centred as it is at its file's first.
+    """
+
+    key: str  # unique and stable in the data set: also the name of its folder
+    source: str
+    seed: int | None = None
+    category: str
+    supercategory: str = ""
+    category_id: int = Field(ge=0)  # 0: background, which only scenery is
+    up: Axis | None = None
+    forward: Axis | None = None
+    unit: float | None = None  # metres in one unit of the file
+    centring: Literal["box", "area", "floor", "as_is"] = "box"
+    scale: Literal["as_is", "real_size"] | float = "as_is"  # a number: metres from front to back
+    real_size: Size | Literal["file"] | None = None  # "file": the size the file has, before any scaling
+    confined: bool = True  # texture and buffer paths may not leave the model's folder
+    frame: int | None = None  # of an animated file, which Blender then reads; None: the first, by which it is also placed
+    clip: str | None = None  # name of the animation that is played, where the file has several; with a frame
+    track: str = ""  # key of the animated model that this is at a moment: what stays itself over time
+    shown: tuple[str, ...] = ()  # objects of a .blend file that are read although renders do not show them
+    parts: Parts | None = None  # what is taken of it, when it is read and normalised
+
+    @property
+    def whole(self) -> ModelSpec:
+        """The model that this one is a part of: equal for all parts of one."""
+        unnamed = {"key": "", "category": "", "supercategory": "", "category_id": 0, "track": "", "parts": None}
+        return self.model_copy(update=unnamed)
