@@ -48,7 +48,7 @@ def preview_samples(recipe: Recipe, count: int = 12, width: int = 320) -> Iterat
         schedule = planned.schedules[model]
         groups = [[pose] for pose in poses] if recipe.scene.is_new_each_frame else schedule.together(poses)
         for group in groups:
-            shot = planned.take(model, group, stages.box)
+            shot = planned.take(planned.model_specs[model].key, group, stages.box)
             channels = tuple(dict.fromkeys((*shot.channels, picture_of(shot.channels) or "rgb", "depth", "instances")))
             small = shot.model_copy(update={"rig": _scaled(shot.rig, width), "channels": channels})
             yield from stages.render(small)

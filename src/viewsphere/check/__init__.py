@@ -14,7 +14,7 @@ from viewsphere.check.frames import FRAME_PROOFS
 from viewsphere.check.rays import RayCaster
 from viewsphere.errors import MissingExtraError, ViewsphereError
 from viewsphere.model.sample import Sample
-from viewsphere.store import Dataset, ShotRow
+from viewsphere.store import Dataset, Row
 
 
 @dataclass(frozen=True)
@@ -100,13 +100,11 @@ def _counts(dataset: Dataset, notes: list[str]) -> Iterator[str]:
     plan, store = dataset.plan, dataset.store
     skipped = store.skipped()
     notes += [f"{key} was left out: {reason}" for key, reason in skipped.items()]
-    if sum(count for _, _, count in plan.shots) != plan.frames:
-        yield f"expected shots of {plan.frames} frames together, found {sum(count for _, _, count in plan.shots)}"
-    if not plan.parts and plan.max_objects == 1 and plan.frames != len(plan.models) * plan.poses:
-        yield f"expected {len(plan.models)} models x {plan.poses} poses, found a plan of {plan.frames} frames"
-    for number, part in enumerate(plan.parts, 1):
-        if part.rows and part.frames != sum(row.frames for row in part.rows):
-            yield f"part {number}: expected {sum(row.frames for row in part.rows)} frames, found a plan of {part.frames}"
+    if sum(part.frames for part in plan.parts) != plan.frames:
+        yield f"expected parts of {plan.frames} frames together, found {sum(part.frames for part in plan.parts)}"
+    for number, (part, index) in enumerate(zip(plan.parts, plan.indices, strict=True), 1):
+        if part.frames != index.samples:
+            yield f"part {number}: expected {index.samples} frames, found a plan of {part.frames}"
     yield from _missing_shots(dataset)
     finished = {info.key: info for info in dataset.models}
     for key in plan.models:
@@ -123,22 +121,21 @@ def _counts(dataset: Dataset, notes: list[str]) -> Iterator[str]:
 def _missing_shots(dataset: Dataset) -> Iterator[str]:
     """What is missing of each part, and of the channels that each one added to others."""
     plan, store = dataset.plan, dataset.store
-    groups: defaultdict[tuple[int, bool], list[ShotRow]] = defaultdict(list)
+    groups: defaultdict[tuple[int, bool], list[Row]] = defaultdict(list)
     for row in store.wanted(plan):
-        _, added, later = row[0].rpartition("+")
-        groups[int(later) if added else plan.part_of(row[1]), bool(added)].append(row)
+        groups[row.part, row.part != plan.part_of(row.first)].append(row)
     for (number, added), rows in groups.items():
-        missing = [row for row in rows if not store.has_shot(row[0])]
+        missing = [row for row in rows if not store.has_shot(row.key)]
         if not missing:
             continue
-        expected, lost = (sum(count for _, _, count in some) for some in (rows, missing))
+        expected, lost = (sum(row.count for row in some) for some in (rows, missing))
         what = f"{len(plan.models)} models x {plan.poses} poses"
         if len(plan.parts) > 1:
             channels = dict.fromkeys(name for _, names in plan.parts[number].supplies for name in names)
             what = f"{', '.join(channels)} of older frames, " if added else ""
             what += f"part {number + 1}, recipe {plan.parts[number].name!r}"
         yield (
-            f"expected {expected} frames ({what}), found {expected - lost}: shot {missing[0][0]} is the first of "
+            f"expected {expected} frames ({what}), found {expected - lost}: shot {missing[0].key} is the first of "
             f"{len(missing)} missing: render again to go on"
         )
 
@@ -146,18 +143,18 @@ def _missing_shots(dataset: Dataset) -> Iterator[str]:
 def _frames(dataset: Dataset, positions: range) -> Iterator[tuple[int, int, Sample | str]]:
     """Position, index and sample of these finished frames, or what is wrong with a record."""
     position = 0
-    for key, first, count in dataset.plan.shots:
-        if not dataset.store.has_shot(key):
+    for row in dataset.plan.rows:
+        if not dataset.store.has_shot(row.key):
             continue
-        for i in range(count):
+        for i in range(row.count):
             if position + i not in positions:
                 continue
             try:
-                yield position + i, first + i, dataset[position + i]
+                yield position + i, row.first + i, dataset[position + i]
             except (ViewsphereError, LookupError, TypeError, ValueError, AttributeError) as error:
                 problem = f"{type(error).__name__}: {error}"
-                yield position + i, first + i, f"shot {key}: expected a readable record, found {problem}"
-        position += count
+                yield position + i, row.first + i, f"shot {row.key}: expected a readable record, found {problem}"
+        position += row.count
 
 
 def _proofs(dataset: Dataset, sample: Sample, caster: RayCaster | None) -> Iterator[tuple[str, list[str]]]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from bisect import bisect_right
 from collections.abc import Iterator
 from dataclasses import dataclass
 from importlib.util import find_spec
@@ -53,7 +52,6 @@ class RayCaster:
         self.notes: list[str] = []
         self._dataset = dataset
         self._files = {info.key: dataset.path(info.glb) for info in dataset.models}
-        self._shots = [(first, key) for key, first, _ in dataset.plan.shots]
         self._stages = Stages()
         self._known: dict[str, _Soup] = {}
         self._scenery_known: dict[str, _Soup | None] = {}
@@ -137,7 +135,7 @@ class RayCaster:
         self._key = key
 
     def _shot_key(self, frame: int) -> str:
-        return self._shots[bisect_right(self._shots, (frame, "\U0010ffff")) - 1][1]
+        return self._dataset.plan.row_at(frame).key
 
     def _scenery(self, frame: int) -> SceneryRecord | None:
         text = self._dataset.store.scenery(self._shot_key(frame))

@@ -56,7 +56,7 @@ class Splits(Frozen):
     model_config = ConfigDict(extra="allow")
     __pydantic_extra__: dict[str, Share] = Field(init=False)  # pyright: ignore[reportIncompatibleVariableOverride]
 
-    by: Literal["model", "pose", "frame"] = Field(default="model", description="what is kept together in one split")
+    by: Literal["model", "pose", "frame", "place"] = Field(default="model", description="what is kept together in one split")
 
     @model_validator(mode="before")
     @classmethod

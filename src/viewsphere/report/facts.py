@@ -31,9 +31,9 @@ class Timing:
 def timing(dataset: Dataset) -> Timing | None:
     """When the finished shots were written; None where there are none."""
     found: list[tuple[float, int]] = []
-    for key, _, count in dataset.plan.shots:
+    for row in dataset.plan.rows:
         try:
-            found.append(((dataset.store.shot_folder(key) / "frames.json").stat().st_mtime, count))
+            found.append(((dataset.store.shot_folder(row.key) / "frames.json").stat().st_mtime, row.count))
         except OSError:
             continue
     if not found:

@@ -21,10 +21,11 @@ from viewsphere.formats import Format
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.run.opening import prepare, to_render
-from viewsphere.run.tasks import Task, Worker
+from viewsphere.run.tasks import Worker
 from viewsphere.run.warm import load_kernels
+from viewsphere.sampling.extension import Portion
 from viewsphere.sampling.plan import Plan
-from viewsphere.store import Dataset, Store
+from viewsphere.store import Dataset, Row, Store
 
 MODELS = 3
 SHOTS_PER_MODEL = 4
@@ -81,18 +82,19 @@ def measure(recipe: Recipe, clock: Callable[[], float] = time.perf_counter) -> R
 
 
 def _measure_in(planned: Plan, store: Store, stopwatch: _Stopwatch) -> Rates:
-    store.open_for(to_render(planned, store).record)
+    portion = to_render(planned, store)
+    store.open_for(portion.record)
     chosen = _spread(planned)
     specs = [planned.model_specs[model] for model in chosen]
-    model = stopwatch.mean([_model_work(store, spec) for spec in specs])
-    worker = Worker(store.root)  # one that did not make the models: in a run that is seldom the one that renders them
-    shots = [planned.shot(index, worker.stages.box) for indices in chosen.values() for index in indices]
+    model = stopwatch.mean([_model_work(store, portion, spec) for spec in specs])
+    worker = Worker(store.root, portion)  # one that did not make the models: in a run that is seldom the one that renders them
+    rows = [row for some in chosen.values() for row in some]
+    shots = [planned.shot(row, worker.stages.box) for row in rows]
     load_kernels(shots[0])
     begun = frame = 0.0
-    for shot in shots:
+    for row, shot in zip(rows, shots, strict=True):
         begun += stopwatch(lambda shot=shot: next(worker.stages.render(shot)))
-        task = Task("shot", shot.key, shot.key, shot.model_dump_json())
-        frame += stopwatch(lambda task=task: worker.do(task))
+        frame += stopwatch(lambda row=row: worker.make_shot(row))
     frames = sum(len(shot.instants) * len(shot.rig.sensors) for shot in shots)
     frame /= frames
     scenes = len({shot.stage_key for shot in shots})
@@ -104,8 +106,8 @@ def _measure_in(planned: Plan, store: Store, stopwatch: _Stopwatch) -> Rates:
     return Rates(model, scene, frame, export / frames, model_bytes / len(specs), frame_bytes)
 
 
-def _model_work(store: Store, spec: ModelSpec) -> Callable[[], object]:
-    return lambda: Worker(store.root).make_model(spec)
+def _model_work(store: Store, portion: Portion, spec: ModelSpec) -> Callable[[], object]:
+    return lambda: Worker(store.root, portion).make_model(spec)
 
 
 def _export(store: Store, formats: Sequence[str], stopwatch: _Stopwatch) -> float:
@@ -121,13 +123,13 @@ def _export(store: Store, formats: Sequence[str], stopwatch: _Stopwatch) -> floa
     return seconds
 
 
-def _spread(planned: Plan) -> dict[int, list[int]]:
-    """Models, evenly over the plan, and the indices of some shots of each: together evenly over the poses."""
+def _spread(planned: Plan) -> dict[int, list[Row]]:
+    """Models, evenly over the plan, and some shots of each: together evenly over the poses."""
     models = min(MODELS, planned.models)
-    chosen: dict[int, list[int]] = {}
+    chosen: dict[int, list[Row]] = {}
     for i in range(models):
         model = i * (planned.models - 1) // max(models - 1, 1)
-        shots = planned.shots_of(model)
+        shots = list(planned.rows.of(planned.model_specs[model].key))
         parts = {int((i * SHOTS_PER_MODEL + k + 1) * GOLDEN % 1 * len(shots)) for k in range(SHOTS_PER_MODEL)}
         chosen[model] = [shots[part] for part in sorted(parts)]
     return chosen

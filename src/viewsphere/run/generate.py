@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import json
 import time
-from collections import defaultdict
-from collections.abc import Callable, Container, Iterator, Sequence
+from collections import Counter, defaultdict
+from collections.abc import Callable, Container, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
+from itertools import chain
 from pathlib import Path
 
 from viewsphere import plugins
@@ -16,16 +17,17 @@ from viewsphere.model.channel import missing
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.run.opening import commit, prepare, to_append, to_render
-from viewsphere.run.pool import Crew, Job, Outcome
+from viewsphere.run.pool import Crew, Job, Listed, Outcome
 from viewsphere.run.skies import check_skies
 from viewsphere.run.stages import Stages, StoredBoxes
-from viewsphere.run.tasks import MODELS, Kind, Task
+from viewsphere.run.tasks import Kind, ModelTask
 from viewsphere.run.unpainted import unpainted
 from viewsphere.run.warm import compile_kernels
-from viewsphere.sampling.composition import BoxOf
+from viewsphere.sampling.distances import Distances
 from viewsphere.sampling.extension import Portion
 from viewsphere.sampling.plan import Plan
-from viewsphere.store import Choice, Dataset, ShotRow, Store, new_folder
+from viewsphere.store import Choice, Dataset, Row, Store, new_folder
+from viewsphere.store.index import Index
 
 
 @dataclass(frozen=True)
@@ -98,7 +100,7 @@ def generate(
     with recipe.located(), store.occupied():
         notes: tuple[str, ...] = ()
         rendered, skipped = 0, dict[str, str]()
-        with Crew(store.root, workers) as crew:
+        with Crew(store.root, workers, portion) as crew:
             if portion.adds_nothing:
                 _compare_models(portion, store, crew)
             else:
@@ -138,7 +140,7 @@ def _unheard(progress: Progress) -> None:
 
 def _check_skies(portion: Portion, store: Store, tell: Listener) -> tuple[str, ...]:
     """Notes on the skies' pictures, if there is anything left to render; raises RecipeError for one that cannot be used."""
-    if all(store.has_shot(key) for key, _, _ in portion.shot_table()):
+    if all(store.has_shot(row.key) for row in portion.rows):
         return ()
     return check_skies(portion.plan, lambda done, total: tell(Progress("skies", done, total)))
 
@@ -163,7 +165,7 @@ def _prepare_models(portion: Portion, store: Store, crew: Crew, keep_going: bool
     """Normalise and export every model; gives the keys left out, and why."""
     planned = portion.plan
     jobs = _model_jobs("same model" if portion.number else "model", portion.model_specs)
-    total = len(jobs)
+    total = len(jobs.all)
     failed: dict[str, ViewsphereError] = {}
     tell(Progress("models", 0, total))
     for done, outcome in enumerate(crew.run(jobs), 1):
@@ -179,15 +181,12 @@ def _prepare_models(portion: Portion, store: Store, crew: Crew, keep_going: bool
     return {key: str(error) for key, error in failed.items()}
 
 
-def _model_jobs(kind: Kind, specs: Sequence[ModelSpec]) -> list[Job]:
+def _model_jobs(kind: Kind, specs: Sequence[ModelSpec]) -> Listed:
     """A job for each model, with its moments."""
     groups: defaultdict[str, list[ModelSpec]] = defaultdict(list)
     for spec in specs:
         groups[spec.track or spec.key].append(spec)
-    return [
-        Job(key, key, lambda key=key, group=group: Task(kind, key, key, MODELS.dump_json(tuple(group)).decode()))
-        for key, group in groups.items()
-    ]
+    return Listed(tuple(Job(key, key, ModelTask(kind, tuple(group))) for key, group in groups.items()))
 
 
 def _compare_models(portion: Portion, store: Store, crew: Crew) -> None:
@@ -201,12 +200,12 @@ def _compare_models(portion: Portion, store: Store, crew: Crew) -> None:
 
 def _distance_problems(planned: Plan, store: Store, failed: Container[str]) -> Iterator[tuple[str, ViewsphereError]]:
     """Models that some pose's camera would stand inside of, or that have no room; each is named once."""
-    box_of = StoredBoxes(store)
+    distances = Distances(planned, StoredBoxes(store))
     for spec in planned.model_specs:
         if any(member.key in failed for member in planned.cast(spec)):
             continue
         try:
-            problem = planned.distance_problem(spec, box_of)
+            problem = distances.problem(spec)
         except RecipeError as error:
             problem = error
         if problem:
@@ -222,42 +221,83 @@ def _joined(errors: Sequence[ViewsphereError]) -> ViewsphereError:
 
 def _render_shots(portion: Portion, store: Store, crew: Crew, keep_going: bool, skipped: dict[str, str], tell: Listener) -> int:
     """Render the shots that the store lacks; gives the number of frames made. Failed shots land in `skipped`."""
-    table = list(_wanted(portion, skipped))
-    missing = [row for row in table if not store.has_shot(row[0])]
-    total = sum(count for _, _, count in table)
-    resumed = total - sum(count for _, _, count in missing)
-    box_of = StoredBoxes(store)
-    rendered = 0
-    if missing:
+    work = Missing(portion, store, skipped)
+    total, resumed, rendered = work.total, work.resumed, 0
+    first = next(work.rows(), None)
+    if first is not None:
         Stages().check_scenery(portion.plan)
         tell(Progress("kernels", 0, 1))
-        compile_kernels(portion.shot(missing[0], box_of))
+        with portion.plan.recipe.located():
+            compile_kernels(portion.shot(first, StoredBoxes(store)))
         tell(Progress("kernels", 1, 1))
     tell(Progress("frames", resumed, total, resumed))
-    for outcome in crew.run([_shot_job(portion, row, box_of) for row in missing]):
+    for outcome in crew.run(work):
         _accept(outcome, keep_going, skipped)
         rendered += outcome.frames
         tell(Progress("frames", resumed + rendered, total, resumed))
     return rendered
 
 
-def _wanted(portion: Portion, skipped: dict[str, str]) -> Iterator[ShotRow]:
-    """The shots that no model left out is in; those that lack company land in `skipped`."""
-    for row in portion.shot_table():
-        lacking = [member.key for member in portion.cast(row) if member.key in skipped] if skipped else []
-        if not lacking:
-            yield row
-        elif portion.shot_model(row[0]) not in skipped:
-            skipped[row[0]] = f"beside its model stands {lacking[0]}, which was left out"
+@dataclass(frozen=True)
+class Missing:
+    """The shots of a part that the store lacks, counted out row by row: those that no model left out is in."""
 
+    portion: Portion
+    store: Store
+    skipped: dict[str, str]
 
-def _shot_job(portion: Portion, row: ShotRow, box_of: BoxOf) -> Job:
-    key, model = row[0], portion.shot_model(row[0])
+    @property
+    def total(self) -> int:
+        """Frames that the part has, without those that are left out."""
+        indices = [self.portion.record.indices[self.portion.number], *self._added]
+        if not self.skipped:
+            return sum(index.samples for index in indices)
+        return sum(row.count for row in self._wanted())
 
-    def make() -> Task:
-        return Task("shot", key, model, portion.shot(row, box_of).model_dump_json())
+    @property
+    def resumed(self) -> int:
+        """Frames of the part that are there."""
+        found = (self.portion.record.find(key) for key in self.store.finished())
+        return sum(row.count for row in found if row is not None and row.part == self.portion.number)
 
-    return Job(key, model, make)
+    def lines(self) -> Iterable[tuple[str, int]]:
+        """The models, and how many shots each has."""
+        indices = (self.portion.record.indices[self.portion.number], *self._added)
+        counts: Counter[str] = Counter()
+        for index in indices:
+            for subject in index.subjects:
+                counts[subject] += index.count_of(subject)
+        return counts.items()
+
+    def jobs(self, line: str) -> Iterator[Job]:
+        """The shots of a model that are to be rendered."""
+        indices = (self.portion.record.indices[self.portion.number], *self._added)
+        rows = chain.from_iterable(index.of(line) for index in indices)
+        return (Job(row.key, line, row) for row in self._lacking(rows))
+
+    def rows(self) -> Iterator[Row]:
+        """All shots that are to be rendered."""
+        return self._lacking(self.portion.rows)
+
+    def _lacking(self, rows: Iterable[Row]) -> Iterator[Row]:
+        return (row for row in rows if not self.store.has_shot(row.key) and not self._lacks_model(row))
+
+    def _wanted(self) -> Iterator[Row]:
+        return (row for row in self.portion.rows if not self._lacks_model(row))
+
+    def _lacks_model(self, row: Row) -> bool:
+        """Whether a model that was left out is in a shot; a shot that lacks company lands in `skipped`."""
+        if not self.skipped:
+            return False
+        lacking = [member.key for member in self.portion.cast(row) if member.key in self.skipped]
+        if lacking and row.subject not in self.skipped:
+            self.skipped[row.key] = f"beside its model stands {lacking[0]}, which was left out"
+        return bool(lacking)
+
+    @property
+    def _added(self) -> Iterator[Index]:
+        supplements = self.portion.record.supplements
+        return (index for index, _ in supplements if index.part == self.portion.number)
 
 
 def _accept(outcome: Outcome, keep_going: bool, skipped: dict[str, str]) -> None:
@@ -270,10 +310,16 @@ def _accept(outcome: Outcome, keep_going: bool, skipped: dict[str, str]) -> None
 
 def _note_skipped(portion: Portion, store: Store, skipped: dict[str, str]) -> None:
     """Keep what was left out, of other parts too."""
-    own = {spec.key for spec in portion.model_specs} | {key for key, _, _ in portion.shot_table()}
-    others = {key: why for key, why in store.skipped().items() if key not in own} if portion.number else {}
+    own = {spec.key for spec in portion.model_specs}
+    others = {key: why for key, why in store.skipped().items() if key not in own and not _is_of(portion, key)}
+    others = others if portion.number else {}
     moments = {spec.key: skipped[spec.track] for spec in portion.model_specs if spec.track in skipped}
     store.write_file("skipped.json", json.dumps(others | moments | skipped, indent=1, sort_keys=True))
+
+
+def _is_of(portion: Portion, key: str) -> bool:
+    row = portion.record.find(key)
+    return row is not None and row.part == portion.number
 
 
 def _check_choice(dataset: Dataset, is_own: bool) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from base64 import b64encode
-from collections.abc import Iterator
 from importlib.metadata import version
 from itertools import islice
 from pathlib import Path
@@ -11,7 +10,7 @@ from pathlib import Path
 from viewsphere import plugins
 from viewsphere.errors import UserError
 from viewsphere.run.generate import Listener, Progress
-from viewsphere.store import Part, PlanRecord, Store
+from viewsphere.store import Block, Part, PlanRecord, Store
 from viewsphere.store.foreign import ForeignDataset
 from viewsphere.store.linking import link_model, link_shot
 
@@ -20,7 +19,10 @@ SHOT_FRAMES = 1000
 
 
 NAME_BYTES = 8
-"""A pose's name in `PlanRecord.pose_names`; zeros are that of no pose a recipe can mean."""
+"""A pose's name in `Part.pose_names`; zeros are that of no pose a recipe can mean."""
+
+SAMPLER = "import"
+"""Frames in the order of another data set; how they were chosen nobody knows."""
 
 
 def readable_formats() -> tuple[str, ...]:
@@ -52,21 +54,35 @@ def import_dataset(
 
 def _link_frames(foreign: ForeignDataset, store: Store, record: PlanRecord, listener: Listener | None) -> None:
     frames = foreign.frames()
-    for key, first, count in record.shots:
-        chunk = islice(frames, count)
-        if store.has_shot(key):
+    for row in record.rows:
+        chunk = islice(frames, row.count)
+        if store.has_shot(row.key):
             for _ in chunk:
                 pass
         else:
-            link_shot(store, key, chunk)
+            link_shot(store, row.key, chunk)
         if listener:
-            listener(Progress("frames", first + count, record.frames))
+            listener(Progress("frames", row.first + row.count, record.frames))
 
 
 def _plan_record(foreign: ForeignDataset) -> PlanRecord:
     made = version("viewsphere")
     recipe = {"name": foreign.name}
-    part = Part(foreign.digest, made, foreign.name, recipe, foreign.channels, 0, foreign.count, foreign.max_objects)
+    part = Part(
+        digest=foreign.digest,
+        version=made,
+        name=foreign.name,
+        recipe=recipe,
+        channels=foreign.channels,
+        first=0,
+        frames=foreign.count,
+        max_objects=foreign.max_objects,
+        blocks=(Block((SAMPLER,), ((0, foreign.count),)),),
+        sampler=SAMPLER,
+        shot_frames=SHOT_FRAMES,
+        new_poses=foreign.poses,
+        pose_names=b64encode(bytes(NAME_BYTES * foreign.poses)).decode(),
+    )
     return PlanRecord(
         version=made,
         digest=foreign.digest,
@@ -79,12 +95,5 @@ def _plan_record(foreign: ForeignDataset) -> PlanRecord:
         poses=foreign.poses,
         frames=foreign.count,
         max_objects=foreign.max_objects,
-        shots=tuple(_shots(foreign.count)),
         parts=(part,),
-        pose_names=b64encode(bytes(NAME_BYTES * foreign.poses)).decode(),
     )
-
-
-def _shots(count: int) -> Iterator[tuple[str, int, int]]:
-    for first in range(0, count, SHOT_FRAMES):
-        yield f"import-{first:06d}", first, min(SHOT_FRAMES, count - first)

@@ -17,8 +17,8 @@ def render(recipe: Recipe) -> Iterator[Sample]:
     """
     planned = prepare(recipe)
     stages = Stages()
-    for model, spec in enumerate(planned.model_specs):
+    for spec in planned.model_specs:
         stages.read_ahead(planned, spec)
         stages.check_distances(planned, spec)
-        for index in planned.shots_of(model):
-            yield from stages.render(planned.shot(index, stages.box))
+        for row in planned.rows.of(spec.key):
+            yield from stages.render(planned.shot(row, stages.box))

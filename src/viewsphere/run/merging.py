@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import hashlib
 import json
-from base64 import b64decode, b64encode
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from importlib.metadata import version
+from itertools import count, islice
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +19,8 @@ from viewsphere.model.camera import Intrinsics
 from viewsphere.model.channel import CHANNELS
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.run.generate import Listener, Progress
-from viewsphere.store import Category, Dataset, ModelInfo, Part, PlanRecord, Row, Store, encode
+from viewsphere.sampling.pose_numbers import kept, names_of
+from viewsphere.store import Block, Category, Dataset, ModelInfo, Part, PlanRecord, Row, Store, encode
 from viewsphere.store.foreign import ForeignFrame
 from viewsphere.store.linking import link_model, link_shot
 
@@ -41,15 +42,9 @@ class _Source:
         return all(old == new.id for old, new in self.categories.items())
 
     @cached_property
-    def shots(self) -> tuple[tuple[str, int, int], ...]:
-        """Key, first frame and number of frames, in the merged data set, of its finished shots."""
-        rows: list[tuple[str, int, int]] = []
-        first = self.first_frame
-        for key, _, count in self.dataset.plan.shots:
-            if self.dataset.store.has_shot(key):
-                rows.append((f"{self.number}~{key}", first, count))
-                first += count
-        return tuple(rows)
+    def rows(self) -> tuple[Row, ...]:
+        """Its finished shots, as it numbers them."""
+        return tuple(row for row in self.dataset.plan.rows if self.dataset.store.has_shot(row.key))
 
 
 def merge(
@@ -80,8 +75,9 @@ def merge(
     with store.occupied():
         for part in parts:
             _link_models(part, store)
+        targets = record.rows
         for part in parts:
-            _link_frames(part, store, record, listener)
+            _link_frames(part, targets, store, record, listener)
     return Dataset(out)
 
 
@@ -101,7 +97,8 @@ def _check_sources(datasets: Sequence[Dataset], out: Path) -> None:
 
 def _check_whole(datasets: Sequence[Dataset]) -> None:
     for dataset in datasets:
-        left = sum(count for (key, _, count), _ in dataset.plan.supplements if not dataset.store.has_shot(key))
+        added = (row for index, _ in dataset.plan.supplements for row in index)
+        left = sum(row.count for row in added if not dataset.store.has_shot(row.key))
         if left and len(dataset) == dataset.plan.frames:
             raise StoreError(
                 f"{dataset.root}: expected all channels, found {left:,} frames that lack those that were added last: render it "
@@ -192,7 +189,7 @@ def _plan_record(sources: Sequence[_Source], categories: tuple[Category, ...], m
     name = " + ".join(dict.fromkeys(plan.name for plan in plans))
     parts = tuple(part for source in sources for part in _parts(source))
     last = sources[-1].dataset
-    whole = [[source.dataset.plan.digest, [key for key, _, _ in source.shots]] for source in sources]
+    whole = [[source.dataset.plan.digest, [row.key for row in source.rows]] for source in sources]
     return PlanRecord(
         version=made,
         digest=hashlib.sha256(json.dumps(whole).encode()).hexdigest(),
@@ -205,24 +202,21 @@ def _plan_record(sources: Sequence[_Source], categories: tuple[Category, ...], m
         poses=sum(plan.poses for plan in plans),
         frames=sum(len(source.dataset) for source in sources),
         max_objects=max(plan.max_objects for plan in plans),
-        shots=tuple(row for source in sources for row in source.shots),
         parts=parts,
-        pose_names=b64encode(b"".join(b64decode(plan.pose_names) for plan in plans)).decode(),
     )
 
 
 def _parts(source: _Source) -> Iterator[Part]:
     """What is finished of the source's parts, renumbered; channels that one supplied to others now lie with the rest.
 
-    Of an unfinished part no recipe renders the rest, so it has no digest by which to find it.
+    Of an unfinished part no recipe renders the rest, so it has no digest by which to find it. All poses come with the first.
     """
-    plan = source.dataset.plan
-    first = source.first_frame
+    plan, first, names = source.dataset.plan, source.first_frame, kept(names_of(source.dataset.plan))
     for number, part in enumerate(plan.parts):
-        shots = [row for row in plan.shots_of(number) if source.dataset.store.has_shot(row[0])]
-        frames = sum(count for _, _, count in shots)
+        rows = [row for row in source.rows if row.part == number]
+        frames = sum(row.count for row in rows)
         whole = frames == part.frames
-        rows = part.rows if whole else tuple(_row_of(part, begin, count) for _, begin, count in shots if part.rows)
+        blocks = part.blocks if whole else tuple(Block((row.subject,), row.positions) for row in rows)
         if frames:
             yield replace(
                 part,
@@ -230,26 +224,20 @@ def _parts(source: _Source) -> Iterator[Part]:
                 first=first,
                 frames=frames,
                 channels=plan.channels_of(number),
-                rows=tuple(_moved(source, row) for row in rows),
+                blocks=tuple(_moved(source, part, block) for block in blocks),
                 supplies=(),
+                new_poses=plan.poses if first == source.first_frame else 0,
+                pose_names=names if first == source.first_frame else "",
+                model_splits={source.model_keys.get(key, key): split for key, split in part.model_splits.items()},
             )
         first += frames
 
 
-def _row_of(part: Part, first: int, count: int) -> Row:
-    """Model and poses of a shot's frames, which are of one model."""
-    rows = iter(part.rows)
-    start, row = part.first, next(rows)
-    while first >= start + row.frames:
-        start, row = start + row.frames, next(rows)
-    model, pose = divmod(first - start, row.count)
-    poses = [number for begin, stop in row.poses for number in range(begin, stop)][pose : pose + count]
-    return Row((row.models[model],), tuple((number, number + 1) for number in poses))
-
-
-def _moved(source: _Source, row: Row) -> Row:
-    poses = ((a + source.first_pose, b + source.first_pose) for a, b in row.poses)
-    return Row(tuple(source.model_keys.get(key, key) for key in row.models), tuple(poses))
+def _moved(source: _Source, part: Part, block: Block) -> Block:
+    """The block with its models' new keys and its poses' new numbers; where poses are not known, positions are frames."""
+    by = source.first_pose if part.is_product else source.first_frame
+    subjects = tuple(source.model_keys.get(key, key) for key in block.subjects)
+    return replace(block, subjects=subjects, positions=tuple((a + by, b + by) for a, b in block.positions))
 
 
 def _link_models(source: _Source, store: Store) -> None:
@@ -258,14 +246,15 @@ def _link_models(source: _Source, store: Store) -> None:
         link_model(store, moved, sorted(source.dataset.path(info.obj).parent.iterdir()))
 
 
-def _link_frames(source: _Source, store: Store, record: PlanRecord, listener: Listener | None) -> None:
-    for key, first, count in source.shots:
-        start = first - source.first_frame
-        if not store.has_shot(key):
-            known = source.dataset.store.known_of(key.partition("~")[2])
-            link_shot(store, key, (_renumbered(source, source.dataset[start + i], first + i) for i in range(count)), known)
+def _link_frames(source: _Source, targets: Iterator[Row], store: Store, record: PlanRecord, listener: Listener | None) -> None:
+    """Link the source's shots as the next of `targets`."""
+    for row, target in zip(source.rows, islice(targets, len(source.rows)), strict=True):
+        if not store.has_shot(target.key):
+            places = zip(source.dataset.samples_of(row.key, range(row.count)), count(target.first), strict=False)
+            frames = (_renumbered(source, sample, index) for sample, index in places)
+            link_shot(store, target.key, frames, source.dataset.store.known_of(row.key))
         if listener:
-            listener(Progress("frames", first + count, record.frames))
+            listener(Progress("frames", target.first + target.count, record.frames))
 
 
 def _renumbered(source: _Source, sample: Sample, index: int) -> ForeignFrame:

@@ -7,7 +7,8 @@ from importlib.metadata import version
 
 from viewsphere.errors import StoreError
 from viewsphere.recipe.recipe import Recipe
-from viewsphere.sampling.extension import LOOK, Portion, extend, whole
+from viewsphere.sampling.extension import Portion, extend, resumed, whole
+from viewsphere.sampling.fitting import LOOK
 from viewsphere.sampling.look import engine_look
 from viewsphere.sampling.plan import Plan, check_engine, check_images, plan
 from viewsphere.store import PlanRecord, Store, check_codecs
@@ -36,7 +37,7 @@ def to_render(planned: Plan, store: Store) -> Portion:
     number = found and found.part_with(planned.digest)
     if found is None or number is None:
         return whole(planned)
-    if len(found.parts) == 1 and (found.version != version("viewsphere") or not any(_finished(store, found, number))):
+    if len(found.parts) == 1 and (found.version != version("viewsphere") or not _is_finished(store, found, number, True)):
         return whole(planned)  # which the store refuses, or puts in the place of the one without frames
     return _resumed(planned, store, found, number)
 
@@ -56,10 +57,10 @@ def to_append(planned: Plan, store: Store) -> Portion:
         raise StoreError(f"{store.root}: expected a data set whose plan names its parts, found an older one: render it anew")
     left = store.missing(found)
     if left:
-        frames = sum(count for _, _, count in left)
+        frames = sum(row.count for row in left)
         raise StoreError(
             f"{store.root}: expected a finished data set to append to, found {frames:,} frames missing (first shot "
-            f"{left[0][0]}): first render the recipe that they are of to the end (the last was {found.name!r})"
+            f"{left[0].key}): first render the recipe that they are of to the end (the last was {found.name!r})"
         )
     return extend(planned, found)
 
@@ -77,7 +78,7 @@ def commit(portion: Portion, store: Store) -> None:
 def _resumed(planned: Plan, store: Store, found: PlanRecord, number: int) -> Portion:
     _check_versions(store, found)
     _check_look(planned, store, found, number)
-    return Portion(planned, found, number)
+    return resumed(planned, found, number)
 
 
 def _check_look(planned: Plan, store: Store, found: PlanRecord, number: int) -> None:
@@ -85,8 +86,8 @@ def _check_look(planned: Plan, store: Store, found: PlanRecord, number: int) -> 
     then, now = found.parts[number].settings.get(LOOK), engine_look(planned.recipe.engine.name)
     if then in (None, now):
         return
-    has = _finished(store, found, number)
-    if any(has) and not all(has):
+    finished = [_is_finished(store, found, number, state) for state in (True, False)]
+    if all(finished):
         engine = planned.recipe.engine.name
         raise StoreError(
             f"{store.root}: expected pictures as the {engine} engine that is installed paints them, found another's: "
@@ -97,13 +98,13 @@ def _check_look(planned: Plan, store: Store, found: PlanRecord, number: int) -> 
 def _check_versions(store: Store, found: PlanRecord) -> None:
     installed = version("viewsphere")
     for part in found.parts:
-        if part.rows and part.version != installed:
+        if part.is_product and part.version != installed:
             raise StoreError(
                 f"{store.root}: expected data made by viewsphere {installed}, found {part.version}: "
                 "install that version to go on, or choose another output folder"
             )
 
 
-def _finished(store: Store, found: PlanRecord, number: int) -> list[bool]:
-    """Of every shot of a part: whether it is there."""
-    return [store.has_shot(key) for key, _, _ in found.shots_of(number)]
+def _is_finished(store: Store, found: PlanRecord, number: int, state: bool) -> bool:
+    """Whether any shot of a part is finished, or with `state` False, whether any is not."""
+    return any(store.has_shot(row.key) == state for row in found.indices[number])

@@ -1,38 +1,66 @@
-"""The local pool: processes that each do one task at a time, are handed what they have warm, and may die.
+"""The local pool: processes that each do one job at a time, are handed what they have warm, and may die.
 
-`ProcessPoolExecutor` can hang when a worker dies or is replaced (CPython issue 115634) and knows no affinity, hence our
-own: one pipe a worker, spawn rather than fork.
+`ProcessPoolExecutor` can hang when a worker dies or is replaced (CPython issue 115634) and knows nothing of what a worker has
+warm, hence our own: one pipe a worker, spawn rather than fork.
 """
 
 from __future__ import annotations
 
 import signal
 import traceback
-from collections import Counter, deque
-from collections.abc import Callable, Iterable, Iterator
+from collections import Counter
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from multiprocessing import get_context
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 from viewsphere.errors import UserError, ViewsphereError
 
 if TYPE_CHECKING:
     from viewsphere.run.tasks import Worker
+    from viewsphere.sampling.extension import Portion
 
 LIVES = 2
 """How often a task is tried when its process dies."""
 
 
+class Work(Protocol):
+    """What there is to do, in lines: jobs of one line share what a worker has warm. Jobs are counted out one by one."""
+
+    def lines(self) -> Iterable[tuple[str, int]]:
+        """The name of each line, and about how many jobs are in it."""
+        ...
+
+    def jobs(self, line: str) -> Iterator[Job]:
+        """The jobs of a line, in order."""
+        ...
+
+
 @dataclass(frozen=True)
 class Job:
-    """Something to do, named before it is spelled out: `make` gives the task when a worker is free for it."""
+    """Something to do: its key in the data set, its line, and what a worker is told."""
 
     key: str
-    affinity: str
-    make: Callable[[], Any]
+    line: str
+    task: Any
+
+
+@dataclass(frozen=True)
+class Listed:
+    """A few jobs, all named at once."""
+
+    all: tuple[Job, ...]
+
+    def lines(self) -> Iterable[tuple[str, int]]:
+        """Their lines in the order of their first jobs."""
+        return Counter(job.line for job in self.all).items()
+
+    def jobs(self, line: str) -> Iterator[Job]:
+        """Those of a line."""
+        return (job for job in self.all if job.line == line)
 
 
 @dataclass(frozen=True)
@@ -45,14 +73,16 @@ class Outcome:
 
 
 class Crew:
-    """So many workers for one data set, this process itself if none; those that have come stay until the context ends.
+    """So many workers for a part of a data set, this process itself if none; workers that were started stay until the context
+    ends.
 
-    A worker comes when there is a job for it, and takes a second.
+    A worker is started when there is a job for it, and takes a second.
     """
 
-    def __init__(self, root: Path, workers: int) -> None:
+    def __init__(self, root: Path, workers: int, portion: Portion) -> None:
         self._root = root
         self._workers = workers
+        self._portion = portion
         self._hands: list[_Hand] = []
         self._here: Worker | None = None
 
@@ -65,40 +95,52 @@ class Crew:
         self._hands.clear()
         self._here = None
 
-    def run(self, jobs: Iterable[Job]) -> Iterator[Outcome]:
-        """Do all jobs, one list at a time; outcomes come as they are ready.
+    def run(self, work: Work) -> Iterator[Outcome]:
+        """Do all jobs; outcomes come as they are ready.
 
         A UserError is an outcome; anything else a worker raises ends the run with its traceback.
         """
+        queue = Queue(work, [hand.line for hand in self._hands])
         if self._workers == 0:
-            yield from self._run_here(jobs)
+            yield from self._run_here(queue)
             return
-        queue = Queue(jobs, [hand.affinity for hand in self._hands])
         busy: dict[Connection, _Hand] = {}
-        for hand in self._come(queue):
-            busy[hand.pipe] = hand
-            hand.give(queue.next(hand.affinity))
+        for hand in self._hands:
+            if hand.line in queue:
+                self._give(hand, queue, busy)
+        for hand in self._hands:
+            if hand.pipe not in busy:
+                self._give(hand, queue, busy)
+        while len(self._hands) < self._workers and self._give(None, queue, busy):
+            pass
         while busy:
             for pipe in wait(list(busy)):
                 assert isinstance(pipe, Connection)
                 yield from self._hear(busy, pipe, queue)
 
-    def _run_here(self, jobs: Iterable[Job]) -> Iterator[Outcome]:
+    def _run_here(self, queue: Queue) -> Iterator[Outcome]:
         from viewsphere.run.tasks import Worker
 
-        self._here = self._here or Worker(self._root)
-        for job in jobs:
+        self._here = self._here or Worker(self._root, self._portion)
+        line = ""
+        while (job := queue.next(line)) is not None:
+            line = job.line
             try:
-                yield Outcome(job.key, self._here.do(job.make()))
+                yield Outcome(job.key, self._here.do(job.task))
             except UserError as error:
                 yield Outcome(job.key, error=error)
 
-    def _come(self, queue: Queue) -> list[_Hand]:
-        """As many hands as there is work for, first those that have some of it warm."""
-        number = min(self._workers, len(queue))
-        while len(self._hands) < number:
-            self._hands.append(_Hand(self._root))
-        return sorted(self._hands, key=lambda hand: hand.affinity not in queue)[:number]
+    def _give(self, hand: _Hand | None, queue: Queue, busy: dict[Connection, _Hand]) -> bool:
+        """Hand out the next job, to a new worker if none is given; False if there is none."""
+        job = queue.next(hand.line if hand else "")
+        if job is None:
+            return False
+        if hand is None:
+            hand = _Hand(self._root, self._portion)
+            self._hands.append(hand)
+        busy[hand.pipe] = hand
+        hand.give(job)
+        return True
 
     def _hear(self, busy: dict[Connection, _Hand], pipe: Connection, queue: Queue) -> Iterator[Outcome]:
         """Take one answer, or the news of a death, and hand out the next job."""
@@ -112,85 +154,80 @@ class Crew:
             code = hand.stop()
             if not queue.again(job):
                 yield Outcome(job.key, error=ViewsphereError(f"{job.key}: its worker died {LIVES} times (exit code {code})"))
-            if queue:
-                hand = _Hand(self._root)
-                self._hands.append(hand)
-                busy[hand.pipe] = hand
-                hand.give(queue.next(""))
+            self._give(None, queue, busy)
             return
         if isinstance(answer, str):
             raise ViewsphereError(f"{job.key}: a worker failed\n{answer}")
-        if queue:
-            busy[pipe] = hand
-            hand.give(queue.next(hand.affinity))
+        self._give(hand, queue, busy)
         yield answer
 
 
 class Queue:
-    """Jobs by affinity: a worker is given what it has warm, then what nobody has, then of what most is left.
+    """Jobs in their lines: a worker is given what it has warm, then of a line that nobody has, then of the line of which most
+    is left. The next job of a line is asked for when a worker is free for it.
 
-    `warm`: what those have who have not asked yet.
+    `warm`: lines of workers who have not asked yet.
     """
 
-    def __init__(self, jobs: Iterable[Job], warm: Iterable[str] = ()) -> None:
-        self._left: dict[str, deque[Job]] = {}
+    def __init__(self, work: Work, warm: Iterable[str] = ()) -> None:
+        self._work = work
+        self._left = dict(work.lines())
+        self._open: dict[str, Iterator[Job]] = {}
         self._takers = Counter(warm)
         self._tries: Counter[str] = Counter()
-        for job in jobs:
-            self._left.setdefault(job.affinity, deque()).append(job)
-        self._count = sum(len(q) for q in self._left.values())
+        self._again: list[Job] = []
 
-    def __len__(self) -> int:
-        return self._count
+    def __contains__(self, line: str) -> bool:
+        return line in self._left
 
-    def __contains__(self, affinity: str) -> bool:
-        return affinity in self._left
-
-    def next(self, warm: str) -> Job:
-        """The next job for a worker that has this affinity warm."""
-        affinity = warm if warm in self else self._coldest()
-        line = self._left[affinity]
-        job = line.popleft()
-        if not line:
-            del self._left[affinity]
-        if affinity != warm:
-            self._takers[affinity] += 1
-        self._count -= 1
-        self._tries[job.key] += 1
-        return job
+    def next(self, warm: str) -> Job | None:
+        """The next job for a worker that has this line warm; None if there is none."""
+        if self._again:
+            job = self._again.pop()
+            self._tries[job.key] += 1
+            return job
+        while self._left:
+            line = warm if warm in self._left else self._coldest()
+            job = next(self._open.setdefault(line, self._work.jobs(line)), None)
+            if job is None:
+                del self._left[line], self._open[line]
+                continue
+            self._left[line] -= 1
+            if line != warm:
+                self._takers[line] += 1
+            return job
+        return None
 
     def _coldest(self) -> str:
-        for affinity in self._left:
-            if not self._takers[affinity]:
-                return affinity
-        return max(self._left, key=lambda a: len(self._left[a]) / self._takers[a])
+        for line in self._left:
+            if not self._takers[line]:
+                return line
+        return max(self._left, key=lambda line: self._left[line] / self._takers[line])
 
     def again(self, job: Job) -> bool:
         """Put back a job whose worker died; False if it was tried often enough."""
-        if self._tries[job.key] >= LIVES:
+        if self._tries[job.key] >= LIVES - 1:
             return False
-        self._left.setdefault(job.affinity, deque()).appendleft(job)
-        self._count += 1
+        self._again.append(job)
         return True
 
 
 class _Hand:
     """One worker process, seen from here."""
 
-    def __init__(self, root: Path) -> None:
+    def __init__(self, root: Path, portion: Portion) -> None:
         context = get_context("spawn")
         self.pipe, theirs = context.Pipe()
-        self.process = context.Process(target=_serve, args=(theirs, root), daemon=True)
+        self.process = context.Process(target=_serve, args=(theirs, root, portion), daemon=True)
         self.process.start()
         theirs.close()
-        self.affinity = ""
+        self.line = ""
         self.job: Job | None = None
 
     def give(self, job: Job) -> None:
-        self.job, self.affinity = job, job.affinity
-        task = job.make()
+        self.job, self.line = job, job.line
         with suppress(OSError):  # a dead worker is noticed when its answer is awaited
-            self.pipe.send(task)
+            self.pipe.send(job)
 
     def stop(self) -> int | None:
         """End the process; what it had not finished is lost, what it had is not."""
@@ -200,18 +237,18 @@ class _Hand:
         return self.process.exitcode
 
 
-def _serve(pipe: Connection, root: Path) -> None:
-    """A worker's life: take a task, answer, until the other side is gone."""
+def _serve(pipe: Connection, root: Path, portion: Portion) -> None:
+    """A worker's life: take a job, answer, until the other side is gone."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's to handle
     from viewsphere.run.tasks import Worker
 
-    worker = Worker(root)
+    worker = Worker(root, portion)
     with suppress(EOFError, BrokenPipeError):
         while True:
-            task = pipe.recv()
+            job: Job = pipe.recv()
             try:
-                pipe.send(Outcome(task.key, worker.do(task)))
+                pipe.send(Outcome(job.key, worker.do(job.task)))
             except UserError as error:
-                pipe.send(Outcome(task.key, error=type(error)(str(error))))
+                pipe.send(Outcome(job.key, error=type(error)(str(error))))
             except Exception:
                 pipe.send(traceback.format_exc())

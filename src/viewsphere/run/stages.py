@@ -123,7 +123,9 @@ class Stages:
 
     def check_distances(self, planned: Plan, spec: ModelSpec) -> None:
         """Raise RecipeError if a pose's camera would stand inside this model, or one that stands beside it."""
-        problem = planned.distance_problem(spec, self.box)
+        from viewsphere.sampling.distances import Distances
+
+        problem = Distances(planned, self.box).problem(spec)
         with planned.recipe.located():
             if problem:
                 raise problem
@@ -133,14 +135,16 @@ class Stages:
 
         Scenery that is drawn for each model or frame is looked at when its shot is rendered.
         """
+        from viewsphere.sampling.distances import Distances
+
         scene = planned.recipe.scene
         if planned.composition is None or not scene.has_fixed_scenery:
             return
         spec = planned.model_specs[0]
         things = planned.composition.things(spec, None, self.box)
-        cameras = planned.cameras(things, self.box)
+        cameras = Distances(planned, self.box).cameras(things, range(0, planned.poses, -(-planned.poses // MOST_CAMERAS)))
         with planned.recipe.located():
-            self._check_cameras(things, cameras[:: -(-len(cameras) // MOST_CAMERAS)])
+            self._check_cameras(things, cameras)
 
     def _check_cameras(self, things: Sequence[Thing], cameras: Float) -> None:
         """Raise RecipeError for the first of the cameras (N, 3) that is inside of something.
@@ -160,6 +164,14 @@ class Stages:
                         f"viewpoints: expected the camera outside of all that is placed; found it at "
                         f"({', '.join(f'{v:.3g}' for v in cameras[i])}) inside {what}, which stands at ({x:.3g}, {y:.3g})"
                     )
+
+    def _check_shot(self, shot: Shot) -> None:
+        """Raise RecipeError where a camera of a shot is inside of something; what stands still is looked at once."""
+        instants, sensors = range(len(shot.instants)), range(len(shot.rig.sensors))
+        for poses in dict.fromkeys(map(shot.poses_at, instants)):
+            together = [instant for instant in instants if shot.poses_at(instant) == poses]
+            cameras = [shot.camera(instant, sensor).center for instant in together for sensor in sensors]
+            self._check_cameras([thing for thing in shot.things_at(together[0]) if thing.is_there], np.array(cameras))
 
     def _roofs(self, thing: Thing, point: Float) -> bool:
         """Whether scenery hides most of the sky from a point in the world."""
@@ -182,10 +194,7 @@ class Stages:
         stage = self.stage(shot)
         boxes = [self.box(p.model) for p in shot.objects]
         sizes = [self.real_size(p.model) for p in shot.objects]
-        if len(shot.things) > 1:
-            for instant in range(len(shot.instants)):
-                cameras = [shot.camera(instant, sensor).center for sensor in range(len(shot.rig.sensors))]
-                self._check_cameras([thing for thing in shot.things_at(instant) if thing.is_there], np.array(cameras))
+        self._check_shot(shot)
         for sample in shot.samples:
             yield render_sample(shot, sample, stage, boxes, sizes)
 

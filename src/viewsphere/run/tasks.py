@@ -8,8 +8,6 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Literal
 
-from pydantic import TypeAdapter
-
 from viewsphere.assets.cache import read_ahead
 from viewsphere.assets.export import export_glb, export_obj
 from viewsphere.assets.mesh import Mesh
@@ -19,24 +17,19 @@ from viewsphere.model.frozen import Frozen
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
-from viewsphere.run.stages import Stages, model_files
-from viewsphere.store import ModelInfo, Store
+from viewsphere.run.stages import Stages, StoredBoxes, model_files
+from viewsphere.sampling.extension import Portion
+from viewsphere.store import ModelInfo, Row, Store
 
-MODELS = TypeAdapter(tuple[ModelSpec, ...])
-
-Kind = Literal["model", "same model", "shot"]
+Kind = Literal["model", "same model"]
 
 
 @dataclass(frozen=True)
-class Task:
-    """A model, with its moments behind it, or a shot as JSON; "same model" has to be what the store holds, if it is there.
-    Tasks of one `affinity` share a warm stage.
-    """
+class ModelTask:
+    """A model, with its moments behind it; the "same model" has to be what the store holds, if it is there."""
 
     kind: Kind
-    key: str
-    affinity: str
-    payload: str
+    specs: tuple[ModelSpec, ...]
 
 
 class SceneryRecord(Frozen):
@@ -47,19 +40,26 @@ class SceneryRecord(Frozen):
 
 
 class Worker:
-    """Does tasks for one data set."""
+    """Does tasks for a part of a data set."""
 
-    def __init__(self, root: Path) -> None:
+    def __init__(self, root: Path, portion: Portion) -> None:
         self.store = Store(root)
         self.stages = Stages()
+        self._portion = portion
+        self._boxes = StoredBoxes(self.store)
         self._digests: dict[str, str] = {}
 
-    def do(self, task: Task) -> int:
-        """Do one task; gives the number of frames it made."""
-        if task.kind != "shot":
-            self.make_models(MODELS.validate_json(task.payload), trusted=task.kind == "model")
-            return 0
-        shot = Shot.model_validate_json(task.payload)
+    def do(self, task: ModelTask | Row) -> int:
+        """Make models, or the shot of a row; gives the number of frames that were made."""
+        if isinstance(task, Row):
+            return self.make_shot(task)
+        self.make_models(task.specs, trusted=task.kind == "model")
+        return 0
+
+    def make_shot(self, row: Row) -> int:
+        """Make the shot of a row and render it into the store; gives the number of its frames."""
+        with self._portion.plan.recipe.located():
+            shot = self._portion.shot(row, self._boxes)
         return self.store.write_shot(shot.key, self.stages.render(shot), self._scenery(shot), shot.files, shot)
 
     def _scenery(self, shot: Shot) -> str:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
-from functools import cache, cached_property, lru_cache
+from dataclasses import dataclass, fields
+from functools import cached_property, lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,6 +51,10 @@ class Composition:
     images: tuple[tuple[str, ...], ...]
     recipe_categories: tuple[Category, ...]
     blend: BlendScenery | None = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What other processes are sent: not what was drawn so far."""
+        return {field.name: getattr(self, field.name) for field in fields(self)}
 
     @cached_property
     def categories(self) -> tuple[Category, ...]:
@@ -177,6 +182,27 @@ class Composition:
         return x, y, z
 
 
+@dataclass(frozen=True, eq=False)
+class Turns:
+    """The number of what a draw is for, in the data set's order: of a model, or of a frame."""
+
+    specs: tuple[ModelSpec, ...]
+    views: Poses
+
+    def __call__(self, names: Names) -> int:
+        """The number of a model's key, or of a model's key and a pose's name."""
+        model = self._models[names[0]]
+        return model if len(names) == 1 else model * len(self.views) + self._poses[names[1]]
+
+    @cached_property
+    def _models(self) -> dict[str, int]:
+        return {spec.key: i for i, spec in enumerate(self.specs)}
+
+    @cached_property
+    def _poses(self) -> dict[str, int]:
+        return {self.views.name(i): i for i in range(len(self.views))}
+
+
 def compose(
     recipe: Recipe, specs: tuple[ModelSpec, ...], own: tuple[Category, ...], splits: Sequence[str], views: Poses
 ) -> Composition:
@@ -215,15 +241,9 @@ def _blend(recipe: Recipe, specs: tuple[ModelSpec, ...], views: Poses) -> BlendS
     if entry is None:
         return None
 
-    @cache
-    def numbers() -> tuple[dict[str, int], dict[str, int]]:
-        return {spec.key: i for i, spec in enumerate(specs)}, {views.name(i): i for i in range(len(views))}
-
-    def turn_of(names: Names) -> int:
-        models, poses = numbers()
-        return models[names[0]] if len(names) == 1 else models[names[0]] * len(poses) + poses[names[1]]
-
     moments = views.moments if isinstance(views, TimedPoses) and entry.frames is not None else ()
-    made = BlendScenery(recipe, entry, turn_of, tuple(sorted({moment.frame for moment in moments if moment is not None})))
+    made = BlendScenery(
+        recipe, entry, Turns(specs, views), tuple(sorted({moment.frame for moment in moments if moment is not None}))
+    )
     made.check()
     return made

@@ -4,21 +4,15 @@ from __future__ import annotations
 
 import hashlib
 import json
-import math
-from bisect import bisect_right
 from collections import Counter
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import accumulate, chain
+from itertools import chain, groupby
 from pathlib import Path
-
-import numpy as np
-from numpy.typing import NDArray
 
 from viewsphere import plugins
 from viewsphere.errors import RecipeError
-from viewsphere.geometry.camera import orbit_center
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.instant import Instant, Viewpoint
@@ -30,7 +24,7 @@ from viewsphere.model.thing import Thing
 from viewsphere.recipe.draws import alternatives, span
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.sampling.blend_scene import BlendScenery
-from viewsphere.sampling.camera import distance_problem, inside_box, looking
+from viewsphere.sampling.camera import looking
 from viewsphere.sampling.checks import (
     check_blend,
     check_catcher,
@@ -55,10 +49,15 @@ from viewsphere.sampling.moments import (
     timed,
 )
 from viewsphere.sampling.pictures import Pictures, check_pictures, proportions, scene_pictures
+from viewsphere.sampling.scenery import draw_names
 from viewsphere.sampling.scenes import Scenes, is_night
-from viewsphere.sampling.seeds import share
+from viewsphere.sampling.splits import expected, hashed, model_splits
 from viewsphere.sampling.viewpoints import Poses, poses
-from viewsphere.store import Category
+from viewsphere.store import Block, Category, Row
+from viewsphere.store.index import Index, numbers
+
+COUNTED = 200_000
+"""Frames whose splits are counted one by one."""
 
 SHOT_FRAMES = 16
 """Most frames of a shot, unless the recipe or the caller says otherwise."""
@@ -78,6 +77,7 @@ class Plan:
     shot_frames: int
     composition: Composition | None = None  # of place, company and planes
     timings: tuple[Timing | None, ...] = ()  # of each model; none at all where nothing moves
+    kept_splits: Mapping[str, str] = field(default_factory=dict[str, str])  # of models that a data set has already
 
     @cached_property
     def intrinsics(self) -> Intrinsics:
@@ -107,7 +107,7 @@ class Plan:
     @property
     def frames(self) -> int:
         """Number of frames: models x poses, or as many as their time steps have."""
-        return self._firsts[-1]
+        return sum(schedule.count for schedule in self.schedules)
 
     @cached_property
     def schedules(self) -> tuple[Schedule, ...]:
@@ -131,11 +131,6 @@ class Plan:
         moving = [timing.moving for timing in self.timings if timing]
         poses = "a pose each" if all(moving) else f"{len(base):,} poses{', of some a pose each' if any(moving) else ''}"
         return f"{self.models:,} models x {self.time_steps:,} time steps x {poses}"
-
-    @cached_property
-    def _firsts(self) -> tuple[int, ...]:
-        """First frame of each model, and the number of all frames."""
-        return tuple(accumulate((schedule.count for schedule in self.schedules), initial=0))
 
     @property
     def max_objects(self) -> int:
@@ -173,18 +168,20 @@ class Plan:
 
     @cached_property
     def split_counts(self) -> dict[str, int]:
-        """Split -> number of its frames."""
+        """Split -> number of its frames; of hashed ones what is expected, where there are more than `COUNTED` to hash."""
         by = self.recipe.splits.by
+        both = list(zip(self.model_specs, self.schedules, strict=True))
         if by == "model":
             found = Counter({s: 0 for s in self.splits})
-            for spec, schedule in zip(self.model_specs, self.schedules, strict=True):
+            for spec, schedule in both:
                 found[self.split(spec, 0)] += schedule.count
-        elif by == "pose" and not self.timings:
+        elif by == "pose" and not self.timings and self.poses <= COUNTED:
             found = Counter(self.split(self.model_specs[0], i) for i in range(self.poses))
             found = Counter({name: count * self.models for name, count in found.items()})
-        else:
-            both = zip(self.model_specs, self.schedules, strict=True)
+        elif self.frames <= COUNTED:
             found = Counter(self.split(spec, i) for spec, schedule in both for i in schedule.poses)
+        else:
+            found = Counter(expected(self.recipe.splits, self.frames))
         return {name: found[name] for name in self.splits}
 
     @cached_property
@@ -210,103 +207,96 @@ class Plan:
         return tuple(map(self.recipe.locate, (*found, *doubts)))
 
     def split(self, spec: ModelSpec, pose: int) -> str:
-        """The split of a frame; it follows from the seed and the names of what is kept together, and nothing else."""
-        if spec.key in self._listed:
-            return self._listed[spec.key]
-        names = {
-            "model": (spec.key,),
-            "pose": (self.pose_list.place(pose),),
-            "frame": (spec.key, self.pose_list.name(pose)),
-        }
-        by = self.recipe.splits.by
-        edges, shared = self._edges
-        return shared[min(bisect_right(edges, share(self.recipe.seed, "split", *names[by])), len(shared) - 1)]
+        """The split of a frame."""
+        splits = self.recipe.splits
+        match splits.by:
+            case "model":
+                return self.model_splits[spec.key]
+            case "pose":
+                return hashed(splits, self.recipe.seed, (self.pose_list.place(pose),))
+            case "place":
+                place = self.recipe.scene.place
+                names = draw_names(place.draw, spec.key, self.pose_list.name(pose)) if place else ()
+                return hashed(splits, self.recipe.seed, ("place", *names))
+            case "frame":
+                return hashed(splits, self.recipe.seed, (spec.key, self.pose_list.name(pose)))
 
     @cached_property
-    def _listed(self) -> dict[str, str]:
-        shares = self.recipe.splits.shares.items()
-        return {key: name for name, keys in shares if isinstance(keys, tuple) for key in keys}
+    def model_splits(self) -> dict[str, str]:
+        """The split of every model, where splits are by model; else none."""
+        if self.recipe.splits.by != "model":
+            return {}
+        keys = (spec.key for spec in self.model_specs)
+        return model_splits(self.recipe.splits, self.recipe.seed, keys, self.kept_splits)
+
+    def keeping(self, splits: Mapping[str, str]) -> Plan:
+        """The same plan for a data set that has some of its models in these splits already."""
+        kept = {key: name for key, name in splits.items() if key in self._position}
+        return _composed(replace(self, kept_splits=kept)) if kept else self
 
     @cached_property
-    def _edges(self) -> tuple[tuple[float, ...], tuple[str, ...]]:
-        """Upper ends of the intervals of [0, 1) that the splits with a share take, and their names."""
-        shares = {name: part for name, part in self.recipe.splits.shares.items() if not isinstance(part, tuple) and part}
-        return tuple(accumulate(shares.values())), tuple(shares)
+    def blocks(self) -> tuple[Block, ...]:
+        """Which models are taken from which poses, time step by time step."""
+        found: list[Block] = []
+        for schedule, members in groupby(range(self.models), lambda model: self.schedules[model]):
+            keys = tuple(self.model_specs[model].key for model in members)
+            runs = [((run.first, run.stop),) for run in schedule.runs]
+            if len(runs) == 1:
+                found.append(Block(keys, runs[0]))
+            else:
+                found += (Block((key,), poses) for key in keys for poses in runs)
+        return tuple(found)
 
     @cached_property
-    def _chunks(self) -> tuple[tuple[tuple[int, int], ...], ...]:
-        """Of each model, the poses [first, stop) of its shots."""
-        known = {id(schedule): schedule.chunks(self.shot_frames) for schedule in self.schedules}
-        return tuple(known[id(schedule)] for schedule in self.schedules)
-
-    @cached_property
-    def _shots(self) -> tuple[int, ...]:
-        """First shot of each model, and the number of all shots."""
-        return tuple(accumulate(map(len, self._chunks), initial=0))
+    def rows(self) -> Index:
+        """All shots."""
+        return Index(self.blocks, 0, self.shot_frames, 0)
 
     @property
     def shot_count(self) -> int:
         """Number of shots."""
-        return self._shots[-1]
+        return len(self.rows)
 
-    def shots_of(self, model: int) -> range:
-        """Indices of a model's shots."""
-        return range(self._shots[model], self._shots[model + 1])
+    def schedule(self, spec: ModelSpec) -> Schedule:
+        """Which poses a model is taken from, and when."""
+        return self.schedules[self._position[spec.key]]
 
-    def shot_model(self, index: int) -> int:
-        """Index of the model of a shot."""
-        return bisect_right(self._shots, index) - 1
+    def spec(self, key: str) -> ModelSpec:
+        """The model of this key."""
+        return self.model_specs[self._position[key]]
 
-    def _shot_poses(self, index: int) -> tuple[int, int]:
-        model = self.shot_model(index)
-        return self._chunks[model][index - self._shots[model]]
+    def shot(self, row: Row | int, box_of: BoxOf) -> Shot:
+        """The shot of a row, or of its number; raises IndexError past the end.
 
-    def shot_key(self, index: int) -> str:
-        """`<model key>-<first pose>`: stable, unique, fit for a folder's name."""
-        return f"{self.model_specs[self.shot_model(index)].key}-{self._shot_poses(index)[0]:06d}"
-
-    def shot_table(self) -> Iterator[tuple[str, int, int]]:
-        """Key, first frame and number of frames of every shot, in order."""
-        frame = 0
-        for index in range(self.shot_count):
-            first, stop = self._shot_poses(index)
-            yield self.shot_key(index), frame, stop - first
-            frame += stop - first
-
-    def shot(self, index: int, box_of: BoxOf | None = None) -> Shot:
-        """One shot; raises IndexError past the end.
-
-        `box_of` is needed where the recipe has a place, company or planes, as what stands on the floor depends on its size, and
-        where what the camera looks at is moved, or moves.
-        Raises RecipeError where there is no room for all that is to stand there, and what `box_of` raises.
+        `box_of` gives the sizes of what stands on the floor and of what the cameras look at. Raises RecipeError where there is
+        no room for all that is to stand there, and what `box_of` raises.
         """
-        if not 0 <= index < self.shot_count:
-            raise IndexError(f"expected a shot of 0..{self.shot_count - 1}, got {index}")
-        return self.take(self.shot_model(index), range(*self._shot_poses(index)), box_of, self.shot_key(index))
+        row = self.rows[row] if isinstance(row, int) else row
+        return self.take(row.subject, tuple(numbers(row.positions)), box_of, row.key, row.first)
 
-    def take(self, model: int, chosen: Sequence[int], box_of: BoxOf | None = None, key: str = "") -> Shot:
-        """A shot of some poses of a model (their indices), of one time step: of one pose where the recipe draws scenes for each
-        frame.
+    def take(self, subject: str, chosen: Sequence[int], box_of: BoxOf, key: str = "", first: int = 0) -> Shot:
+        """A shot of some poses (their indices) of the model of this key, of one time step: of one pose where the recipe draws
+        scenes for each frame. `first` is the number of its first sample.
         """
-        spec, pose = self.model_specs[model], self.pose_list.name(chosen[0])
+        spec, pose = self.spec(subject), self.pose_list.name(chosen[0])
         things, target = (Thing(id=1, model=spec),), None
         if self.composition is not None:
             with self.recipe.located():
-                things = self.composition.things(spec, self._scene_pose(chosen[0]), _known(box_of))
+                things = self.composition.things(spec, self._scene_pose(chosen[0]), box_of)
             company = self.recipe.scene.company
-            target = self.composition.center(things[: 1 + (company.number if company else 0)], _known(box_of))
+            target = self.composition.center(things[: 1 + (company.number if company else 0)], box_of)
         if self.recipe.scene.materials:
             things = tuple(self._repainted(p, spec, pose) for p in things)
-        run = self.schedules[model].run_of(chosen[0])
-        target, placed = self._target(things[0], run, target, box_of), self._at(things, run)
-        focus = target or center(placed[0], _known(box_of))
+        run = self.schedule(spec).run_of(chosen[0])
+        target, placed = self.target(things[0], run, target, box_of), self.at(things, run)
+        focus = target or center(placed[0], box_of)
         return Shot(
             key=key or spec.key,
             things=placed,
             rig=Rig.of(self.intrinsics),
             scene=self._scene(spec, pose, run).model_copy(update=self._floor(spec, things, box_of)),
-            first=self._firsts[model] + self.schedules[model].position(chosen[0]),
-            instants=tuple(self.instant(model, i, target, focus) for i in chosen),
+            first=first,
+            instants=tuple(self.instant(spec, pose, target, focus, first + i) for i, pose in enumerate(chosen)),
             engine=self.recipe.engine.name,
             engine_options=self.recipe.engine.options,
             channels=self.recipe.channels,
@@ -315,28 +305,28 @@ class Plan:
             category_deg=self.recipe.viewpoints.bins,
         )
 
-    def _target(self, first: Thing, run: Run, target: Vector | None, box_of: BoxOf | None) -> Vector | None:
+    def target(self, first: Thing, run: Run, target: Vector | None, box_of: BoxOf) -> Vector | None:
         """What cameras look at that have no target of their own, None for the first object's centre: where that stands at the
         first frame, or follows it.
         """
         moves = run.step is not None and run.step.model is not None
         if moves and self.recipe.viewpoints.target == "follow":
-            target, first = None, self._at((first,), run)[0]
+            target, first = None, self.at((first,), run)[0]
         elif target is None and moves:
-            return center(first, _known(box_of))
+            return center(first, box_of)
         if target is None and self.scenes.is_target_moved:
-            target = center(first, _known(box_of))
+            target = center(first, box_of)
         return target
 
-    def _floor(self, spec: ModelSpec, things: Sequence[Thing], box_of: BoxOf | None) -> dict[str, float]:
+    def _floor(self, spec: ModelSpec, things: Sequence[Thing], box_of: BoxOf) -> dict[str, float]:
         """How high the ground is at most, in a scene's field: at the lowest that a model comes at its time steps."""
         moments = self.moments_of(spec)
         if not moments or self.recipe.scene.ground == "off":
             return {}
         world = things[0].world_from_object
-        return {"floor": min(float(transform(world, _known(box_of)(moment))[:, 2].min()) for moment in moments)}
+        return {"floor": min(float(transform(world, box_of(moment))[:, 2].min()) for moment in moments)}
 
-    def _at(self, things: Sequence[Thing], run: Run) -> tuple[Thing, ...]:
+    def at(self, things: Sequence[Thing], run: Run) -> tuple[Thing, ...]:
         """What is placed, as it is at a time step; company is at its own of the same number. What of the scene's file shows
         nothing then is left out, so that others have other ids.
         """
@@ -386,85 +376,27 @@ class Plan:
             return (spec,)
         return self.composition.cast(spec, None if pose is None else self._scene_pose(pose))
 
-    def shots(self, box_of: BoxOf | None = None) -> Iterator[Shot]:
+    def shots(self, box_of: BoxOf) -> Iterator[Shot]:
         """All shots in order, made one by one."""
-        return (self.shot(i, box_of) for i in range(self.shot_count))
+        return (self.shot(row, box_of) for row in self.rows)
 
-    def instant(self, model: int, pose: int, target: Vector | None, focus: Vector) -> Instant:
-        """The instant of a model (its index) and a pose; the camera looks at `target` unless the pose has its own, and where
-        there is neither at `focus`.
+    def instant(self, spec: ModelSpec, pose: int, target: Vector | None, focus: Vector, number: int) -> Instant:
+        """The instant of a model and a pose; the camera looks at `target` unless the pose has its own, and where there is
+        neither at `focus`. `number` is the instant's own.
         """
-        spec, finish = self.model_specs[model], None
-        if self.scenes.has_finish_per_frame:
-            finish = self.scenes.finish(spec.key, self.pose_list.name(pose))
-        number = self._firsts[model] + self.schedules[model].position(pose)
-        return looking(self._pose(spec, pose, target), focus, index=number, split=self.split(spec, pose), finish=finish)
+        finish = self.scenes.finish(spec.key, self.pose_list.name(pose)) if self.scenes.has_finish_per_frame else None
+        return looking(self.pose(spec, pose, target), focus, index=number, split=self.split(spec, pose), finish=finish)
 
-    def _pose(self, spec: ModelSpec, index: int, target: Vector | None) -> Viewpoint:
+    def pose(self, spec: ModelSpec, index: int, target: Vector | None) -> Viewpoint:
         """The pose of a model's frame, which looks at `target` unless it has a target of its own."""
         pose = self.pose_list[index]
         if target is not None and pose.target is None:
             pose = pose.model_copy(update={"target": target})
         return self.scenes.jittered(pose, spec.key, self.pose_list.place(index)) if self.scenes.is_jittered else pose
 
-    def distance_problem(self, spec: ModelSpec, box_of: BoxOf) -> RecipeError | None:
-        """The first pose whose camera would stand inside a target's box, in words; None if there is none.
-
-        Company that is drawn for each frame is not looked at: that is left to whoever renders the frame.
-        """
-        things, target = (Thing(id=1, model=spec),), None
-        if self.composition is not None and not self.recipe.scene.is_moved_each_frame:
-            things = self.composition.targets(spec, None, box_of)
-            target = self.composition.center(things, box_of)
-        fixed = None if self.timings else self.cameras(things, box_of)
-        for run in self.schedules[self._position[spec.key]].runs:
-            at = self._target(things[0], run, target, box_of)
-            moved = self._at(things, run)
-            cameras = fixed if fixed is not None else self.cameras(moved, box_of, at)
-            for thing in moved:
-                box = transform(thing.world_from_object, box_of(thing.model))
-                inside = inside_box(box, cameras[run.first : run.stop])
-                if inside.any():
-                    pose = self._pose(spec, run.first + int(np.flatnonzero(inside)[0]), at)
-                    problem = distance_problem(pose, box)
-                    return RecipeError(f"viewpoints.distance: {problem} (model {thing.model.key})")
-        return None
-
     @cached_property
     def _position(self) -> dict[str, int]:
         return {spec.key: i for i, spec in enumerate(self.model_specs)}
-
-    def cameras(self, things: Sequence[Thing], box_of: BoxOf, target: Vector | None = None) -> NDArray[np.float64]:
-        """Where the cameras of all poses stand, (poses, 3) world metres, when these are placed; they look at `target`, by
-        default at the middle of what is placed.
-        """
-        targets = [p for p in things if p.id and not p.scenery]
-        corners = np.concatenate([transform(t.world_from_object, box_of(t.model)) for t in targets])
-        middle = corners.mean(axis=0) if len(targets) == 1 else (corners.min(axis=0) + corners.max(axis=0)) / 2
-        middle = middle if target is None else np.array(target)
-        if not self.scenes.is_jittered:
-            return self._offsets + np.where(np.isnan(self._targets), middle, self._targets)
-        x, y, z = middle.tolist()
-        spec = targets[0].model
-        base = self.model_specs[self._position[spec.track or spec.key]]
-        moved = (self._pose(base, i, (x, y, z)) for i in range(self.poses))
-        return np.array([_stand(pose) for pose in moved])
-
-    @cached_property
-    def _offsets(self) -> NDArray[np.float64]:
-        """From what the cameras look at to where they stand, (poses, 3)."""
-        views = (self.pose_list.view(i) for i in range(self.poses))
-        flat = np.fromiter((x for v in views for x in (v.azimuth, v.elevation, v.distance)), np.float64, 3 * self.poses)
-        azimuth, elevation = np.radians(flat.reshape(-1, 3)[:, :2]).T
-        level = np.cos(elevation)
-        direction = np.stack([level * np.sin(azimuth), -level * np.cos(azimuth), np.sin(elevation)], axis=1)
-        return flat.reshape(-1, 3)[:, 2:] * direction
-
-    @cached_property
-    def _targets(self) -> NDArray[np.float64]:
-        """What the cameras look at, (poses, 3); NaN where that is the models' centre."""
-        targets = (self.pose_list.target(i) or (math.nan,) * 3 for i in range(self.poses))
-        return np.fromiter((x for t in targets for x in t), np.float64, 3 * self.poses).reshape(-1, 3)
 
     @cached_property
     def digest(self) -> str:
@@ -475,7 +407,7 @@ class Plan:
         models = [m.model_dump(mode="json") | {"source": Path(m.source).name} for m in self.kept_specs]
         planes = () if self.composition is None else self.composition.images
         images = [Path(i).name for files in (self.images, *planes) for i in files]
-        value = [self.recipe.digest, models, self.pose_list.digest, images, self._chunks]
+        value = [self.recipe.digest, models, self.pose_list.digest, images, self.shot_frames]
         value += [] if self.blend is None else [self.blend.digest]
         return hashlib.sha256(json.dumps(value, separators=(",", ":")).encode()).hexdigest()
 
@@ -502,12 +434,17 @@ def plan(recipe: Recipe, shot_frames: int | None = None) -> Plan:
         if timings:
             check_moments(recipe, planned.frames)
             check_keys(planned.kept_specs)
-        if not recipe.scene.is_composed:
-            return planned
-        apart = recipe.splits.by == "model"
-        splits = [planned.split(spec, 0) if apart else "" for spec in specs]
-        composition = compose(recipe, specs, planned.categories, splits, views)
-        return replace(planned, categories=composition.categories, composition=composition)
+        return _composed(planned)
+
+
+def _composed(planned: Plan) -> Plan:
+    """The plan with all that stands around its models: only those of one split are seen together, where splits are by model."""
+    recipe, specs = planned.recipe, planned.model_specs
+    if not recipe.scene.is_composed:
+        return planned
+    splits = [planned.model_splits.get(spec.key, "") for spec in specs]
+    composition = compose(recipe, specs, categories(recipe), splits, planned.pose_list)
+    return replace(planned, categories=composition.categories, composition=composition)
 
 
 def check_engine(recipe: Recipe) -> None:
@@ -531,18 +468,6 @@ def center(thing: Thing, box_of: BoxOf) -> Vector:
     """What a camera looks at that has no target of its own: the centre of the first object's box, world metres."""
     x, y, z = transform(thing.world_from_object, box_of(thing.model).mean(axis=0)).tolist()
     return x, y, z
-
-
-def _stand(pose: Viewpoint) -> NDArray[np.float64]:
-    """Where the camera of a pose with a target stands, (3,) world metres."""
-    assert pose.target is not None
-    return np.array(pose.target) + orbit_center(math.radians(pose.azimuth_deg), math.radians(pose.elevation_deg), pose.distance)
-
-
-def _known(box_of: BoxOf | None) -> BoxOf:
-    if box_of is None:
-        raise ValueError("expected box_of for a recipe with place, company, planes or a jittered target")
-    return box_of
 
 
 def _lens(recipe: Recipe, views: Poses) -> Intrinsics:

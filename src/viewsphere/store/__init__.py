@@ -4,7 +4,7 @@
     OUT/store/models/<key>/                    the normalised model (OBJ, GLB) and model.json
     OUT/store/shots/<hh>/<shot>/frames.json    records of the shot's frames
     OUT/store/shots/<hh>/<shot>/shot.json      the scene that they show (what is no object: scenery.json)
-    OUT/store/shots/<hh>/<shot>/<channel>/<pose>.png|.tiff|...
+    OUT/store/shots/<hh>/<shot>/<channel>/<sample>.png|.tiff|...
     OUT/store/writing/                         what is not whole yet
 
 `hh` are the first two hexadecimal digits of the shot key's SHA-256, so that no folder grows large. Workers never share
@@ -15,9 +15,11 @@ from viewsphere.store.channel_files import check_codecs, decode, depth_step, enc
 from viewsphere.store.choice import Choice, frame_ranges
 from viewsphere.store.dataset import Dataset
 from viewsphere.store.folder import Store, new_folder
-from viewsphere.store.records import Category, ModelInfo, Part, PlanRecord, Row, ShotRow
+from viewsphere.store.index import Block, Row
+from viewsphere.store.records import Category, ModelInfo, Part, PlanRecord
 
 __all__ = [
+    "Block",
     "Category",
     "Choice",
     "Dataset",
@@ -25,7 +27,6 @@ __all__ = [
     "Part",
     "PlanRecord",
     "Row",
-    "ShotRow",
     "Store",
     "check_codecs",
     "decode",

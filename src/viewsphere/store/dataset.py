@@ -20,8 +20,9 @@ from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.store.channel_files import decode
 from viewsphere.store.choice import Choice
 from viewsphere.store.folder import Store
+from viewsphere.store.index import Row
 from viewsphere.store.linking import link_file
-from viewsphere.store.records import Category, ModelInfo, ShotRow
+from viewsphere.store.records import Category, ModelInfo
 
 
 class Dataset(Sequence[Sample]):
@@ -83,10 +84,12 @@ class Dataset(Sequence[Sample]):
         """Keys of the finished shots in frame order, with the places of their frames, and the number of frames before each."""
         shots: list[tuple[str, Sequence[int]]] = []
         starts, total = [0], 0
-        for key, first, count in self.plan.shots:
-            places = self._places(key, first, count) if self.store.has_shot(key) else ()
+        found = (self.plan.find(key) for key in self.store.finished())
+        own = (row for row in found if row is not None and row.part == self.plan.part_of(row.first))
+        for row in sorted(own, key=lambda row: row.first):
+            places = self._places(row)
             if places:
-                shots.append((key, places))
+                shots.append((row.key, places))
                 total += len(places)
                 starts.append(total)
         return shots, starts
@@ -124,20 +127,19 @@ class Dataset(Sequence[Sample]):
         for place in places:
             yield self._sample(key, records[place])
 
-    def _places(self, key: str, first: int, count: int) -> Sequence[int]:
+    def _places(self, row: Row) -> Sequence[int]:
         """Which of a finished shot's frames the choice means, by the model's key, or by that of its moment where it moves.
         Where the plan does not know the model, as of data sets made elsewhere, a frame is of all models that it shows.
         """
-        places = self.choice.places(first, count)
+        places = self.choice.places(row.first, row.count)
         if not self.choice.models or not places:
             return places
-        part = self.plan.parts[self.plan.part_of(first)] if self.plan.parts else None
-        model = part.model_at(first) if part else key.rpartition("-")[0]
+        model = row.subject if self.plan.parts[row.part].is_product else None
         if model is not None and self.choice.has_model(model):
             return places
         if model is not None and not any(key.startswith(f"{model}-") for key in self._chosen):
             return ()
-        shown = zip(places, self.samples_of(key, places), strict=True)
+        shown = zip(places, self.samples_of(row.key, places), strict=True)
         return [place for place, sample in shown if any(self._is_chosen(o, model) for o in sample.objects)]
 
     def _is_chosen(self, shown: ObjectAnnotation, model: str | None) -> bool:
@@ -151,16 +153,13 @@ class Dataset(Sequence[Sample]):
         """Keys of the models that the choice names, moments of models that move among them."""
         return tuple(key for key in self.plan.models if self.choice.has_model(key))
 
-    @cached_property
-    def _frames_of(self) -> dict[str, int]:
-        return {key: count for key, _, count in self.plan.shots}
-
     def _read_records(self, key: str) -> list[dict[str, Any]]:
         file = self.store.shot_folder(key) / "frames.json"
         try:
             records: list[dict[str, Any]] = json.loads(file.read_text("utf-8"))
-            if len(records) != self._frames_of[key]:
-                raise ValueError(f"{len(records)} frames instead of {self._frames_of[key]}")
+            row = self.plan.find(key)
+            if row is None or len(records) != row.count:
+                raise ValueError(f"{len(records)} frames instead of {row and row.count}")
         except (OSError, TypeError, ValueError) as error:
             raise _damaged(file, error) from None
         return records
@@ -175,22 +174,19 @@ class Dataset(Sequence[Sample]):
     def _supplied(self, record: dict[str, Any]) -> dict[str, str]:
         """Files of channels that were added to a frame later."""
         files: dict[str, str] = {}
-        for kinds, firsts, rows in self._supplements:
-            at = bisect_right(firsts, record["index"]) - 1
-            (key, first, count), channels = rows[at] if at >= 0 else (("", 0, 0), ())
-            if record["index"] < first + count:
-                files |= {name: self.store.channel_file(key, name, record["index"], kinds) for name in channels}
+        number = record["index"]
+        for index, channels in self.plan.supplements:
+            if index.first <= number < index.first + index.samples:
+                key = index.at(number).key
+                if self.store.has_shot(key):
+                    kinds = self._kinds[index.part]
+                    files |= {name: self.store.channel_file(key, name, number, kinds) for name in channels}
         return files
 
     @cached_property
-    def _supplements(self) -> list[tuple[Files, list[int], list[tuple[ShotRow, tuple[str, ...]]]]]:
-        """For each part that added channels: how it wrote them, and its finished shots of them behind their first frames."""
-        found: list[tuple[Files, list[int], list[tuple[ShotRow, tuple[str, ...]]]]] = []
-        for number, part in enumerate(self.plan.parts):
-            if part.supplies:
-                rows = [row for row in self.plan.supplements_of(number) if self.store.has_shot(row[0][0])]
-                found.append((Files.model_validate(part.recipe.get("files", {})), [row[1] for row, _ in rows], rows))
-        return found
+    def _kinds(self) -> tuple[Files, ...]:
+        """How each part wrote its files."""
+        return tuple(Files.model_validate(part.recipe.get("files", {})) for part in self.plan.parts)
 
     def path(self, relative: str) -> Path:
         """A file of the data set."""

@@ -24,7 +24,8 @@ from viewsphere.model.sample import Sample
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
 from viewsphere.store.channel_files import encode
-from viewsphere.store.records import ModelInfo, PlanRecord, ShotRow
+from viewsphere.store.index import Row
+from viewsphere.store.records import ModelInfo, PlanRecord
 
 
 class Store:
@@ -84,15 +85,21 @@ class Store:
         """Put a plan in the place of the one that it continues."""
         self._write_atomically(self.plan_file, plan.to_json())
 
-    def missing(self, plan: PlanRecord) -> list[ShotRow]:
+    def missing(self, plan: PlanRecord) -> list[Row]:
         """The shots of a plan that are neither finished nor left out at the user's wish."""
-        return [row for row in self.wanted(plan) if not self.has_shot(row[0])]
+        return [row for row in self.wanted(plan) if not self.has_shot(row.key)]
 
-    def wanted(self, plan: PlanRecord) -> Iterator[ShotRow]:
+    def finished(self) -> Iterator[str]:
+        """Keys of all shots that are there, in no order."""
+        with suppress(FileNotFoundError):
+            for group in os.scandir(self.folder / "shots"):
+                yield from (entry.name for entry in os.scandir(group.path))
+
+    def wanted(self, plan: PlanRecord) -> Iterator[Row]:
         """The shots of a plan, those with channels that were added later last, but for what was left out at the user's wish."""
         skipped = self.skipped().keys()
-        for row in chain(plan.shots, (row for row, _ in plan.supplements)):
-            if not {row[0], row[0].rpartition("-")[0]} & skipped:
+        for row in chain(plan.rows, *(index for index, _ in plan.supplements)):
+            if not {row.key, row.subject} & skipped:
                 yield row
 
     def drop_unnamed_models(self) -> None:

@@ -7,18 +7,19 @@ from bisect import bisect_right
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field, fields
 from functools import cached_property
-from itertools import accumulate, chain, pairwise
+from itertools import accumulate, chain
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.model.model_spec import Size
+from viewsphere.store.index import Block, Index, Row
 
-STORE_VERSION = 1
+STORE_VERSION = 2
 
-ShotRow = tuple[str, int, int]
-"""A shot's key, its first frame and its number of frames."""
+PRODUCT = "product"
+"""The sampler of models x poses."""
 
 
 @dataclass(frozen=True)
@@ -53,30 +54,15 @@ class ModelInfo:
 
 
 @dataclass(frozen=True)
-class Row:
-    """Models that were taken from the same poses: every model, in order, from every pose of the ranges [first, stop)."""
-
-    models: tuple[str, ...]
-    poses: tuple[tuple[int, int], ...]
-
-    @property
-    def count(self) -> int:
-        """Poses of each model."""
-        return sum(stop - first for first, stop in self.poses)
-
-    @property
-    def frames(self) -> int:
-        """Number of frames."""
-        return len(self.models) * self.count
-
-
-@dataclass(frozen=True)
 class Part:
-    """What one recipe (or one source of a merge) brought: the frames [first, first + frames).
+    """What one recipe (or one source of a merge) brought: the samples [first, first + frames).
 
-    `rows` say which model and pose each of its frames shows, in frame order; a part whose models or poses are not known has
-    none. `supplies`: (number of an earlier part, channels) that this one added to all frames of that part; they lie in shots
-    of their own. `shot_frames`: most frames of a shot. `settings`: digests of what frames that are appended have to share.
+    `blocks` say what each of its samples shows, in order: with the sampler `product` models and the numbers of their poses.
+    `supplies`: (number of an earlier part, channels) that this one added to all frames of that part; they lie in shots
+    of their own. `shot_frames`: most positions of a shot. `settings`: digests of what frames that are appended have to share.
+    `new_poses`: how many poses no earlier part had; `pose_names`: their digests (see `sampling.extension`), None where they
+    follow from the recipe. `model_splits`: where splits are by model, the split of every model
+    that no earlier part had.
     """
 
     digest: str
@@ -87,51 +73,32 @@ class Part:
     first: int
     frames: int
     max_objects: int
-    rows: tuple[Row, ...] = ()
+    blocks: tuple[Block, ...] = ()
+    sampler: str = PRODUCT
     supplies: tuple[tuple[int, tuple[str, ...]], ...] = ()
     shot_frames: int = 1
     settings: dict[str, str] = field(default_factory=dict[str, str])
+    new_poses: int = 0
+    pose_names: str | None = None
+    model_splits: dict[str, str] = field(default_factory=dict[str, str])
 
     @property
     def models(self) -> tuple[str, ...]:
-        """Keys of the models that it shows, each once."""
-        return tuple(dict.fromkeys(key for row in self.rows for key in row.models))
+        """Keys of the models that it shows, each once; none where they are not known."""
+        return tuple(dict.fromkeys(key for block in self.blocks for key in block.subjects)) if self.is_product else ()
 
     @property
-    def poses(self) -> int:
-        """Number of different poses that it shows."""
-        return len({pose for row in self.rows for first, stop in row.poses for pose in range(first, stop)})
-
-    def model_at(self, frame: int) -> str | None:
-        """Key of the model that one of its frames shows, None where that is not known."""
-        start = self.first
-        for row in self.rows:
-            if frame < start + row.frames:
-                return row.models[(frame - start) // row.count]
-            start += row.frames
-        return None
-
-    def shots(self, most: int) -> Iterator[ShotRow]:
-        """Key, first frame and number of frames of shots of `most` frames at most, of one model each.
-
-        The keys are `<model>-<first pose>`; the sizes of a model's shots differ by one at most.
-        """
-        frame = self.first
-        for row in self.rows:
-            poses = [pose for first, stop in row.poses for pose in range(first, stop)]
-            chunks = -(-len(poses) // most)
-            edges = [i * len(poses) // chunks for i in range(chunks + 1)]
-            for key in row.models:
-                for first, stop in pairwise(edges):
-                    yield f"{key}-{poses[first]:06d}", frame, stop - first
-                    frame += stop - first
+    def is_product(self) -> bool:
+        """Whether its samples are known models at known poses."""
+        return self.sampler == PRODUCT and bool(self.blocks)
 
     @staticmethod
     def from_plain(value: dict[str, Any]) -> Part:
         """The part whose fields are these, as JSON gives them back."""
         plain = dict(value)
         plain["channels"] = tuple(value["channels"])
-        plain["rows"] = tuple(Row(tuple(r["models"]), tuple((int(a), int(b)) for a, b in r["poses"])) for r in value["rows"])
+        blocks = ((b["subjects"], b["positions"], b["each"]) for b in value["blocks"])
+        plain["blocks"] = tuple(Block(tuple(s), tuple((int(a), int(z)) for a, z in p), int(e)) for s, p, e in blocks)
         plain["supplies"] = tuple((int(part), tuple(channels)) for part, channels in value["supplies"])
         return Part(**plain)
 
@@ -140,7 +107,6 @@ class Part:
 class PlanRecord:
     """What `plan.json` says: all a reader needs to know of the plan.
 
-    `shots`: (key, first frame, frames). `pose_names`: a digest of each pose, by its index (see `sampling.extension`).
     `parts`: what was rendered or brought in one after another; a recipe that was just rendered has one. Version, digest, name
     and recipe are the last part's, all other fields are of all parts together.
     """
@@ -156,9 +122,7 @@ class PlanRecord:
     poses: int
     frames: int
     max_objects: int
-    shots: tuple[ShotRow, ...]
     parts: tuple[Part, ...] = ()
-    pose_names: str = ""
 
     def part_of(self, frame: int) -> int:
         """Number of the part that a frame belongs to."""
@@ -198,24 +162,41 @@ class PlanRecord:
         added = (channels for later in self.parts for number, channels in later.supplies if number == part)
         return tuple(dict.fromkeys(chain(self.parts[part].channels, *added)))
 
-    def shots_of(self, part: int) -> Iterator[ShotRow]:
-        """A part's own shots."""
-        first, stop = self.parts[part].first, self.parts[part].first + self.parts[part].frames
-        return (row for row in self.shots if first <= row[1] < stop)
+    @cached_property
+    def indices(self) -> tuple[Index, ...]:
+        """The shots of each part, but for those with channels of others' frames."""
+        return tuple(Index(p.blocks, p.first, p.shot_frames, number) for number, p in enumerate(self.parts))
 
-    def supplements_of(self, part: int) -> Iterator[tuple[ShotRow, tuple[str, ...]]]:
-        """The shots with channels that a part added to frames of earlier ones, and these channels.
+    @cached_property
+    def supplements(self) -> tuple[tuple[Index, tuple[str, ...]], ...]:
+        """The shots with channels that a part added to frames of an earlier one, and these channels.
 
         No other shot's key holds a plus.
         """
-        for number, channels in self.parts[part].supplies:
-            for key, first, count in self.parts[number].shots(self.parts[part].shot_frames):
-                yield (f"{key}+{part}", first, count), channels
+        return tuple(
+            (Index(self.parts[number].blocks, self.parts[number].first, part.shot_frames, later, f"+{later}"), channels)
+            for later, part in enumerate(self.parts)
+            for number, channels in part.supplies
+        )
 
     @property
-    def supplements(self) -> Iterator[tuple[ShotRow, tuple[str, ...]]]:
-        """Those of all parts."""
-        return chain.from_iterable(map(self.supplements_of, range(len(self.parts))))
+    def rows(self) -> Iterator[Row]:
+        """All shots, but for those with channels that were added later, in the order of their samples."""
+        return chain.from_iterable(self.indices)
+
+    def rows_of(self, part: int) -> Iterator[Row]:
+        """All shots that a part renders: its own, then those with channels of older frames."""
+        added = (index for index, _ in self.supplements if index.part == part)
+        return chain(self.indices[part], chain.from_iterable(added))
+
+    def find(self, key: str) -> Row | None:
+        """The row of this key, None if there is none."""
+        every = chain(self.indices, (index for index, _ in self.supplements))
+        return next((row for row in (index.find(key) for index in every) if row is not None), None)
+
+    def row_at(self, sample: int) -> Row:
+        """The row that holds a sample; raises IndexError for one that none holds."""
+        return self.indices[self.part_of(sample)].at(sample)
 
     @cached_property
     def _firsts(self) -> list[int]:
@@ -241,10 +222,10 @@ class PlanRecord:
     def from_json(text: str) -> PlanRecord:
         """Read plan.json's text; raises KeyError, TypeError or ValueError for anything else."""
         value: dict[str, Any] = json.loads(text)
-        if value.pop("store") != STORE_VERSION:
-            raise ValueError("made by another version of the store")
+        found = value.pop("store")
+        if found != STORE_VERSION:
+            raise ValueError(f"a store of version {found}, where this viewsphere reads {STORE_VERSION}: render the recipe anew")
         value["categories"] = tuple(Category(**c) for c in value["categories"])
-        value["shots"] = tuple((str(k), int(a), int(n)) for k, a, n in value["shots"])
         value["parts"] = tuple(Part.from_plain(part) for part in value.get("parts", ()))
         for name in ("splits", "channels", "models"):
             value[name] = tuple(value[name])

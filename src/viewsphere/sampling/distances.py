@@ -1,0 +1,91 @@
+"""Where a plan's cameras stand before anything is rendered, and whether one would stand inside of a model."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.errors import RecipeError
+from viewsphere.geometry.camera import orbit_center
+from viewsphere.geometry.rotation import transform
+from viewsphere.model.instant import Viewpoint
+from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.scene import Vector
+from viewsphere.model.thing import Thing
+from viewsphere.sampling.camera import distance_problem, inside_box
+from viewsphere.sampling.composition import BoxOf
+from viewsphere.sampling.plan import Plan
+
+Float = NDArray[np.float64]
+
+MOST_CAMERAS = 100_000
+"""Poses that are looked at beforehand, evenly over all; the others are when their shot is rendered."""
+
+
+@dataclass(frozen=True, eq=False)
+class Distances:
+    """Cameras of a plan; those of poses that are the same for all models are computed once."""
+
+    plan: Plan
+    box_of: BoxOf
+    _offsets: dict[range, tuple[Float, Float]] = field(default_factory=dict[range, tuple[Float, Float]])
+
+    def problem(self, spec: ModelSpec) -> RecipeError | None:
+        """The first pose whose camera would stand inside a target's box, in words; None if there is none.
+
+        Company that is drawn for each frame is not looked at: that is left to whoever renders the frame.
+        """
+        plan = self.plan
+        things, target = (Thing(id=1, model=spec),), None
+        if plan.composition is not None and not plan.recipe.scene.is_moved_each_frame:
+            things = plan.composition.targets(spec, None, self.box_of)
+            target = plan.composition.center(things, self.box_of)
+        step = -(-plan.poses // MOST_CAMERAS)
+        for run in plan.schedule(spec).runs:
+            at, moved = plan.target(things[0], run, target, self.box_of), plan.at(things, run)
+            poses = range(run.first, run.stop, step)
+            cameras = self.cameras(moved, poses, at)
+            for thing in moved:
+                box = transform(thing.world_from_object, self.box_of(thing.model))
+                inside = inside_box(box, cameras)
+                if inside.any():
+                    pose = plan.pose(spec, poses[int(np.flatnonzero(inside)[0])], at)
+                    return RecipeError(f"viewpoints.distance: {distance_problem(pose, box)} (model {thing.model.key})")
+        return None
+
+    def cameras(self, things: Sequence[Thing], poses: range, target: Vector | None = None) -> Float:
+        """Where the cameras of these poses stand, (poses, 3) world metres, when these things are placed; they look at `target`,
+        by default at the middle of what is placed.
+        """
+        targets = [thing for thing in things if thing.id and not thing.scenery]
+        corners = np.concatenate([transform(t.world_from_object, self.box_of(t.model)) for t in targets])
+        middle = corners.mean(axis=0) if len(targets) == 1 else (corners.min(axis=0) + corners.max(axis=0)) / 2
+        middle = middle if target is None else np.array(target)
+        if not self.plan.scenes.is_jittered:
+            offsets, own = self._stand(poses)
+            return offsets + np.where(np.isnan(own), middle, own)
+        x, y, z = middle.tolist()
+        base = self.plan.spec(targets[0].model.track or targets[0].model.key)
+        return np.array([_stand(self.plan.pose(base, i, (x, y, z))) for i in poses])
+
+    def _stand(self, poses: range) -> tuple[Float, Float]:
+        """From what the cameras look at to where they stand, and what they look at: NaN where that is the models' centre."""
+        if poses not in self._offsets:
+            views = [self.plan.pose_list.view(i) for i in poses]
+            values = np.array([(view.azimuth, view.elevation, view.distance) for view in views])
+            azimuth, elevation = np.radians(values[:, :2]).T
+            level = np.cos(elevation)
+            direction = np.stack([level * np.sin(azimuth), -level * np.cos(azimuth), np.sin(elevation)], axis=1)
+            targets = np.array([self.plan.pose_list.target(i) or (math.nan,) * 3 for i in poses])
+            self._offsets[poses] = values[:, 2:] * direction, targets
+        return self._offsets[poses]
+
+
+def _stand(pose: Viewpoint) -> Float:
+    """Where the camera of a pose with a target stands, (3,) world metres."""
+    assert pose.target is not None
+    return np.array(pose.target) + orbit_center(math.radians(pose.azimuth_deg), math.radians(pose.elevation_deg), pose.distance)

@@ -1,0 +1,89 @@
+"""Whether what a recipe adds to a data set fits what is there."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+
+from viewsphere.errors import RecipeError
+from viewsphere.model.mistakes import shown
+from viewsphere.recipe.recipe import Splits
+from viewsphere.sampling.look import engine_look
+from viewsphere.sampling.plan import Plan
+from viewsphere.store import Part, PlanRecord
+
+FITTING = "appended frames have to fit those that are there; choose another output folder for others"
+
+LOOK = "the engine's program"
+"""Name of the setting that says how the engine paints."""
+
+
+def check_fit(planned: Plan, there: PlanRecord) -> None:
+    """Raises RecipeError where the recipe's pictures, splits or models would not fit those that are there."""
+    for part in there.parts:
+        _check_settings(planned, part)
+        _check_splits(planned, part)
+    _check_models(planned, there)
+
+
+def settings(planned: Plan) -> dict[str, str]:
+    """Digests of what the frames of a data set have in common, by the names of the recipe's fields."""
+    recipe = planned.recipe
+    value = recipe.model_dump(mode="json", include={"seed", "scene", "engine", "label_alpha", "viewpoints"})
+    viewpoints = value.pop("viewpoints")
+    planes = () if planned.composition is None else planned.composition.images
+    value |= {
+        "camera": planned.intrinsics.model_dump(mode="json"),
+        "viewpoints.target": viewpoints.get("target"),
+        "viewpoints.bins": viewpoints.get("bins"),
+        "scene's images": [file.rpartition("/")[2] for files in (planned.images, *planes) for file in files],
+    }
+    digests = {name: hashlib.sha256(json.dumps(value[name]).encode()).hexdigest()[:16] for name in value}
+    return digests | {LOOK: engine_look(recipe.engine.name)}
+
+
+def _check_settings(planned: Plan, part: Part) -> None:
+    own = settings(planned)
+    for name, digest in part.settings.items():
+        if own[name] != digest:
+            found = planned.recipe.model_dump(mode="json")
+            values = [_value(recipe, name) for recipe in (part.recipe, found)]
+            differ = f"{values[0]}, as the data set has; found {values[1]}"
+            if values[0] == values[1]:
+                differ = "what the data set has; found another"
+            raise RecipeError(f"{name}: expected {differ}: {FITTING}")
+
+
+def _value(recipe: object, name: str) -> str:
+    for field in name.split("."):
+        recipe = recipe.get(field) if isinstance(recipe, dict) else None
+    return shown(recipe)
+
+
+def _check_splits(planned: Plan, part: Part) -> None:
+    """Splits stay what they are, but for the lists of models that are new."""
+    if not part.is_product:
+        return
+    before, now = Splits.model_validate(part.recipe["splits"]), planned.recipe.splits
+    if _shares(before) != _shares(now):
+        raise RecipeError(f"splits: expected {_shares(before)}, as the data set has; found {_shares(now)}: {FITTING}")
+    listed = {key: name for name, some in now.shares.items() if isinstance(some, tuple) for key in some}
+    for key, split in part.model_splits.items():
+        if listed.get(key, split) != split:
+            raise RecipeError(
+                f"splits: expected model {key!r} in {split!r}, where the data set has it; found it in {listed[key]!r}"
+            )
+
+
+def _shares(splits: Splits) -> str:
+    parts = (f"{name} {'listed' if isinstance(part, tuple) else f'{part:g}'}" for name, part in splits.shares.items())
+    return f"{', '.join(parts)} by {splits.by}"
+
+
+def _check_models(planned: Plan, there: PlanRecord) -> None:
+    """File systems that do not tell capitals apart would mix two models up."""
+    known = {key.casefold(): key for key in there.models}
+    for spec in planned.kept_specs:
+        other = known.get(spec.key.casefold(), spec.key)
+        if other != spec.key:
+            raise RecipeError(f"models: expected keys that differ in more than capitals; found {spec.key!r} beside {other!r}")
