@@ -88,7 +88,7 @@ class Portion:
         model, poses = self._frames(row)
         return self.plan.cast(self.plan.model_specs[self._position[model]], int(self._of_recipe[poses[0]]))
 
-    def shot(self, row: ShotRow, box_of: BoxOf | None = None) -> Shot:
+    def shot(self, row: ShotRow, box_of: BoxOf) -> Shot:
         """A shot of the table; `box_of` and errors as for `Plan.shot`."""
         key, first, _ = row
         model, poses = self._frames(row)

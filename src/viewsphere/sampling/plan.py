@@ -273,18 +273,17 @@ class Plan:
             yield self.shot_key(index), frame, stop - first
             frame += stop - first
 
-    def shot(self, index: int, box_of: BoxOf | None = None) -> Shot:
+    def shot(self, index: int, box_of: BoxOf) -> Shot:
         """One shot; raises IndexError past the end.
 
-        `box_of` is needed where the recipe has a place, company or planes, as what stands on the floor depends on its size, and
-        where what the camera looks at is moved, or moves.
+        `box_of` gives a model's box: cameras look at its centre, and what stands on the floor depends on its size.
         Raises RecipeError where there is no room for all that is to stand there, and what `box_of` raises.
         """
         if not 0 <= index < self.shot_count:
             raise IndexError(f"expected a shot of 0..{self.shot_count - 1}, got {index}")
         return self.take(self.shot_model(index), range(*self._shot_poses(index)), box_of, self.shot_key(index))
 
-    def take(self, model: int, chosen: Sequence[int], box_of: BoxOf | None = None, key: str = "") -> Shot:
+    def take(self, model: int, chosen: Sequence[int], box_of: BoxOf, key: str = "") -> Shot:
         """A shot of some poses of a model (their indices), of one time step: of one pose where the recipe draws scenes for each
         frame.
         """
@@ -292,14 +291,14 @@ class Plan:
         things, target = (Thing(id=1, model=spec),), None
         if self.composition is not None:
             with self.recipe.located():
-                things = self.composition.things(spec, self._scene_pose(chosen[0]), _known(box_of))
+                things = self.composition.things(spec, self._scene_pose(chosen[0]), box_of)
             company = self.recipe.scene.company
-            target = self.composition.center(things[: 1 + (company.number if company else 0)], _known(box_of))
+            target = self.composition.center(things[: 1 + (company.number if company else 0)], box_of)
         if self.recipe.scene.materials:
             things = tuple(self._repainted(p, spec, pose) for p in things)
         run = self.schedules[model].run_of(chosen[0])
         target, placed = self._target(things[0], run, target, box_of), self._at(things, run)
-        focus = target or center(placed[0], _known(box_of))
+        focus = target or center(placed[0], box_of)
         return Shot(
             key=key or spec.key,
             things=placed,
@@ -315,7 +314,7 @@ class Plan:
             category_deg=self.recipe.viewpoints.bins,
         )
 
-    def _target(self, first: Thing, run: Run, target: Vector | None, box_of: BoxOf | None) -> Vector | None:
+    def _target(self, first: Thing, run: Run, target: Vector | None, box_of: BoxOf) -> Vector | None:
         """What cameras look at that have no target of their own, None for the first object's centre: where that stands at the
         first frame, or follows it.
         """
@@ -323,18 +322,18 @@ class Plan:
         if moves and self.recipe.viewpoints.target == "follow":
             target, first = None, self._at((first,), run)[0]
         elif target is None and moves:
-            return center(first, _known(box_of))
+            return center(first, box_of)
         if target is None and self.scenes.is_target_moved:
-            target = center(first, _known(box_of))
+            target = center(first, box_of)
         return target
 
-    def _floor(self, spec: ModelSpec, things: Sequence[Thing], box_of: BoxOf | None) -> dict[str, float]:
+    def _floor(self, spec: ModelSpec, things: Sequence[Thing], box_of: BoxOf) -> dict[str, float]:
         """How high the ground is at most, in a scene's field: at the lowest that a model comes at its time steps."""
         moments = self.moments_of(spec)
         if not moments or self.recipe.scene.ground == "off":
             return {}
         world = things[0].world_from_object
-        return {"floor": min(float(transform(world, _known(box_of)(moment))[:, 2].min()) for moment in moments)}
+        return {"floor": min(float(transform(world, box_of(moment))[:, 2].min()) for moment in moments)}
 
     def _at(self, things: Sequence[Thing], run: Run) -> tuple[Thing, ...]:
         """What is placed, as it is at a time step; company is at its own of the same number. What of the scene's file shows
@@ -386,7 +385,7 @@ class Plan:
             return (spec,)
         return self.composition.cast(spec, None if pose is None else self._scene_pose(pose))
 
-    def shots(self, box_of: BoxOf | None = None) -> Iterator[Shot]:
+    def shots(self, box_of: BoxOf) -> Iterator[Shot]:
         """All shots in order, made one by one."""
         return (self.shot(i, box_of) for i in range(self.shot_count))
 
@@ -537,12 +536,6 @@ def _stand(pose: Viewpoint) -> NDArray[np.float64]:
     """Where the camera of a pose with a target stands, (3,) world metres."""
     assert pose.target is not None
     return np.array(pose.target) + orbit_center(math.radians(pose.azimuth_deg), math.radians(pose.elevation_deg), pose.distance)
-
-
-def _known(box_of: BoxOf | None) -> BoxOf:
-    if box_of is None:
-        raise ValueError("expected box_of for a recipe with place, company, planes or a jittered target")
-    return box_of
 
 
 def _lens(recipe: Recipe, views: Poses) -> Intrinsics:
