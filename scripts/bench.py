@@ -26,19 +26,18 @@ from bench_scene import reference_recipe, write_reference
 from viewsphere import generate, plan, plugins
 from viewsphere.annotate import annotate
 from viewsphere.assets.mesh import Mesh
+from viewsphere.engines import Engine, Stage
 from viewsphere.engines.raster import painting, staging
 from viewsphere.geometry.box import box_vertices
 from viewsphere.model.camera import Camera
-from viewsphere.model.instant import Instant
 from viewsphere.model.sample import Sample
 from viewsphere.model.shot import Shot
 from viewsphere.run.stages import Stages
-from viewsphere.sampling.camera import camera_for
 from viewsphere.sampling.plan import SHOT_FRAMES
 from viewsphere.store import Store
 from viewsphere.truth.channels import observe
 from viewsphere.truth.geometry import Geometry
-from viewsphere.truth.visibility import rasterize
+from viewsphere.truth.visibility import Visibility, rasterize
 
 ROOT = Path(__file__).parent.parent
 PARTS_OF_COLOUR = (
@@ -145,23 +144,32 @@ def timed(times: dict[str, float]) -> Iterator[None]:
 def measure(frames: int, antialias: int, folder: Path) -> tuple[Clock, int]:
     """The reference frame stage by stage; also how many triangles it has."""
     clock = Clock()
-    shot = next(iter(plan(reference_recipe(frames, antialias, folder), shot_frames=frames).shots()))
-    mesh = Stages().model(shot.things[0].model)
-    engine: plugins.Engine = plugins.load("engines", "raster")
+    stages = Stages()
+    shot = next(plan(reference_recipe(frames, antialias, folder), shot_frames=frames).shots(stages.box))
+    mesh = stages.model(shot.things[0].model)
+    engine: Engine = plugins.load("engines", "raster")
     store = Store(folder / f"store{antialias}")
     (store.root / "store" / "writing").mkdir(parents=True)
     warm_up = engine.stage(shot, lambda spec: mesh)  # compiles, or reads the cache
-    one_shot(Clock(), shot, shot.frames[:2], warm_up, mesh, store)
-    stage = clock("stage: baked already", lambda: engine.stage(shot, lambda spec: mesh))
-    rivals = installed_rivals(stage.geometry)
-    for first in range(0, len(shot.frames), SHOT_FRAMES):
-        frames_of_run = shot.frames[first : first + SHOT_FRAMES]
-        one_shot(clock, shot, frames_of_run, stage, mesh, store)
+    one_shot(Clock(), shot, range(2), warm_up, mesh, store)
+    stage = clock("stage: baked already", lambda: baked(engine, shot, mesh))
+    rivals = installed_rivals(stage.at(0))
+    instants = range(len(shot.instants))
+    for first in instants[::SHOT_FRAMES]:
+        instants_of_run = instants[first : first + SHOT_FRAMES]
+        one_shot(clock, shot, instants_of_run, stage, mesh, store)
         for name, draw in rivals:
-            rival_shot(clock, name, draw, shot, frames_of_run, mesh)
+            rival_shot(clock, name, draw, [shot.camera(instant) for instant in instants_of_run])
     frames_parts = zip(*(clock.times[name] for name in STAGES), strict=True)
     clock.times["whole frame"] = [sum(parts) for parts in frames_parts]
-    return clock, len(stage.geometry.triangles)
+    return clock, len(stage.at(0).triangles)
+
+
+def baked(engine: Engine, shot: Shot, mesh: Mesh) -> Stage:
+    """The stage with all that its first picture needs."""
+    stage = engine.stage(shot, lambda spec: mesh)
+    stage.at(0)
+    return stage
 
 
 def installed_rivals(geometry: Geometry) -> list[Rival]:
@@ -173,39 +181,42 @@ def installed_rivals(geometry: Geometry) -> list[Rival]:
     return rivals
 
 
-def rival_shot(
-    clock: Clock, name: str, draw: Callable[[Camera], Any], shot: Shot, frames: Sequence[Instant], mesh: Mesh
-) -> None:
+def rival_shot(clock: Clock, name: str, draw: Callable[[Camera], Any], cameras: Sequence[Camera]) -> None:
     """The same frames by a rival, right after ours: what slows the machine for seconds slows both."""
-    cameras = [camera_for(shot.intrinsics, frame.pose, box_vertices(*mesh.bounds).mean(axis=0)) for frame in frames]
     draw(cameras[0])  # its scene comes back into the caches, as ours has
     for camera in cameras:
         clock(name, lambda camera=camera: draw(camera))
 
 
-def one_frame(clock: Clock, shot: Shot, frame: Instant, stage: plugins.Stage, mesh: Mesh) -> Sample:
+def drawn(stage: Stage, instant: int, camera: Camera) -> tuple[Geometry, Visibility]:
+    """What there is at an instant, and what of it a camera sees."""
+    geometry = stage.at(instant)
+    return geometry, rasterize(geometry, camera)
+
+
+def one_frame(clock: Clock, shot: Shot, instant: int, stage: Stage, mesh: Mesh) -> Sample:
     """One frame stage by stage, but for its files."""
     boxes = [box_vertices(*mesh.bounds)]
-    camera = camera_for(shot.intrinsics, frame.pose, boxes[0].mean(axis=0))
-    visibility = clock("truth: raster", lambda: rasterize(stage.geometry, camera))
+    now, camera = shot.instants[instant], shot.camera(instant)
+    geometry, visibility = clock("truth: raster", lambda: drawn(stage, instant, camera))
     names = ["depth", "instances", "normals"]
-    observed = clock("truth: channels", lambda: observe(stage.geometry, camera, visibility, names))
-    observed["rgb"] = clock("colour", lambda: stage.color(camera, frame, visibility))
-    objects = clock("annotations", lambda: annotate(shot, frame, camera, stage.geometry, visibility, boxes, ["model.obj"]))
-    return Sample(frame.index, "train", camera, frame.pose, objects, observed, {})
+    observed = clock("truth: channels", lambda: observe(geometry, camera, visibility, names))
+    observed["rgb"] = clock("colour", lambda: stage.color(instant, 0, visibility, False))
+    objects = clock("annotations", lambda: annotate(shot, instant, camera, geometry, visibility, boxes, ["model.obj"]))
+    return Sample(now.index, "train", camera, now.viewpoint, objects, observed, {})
 
 
-def one_shot(clock: Clock, shot: Shot, frames: Sequence[Instant], stage: plugins.Stage, mesh: Mesh, store: Store) -> None:
+def one_shot(clock: Clock, shot: Shot, instants: Sequence[int], stage: Stage, mesh: Mesh, store: Store) -> None:
     """As many frames as a run has in a shot, stage by stage. Each has its share of what a shot writes beside them."""
     inside: list[float] = []
     files: list[float] = []
 
     def samples() -> Iterator[Sample]:
-        for frame in frames:
+        for instant in instants:
             begun = time.process_time()
             parts: dict[str, float] = {}
             with timed(parts):
-                sample = one_frame(clock, shot, frame, stage, mesh)
+                sample = one_frame(clock, shot, instant, stage, mesh)
             for name, value in parts.items():
                 clock.times.setdefault(name, []).append(value)
             made = time.process_time()
@@ -214,8 +225,8 @@ def one_shot(clock: Clock, shot: Shot, frames: Sequence[Instant], stage: plugins
             inside.append(time.process_time() - begun)
 
     begun = time.process_time()
-    store.write_shot(f"{id(clock)}-{frames[0].index}", samples())
-    share = (time.process_time() - begun - sum(inside)) / len(frames)
+    store.write_shot(f"{id(clock)}-{instants[0]}", samples())
+    share = (time.process_time() - begun - sum(inside)) / len(instants)
     clock.times.setdefault("files", []).extend(1e3 * (own + share) for own in files)
 
 

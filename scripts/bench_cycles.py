@@ -22,11 +22,11 @@ from bench_scene import write_reference
 from viewsphere import Recipe, plan, plugins
 from viewsphere.annotate import annotate
 from viewsphere.blender.interpreter import find_blender
+from viewsphere.engines import Engine
 from viewsphere.engines.cycles.staging import CyclesStage
 from viewsphere.geometry.box import box_vertices
 from viewsphere.model.shot import Shot
 from viewsphere.run.stages import Stages
-from viewsphere.sampling.camera import camera_for
 from viewsphere.surroundings.sky import sky_pictures
 from viewsphere.surroundings.sun import sun_light
 from viewsphere.truth.channels import observe
@@ -91,11 +91,11 @@ def cpu_of(pid: int) -> float:
 def ours(shot: Shot, stages: Stages, pictures: Path | None = None) -> Costs:
     """A shot's frames by the engine that it names."""
     mesh = stages.model(shot.things[0].model)
-    engine: plugins.Engine = plugins.load("engines", shot.engine)
+    engine: Engine = plugins.load("engines", shot.engine)
 
     def spent() -> float:
         """Here and in Blender."""
-        there = cpu_of(stage.keeper.process_for(stage).pid) if isinstance(stage, CyclesStage) else 0.0
+        there = cpu_of(stage.keeper.process_for(stage.arrangement(0)).pid) if isinstance(stage, CyclesStage) else 0.0
         return time.process_time() + there
 
     stage = engine.stage(shot, stages.model)
@@ -103,18 +103,19 @@ def ours(shot: Shot, stages: Stages, pictures: Path | None = None) -> Costs:
     boxes = [box_vertices(*mesh.bounds)]
     color: list[float] = []
     labels: list[float] = []
-    for frame in shot.frames:
-        camera = camera_for(shot.intrinsics, frame.pose, boxes[0].mean(axis=0))
+    for number, instant, sensor in shot.samples:
+        camera = shot.camera(instant, sensor)
         before = time.process_time()
-        visibility = rasterize(stage.geometry, camera)
-        observe(stage.geometry, camera, visibility, LABELS)
-        annotate(shot, frame, camera, stage.geometry, visibility, boxes, ["model.obj"])
+        geometry = stage.at(instant)
+        visibility = rasterize(geometry, camera)
+        observe(geometry, camera, visibility, LABELS)
+        annotate(shot, instant, camera, geometry, visibility, boxes, ["model.obj"])
         labels.append(time.process_time() - before)
         before = spent()
-        picture = stage.color(camera, frame, visibility)
+        picture = stage.color(instant, sensor, visibility, False)
         color.append(spent() - before)
         if pictures is not None:
-            save(pictures / f"{frame.index}.png", picture)
+            save(pictures / f"{number}.png", picture)
     return Costs(color[0] + labels[0], color[1:], labels[1:])
 
 
@@ -129,8 +130,7 @@ def told(shot: Shot, stages: Stages, folder: Path, threads: int) -> dict[str, An
     """What the other program needs: the same model, lights and cameras."""
     thing, scene = shot.things[0], shot.scene
     mesh = stages.model(thing.model)
-    middle = box_vertices(*mesh.bounds).mean(axis=0)
-    cameras = [camera_for(shot.intrinsics, frame.pose, middle) for frame in shot.frames]
+    cameras = [shot.camera(instant) for instant in range(len(shot.instants))]
     sun = sun_light(scene.sky, scene.sun)
     assert sun is not None
     write_exr(folder / "world.exr", sky_pictures(scene.sky, scene.sun, scene.lights, scene.ground is not None).lighting)
@@ -144,7 +144,7 @@ def told(shot: Shot, stages: Stages, folder: Path, threads: int) -> dict[str, An
         "transparent": scene.ground is None,
         "sun": {"energy": max(sun.irradiance), "angle": np.deg2rad(sun.angle_deg), "direction": list(sun.direction)},
         "sky": str(folder / "world.exr"),
-        "camera": {"width": 640, "height": 480, "fx": shot.intrinsics.fx},
+        "camera": {"width": 640, "height": 480, "fx": cameras[0].intrinsics.fx},
         "poses": [{"R": c.R.tolist(), "center": c.center.tolist()} for c in cameras],
         "samples": EQUAL["samples"],
         "threads": threads,
@@ -176,7 +176,7 @@ def compare(frames: int, threads: int, folder: Path) -> dict[str, dict[str, Cost
     found: dict[str, dict[str, Costs]] = {}
     for scene, has_ground in (("ground", True), ("picture", False)):
         shots = {
-            name: next(iter(plan(recipe_of(folder, engine, has_ground, frames), shot_frames=frames).shots()))
+            name: next(iter(plan(recipe_of(folder, engine, has_ground, frames), shot_frames=frames).shots(stages.box)))
             for name, engine in ENGINES.items()
         }
         costs = {name: ours(shot, stages, folder / f"{scene} {name}") for name, shot in shots.items()}
@@ -208,11 +208,11 @@ def memory(frames: int, folder: Path) -> list[float]:
     found: list[float] = []
     for i in range(frames // PER_SHOT):
         recipe = recipe_of(folder, engine, i % 2 == 0, PER_SHOT, (160, 120))
-        shot = next(iter(plan(recipe, shot_frames=PER_SHOT).shots()))
+        shot = next(iter(plan(recipe, shot_frames=PER_SHOT).shots(stages.box)))
         stage = stages.stage(shot)
         assert isinstance(stage, CyclesStage)
         for _ in stages.render(shot):
-            found.append(stage.keeper.process_for(stage).ask("memory")["rss_mb"])
+            found.append(stage.keeper.process_for(stage.arrangement(0)).ask("memory")["rss_mb"])
     return found
 
 

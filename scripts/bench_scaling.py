@@ -14,14 +14,16 @@ from bench_scene import texture_set
 
 from viewsphere import plugins
 from viewsphere.assets.mesh import Image, Material, Mesh, Texture
+from viewsphere.engines import Engine
 from viewsphere.model.camera import Intrinsics
-from viewsphere.model.instant import Instant, Viewpoint
+from viewsphere.model.instant import Viewpoint
 from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.rig import Rig
 from viewsphere.model.scene import Ground, Scene, Sun
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Motion, Thing
 from viewsphere.run.allocator import keep_freed_memory
-from viewsphere.sampling.camera import camera_for
+from viewsphere.sampling.camera import looking
 from viewsphere.truth.channels import observe
 from viewsphere.truth.visibility import rasterize
 
@@ -85,23 +87,23 @@ def frame_cost(mesh: Mesh, side: tuple[int, int] = (640, 480), copies: int = 1) 
     shot = Shot(
         key="scaling",
         things=tuple(Thing(id=i, model=spec, motion=Motion.still(w)) for i, w in enumerate(rows, 1)),
-        intrinsics=Intrinsics(width=width, height=height, fx=1.2 * width, fy=1.2 * width, cx=width / 2, cy=height / 2),
+        rig=Rig.of(Intrinsics(width=width, height=height, fx=1.2 * width, fy=1.2 * width, cx=width / 2, cy=height / 2)),
         scene=Scene(sun=Sun(), ground=Ground()),
-        frames=tuple(Instant(index=p.index, pose=p, split="train") for p in poses),
+        instants=tuple(looking(p, (0.0, 0.0, 0.5), index=p.index) for p in poses),
         channels=("rgb", "depth", "instances", "normals"),
     )
-    engine: plugins.Engine = plugins.load("engines", "raster")
+    engine: Engine = plugins.load("engines", "raster")
     begun = time.process_time()
     stage = engine.stage(shot, lambda spec: mesh)
+    geometry = stage.at(0)
     times: dict[str, list[float]] = {"stage": [1e3 * (time.process_time() - begun)], "truth": [], "colour": []}
-    target = np.array([0.0, 0.0, 0.5])
-    for frame in shot.frames:
-        camera = camera_for(shot.intrinsics, frame.pose, target)
+    for instant in range(len(shot.instants)):
+        camera = shot.camera(instant)
         begun = time.process_time()
-        visibility = rasterize(stage.geometry, camera)
-        observe(stage.geometry, camera, visibility, ["depth", "instances", "normals"])
+        visibility = rasterize(geometry, camera)
+        observe(geometry, camera, visibility, ["depth", "instances", "normals"])
         middle = time.process_time()
-        stage.color(camera, frame, visibility)
+        stage.color(instant, 0, visibility, False)
         times["truth"].append(1e3 * (middle - begun))
         times["colour"].append(1e3 * (time.process_time() - middle))
     return {name: float(np.median(values)) for name, values in times.items()}

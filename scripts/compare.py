@@ -28,16 +28,18 @@ from viewsphere.assets.export import export_glb
 from viewsphere.assets.mesh import Material, Mesh
 from viewsphere.assets.srgb import linear
 from viewsphere.blender.interpreter import find_blender
+from viewsphere.engines import Engine
 from viewsphere.errors import ViewsphereError
 from viewsphere.geometry.box import box_vertices
 from viewsphere.imaging.view import develop
-from viewsphere.model.camera import Camera, Intrinsics
-from viewsphere.model.instant import Instant, Viewpoint
+from viewsphere.model.camera import Intrinsics
+from viewsphere.model.instant import Viewpoint
 from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.rig import Rig
 from viewsphere.model.scene import AreaLight, Environment, Ground, PointLight, Scene, Sky, SpotLight, Sun, View
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Motion, Thing
-from viewsphere.sampling.camera import camera_for
+from viewsphere.sampling.camera import looking
 from viewsphere.truth.visibility import rasterize
 from viewsphere.zoo import build
 
@@ -122,22 +124,18 @@ def shot_of(case: Case) -> tuple[Shot, dict[str, Mesh]]:
     )
     corners = np.concatenate([box_vertices(*mesh.bounds) + np.array(at) for mesh, at in case.models])
     middle = (corners.min(axis=0) + corners.max(axis=0)) / 2
-    pose = Viewpoint(
-        index=0,
-        azimuth_deg=case.azimuth_deg,
-        elevation_deg=case.elevation_deg,
-        distance=case.distance,
-        target=(float(middle[0]), float(middle[1]), float(middle[2])),
-    )
+    x, y, z = middle.tolist()
+    pose = Viewpoint(index=0, azimuth_deg=case.azimuth_deg, elevation_deg=case.elevation_deg, distance=case.distance)
     lens = Intrinsics(width=WIDTH, height=HEIGHT, fx=WIDTH * 1.25, fy=WIDTH * 1.25, cx=WIDTH / 2, cy=HEIGHT / 2)
-    frame = Instant(index=0, pose=pose, split="train")
-    return Shot(key=case.name, things=things, intrinsics=lens, scene=case.scene, frames=(frame,), channels=("rgb",)), meshes
+    instant = looking(pose, (x, y, z), index=0)
+    shot = Shot(key=case.name, things=things, rig=Rig.of(lens), instants=(instant,), scene=case.scene, channels=("rgb",))
+    return shot, meshes
 
 
 def describe(case: Case, folder: Path) -> None:
     """Write the scene as Cycles is to render it."""
     shot, meshes = shot_of(case)
-    camera = camera_of(shot)
+    camera = shot.camera(0)
     models: list[dict[str, Any]] = []
     for thing in shot.things:
         file = export_glb(meshes[thing.model.key], folder / f"{case.name}_{thing.model.key}.glb")
@@ -151,24 +149,18 @@ def describe(case: Case, folder: Path) -> None:
         "models": models,
         "ground": scene.ground and {"z": float(low), "color": linear(scene.ground.color).tolist()},
         "lights": sun + [light.model_dump() for light in scene.lights],
-        "centre": shot.frames[0].pose.target,
+        "centre": shot.instants[0].focus,
         "sky": scene.sky.model_dump(),
     }
     (folder / f"{case.name}.json").write_text(json.dumps(told))
 
 
-def camera_of(shot: Shot) -> Camera:
-    pose = shot.frames[0].pose
-    return camera_for(shot.intrinsics, pose, np.array(pose.target))
-
-
 def picture(case: Case) -> np.ndarray[Any, Any]:
     """viewsphere's."""
     shot, meshes = shot_of(case)
-    engine: plugins.Engine = plugins.load("engines", "raster")
+    engine: Engine = plugins.load("engines", "raster")
     stage = engine.stage(shot, lambda spec: meshes[spec.key])
-    camera = camera_of(shot)
-    return stage.color(camera, shot.frames[0], rasterize(stage.geometry, camera))
+    return stage.color(0, 0, rasterize(stage.at(0), shot.camera(0)), False)
 
 
 def developed(file: Path) -> np.ndarray[Any, Any]:

@@ -15,7 +15,8 @@ from PIL import Image, ImageDraw, ImageFont
 from viewsphere import Recipe
 from viewsphere.geometry.box import EDGES, FACES
 from viewsphere.model.camera import Camera, Intrinsics
-from viewsphere.model.instant import Instant, Viewpoint
+from viewsphere.model.instant import Viewpoint
+from viewsphere.model.rig import Rig
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.model.scene import Background, Finish, Scene
 from viewsphere.model.shot import Shot
@@ -23,6 +24,7 @@ from viewsphere.model.thing import Thing
 from viewsphere.preview import INK, PALETTE, PAPER, draw_sample
 from viewsphere.run.opening import prepare
 from viewsphere.run.stages import Stages
+from viewsphere.sampling.camera import looking
 
 ROOT = Path(__file__).parent.parent
 IMAGES = ROOT / "docs" / "images"
@@ -316,12 +318,13 @@ def pose_sphere(made_of: Recipe, size: int) -> Picture:
     spec = planned.model_specs[17].model_copy(update={"scale": 3.6})  # twice its length, to be seen among the cameras
     lens = Intrinsics(width=2 * size, height=2 * size, fx=3.0 * size, fy=3.0 * size, cx=size, cy=1.24 * size)
     pose = Viewpoint(index=0, azimuth_deg=30, elevation_deg=17, distance=24.5)
+    x, y, z = stages.box(spec).mean(axis=0).tolist()
     shot = Shot(
         key="sphere",
         things=(Thing(id=1, model=spec),),
-        intrinsics=lens,
+        rig=Rig.of(lens),
         scene=Scene(finish=Finish(background=Background(color=(1.0, 1.0, 1.0)))),
-        frames=(Instant(index=0, pose=pose, split=""),),
+        instants=(looking(pose, (x, y, z), index=0),),
         channels=("rgb", "depth", "instances"),
     )
     (sample,) = stages.render(shot)

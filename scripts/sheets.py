@@ -18,11 +18,12 @@ from PIL import Image, ImageDraw
 from viewsphere import plugins
 from viewsphere.assets.cache import load_normalised
 from viewsphere.assets.mesh import Mesh
+from viewsphere.engines import Engine
 from viewsphere.errors import ViewsphereError
-from viewsphere.geometry.box import box_vertices
 from viewsphere.model.camera import Intrinsics
-from viewsphere.model.instant import Instant, Viewpoint
+from viewsphere.model.instant import Viewpoint
 from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.rig import Rig
 from viewsphere.model.scene import (
     AreaLight,
     Background,
@@ -39,7 +40,7 @@ from viewsphere.model.scene import (
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
 from viewsphere.run.stages import build_zoo_model
-from viewsphere.sampling.camera import camera_for
+from viewsphere.sampling.camera import looking
 from viewsphere.truth.visibility import rasterize
 from viewsphere.zoo import build
 
@@ -93,13 +94,13 @@ def tile(mesh: Mesh, scene: Scene, azimuth_deg: float = 35, elevation_deg: float
     """The model in this light, all of it in the picture."""
     size = float(np.linalg.norm(np.ptp(mesh.bounds, axis=0)))
     pose = Viewpoint(index=0, azimuth_deg=azimuth_deg, elevation_deg=elevation_deg, distance=2.2 * size)
-    frame = Instant(index=0, pose=pose, split="train")
+    x, y, z = mesh.bounds.mean(axis=0).tolist()
+    instants = (looking(pose, (x, y, z), index=0),)
     thing = Thing(id=1, model=SPEC)
-    shot = Shot(key="sheet", things=(thing,), intrinsics=LENS, scene=scene, frames=(frame,), channels=("rgb",))
-    engine: plugins.Engine = plugins.load("engines", "raster")
+    shot = Shot(key="sheet", things=(thing,), rig=Rig.of(LENS), instants=instants, scene=scene, channels=("rgb",))
+    engine: Engine = plugins.load("engines", "raster")
     stage = engine.stage(shot, lambda spec: mesh)
-    camera = camera_for(LENS, pose, box_vertices(*mesh.bounds).mean(axis=0))
-    return Image.fromarray(stage.color(camera, frame, rasterize(stage.geometry, camera)))
+    return Image.fromarray(stage.color(0, 0, rasterize(stage.at(0), shot.camera(0)), False))
 
 
 def main() -> None:

@@ -8,16 +8,17 @@ from viewsphere.annotate import annotate
 from viewsphere.assets.export import export_glb, export_obj
 from viewsphere.assets.mesh import Mesh
 from viewsphere.geometry.box import FACES, box_vertices
-from viewsphere.geometry.camera import orbit_center, orbit_rotation
 from viewsphere.geometry.pose_category import pose_category
-from viewsphere.model.camera import Camera, Intrinsics
+from viewsphere.model.camera import Intrinsics
 from viewsphere.model.channel import CHANNELS, PICTURES
-from viewsphere.model.instant import Instant, Viewpoint
+from viewsphere.model.instant import Viewpoint
 from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.rig import Rig
 from viewsphere.model.sample import Sample
 from viewsphere.model.scene import Ground, Scene
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Motion, Thing
+from viewsphere.sampling.camera import looking
 from viewsphere.store import Category, Dataset, ModelInfo, PlanRecord, Store
 from viewsphere.truth.channels import observe
 from viewsphere.truth.geometry import build_geometry
@@ -66,18 +67,16 @@ def render(shot: Shot):
     geometry = build_geometry(shot.things, meshes, shot.scene.ground is not None, shot.label_alpha)
     boxes = [box_vertices(*m.bounds) for m in meshes]
     files = [f"store/models/{p.model.key}/{p.model.key}.obj" for p in shot.things]
-    for frame in shot.frames:
-        angles = np.radians([frame.pose.azimuth_deg, frame.pose.elevation_deg, frame.pose.tilt_deg])
-        rotation = orbit_rotation(*angles)
-        camera = Camera(shot.intrinsics, rotation, -rotation @ orbit_center(*angles[:2], frame.pose.distance))
+    for number, instant, _ in shot.samples:
+        now, camera = shot.instants[instant], shot.camera(instant)
         visibility = rasterize(geometry, camera)
         channels = dict(observe(geometry, camera, visibility, {"instances", *shot.channels} - set(PICTURES)))
         colors = (channels["instances"][..., None] * np.array([90, 60, 30])).astype(np.uint8)
         alpha = np.where(channels["instances"] > 0, 255, 0).astype(np.uint8)
         channels |= {"rgb": colors, "rgba": np.dstack([colors, alpha])}
         channels = {name: channels[name] for name in shot.channels}
-        objects = annotate(shot, frame, camera, geometry, visibility, boxes, files)
-        yield Sample(frame.index, frame.split, camera, frame.pose, objects, channels, {})
+        objects = annotate(shot, instant, camera, geometry, visibility, boxes, files)
+        yield Sample(number, now.split, camera, now.viewpoint, objects, channels, {})
 
 
 def shots(several: bool, channels: tuple[str, ...], intrinsics: Intrinsics, ground: bool) -> list[Shot]:
@@ -85,13 +84,13 @@ def shots(several: bool, channels: tuple[str, ...], intrinsics: Intrinsics, grou
     scenes = [{0: (0, 0, 0), 1: (0.5, 0.8, 0), 2: (0, 50, 0)}] if several else [{m: (0, 0, 0)} for m in range(3)]
     made = []
     for s, offsets in enumerate(scenes):
-        frames = tuple(
-            Instant(index=s * len(POSES) + p.index, pose=p, split="val" if (p.index if several else s) == 2 else "train")
-            for p in POSES
-        )
+        splits = ["val" if (p.index if several else s) == 2 else "train" for p in POSES]
+        first = s * len(POSES)
+        instants = (looking(p, (0, 0, 0), index=first + p.index, split=split) for p, split in zip(POSES, splits, strict=True))
         made.append(
             Shot(
-                key=f"shot-{s}", things=placed(offsets), intrinsics=intrinsics, channels=channels, frames=frames,
+                key=f"shot-{s}", things=placed(offsets), rig=Rig.of(intrinsics), channels=channels, first=first,
+                instants=tuple(instants),
                 scene=Scene(ground=Ground() if ground else None),
             )
         )  # fmt: skip
@@ -106,8 +105,8 @@ def make(root: Path, several=False, channels=tuple(CHANNELS), intrinsics=LENS, g
         PlanRecord(
             version="1", digest="d", name="blocks", recipe={}, categories=CATEGORIES, splits=("train", "val"),
             channels=channels, models=tuple(f"block-{i}" for i in range(3)), poses=len(POSES),
-            frames=sum(len(s.frames) for s in planned), max_objects=3 if several else 1,
-            shots=tuple((s.key, s.frames[0].index, len(s.frames)) for s in planned),
+            frames=sum(len(s.instants) for s in planned), max_objects=3 if several else 1,
+            shots=tuple((s.key, s.first, len(s.instants)) for s in planned),
         )
     )  # fmt: skip
     for i, mesh in enumerate(MESHES):

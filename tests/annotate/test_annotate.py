@@ -4,6 +4,7 @@ import json
 import numpy as np
 import pytest
 
+from shots import still_shot
 from viewsphere.annotate import annotate
 from viewsphere.annotate.view import view_of
 from viewsphere.assets.mesh import Mesh
@@ -11,12 +12,10 @@ from viewsphere.geometry.box import FACES, box_vertices
 from viewsphere.geometry.camera import orbit_center, orbit_rotation
 from viewsphere.geometry.rotation import matrix_from_quaternion, rigid
 from viewsphere.model.camera import Camera, Distortion, Intrinsics
-from viewsphere.model.instant import Instant, Viewpoint
+from viewsphere.model.instant import Viewpoint
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.record import sample_from_record, sample_to_record
 from viewsphere.model.sample import Sample
-from viewsphere.model.scene import Scene
-from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Motion, Thing
 from viewsphere.truth.geometry import build_geometry
 from viewsphere.truth.visibility import rasterize, silhouette
@@ -53,15 +52,11 @@ def scene(meshes, motions, pose=None, intrinsics=LENS, ground=False, category_de
     things = tuple(
         Thing(id=i + 1, model=s, motion=Motion.still(m)) for i, (s, m) in enumerate(zip(specs, motions, strict=True))
     )
-    frame = Instant(index=5, pose=pose, split="train")
-    shot = Shot(
-        key="shot", things=things, intrinsics=intrinsics, scene=Scene(), frames=(frame,),
-        channels=("instances",), category_deg=category_deg,
-    )  # fmt: skip
+    shot = still_shot(things, intrinsics, [pose], category_deg=category_deg)
     geometry = build_geometry(things, meshes, ground, 0.01)
     visibility = rasterize(geometry, camera)
     boxes = [box_vertices(*m.bounds) for m in meshes]
-    objects = annotate(shot, frame, camera, geometry, visibility, boxes, [f"MODELS/{s.key}.glb" for s in specs])
+    objects = annotate(shot, 0, camera, geometry, visibility, boxes, [f"MODELS/{s.key}.glb" for s in specs])
     return objects, camera, geometry, visibility, pose
 
 
@@ -227,11 +222,9 @@ def test_lens_distortion_is_followed():
 
 
 def test_wrong_numbers_of_models_are_refused():
-    objects, camera, geometry, visibility, pose = scene([UNIT], [at()])
-    frame = Instant(index=5, pose=pose, split="train")
-    shot = Shot(key="s", things=(), intrinsics=LENS, scene=Scene(), frames=(frame,), channels=())
-    with pytest.raises(ValueError, match="frame 5: expected 1 objects"):
-        annotate(shot, frame, camera, geometry, visibility, [objects[0].box3d_object], ["m"])
+    objects, camera, geometry, visibility, _ = scene([UNIT], [at()])
+    with pytest.raises(ValueError, match="shot s: expected 1 objects"):
+        annotate(still_shot((), key="s"), 0, camera, geometry, visibility, [objects[0].box3d_object], ["m"])
 
 
 def test_a_record_gives_back_every_bit():

@@ -14,14 +14,13 @@ import numpy as np
 import pytest
 
 import viewsphere
+from shots import still_shot
 from viewsphere.assets.mesh import Image, Material, Mesh
 from viewsphere.engines import raster
 from viewsphere.geometry.camera import orbit_center, orbit_rotation
 from viewsphere.model import scene as model
 from viewsphere.model.camera import Camera, Intrinsics
-from viewsphere.model.instant import Instant, Viewpoint
 from viewsphere.model.model_spec import ModelSpec
-from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
 
 VARIABLE = "VIEWSPHERE_BLENDER_PYTHON"
@@ -145,13 +144,5 @@ def flat_image(*rgba: int) -> Image:
 
 def raster_stage(mesh: Mesh, scene: model.Scene):
     """The mesh alone in the raster engine."""
-    shot = Shot(
-        key="shot",
-        things=(Thing(id=1, model=ModelSpec(key="model", source="memory", category="thing", category_id=1)),),
-        intrinsics=Intrinsics(width=8, height=8, fx=8, fy=8, cx=4, cy=4),
-        scene=scene,
-        frames=(Instant(index=0, pose=Viewpoint(index=0, azimuth_deg=0, elevation_deg=0, distance=1), split="train"),),
-        channels=("rgb",),
-        engine_options={},
-    )
-    return raster.stage(shot, lambda _: mesh)
+    spec = ModelSpec(key="model", source="memory", category="thing", category_id=1)
+    return raster.stage(still_shot([Thing(id=1, model=spec)], scene=scene), lambda _: mesh)

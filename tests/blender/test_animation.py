@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from shots import camera_of
 from viewsphere import Dataset, Recipe, generate, plan
 from viewsphere.assets import cache
 from viewsphere.assets.cache import load, load_normalised, read_ahead
@@ -19,7 +20,6 @@ from viewsphere.geometry.camera import project
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.run.importing import import_dataset
 from viewsphere.run.stages import Stages
-from viewsphere.sampling.camera import camera_for
 from viewsphere.store import Choice
 
 FRAMES = (1, 13, 25)
@@ -351,10 +351,10 @@ def test_cameras_see_what_blender_sees(files, kind):
     seen = json.loads((files / "seen.json").read_text())
     assert planned.frames == planned.shot_count == 3
     for shot in (planned.shot(i, stages.box) for i in range(3)):
-        camera = camera_for(lens, shot.frames[0].pose, (0, 0, 0))
+        camera = camera_of(lens, shot.instants[0].viewpoint, (0, 0, 0))
         vertices = stages.model(shot.things[0].model).vertices.astype(float)
         pixels, _ = project(lens, vertices @ camera.R.T + camera.t)
-        expected = np.array(seen[str(shot.frames[0].pose.time.frame)])
+        expected = np.array(seen[str(shot.instants[0].viewpoint.time.frame)])
         gaps = np.linalg.norm(pixels[:, None] - expected, axis=2)
         assert gaps.min(axis=0).max() < 1e-3
         assert gaps.min(axis=1).max() < 1e-3
@@ -364,7 +364,7 @@ def test_an_object_may_be_the_cameras_world(files):
     def center(**fields):
         viewpoints = {"kind": "file", "path": str(files / "jump.blend"), **fields}
         planned = plan(recipe(files, frames=[1], viewpoints=viewpoints, camera={"of_viewpoints": True}))
-        return camera_for(planned.intrinsics, planned.pose_list[0], (0, 0, 0)).center
+        return camera_of(planned.intrinsics, planned.pose_list[0], (0, 0, 0)).center
 
     np.testing.assert_allclose(center(), (0, -6, 2), atol=1e-5)
     c, s = np.cos(0.5), np.sin(0.5)

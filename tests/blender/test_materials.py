@@ -242,7 +242,7 @@ SCENES["holes"] = Scene((HOLED,), ASKEW, transparent=True, sharp=True, samples=4
 
 
 def test_cut_outs_end_where_labels_do(seen):
-    truth = rasterize(raster_stage(HOLED, model.Scene()).geometry, ASKEW).triangle >= 0
+    truth = rasterize(raster_stage(HOLED, model.Scene()).at(0), ASKEW).triangle >= 0
     assert 0.1 < truth.mean() < 0.6
     alpha = seen["holes"][..., 3]
     # The rays of a sharp picture still differ by a hundredth of a pixel.
@@ -370,8 +370,8 @@ def test_the_raster_engine_shows_the_same(seen, even_sky, name):
     scene = SCENES[f"even {name}"]
     stage = raster_stage(scene.meshes[0], even_sky)
     radiance = np.empty((EVEN.width * EVEN.height, 4), np.float32)
-    visible = rasterize(stage.geometry, EVEN)
-    paint(stage.baked, EVEN, visible, False, True, radiance)
+    visible = rasterize(stage.at(0), EVEN)
+    paint(stage.baked(0), EVEN, visible, False, True, radiance)
     inner = np.zeros((EVEN.height, EVEN.width), bool)
     inner[8:24, 8:24] = True
     expected = radiance[inner.reshape(-1), :3].mean(axis=0)

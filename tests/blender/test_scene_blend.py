@@ -17,7 +17,6 @@ from viewsphere.engines.cycles.staging import told_camera
 from viewsphere.errors import RecipeError
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.run.stages import Stages
-from viewsphere.sampling.camera import camera_for
 from viewsphere.truth.visibility import rasterize
 
 pytestmark = [pytest.mark.timeout(300), pytest.mark.usefixtures("blender")]
@@ -127,8 +126,8 @@ def met_by_cycles(recipe):
     """Ids of what is seen, where Cycles' own pass of object indices agrees, looked at through the pixels' middles."""
     stages, met = Stages(), set()
     for shot in plan(recipe).shots(stages.box):
-        stage = cycles.stage(shot, stages.model)
-        camera = camera_for(shot.intrinsics, shot.frames[0].pose, stage.middle)
+        stage = cycles.stage(shot, stages.model).arrangement(0)
+        camera = shot.camera(0)
         truth = rasterize(stage.geometry, camera).triangle
         process = stage.keeper.process_for(stage)
         out = process.folder / "asked.npy"
@@ -202,7 +201,7 @@ def hidden(made, step):
         made, blend={"variants": {"planes": "plane*"}}, viewpoints={"azimuth": list(range(0, 60, step)), "distance": 6}
     )
     shots = plan(recipe).shots(Stages().box)
-    return {frame.pose.azimuth_deg: shot.scene.blend.hidden for shot in shots for frame in shot.frames}
+    return {frame.viewpoint.azimuth_deg: shot.scene.blend.hidden for shot in shots for frame in shot.instants}
 
 
 def test_depth_sees_the_variant_that_is_shown_and_no_other(made):

@@ -7,9 +7,11 @@ from functools import cache
 
 import numpy as np
 
+from shots import camera_of
 from viewsphere import Recipe, plan
 from viewsphere.engines import cycles
-from viewsphere.engines.cycles.staging import CyclesStage, told_camera
+from viewsphere.engines.cycles.staging import Arrangement, told_camera
+from viewsphere.model.shot import Shot
 from viewsphere.run.stages import Stages
 
 DRAFT = {"name": "cycles", "quality": "draft"}
@@ -36,13 +38,19 @@ def stages() -> Stages:
     return Stages()
 
 
-def stage_of(recipe: Recipe) -> CyclesStage:
-    """The first shot's stage."""
+def stage_of(recipe: Recipe) -> Arrangement:
+    """What Blender has of the first shot."""
     known = stages()
-    return cycles.stage(next(plan(recipe).shots(known.box)), known.model)
+    return cycles.stage(next(plan(recipe).shots(known.box)), known.model).arrangement(0)
 
 
-def asked(stage: CyclesStage, camera, passes=(), **changed) -> dict[str, np.ndarray]:
+def moved_camera(shot: Shot, offset):
+    """The camera of the shot's first instant, looking beside its focus."""
+    now = shot.instants[0]
+    return camera_of(shot.rig.sensors[0].intrinsics, now.viewpoint, now.focus + np.array(offset))
+
+
+def asked(stage: Arrangement, camera, passes=(), **changed) -> dict[str, np.ndarray]:
     """A picture of the stage as Cycles gives it, and passes."""
     process = stage.keeper.process_for(stage)
     out = str(process.folder / "asked.npy")

@@ -10,13 +10,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from cycles_scenes import DRAFT, HAIR_DRIER, asked, recipe_of, shift_between, stage_of
+from cycles_scenes import DRAFT, HAIR_DRIER, asked, moved_camera, recipe_of, shift_between, stage_of
 
 from viewsphere import render
 from viewsphere.assets.srgb import linear
 from viewsphere.engines.cycles.staging import border_of, keeper_of
 from viewsphere.errors import UserError
-from viewsphere.sampling.camera import camera_for
 from viewsphere.truth.visibility import rasterize
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(600), pytest.mark.usefixtures("blender")]
@@ -73,7 +72,7 @@ def test_truth_is_what_cycles_sees(source):
         viewpoints={"azimuth": [35], "elevation": [20], "distance": 10.0},
     )
     stage = stage_of(recipe)
-    camera = camera_for(stage.shot.intrinsics, stage.shot.frames[0].pose, stage.middle)
+    camera = stage.shot.camera(0)
     truth = rasterize(stage.geometry, camera)
     found = asked(stage, camera, ["index", "depth"], border=border_of(stage.geometry, camera))
     is_object = truth.triangle >= 0
@@ -167,7 +166,7 @@ def test_what_this_blender_lacks_is_one_line(engine, said):
 
 def test_a_border_changes_no_pixel():
     stage = stage_of(recipe_of(DRAFT | {"denoise": "off"}))
-    camera = camera_for(stage.shot.intrinsics, stage.shot.frames[0].pose, stage.middle + np.array((0.12, 0.0, 0.03)))
+    camera = moved_camera(stage.shot, (0.12, 0.0, 0.03))
     border = border_of(stage.geometry, camera)
     x0, y0, x1, y1 = border
     assert 0 < (x1 - x0) * (y1 - y0) < 0.6 * camera.width * camera.height
@@ -179,7 +178,7 @@ def test_a_border_changes_no_pixel():
 def test_pictures_do_not_depend_on_those_before_them():
     recipe = recipe_of(DRAFT | {"samples": 1, "denoise": "off"}, scene={"ground": True})
     stage = stage_of(recipe)
-    cameras = [camera_for(stage.shot.intrinsics, frame.pose, stage.middle) for frame in stage.shot.frames]
+    cameras = [stage.shot.camera(i) for i in range(2)]
     asks = [(0, True, None), (1, False, None), (1, True, None), (0, False, (20, 10, 60, 50))]
 
     def picture(stage, i, is_open, border):
@@ -194,8 +193,7 @@ def test_pictures_do_not_depend_on_those_before_them():
 def test_nothing_in_view_is_nothing():
     recipe = recipe_of(scene={"ground": False, "background": "transparent"}, channels=["rgba"])
     stage = stage_of(recipe)
-    frame = stage.shot.frames[0]
-    camera = camera_for(stage.shot.intrinsics, frame.pose, stage.middle + np.array((30.0, -40.0, 0.0)))
+    camera = moved_camera(stage.shot, (30.0, -40.0, 0.0))
     assert not stage._radiance(camera, True).any()
     assert np.isfinite(stage._radiance(camera, False)).all()
 
@@ -348,7 +346,7 @@ def test_memory_stays_flat_over_many_shots(blender):
     for i in range(60):
         engine = DRAFT | {"samples": 1, "denoise": "off", "replace_after": 0}
         stage = stage_of(recipe_of(engine, models=[HAIR_DRIER], seed=i % 3))
-        camera = camera_for(stage.shot.intrinsics, stage.shot.frames[0].pose, stage.middle)
+        camera = stage.shot.camera(0)
         asked(stage, camera)
         used.append(keeper_of(blender).process.ask("memory")["rss_mb"])
     assert max(used[40:]) <= 1.05 * max(used[10:20])

@@ -9,18 +9,17 @@ import numpy as np
 import pytest
 from cycles_scenes import asked
 
+from shots import still_shot
 from viewsphere.assets.mesh import Image, Material, Mesh, Texture
 from viewsphere.assets.srgb import encoded
 from viewsphere.engines import cycles
 from viewsphere.engines.cycles.texels import BUMPED, CONTENTS, FINEST, Kind, halved, spread_of
 from viewsphere.geometry.camera import orbit_center, orbit_rotation
 from viewsphere.model.camera import Camera, Intrinsics
-from viewsphere.model.instant import Instant, Viewpoint
+from viewsphere.model.instant import Viewpoint
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Scene
-from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Motion, Repaint, Thing
-from viewsphere.sampling.camera import camera_for
 from viewsphere.truth.visibility import rasterize
 
 RNG = np.random.default_rng(5)
@@ -224,32 +223,16 @@ def _opaque(values) -> np.ndarray:
 
 
 def stage_with(mesh: Mesh, distances, **engine):
-    frames = [
-        Instant(index=i, pose=Viewpoint(index=i, azimuth_deg=15, elevation_deg=10, distance=d), split="train")
-        for i, d in enumerate(distances)
-    ]
-    shot = Shot(
-        key="shot",
-        things=(PLACED,),
-        intrinsics=Intrinsics(width=48, height=48, fx=80, fy=80, cx=24, cy=24),
-        scene=Scene(ground=None),
-        frames=tuple(frames),
-        channels=("rgb",),
-        engine="cycles",
-        engine_options={"samples": 16, "denoise": "off", "bounces": 1, **engine},
-    )
+    lens = Intrinsics(width=48, height=48, fx=80, fy=80, cx=24, cy=24)
+    around = [Viewpoint(index=i, azimuth_deg=15, elevation_deg=10, distance=d) for i, d in enumerate(distances)]
+    options = {"samples": 16, "denoise": "off", "bounces": 1, **engine}
+    shot = still_shot([PLACED], lens, around, scene=Scene(ground=None), engine="cycles", engine_options=options)
     return cycles.stage(shot, lambda _: mesh)
 
 
-def cameras(stage):
-    return [camera_for(stage.shot.intrinsics, frame.pose, stage.middle) for frame in stage.shot.frames]
-
-
-def painted(stage) -> list[bytes]:
-    return [
-        stage.color(camera, frame, rasterize(stage.geometry, camera)).tobytes()
-        for camera, frame in zip(cameras(stage), stage.shot.frames, strict=True)
-    ]
+def pictures(stage) -> list[bytes]:
+    cameras = map(stage.shot.camera, range(len(stage.shot.instants)))
+    return [stage.color(i, 0, rasterize(stage.at(i), camera), False).tobytes() for i, camera in enumerate(cameras)]
 
 
 class TestInBlender:
@@ -257,23 +240,23 @@ class TestInBlender:
 
     def test_frames_do_not_know_one_another(self):
         mesh = hammered(256)
-        far, near, again = painted(stage_with(mesh, [FAR, NEAR, FAR]))
+        far, near, again = pictures(stage_with(mesh, [FAR, NEAR, FAR]))
         assert far == again != near
-        assert painted(stage_with(mesh, [NEAR])) == [near]
-        assert painted(stage_with(mesh, [FAR])) == [far]
+        assert pictures(stage_with(mesh, [NEAR])) == [near]
+        assert pictures(stage_with(mesh, [FAR])) == [far]
 
     def test_halved_pictures_are_no_farther_from_the_truth(self):
         mesh = hammered()
-        stage = stage_with(mesh, [FAR])
-        (camera,) = cameras(stage)
+        stage = stage_with(mesh, [FAR]).arrangement(0)
+        camera = stage.shot.camera(0)
         levels = stage.kinds[0].levels([camera])
         assert levels[0][:3] == (3, 3, 3)
         assert levels[1] == (0,) * len(CONTENTS)
         coarse = stage._radiance(camera, True)
-        whole = stage_with(mesh, [FAR])
+        whole = stage_with(mesh, [FAR]).arrangement(0)
         full = asked(whole, camera)["picture"]
-        reference = asked(stage_with(mesh, [FAR], samples=1024), camera)["picture"]
-        smooth = stage_with(mesh, [FAR], samples=1024)._radiance(camera, True)
+        reference = asked(stage_with(mesh, [FAR], samples=1024).arrangement(0), camera)["picture"]
+        smooth = stage_with(mesh, [FAR], samples=1024).arrangement(0)._radiance(camera, True)
         assert np.abs(smooth[..., :3] - reference[..., :3]).mean() < 0.04 * reference[..., :3].mean()
         assert smooth[..., :3].mean() == pytest.approx(reference[..., :3].mean(), rel=0.01)
         error = [float(((p - reference)[..., :3] ** 2).mean()) for p in (coarse, full)]

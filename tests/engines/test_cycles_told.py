@@ -68,7 +68,7 @@ def test_a_python_without_blender_is_one_line(tmp_path):
     for python in (bare, tmp_path / "none"):
         with pytest.raises((UserError, MissingExtraError), match=str(python)) as caught:
             cycles.check({"python": str(python)})
-            stage = cycles.stage(shot_of(engine={"name": "cycles", "python": str(python)}), stages().model)
+            stage = cycles.stage(shot_of(engine={"name": "cycles", "python": str(python)}), stages().model).arrangement(0)
             stage.keeper.process_for(stage)
         assert "\n" not in str(caught.value)
 
@@ -156,12 +156,12 @@ def test_views_hold_every_ray_where_the_lens_has_it(lens):
 def test_a_border_holds_all_that_is_seen():
     shot = shot_of(viewpoints={"azimuth": [0], "elevation": [10], "distance": 1.5})
     geometry = build_geometry(shot.things, [stages().model(shot.things[0].model)], False, shot.label_alpha)
-    pose = Camera(shot.intrinsics, np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]]), np.array([0.1, 0.0, 1.0]))
+    pose = Camera(shot.rig.sensors[0].intrinsics, np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]]), np.array([0.1, 0.0, 1.0]))
     x0, y0, x1, y1 = border_of(geometry, pose)
     seen = (geometry.vertices @ pose.R.T + pose.t) @ pose.K.T
     x, y = seen[:, 0] / seen[:, 2], seen[:, 1] / seen[:, 2]
     assert x0 <= max(x.min(), 0) and y0 <= max(y.min(), 0)
     assert x1 >= min(x.max(), pose.width) and y1 >= min(y.max(), pose.height)
     assert x1 - x0 < np.ptp(x) + 8 and y1 - y0 < np.ptp(y) + 8
-    inside = Camera(shot.intrinsics, pose.R, np.zeros(3))
+    inside = Camera(pose.intrinsics, pose.R, np.zeros(3))
     assert border_of(geometry, inside) is None

@@ -119,7 +119,7 @@ def test_other_pixels_stay_as_they_are(name):
 
 def marked(mesh, radiance):
     """The stage, what is visible, and the marks, where these are the pixels' colours."""
-    baked, view = stage_of(mesh, LIGHT).baked, view_of(None)
+    baked, view = stage_of(mesh, LIGHT).baked(0), view_of(None)
     visibility = rasterize(baked.geometry, view)
     shown = visibility.triangle.reshape(-1), visibility.inverse_depth.reshape(-1)
     stack = layers(baked.blended, view, *shown, baked.see_through)

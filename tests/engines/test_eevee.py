@@ -14,14 +14,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from cycles_scenes import recipe_of, shift_between, stage_of
+from cycles_scenes import moved_camera, recipe_of, shift_between, stage_of
 
 from viewsphere import render
 from viewsphere.assets.srgb import linear
 from viewsphere.blender.interpreter import probe
 from viewsphere.engines.cycles.staging import Keeper, border_of, clip_of, keeper_of
 from viewsphere.errors import UserError
-from viewsphere.sampling.camera import camera_for
 from viewsphere.truth.visibility import rasterize
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(900), pytest.mark.usefixtures("drawing")]
@@ -208,7 +207,7 @@ def test_textures_are_there(tmp_path):
 @pytest.mark.parametrize("engine", ENGINES.values(), ids=ENGINES)
 def test_a_border_moves_no_pixel(engine):
     stage = stage_of(recipe_of(engine))
-    camera = camera_for(stage.shot.intrinsics, stage.shot.frames[0].pose, stage.middle + np.array((0.12, 0.0, 0.03)))
+    camera = moved_camera(stage.shot, (0.12, 0.0, 0.03))
     clip = clip_of(rasterize(stage.geometry, camera))
     x0, y0, x1, y1 = border_of(stage.geometry, camera)
     assert 0 < (x1 - x0) * (y1 - y0) < 0.6 * camera.width * camera.height
@@ -253,7 +252,7 @@ def test_where_nothing_can_be_drawn_it_says_so(drawing, monkeypatch, tmp_path):
     graphics = probe(drawing).graphics
     assert graphics is not None and "libegl1" in graphics.problem
     stage = replace(stage_of(recipe_of(WORKBENCH)), keeper=Keeper(drawing))
-    camera = camera_for(stage.shot.intrinsics, stage.shot.frames[0].pose, stage.middle)
+    camera = stage.shot.camera(0)
     with pytest.raises(UserError, match=r"engine: Workbench cannot draw .* libegl1 libgl1-mesa-dri, .* cycles") as caught:
         stage._radiance(camera, True)
     assert "\n" not in str(caught.value)

@@ -8,8 +8,9 @@ import sys
 
 import numpy as np
 import pytest
-from cycles_scenes import recipe_of, stages
+from cycles_scenes import moved_camera, recipe_of, stages
 
+from shots import camera_of
 from viewsphere import plan, plugins, render
 from viewsphere.blender.interpreter import VARIABLE
 from viewsphere.engines import eevee, workbench
@@ -19,7 +20,6 @@ from viewsphere.engines.cycles.staging import SPARE, clip_of
 from viewsphere.engines.cycles.told import told_scene, told_settings
 from viewsphere.errors import RecipeError
 from viewsphere.imaging.finish import finished
-from viewsphere.sampling.camera import camera_for
 from viewsphere.sampling.look import engine_look
 from viewsphere.truth.geometry import build_geometry
 from viewsphere.truth.visibility import rasterize
@@ -138,7 +138,7 @@ def test_the_ground_fades_where_blender_is_told_to():
     geometry, meshes = geometry_of(shot)
     told = told_scene(shot.things, meshes, geometry, shot.scene, options_of("workbench", {}), lambda array: "array")
     fading, backdrop = told["ground"]["fading"], Backdrop.of(shot, geometry)
-    camera = camera_for(shot.intrinsics, shot.frames[0].pose, backdrop.middle)
+    camera = moved_camera(shot, backdrop.middle - shot.instants[0].focus)
     before = np.linalg.norm(backdrop.middle - camera.center)
 
     def left(behind, rise):
@@ -175,8 +175,8 @@ def test_the_sky_behind_is_rasters(scene):
 def test_the_ground_fades_and_what_stands_before_it_does_not():
     shot = shot_of({"name": "raster"}, scene={"background": "transparent", "ground": "on"}, channels=["rgba"])
     geometry, _ = geometry_of(shot)
-    pose = shot.frames[0].pose.model_copy(update={"elevation_deg": 6})
-    camera = camera_for(shot.intrinsics, pose, np.array((0.0, 0.0, 0.05)))
+    pose = shot.instants[0].viewpoint.model_copy(update={"elevation_deg": 6})
+    camera = camera_of(shot.rig.sensors[0].intrinsics, pose, (0.0, 0.0, 0.05))
     visibility = rasterize(geometry, camera)
     left = Backdrop.of(shot, geometry).behind(np.ones((96, 96, 4), np.float32), camera, visibility, True)[..., 3]
     is_object = (visibility.triangle >= 0) & (geometry.triangle_object[visibility.triangle] > 0)
@@ -189,10 +189,10 @@ def test_the_ground_fades_and_what_stands_before_it_does_not():
 def test_a_camera_sees_what_there_is_and_little_more():
     shot = shot_of({"name": "raster"}, viewpoints={"azimuth": [0], "elevation": [10], "distance": 1.5})
     geometry, _ = geometry_of(shot)
-    camera = camera_for(shot.intrinsics, shot.frames[0].pose, np.zeros(3))
+    camera = shot.camera(0)
     near, far = clip_of(rasterize(geometry, camera))
     away = (geometry.vertices @ camera.R.T + camera.t)[:, 2]
     assert near < away.min() and far > away.max()
     assert far / near < 2 * SPARE**2
-    near, far = clip_of(rasterize(geometry, camera_for(shot.intrinsics, shot.frames[0].pose, np.array((50.0, 0, 0)))))
+    near, far = clip_of(rasterize(geometry, moved_camera(shot, (50.0, 0, 0))))
     assert 0 < near < far

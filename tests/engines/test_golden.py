@@ -15,8 +15,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from shots import still_shot
 from viewsphere.model.camera import Distortion, Intrinsics
-from viewsphere.model.instant import Instant, Viewpoint
+from viewsphere.model.instant import Viewpoint
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import (
     AreaLight,
@@ -32,7 +33,6 @@ from viewsphere.model.scene import (
     Sun,
     View,
 )
-from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
 from viewsphere.run.stages import Stages
 
@@ -94,15 +94,9 @@ def rendered(name: str) -> np.ndarray:
     focal = WIDTH * (0.9 if distortion else 1.2)
     lens = Intrinsics(width=WIDTH, height=HEIGHT, fx=focal, fy=focal, cx=WIDTH / 2, cy=HEIGHT / 2, distortion=distortion)
     pose = Viewpoint(index=0, azimuth_deg=azimuth, elevation_deg=elevation, distance=distance)
-    shot = Shot(
-        key=name,
-        things=(Thing(id=1, model=ModelSpec(key=name, source=source, seed=seed, category=name, category_id=1)),),
-        intrinsics=lens,
-        scene=scene,
-        frames=(Instant(index=0, pose=pose, split="train"),),
-        channels=("rgb",),
-    )
-    return next(iter(Stages().render(shot))).rgb
+    spec, stages = ModelSpec(key=name, source=source, seed=seed, category=name, category_id=1), Stages()
+    shot = still_shot([Thing(id=1, model=spec)], lens, [pose], stages.box(spec).mean(axis=0), scene=scene)
+    return next(stages.render(shot)).rgb
 
 
 @pytest.mark.parametrize("name", SCENES)

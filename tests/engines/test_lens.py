@@ -10,15 +10,14 @@ import math
 import numpy as np
 import pytest
 
+from shots import painted, still_shot
 from viewsphere.assets.mesh import Material
 from viewsphere.assets.srgb import encoded, linear
 from viewsphere.engines import raster
 from viewsphere.geometry.camera import pixel_rays, project
 from viewsphere.model.camera import Camera, Distortion, Intrinsics
-from viewsphere.model.instant import Instant, Viewpoint
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Background, Finish, Scene, View
-from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Motion, Thing
 from viewsphere.truth.channels import observe
 from viewsphere.truth.visibility import rasterize
@@ -80,20 +79,13 @@ def stage():
         spec = ModelSpec(key=f"{i}", source="memory", category="ball", category_id=1)
         move = ((1, 0, 0, x), (0, 1, 0, y), (0, 0, 1, 3 * z), (0, 0, 0, 1))
         things.append(Thing(id=i + 1, model=spec, motion=Motion.still(move)))
-    shot = Shot(
-        key="shot",
-        things=tuple(things),
-        intrinsics=lens("barrel"),
+    shot = still_shot(
+        things,
+        lens("barrel"),
         scene=Scene(sun=None, finish=Finish(background=Background(color=(0, 0, 0)), view=View(transform="raw"))),
-        frames=(frame(),),
-        channels=("rgb",),
         engine_options={"antialias": 1, "ambient_occlusion": "off"},
     )
     return raster.stage(shot, lambda spec: meshes[int(spec.key)]), meshes
-
-
-def frame() -> Instant:
-    return Instant(index=0, pose=Viewpoint(index=0, azimuth_deg=0, elevation_deg=0, distance=1), split="train")
 
 
 def camera(name: str, rng) -> Camera:
@@ -124,16 +116,16 @@ def traced(geometry, view: Camera):
 def test_labels_and_colour_are_those_of_the_bent_rays(name, stage):
     stage, meshes = stage
     colors = np.concatenate([m.colors[::3, :3] for m in meshes])
-    painted = np.round(255 * encoded(colors)).astype(int)
+    colors = np.round(255 * encoded(colors)).astype(int)
     rng = np.random.default_rng(11)
     behind = differs = 0
     errors = []
     for _ in range(3):
         view = camera(name, rng)
-        visible = rasterize(stage.geometry, view)
-        labels = observe(stage.geometry, view, visible, ("instances", "depth"))
-        seen = stage.color(view, frame(), visible).reshape(-1, 3)
-        other, s = traced(stage.geometry, view)
+        visible = rasterize(stage.at(0), view)
+        labels = observe(stage.at(0), view, visible, ("instances", "depth"))
+        seen = painted(stage, view).reshape(-1, 3)
+        other, s = traced(stage.at(0), view)
         own = visible.triangle.reshape(-1)
         same = own == other
         differs += int((~same).sum())
@@ -141,9 +133,9 @@ def test_labels_and_colour_are_those_of_the_bent_rays(name, stage):
         z = s * pixel_rays(view.intrinsics).reshape(-1, 3)[:, 2]
         behind += int((z[hit] < 0).sum())
         errors.append((np.abs(labels["depth"].reshape(-1) - z) / np.maximum(1, np.abs(z) / 10))[hit])
-        objects = np.where(other >= 0, stage.geometry.triangle_object[other], 0)
+        objects = np.where(other >= 0, stage.at(0).triangle_object[other], 0)
         assert np.array_equal(labels["instances"].reshape(-1)[same], objects[same])
-        assert np.abs(seen[hit] - painted[other[hit]]).max() <= 1
+        assert np.abs(seen[hit] - colors[other[hit]]).max() <= 1
         assert (seen[same & (other < 0)] == 0).all()
         assert hit.mean() > 0.05
     assert differs < 2e-4 * 3 * WIDTH * HEIGHT
@@ -156,7 +148,7 @@ def test_projected_points_fall_where_the_picture_shows_them(name, stage):
     """The corner of the label is the corner of the picture: points of visible triangles project into pixels that show them."""
     stage, _ = stage
     view = camera(name, np.random.default_rng(2))
-    visible = rasterize(stage.geometry, view)
+    visible = rasterize(stage.at(0), view)
     rays = pixel_rays(view.intrinsics)
     shown = visible.triangle >= 0
     place = rays[shown] / visible.inverse_depth[shown][:, None]

@@ -9,17 +9,15 @@ import numpy as np
 import pytest
 from light_stage import cuboid, flat
 
+from shots import painted, still_shot
 from viewsphere.engines import raster
 from viewsphere.engines.raster.environment import bake_surrounding, sky_lights
 from viewsphere.model.camera import Intrinsics
-from viewsphere.model.instant import Instant, Viewpoint
+from viewsphere.model.instant import Viewpoint
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import AreaLight, Daylight, Ground, PointLight, Scene, Sky, SpotLight, Sun
-from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
-from viewsphere.sampling.camera import camera_for
 from viewsphere.surroundings.daylight import air, daylight_picture, opening
-from viewsphere.truth.visibility import rasterize
 
 SPEC = ModelSpec(key="model", source="memory", category="thing", category_id=1)
 
@@ -30,22 +28,9 @@ def picture(
     """From azimuth 30, 40 pixels wide for each metre at the target."""
     focal = 40 * distance
     lens = Intrinsics(width=width, height=height, fx=focal, fy=focal, cx=width / 2, cy=height / 2)
-    frame = Instant(
-        index=0,
-        pose=Viewpoint(index=0, azimuth_deg=30, elevation_deg=elevation_deg, distance=distance, target=(0, 0, 0)),
-        split="train",
-    )
-    shot = Shot(
-        key="s",
-        things=(Thing(id=1, model=SPEC),),
-        intrinsics=lens,
-        scene=scene,
-        frames=(frame,),
-        channels=("rgb",),
-    )
-    stage = raster.stage(shot, lambda spec: mesh)
-    camera = camera_for(lens, frame.pose, np.zeros(3))
-    return stage.color(camera, frame, rasterize(stage.geometry, camera)).astype(float)
+    pose = Viewpoint(index=0, azimuth_deg=30, elevation_deg=elevation_deg, distance=distance)
+    shot = still_shot([Thing(id=1, model=SPEC)], lens, [pose], scene=scene)
+    return painted(raster.stage(shot, lambda spec: mesh), shot.camera(0)).astype(float)
 
 
 @pytest.mark.parametrize("turbidity", [1.8, 2.5, 3, 5, 8, 10])

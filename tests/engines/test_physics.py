@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from light_stage import ball, cuboid, flat, quad
 
+from shots import painted, still_shot
 from viewsphere.assets.mesh import Image, Material, Mesh, Texture
 from viewsphere.assets.srgb import encoded, linear
 from viewsphere.engines import raster
@@ -20,7 +21,6 @@ from viewsphere.engines.raster.painting import paint
 from viewsphere.geometry.camera import orbit_center, orbit_rotation, pixel_rays
 from viewsphere.imaging.view import EXPOSURE
 from viewsphere.model.camera import Camera, Intrinsics
-from viewsphere.model.instant import Instant, Viewpoint
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import (
     AreaLight,
@@ -35,12 +35,10 @@ from viewsphere.model.scene import (
     Sun,
     View,
 )
-from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
 from viewsphere.truth.visibility import rasterize
 
 SPEC = ModelSpec(key="model", source="memory", category="thing", category_id=1)
-FRAME = Instant(index=0, pose=Viewpoint(index=0, azimuth_deg=0, elevation_deg=0, distance=1), split="train")
 DARK = Sky(strength=0.0)
 AS_IT_IS = View(transform="raw", exposure=math.log2(1 / EXPOSURE))
 """A radiance of 1 is white."""
@@ -54,29 +52,21 @@ def camera(width, height, focal, azimuth=0.0, elevation=0.0, distance=1.0, targe
 
 
 def stage_of(meshes: list[Mesh], scene: Scene, **options):
-    shot = Shot(
-        key="shot",
-        things=tuple(Thing(id=i + 1, model=SPEC.model_copy(update={"key": f"m{i}"})) for i in range(len(meshes))),
-        intrinsics=Intrinsics(width=8, height=8, fx=8, fy=8, cx=4, cy=4),
-        scene=scene,
-        frames=(FRAME,),
-        channels=("rgb",),
-        engine_options=options,
-    )
+    things = [Thing(id=i + 1, model=SPEC.model_copy(update={"key": f"m{i}"})) for i in range(len(meshes))]
+    shot = still_shot(things, scene=scene, engine_options=options)
     return raster.stage(shot, lambda spec: meshes[int(spec.key[1:])])
 
 
 def picture(mesh: Mesh, scene: Scene, view: Camera, **options) -> np.ndarray:
-    stage = stage_of([mesh], scene, **options)
-    return stage.color(view, FRAME, rasterize(stage.geometry, view))
+    return painted(stage_of([mesh], scene, **options), view)
 
 
 def light_of(mesh: Mesh, scene: Scene, view: Camera, **options) -> tuple[np.ndarray, np.ndarray]:
     """Radiance (H, W, 3), a sample a pixel, and the triangle seen (H, W)."""
     stage = stage_of([mesh], scene, **options)
-    visible = rasterize(stage.geometry, view)
+    visible = rasterize(stage.at(0), view)
     light = np.empty((view.width * view.height, 4), np.float32)
-    paint(stage.baked, view, visible, False, True, light)
+    paint(stage.baked(0), view, visible, False, True, light)
     return light.reshape(view.height, view.width, 4)[..., :3].astype(float), visible.triangle
 
 
@@ -299,12 +289,12 @@ def test_whole_pictures_are_lit_where_rays_reach_the_sun(kind, azimuth, elevatio
     sun = Sun(azimuth_deg=azimuth, elevation_deg=elevation, angle_deg=0.53)
     view = camera(320, 240, 300, azimuth - 60, 28, 1.5 * size, mesh.bounds.mean(axis=0))
     stage = stage_of([mesh], Scene(sun=sun, sky=DARK, ground=Ground(color=(0.05, 0.05, 0.05))))  # hardly lights what is shaded
-    visible = rasterize(stage.geometry, view)
+    visible = rasterize(stage.at(0), view)
     light = np.empty((320 * 240, 4), np.float32)
-    paint(stage.baked, view, visible, False, True, light)
+    paint(stage.baked(0), view, visible, False, True, light)
     triangle = visible.triangle.reshape(-1)
     to, count = toward_sun(sun), len(mesh.triangles)
-    normals = np.concatenate([stage.geometry.triangle_normals[: count + 2], [[0.0, 0.0, 1.0]]])
+    normals = np.concatenate([stage.at(0).triangle_normals[: count + 2], [[0.0, 0.0, 1.0]]])
     normal = normals[triangle].astype(float)
     rays = pixel_rays(view.intrinsics).reshape(-1, 3)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -377,10 +367,9 @@ def test_bytes_are_the_light_through_the_curve_and_colours_come_back():
     assert np.array_equal(seen, pixels[..., :3])
     stage = stage_of([card], Scene())
     away = camera(4, 4, 40, 180, 0, 1, (0, -50, 0))
-    visible = rasterize(stage.geometry, away)
     for value in range(0, 256, 3):
         finish = Finish(background=Background(color=(value / 255, 1 - value / 255, 0.5)))
-        seen = stage.color(away, FRAME.model_copy(update={"finish": finish}), visible)
+        seen = painted(stage, away, finish)
         assert (seen == [value, 255 - value, 128]).all()
 
 
@@ -482,4 +471,4 @@ def test_the_ground_throws_back_the_light_of_lamps(kind):
     distance = 0.75**2 + square
     share = 0.75 / np.sqrt(distance) / distance * (0.75 / np.sqrt(distance) if kind == "area" else 1)
     expected = 0.5 * 2.0 * share[square <= 0.41**2].mean() / math.pi
-    assert stage.baked.surrounding.lamps == pytest.approx(np.full(3, expected), rel=0.03)
+    assert stage.baked(0).surrounding.lamps == pytest.approx(np.full(3, expected), rel=0.03)

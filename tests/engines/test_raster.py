@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from shots import painted, still_shot
 from viewsphere.assets.mesh import Image, Material, Mesh, Texture
 from viewsphere.assets.srgb import encoded
 from viewsphere.assets.srgb import linear as linear_light
@@ -16,17 +17,14 @@ from viewsphere.errors import UserError
 from viewsphere.geometry.camera import orbit_center, orbit_rotation
 from viewsphere.imaging.view import EXPOSURE, KNEE
 from viewsphere.model.camera import Camera, Distortion, Intrinsics
-from viewsphere.model.instant import Instant, Viewpoint
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Background, Finish, Ground, Scene, Sky, Sun, View
-from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
 from viewsphere.truth.visibility import rasterize
 
 DARK = Sky(strength=0.0)
 BLACK = Background(color=(0, 0, 0))
 SPEC = ModelSpec(key="model", source="memory", category="thing", category_id=1)
-FRAME = Instant(index=0, pose=Viewpoint(index=0, azimuth_deg=0, elevation_deg=0, distance=1), split="train")
 
 
 def mesh_of(triangles: np.ndarray, material: Material | None = None, **fields) -> Mesh:
@@ -93,15 +91,7 @@ def camera(
 
 
 def stage_of(mesh: Mesh, scene: Scene, **options):
-    shot = Shot(
-        key="shot",
-        things=(Thing(id=1, model=SPEC),),
-        intrinsics=Intrinsics(width=8, height=8, fx=8, fy=8, cx=4, cy=4),
-        scene=scene,
-        frames=(FRAME,),
-        channels=("rgb",),
-        engine_options=options,
-    )
+    shot = still_shot([Thing(id=1, model=SPEC)], scene=scene, engine_options=options)
     return raster.stage(shot, lambda _: mesh)
 
 
@@ -109,9 +99,8 @@ AS_IT_IS = Finish(background=BLACK, view=View(transform="raw"))
 """Unlit colours are shown as they are, also those above the shoulder of the standard view."""
 
 
-def picture(mesh: Mesh, scene: Scene, view: Camera, frame: Instant = FRAME, **options) -> np.ndarray:
-    stage = stage_of(mesh, scene, **options)
-    return stage.color(view, frame, rasterize(stage.geometry, view))
+def picture(mesh: Mesh, scene: Scene, view: Camera, finish: Finish | None = None, **options) -> np.ndarray:
+    return painted(stage_of(mesh, scene, **options), view, finish)
 
 
 def displayed(radiance: float) -> float:
@@ -245,13 +234,13 @@ def test_image_background_covers_the_frame(tmp_path):
     path = tmp_path / "photo.png"
     PillowImage.fromarray(pixels).save(path)
     scene = Scene(finish=Finish(background=Background(color=(1, 0, 0))))
-    frame = FRAME.model_copy(update={"finish": Finish(background=Background(image=str(path)))})
+    finish = Finish(background=Background(image=str(path)))
     far = mesh_of(card(0.001, 0.001, y=-100.0))
-    seen = picture(far, scene, camera(24, 24, 8.0), frame)
+    seen = picture(far, scene, camera(24, 24, 8.0), finish)
     np.testing.assert_array_equal(seen, pixels[:, 8:32])
     with pytest.raises(UserError, match="background image"):
         path.write_bytes(b"no image")
-        picture(far, scene, camera(24, 24, 8.0), frame)
+        picture(far, scene, camera(24, 24, 8.0), finish)
 
 
 def test_sky_is_brighter_low_and_near_the_sun():
@@ -296,9 +285,9 @@ def test_no_acne_and_no_gap_at_the_foot():
     assert max(np.abs(np.diff(front, axis=axis)).max() for axis in (0, 1)) <= 1
     view = camera(160, 160, 1600.0, azimuth=180, elevation=60, distance=10.0, target=(-0.5, 0.5, 0.0))
     stage = stage_of(mesh_of(BOX), GROUND_SCENE, antialias=1)
-    visible = rasterize(stage.geometry, view)
-    seen = stage.color(view, FRAME, visible).astype(int).sum(axis=2)
-    ground = stage.geometry.triangle_object[visible.triangle] == 0
+    visible = rasterize(stage.at(0), view)
+    seen = painted(stage, view).astype(int).sum(axis=2)
+    ground = stage.at(0).triangle_object[visible.triangle] == 0
     i, j = np.nonzero(ground)
     rays = np.stack([(j + 0.5 - 80) / 1600, (i + 0.5 - 80) / 1600, np.ones(len(i))], axis=1)
     points = view.center + (rays / visible.inverse_depth[i, j, None]) @ view.R
@@ -369,18 +358,11 @@ def test_size_does_not_change_the_picture(size):
 
 
 def test_ground_without_objects_and_nothing_at_all():
-    shot = Shot(
-        key="shot",
-        things=(),
-        intrinsics=Intrinsics(width=16, height=16, fx=16, fy=16, cx=8, cy=8),
-        scene=Scene(ground=Ground(), finish=Finish(background=Background(color=(0, 0, 1)))),
-        frames=(FRAME,),
-        channels=("rgb",),
-    )
+    shot = still_shot((), scene=Scene(ground=Ground(), finish=Finish(background=Background(color=(0, 0, 1)))))
     view = camera(16, 16, 16.0, elevation=45, distance=3.0)
     for scene, expected in ((shot.scene, False), (shot.scene.model_copy(update={"ground": None}), True)):
         stage = raster.stage(shot.model_copy(update={"scene": scene}), lambda _: pytest.fail("nothing to load"))
-        seen = stage.color(view, FRAME, rasterize(stage.geometry, view))
+        seen = painted(stage, view)
         assert bool((seen == [0, 0, 255]).all()) is expected
         assert np.ptp(seen[-4:].reshape(-1, 3), axis=0).max() <= 1
 
@@ -405,8 +387,8 @@ def test_distorted_colour_follows_the_labels(lens):
     stage = stage_of(
         mesh, Scene(finish=Finish(background=Background(color=(0, 0, 1)), view=View(transform="raw"))), antialias=1
     )
-    visible = rasterize(stage.geometry, view)
-    seen = stage.color(view, FRAME, visible)
+    visible = rasterize(stage.at(0), view)
+    seen = painted(stage, view)
     expected = np.where((visible.triangle >= 0)[..., None], np.uint8([255, 0, 0]), np.uint8([0, 0, 255]))
     assert 0 < (visible.triangle >= 0).sum() < 64 * 64
     np.testing.assert_array_equal(seen, expected)

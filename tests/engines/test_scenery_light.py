@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from test_raster import BLACK, DARK, FRAME, SPEC, box, camera, mesh_of, rectangle
+from test_raster import BLACK, DARK, SPEC, box, camera, mesh_of, rectangle
 
+from shots import painted, still_shot
 from viewsphere.assets.mesh import Material
 from viewsphere.engines import raster
-from viewsphere.model.camera import Intrinsics
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Finish, Scene, Sky, Sun
-from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Motion, Thing
-from viewsphere.truth.visibility import rasterize
 
 SUN = Sun(azimuth_deg=90, elevation_deg=45, strength=3.0)
 SCENE = Scene(sun=SUN, sky=DARK, finish=Finish(background=BLACK))
@@ -44,18 +42,14 @@ def stage_of(target, scenery, scene=SCENE, **options):
             for i, (_, move) in enumerate(scenery)
         ),
     )
-    shot = Shot(
-        key="shot", things=things, intrinsics=Intrinsics(width=8, height=8, fx=8, fy=8, cx=4, cy=4), scene=scene,
-        frames=(FRAME,), channels=("rgb",), engine_options=options,
-    )  # fmt: skip
-    return raster.stage(shot, lambda spec: meshes[spec.key])
+    return raster.stage(still_shot(things, scene=scene, engine_options=options), lambda spec: meshes[spec.key])
 
 
 def from_above(stage, x, y, scale, size=160):
     """Brightness of the floor around (x, y), `scale` pixels a metre, and each pixel's world x and y."""
     at = np.array([x + 0.011, y + 0.007])
     view = camera(size, size, scale * 50.0, elevation=90, distance=50.0, target=(*at, 0.0))
-    seen = stage.color(view, FRAME, rasterize(stage.geometry, view)).astype(int).sum(axis=2)
+    seen = painted(stage, view).astype(int).sum(axis=2)
     along = (np.arange(size) + 0.5 - size / 2) / scale
     return seen, *np.meshgrid(along + at[0], at[1] - along)
 
@@ -97,7 +91,7 @@ def test_scenery_shades_the_target():
 
     def face(scenery):
         stage = stage_of(BOX, scenery)
-        return stage.color(view, FRAME, rasterize(stage.geometry, view)).astype(int)[24:40, 24:40]
+        return painted(stage, view).astype(int)[24:40, 24:40]
 
     assert face([(floor(), moved(0, 0))]).min() > 150
     assert face([(floor(), moved(0, 0)), (wall, moved(0, 0))]).max() < 80  # what the surroundings throw back
@@ -134,7 +128,7 @@ def test_the_next_target_is_lit_by_the_same_place_and_another_sun_by_another():
     place = [(floor(), moved(0, 0)), (house, moved(20, 0))]
     first = stage_of(BOX, place)
     second = stage_of(mesh_of(box((-0.4, -0.6, 0), (0.4, 0.6, 0.9))), place)
-    assert first.baked.lights.views.depth.size == second.baked.lights.views.depth.size
+    assert first.baked(0).lights.views.depth.size == second.baked(0).lights.views.depth.size
     west = stage_of(BOX, place, SCENE.model_copy(update={"sun": Sun(azimuth_deg=270, elevation_deg=45)}))
     for stage, shaded, lit in ((second, 13, 27), (west, 27, 13)):
         seen, x, _ = from_above(stage, 20, 0, 4)
@@ -143,7 +137,7 @@ def test_the_next_target_is_lit_by_the_same_place_and_another_sun_by_another():
 
 
 def test_without_scenery_there_are_no_wide_maps():
-    assert len(stage_of(BOX, []).baked.lights.views.form) == 1
-    assert len(stage_of(BOX, [(floor(), moved(0, 0))]).baked.lights.views.form) > 1
+    assert len(stage_of(BOX, []).baked(0).lights.views.form) == 1
+    assert len(stage_of(BOX, [(floor(), moved(0, 0))]).baked(0).lights.views.form) > 1
     no_sun = SCENE.model_copy(update={"sun": None, "sky": Sky()})
-    assert len(stage_of(BOX, [(floor(), moved(0, 0))], no_sun).baked.lights.views.form) == 0
+    assert len(stage_of(BOX, [(floor(), moved(0, 0))], no_sun).baked(0).lights.views.form) == 0

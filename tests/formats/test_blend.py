@@ -49,7 +49,7 @@ def test_frames_of_one_scene_share_a_file(asked, small_run, tmp_path):
     assert sorted(asked) == sorted(f"{key}.blend" for key in dataset.plan.models)
     for name, told in asked.items():
         expected = [s.index for s in dataset if s.objects[0].key == name.removesuffix(".blend")]
-        assert [s.index for s in told.samples] == [f.index for f in told.shot.frames] == expected
+        assert [s.index for s in told.samples] == [f.index for f in told.shot.instants] == expected
         assert told.data == dataset.name
 
 
@@ -72,7 +72,7 @@ def test_sky_and_colours_behind_have_files_of_their_own(asked, tmp_path):
     assert sorted(s.index for told in asked.values() for s in told.samples) == [s.index for s in samples]
     assert len(asked) > len({s.objects[0].key for s in samples})
     for told in asked.values():
-        finishes = [frame.finish or told.shot.scene.finish for frame in told.shot.frames]
+        finishes = [frame.finish or told.shot.scene.finish for frame in told.shot.instants]
         assert len({finish.background.color is None for finish in finishes}) == 1
 
 

@@ -20,6 +20,7 @@ from hypothesis import strategies as st
 
 import viewsphere as vs
 from command_line import viewsphere
+from shots import unit_box
 from small import small_recipe, tree_hash
 from viewsphere import Dataset, generate
 from viewsphere.check import check
@@ -524,10 +525,10 @@ def test_large_data_sets_are_planned_fast_and_kept_small():
     assert [len(row.models) for row in portion.part.rows] == [38, 2]
     assert all(len(row.poses) == 1 for row in portion.part.rows)
     last = list(portion.shot_table())[-1]
-    shot = portion.shot(last)
-    assert shot.frames[-1].index == 575_999
-    assert [f.index for f in shot.frames] == list(range(last[1], last[1] + last[2]))
-    assert shot.frames[-1].pose.azimuth_deg % 1 == 0.5
+    shot = portion.shot(last, unit_box)
+    assert shot.instants[-1].index == 575_999
+    assert [f.index for f in shot.instants] == list(range(last[1], last[1] + last[2]))
+    assert shot.instants[-1].viewpoint.azimuth_deg % 1 == 0.5
 
 
 def test_poses_that_a_merged_data_set_has_twice_are_there():
@@ -544,10 +545,11 @@ def test_poses_that_a_merged_data_set_has_twice_are_there():
     ]
     supplied = extend(vs.plan(recipe(models=models(3), channels=[*CHANNELS, "normals"])), twice)
     rows = [row for row, _ in supplied.record.supplements]
-    assert [supplied.shot(row).frames[0].index for row in rows] == [row[1] for row in rows] == list(range(0, 18, 2))
-    last = supplied.shot(rows[-1])
+    assert [supplied.shot(row, unit_box).instants[0].index for row in rows] == [row[1] for row in rows] == list(range(0, 18, 2))
+    last = supplied.shot(rows[-1], unit_box)
     assert (last.things[0].model.key, last.channels) == ("post_box_002", ("normals",))
-    assert [(f.pose.index, f.pose.azimuth_deg, f.pose.elevation_deg) for f in last.frames] == [(10, 120, 50), (11, 240, 50)]
+    seen = [now.viewpoint for now in last.instants]
+    assert [(v.index, v.azimuth_deg, v.elevation_deg) for v in seen] == [(10, 120, 50), (11, 240, 50)]
 
 
 @given(st.lists(st.tuples(st.integers(0, 40), st.integers(1, 7)), min_size=1, max_size=5), st.integers(8, 20))

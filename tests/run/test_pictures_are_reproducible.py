@@ -106,8 +106,8 @@ def test_frames_come_out_alike_in_any_order(pictures):
     from viewsphere.run.stages import Stages
     from viewsphere.sampling.plan import plan
 
-    shots = list(plan(recipe(pictures)).shots())
     forwards, backwards = Stages(), Stages()
+    shots = list(plan(recipe(pictures)).shots(forwards.box))
     first = {shot.key: next(iter(forwards.render(shot))) for shot in shots}
     for shot in reversed(shots):
         again = next(iter(backwards.render(shot)))
@@ -124,7 +124,7 @@ def test_labels_know_nothing_of_what_is_done_to_pictures(pictures):
     made = {}
     for name, values in (("plain", plain), ("all", scene(pictures))):
         stages = Stages()
-        shots = list(plan(recipe(pictures, scene=values)).shots())
+        shots = list(plan(recipe(pictures, scene=values)).shots(stages.box))
         made[name] = [sample for shot in shots for sample in stages.render(shot)]
     assert len(made["plain"]) == len(made["all"]) == 12
     for a, b in zip(made["plain"], made["all"], strict=True):

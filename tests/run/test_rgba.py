@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from pictures import photograph, write
+from shots import still_shot
 from viewsphere.assets.srgb import encoded, linear
 from viewsphere.imaging.background import display_background
 from viewsphere.model.camera import Intrinsics
-from viewsphere.model.instant import Instant, Viewpoint
+from viewsphere.model.instant import Viewpoint
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Background, Finish, Ground, Scene
-from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
 from viewsphere.run.stages import Stages
 
@@ -30,16 +30,10 @@ def stages():
 
 
 def samples_of(stages: Stages, scene: Scene, channels=("rgb", "rgba", "instances"), finish=None, **options):
-    frames = tuple(Instant(index=p.index, pose=p, split="train", finish=finish) for p in POSES)
-    shot = Shot(
-        key="car",
-        things=(Thing(id=1, model=CAR),),
-        intrinsics=Intrinsics(width=WIDTH, height=HEIGHT, fx=150, fy=150, cx=WIDTH / 2, cy=HEIGHT / 2),
-        scene=scene,
-        frames=frames,
-        engine_options=options,
-        channels=channels,
-    )
+    lens = Intrinsics(width=WIDTH, height=HEIGHT, fx=150, fy=150, cx=WIDTH / 2, cy=HEIGHT / 2)
+    more = {"scene": scene, "engine_options": options, "channels": channels}
+    middle = stages.box(CAR).mean(axis=0)
+    shot = still_shot([Thing(id=1, model=CAR)], lens, POSES, middle, finish=finish, **more)
     return list(stages.render(shot))
 
 

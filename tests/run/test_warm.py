@@ -8,6 +8,7 @@ import sys
 
 import pytest
 
+from shots import unit_box
 from viewsphere import Recipe, plan
 from viewsphere.kernels.kernel_cache import sources_digest
 from viewsphere.run import warm
@@ -43,7 +44,7 @@ RECIPE = Recipe(models=[{"source": "zoo:chair"}], viewpoints={"azimuth": [0], "e
 
 def mark(**changes):
     recipe = Recipe.model_validate({**RECIPE.model_dump(mode="json", exclude_unset=True), **changes})
-    return warm._mark(warm._small(next(iter(plan(recipe).shots()))))
+    return warm._mark(warm._small(next(iter(plan(recipe).shots(unit_box)))))
 
 
 def test_a_mark_is_of_what_a_shot_uses_and_about_how_much_of_it():
@@ -83,7 +84,7 @@ def test_a_mark_is_void_when_a_source_changes(tmp_path):
 
 
 def test_a_mark_is_void_when_a_kernel_is_gone(tmp_path, monkeypatch):
-    shot = next(iter(plan(RECIPE).shots()))
+    shot = next(iter(plan(RECIPE).shots(unit_box)))
     rendered = []
 
     def render(small):

@@ -53,23 +53,24 @@ def test_every_pose_at_every_time_step():
     planned = plan(recipe())
     assert (planned.models, planned.time_steps, planned.frames) == (1, 4, 12)
     shots = list(planned.shots(box_of))
-    assert [f.index for s in shots for f in s.frames] == list(range(12))
+    assert [f.index for s in shots for f in s.instants] == list(range(12))
     assert [(s.things[0].model.frame, s.things[0].model.key) for s in shots] == [
         (frame, f"walk-f{frame:04d}") for frame in (1, 13, 25, 37)
     ]
-    assert [[f.pose.azimuth_deg for f in s.frames] for s in shots] == [[0, 90, 180]] * 4
-    assert [s.frames[0].pose.time.seconds for s in shots] == [0, 0.5, 1, 1.5]
-    assert len({f.pose.index for s in shots for f in s.frames}) == 12
+    assert [[f.viewpoint.azimuth_deg for f in s.instants] for s in shots] == [[0, 90, 180]] * 4
+    assert [s.instants[0].viewpoint.time.seconds for s in shots] == [0, 0.5, 1, 1.5]
+    assert len({f.viewpoint.index for s in shots for f in s.instants}) == 12
     # The cameras look where the model's centre is at the first frame.
-    assert {f.pose.target for s in shots for f in s.frames} == {tuple(box_of(planned.model_specs[0]).mean(axis=0).tolist())}
+    middle = tuple(box_of(planned.model_specs[0]).mean(axis=0).tolist())
+    assert {f.viewpoint.target for s in shots for f in s.instants} == {middle}
     assert [row[0] for row in planned.shot_table()] == [s.key for s in shots]
     assert [spec.key for spec in planned.kept_specs] == ["walk", *(s.things[0].model.key for s in shots)]
 
 
 def test_a_camera_that_moves_takes_a_pose_a_time_step():
     planned = plan(recipe(walker(frames=[1, 2, 48], poses="moving")))
-    frames = [f for s in planned.shots(box_of) for f in s.frames]
-    assert [(f.pose.time.frame, f.pose.azimuth_deg) for f in frames] == [(1, 0), (2, 90), (48, 180)]
+    frames = [f for s in planned.shots(box_of) for f in s.instants]
+    assert [(f.viewpoint.time.frame, f.viewpoint.azimuth_deg) for f in frames] == [(1, 0), (2, 90), (48, 180)]
     assert [f.index for f in frames] == [0, 1, 2]
     assert "expected as many poses as time steps, for moving; found 3 poses and 4" in error(walker(poses="moving"))
 
@@ -79,14 +80,14 @@ def test_models_of_other_time_steps_and_none_stand_side_by_side():
     planned = plan(recipe(*models))
     assert (planned.frames, planned.time_steps) == (12 + 6 + 3, None)
     alone = plan(recipe({"source": "zoo:car"}))
-    car, same = planned.shot(planned.shot_count - 1, box_of), alone.shot(0)
+    car, same = planned.shot(planned.shot_count - 1, box_of), alone.shot(0, box_of)
     assert (car.key, car.scene, car.things[0].model.seed) == (same.key, same.scene, same.things[0].model.seed)
-    assert [f.pose.model_copy(update={"index": 0}) for f in car.frames] == [
-        f.pose.model_copy(update={"index": 0}) for f in same.frames
+    assert [f.viewpoint.model_copy(update={"index": 0}) for f in car.instants] == [
+        f.viewpoint.model_copy(update={"index": 0}) for f in same.instants
     ]
-    assert [f.index for s in planned.shots(box_of) for f in s.frames] == list(range(21))
+    assert [f.index for s in planned.shots(box_of) for f in s.instants] == list(range(21))
     # Frame 1 of both files is the same moment: the poses are shared.
-    assert len({f.pose.index for s in planned.shots(box_of) for f in s.frames}) == 3 * (4 + 1 + 1)
+    assert len({f.viewpoint.index for s in planned.shots(box_of) for f in s.instants}) == 3 * (4 + 1 + 1)
 
 
 def test_all_time_steps_of_a_model_share_a_split_a_scene_and_a_camera():
@@ -94,10 +95,10 @@ def test_all_time_steps_of_a_model_share_a_split_a_scene_and_a_camera():
     for by in ("model", "pose"):
         splits = {"train": 0.5, "val": 0.5, "by": by}
         planned = plan(recipe(walker(), {"source": "run.fbx", "category": "x", "frames": "all"}, scene=scene, splits=splits))
-        frames = [(s.things[0].model.track, f) for s in planned.shots(box_of) for f in s.frames]
+        frames = [(s.things[0].model.track, f) for s in planned.shots(box_of) for f in s.instants]
         groups = {}
         for number, (track, frame) in enumerate(frames):
-            groups.setdefault((track, number % 3), set()).add((frame.split, frame.pose.azimuth_deg))
+            groups.setdefault((track, number % 3), set()).add((frame.split, frame.viewpoint.azimuth_deg))
         assert all(len(found) == 1 for found in groups.values())
         assert sum(planned.split_counts.values()) == planned.frames == 3 * (4 + 24)
     suns = {(s.things[0].model.track, s.scene.sun.azimuth_deg) for s in planned.shots(box_of)}
@@ -123,7 +124,7 @@ def test_the_ground_is_where_the_lowest_moment_touches_it():
 
     assert {s.scene.floor for s in plan(recipe()).shots(sinking)} == {-37 / 50}
     assert {s.scene.floor for s in plan(recipe(scene={"ground": "off"})).shots(sinking)} == {None}
-    assert plan(recipe({"source": "zoo:car"})).shot(0).scene.floor is None
+    assert plan(recipe({"source": "zoo:car"})).shot(0, box_of).scene.floor is None
 
 
 def test_shots_never_span_time_steps_and_records_say_the_same():
@@ -132,8 +133,8 @@ def test_shots_never_span_time_steps_and_records_say_the_same():
     assert list(portion.record.shots) == list(planned.shot_table())
     for row in portion.record.shots:
         shot = portion.shot(row, box_of)
-        assert len({f.pose.time for f in shot.frames}) == 1
-        assert [f.index for f in shot.frames] == list(range(row[1], row[1] + row[2]))
+        assert len({f.viewpoint.time for f in shot.instants}) == 1
+        assert [f.index for f in shot.instants] == list(range(row[1], row[1] + row[2]))
     assert portion.record.models == tuple(spec.key for spec in planned.kept_specs)
 
 
@@ -143,8 +144,8 @@ def test_time_steps_are_added_to_those_there_are():
     assert again.adds_nothing
     more = extend(plan(recipe(walker(frames=[1, 13, 25]))), first)
     assert more.part.frames == 3
-    shown = [portion_shot for row in more.record.shots_of(1) for portion_shot in more.shot(row, box_of).frames]
-    assert [(f.index, f.pose.index, f.pose.time.frame) for f in shown] == [(6, 6, 13), (7, 7, 13), (8, 8, 13)]
+    shown = [portion_shot for row in more.record.shots_of(1) for portion_shot in more.shot(row, box_of).instants]
+    assert [(f.index, f.viewpoint.index, f.viewpoint.time.frame) for f in shown] == [(6, 6, 13), (7, 7, 13), (8, 8, 13)]
 
 
 def test_a_camera_inside_at_any_time_step_is_found():

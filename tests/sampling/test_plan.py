@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from shots import unit_box
 from viewsphere.errors import RecipeError
 from viewsphere.model.shot import Shot
 from viewsphere.recipe.recipe import Recipe
@@ -52,20 +53,20 @@ def test_the_recipes_of_the_paper_have_its_counts(name):
 def test_shots_are_even_chunks_in_index_order():
     planned = plan(recipe())
     assert (planned.models, planned.poses, planned.frames) == (3, 36, 108)
-    shots = list(planned.shots())
+    shots = list(planned.shots(unit_box))
     assert planned.shot_count == len(shots) == 9
-    sizes = [len(s.frames) for s in shots]
+    sizes = [len(s.instants) for s in shots]
     assert max(sizes) <= SHOT_FRAMES
     assert max(sizes) - min(sizes) <= 1
-    assert [f.index for s in shots for f in s.frames] == list(range(108))
-    assert [f.pose.index for s in shots for f in s.frames] == 3 * list(range(36))
+    assert [f.index for s in shots for f in s.instants] == list(range(108))
+    assert [f.viewpoint.index for s in shots for f in s.instants] == 3 * list(range(36))
     assert [s.key for s in shots[:4]] == ["car_000-000000", "car_000-000012", "car_000-000024", "car_001-000000"]
-    assert shots[3] == planned.shot(3)
-    assert list(planned.shot_table()) == [(s.key, s.frames[0].index, len(s.frames)) for s in shots]
+    assert shots[3] == planned.shot(3, unit_box)
+    assert list(planned.shot_table()) == [(s.key, s.instants[0].index, len(s.instants)) for s in shots]
     assert [s.key.rpartition("-")[0] for s in shots] == [s.things[0].model.key for s in shots]
     assert planned.max_objects == max(len(s.things) for s in shots) == 1
     with pytest.raises(IndexError):
-        planned.shot(9)
+        planned.shot(9, unit_box)
 
 
 def test_the_recipe_s_shot_frames_come_before_the_caller_s():
@@ -74,18 +75,18 @@ def test_the_recipe_s_shot_frames_come_before_the_caller_s():
 
 
 def test_a_shot_is_plain_json_and_comes_back_the_same():
-    shot = plan(recipe(engine={"name": "raster", "samples": 2}, viewpoints={"distance": 5, "bins": 90})).shot(1)
+    shot = plan(recipe(engine={"name": "raster", "samples": 2}, viewpoints={"distance": 5, "bins": 90})).shot(1, unit_box)
     assert Shot.model_validate_json(shot.model_dump_json()) == shot
     assert shot.engine_options == {"samples": 2}
     assert shot.category_deg == 90
-    assert shot.intrinsics.width == 640
+    assert shot.rig.sensors[0].intrinsics.width == 640
     assert shot.scene.ground is not None
     assert shot.scene.finish.background.color is None
     assert shot.things[0].id == 1
 
 
 def test_shots_of_one_model_share_a_stage():
-    shots = list(plan(recipe()).shots())
+    shots = list(plan(recipe()).shots(unit_box))
     assert len({s.stage_key for s in shots[:3]}) == 1
     assert len({s.stage_key for s in shots}) == 3
 
@@ -110,7 +111,7 @@ def test_a_million_frames_can_be_meant():
     started = time.perf_counter()
     planned = plan(recipe(models=[{"source": "zoo:car"}], viewpoints={"kind": "sphere", "count": 1_000_000, "distance": 5}))
     assert planned.frames == 1_000_000
-    assert planned.shot(planned.shot_count - 1).frames[-1].index == 999_999
+    assert planned.shot(planned.shot_count - 1, unit_box).instants[-1].index == 999_999
     assert planned.split_counts in ({"train": 1_000_000, "val": 0}, {"train": 0, "val": 1_000_000})
     assert time.perf_counter() - started < 1
     assert plan(recipe(max_frames=10**9, viewpoints={"kind": "sphere", "count": 10**7, "distance": 5})).frames == 3 * 10**7
@@ -126,9 +127,9 @@ def test_splits_have_their_shares_and_keep_together_what_they_should(by, units):
         spread = (share * (1 - share) / units) ** 0.5
         assert abs(planned.split_counts[name] / 36_000 - share) < 4 * spread
     found = {}
-    for shot in (planned.shot(i) for i in range(0, 300)):
-        for frame in shot.frames:
-            unit = {"model": shot.things[0].model.key, "pose": frame.pose.index, "frame": frame.index}[by]
+    for shot in (planned.shot(i, unit_box) for i in range(0, 300)):
+        for frame in shot.instants:
+            unit = {"model": shot.things[0].model.key, "pose": frame.viewpoint.index, "frame": frame.index}[by]
             assert found.setdefault(unit, frame.split) == frame.split
     assert len(set(found.values())) == 3
 
@@ -138,7 +139,7 @@ def test_adding_models_and_poses_moves_nothing_to_another_split():
         planned = plan(
             recipe(models=models, viewpoints={"azimuth": azimuths, "distance": 5}, splits={"by": by, "a": 0.5, "b": 0.5})
         )
-        return {(s.things[0].model.key, f.pose.azimuth_deg): f.split for s in planned.shots() for f in s.frames}
+        return {(s.things[0].model.key, f.viewpoint.azimuth_deg): f.split for s in planned.shots(unit_box) for f in s.instants}
 
     cars = {"source": "zoo:car", "count": 20}
     for by in ("model", "pose", "frame"):
@@ -151,7 +152,7 @@ def test_adding_models_and_poses_moves_nothing_to_another_split():
 def test_listed_models_go_where_they_are_listed():
     planned = plan(recipe(splits={"train": 1, "val": ["car_001"]}))
     assert planned.split_counts == {"train": 72, "val": 36}
-    assert [planned.shot(i).frames[0].split for i in (0, 3, 6)] == ["train", "val", "train"]
+    assert [planned.shot(i, unit_box).instants[0].split for i in (0, 3, 6)] == ["train", "val", "train"]
     assert error(splits={"train": 1, "val": ["car_01"]}).startswith("splits.val: expected keys of models; found 'car_01'; did")
     assert error(splits={"a": ["car_001"], "b": ["car_001"]}) == (
         "splits.b: expected every model in one split; found 'car_001', listed in 'a' too"
@@ -189,7 +190,9 @@ def backgrounds(folder, models, azimuths=(0, 10, 20), **background):
     }
     planned = plan(Recipe.model_validate(data, context={"folder": folder}))
     return planned, {
-        (s.things[0].model.key, f.pose.azimuth_deg): f.finish and f.finish.background for s in planned.shots() for f in s.frames
+        (s.things[0].model.key, f.viewpoint.azimuth_deg): f.finish and f.finish.background
+        for s in planned.shots(unit_box)
+        for f in s.instants
     }
 
 
@@ -201,15 +204,15 @@ def test_backgrounds_drawn_per_frame_follow_from_names(photos):
     assert all(b is not None and b.image in planned.images for b in few.values())
     assert len({b.image for b in few.values()}) > 15  # 60 draws of 20
     assert all(many[frame] == background for frame, background in few.items())
-    assert planned.shot(0).scene.ground is None
+    assert planned.shot(0, unit_box).scene.ground is None
 
 
 def test_a_fixed_background_is_one_for_all_frames(photos):
     planned, frames = backgrounds(photos, [{"source": "zoo:car", "count": 9}], images="photos", draw="fixed")
     assert set(frames.values()) == {None}
-    assert len({s.scene.finish.background.image for s in planned.shots()}) == 1
+    assert len({s.scene.finish.background.image for s in planned.shots(unit_box)}) == 1
     planned, _ = backgrounds(photos, [{"source": "zoo:car"}], image="photos/0/04.jpg")
-    assert planned.shot(0).scene.finish.background.image == str(photos / "photos/0/04.jpg")
+    assert planned.shot(0, unit_box).scene.finish.background.image == str(photos / "photos/0/04.jpg")
 
 
 def test_missing_backgrounds_are_named(photos):

@@ -8,12 +8,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from shots import camera_of
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.camera import orbit_angles, orbit_center, orbit_rotation
 from viewsphere.geometry.rotation import quaternion_from_matrix
 from viewsphere.model.camera import Distortion, Intrinsics
 from viewsphere.recipe.recipe import Recipe
-from viewsphere.sampling.camera import camera_for
 from viewsphere.sampling.plan import plan
 from viewsphere.sampling.pose_files import read_poses
 
@@ -29,7 +29,7 @@ def make(path, **more):
 
 
 def cameras(path, **more):
-    return [camera_for(LENS, pose, (0, 0, 0)) for pose in make(path, **more).pose_list]
+    return [camera_of(LENS, pose, (0, 0, 0)) for pose in make(path, **more).pose_list]
 
 
 def motions(count=7, seed=3):

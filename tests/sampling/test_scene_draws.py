@@ -55,15 +55,15 @@ def planned(scene, folder=Path(), **fields):
 
 
 def scene_of(scene, folder=Path()) -> Scene:
-    return planned(scene, folder).shot(0).scene
+    return planned(scene, folder).shot(0, box_of).scene
 
 
 def finishes(scene, folder=Path(), **fields):
     found = planned(scene, folder, **fields)
     return {
-        (shot.things[0].model.key, frame.pose.azimuth_deg): frame.finish or shot.scene.finish
-        for shot in found.shots()
-        for frame in shot.frames
+        (shot.things[0].model.key, frame.viewpoint.azimuth_deg): frame.finish or shot.scene.finish
+        for shot in found.shots(box_of)
+        for frame in shot.instants
     }
 
 
@@ -73,9 +73,9 @@ def box_of(spec):
 
 def test_a_recipe_without_a_word_on_its_scene_has_the_default_one():
     found = planned({})
-    shot = found.shot(0)
+    shot = found.shot(0, box_of)
     assert shot.scene == Scene(ground=Ground())
-    assert {f.finish for f in shot.frames} == {None}
+    assert {f.finish for f in shot.instants} == {None}
     assert shot.things[0].repaints == ()
 
 
@@ -135,14 +135,14 @@ def test_a_sun_by_date_time_and_place_stands_in_its_part_of_the_world():
     assert (noon.elevation_deg, noon.strength) == (pytest.approx(61.94, abs=0.05), 5)
     assert 60 < scene_of({"sun": {**where, "time": "07:00Z"}}).sun.azimuth_deg < 120  # in the east, +X
     night = planned({"sun": {**where, "time": "23:00Z"}})
-    assert night.shot(0).scene.sun is None
+    assert night.shot(0, box_of).scene.sun is None
     assert any("below the horizon" in warning for warning in night.warnings)
     assert scene_of({"sun": {**where, "time": "23:00Z"}, "sky": "daylight"}).sky.strength == 0
     assert planned({"sun": {**where, "time": [0, 24]}}).warnings == planned({}).warnings
 
 
 def test_an_environment_brings_its_own_sun(folder):
-    shot = planned({"sky": {"hdri": "day.exr", "rotation_deg": 90, "strength": 2}}, folder).shot(0)
+    shot = planned({"sky": {"hdri": "day.exr", "rotation_deg": 90, "strength": 2}}, folder).shot(0, box_of)
     assert shot.scene.sky == Environment(file=str(folder / "day.exr"), rotation_deg=90, strength=2)
     assert shot.scene.sun is None
     assert scene_of({"sky": "day.exr", "sun": "on"}, folder).sun == Sun()
@@ -157,9 +157,9 @@ def test_pictures_of_the_ground_are_found_beside_the_recipe(folder):
 
 
 def test_transparent_pictures_are_kept_as_rgba():
-    assert planned({"background": "transparent"}, channels=["depth", "rgb"]).shot(0).channels == ("depth", "rgba")
-    assert planned({"background": "transparent"}, channels=["rgba", "rgb"]).shot(0).channels == ("rgba",)
-    assert planned({}, channels=["rgb"]).shot(0).channels == ("rgb",)
+    assert planned({"background": "transparent"}, channels=["depth", "rgb"]).shot(0, box_of).channels == ("depth", "rgba")
+    assert planned({"background": "transparent"}, channels=["rgba", "rgb"]).shot(0, box_of).channels == ("rgba",)
+    assert planned({}, channels=["rgb"]).shot(0, box_of).channels == ("rgb",)
 
 
 MISSING = [
@@ -205,30 +205,30 @@ RANDOM = {
 def test_the_stage_is_drawn_once_a_model_by_default():
     found = planned(RANDOM, shot_frames=2)
     scenes = {}
-    for shot in found.shots():
+    for shot in found.shots(box_of):
         scenes.setdefault(shot.things[0].model.key, set()).add(shot.scene.model_dump_json())
-        assert len(shot.frames) == 2
+        assert len(shot.instants) == 2
     assert [len(s) for s in scenes.values()] == [1, 1, 1]
     assert len(set.union(*scenes.values())) == 3
 
 
 def test_the_stage_is_drawn_once_for_all_or_for_every_frame_where_that_is_asked_for():
-    assert len({s.scene.model_dump_json() for s in planned({**RANDOM, "draw": "fixed"}).shots()}) == 1
-    shots = list(planned({**RANDOM, "draw": "per_frame"}).shots())
-    assert {len(s.frames) for s in shots} == {1}
+    assert len({s.scene.model_dump_json() for s in planned({**RANDOM, "draw": "fixed"}).shots(box_of)}) == 1
+    shots = list(planned({**RANDOM, "draw": "per_frame"}).shots(box_of))
+    assert {len(s.instants) for s in shots} == {1}
     assert len({s.scene.model_dump_json() for s in shots}) == 24
-    assert {len(s.frames) for s in planned({"draw": "per_frame"}).shots()} == {8}  # nothing to draw
+    assert {len(s.instants) for s in planned({"draw": "per_frame"}).shots(box_of)} == {8}  # nothing to draw
 
 
 def test_same_seed_same_draw_and_another_seed_another():
-    again = [list(planned(RANDOM, seed=seed).shots()) for seed in (5, 5, 6)]
+    again = [list(planned(RANDOM, seed=seed).shots(box_of)) for seed in (5, 5, 6)]
     assert again[0] == again[1]
     assert again[0][0].scene != again[2][0].scene
 
 
 def test_more_models_poses_and_fields_change_nobody_else_s_draw():
     def scenes(**fields):
-        return {s.things[0].model.key: s.scene for s in planned(**fields).shots()}
+        return {s.things[0].model.key: s.scene for s in planned(**fields).shots(box_of)}
 
     few = scenes(scene=RANDOM)
     more = scenes(scene=RANDOM, models=[{"source": "zoo:boat"}, {"source": "zoo:car", "count": 5}])
@@ -246,13 +246,13 @@ def test_more_models_poses_and_fields_change_nobody_else_s_draw():
 def test_each_of_several_lamps_is_drawn_by_itself():
     lights = scene_of({"lights": [{"position": [[-2, 2], 0, 3], "strength": [1, 2], "count": 20}]}).lights
     assert len({lamp.position for lamp in lights}) == len({lamp.strength for lamp in lights}) == 20
-    counts = {len(s.scene.lights) for s in planned(RANDOM, models=[{"source": "zoo:car", "count": 30}]).shots()}
+    counts = {len(s.scene.lights) for s in planned(RANDOM, models=[{"source": "zoo:car", "count": 30}]).shots(box_of)}
     assert counts == {1, 2, 3}
 
 
 def test_statistics_of_a_field_over_models():
     found = planned({"sun": {"elevation_deg": [10, 70]}}, models=[{"source": "zoo:car", "count": 1000}])
-    heights = np.array([found.shot(i).scene.sun.elevation_deg for i in range(found.shot_count)])
+    heights = np.array([found.shot(i, box_of).scene.sun.elevation_deg for i in range(found.shot_count)])
     assert 10 <= heights.min() < 11
     assert 69 < heights.max() <= 70
     assert abs(heights.mean() - 40) < 4 * 60 / math.sqrt(12 * 1000)
@@ -278,8 +278,8 @@ def test_the_finish_is_drawn_for_every_frame_by_default():
 
 def test_a_finish_that_is_not_drawn_for_frames_is_the_scene_s():
     scene = {"view": {"exposure": [-1, 1], "draw": "per_model"}, "effects": {"vignetting": 0.2}}
-    shots = list(planned(scene).shots())
-    assert {f.finish for s in shots for f in s.frames} == {None}
+    shots = list(planned(scene).shots(box_of))
+    assert {f.finish for s in shots for f in s.instants} == {None}
     assert len({s.scene.finish.view.exposure for s in shots}) == 3
     assert {s.scene.finish.effects.vignetting for s in shots} == {0.2}
 
@@ -293,13 +293,13 @@ def test_noise_is_another_in_every_frame():
 
 def test_folders_of_skies_are_drawn_with_the_stage_and_of_photos_with_the_frame(folder):
     found = planned({"sky": "skies", "background": {"images": "photos", "flip": {"choice": [True, False]}}}, folder)
-    shots = list(found.shots())
-    assert {len(s.frames) for s in shots} == {8}
+    shots = list(found.shots(box_of))
+    assert {len(s.instants) for s in shots} == {8}
     assert len({s.scene.sky.file for s in shots}) > 1
-    assert len({f.finish.background.image for s in shots for f in s.frames}) > 6
-    assert {f.finish.background.flip for s in shots for f in s.frames} == {True, False}
-    assert {len(s.frames) for s in planned({"sky": "skies", "draw": "per_frame"}, folder).shots()} == {1}
-    assert {len(s.frames) for s in planned({"sky": "day.exr", "draw": "per_frame"}, folder).shots()} == {8}
+    assert len({f.finish.background.image for s in shots for f in s.instants}) > 6
+    assert {f.finish.background.flip for s in shots for f in s.instants} == {True, False}
+    assert {len(s.instants) for s in planned({"sky": "skies", "draw": "per_frame"}, folder).shots(box_of)} == {1}
+    assert {len(s.instants) for s in planned({"sky": "day.exr", "draw": "per_frame"}, folder).shots(box_of)} == {8}
 
 
 def test_materials_are_drawn_for_the_models_they_fit():
@@ -309,12 +309,12 @@ def test_materials_are_drawn_for_the_models_they_fit():
             {"roughness": [0.2, 0.6]},
         ]
     }
-    paints = {s.things[0].model.key: s.things[0].repaints for s in planned(scene).shots()}
+    paints = {s.things[0].model.key: s.things[0].repaints for s in planned(scene).shots(box_of)}
     assert [len(p) for p in paints.values()] == [2, 2, 1]
     assert paints["car_000"][0].material == "paint*"
     assert len({p[0].tint for p in list(paints.values())[:2]}) == 2
     assert all(0.2 <= p[-1].roughness <= 0.6 for p in paints.values())
-    fixed = [s.things[0].repaints for s in planned({**scene, "draw": "fixed"}).shots()]
+    fixed = [s.things[0].repaints for s in planned({**scene, "draw": "fixed"}).shots(box_of)]
     assert fixed[0] == fixed[1] == (*fixed[0][:1], *fixed[2])
 
 
@@ -331,37 +331,35 @@ def test_jitter_moves_every_pose_a_little_and_keeps_its_index_and_name():
     scene = {
         "jitter": {"azimuth_deg": {"normal": [0, 3]}, "elevation_deg": [-5, 5], "distance": [-0.1, 0.1], "tilt_deg": [-2, 2]}
     }
-    frames = [f for s in planned(scene).shots() for f in s.frames]
-    nominal = [f for s in planned({}).shots() for f in s.frames]
-    assert [(f.index, f.pose.index, f.split) for f in frames] == [(f.index, f.pose.index, f.split) for f in nominal]
+    frames = [f for s in planned(scene).shots(box_of) for f in s.instants]
+    nominal = [f for s in planned({}).shots(box_of) for f in s.instants]
+    assert [(f.index, f.viewpoint.index, f.split) for f in frames] == [(f.index, f.viewpoint.index, f.split) for f in nominal]
     offsets = np.array(
         [
             [a.azimuth_deg - b.azimuth_deg, a.elevation_deg - b.elevation_deg, a.distance / b.distance - 1, a.tilt_deg]
-            for a, b in ((f.pose, n.pose) for f, n in zip(frames, nominal, strict=True))
+            for a, b in ((f.viewpoint, n.viewpoint) for f, n in zip(frames, nominal, strict=True))
         ]
     )
     assert len(np.unique(offsets, axis=0)) == 24
     assert (np.abs(offsets) <= [15, 5, 0.1 + 1e-9, 2]).all()
     assert (offsets.std(axis=0) > [1.5, 1.5, 0.03, 0.6]).all()
-    assert {f.pose.target for f in frames} == {None}
+    assert {f.viewpoint.target for f in frames} == {None}
 
 
 def test_jitter_names_the_side_that_the_camera_truly_sees_and_stops_at_the_pole():
-    (frame, *_) = planned({"jitter": {"azimuth_deg": 30, "elevation_deg": 80}}).shot(0).frames
-    assert (frame.pose.azimuth_deg, frame.pose.elevation_deg, frame.pose.category) == (30, 90, "top")
-    (frame, *_) = planned({"jitter": {"azimuth_deg": 30}}).shot(0).frames
-    assert frame.pose.category == "front-left"
+    (frame, *_) = planned({"jitter": {"azimuth_deg": 30, "elevation_deg": 80}}).shot(0, box_of).instants
+    assert (frame.viewpoint.azimuth_deg, frame.viewpoint.elevation_deg, frame.viewpoint.category) == (30, 90, "top")
+    (frame, *_) = planned({"jitter": {"azimuth_deg": 30}}).shot(0, box_of).instants
+    assert frame.viewpoint.category == "front-left"
 
 
 def test_a_jittered_target_lies_around_the_models_centre_or_the_given_one():
     scene = {"jitter": {"target": {"uniform": [[-0.1, -0.1, 0], [0.1, 0.1, 0]]}}}
-    targets = np.array([f.pose.target for s in planned(scene).shots(box_of) for f in s.frames])
+    targets = np.array([f.viewpoint.target for s in planned(scene).shots(box_of) for f in s.instants])
     assert (np.abs(targets - [0, 0, 0.5]) <= [0.1 + 1e-9, 0.1 + 1e-9, 1e-9]).all()
     assert len(np.unique(targets, axis=0)) == 24
-    with pytest.raises(ValueError, match="expected box_of"):
-        planned(scene).shot(0)
-    given = planned(scene, viewpoints={**VIEWS, "target": [1, 2, 3]}).shot(0, box_of).frames
-    assert all(abs(f.pose.target[0] - 1) <= 0.1 and f.pose.target[2] == 3 for f in given)
+    given = planned(scene, viewpoints={**VIEWS, "target": [1, 2, 3]}).shot(0, box_of).instants
+    assert all(abs(f.viewpoint.target[0] - 1) <= 0.1 and f.viewpoint.target[2] == 3 for f in given)
 
 
 def test_jitter_into_a_model_is_found_before_rendering():
@@ -375,7 +373,7 @@ def test_jitter_into_a_model_is_found_before_rendering():
 
 
 def test_a_shot_of_a_random_scene_is_plain_json():
-    shot = planned({**RANDOM, "effects": {"shot_noise": [0, 0.1]}, "materials": [{"metallic": [0, 1]}]}).shot(0)
+    shot = planned({**RANDOM, "effects": {"shot_noise": [0, 0.1]}, "materials": [{"metallic": [0, 1]}]}).shot(0, box_of)
     assert Shot.model_validate_json(shot.model_dump_json()) == shot
 
 
@@ -383,5 +381,5 @@ def test_lists_of_many_frames_are_made_quickly():
     effects = {"blur": [0, 0.1], "jpeg": [0, 0.5]}
     found = planned({**RANDOM, "effects": effects}, models=[{"source": "zoo:car", "count": 20}])
     started = time.process_time()
-    frames = sum(len(s.frames) for s in found.shots())
+    frames = sum(len(s.instants) for s in found.shots(box_of))
     assert (time.process_time() - started) / frames < 0.004

@@ -8,12 +8,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from shots import camera_of
 from viewsphere.geometry.box import box_vertices
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.instant import Viewpoint
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.viewpoints import Range, axis_count, axis_value
-from viewsphere.sampling.camera import camera_for, distance_problem
+from viewsphere.sampling.camera import distance_problem
 from viewsphere.sampling.viewpoints import poses
 
 
@@ -183,21 +184,21 @@ LENS = Intrinsics(width=64, height=48, fx=50, fy=50, cx=32, cy=24)
 
 def test_the_camera_stands_where_the_pose_says_and_looks_at_the_target():
     pose = Viewpoint(index=0, azimuth_deg=90, elevation_deg=0, distance=5)
-    camera = camera_for(LENS, pose, (1, 2, 3))
+    camera = camera_of(LENS, pose, (1, 2, 3))
     assert np.allclose(camera.center, [6, 2, 3], atol=1e-14)
     assert np.allclose(camera.R @ [1, 2, 3] + camera.t, [0, 0, 5], atol=1e-14)
-    above = camera_for(LENS, Viewpoint(index=0, azimuth_deg=0, elevation_deg=90, distance=2), (0, 0, 0))
+    above = camera_of(LENS, Viewpoint(index=0, azimuth_deg=0, elevation_deg=90, distance=2), (0, 0, 0))
     assert np.allclose(above.R, [[1, 0, 0], [0, -1, 0], [0, 0, -1]], atol=1e-15)
 
 
 def test_a_pose_s_own_target_wins():
     pose = Viewpoint(index=0, azimuth_deg=0, elevation_deg=0, distance=5, target=(1, 1, 1))
-    assert np.allclose(camera_for(LENS, pose, (0, 0, 0)).center, [1, -4, 1])
+    assert np.allclose(camera_of(LENS, pose, (0, 0, 0)).center, [1, -4, 1])
 
 
 def test_a_tilt_rolls_the_camera_clockwise_seen_from_behind():
     pose = Viewpoint(index=0, azimuth_deg=0, elevation_deg=0, distance=5, tilt_deg=90)
-    camera = camera_for(LENS, pose, (0, 0, 0))
+    camera = camera_of(LENS, pose, (0, 0, 0))
     assert np.allclose(camera.R @ [0, 0, 1], [-1, 0, 0], atol=1e-15)  # up in the world is left in the picture
 
 

@@ -7,13 +7,11 @@ import pytest
 from test_embree import compare, embree, trace, turned
 from truth_scenes import LENSES, cube, lens, mesh_of, orbit_camera, placed, sphere
 
+from shots import still_shot
 from viewsphere.annotate import annotate
 from viewsphere.geometry.box import box_vertices
 from viewsphere.model.camera import Camera
-from viewsphere.model.instant import Instant, Viewpoint
 from viewsphere.model.model_spec import ModelSpec
-from viewsphere.model.scene import Scene
-from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Motion, Thing
 from viewsphere.truth.channels import observe
 from viewsphere.truth.geometry import build_geometry
@@ -110,10 +108,9 @@ def test_masks_boxes_and_visible_shares_of_a_whole_scene():
     whole = embree(geometry)
     hidden, cut, clear = 0, 0, 0
     for camera in cameras("pinhole", 8, 200, 150):
-        frame = Instant(index=0, pose=Viewpoint(index=0, azimuth_deg=0, elevation_deg=0, distance=3), split="train")
-        shot = Shot(key="s", things=things, intrinsics=camera.intrinsics, scene=Scene(), frames=(frame,), channels=())
+        shot = still_shot(things, camera.intrinsics)
         boxes = [box_vertices(*m.bounds) for m in meshes[:3]]
-        found = annotate(shot, frame, camera, geometry, rasterize(geometry, camera), boxes, ["m"] * 3)
+        found = annotate(shot, 0, camera, geometry, rasterize(geometry, camera), boxes, ["m"] * 3)
         assert [o.id for o in found] == [1, 2, 3]
         triangle, _ = trace(whole, camera)
         ids = np.where(triangle >= 0, geometry.triangle_object[triangle], 0)
@@ -146,10 +143,9 @@ def test_scenery_hides_and_is_not_labelled():
     camera = orbit_camera(lens(64, 48), 0.0, 0.0, 5.0)
     spec = ModelSpec(key="m", source="m", category="thing", category_id=1)
     things = (Thing(id=1, model=spec), Thing(id=0, model=spec, scenery=True))
-    frame = Instant(index=0, pose=Viewpoint(index=0, azimuth_deg=0, elevation_deg=0, distance=5), split="train")
-    shot = Shot(key="s", things=things, intrinsics=camera.intrinsics, scene=Scene(), frames=(frame,), channels=())
+    shot = still_shot(things, camera.intrinsics)
     boxes = [box_vertices(*cube().bounds)]
-    (o,) = annotate(shot, frame, camera, geometry, rasterize(geometry, camera), boxes, ["m"])
+    (o,) = annotate(shot, 0, camera, geometry, rasterize(geometry, camera), boxes, ["m"])
     assert (o.visibility, o.truncation) == (0.5, 0.0)
     assert o.box2d is not None and o.box2d[0] == 32
     assert o.box2d_projected[0] < 27

@@ -1,0 +1,45 @@
+"""Shots of what stands still, built by hand, and the pictures that any camera takes of them."""
+
+import numpy as np
+
+from viewsphere.geometry.box import box_vertices
+from viewsphere.model.camera import Camera, Intrinsics
+from viewsphere.model.instant import Instant, Viewpoint
+from viewsphere.model.rig import Rig
+from viewsphere.model.scene import IDENTITY, Finish, Scene
+from viewsphere.model.shot import Shot
+from viewsphere.sampling.camera import looking
+from viewsphere.truth.visibility import rasterize
+
+SMALL = Intrinsics(width=8, height=8, fx=8, fy=8, cx=4, cy=4)
+AHEAD = Viewpoint(index=0, azimuth_deg=0, elevation_deg=0, distance=1)
+
+
+def unit_box(_):
+    """The box of any model."""
+    return box_vertices((-0.5,) * 3, (0.5,) * 3)
+
+
+def still_shot(things, lens=SMALL, viewpoints=(AHEAD,), focus=(0, 0, 0), split="train", finish=None, **more) -> Shot:
+    """A shot from these viewpoints, which look at `focus` unless they have targets of their own."""
+    more = {"key": "shot", "scene": Scene(), "channels": ("rgb",)} | more
+    instants = (looking(v, tuple(focus), index=v.index, split=split, finish=finish) for v in viewpoints)
+    return Shot(things=tuple(things), rig=Rig.of(lens), instants=tuple(instants), **more)
+
+
+def camera_of(lens: Intrinsics, viewpoint: Viewpoint, focus=(0, 0, 0)) -> Camera:
+    return still_shot((), lens, (viewpoint,), focus).camera(0)
+
+
+def with_camera(shot: Shot, camera: Camera, finish: Finish | None = None) -> Shot:
+    """The shot with this camera alone; its focus is that of the shot's first instant."""
+    first = shot.instants[0]
+    rows = np.column_stack([camera.R.T, camera.center]).tolist()
+    now = Instant(index=0, world_from_rig=(*map(tuple, rows), IDENTITY[3]), focus=first.focus, finish=finish or first.finish)
+    return shot.model_copy(update={"rig": Rig.of(camera.intrinsics), "instants": (now,)})
+
+
+def painted(stage, camera: Camera, finish: Finish | None = None, transparent: bool = False) -> np.ndarray:
+    """What a camera sees on a stage of any engine."""
+    own = stage.of(with_camera(stage.shot, camera, finish))
+    return own.color(0, 0, rasterize(own.at(0), own.shot.camera(0)), transparent)
