@@ -22,8 +22,11 @@ from viewsphere.sampling.plan import Plan
 
 Float = NDArray[np.float64]
 
-MOST_CAMERAS = 100_000
-"""Poses that are looked at beforehand, evenly over all; the others are when their shot is rendered."""
+MOST_CAMERAS = 20_000
+"""Poses of a model that are looked at beforehand, evenly over all; the others are when their shot is rendered."""
+
+MOST_PAIRS = 1_000_000
+"""Likewise of all models together."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +47,7 @@ class Distances:
         if plan.composition is not None and not plan.recipe.scene.is_moved_each_frame:
             things = plan.composition.targets(spec, None, self.box_of)
             target = plan.composition.center(things, self.box_of)
-        step = -(-plan.poses // MOST_CAMERAS)
+        step = -(-plan.poses // max(1, min(MOST_CAMERAS, MOST_PAIRS // plan.models)))
         for run in plan.schedule(spec).runs:
             at, moved = plan.target(things[0], run, target, self.box_of), plan.at(things, run)
             poses = range(run.first, run.stop, step)
