@@ -32,7 +32,7 @@ def visible_and_cut(
     if own is None:
         if not area:
             return 0.0, 1.0
-        own = (-math.inf, -math.inf, math.inf, math.inf)  # no edge is in the lens' field because the object fills it
+        own = (-math.inf, -math.inf, math.inf, math.inf)  # all that is seen of it is nearer than boxes begin
     width, height = camera.width, camera.height
     image = (0.0, 0.0, float(width), float(height))
     if whole[object_id - 1] and not overlap(own, image):
