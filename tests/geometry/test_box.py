@@ -11,7 +11,7 @@ from viewsphere.geometry.box import (
     overlap,
     projected_bounds,
 )
-from viewsphere.geometry.camera import orbit_center, orbit_rotation, project
+from viewsphere.geometry.camera import lens_limit, orbit_center, orbit_rotation, project
 from viewsphere.geometry.pose_category import SIDES, pose_category
 from viewsphere.model.camera import Camera, Distortion, Intrinsics
 
@@ -110,31 +110,142 @@ def test_cutting_agrees_with_a_finely_divided_model():
             np.testing.assert_allclose(found, near, atol=2)
 
 
-BARREL = Distortion(model="brown_conrady", coefficients=(-0.25, 0.05, 0.001, -0.002, 0.0))
-FISHEYE = Distortion(model="fisheye", coefficients=(0.02, -0.01, 0.002, 0.0))
+LENSES = {
+    "barrel": Distortion(model="brown_conrady", coefficients=(-0.45, 0.25, 0.01, -0.015, -0.02)),
+    "folding": Distortion(model="brown_conrady", coefficients=(-0.3, 0.0, 0.0, 0.0)),
+    "pincushion": Distortion(model="brown_conrady", coefficients=(0.6, 0.4, -0.03, 0.02)),
+    "rational": Distortion(model="brown_conrady", coefficients=(0.4, 0.05, -0.001, 0.0007, 0.01, 0.9, 0.32, 0.02)),
+    "equidistant": Distortion(model="fisheye", coefficients=(0.0, 0.0, 0.0, 0.0)),
+    "fisheye": Distortion(model="fisheye", coefficients=(-0.12, 0.03, -0.02, 0.003)),
+}
 
 
-@pytest.mark.parametrize("lens", [BARREL, FISHEYE], ids=["brown_conrady", "fisheye"])
-def test_bent_edges_are_followed(lens):
-    camera = camera_at(0.4, 0.3, 3.0, lens)
-    vertices = box_vertices((-1, -0.5, -0.6), (0.8, 0.7, 0.5))
-    bounds, whole = bounds_of(camera, vertices)
-    s = np.linspace(0, 1, 5001)[:, None]
-    edges = np.concatenate([vertices[a] + s * (vertices[b] - vertices[a]) for a, b in EDGES])
-    pixels, _ = project(camera.intrinsics, edges @ camera.R.T + camera.t)
-    np.testing.assert_allclose(bounds, (*pixels.min(0), *pixels.max(0)), atol=0.01)
-    assert whole
+def finely_seen(camera, corners, samples=4001):
+    """Pixels of many points on a triangle's edges, most where one leaves the lens' field or turns, and on the field's rim."""
+    local = corners @ camera.R.T + camera.t
+    local /= np.linalg.norm(local, axis=1)[:, None]
+    found = [_rim_seen(camera, local)]
+    for a, b in zip(local, local[[1, 2, 0]], strict=True):
+        s = np.linspace(0, 1, samples)
+        for _ in range(4):
+            pixels = project(camera.intrinsics, a + s[:, None] * (b - a))[0]
+            found.append(pixels)
+            near = [*np.flatnonzero(np.diff(np.isnan(pixels[:, 0])))]
+            if not np.isnan(pixels).all():
+                near += [*np.nanargmin(pixels, axis=0), *np.nanargmax(pixels, axis=0)]
+            s = np.concatenate([np.linspace(s[max(i - 1, 0)], s[min(i + 2, len(s) - 1)], 401) for i in near] or [s])
+            s = np.unique(s)
+    pixels = np.concatenate(found)
+    return pixels[~np.isnan(pixels[:, 0])]
+
+
+def _rim_seen(camera, corners):
+    """Pixels of those directions at the limit of a lens that lie in a triangle."""
+    limit = lens_limit(camera.distortion) * (1 - 1e-9)
+    if not np.isfinite(limit):
+        return np.empty((0, 2))
+    turn = np.linspace(0, 2 * np.pi, 20001)
+    r, z = (np.sin(limit), np.cos(limit)) if camera.distortion.model == "fisheye" else (limit, 1.0)
+    rim = np.stack([r * np.cos(turn), r * np.sin(turn), np.full_like(turn, z)], axis=1)
+    return project(camera.intrinsics, rim[(np.linalg.solve(corners.T, rim.T) >= 0).all(axis=0)])[0]
+
+
+def random_camera(rng, lens, focal=300.0):
+    fx, fy = focal * rng.uniform(0.7, 1.5, 2)
+    intrinsics = Intrinsics(width=640, height=480, fx=fx, fy=fy, cx=300.0, cy=250.0, skew=rng.uniform(-9, 9), distortion=lens)
+    return Camera(intrinsics, orbit_rotation(*rng.uniform(-3, 3, 3)), rng.normal(size=3) * 0.1)
+
+
+def box_of(pixels):
+    return np.array([*pixels.min(axis=0), *pixels.max(axis=0)])
+
+
+ONE = np.array([[0, 1, 2]], np.int32)
+
+
+@pytest.mark.parametrize("name", LENSES)
+@pytest.mark.parametrize(("spread", "focal"), [(0.04, 60.0), (0.1, 300.0), (0.5, 300.0)], ids=["8 px", "small", "large"])
+def test_boxes_of_bent_triangles_are_exact_to_a_thousandth(name, spread, focal):
+    lens, rng = LENSES[name], np.random.default_rng(5)
+    reach, bulges = 0.99 * min(lens_limit(lens), 2.0 if lens.model == "fisheye" else 1.2), []
+    while len(bulges) < 40:
+        camera, out, turn = random_camera(rng, lens, focal), reach * rng.uniform(0.3, 1), rng.uniform(0, 2 * np.pi)
+        flat = out * np.array([np.cos(turn), np.sin(turn)]) + spread * rng.normal(size=(3, 2))
+        off = np.hypot(*flat.T)[:, None]
+        if off.max() > reach:
+            continue
+        local = np.hstack([flat * np.sin(off) / off, np.cos(off)] if lens.model == "fisheye" else [flat, np.ones((3, 1))])
+        triangle = (local * 10 ** rng.uniform(-1, 1, (3, 1)) - camera.t) @ camera.R
+        bounds, whole = bounds_of(camera, triangle, ONE)
+        expected = box_of(finely_seen(camera, triangle))
+        assert whole
+        np.testing.assert_allclose(bounds, expected, atol=1e-3)
+        corners = project(camera.intrinsics, triangle @ camera.R.T + camera.t)[0]
+        if focal > 60 or np.ptp(corners, axis=0).max() <= 8:
+            bulges.append(np.abs(box_of(corners) - expected).max())
+    assert max(bulges) > (0.003 if focal < 100 else 0.02)  # the corners alone would not do
+
+
+@pytest.mark.parametrize("name", LENSES)
+def test_boxes_of_triangles_that_leave_the_field_are_exact(name):
+    lens, rng, cut = LENSES[name], np.random.default_rng(6), 0
+    for _ in range(60):
+        camera = random_camera(rng, lens)
+        triangle = rng.normal(size=3) + rng.normal(size=(3, 3)) * 10 ** rng.uniform(-1.0, 0.7)
+        bounds, whole = bounds_of(camera, triangle, ONE)
+        pixels = finely_seen(camera, triangle)
+        assert (bounds is None) == (len(pixels) == 0)
+        if bounds is not None:
+            clipped, expected = np.clip(bounds, -1000, 1000), np.clip(box_of(pixels), -1000, 1000)
+            np.testing.assert_allclose(clipped, expected, atol=0.01)
+            cut += not whole
+    assert cut > (0 if name == "equidistant" else 8)
+
+
+def test_an_edge_that_reaches_behind_and_back_is_cut_twice():
+    """Both ends are in a fisheye's field, the middle is not; and an edge of which only the middle is."""
+    narrow = Distortion(model="fisheye", coefficients=(-0.2, 0.0, 0.0, 0.0))  # folds at 74 degrees
+    wide = Distortion(model="fisheye", coefficients=(-0.04, 0.0, 0.0, 0.0))  # at 165
+    for lens, corners in ((narrow, [[-9, 0.1, 1], [9, 0.1, 1], [0, 9, 1]]), (wide, [[-2, 0.1, -5], [2, 0.1, -5], [0, 5, -5]])):
+        intrinsics = Intrinsics(width=640, height=480, fx=150.0, fy=150.0, cx=320.0, cy=240.0, distortion=lens)
+        camera, triangle = Camera(intrinsics, np.eye(3), np.zeros(3)), np.array(corners, float)
+        bounds, whole = bounds_of(camera, triangle, ONE)
+        pixels = finely_seen(camera, triangle)
+        assert not whole
+        np.testing.assert_allclose(bounds, box_of(pixels), atol=0.01)
+
+
+@pytest.mark.parametrize("limit_folds", [False, True])
+def test_what_surrounds_the_camera_fills_a_fisheye(limit_folds):
+    """All corners of a cube around the camera may be seen though the middle of its back is not."""
+    lens = Distortion(model="fisheye", coefficients=(-0.04 if limit_folds else 0.0, 0.0, 0.0, 0.0))
+    intrinsics = Intrinsics(width=640, height=640, fx=90.0, fy=90.0, cx=320.0, cy=320.0, distortion=lens)
+    camera = Camera(intrinsics, np.eye(3), np.zeros(3))
+    bounds, whole = bounds_of(camera, box_vertices((-1.0,) * 3, (1.1,) * 3))
+    limit = lens_limit(lens)
+    radius = 90 * (limit + lens.coefficients[0] * limit**3)
+    assert not whole
+    np.testing.assert_allclose(bounds, (320 - radius, 320 - radius, 320 + radius, 320 + radius), atol=1e-4)
+
+
+def test_what_covers_a_whole_lens_has_the_box_of_its_limit():
+    """A wall none of whose edges is in the field."""
+    folding = LENSES["folding"]
+    wall = np.array([[-50.0, 2, -50], [50, 2, -50], [0, 2, 90]])
+    bounds, whole = bounds_of(camera_at(distance=1.0, lens=folding), wall, ONE)
+    r = lens_limit(folding)
+    radius = 500 * (r - 0.3 * r**3)
+    assert not whole
+    np.testing.assert_allclose(bounds, (320 - radius, 240 - radius, 320 + radius, 240 + radius), atol=1e-4)
 
 
 def test_edges_that_leave_a_lens_are_cut_at_its_limit():
-    folding = Distortion(model="brown_conrady", coefficients=(-0.3, 0.0, 0.0, 0.0))
-    camera = camera_at(distance=1.0, lens=folding)
+    camera = camera_at(distance=1.0, lens=LENSES["folding"])
     vertices = np.array([[0.0, 0, 0], [0.4, 0, 0], [50, 0.5, 0.1]])
-    bounds, whole = bounds_of(camera, vertices, np.array([[0, 1, 2]], np.int32))
-    edge = vertices[1] + np.linspace(0, 1, 20001)[:, None] * (vertices[2] - vertices[1])
-    pixels, _ = project(camera.intrinsics, edge @ camera.R.T + camera.t)
+    bounds, whole = bounds_of(camera, vertices, ONE)
+    pixels = finely_seen(camera, vertices)
     assert not whole
-    assert bounds[2] == pytest.approx(np.nanmax(pixels[:, 0]), abs=0.5)
+    np.testing.assert_allclose(bounds, box_of(pixels), atol=0.01)
 
 
 def test_clipping_and_overlap():

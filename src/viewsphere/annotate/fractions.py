@@ -32,7 +32,7 @@ def visible_and_cut(
     if own is None:
         if not area:
             return 0.0, 1.0
-        own = (-math.inf, -math.inf, math.inf, math.inf)  # no edge is in the lens' field because the object fills it
+        own = (-math.inf, -math.inf, math.inf, math.inf)  # all that is seen of it is nearer than boxes begin
     width, height = camera.width, camera.height
     image = (0.0, 0.0, float(width), float(height))
     if whole[object_id - 1] and not overlap(own, image):
@@ -60,9 +60,7 @@ def _unobstructed(
     for i, other in enumerate(bounds):
         if i != object_id - 1 and own and other and (not whole[i] or overlap(own, other)):
             return False
-    if geometry.ground_z is None:
-        return True
-    return float(camera.center[2]) > geometry.ground_z and not geometry.in_ground[object_id - 1]
+    return geometry.ground_z is None or float(camera.center[2]) > geometry.ground_z
 
 
 def _pixels_alone(geometry: Geometry, camera: Camera, object_id: int, own: Bounds | None) -> tuple[int, int]:

@@ -7,13 +7,14 @@ pixel corners (x0, y0, x1, y1).
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 if TYPE_CHECKING:
-    from viewsphere.model.camera import Camera
+    from viewsphere.model.camera import Camera, Distortion
 
 Float = NDArray[np.float64]
 Bounds = tuple[float, float, float, float]
@@ -46,7 +47,11 @@ EDGES = ((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4),
 NEAR = 1e-6
 """Metres in front of the camera plane from which a model's projection counts."""
 
-LONG_EDGE, SAMPLES, BISECTIONS = 8.0, 65, 50
+KNOTS = 1024
+"""Steps of the table of how much a lens bends lines, from its axis to its limit."""
+
+RIM = 1 << 14
+"""Directions along a lens' limit that are looked at."""
 
 
 def box_vertices(low: ArrayLike, high: ArrayLike) -> Float:
@@ -81,26 +86,29 @@ def projected_bounds(
     points: tuple[int, int],
     is_used: NDArray[np.bool_] | None = None,
 ) -> tuple[Bounds | None, bool]:
-    """The 2D box of triangles [faces) whose corners are world vertices [points), and whether the lens sees
+    """The 2D box of triangles [faces) whose corners are world vertices [points), and whether the camera sees
     all of them. `is_used`, if known: of all vertices, whether a triangle has them.
 
     Triangles that cross the plane z = NEAR of the camera (or the limit of a distorted lens) are cut there.
-    None if nothing of them is on the camera's side. Under lens distortion straight edges bend; they are
-    followed to 1/100 px.
+    None if nothing of them is on the camera's side. Under lens distortion straight edges bend; the box is
+    that of the bent ones, to 1e-5 px.
     """
+    from viewsphere.geometry import kernels_bent
     from viewsphere.geometry import kernels_box as kernels
 
-    if camera.distortion is not None:
-        used = vertices[triangles[faces[0] : faces[1]]]
-        x0, y0, x1, y1, whole = _distorted_bounds(camera, used)
-        return ((x0, y0, x1, y1) if x0 <= x1 else None), whole
     if faces[0] == faces[1]:
         return None, True
     if is_used is None:
         is_used = np.zeros(len(vertices), np.bool_)
         is_used[triangles[faces[0] : faces[1]]] = True
     base, stop = points
-    seen, used = np.empty((3, stop - base)), is_used[base:stop]
+    used = is_used[base:stop]
+    if camera.distortion is not None:
+        lens, rim = _bent_lens(camera.distortion, camera.K)
+        room = np.empty((stop - base, 6))
+        box, whole = kernels_bent.bent_bounds(vertices, used, base, triangles, *faces, camera.R, camera.t, lens, rim, room)
+        return (box if box[0] <= box[2] else None), whole
+    seen = np.empty((3, stop - base))
     kernels.project(vertices, base, camera.K, camera.R, camera.t, seen)
     u, v, w = seen if used.all() else seen[:, used]
     if w.min() >= NEAR:
@@ -109,32 +117,36 @@ def projected_bounds(
     return ((x0, y0, x1, y1) if x0 <= x1 else None), bool(whole)
 
 
-def _distorted_bounds(camera: Camera, corners: Float) -> tuple[float, float, float, float, bool]:
-    """As the kernel, for triangles (T, 3, 3) in the world; long edges are sampled, edges that leave the
-    lens' field cut.
-    """
-    from viewsphere.geometry.camera import project
-    from viewsphere.geometry.rotation import rigid, transform
+def _bent_lens(lens: Distortion, matrix: Float) -> tuple[tuple[Any, ...], Float]:
+    """A lens as `kernels_bent` takes it, and its rim: the directions (M, 3) at its limit where u or v turns back."""
+    from viewsphere.geometry.camera import coefficients, lens_limit
 
-    local = transform(rigid(camera.R, camera.t), corners)
-    starts, stops = local.reshape(-1, 3), local[:, (1, 2, 0)].reshape(-1, 3)
-    pixels = project(camera.intrinsics, starts)[0]
-    ends = pixels.reshape(-1, 3, 2)[:, (1, 2, 0)].reshape(-1, 2)
-    seen, end_seen = ~np.isnan(pixels[:, 0]), ~np.isnan(ends[:, 0])
-    long = seen & end_seen
-    long[long] = np.abs(pixels[long] - ends[long]).max(axis=1) > LONG_EDGE
-    s = np.linspace(0, 1, SAMPLES)[:, None, None]
-    bent = project(camera.intrinsics, (starts[long] + s * (stops[long] - starts[long])).reshape(-1, 3))[0]
-    leaving, entering = seen & ~end_seen, ~seen & end_seen
-    inside = np.concatenate([starts[leaving], stops[entering]])
-    outside = np.concatenate([stops[leaving], starts[entering]])
-    for _ in range(BISECTIONS):
-        middle = (inside + outside) / 2
-        shown = ~np.isnan(project(camera.intrinsics, middle)[0][:, :1])
-        inside, outside = np.where(shown, middle, inside), np.where(shown, outside, middle)
-    points = np.concatenate([pixels, bent, project(camera.intrinsics, inside)[0]])
-    points = points[~np.isnan(points[:, 0])]
-    if not len(points):
-        return math.inf, math.inf, -math.inf, -math.inf, bool(seen.all())
-    (x0, y0), (x1, y1) = points.min(axis=0).tolist(), points.max(axis=0).tolist()
-    return x0, y0, x1, y1, bool(seen.all())
+    fisheye, k = lens.model == "fisheye", coefficients(lens)
+    limit = lens_limit(lens) if fisheye else min(float(np.nextafter(lens_limit(lens), 0)), 1 / NEAR)
+    skew = float(matrix[0, 1] / matrix[0, 0])
+    return (fisheye, k, limit, matrix, _bends(fisheye, tuple(k.tolist()), limit)), _rim(fisheye, tuple(k.tolist()), limit, skew)
+
+
+@lru_cache(maxsize=64)
+def _bends(fisheye: bool, k: tuple[float, ...], limit: float) -> Float:
+    from viewsphere.geometry import kernels_bent
+
+    table = np.empty(KNOTS + 1)
+    kernels_bent.tabulate(fisheye, np.array(k), limit, table)
+    return table
+
+
+@lru_cache(maxsize=64)
+def _rim(fisheye: bool, k: tuple[float, ...], limit: float, skew: float) -> Float:
+    """Where a lens' limit, all the way round, is seen farthest left, right, up or down, or turns back."""
+    from viewsphere.geometry import kernels_lens as kernels
+
+    turn, within = np.linspace(0, 2 * np.pi, RIM, endpoint=False), limit * (1 - 1e-12)
+    r, z = (math.sin(within), math.cos(within)) if fisheye else (within, 1.0)
+    directions = np.stack([r * np.cos(turn), r * np.sin(turn), np.full(RIM, z)], axis=1)
+    seen = np.empty((RIM, 2))
+    (kernels.distort_fisheye if fisheye else kernels.distort_brown)(np.array(k), limit, directions, seen)
+    turns = np.zeros(RIM, np.bool_)
+    for along in (seen[:, 0] + skew * seen[:, 1], seen[:, 1]):
+        turns |= (along > np.roll(along, 1)) != (np.roll(along, -1) > along)
+    return directions[turns]

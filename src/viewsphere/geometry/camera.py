@@ -101,7 +101,7 @@ def pixel_rays(intrinsics: Intrinsics, subdivision: int = 1, window: Window | No
         return rays
     from viewsphere.geometry import kernels_lens as kernels
 
-    k, limit = _coefficients(lens), lens_limit(lens)
+    k, limit = coefficients(lens), lens_limit(lens)
     cast = kernels.rays_fisheye if lens.model == "fisheye" else kernels.rays_brown
     cast(k, limit, i.K, x0, y0, subdivision, rays)
     return rays
@@ -125,7 +125,7 @@ def project(intrinsics: Intrinsics, points: ArrayLike) -> tuple[Float, NDArray[n
 
         out = np.empty((len(flat), 2))
         distort = kernels.distort_fisheye if lens.model == "fisheye" else kernels.distort_brown
-        distort(_coefficients(lens), lens_limit(lens), flat, out)
+        distort(coefficients(lens), lens_limit(lens), flat, out)
         x, y = out.T
     pixels = np.stack([i.fx * x + i.skew * y + i.cx, i.fy * y + i.cy], axis=-1)
     return pixels.reshape(*points.shape[:-1], 2), in_front
@@ -138,7 +138,7 @@ def lens_limit(lens: Distortion) -> float:
     the angle. Brown-Conrady's Jacobian is symmetric (the map is the gradient of a potential); inside the limit it is positive
     definite all around, so the potential is convex and no two rays meet in a pixel.
     """
-    return _limit(lens.model, tuple(_coefficients(lens).tolist()))
+    return _limit(lens.model, tuple(coefficients(lens).tolist()))
 
 
 @lru_cache(maxsize=64)
@@ -192,7 +192,7 @@ def _first_positive_root(polynomial: Float) -> float:
     return 1.0 / float(real.max()) if len(real) else math.inf
 
 
-def _coefficients(lens: Distortion) -> Float:
+def coefficients(lens: Distortion) -> Float:
     """Padded to the model's full length with zeros."""
     k = np.zeros(4 if lens.model == "fisheye" else 8)
     k[: len(lens.coefficients)] = lens.coefficients

@@ -21,9 +21,6 @@ BACKGROUND = 0
 
 GROUND_REACH = 1000.0
 
-TOUCHING = 1e-6
-"""Share of an object's height within which a triangle counts as lying in the ground."""
-
 STACKED = (
     "vertices",
     "normals",
@@ -80,20 +77,6 @@ class Geometry:
         used = np.zeros(len(self.vertices), np.bool_)
         used[self.triangles] = True
         return used
-
-    @cached_property
-    def in_ground(self) -> tuple[bool, ...]:
-        """Of each object, whether one of its triangles lies in the ground's plane, where rounding decides which is seen."""
-        if self.ground_z is None:
-            return (False,) * self.object_count
-        found: list[bool] = []
-        for i in range(self.object_count):
-            base, stop = self.vertex_start[i : i + 2]
-            first, last = self.triangle_start[i : i + 2]
-            heights = self.vertices[base:stop, 2]
-            low = heights <= self.ground_z + TOUCHING * (float(heights.max(initial=self.ground_z)) - self.ground_z)
-            found.append(bool(low.any() and low[self.triangles[first:last] - base].all(axis=1).any()))
-        return tuple(found)
 
 
 def placed_meshes(things: Sequence[Thing], load: Callable[[ModelSpec], Mesh]) -> list[Mesh]:

@@ -3,7 +3,8 @@
 With q_i = K (R X_i + t) not divided by w, a pixel centre p = (x + .5, y + .5, 1) is covered by a triangle where all three
 e_i(p) = det[p, q_j, q_k] have one sign and 1/z = n.p / n.q_0 > 0, n = (q_1 - q_0) x (q_2 - q_0) = e_0 + e_1 + e_2: exactly the
 ray's intersection (Olano and Greer 1997, "Triangle scan conversion using 2D homogeneous coordinates"). Two triangles that share
-an edge evaluate the same products with opposite signs, so no pixel centre falls between them.
+an edge evaluate the same products with opposite signs, so no pixel centre falls between them. Triangles are drawn in order, and
+a later one replaces an earlier one only if its 1/z is greater by more than rounding makes it (`NEARER`).
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import math
 import numpy as np
 
 from viewsphere.kernels.jit import inner, njit
-from viewsphere.truth.kernels_row import FOUR, draw_four, shows_farther
+from viewsphere.truth.kernels_row import FOUR, NEARER, draw_four, shows_farther
 
 EPSILON = 1e-5  # pixels a bounding box is widened by: more than the edge functions' rounding
 BEHIND = -(1 << 30)
@@ -122,7 +123,7 @@ def draw(q, cell, triangles, span, canvas, cutout, cutouts, nearest, seen):
         xb, yb = -min(cell[i0, c], cell[i1, c], cell[i2, c]), -min(cell[i0, d], cell[i1, d], cell[i2, d])
         if xa > xb or ya > yb or cutout[ut] == NEVER:
             continue
-        most = max(q[i0, d], q[i1, d], q[i2, d]) * ROUNDED_UP
+        most = max(q[i0, d], q[i1, d], q[i2, d]) * (ROUNDED_UP / NEARER)
         is_small = xb - xa < SMALL and width >= FOUR
         if is_small and _hidden(nearest, xa, ya, xb, yb, most):
             continue
@@ -221,7 +222,7 @@ def _draw_rows(t, e0, e1, e2, n, box, canvas, nearest, seen):
         for x in range(left, right + 1):
             inverse = n[0] * ((x + x0 + 0.5) * step) + s
             ux = np.uintp(x)
-            better = inverse > nearest[uy, ux]
+            better = inverse > nearest[uy, ux] * NEARER
             nearest[uy, ux] = inverse if better else nearest[uy, ux]
             seen[uy, ux] = t if better else seen[uy, ux]
 
@@ -248,7 +249,7 @@ def _draw_checked(t, q0, q1, q2, box, canvas, bounds, cutout, cutouts, nearest, 
             if not ((e0 >= 0.0 and e1 >= 0.0 and e2 >= 0.0) or (e0 <= 0.0 and e1 <= 0.0 and e2 <= 0.0)):
                 continue
             inverse = min(max((nx * px + (ny * py + nz)) / det, bounds[0]), bounds[1])
-            if inverse > nearest[y, x] and hits_surface(cutouts, cutout, e0, e1, e2):
+            if inverse > nearest[y, x] * NEARER and hits_surface(cutouts, cutout, e0, e1, e2):
                 nearest[y, x] = inverse
                 seen[y, x] = t
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from viewsphere.kernels.jit import inner, njit
 from viewsphere.truth.kernels_draw import NEVER, edge, hits_surface, negated, plane
+from viewsphere.truth.kernels_row import NEARER
 
 LEAF = 8  # pixels of a leaf's side
 MANY_CELLS, MANY_PIXELS = 64, 1024  # of a triangle's box: beyond them the tree is faster
@@ -261,6 +262,6 @@ def _draw_box(t, a, b, c, n, sliver, bounds, rays, box, origin, cutout, cutouts,
             if inside or (sliver and e0 <= 0.0 and e1 <= 0.0 and e2 <= 0.0):
                 inverse = min(max(n[0] * dx + (n[1] * dy + n[2] * dz), bounds[0]), bounds[1])
                 i, j = x - x0, y - y0
-                if inverse > nearest[j, i] and hits_surface(cutouts, cutout, e0, e1, e2):
+                if inverse > nearest[j, i] * NEARER and hits_surface(cutouts, cutout, e0, e1, e2):
                     nearest[j, i] = inverse
                     seen[j, i] = t

@@ -9,6 +9,10 @@ from llvmlite import ir
 from numba.extending import intrinsic
 
 FOUR = 4
+NEARER = 1.0 + 2.0**-22
+"""By how much 1/z of a surface has to exceed that of the one seen so far to be seen instead: what is nearer by less lies in one
+place with it. Four times the rounding of the models' float32 coordinates, which make one plane two, and of float32 depth.
+"""
 _REAL, _WHOLE, _FLAGS = ir.DoubleType(), ir.IntType(32), ir.IntType(FOUR)
 _REALS, _WHOLES = ir.VectorType(_REAL, FOUR), ir.VectorType(_WHOLE, FOUR)
 _EDGES = nb.types.UniTuple(nb.float64, 3)
@@ -45,7 +49,7 @@ def draw_four(
 ) -> Any:
     """Show triangle t at the samples from flat index `at` on, at (first + i) step along the row, that are inside and nearer.
 
-    Inside is where e x + f is not negative for all three edges; 1/z is n x + s.
+    Inside is where e x + f is not negative for all three edges; 1/z is n x + s, which has to exceed that shown times NEARER.
     """
 
     def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
@@ -59,7 +63,7 @@ def draw_four(
             return builder.fadd(builder.fmul(_spread(builder, slope), x), _spread(builder, offset))
 
         shown, inverse = builder.load(place, align=8), line(n, s)
-        flags = builder.fcmp_ordered(">", inverse, shown)
+        flags = builder.fcmp_ordered(">", inverse, builder.fmul(shown, ir.Constant(_REALS, [NEARER] * FOUR)))
         for i in range(3):
             value = line(builder.extract_value(e, i), builder.extract_value(f, i))
             flags = builder.and_(flags, builder.fcmp_ordered(">=", value, ir.Constant(_REALS, [0.0] * FOUR)))

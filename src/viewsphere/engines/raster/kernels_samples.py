@@ -28,6 +28,7 @@ from viewsphere.truth.kernels_draw import (
     plane,
 )
 from viewsphere.truth.kernels_rays import LEAF, leaf_list, limits, pixel_box, touched
+from viewsphere.truth.kernels_row import NEARER
 
 U = nb.uintp
 TIE = 1e-5  # relative difference of 1/z below which surfaces lie on one another
@@ -286,10 +287,16 @@ def _draw_solid(surface, edges, found, count, points, solid):
             )
             inverse = n[0] * px + (n[1] * py + n[2])
             old = nearest[U(k), i]
-            if inside & ((inverse > old) | ((inverse == old) & (t < seen[U(k), i]))):
+            if inside & _is_before(inverse, t, old, seen[U(k), i]):
                 nearest[U(k), i], seen[U(k), i] = inverse, t
             least = min(least, level(nearest[U(k), i]))
         farthest[row, column] = max(farthest[row, column], least)
+
+
+@inner
+def _is_before(inverse, t, old, seen):
+    """Whether triangle t is seen instead of another: what truth, which draws in order, decides by `NEARER` alone."""
+    return (inverse > old * NEARER) | ((t < seen) & (inverse * NEARER >= old))
 
 
 @inner
@@ -322,7 +329,7 @@ def _cast(surface, edges, ray, p, cutouts, triangles, solid, fragments):
     if is_see_through:
         if inverse > 0.0 and inverse * (1.0 + TIE) >= nearest[p] and hits_surface(cutouts, cutout, e0, e1, e2):
             _insert(t, inverse, p, triangles, fragments)
-    elif (inverse > nearest[p] or (inverse == nearest[p] and t < seen[p])) and hits_surface(cutouts, cutout, e0, e1, e2):
+    elif _is_before(inverse, t, nearest[p], seen[p]) and hits_surface(cutouts, cutout, e0, e1, e2):
         nearest[p] = inverse
         seen[p] = t
 
