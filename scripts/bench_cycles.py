@@ -23,7 +23,7 @@ from viewsphere import Recipe, plan, plugins
 from viewsphere.annotate import annotate
 from viewsphere.blender.interpreter import find_blender
 from viewsphere.engines import Engine
-from viewsphere.engines.cycles.staging import CyclesStage
+from viewsphere.engines._blender.staging import CyclesStage
 from viewsphere.geometry.box import box_vertices
 from viewsphere.model.shot import Shot
 from viewsphere.run.stages import Stages

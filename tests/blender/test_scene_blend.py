@@ -12,8 +12,8 @@ from viewsphere import Dataset, Recipe, generate, plan, render
 from viewsphere.assets.cache import load_normalised
 from viewsphere.check import check
 from viewsphere.engines import cycles
-from viewsphere.engines.cycles.file_frame import FileFrame
-from viewsphere.engines.cycles.staging import told_camera
+from viewsphere.engines._blender.file_frame import FileFrame
+from viewsphere.engines._blender.staging import told_camera
 from viewsphere.errors import RecipeError
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.run.stages import Stages

@@ -10,7 +10,7 @@ import numpy as np
 from shots import camera_of
 from viewsphere import Recipe, plan
 from viewsphere.engines import cycles
-from viewsphere.engines.cycles.staging import Arrangement, told_camera
+from viewsphere.engines._blender.staging import Arrangement, told_camera
 from viewsphere.model.shot import Shot
 from viewsphere.run.stages import Stages
 

@@ -14,7 +14,7 @@ from cycles_scenes import DRAFT, HAIR_DRIER, asked, moved_camera, recipe_of, shi
 
 from viewsphere import render
 from viewsphere.assets.srgb import linear
-from viewsphere.engines.cycles.staging import border_of, keeper_of
+from viewsphere.engines._blender.staging import border_of, keeper_of
 from viewsphere.errors import UserError
 from viewsphere.truth.visibility import rasterize
 

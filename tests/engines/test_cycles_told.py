@@ -11,10 +11,10 @@ from cycles_scenes import recipe_of, stages
 
 from viewsphere import plan
 from viewsphere.engines import cycles
-from viewsphere.engines.cycles.lens import resampled, views_of
-from viewsphere.engines.cycles.options import PRESETS, Options, parse_options
-from viewsphere.engines.cycles.staging import border_of
-from viewsphere.engines.cycles.told import told_scene
+from viewsphere.engines._blender.lens import resampled, views_of
+from viewsphere.engines._blender.options import PRESETS, Options, parse_options
+from viewsphere.engines._blender.requests import told_scene
+from viewsphere.engines._blender.staging import border_of
 from viewsphere.errors import MissingExtraError, RecipeError, UserError, ViewsphereError
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.model.camera import Camera, Distortion, Intrinsics

@@ -14,10 +14,10 @@ from shots import camera_of
 from viewsphere import plan, plugins, render
 from viewsphere.blender.interpreter import VARIABLE
 from viewsphere.engines import eevee, workbench
-from viewsphere.engines.cycles.backdrop import Backdrop
-from viewsphere.engines.cycles.options import EEVEE_PRESETS, WORKBENCH_PRESETS, Eevee, Workbench, options_of
-from viewsphere.engines.cycles.staging import SPARE, clip_of
-from viewsphere.engines.cycles.told import told_scene, told_settings
+from viewsphere.engines._blender.backdrop import Backdrop
+from viewsphere.engines._blender.options import EEVEE_PRESETS, WORKBENCH_PRESETS, Eevee, Workbench, options_of
+from viewsphere.engines._blender.requests import told_scene, told_settings
+from viewsphere.engines._blender.staging import SPARE, clip_of
 from viewsphere.errors import RecipeError
 from viewsphere.imaging.finish import finished
 from viewsphere.sampling.look import engine_look

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 if TYPE_CHECKING:
-    from viewsphere.model.camera import Camera, Distortion
+    from viewsphere.geometry.lens import Camera, Distortion
 
 Float = NDArray[np.float64]
 Bounds = tuple[float, float, float, float]

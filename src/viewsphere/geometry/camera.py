@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 if TYPE_CHECKING:
-    from viewsphere.model.camera import Distortion, Intrinsics
+    from viewsphere.geometry.lens import Distortion, Intrinsics
 
 Float = NDArray[np.float64]
 Window = tuple[int, int, int, int]

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from viewsphere.assets.mesh import Image, Material, Mesh
 from viewsphere.assets.repaint import repainted
-from viewsphere.engines.cycles.file_frame import FileFrame
-from viewsphere.engines.cycles.options import AnyOptions
-from viewsphere.engines.cycles.texels import Kind, Levels
+from viewsphere.engines._blender.file_frame import FileFrame
+from viewsphere.engines._blender.options import AnyOptions
+from viewsphere.engines._blender.texels import Kind, Levels
 from viewsphere.model.scene import AnyLight, BlendScene, Ground, HemisphereLight, Scene
 from viewsphere.model.thing import Repaint, Thing
 from viewsphere.surroundings.ground import ground_frame, ground_material, only_scatters

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.engines.cycles.told import BEGIN, FLAT, FLATTER, OVER, extent
+from viewsphere.engines._blender.requests import BEGIN, FLAT, FLATTER, OVER, extent
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.model.camera import Camera
 from viewsphere.model.shot import Shot

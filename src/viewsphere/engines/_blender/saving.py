@@ -13,8 +13,8 @@ import numpy as np
 from viewsphere.assets.mesh import Mesh
 from viewsphere.assets.srgb import encoded
 from viewsphere.codecs.png_tiff import encode_png
-from viewsphere.engines.cycles.file_frame import FileFrame
-from viewsphere.engines.cycles.staging import STAGE_SECONDS, Arrangement, build_stage, told_camera
+from viewsphere.engines._blender.file_frame import FileFrame
+from viewsphere.engines._blender.staging import STAGE_SECONDS, Arrangement, build_stage, told_camera
 from viewsphere.errors import BlenderDied, ModelError
 from viewsphere.geometry.camera import orbit_angles
 from viewsphere.imaging.background import display_background

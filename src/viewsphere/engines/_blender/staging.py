@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 from viewsphere.assets.mesh import Mesh
 from viewsphere.blender.interpreter import GRAPHICS, find_blender
 from viewsphere.blender.process import BlenderProcess
-from viewsphere.engines.cycles.backdrop import Backdrop
-from viewsphere.engines.cycles.file_frame import FileFrame
-from viewsphere.engines.cycles.lens import resampled, views_of
-from viewsphere.engines.cycles.options import AnyOptions, options_of
-from viewsphere.engines.cycles.texels import Kind, Levels
-from viewsphere.engines.cycles.told import kinds_of, told_looks, told_scene
+from viewsphere.engines._blender.backdrop import Backdrop
+from viewsphere.engines._blender.file_frame import FileFrame
+from viewsphere.engines._blender.lens import resampled, views_of
+from viewsphere.engines._blender.options import AnyOptions, options_of
+from viewsphere.engines._blender.requests import kinds_of, told_looks, told_scene
+from viewsphere.engines._blender.texels import Kind, Levels
 from viewsphere.errors import BlenderDied, BlenderError, ModelError, RecipeError, UserError
 from viewsphere.imaging.background import display_background
 from viewsphere.imaging.finish import finished

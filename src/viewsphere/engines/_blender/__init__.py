@@ -1,7 +1,4 @@
-"""cycles: path-traced pictures by Blender's Cycles, which runs in a process of its own; labels are the same as raster's.
-
-The engines `eevee` and `workbench` are Blender's other renderers, and this package's work but for their names.
-"""
+"""What Blender's renderers have in common: `cycles`, `eevee` and `workbench` are this package's work but for their names."""
 
 from __future__ import annotations
 
@@ -13,26 +10,20 @@ if TYPE_CHECKING:
     from pydantic import JsonValue
 
     from viewsphere.assets.mesh import Mesh
-    from viewsphere.engines.cycles.staging import CyclesStage
+    from viewsphere.engines._blender.staging import CyclesStage
     from viewsphere.model.model_spec import ModelSpec
     from viewsphere.model.sample import Sample
     from viewsphere.model.scene import Finish
     from viewsphere.model.shot import Shot
 
-PROGRAMS = (Path(__file__).parents[2] / "blender" / "worker",)
-"""Sources besides these that pictures depend on."""
-
-SOURCES = (Path(__file__).parent, *PROGRAMS)
-"""The same, and these: what the pictures of Blender's other renderers depend on."""
-
-OPENS_SCENES = True
-"""It renders .blend files that are the scene."""
+PROGRAMS = (Path(__file__).parent, Path(__file__).parents[2] / "blender" / "worker")
+"""Sources that the pictures of all these renderers depend on."""
 
 
-def check(options: Mapping[str, JsonValue], renderer: str = "cycles") -> None:
+def check(options: Mapping[str, JsonValue], renderer: str) -> None:
     """Raise UserError for an option that is not known (with the nearest name), out of range, or without a Blender."""
     from viewsphere.blender.interpreter import find_blender
-    from viewsphere.engines.cycles.options import options_of
+    from viewsphere.engines._blender.options import options_of
 
     find_blender(options_of(renderer, options).python)
 
@@ -42,20 +33,20 @@ def stage(shot: Shot, load: Callable[[ModelSpec], Mesh]) -> CyclesStage:
 
     Raises UserError for an unknown engine option or one out of range, or where Blender cannot be used.
     """
-    from viewsphere.engines.cycles.staging import build_stage
+    from viewsphere.engines._blender.staging import build_stage
 
     return build_stage(shot, load)
 
 
 def save(shot: Shot, samples: Sequence[Sample], load: Callable[[ModelSpec], Mesh], file: Path, data: str) -> tuple[str, ...]:
     """Write a shot of any engine as a .blend file, with the cameras of its frames' samples; see `saving.save`."""
-    from viewsphere.engines.cycles import saving
+    from viewsphere.engines._blender import saving
 
     return saving.save(shot, samples, load, file, data)
 
 
 def shows_sky(shot: Shot, finish: Finish) -> bool:
     """Whether a picture of a shot has the sky where nothing else is; `save` wants frames that agree in this."""
-    from viewsphere.engines.cycles import saving
+    from viewsphere.engines._blender import saving
 
     return saving.shows_sky(shot, finish)

@@ -1,0 +1,116 @@
+"""What lies in a folder that is finished: each file's size and digest, in a file that is written last and proves itself.
+
+    {"files": {"depth/00000012.tiff": [34180, "6f0c..."], ...}, "digest": "91d2..."}
+
+Digests are XXH3 of 128 bits (https://github.com/Cyan4973/xxHash): they find damage at the speed of memory, and are no proof
+against somebody who wants to deceive.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import xxhash
+
+from viewsphere.errors import StoreError
+
+MANIFEST = "manifest.json"
+"""Name of the file in a finished folder."""
+
+BLOCK = 1 << 20
+"""Bytes of a file that are read at once."""
+
+Told = tuple[int, str]
+"""A file's size in bytes and its digest."""
+
+
+def digest(data: bytes | memoryview) -> str:
+    """The digest of some bytes, 32 hexadecimal digits."""
+    return xxhash.xxh3_128_hexdigest(data)
+
+
+def sealed(value: Mapping[str, Any]) -> str:
+    """The text of a JSON object that carries its own digest."""
+    text = json.dumps(value, separators=(",", ":"), allow_nan=False)
+    return f'{text[:-1]}{"," if value else ""}"digest":"{digest(text.encode())}"}}'
+
+
+def unsealed(text: str) -> dict[str, Any]:
+    """What `sealed` was given; raises ValueError for a text that was changed since."""
+    start, comma, _ = text.rpartition(',"digest":"')
+    if not comma or f'{start},"digest":"{digest((start + "}").encode())}"}}' != text:
+        raise ValueError("a text that was changed since it was written: its digest is another")
+    return json.loads(start + "}")
+
+
+def told_of(file: Path) -> Told:
+    """A file's size and digest, read block by block."""
+    found, size = xxhash.xxh3_128(), 0
+    with file.open("rb") as stream:
+        while block := stream.read(BLOCK):
+            found.update(block)
+            size += len(block)
+    return size, found.hexdigest()
+
+
+@dataclass(frozen=True)
+class Manifest:
+    """The files of a folder by their paths in it."""
+
+    files: Mapping[str, Told]
+
+    @staticmethod
+    def of(folder: Path) -> Manifest:
+        """What lies in a folder and below, but for the manifest itself."""
+        paths = sorted(path for path in folder.rglob("*") if path.is_file() and path != folder / MANIFEST)
+        return Manifest({path.relative_to(folder).as_posix(): told_of(path) for path in paths})
+
+    @staticmethod
+    def read(folder: Path) -> Manifest:
+        """The manifest of a finished folder; raises StoreError where there is none, or it was damaged."""
+        file = folder / MANIFEST
+        try:
+            value: dict[str, list[Any]] = unsealed(file.read_text("utf-8"))["files"]
+            return Manifest({path: (int(size), str(found)) for path, (size, found) in value.items()})
+        except (OSError, LookupError, TypeError, ValueError, AttributeError) as error:
+            problem = (error.strerror if isinstance(error, OSError) else None) or error
+            raise StoreError(f"{file}: expected the manifest of a finished folder, found {problem}: {REPAIR}") from None
+
+    def write(self, folder: Path) -> None:
+        """Write it into its folder, whose other files are whole."""
+        (folder / MANIFEST).write_text(sealed({"files": {path: list(told) for path, told in self.files.items()}}), "utf-8")
+
+    def check(self, path: str, data: bytes, file: Path) -> None:
+        """Raises StoreError where the bytes of a file are not those that were written."""
+        told = self.files.get(path)
+        if told != (len(data), digest(data)):
+            raise StoreError(f"{file}: expected {said(told)}, found {said((len(data), digest(data)))}: {REPAIR}")
+
+    def damage(self, folder: Path) -> Iterator[str]:
+        """What is not as it was written: files that are missing, changed, or too many."""
+        for path, told in self.files.items():
+            try:
+                found = told_of(folder / path)
+            except OSError as error:
+                yield f"{folder / path}: expected {said(told)}, found {error.strerror or error}"
+                continue
+            if found != told:
+                yield f"{folder / path}: expected {said(told)}, found {said(found)}"
+        yield from (f"{path}: expected no such file" for path in self._strangers(folder))
+
+    def _strangers(self, folder: Path) -> Iterable[Path]:
+        known = {folder / path for path in (*self.files, MANIFEST)}
+        return (path for path in sorted(folder.rglob("*")) if path.is_file() and path not in known)
+
+
+REPAIR = "mend it with viewsphere check --repair"
+"""What a user can do about damaged files."""
+
+
+def said(told: Told | None) -> str:
+    """A file's size and the beginning of its digest, in words."""
+    return "no such file" if told is None else f"{told[0]:,} bytes with digest {told[1][:12]}"
