@@ -1,4 +1,4 @@
-"""Generated pages: the command line, the table of channels, the recipe's schema."""
+"""Generated pages: the command line, the table of channels, the recipe's schema and its tables of fields."""
 
 from __future__ import annotations
 
