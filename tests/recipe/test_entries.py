@@ -37,13 +37,13 @@ class HaloEntry(entry_of(Halo, without=("seed",), fixed=("solid",), optional=("w
     at: str | None = Field(default=None, description="or the name of a place")
 
 
-class Bloom(Effects):
+class MoreEffects(Effects):
     """Effects with one field more than ours."""
 
-    bloom: Portion = Field(default=0.25, description="light that spills over")
+    example: Portion = Field(default=0.25, description="what it is for")
 
 
-class BloomEntry(entry_of(Bloom, without=("seed",)), finish.PerFrame):
+class MoreEffectsEntry(entry_of(MoreEffects, without=("seed",)), finish.PerFrame):
     """What a recipe would say of it."""
 
 
@@ -56,16 +56,16 @@ def rng_of(path):
 
 
 def test_a_field_that_is_added_to_the_scene_is_one_of_recipes():
-    assert [*BloomEntry.model_fields] == [*finish.EffectsEntry.model_fields, "bloom"]
-    told = properties(BloomEntry)
-    assert told["bloom"] == {**told["blur"], "default": 0.25, "description": "light that spills over", "title": "Bloom"}
-    assert concrete(drawn(BloomEntry(), rng_of)) == Bloom()
-    made = concrete(drawn(BloomEntry(bloom=[0.4, 0.6], blur={"choice": [0.1]}), rng_of))
-    assert (type(made), made.blur) == (Bloom, 0.1)
-    assert 0.4 <= made.bloom <= 0.6
+    assert [*MoreEffectsEntry.model_fields] == [*finish.EffectsEntry.model_fields, "example"]
+    told = properties(MoreEffectsEntry)
+    assert told["example"] == {**told["blur"], "default": 0.25, "description": "what it is for", "title": "Example"}
+    assert concrete(drawn(MoreEffectsEntry(), rng_of)) == MoreEffects()
+    made = concrete(drawn(MoreEffectsEntry(example=[0.4, 0.6], blur={"choice": [0.1]}), rng_of))
+    assert (type(made), made.blur) == (MoreEffects, 0.1)
+    assert 0.4 <= made.example <= 0.6
     for beyond in (1.5, [0, 1.5], "0.5", {"normal": [1.5, 1]}):
         with pytest.raises(ValidationError):
-            BloomEntry(bloom=beyond)
+            MoreEffectsEntry(example=beyond)
 
 
 def test_fields_stand_in_the_scene_s_order_behind_those_of_the_body_but_optional_ones_before():
