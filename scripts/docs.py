@@ -1,9 +1,10 @@
-"""Generated pages: the command line, the table of channels, the recipe's schema."""
+"""Generated pages: the command line, the table of channels, the recipe's schema and its tables of fields."""
 
 from __future__ import annotations
 
 import inspect
 import json
+import re
 import sys
 from enum import Enum
 from pathlib import Path
@@ -75,9 +76,44 @@ def channels_page() -> str:
     return text
 
 
+FIELDS = re.compile(r"(<!-- fields of (.+?), written by scripts/docs -->\n).*?(?=\n<!-- end -->)", re.DOTALL)
+
+
+def recipe_page() -> str:
+    """The hand-written page with its tables of fields as the schema has them."""
+    entries = schema()["$defs"]
+    return FIELDS.sub(
+        lambda found: found[1] + fields_table(entries, found[2].split(", ")), (DOCS / "recipe.md").read_text("utf-8")
+    )
+
+
+def fields_table(entries: dict[str, Any], named: list[str]) -> str:
+    """Fields of one entry, or of several: `point=PointEntry, spot=SpotEntry`; one that not all have says whose it is."""
+    kinds = {name: entries[entry or name] for name, _, entry in (one.partition("=") for one in named)}
+    rows: dict[tuple[str, str, str], list[str]] = {}
+    for kind, entry in kinds.items():
+        for name, field in entry["properties"].items():
+            first = "needed" if name in entry.get("required", ()) else value(field.get("default"))
+            rows.setdefault((name, first, field["description"]), []).append(kind)
+    text = "\n| field | default | meaning |\n|---|---|---|\n"
+    for (name, first, meaning), of in rows.items():
+        text += f"| `{name}` | {first} | {'' if len(of) == len(kinds) else ', '.join(of) + ': '}{meaning} |\n"
+    return text
+
+
+def value(default: Any) -> str:
+    """A default as a recipe would have it; empty for none."""
+    if isinstance(default, list):
+        return f"[{', '.join(map(value, default))}]"
+    if isinstance(default, str):
+        return f"`{default}`"
+    return "" if default is None else str(default).lower() if isinstance(default, bool) else f"{default:g}"
+
+
 PAGES = {
     "cli.md": cli_page,
     "channels.md": channels_page,
+    "recipe.md": recipe_page,
     "recipe.schema.json": lambda: json.dumps(schema(), indent=1) + "\n",
 }
 

@@ -1,4 +1,4 @@
-"""The kinds of number that what a user writes may hold."""
+"""The kinds of number that recipes and scenes hold, with the limits of each."""
 
 from __future__ import annotations
 
@@ -9,12 +9,22 @@ from pydantic import BeforeValidator, Field
 LARGEST = 1e9
 """Of any number in a recipe: metres, degrees, pixels; beyond it what is meant is out of every picture."""
 
+FARTHEST = 1e5
+"""Metres that anything of a scene may be away from its middle, as large as models may be: single precision ends soon after."""
 
-def _whole(value: object) -> object:
+
+def whole(value: object) -> object:
+    """A float without a fraction as a whole number; anything else as it is."""
     return int(value) if isinstance(value, float) and value.is_integer() else value
 
 
 Number = Annotated[float, Field(strict=True, ge=-LARGEST, le=LARGEST)]
 Positive = Annotated[float, Field(strict=True, gt=0, le=LARGEST)]
-Count = Annotated[int, BeforeValidator(_whole), Field(strict=True, ge=1)]
-Natural = Annotated[int, BeforeValidator(_whole), Field(strict=True, ge=0)]
+Strength = Annotated[float, Field(strict=True, ge=0, le=LARGEST)]
+Amount = Annotated[float, Field(strict=True, ge=0, le=1e6)]
+Portion = Annotated[float, Field(strict=True, ge=0, le=1)]
+Signed = Annotated[float, Field(strict=True, ge=-1, le=1)]
+Length = Annotated[float, Field(strict=True, gt=0, le=FARTHEST)]
+Metres = Annotated[float, Field(strict=True, ge=-FARTHEST, le=FARTHEST)]
+Count = Annotated[int, BeforeValidator(whole), Field(strict=True, ge=1)]
+Natural = Annotated[int, BeforeValidator(whole), Field(strict=True, ge=0)]

@@ -10,35 +10,40 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from viewsphere.model.frozen import Frozen
+from viewsphere.model.numbers import Amount, Length, Metres, Number, Portion, Signed, Strength
 
 Vector = tuple[float, float, float]
 Row = tuple[float, float, float, float]
 Matrix4 = tuple[Row, Row, Row, Row]
 IDENTITY: Matrix4 = ((1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0), (0.0, 0.0, 0.0, 1.0))
-Component = Annotated[float, Field(ge=0)]
-Color = tuple[Component, Component, Component]
-Share = Annotated[float, Field(ge=0, le=1)]
-Strength = Annotated[float, Field(ge=0)]
+Position = tuple[Metres, Metres, Metres]
+
+LINEAR, SRGB, PICTURE = "linear", "sRGB", "picture"
+"""Say of a field what kind of colour it is, or that it names a file: recipes have short forms for these."""
+
+Color = Annotated[tuple[Amount, Amount, Amount], LINEAR]
+Srgb = Annotated[tuple[Portion, Portion, Portion], SRGB]
+Picture = Annotated[str, Field(min_length=1), PICTURE]
 WHITE: Color = (1.0, 1.0, 1.0)
 
 
 class Sun(Frozen):
     """A distant light. Azimuth and elevation are those of the direction it stands in, as for cameras."""
 
-    azimuth_deg: float = Field(default=40.0, description="direction the sun stands in, degrees, as for cameras")
+    azimuth_deg: Number = Field(default=40.0, description="where it stands, degrees, as for cameras")
     elevation_deg: float = Field(default=50.0, gt=0, le=90, description="degrees above the horizon")
-    strength: float = Field(default=3.0, ge=0, description="irradiance on a plane that faces the sun, in the sky's units")
-    color: Color = Field(default=(1.0, 0.96, 0.9), description="linear red, green, blue")
-    angle_deg: float = Field(default=0.53, ge=0, le=60, description="how wide the sun is: wider means softer shadows")
+    strength: Strength = Field(default=3.0, description="irradiance of what faces it, in the sky's units")
+    color: Color = Field(default=(1.0, 0.96, 0.9), description="linear [r, g, b]")
+    angle_deg: float = Field(default=0.53, ge=0, le=60, description="how wide it is: wider means softer shadows")
 
 
 class Sky(Frozen):
-    """Ambient light from above: a vertical gradient, linear colours."""
+    """Ambient light from above: a vertical gradient."""
 
     kind: Literal["gradient"] = Field(default="gradient", description="a vertical gradient")
-    zenith: Color = Field(default=(0.55, 0.7, 1.0), description="linear red, green, blue overhead")
-    horizon: Color = Field(default=(0.9, 0.92, 0.95), description="linear red, green, blue at the horizon")
-    strength: float = Field(default=1.0, ge=0, description="factor of both colours")
+    zenith: Color = Field(default=(0.55, 0.7, 1.0), description="colour overhead: linear [r, g, b]")
+    horizon: Color = Field(default=(0.9, 0.92, 0.95), description="colour at the horizon: linear [r, g, b]")
+    strength: Strength = Field(default=1.0, description="factor of both colours")
 
 
 class Daylight(Frozen):
@@ -46,143 +51,158 @@ class Daylight(Frozen):
 
     kind: Literal["daylight"] = Field(default="daylight", description="a sky made by the sun's place")
     turbidity: float = Field(default=3.0, ge=1.8, le=10, description="haze: 2 is very clear, 10 hazy")
-    clouds: Share = Field(default=0.0, description="0 clear, 1 overcast: then there is no sun")
-    strength: float = Field(default=1.0, ge=0, description="factor of the sky's radiance")
+    clouds: Portion = Field(default=0.0, description="0 clear, 1 overcast: then there is no sun")
+    strength: Strength = Field(default=1.0, description="factor of the sky's light")
 
 
 class Environment(Frozen):
     """Light from everywhere, from a picture of the whole sphere (equirectangular EXR or HDR, linear)."""
 
     kind: Literal["hdri"] = Field(default="hdri", description="a picture of the whole sphere")
-    file: str = Field(description="path of an EXR or HDR file")
-    rotation_deg: float = Field(default=0.0, description="turns the picture about the vertical, counter-clockwise from above")
-    strength: float = Field(default=1.0, ge=0, description="factor of its radiance")
+    file: str = Field(description="absolute path of an EXR or HDR file")
+    strength: Strength = Field(default=1.0, description="factor of its light")
+    rotation_deg: Number = Field(default=0.0, description="turns it about the vertical, counter-clockwise from above")
 
 
 AnySky = Annotated[Sky | Daylight | Environment, Field(discriminator="kind")]
 
 
-class PointLight(Frozen):
-    """A small ball that shines everywhere. Positions are metres from the centre of the box around the targets, world axes.
+class Light(Frozen):
+    """What all lamps have."""
 
-    `strength` is the irradiance at one metre, facing the light.
-    """
-
-    kind: Literal["point"] = "point"
-    position: Vector
-    strength: Strength
-    color: Color = WHITE
-    radius: float = Field(default=0.05, ge=0)
+    strength: Strength = Field(description="irradiance at one metre, facing it; of a hemisphere its radiance")
+    color: Color = Field(default=WHITE, description="linear [r, g, b]")
 
 
-class SpotLight(Frozen):
+class PlacedLight(Light):
+    """A lamp that stands somewhere, in world axes."""
+
+    position: Position = Field(description="[x, y, z] in metres from the centre of the targets' box")
+
+
+class AimedLight(PlacedLight):
+    """A lamp that points somewhere: two places give the direction."""
+
+    toward: Position = Field(default=(0.0, 0.0, 0.0), description="what it points at, [x, y, z] as for position")
+
+
+class PointLight(PlacedLight):
+    """A small ball that shines everywhere."""
+
+    kind: Literal["point"] = Field(default="point", description="a small ball that shines everywhere")
+    radius: Amount = Field(default=0.05, description="metres: larger means softer shadows")
+
+
+class SpotLight(AimedLight):
     """A small disc that shines into a cone around the direction to `toward`; full inside of (1 - blend) of its angle."""
 
-    kind: Literal["spot"] = "spot"
-    position: Vector
-    strength: Strength
-    color: Color = WHITE
-    radius: float = Field(default=0.05, ge=0)
-    toward: Vector = (0.0, 0.0, 0.0)
-    angle_deg: float = Field(default=45.0, gt=0, le=160)  # of the whole cone
-    blend: Share = 0.15
+    kind: Literal["spot"] = Field(default="spot", description="a cone of light")
+    radius: Amount = Field(default=0.05, description="metres: larger means softer shadows")
+    angle_deg: float = Field(default=45.0, gt=0, le=160, description="of the whole cone")
+    blend: Portion = Field(default=0.15, description="share of the cone that fades")
 
 
-class AreaLight(Frozen):
+class AreaLight(AimedLight):
     """A rectangle that shines to one side, towards `toward`, as Lambert says; its width lies level."""
 
-    kind: Literal["area"] = "area"
-    position: Vector
-    strength: Strength
-    color: Color = WHITE
-    toward: Vector = (0.0, 0.0, 0.0)
-    size: tuple[float, float] = (1.0, 1.0)  # metres
+    kind: Literal["area"] = Field(default="area", description="a rectangle that shines to one side")
+    size: tuple[Length, Length] = Field(default=(1.0, 1.0), description="[width, height] in metres")
 
 
-class HemisphereLight(Frozen):
+class HemisphereLight(Light):
     """Even light from above and another from below: radiance `strength` times each colour. It casts no shadow."""
 
-    kind: Literal["hemisphere"] = "hemisphere"
-    strength: Strength
-    color: Color = WHITE
-    below: Color = (0.0, 0.0, 0.0)
+    kind: Literal["hemisphere"] = Field(default="hemisphere", description="even light from above, and other from below")
+    below: Color = Field(default=(0.0, 0.0, 0.0), description="colour of what comes from below: linear [r, g, b]")
 
 
 AnyLight = Annotated[PointLight | SpotLight | AreaLight | HemisphereLight, Field(discriminator="kind")]
 
 
 class Ground(Frozen):
-    """A horizontal plane at the lowest point of all that is placed. Images repeat every `tile` metres.
+    """A horizontal plane at the lowest point of all that is placed.
 
     A catcher shows nothing but the shadows and the occlusion it receives.
     """
 
-    color: Color = (0.56, 0.55, 0.53)  # sRGB 0..1; multiplies the image
-    image: str | None = None  # absolute path, sRGB
-    roughness: Share = 1.0
-    roughness_image: str | None = None
-    normal_image: str | None = None
-    metallic: Share = 0.0
-    tile: float = Field(default=2.0, gt=0)
-    catcher: bool = False
+    color: Srgb = Field(
+        default=(0.56, 0.55, 0.53), description="multiplies the image, beside which the default is white: sRGB [r, g, b]"
+    )
+    image: Picture | None = Field(default=None, description="path of a picture that repeats every `tile` metres")
+    roughness: Portion = Field(default=1.0, description="0 a mirror, 1 matt")
+    roughness_image: Picture | None = Field(default=None, description="path of a grey picture: 0 smooth, white rough")
+    normal_image: Picture | None = Field(default=None, description="path of a normal map (green up)")
+    metallic: Portion = Field(default=0.0, description="1: metal")
+    tile: Length = Field(default=2.0, description="metres after which images repeat")
+    catcher: bool = Field(default=False, description="true: only the shadows on it are seen, over the background")
 
 
 class Background(Frozen):
     """What is seen where nothing else is: a plain colour, an image, else the sky.
 
     cover: the largest centred part with the frame's proportions; stretch: all of it; crop: a part of the frame's
-    proportions, `zoom` times smaller than the largest, at `place` (x, y) of the room there is. `blur` is a Gaussian's sigma
-    as a share of the frame's width.
+    proportions, `zoom` times smaller than the largest, at `place` (x, y) of the room there is.
     """
 
-    color: Color | None = None  # sRGB 0..1
-    image: str | None = None  # absolute path
-    fit: Literal["cover", "stretch", "crop"] = "cover"
-    zoom: float = Field(default=1.0, ge=1)
-    place: tuple[Share, Share] = (0.5, 0.5)
-    flip: bool = False
-    blur: Share = 0.0
-    transparent: bool = False  # nothing at all: the picture has alpha
+    color: Srgb | None = Field(default=None, description="a plain colour: sRGB [r, g, b]")
+    image: Picture | None = Field(default=None, description="path of an image")
+    transparent: bool = Field(
+        default=False, description="true: nothing; the channel rgb becomes rgba, red, green, blue and alpha"
+    )
+    fit: Literal["cover", "stretch", "crop"] = Field(
+        default="cover",
+        description="of an image: cover (its largest centred part of the frame's proportions), stretch, or crop (a part)",
+    )
+    zoom: float = Field(default=1.0, ge=1, le=100, description="fit: crop: how many times smaller than the largest part")
+    place: tuple[Portion, Portion] = Field(
+        default=(0.5, 0.5), description="fit: crop: [x, y], 0 to 1 of the room there is, from the left and the top"
+    )
+    flip: bool = Field(default=False, description="whether an image is mirrored")
+    blur: Portion = Field(default=0.0, description="of an image: a Gaussian's sigma, as a share of the frame's width")
 
 
 class View(Frozen):
-    """From scene-linear light to display-linear: stops of exposure, the light that shall look white, a view transform.
+    """From scene-linear light to display-linear: stops of exposure, the light that shall look white, a view transform."""
 
-    temperature_k: correlated colour temperature; 6500 changes nothing. tint: above 0 towards magenta.
-    """
-
-    exposure: float = Field(default=0.0, ge=-16, le=16)
-    temperature_k: float = Field(default=6500.0, ge=1500, le=20000)
-    tint: float = Field(default=0.0, ge=-1, le=1)
-    transform: Literal["standard", "filmic", "agx", "raw"] = "standard"
+    exposure: float = Field(default=0.0, ge=-16, le=16, description="stops: 1 is twice as bright")
+    temperature_k: float = Field(
+        default=6500.0,
+        ge=1500,
+        le=20000,
+        description="colour temperature of the light that shall look white; 6500 changes nothing",
+    )
+    tint: Signed = Field(default=0.0, description="-1 to 1: green to magenta")
+    transform: Literal["standard", "filmic", "agx", "raw"] = Field(
+        default="standard", description="standard, filmic, agx or raw"
+    )
 
 
 class Smoother(Frozen):
     """What is done to the border between the targets and their background: Dwibedi et al., *Cut, Paste and Learn* (2017)."""
 
-    kind: Literal["none", "box", "gaussian", "poisson"] = "none"
-    size: float = Field(default=1.5, gt=0, le=50)  # pixels: half the box' side, the Gaussian's sigma
+    kind: Literal["none", "box", "gaussian", "poisson"] = Field(default="none", description="none, box, gaussian or poisson")
+    size: float = Field(default=1.5, gt=0, le=50, description="pixels: half the box' side, or the Gaussian's sigma")
 
 
 class Effects(Frozen):
     """What a camera does to its picture; strengths are 0 (nothing) to 1 (as much as ever makes sense). Labels never change."""
 
-    blur: Share = 0.0
-    motion_blur: Share = 0.0
-    motion_angle_deg: float = 0.0  # across the picture, counter-clockwise from the right
-    depth_of_field: Share = 0.0
-    focus: float | None = Field(default=None, gt=0)  # metres along the camera's axis; None: what the camera looks at
-    vignetting: Share = 0.0
-    chromatic_aberration: Share = 0.0
-    brightness: float = Field(default=0.0, ge=-1, le=1)
-    contrast: float = Field(default=0.0, ge=-1, le=1)
-    saturation: float = Field(default=0.0, ge=-1, le=1)
-    hue: float = Field(default=0.0, ge=-1, le=1)  # 1: half a turn
-    edge_highlight: Share = 0.0
-    shot_noise: Share = 0.0
-    read_noise: Share = 0.0
-    jpeg: Share = 0.0
-    seed: int = Field(default=0, ge=0)  # of the noise
+    blur: Portion = Field(default=0.0, description="out of focus: a Gaussian")
+    motion_blur: Portion = Field(default=0.0, description="the camera moves")
+    motion_angle_deg: Number = Field(default=0.0, description="which way: counter-clockwise from the right")
+    depth_of_field: Portion = Field(default=0.0, description="what is nearer or farther than focus is blurred")
+    focus: Length | None = Field(default=None, description="metres; default: what the camera looks at")
+    vignetting: Portion = Field(default=0.0, description="darker corners")
+    chromatic_aberration: Portion = Field(default=0.0, description="coloured edges towards the corners")
+    brightness: Signed = Field(default=0.0, description="-1 to 1")
+    contrast: Signed = Field(default=0.0, description="-1 to 1")
+    saturation: Signed = Field(default=0.0, description="-1 (grey) to 1")
+    hue: Signed = Field(default=0.0, description="-1 to 1: 1 turns colours half way round")
+    edge_highlight: Portion = Field(default=0.0, description="brighter edges")
+    shot_noise: Portion = Field(default=0.0, description="noise of the light, more where it is bright")
+    read_noise: Portion = Field(default=0.0, description="noise of the sensor, everywhere alike")
+    jpeg: Portion = Field(default=0.0, description="traces of compression")
+    seed: int = Field(default=0, ge=0, description="of the noise")
 
 
 class Finish(Frozen):

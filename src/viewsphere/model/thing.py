@@ -6,18 +6,17 @@ from pydantic import Field
 
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.numbers import Portion
 from viewsphere.model.scene import IDENTITY, Color, Matrix4
 
 
 class Repaint(Frozen):
-    """A change to the materials whose names match `material`, a pattern of fnmatch: `tint` (linear) multiplies the base colour,
-    the others replace what the file says and its textures say.
-    """
+    """A change to the materials whose names match `material`, a pattern of fnmatch. What is None stays as the file says."""
 
-    material: str = "*"
-    tint: Color | None = None
-    metallic: float | None = Field(default=None, ge=0, le=1)
-    roughness: float | None = Field(default=None, ge=0, le=1)
+    material: str = Field(default="*", min_length=1, description="names of the materials, a pattern such as paint*")
+    tint: Color | None = Field(default=None, description="multiplies the colour; white changes nothing: linear [r, g, b]")
+    metallic: Portion | None = Field(default=None, description="instead of what the model says: 1 is metal")
+    roughness: Portion | None = Field(default=None, description="instead of what the model says: 0 a mirror, 1 matt")
 
 
 class Motion(Frozen):

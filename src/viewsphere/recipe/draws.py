@@ -29,8 +29,8 @@ from pydantic_core import CoreSchema, core_schema
 
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.mistakes import at, nearest, shown
-from viewsphere.model.numbers import Number
-from viewsphere.recipe.values import COLOR_FORMS, OrShort, parse_color
+from viewsphere.model.numbers import Metres, Number
+from viewsphere.recipe.values import OrShort
 
 if TYPE_CHECKING:
     from numpy.random import Generator
@@ -367,44 +367,5 @@ def alternatives(value: Any) -> Iterator[Any]:
         yield value
 
 
-FARTHEST = 1e5
-"""Metres that anything of a scene may be away from its middle, as large as models may be: single precision ends soon after."""
-
-Amount = Annotated[float, Field(strict=True, ge=0, le=1e6)]
-Strength = Annotated[float, Field(strict=True, ge=0, le=1e9)]
-Length = Annotated[float, Field(strict=True, gt=0, le=FARTHEST)]
-Portion = Annotated[float, Field(strict=True, ge=0, le=1)]
-Signed = Annotated[float, Field(strict=True, ge=-1, le=1)]
 Coordinate = Drawn[Number]
-Metres = Drawn[Annotated[float, Field(strict=True, ge=-FARTHEST, le=FARTHEST)]]
-PointDrawn = Drawn[tuple[Metres, Metres, Metres]]
-
-
-def is_drawn_color(value: Any) -> bool:
-    """Whether a value that may be more than a colour is one that is drawn: as a whole, or component by component."""
-    if isinstance(value, Mapping):
-        return not value.keys().isdisjoint(KINDS)
-    parts = cast(tuple[Any, ...], value) if isinstance(value, (list, tuple)) else ()
-    return any(isinstance(part, (list, tuple, Mapping, Distribution)) for part in parts)
-
-
-def _srgb(value: Any) -> Any:
-    return value if is_drawn_color(value) else parse_color(value)
-
-
-def _linear(value: Any) -> Any:
-    """A colour's name or code as linear light; numbers are linear already."""
-    if not isinstance(value, str):
-        return value
-    return tuple(round(c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4, 9) for c in parse_color(value))
-
-
-SrgbDrawn = Drawn[
-    Annotated[tuple[Drawn[Portion], Drawn[Portion], Drawn[Portion]], BeforeValidator(_srgb), OrShort(COLOR_FORMS[0])]
-]
-"""An sRGB colour: a name, '#rrggbb' or [r, g, b] of 0..1."""
-
-LinearDrawn = Drawn[
-    Annotated[tuple[Drawn[Amount], Drawn[Amount], Drawn[Amount]], BeforeValidator(_linear), OrShort(COLOR_FORMS[0])]
-]
-"""Linear light: [r, g, b] from 0 up, or the light that a name or '#rrggbb' stands for."""
+PointDrawn = Drawn[tuple[Drawn[Metres], Drawn[Metres], Drawn[Metres]]]

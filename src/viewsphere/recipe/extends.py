@@ -13,7 +13,9 @@ from typing import Any, cast
 from viewsphere.errors import RecipeError
 from viewsphere.model.mistakes import Marks, Place, dotted, shown
 from viewsphere.model.mistakes import Path as Steps
+from viewsphere.model.scene import Background, Ground
 from viewsphere.recipe.draws import KINDS
+from viewsphere.recipe.entries import pictures_of
 from viewsphere.recipe.file import parse, read
 from viewsphere.recipe.models import ZOO
 
@@ -23,13 +25,11 @@ PATHS: tuple[tuple[str, ...], ...] = (
     ("models", "*", "real_size"),
     ("models", "*", "real_size", "csv"),
     ("viewpoints", "path"),
-    ("scene", "background", "image"),
+    *(("scene", "background", name) for name in pictures_of(Background)),
     ("scene", "background", "images"),
     ("scene", "sky"),
     ("scene", "sky", "hdri"),
-    ("scene", "ground", "image"),
-    ("scene", "ground", "roughness_image"),
-    ("scene", "ground", "normal_image"),
+    *(("scene", "ground", name) for name in pictures_of(Ground)),
     ("scene", "place"),
     ("scene", "place", "source"),
     ("scene", "planes", "*", "image"),

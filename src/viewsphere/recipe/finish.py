@@ -2,37 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field, model_validator
 
 from viewsphere.model.frozen import Frozen
-from viewsphere.model.scene import Background, Smoother, View
-from viewsphere.recipe.draws import (
-    Coordinate,
-    Distribution,
-    Drawn,
-    Length,
-    PointDrawn,
-    Portion,
-    Signed,
-    SrgbDrawn,
-    is_drawn_color,
-    is_random,
-)
+from viewsphere.model.scene import Background, Effects, Picture, Smoother, View
+from viewsphere.recipe.draws import Coordinate, Distribution, Drawn, PointDrawn, is_random
+from viewsphere.recipe.entries import entry_of, is_drawn_color, words_of
 from viewsphere.recipe.scenery import Draw
-from viewsphere.recipe.surface import Picture
 from viewsphere.recipe.values import COLOR_FORMS, OrShort, parse_color
-
-_BACKGROUND, _SMOOTHER, _VIEW = Background(), Smoother(), View()
-
-Fit = Literal["cover", "stretch", "crop"]
-Kernel = Literal["none", "box", "gaussian", "poisson"]
-Transform = Literal["standard", "filmic", "agx", "raw"]
 
 WORDS = ("sky", "environment", "transparent")
 SOURCES = ("color", "image", "images", "environment", "transparent")
-OF_IMAGES = ("fit", "zoom", "place", "flip", "blur")
+OF_IMAGES = tuple(name for name in Background.model_fields if name not in SOURCES)
 
 
 class PerFrame(Frozen):
@@ -44,30 +27,13 @@ class PerFrame(Frozen):
     )
 
 
-class BackgroundEntry(PerFrame):
+class BackgroundEntry(entry_of(Background, optional=("color", "image"), fixed=("transparent",)), PerFrame):
     """What is seen where nothing else is; the sky when nothing is given."""
 
-    color: SrgbDrawn | None = Field(default=None, description="a plain colour")
-    image: Drawn[Picture] | None = Field(default=None, description="path of an image")
     images: Picture | None = Field(default=None, description="folder of images to draw from")
     environment: bool = Field(
         default=False, strict=True, description="true: the sky, below the horizon too; ground: auto is then a catcher"
     )
-    transparent: bool = Field(
-        default=False, strict=True, description="true: nothing; the channel rgb becomes rgba, red, green, blue and alpha"
-    )
-    fit: Drawn[Fit] = Field(
-        default=_BACKGROUND.fit,
-        description="of an image: cover (its largest centred part of the frame's proportions), stretch, or crop (a part)",
-    )
-    zoom: Drawn[Annotated[float, Field(strict=True, ge=1, le=100)]] = Field(
-        default=_BACKGROUND.zoom, description="fit: crop: how many times smaller than the largest part"
-    )
-    place: Drawn[tuple[Drawn[Portion], Drawn[Portion]]] = Field(
-        default=_BACKGROUND.place, description="fit: crop: [x, y], 0 to 1 of the room there is, from the left and the top"
-    )
-    flip: Drawn[Annotated[bool, Field(strict=True)]] = Field(default=False, description="whether an image is mirrored")
-    blur: Drawn[Portion] = Field(default=0.0, description="of an image: a Gaussian's sigma, as a share of the frame's width")
 
     @model_validator(mode="after")
     def _one(self) -> BackgroundEntry:
@@ -106,46 +72,16 @@ BackgroundField = Annotated[
 ]
 
 
-class SmootherEntry(PerFrame):
+class SmootherEntry(entry_of(Smoother), PerFrame):
     """What is done to the border between the targets and their background."""
 
-    kind: Drawn[Kernel] = Field(default=_SMOOTHER.kind, description="none, box, gaussian or poisson")
-    size: Drawn[Annotated[float, Field(strict=True, gt=0, le=50)]] = Field(
-        default=_SMOOTHER.size, description="pixels: half the box' side, or the Gaussian's sigma"
-    )
 
-
-class ViewEntry(PerFrame):
+class ViewEntry(entry_of(View), PerFrame):
     """From light to a picture."""
 
-    exposure: Drawn[Annotated[float, Field(strict=True, ge=-16, le=16)]] = Field(
-        default=_VIEW.exposure, description="stops: 1 is twice as bright"
-    )
-    temperature_k: Drawn[Annotated[float, Field(strict=True, ge=1500, le=20000)]] = Field(
-        default=_VIEW.temperature_k, description="colour temperature of the light that shall look white; 6500 changes nothing"
-    )
-    tint: Drawn[Signed] = Field(default=_VIEW.tint, description="-1 to 1: green to magenta")
-    transform: Drawn[Transform] = Field(default=_VIEW.transform, description="standard, filmic, agx or raw")
 
-
-class EffectsEntry(PerFrame):
+class EffectsEntry(entry_of(Effects, without=("seed",)), PerFrame):
     """What a camera does to its picture; strengths are 0 (nothing) to 1 (as much as ever makes sense)."""
-
-    blur: Drawn[Portion] = Field(default=0.0, description="out of focus: a Gaussian")
-    motion_blur: Drawn[Portion] = Field(default=0.0, description="the camera moves")
-    motion_angle_deg: Coordinate = Field(default=0.0, description="which way: counter-clockwise from the right")
-    depth_of_field: Drawn[Portion] = Field(default=0.0, description="what is nearer or farther than focus is blurred")
-    focus: Drawn[Length] | None = Field(default=None, description="metres; default: what the camera looks at")
-    vignetting: Drawn[Portion] = Field(default=0.0, description="darker corners")
-    chromatic_aberration: Drawn[Portion] = Field(default=0.0, description="coloured edges towards the corners")
-    brightness: Drawn[Signed] = Field(default=0.0, description="-1 to 1")
-    contrast: Drawn[Signed] = Field(default=0.0, description="-1 to 1")
-    saturation: Drawn[Signed] = Field(default=0.0, description="-1 (grey) to 1")
-    hue: Drawn[Signed] = Field(default=0.0, description="-1 to 1: 1 turns colours half way round")
-    edge_highlight: Drawn[Portion] = Field(default=0.0, description="brighter edges")
-    shot_noise: Drawn[Portion] = Field(default=0.0, description="noise of the light, more where it is bright")
-    read_noise: Drawn[Portion] = Field(default=0.0, description="noise of the sensor, everywhere alike")
-    jpeg: Drawn[Portion] = Field(default=0.0, description="traces of compression")
 
     @property
     def is_noisy(self) -> bool:
@@ -169,5 +105,5 @@ def _of(name: str) -> BeforeValidator:
     return BeforeValidator(lambda value: {name: value} if isinstance(value, str) else value)
 
 
-SmootherField = Annotated[SmootherEntry, _of("kind"), OrShort({"enum": ["none", "box", "gaussian", "poisson"]})]
-ViewField = Annotated[ViewEntry, _of("transform"), OrShort({"enum": ["standard", "filmic", "agx", "raw"]})]
+SmootherField = Annotated[SmootherEntry, _of("kind"), OrShort({"enum": words_of(Smoother, "kind")})]
+ViewField = Annotated[ViewEntry, _of("transform"), OrShort({"enum": words_of(View, "transform")})]

@@ -14,30 +14,26 @@ from viewsphere.geometry.camera import orbit_center
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.mistakes import at as standing_at
 from viewsphere.model.mistakes import nearest, one_of, shown
-from viewsphere.model.numbers import Natural
-from viewsphere.model.scene import WHITE, AreaLight, Daylight, PointLight, Sky, SpotLight, Sun, Vector
-from viewsphere.recipe.draws import (
-    Amount,
-    Coordinate,
-    Drawn,
-    Length,
-    LinearDrawn,
-    PointDrawn,
-    Portion,
-    Strength,
-    alternatives,
-    is_random,
+from viewsphere.model.numbers import Length, Natural
+from viewsphere.model.scene import (
+    AimedLight,
+    AreaLight,
+    Daylight,
+    Environment,
+    HemisphereLight,
+    Light,
+    PlacedLight,
+    PointLight,
+    Sky,
+    SpotLight,
+    Sun,
+    Vector,
 )
+from viewsphere.recipe.draws import Coordinate, Drawn, alternatives, is_random
+from viewsphere.recipe.entries import entry_of
 from viewsphere.recipe.values import OrShort, shape_of, switch
 
 SWITCH: list[Any] = [True, False, "on", "off"]
-_SUN, _SKY, _DAYLIGHT = Sun(), Sky(), Daylight()
-_POINT = PointLight(position=(0, 0, 0), strength=0)
-_SPOT = SpotLight(position=(0, 0, 0), strength=0)
-_AREA = AreaLight(position=(0, 0, 0), strength=0)
-SKIES = ("zenith", "horizon", "strength", "daylight", "hdri", "rotation_deg")
-"""Fields of skies of all kinds."""
-
 SKY_SUFFIXES = (".exr", ".hdr")
 WHEN = ("date", "time", "latitude", "longitude")
 _TIME = re.compile(r"(\d\d?):(\d\d)(?::(\d\d))?(?:Z|([+-])(\d\d)(?::?(\d\d))?)\Z")
@@ -64,18 +60,12 @@ def _hours(value: Any) -> Any:
 
 Day = Annotated[str, AfterValidator(_day)]
 Hours = Annotated[float, Field(strict=True, ge=-24, le=48), BeforeValidator(_hours), OrShort({"type": "string"})]
-Height = Annotated[float, Field(strict=True, gt=0, le=90)]
+ANGLES = ("azimuth_deg", "elevation_deg")
 
 
-class SunEntry(Frozen):
+class SunEntry(entry_of(Sun, optional=ANGLES)):
     """The sun: where it stands, by angles or by date, time and place, and how it shines."""
 
-    azimuth_deg: Coordinate | None = Field(
-        default=None, description=f"where it stands, degrees, as for cameras; default {_SUN.azimuth_deg:g}"
-    )
-    elevation_deg: Drawn[Height] | None = Field(
-        default=None, description=f"degrees above the horizon; default {_SUN.elevation_deg:g}"
-    )
     date: Drawn[Day] | None = Field(default=None, description="or by the day, '2026-06-21'; north is +Y")
     time: Drawn[Hours] | None = Field(
         default=None, description="with date: '14:30+02:00', with the distance from UTC, or hours of the day in UTC"
@@ -86,18 +76,13 @@ class SunEntry(Frozen):
     longitude: Drawn[Annotated[float, Field(strict=True, ge=-180, le=180)]] | None = Field(
         default=None, description="with date: degrees east"
     )
-    strength: Drawn[Strength] = Field(default=_SUN.strength, description="irradiance of what faces it, in the sky's units")
-    color: LinearDrawn = Field(default=_SUN.color, description="[r, g, b] of linear light, a name or '#rrggbb'")
-    angle_deg: Drawn[Annotated[float, Field(strict=True, ge=0, le=60)]] = Field(
-        default=_SUN.angle_deg, description="how wide it is: wider means softer shadows"
-    )
 
     @model_validator(mode="after")
     def _check(self) -> SunEntry:
         given = [name for name in WHEN if getattr(self, name) is not None]
         if given and len(given) < len(WHEN):
             raise ValueError(f"expected {', '.join(WHEN)} together; found {', '.join(given)}")
-        if given and not (self.azimuth_deg is None and self.elevation_deg is None):
+        if given and any(getattr(self, name) is not None for name in ANGLES):
             raise ValueError("expected angles or date, time and place, not both; found both")
         return self
 
@@ -115,22 +100,12 @@ SunField = Annotated[
 ]
 
 
-class GradientEntry(Frozen):
+class GradientEntry(entry_of(Sky, without=("kind",))):
     """Ambient light from above: a vertical gradient."""
 
-    zenith: LinearDrawn = Field(default=_SKY.zenith, description="colour overhead: linear [r, g, b], a name or '#rrggbb'")
-    horizon: LinearDrawn = Field(default=_SKY.horizon, description="colour at the horizon")
-    strength: Drawn[Strength] = Field(default=_SKY.strength, description="factor of both colours")
 
-
-class DaylightEntry(Frozen):
+class DaylightEntry(entry_of(Daylight, without=("kind",))):
     """The sky that the sun's place makes."""
-
-    turbidity: Drawn[Annotated[float, Field(strict=True, ge=1.8, le=10)]] = Field(
-        default=_DAYLIGHT.turbidity, description="haze: 2 is very clear, 10 hazy"
-    )
-    clouds: Drawn[Portion] = Field(default=_DAYLIGHT.clouds, description="0 clear, 1 overcast: then there is no sun")
-    strength: Drawn[Strength] = Field(default=_DAYLIGHT.strength, description="factor of the sky's light")
 
 
 class DaylightSky(Frozen):
@@ -139,14 +114,16 @@ class DaylightSky(Frozen):
     daylight: DaylightEntry = Field(description="a sky made by the sun's place: turbidity, clouds, strength")
 
 
-class HdriSky(Frozen):
+class HdriSky(entry_of(Environment, without=("kind", "file"))):
     """Light from a picture of the whole sphere."""
 
     hdri: Drawn[Annotated[str, Field(min_length=1)]] = Field(
         description="an EXR or HDR file of the whole sphere (equirectangular), or a folder of them to draw from"
     )
-    strength: Drawn[Strength] = Field(default=1.0, description="factor of its light")
-    rotation_deg: Coordinate = Field(default=0.0, description="turns it about the vertical, counter-clockwise from above")
+
+
+SKIES = tuple(dict.fromkeys([*GradientEntry.model_fields, *DaylightSky.model_fields, *HdriSky.model_fields]))
+"""Fields of skies of all kinds."""
 
 
 def _sky(value: Any) -> Any:
@@ -188,29 +165,25 @@ class At(Frozen):
     distance: Drawn[Length] = Field(description="metres")
 
 
-class _Lamp(Frozen):
+class _Lamp(entry_of(Light)):
     """What all lamps have."""
 
     count: Drawn[Annotated[Natural, Field(le=64)]] = Field(default=1, description="how many of them, each drawn by itself")
-    strength: Drawn[Strength] = Field(description="irradiance at one metre, facing it; of a hemisphere its radiance")
-    color: LinearDrawn = Field(default=WHITE, description="[r, g, b] of linear light, a name or '#rrggbb'")
 
 
-class _Placed(_Lamp):
-    position: PointDrawn | None = Field(default=None, description="[x, y, z] in metres from the centre of the targets' box")
+class _Placed(entry_of(PlacedLight, optional=("position",)), _Lamp):
     at: At | None = Field(default=None, description="or {azimuth_deg, elevation_deg, distance} from there, as for cameras")
 
     @model_validator(mode="after")
     def _placed(self) -> _Placed:
-        if (self.position is None) == (self.at is None):
-            raise ValueError(f"expected one of position, at; found {'none' if self.at is None else 'both'}")
+        given = [name for name in ("position", "at") if getattr(self, name) is not None]
+        if len(given) != 1:
+            raise ValueError(f"expected one of position, at; found {'both' if given else 'none'}")
         return self
 
 
-class _Aimed(_Placed):
+class _Aimed(entry_of(AimedLight), _Placed):
     """A lamp that points somewhere: two places give the direction."""
-
-    toward: PointDrawn = Field(default=_SPOT.toward, description="what it points at, [x, y, z] as for position")
 
     @model_validator(mode="after")
     def _pointed(self) -> _Aimed:
@@ -235,36 +208,26 @@ def _is_one_point(a: Any, b: Any) -> bool:
     return known and math.dist(cast(Vector, a), cast(Vector, b)) < 1e-6
 
 
-class PointEntry(_Placed):
+class PointEntry(entry_of(PointLight, fixed=("kind",)), _Placed):
     """Small balls that shine everywhere."""
 
-    kind: Literal["point"] = Field(default="point", description="a small ball that shines everywhere")
-    radius: Drawn[Amount] = Field(default=_POINT.radius, description="metres: larger means softer shadows")
 
-
-class SpotEntry(_Aimed):
+class SpotEntry(entry_of(SpotLight), _Aimed):
     """Lamps that shine into a cone."""
 
     kind: Literal["spot"] = Field(description="a cone of light")
-    radius: Drawn[Amount] = Field(default=_SPOT.radius, description="metres: larger means softer shadows")
-    angle_deg: Drawn[Annotated[float, Field(strict=True, gt=0, le=160)]] = Field(
-        default=_SPOT.angle_deg, description="of the whole cone"
-    )
-    blend: Drawn[Portion] = Field(default=_SPOT.blend, description="share of the cone that fades")
 
 
-class AreaEntry(_Aimed):
+class AreaEntry(entry_of(AreaLight), _Aimed):
     """Rectangles that shine to one side."""
 
     kind: Literal["area"] = Field(description="a rectangle that shines to one side")
-    size: Drawn[tuple[Drawn[Length], Drawn[Length]]] = Field(default=_AREA.size, description="[width, height] in metres")
 
 
-class HemisphereEntry(_Lamp):
+class HemisphereEntry(entry_of(HemisphereLight), _Lamp):
     """Even light from above and from below, without shadows."""
 
     kind: Literal["hemisphere"] = Field(description="even light from above, and other from below")
-    below: LinearDrawn = Field(default=(0.0, 0.0, 0.0), description="colour of what comes from below")
 
 
 def _kind_of_lamp(value: Any) -> Any:

@@ -10,15 +10,14 @@ from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.mistakes import shown
 from viewsphere.model.model_spec import Axis
-from viewsphere.model.numbers import Count, Number
-from viewsphere.recipe.draws import FARTHEST, Drawn, Length, is_random
+from viewsphere.model.numbers import FARTHEST, Count, Length, Metres, Number
+from viewsphere.recipe.draws import Drawn, is_random
 from viewsphere.recipe.models import ZOO, Unit
 from viewsphere.recipe.values import Interval, OrShort, Point, shape_of
 
 Draw = Literal["fixed", "per_model", "per_frame"]
 Labels = Literal["background", "own"]
-Away = Annotated[float, Field(strict=True, ge=-FARTHEST, le=FARTHEST)]
-Spot = tuple[Away, Away, Number]
+Spot = tuple[Metres, Metres, Number]
 
 DRAWS = "one for the whole data set (fixed), one a model (per_model) or one a frame (per_frame)"
 LABELS = "background, or own: every piece is an object with a category, boxes and a mask"

@@ -15,7 +15,9 @@ from viewsphere.assets.folder import UnreadableError
 from viewsphere.assets.sphere import read_head
 from viewsphere.errors import RecipeError
 from viewsphere.model.mistakes import nearest
+from viewsphere.model.scene import Background, Ground
 from viewsphere.recipe.draws import alternatives
+from viewsphere.recipe.entries import pictures_of
 from viewsphere.recipe.light import SKY_SUFFIXES
 from viewsphere.recipe.recipe import Recipe
 
@@ -31,11 +33,9 @@ Pictures = Mapping[tuple[Kind, str], tuple[str, ...]]
 """Absolute paths of the files that a path of the recipe stands for, sorted."""
 
 FIELDS: tuple[tuple[str, str, Kind], ...] = (
-    ("background", "image", "image"),
+    *(("background", name, "image") for name in pictures_of(Background)),
     ("background", "images", "images"),
-    ("ground", "image", "image"),
-    ("ground", "roughness_image", "image"),
-    ("ground", "normal_image", "image"),
+    *(("ground", name, "image") for name in pictures_of(Ground)),
     ("sky", "hdri", "hdri"),
 )
 PICTURE_FORMATS = ("PNG", "JPEG", "WEBP", "BMP", "GIF", "TIFF", "TGA", "PPM")

@@ -7,11 +7,11 @@ for them: one more field, model or pose changes nobody else's draw.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from functools import cached_property, lru_cache
-from typing import Any, TypeVar
+from typing import Any
 
 from viewsphere.geometry.camera import orbit_center
 from viewsphere.geometry.pose_category import pose_category
@@ -22,37 +22,20 @@ from viewsphere.model.scene import (
     WHITE,
     AnyLight,
     AnySky,
-    AreaLight,
     Background,
     Daylight,
-    Effects,
     Environment,
     Finish,
     Ground,
-    HemisphereLight,
-    PointLight,
     Scene,
-    Sky,
-    Smoother,
-    SpotLight,
     Sun,
     Vector,
-    View,
 )
 from viewsphere.model.thing import Repaint
 from viewsphere.recipe.draws import RngOf, drawn, is_random
+from viewsphere.recipe.entries import concrete, pictures_of
 from viewsphere.recipe.finish import BackgroundEntry, JitterEntry, PerFrame
-from viewsphere.recipe.light import (
-    AreaEntry,
-    At,
-    DaylightSky,
-    HdriSky,
-    HemisphereEntry,
-    LampEntry,
-    PointEntry,
-    SpotEntry,
-    SunEntry,
-)
+from viewsphere.recipe.light import At, DaylightSky, HdriSky, LampEntry, SunEntry
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.surface import GroundEntry
 from viewsphere.sampling.company import Names
@@ -61,14 +44,8 @@ from viewsphere.sampling.scenery import draw_names
 from viewsphere.sampling.seeds import scene_generators, share
 from viewsphere.sampling.sun import sun_position
 
-Concrete = TypeVar("Concrete", bound=Frozen)
-
-LIGHTS: Mapping[type[Frozen], type[PointLight | SpotLight | AreaLight | HemisphereLight]] = {
-    PointEntry: PointLight,
-    SpotEntry: SpotLight,
-    AreaEntry: AreaLight,
-    HemisphereEntry: HemisphereLight,
-}
+PARTS = tuple(Finish.model_fields)
+"""The parts of a finish, which have their names in a recipe's scene, too."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,10 +68,9 @@ class Scenes:
     @cached_property
     def has_finish_per_frame(self) -> bool:
         """Whether every frame has a finish of its own."""
-        scene = self.recipe.scene
-        parts = (scene.background, scene.smoother, scene.view, scene.effects)
-        return scene.effects.is_noisy or any(
-            _draw(part) == "per_frame" and (is_random(part) or getattr(part, "images", None) is not None) for part in parts
+        return self.recipe.scene.effects.is_noisy or any(
+            _draw(part) == "per_frame" and (is_random(part) or getattr(part, "images", None) is not None)
+            for part in self._finishing
         )
 
     def scene(self, model: str, pose: str) -> Scene:
@@ -110,7 +86,7 @@ class Scenes:
         entry = self.recipe.scene
         names = (spec.key, model, pose) if entry.draw == "per_frame" else draw_names(entry.draw, spec.key, None)
         return tuple(
-            _concrete(Repaint, drawn(material, self._rng_of(names), ("materials", str(i))))
+            concrete(drawn(material, self._rng_of(names), ("materials", str(i))))
             for i, material in enumerate(entry.materials)
             if fnmatchcase(spec.key, material.models)
         )
@@ -140,9 +116,12 @@ class Scenes:
         """What background, smoother, view and effects are drawn for; empty where every frame has a finish of its own."""
         if pose is None and self.has_finish_per_frame:
             return ()
-        scene = self.recipe.scene
-        parts = (scene.background, scene.smoother, scene.view, scene.effects)
-        return tuple(draw_names(_draw(part), model, pose) for part in parts)
+        return tuple(draw_names(_draw(part), model, pose) for part in self._finishing)
+
+    @property
+    def _finishing(self) -> tuple[object, ...]:
+        """The entries of a finish's parts."""
+        return tuple(getattr(self.recipe.scene, name) for name in PARTS)
 
     @cached_property
     def _scene(self) -> Callable[[Names, tuple[Names, ...]], Scene]:
@@ -164,18 +143,17 @@ class Scenes:
 
     def _sky(self, entry: Any, names: Names) -> AnySky:
         if isinstance(entry, HdriSky):
-            return _concrete(Environment, entry, file=self._file("hdri", entry.hdri, ("sky", "hdri"), names))
-        return _concrete(Daylight, entry.daylight) if isinstance(entry, DaylightSky) else _concrete(Sky, entry)
+            return concrete(entry, file=self._file("hdri", entry.hdri, ("sky", "hdri"), names))
+        return concrete(entry.daylight if isinstance(entry, DaylightSky) else entry)
 
     def _ground(self, entry: Any) -> Ground | None:
         if entry == "auto":
             entry = self.recipe.scene.automatic_ground
         if not isinstance(entry, GroundEntry):
             return None if entry == "off" else Ground(catcher=entry == "catcher")
-        images = ("image", "roughness_image", "normal_image")
-        files = {name: self.pictures["image", path][0] for name in images if (path := getattr(entry, name)) is not None}
-        color = {"color": WHITE} if entry.color is None and entry.image is not None else {}
-        return _concrete(Ground, entry, **files, **color)
+        files = {name: self.pictures["image", path][0] for name in pictures_of(Ground) if (path := getattr(entry, name))}
+        ground: Ground = concrete(entry, **files)
+        return ground if entry.color or not entry.image else ground.model_copy(update={"color": WHITE})
 
     def _file(self, kind: Kind, path: str, field: tuple[str, ...], names: Names) -> str:
         """The file that a path of the recipe means, drawn where that is a folder."""
@@ -185,31 +163,20 @@ class Scenes:
         return files[int(self._rng_of(names)((*field, "file")).integers(len(files)))]
 
     def _finish(self, names: tuple[Names, ...], frame: Names) -> Finish:
-        background, smoother, view, effects = names
-        made: Effects = self._part("effects", effects)
+        parts = {name: self._part(name, drawn_for) for name, drawn_for in zip(PARTS, names, strict=True)}
         if self.recipe.scene.effects.is_noisy:
-            made = made.model_copy(update={"seed": int(share(self.recipe.seed, "noise", *frame) * 2**32)})
-        return Finish(
-            background=self._part("background", background),
-            smoother=self._part("smoother", smoother),
-            view=self._part("view", view),
-            effects=made,
-        )
+            seed = int(share(self.recipe.seed, "noise", *frame) * 2**32)
+            parts["effects"] = parts["effects"].model_copy(update={"seed": seed})
+        return Finish(**parts)
 
     @cached_property
     def _part(self) -> Callable[[str, Names], Any]:
-        """One of the four parts of a finish by what it is drawn for; the last are kept."""
-        makers: dict[str, Callable[[Any, Names], Frozen]] = {
-            "background": self._background,
-            "smoother": lambda entry, names: _concrete(Smoother, entry),
-            "view": lambda entry, names: _concrete(View, entry),
-            "effects": lambda entry, names: _concrete(Effects, entry),
-        }
+        """One part of a finish by what it is drawn for; the last are kept."""
 
         @lru_cache(maxsize=256)
         def part(field: str, names: Names) -> Frozen:
             entry = drawn(getattr(self.recipe.scene, field), self._rng_of(names), (field,))
-            return makers[field](entry, names)
+            return self._background(entry, names) if isinstance(entry, BackgroundEntry) else concrete(entry)
 
         return part
 
@@ -219,7 +186,7 @@ class Scenes:
             image = self._file("images", entry.images, ("background", "images"), names)
         elif entry.image is not None:
             image = self.pictures["image", entry.image][0]
-        return _concrete(Background, entry, image=image)
+        return concrete(entry, image=image)
 
 
 def _draw(entry: object) -> str:
@@ -227,19 +194,13 @@ def _draw(entry: object) -> str:
     return entry.draw if isinstance(entry, PerFrame) else "per_frame"
 
 
-def _concrete(kind: type[Concrete], entry: Frozen, **others: Any) -> Concrete:
-    """What an entry says, once it is drawn, as a part of a scene; what is None there has the scene's default."""
-    own = {name: getattr(entry, name, None) for name in kind.model_fields} | others
-    return kind(**{name: value for name, value in own.items() if value is not None})
-
-
 def _sun(entry: Any, sky: AnySky) -> Sun | None:
     if not isinstance(entry, SunEntry):
         return None if entry == "off" or (entry == "auto" and isinstance(sky, Environment)) else Sun()
     angles = _angles(entry)
     if angles is None:
-        return _concrete(Sun, entry)
-    return _concrete(Sun, entry, azimuth_deg=angles[0], elevation_deg=angles[1]) if angles[1] > 0 else None
+        return concrete(entry)
+    return concrete(entry, azimuth_deg=angles[0], elevation_deg=angles[1]) if angles[1] > 0 else None
 
 
 def _angles(entry: SunEntry) -> tuple[float, float] | None:
@@ -264,7 +225,7 @@ def _lights(entries: tuple[LampEntry, ...], rng_of: RngOf) -> tuple[AnyLight, ..
         for j in range(drawn(entry.count, rng_of, ("lights", str(i), "count"))):
             lamp = drawn(entry, rng_of, ("lights", str(i), str(j)))
             at = getattr(lamp, "at", None)
-            lights.append(_concrete(LIGHTS[type(lamp)], lamp, **({} if at is None else {"position": _spot(at)})))
+            lights.append(concrete(lamp) if at is None else concrete(lamp, position=_spot(at)))
     return tuple(lights)
 
 

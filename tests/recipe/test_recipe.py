@@ -2,7 +2,6 @@
 
 import math
 import pickle
-from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -10,35 +9,7 @@ import pytest
 from pydantic import ValidationError
 
 from viewsphere.errors import RecipeError
-from viewsphere.model.scene import (
-    AreaLight,
-    Background,
-    Daylight,
-    Effects,
-    Environment,
-    Ground,
-    HemisphereLight,
-    PointLight,
-    Sky,
-    Smoother,
-    SpotLight,
-    Sun,
-    View,
-)
-from viewsphere.model.thing import Repaint
-from viewsphere.recipe.finish import BackgroundEntry, EffectsEntry, SmootherEntry, ViewEntry
-from viewsphere.recipe.light import (
-    AreaEntry,
-    DaylightEntry,
-    GradientEntry,
-    HdriSky,
-    HemisphereEntry,
-    PointEntry,
-    SpotEntry,
-    SunEntry,
-)
 from viewsphere.recipe.recipe import Recipe
-from viewsphere.recipe.surface import GroundEntry, MaterialEntry
 
 MODELS = [{"source": "zoo:car", "count": 3}]
 VIEWS = {"distance": 5}
@@ -340,53 +311,3 @@ def test_engine_options_stand_beside_its_name():
     engine = recipe(engine={"name": "raster", "samples": 4}).engine
     assert (engine.name, engine.options) == ("raster", {"samples": 4})
     assert recipe(engine="blender").engine.name == "blender"
-
-
-ENTRIES = [
-    (SunEntry, Sun(), {"azimuth_deg", "elevation_deg"}),
-    (GradientEntry, Sky(), {"kind"}),
-    (DaylightEntry, Daylight(), {"kind"}),
-    (HdriSky, Environment(file="a"), {"kind", "file"}),
-    (PointEntry, PointLight(position=(0, 0, 0), strength=1), {"position", "strength"}),
-    (SpotEntry, SpotLight(position=(0, 0, 0), strength=1), {"kind", "position", "strength"}),
-    (AreaEntry, AreaLight(position=(0, 0, 0), strength=1), {"kind", "position", "strength"}),
-    (HemisphereEntry, HemisphereLight(strength=1), {"kind", "strength"}),
-    (GroundEntry, Ground(), {"color"}),
-    (BackgroundEntry, Background(), set()),
-    (SmootherEntry, Smoother(), set()),
-    (ViewEntry, View(), set()),
-    (EffectsEntry, Effects(), {"seed"}),
-    (MaterialEntry, Repaint(), set()),
-]
-
-
-@pytest.mark.parametrize(("entry", "concrete", "others"), ENTRIES)
-def test_entries_have_the_defaults_of_the_scene_they_become(entry, concrete, others):
-    for name in type(concrete).model_fields.keys() - others:
-        assert entry.model_fields[name].default == getattr(concrete, name), name
-
-
-LIMITS = [
-    (SunEntry, Sun, "elevation_deg", (0, 90.1)),
-    (SunEntry, Sun, "angle_deg", (-1, 61)),
-    (DaylightEntry, Daylight, "turbidity", (1.7, 10.1)),
-    (GroundEntry, Ground, "tile", (0,)),
-    (BackgroundEntry, Background, "zoom", (0.9,)),
-    (SmootherEntry, Smoother, "size", (0, 51)),
-    (ViewEntry, View, "exposure", (-17, 17)),
-    (ViewEntry, View, "temperature_k", (1499, 20001)),
-    (ViewEntry, View, "tint", (-1.1, 1.1)),
-    *(
-        (EffectsEntry, Effects, name, (-1.1, 1.1))
-        for name in Effects.model_fields
-        if name not in {"seed", "motion_angle_deg", "focus"}
-    ),
-    (EffectsEntry, Effects, "focus", (0,)),
-]
-
-
-@pytest.mark.parametrize(("entry", "concrete", "field", "beyond"), LIMITS)
-def test_entries_refuse_what_the_scene_would(entry, concrete, field, beyond):
-    for kind, value in product((entry, concrete), beyond):
-        with pytest.raises(ValidationError):
-            kind(**{field: value})

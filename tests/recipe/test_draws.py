@@ -1,7 +1,7 @@
 """Distributions in place of a scene's numbers, vectors, colours and words: what is accepted, refused and drawn."""
 
 import math
-from typing import Annotated, Literal
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -9,31 +9,28 @@ from pydantic import Field, ValidationError
 
 from viewsphere.errors import RecipeError
 from viewsphere.model.frozen import Frozen
-from viewsphere.recipe.draws import (
-    Amount,
-    Drawn,
-    LinearDrawn,
-    PointDrawn,
-    Portion,
-    SrgbDrawn,
-    alternatives,
-    drawn,
-    is_random,
-)
+from viewsphere.model.numbers import Amount, Portion
+from viewsphere.model.scene import Color, Position, Srgb
+from viewsphere.recipe.draws import Drawn, alternatives, drawn, is_random
+from viewsphere.recipe.entries import entry_of
 from viewsphere.recipe.extends import assemble
 from viewsphere.recipe.recipe import Recipe
 
 
-class Entry(Frozen):
-    number: Drawn[Annotated[float, Field(strict=True, gt=0, le=90)]] = 45.0
-    share: Drawn[Portion] | None = None
-    free: Drawn[Annotated[float, Field(strict=True)]] = 0.0
-    whole: Drawn[Annotated[int, Field(strict=True, ge=0)]] = 1
-    point: PointDrawn = (0.0, 0.0, 0.0)
-    color: SrgbDrawn = (0.0, 0.0, 0.0)
-    light: LinearDrawn = (1.0, 1.0, 1.0)
-    word: Drawn[Literal["a", "b", "c"]] = "a"
-    flag: Drawn[Annotated[bool, Field(strict=True)]] = False
+class Part(Frozen):
+    number: float = Field(default=45.0, gt=0, le=90)
+    share: Portion | None = None
+    free: float = 0.0
+    whole: int = Field(default=1, ge=0)
+    point: Position = (0.0, 0.0, 0.0)
+    color: Srgb = (0.0, 0.0, 0.0)
+    light: Color = (1.0, 1.0, 1.0)
+    word: Literal["a", "b", "c"] = "a"
+    flag: bool = False
+
+
+class Entry(entry_of(Part)):
+    """All that may be drawn."""
 
 
 class Outer(Frozen):

@@ -1,0 +1,156 @@
+"""Entries: what a recipe says of a part of the scene, derived from the class of that part.
+
+A field is written once, in the scene's class: the entry has its limits, its default and its description from there, and takes
+distributions over its values. The body of an entry holds only what differs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from types import NoneType, UnionType
+from typing import Annotated, Any, ClassVar, TypeVar, Union, cast, get_args, get_origin
+
+from pydantic import BeforeValidator, Field, Strict
+from pydantic.fields import FieldInfo
+from pydantic_core import PydanticUndefined
+
+from viewsphere.model.frozen import Frozen
+from viewsphere.model.mistakes import shown
+from viewsphere.model.numbers import whole
+from viewsphere.model.scene import LINEAR, PICTURE, SRGB
+from viewsphere.recipe.draws import KINDS, Distribution, Drawn
+from viewsphere.recipe.values import COLOR_FORMS, OrShort, parse_color
+
+Part = TypeVar("Part", bound=Frozen)
+Names = Collection[str]
+
+
+class Entry(Frozen):
+    """What a recipe says of a part of the scene."""
+
+    part: ClassVar[type[Frozen]]
+
+
+def entry_of(part: type[Part], *, without: Names = (), fixed: Names = (), optional: Names = ()) -> type[Part]:
+    """A base for the entry of `part`: a class upon it gets every field of the part that its own body and bases lack.
+
+    without: fields that recipes do not have.
+    fixed: fields that are not drawn, because planning has to know them.
+    optional: fields that are None where nothing is said, as the entry has other ways to say it; they stand before its own.
+
+    To a type checker an entry is what becomes of it once it is drawn, as it is with `Drawn`.
+    """
+
+    class Derived(Entry):
+        def __init_subclass__(cls, **config: Any) -> None:
+            super().__init_subclass__(**config)
+            if Derived in cls.__bases__:
+                cls.part = part
+                _derive(cls, without, fixed, optional)
+
+    return cast("type[Part]", Derived)
+
+
+def concrete(entry: Frozen, **others: Any) -> Any:
+    """The part of a scene that a drawn entry means; `others` are fields that follow from more than the entry.
+
+    What is None has the default of the scene's class.
+    """
+    part = cast("Entry", entry).part
+    said = {name: getattr(entry, name, None) for name in part.model_fields} | others
+    return part(**{name: value for name, value in said.items() if value is not None})
+
+
+def pictures_of(part: type[Frozen]) -> tuple[str, ...]:
+    """Names of the fields of a scene's class that hold the path of a picture."""
+    return tuple(name for name, field in part.model_fields.items() if _has(_kind(field), PICTURE))
+
+
+def words_of(part: type[Frozen], name: str) -> list[str]:
+    """The words that a field of a scene's class may be."""
+    return list(get_args(part.model_fields[name].annotation))
+
+
+def is_drawn_color(value: Any) -> bool:
+    """Whether a value that may be more than a colour is one that is drawn: as a whole, or component by component."""
+    if isinstance(value, Mapping):
+        return not value.keys().isdisjoint(KINDS)
+    parts = cast(tuple[Any, ...], value) if isinstance(value, (list, tuple)) else ()
+    return any(isinstance(part, (list, tuple, Mapping, Distribution)) for part in parts)
+
+
+def _srgb(value: Any) -> Any:
+    return value if is_drawn_color(value) else parse_color(value)
+
+
+def _linear(value: Any) -> Any:
+    """A colour's name or code as linear light; numbers are linear already."""
+    if not isinstance(value, str):
+        return value
+    return tuple(round(c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4, 9) for c in parse_color(value))
+
+
+_READERS: dict[Any, tuple[Any, ...]] = {
+    float: (Strict(),),
+    bool: (Strict(),),
+    int: (Strict(), BeforeValidator(whole)),
+    LINEAR: (BeforeValidator(_linear), OrShort(COLOR_FORMS[0])),
+    SRGB: (BeforeValidator(_srgb), OrShort(COLOR_FORMS[0])),
+}
+"""How values of a kind are read in a recipe, beyond what the scene asks of them."""
+
+
+def _derive(entry: type[Entry], without: Names, fixed: Names, optional: Names) -> None:
+    """Give an entry's class, before pydantic collects its fields, those of its part that it lacks."""
+    known = {name for base in entry.__mro__ for name in vars(base).get("__annotations__", {})}
+    forms: dict[str, Any] = {}
+    for name, field in entry.part.model_fields.items():
+        if name not in known and name not in without:
+            kind = _kind(field)
+            form = _read(kind) if name in fixed else _form(kind)
+            forms[name] = form | None if name in optional else form
+            setattr(entry, name, _field(field, name in optional))
+    first = {name: form for name, form in forms.items() if name in optional}
+    entry.__annotations__ = first | entry.__annotations__ | forms
+
+
+def _kind(field: FieldInfo) -> Any:
+    """The whole type of a field, its limits and marks too."""
+    return cast(Any, Annotated)[field.annotation, *field.metadata] if field.metadata else field.annotation
+
+
+def _form(kind: Any, *limits: Any) -> Any:
+    """A type whose values, and those in them, may be distributions."""
+    origin, args = get_origin(kind), get_args(kind)
+    if origin is Annotated:
+        return _form(args[0], *args[1:], *limits)
+    if origin in (Union, UnionType):
+        (inner,) = (arg for arg in args if arg is not NoneType)
+        return _form(inner, *limits) | None
+    if origin is tuple:
+        kind = tuple[tuple(map(_form, args))]
+    return cast(Any, Drawn)[_read(kind, *limits)]
+
+
+def _read(kind: Any, *limits: Any) -> Any:
+    """A type within its limits, read as recipes are."""
+    marks = [kind, *(limit for limit in limits if isinstance(limit, str))]
+    readers = [reader for mark in marks for reader in _READERS.get(mark, ())]
+    return cast(Any, Annotated)[kind, *limits, *readers] if limits or readers else kind
+
+
+def _field(field: FieldInfo, optional: bool) -> Any:
+    """Default and description of an entry's field."""
+    short = ", a name or '#rrggbb'" if _has(_kind(field), LINEAR, SRGB) else ""
+    text = f"{field.description}{short}"
+    if not optional:
+        return Field(default=field.default, description=text)
+    if field.default not in (None, PydanticUndefined):
+        text += f"; default {field.default:g}" if isinstance(field.default, float) else f"; default {shown(field.default)}"
+    return Field(default=None, description=text)
+
+
+def _has(kind: Any, *marks: str) -> bool:
+    """Whether a type, or one in it, has one of the marks."""
+    args = get_args(kind)
+    return any(mark in args for mark in marks) or any(_has(arg, *marks) for arg in args)
