@@ -39,10 +39,9 @@ from viewsphere.model.scene import (
 )
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
-from viewsphere.run.stages import build_zoo_model
 from viewsphere.sampling.camera import looking
 from viewsphere.truth.visibility import rasterize
-from viewsphere.zoo import build
+from viewsphere.zoo import build, build_zoo_model
 
 TILE = (320, 240)
 LENS = Intrinsics(width=TILE[0], height=TILE[1], fx=480, fy=480, cx=TILE[0] / 2, cy=TILE[1] / 2)

@@ -1,7 +1,8 @@
 """How a name finds its module; what a plug-in must offer stands in its package (`Engine` in `viewsphere.engines`, ...).
 
 A plug-in is one module; its name is its file's name, listed without importing it. Third parties use the entry-point
-groups `viewsphere.engines` and `viewsphere.formats`. What is found by name is imported here and nowhere else.
+groups `viewsphere.engines`, `viewsphere.formats` and `viewsphere.placers`. What is found by name is imported here and nowhere
+else.
 """
 
 from __future__ import annotations
@@ -13,12 +14,19 @@ from typing import Any, Literal
 
 from viewsphere.errors import UserError
 
-Kind = Literal["engines", "formats"]
+Kind = Literal["engines", "formats", "placers"]
+
+PACKAGES: dict[Kind, str] = {
+    "engines": "viewsphere.engines",
+    "formats": "viewsphere.formats",
+    "placers": "viewsphere.sampling.placing",
+}
+"""Where the plug-ins of a kind are that ship with the tool."""
 
 
 def names(kind: Kind) -> tuple[str, ...]:
     """Names of all plug-ins of this kind, sorted; none is imported."""
-    package = importlib.import_module(f"viewsphere.{kind}")
+    package = importlib.import_module(PACKAGES[kind])
     own = {m.name for m in pkgutil.iter_modules(package.__path__) if not m.name.startswith("_")}
     return tuple(sorted(own | {e.name for e in entry_points(group=f"viewsphere.{kind}")}))
 
@@ -34,7 +42,7 @@ def load(kind: Kind, name: str) -> Any:
     known = names(kind)
     if name not in known:
         raise _unknown(kind[:-1], name, known)
-    return importlib.import_module(f"viewsphere.{kind}.{name}")
+    return importlib.import_module(f"{PACKAGES[kind]}.{name}")
 
 
 def attribute(path: str) -> Any:

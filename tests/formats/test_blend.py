@@ -25,8 +25,9 @@ from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Scene
 from viewsphere.run.generate import export
 from viewsphere.run.importing import import_dataset
-from viewsphere.run.stages import Stages, build_zoo_model
+from viewsphere.run.stages import Stages
 from viewsphere.store import Choice, frame_ranges
+from viewsphere.zoo import build_zoo_model
 
 
 @pytest.fixture

@@ -62,18 +62,30 @@ class PlaceEntry(Frozen):
         return self
 
 
+def _renamed(value: Any) -> Any:
+    """`random` is an older word for `scatter`."""
+    return "scatter" if value == "random" else value
+
+
+Layout = Annotated[
+    Annotated[str, Tag("text")] | Annotated[tuple[Spot, ...], Field(min_length=1), Tag("list")],
+    Discriminator(
+        shape_of,
+        custom_error_type="layout",
+        custom_error_message="expected a placer, such as scatter or row, or a list of [x, y, azimuth]",
+    ),
+    BeforeValidator(_renamed),
+]
+
+
 class CompanyEntry(Frozen):
     """Other models of the recipe, of the same split, beside the one each frame is about."""
 
     count: Count | None = Field(default=None, description="how many; not needed where layout is a list")
-    layout: Annotated[
-        Annotated[Literal["random", "row"], Tag("text")] | Annotated[tuple[Spot, ...], Field(min_length=1), Tag("list")],
-        Discriminator(
-            shape_of, custom_error_type="layout", custom_error_message="expected random, row or a list of [x, y, azimuth]"
-        ),
-    ] = Field(
-        default="random",
-        description="random: close by, turned at random; row: side by side; or where each stands: [x, y, azimuth in degrees]",
+    layout: Layout = Field(
+        default="scatter",
+        description="scatter: close by, turned at random; row: side by side; another placer's name; or where each stands: "
+        "[x, y, azimuth in degrees]",
     )
     gap: Annotated[Number, Field(ge=0)] = Field(default=0.3, description="metres that are free between two of them, at least")
     draw: Draw = Field(default="per_model", description=f"who and where: {DRAWS}")
@@ -91,6 +103,16 @@ class CompanyEntry(Frozen):
     def number(self) -> int:
         """How many there are."""
         return self.count or len(self.layout)
+
+    @property
+    def placer(self) -> str:
+        """Name of the placer."""
+        return self.layout if isinstance(self.layout, str) else "listed"
+
+    @property
+    def spots(self) -> tuple[Spot, ...]:
+        """Where each stands, as far as the recipe says."""
+        return () if isinstance(self.layout, str) else self.layout
 
 
 class Around(Frozen):

@@ -9,7 +9,7 @@ from typing import cast, get_args
 from viewsphere.assets.inspect import ModelReport, describe
 from viewsphere.errors import UserError
 from viewsphere.model.model_spec import Axis, ModelSpec
-from viewsphere.run.stages import build_zoo_model
+from viewsphere.zoo import build_zoo_model
 
 
 def model_spec(

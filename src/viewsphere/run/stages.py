@@ -27,7 +27,7 @@ from viewsphere.store import Store
 from viewsphere.truth.channels import observe
 from viewsphere.truth.enclosure import sky_hidden
 from viewsphere.truth.visibility import rasterize
-from viewsphere.zoo import build
+from viewsphere.zoo import build_zoo_model
 
 if TYPE_CHECKING:
     from viewsphere.engines import Engine, Stage  # which takes a third of a worker's start
@@ -41,11 +41,6 @@ MOST_CAMERAS = 1000
 
 MOST_SKY = 0.8
 """Share of the sky that scenery may hide from a camera that is not inside of it."""
-
-
-def build_zoo_model(spec: ModelSpec) -> Mesh:
-    """The procedural model a `zoo:family` source names, drawn from its seed."""
-    return build(spec.source.removeprefix("zoo:"), np.random.default_rng(spec.seed))
 
 
 def model_files(key: str) -> tuple[str, str]:

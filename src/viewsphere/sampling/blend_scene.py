@@ -22,10 +22,9 @@ from viewsphere.model.thing import Thing
 from viewsphere.recipe.blend import VALUE, BlendEntry, LabelRule, VariantEntry
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.scenery import Labels
-from viewsphere.sampling.company import Names
 from viewsphere.sampling.moments import at_frame
 from viewsphere.sampling.scenery import Naming, Piece, draw_names, scenery_key
-from viewsphere.sampling.seeds import share
+from viewsphere.sampling.seeds import Names, share
 
 NAMES_SAID = 5
 

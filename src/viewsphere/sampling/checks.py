@@ -17,7 +17,7 @@ from viewsphere.sampling.viewpoints import Poses
 
 
 def check_names(recipe: Recipe) -> None:
-    """Engines and formats are known."""
+    """The engine, the formats and the placer are known."""
     engines = plugins.names("engines")
     if recipe.engine.name not in engines:
         raise RecipeError(f"engine: {one_of(recipe.engine.name, engines)}")
@@ -25,6 +25,9 @@ def check_names(recipe: Recipe) -> None:
     for i, name in enumerate(recipe.formats):
         if name not in formats:
             raise RecipeError(f"formats[{i}]: {one_of(name, formats)}")
+    company = recipe.scene.company
+    if company is not None and company.placer not in (placers := plugins.names("placers")):
+        raise RecipeError(f"scene.company.layout: {one_of(company.placer, placers)}")
 
 
 def check_blend(recipe: Recipe) -> None:

@@ -5,22 +5,25 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from viewsphere import plugins
+from viewsphere.assets.cache import load_normalised
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.model_spec import ModelSpec
-from viewsphere.model.scene import Vector
+from viewsphere.model.scene import Matrix4, Vector
 from viewsphere.model.thing import Motion, Thing
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.scenery import Labels
 from viewsphere.sampling.blend_scene import BlendScenery
-from viewsphere.sampling.company import Names, companions, footprint, layout, standing
+from viewsphere.sampling.cast import companions
 from viewsphere.sampling.moments import TimedPoses
+from viewsphere.sampling.placing import Placer, Room, Shape, footprint, standing
 from viewsphere.sampling.scenery import (
     Piece,
     draw_names,
@@ -31,8 +34,10 @@ from viewsphere.sampling.scenery import (
     plane_pieces,
     plane_spec,
 )
+from viewsphere.sampling.seeds import Names, generator
 from viewsphere.sampling.viewpoints import Poses
 from viewsphere.store import Category
+from viewsphere.zoo import build_zoo_model
 
 BoxOf = Callable[[ModelSpec], NDArray[np.float64]]
 """A normalised model's 3D box (8, 3) in its own axes, metres."""
@@ -130,14 +135,23 @@ class Composition:
     def targets(self, spec: ModelSpec, pose: str | None, box_of: BoxOf) -> tuple[Thing, ...]:
         """The targets where they stand, the frame's model at the origin; raises RecipeError where there is no room."""
         cast = self.cast(spec, pose)
-        boxes = [box_of(member) for member in cast]
-        entry, place = self.recipe.scene.company, self.recipe.scene.place
-        moves = (standing(boxes[0]),)
-        if entry is not None:
-            names = draw_names(entry.draw, spec.key, pose)
-            free = free_floor(self.recipe, place, draw_names(place.draw, spec.key, pose)) if place else None
-            moves = layout(entry, self.recipe.seed, cast, boxes, names, free)
-        return tuple(Thing(id=i, model=m, motion=Motion.still(w)) for i, (m, w) in enumerate(zip(cast, moves, strict=True), 1))
+        poses = self._poses(cast, pose, box_of) if self.recipe.scene.company else (standing(box_of(spec)),)
+        return tuple(Thing(id=i, model=m, motion=Motion.still(w)) for i, (m, w) in enumerate(zip(cast, poses, strict=True), 1))
+
+    def _poses(self, cast: Sequence[ModelSpec], pose: str | None, box_of: BoxOf) -> Sequence[Matrix4]:
+        """Where the recipe's placer puts the cast."""
+        entry, place, key = self.recipe.scene.company, self.recipe.scene.place, cast[0].key
+        assert entry is not None
+        free = free_floor(self.recipe, place, draw_names(place.draw, key, pose)) if place else None
+        shapes = [Shape(box_of(member), partial(_vertices, member)) for member in cast]
+        rng = partial(generator, self.recipe.seed, "layout", *draw_names(entry.draw, key, pose))
+        return self._placer.place(cast, Room(free, entry.gap, entry.spots), shapes, (), rng)
+
+    @cached_property
+    def _placer(self) -> Placer:
+        entry = self.recipe.scene.company
+        assert entry is not None
+        return plugins.load("placers", entry.placer)
 
     def things(self, spec: ModelSpec, pose: str | None, box_of: BoxOf) -> tuple[Thing, ...]:
         """All that is placed: targets, labelled scenery, then the scenery that is background."""
@@ -233,6 +247,11 @@ def compose(
     if place is not None:
         place_pieces(recipe, place, draw_names(place.draw, specs[0].key, ""), lambda category, labels: 1)
     return made
+
+
+def _vertices(spec: ModelSpec) -> NDArray[np.float64]:
+    """Those of the normalised model, (N, 3); raises ModelError if its file cannot be used."""
+    return load_normalised(spec, build_zoo_model).vertices.astype(np.float64)
 
 
 def _blend(recipe: Recipe, specs: tuple[ModelSpec, ...], views: Poses) -> BlendScenery | None:

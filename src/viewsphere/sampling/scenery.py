@@ -25,9 +25,9 @@ from viewsphere.recipe.draws import drawn
 from viewsphere.recipe.models import ZOO, unit_metres
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.scenery import Labels, PlaceEntry, PlaneEntry
-from viewsphere.sampling.company import Footprint, Names, footprint, standing
 from viewsphere.sampling.pictures import IMAGE_SUFFIXES, files_in, proportions
-from viewsphere.sampling.seeds import generator, scene_generators, share
+from viewsphere.sampling.placing import Footprint, footprint, standing
+from viewsphere.sampling.seeds import Names, generator, scene_generators, share
 
 TRIES = 200
 """Spots that are tried for one plane."""

@@ -38,10 +38,9 @@ from viewsphere.recipe.finish import BackgroundEntry, JitterEntry, PerFrame
 from viewsphere.recipe.light import At, DaylightSky, HdriSky, LampEntry, SunEntry
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.surface import GroundEntry
-from viewsphere.sampling.company import Names
 from viewsphere.sampling.pictures import Kind, Pictures
 from viewsphere.sampling.scenery import draw_names
-from viewsphere.sampling.seeds import scene_generators, share
+from viewsphere.sampling.seeds import Names, scene_generators, share
 from viewsphere.sampling.sun import sun_position
 
 PARTS = tuple(Finish.model_fields)

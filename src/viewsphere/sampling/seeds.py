@@ -7,6 +7,9 @@ from collections.abc import Callable
 
 import numpy as np
 
+Names = tuple[str, ...]
+"""What a draw is for: nothing, a model's key, or a model's key and a pose's name."""
+
 
 def _digest(names: tuple[str, ...], size: int) -> bytes:
     hasher = hashlib.blake2b(digest_size=size)

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     import numpy as np
 
     from viewsphere.assets.mesh import Mesh
+    from viewsphere.model.model_spec import ModelSpec
 
 
 def families() -> tuple[str, ...]:
@@ -27,6 +28,13 @@ def build(family: str, rng: np.random.Generator) -> Mesh:
     Raises UserError for an unknown family, with the nearest known one.
     """
     return getattr(plugins.family(family), f"{family}_random")(rng)
+
+
+def build_zoo_model(spec: ModelSpec) -> Mesh:
+    """The procedural model that a `zoo:family` source names, drawn from its seed."""
+    import numpy as np
+
+    return build(spec.source.removeprefix("zoo:"), np.random.default_rng(spec.seed))
 
 
 def real_size(mesh: Mesh) -> tuple[float, float, float]:

@@ -1,0 +1,42 @@
+"""The shape of a model, as far as placing asks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.errors import MissingExtraError
+
+Float = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """A model's shape in its own axes, metres: its box (8, 3), and its convex hull, for which `vertices` is asked when it is
+    first needed: it gives those of the model's mesh, (N, 3).
+    """
+
+    box: Float
+    vertices: Callable[[], Float]
+
+    @cached_property
+    def hull(self) -> Float:
+        """Vertices of the convex hull (N, 3), in rising order of x, y, z; of a flat model all its vertices, each once.
+
+        By Qhull (Barber et al. 1996). Raises ModelError if the model's file cannot be used, MissingExtraError without scipy.
+        """
+        try:
+            from scipy.spatial import ConvexHull, QhullError
+        except ImportError:
+            raise MissingExtraError(
+                "scene.company.layout: expected the package scipy for convex hulls, found none: pip install 'viewsphere[hulls]'"
+            ) from None
+        points = np.unique(self.vertices(), axis=0)
+        try:
+            return points[np.sort(ConvexHull(points).vertices)]
+        except QhullError:  # no volume, or fewer than four points
+            return points
