@@ -32,6 +32,7 @@ from viewsphere.geometry.box import box_vertices
 from viewsphere.model.camera import Camera
 from viewsphere.model.sample import Sample
 from viewsphere.model.shot import Shot
+from viewsphere.run.allocator import keep_freed_memory
 from viewsphere.run.stages import Stages
 from viewsphere.sampling.plan import SHOT_FRAMES
 from viewsphere.store import Store
@@ -261,6 +262,7 @@ def main() -> None:
     options.add_argument("--endurance", type=int, metavar="FRAMES", help="tell the memory of one Blender over so many frames")
     options.add_argument("--json", type=Path, help="write the figures here too")
     args = options.parse_args()
+    keep_freed_memory()  # as workers do
     print(f"{processor()}, {os.cpu_count()} cores, Python {platform.python_version()}")
     if args.scaling:
         from bench_scaling import scaling

@@ -19,6 +19,7 @@ from viewsphere.errors import MissingExtraError
 from viewsphere.model.channel import CHANNELS
 from viewsphere.model.files import Files
 from viewsphere.recipe.recipe import Recipe
+from viewsphere.run.allocator import keep_freed_memory
 from viewsphere.run.opening import prepare
 from viewsphere.run.stages import Stages
 from viewsphere.sampling.extension import whole
@@ -77,6 +78,7 @@ def by_numpy(array: Any) -> bytes:
 
 
 def main() -> None:
+    keep_freed_memory()  # as workers do
     made, rng = frames(), np.random.default_rng(0)
     plain = [frame["rgb"] for frame in made]
     noisy = [np.clip(a + rng.normal(0, NOISE, a.shape), 0, 255).astype(np.uint8) for a in plain]

@@ -22,7 +22,6 @@ from viewsphere.model.rig import Rig
 from viewsphere.model.scene import Ground, Scene, Sun
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Motion, Thing
-from viewsphere.run.allocator import keep_freed_memory
 from viewsphere.sampling.camera import looking
 from viewsphere.truth.channels import observe
 from viewsphere.truth.visibility import rasterize
@@ -129,7 +128,6 @@ def least(run: Callable[[], dict[str, float]]) -> dict[str, float]:
 
 def scaling(folder: Path) -> None:
     """Measure, print tables and write `scaling.svg`."""
-    keep_freed_memory()  # as runs do
     frame_cost(ball(1_000))  # compiles, or reads the cache
     results: list[tuple[str, list[float], list[dict[str, float]]]] = []
     for name, runs in series():

@@ -16,10 +16,12 @@ def main() -> None:
     from viewsphere.cli import completion
     from viewsphere.cli.commands import app
     from viewsphere.cli.terminal import complain
+    from viewsphere.run.allocator import keep_freed_memory
 
     try:
         if os.environ.get("_VIEWSPHERE_COMPLETE") == completion.BASH:
             completion.in_bash(app, os.environ)
+        keep_freed_memory()
         app()
     except CheckFailedError as error:
         complain(error, 1)

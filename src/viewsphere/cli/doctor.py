@@ -71,7 +71,7 @@ def _processor() -> dict[str, Any]:
 
 def _kernels() -> dict[str, Any]:
     """Where compiled kernels are kept; whether that can be written, and has some."""
-    from viewsphere.kernels.jit import kernel_folder
+    from viewsphere.kernels.kernel_cache import kernel_folder
 
     folder = kernel_folder()
     there = next(place for place in (folder, *folder.parents) if place.exists())

@@ -213,7 +213,7 @@ def _estimate(recipe: Recipe, workers: int | None) -> Estimate:
 
 def _announce_compilation() -> None:
     """Say why the first picture on a machine takes longer."""
-    from viewsphere.kernels.jit import kernel_folder
+    from viewsphere.kernels.kernel_cache import kernel_folder
 
     if not kernel_folder().is_dir():
         typer.echo("compiling kernels, once on this machine: about 20 seconds", err=True)

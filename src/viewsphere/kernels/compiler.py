@@ -248,3 +248,17 @@ class KernelCache(FunctionCache):
 
 PART: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "pipeline_class": Part}
 """Options of parts."""
+
+
+def whole(function: Callable[..., Any], **options: Any) -> Any:
+    """The kernel that compiles a function, cached where numba's configuration says now; allocates no arrays unless `_nrt`."""
+    how: dict[str, Any] = {"no_cfunc_wrapper": True, "pipeline_class": Kernel, "_nrt": False, **options}
+    made = numba.njit(**how)(function)
+    setattr(made, "_cache", KernelCache(function))  # noqa: B010, not in its stubs
+    return made
+
+
+def part(function: Callable[..., Any], **options: Any) -> Any:
+    """The part of kernels that compiles a function; it allocates no arrays unless `_nrt`, and Python cannot call it."""
+    how: dict[str, Any] = {**PART, "_nrt": False, **options}
+    return numba.njit(**how)(function)

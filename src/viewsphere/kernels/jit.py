@@ -3,6 +3,8 @@
 numba's own cache misses changes in functions that a kernel calls from another file, so each kernel is cached in a
 folder keyed by a digest of its source file, of the files of all kernels it can call and of the constants they use, of
 numba's version and of the processor's name.
+
+What is compiled, and how, is `stock`'s or, with versions of numba that are known well enough, `compiler`'s.
 """
 
 from __future__ import annotations
@@ -12,19 +14,27 @@ import os
 import re
 import sys
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
 from functools import cache, partial
 from pathlib import Path
+from threading import Lock
 from typing import Any
 
-import numba
 from numba.core import config
 
-from viewsphere.kernels import compiler
-from viewsphere.kernels.kernel_cache import BUILD, kernel_folder
+from viewsphere.kernels.kernel_cache import BUILD, IS_STOCK, kernel_folder
+
+if IS_STOCK:
+    from viewsphere.kernels import stock as compiler
+else:
+    from viewsphere.kernels import compiler
 
 _IMPORT = re.compile(r"^from (viewsphere[\w.]*) import", re.MULTILINE)
-_COMPILER = tuple(str(Path(__file__).with_name(f"{name}.py")) for name in ("jit", "compiler", "lowering"))
+_COMPILER = tuple(str(Path(__file__).with_name(f"{name}.py")) for name in ("jit", "stock", "compiler", "lowering"))
+_EXACT: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
+_config: Any = config
+_configuring = Lock()
 
 
 def njit(function: Callable[..., Any] | None = None, **options: Any) -> Any:
@@ -34,13 +44,8 @@ def njit(function: Callable[..., Any] | None = None, **options: Any) -> Any:
     """
     if function is None:
         return partial(njit, **options)
-    if not os.environ.get("NUMBA_CACHE_DIR"):
-        folder = _cache_folder(_sources(function.__code__.co_filename))
-        setattr(config, "CACHE_DIR", folder)  # noqa: B010, not in its stubs
-    whole: dict[str, Any] = {"no_cfunc_wrapper": True, "pipeline_class": compiler.Kernel, "_nrt": False}
-    made = numba.njit(nogil=True, error_model="numpy", **{**whole, **options})(function)
-    setattr(made, "_cache", compiler.KernelCache(function))  # noqa: B010, not in its stubs
-    return made
+    with _cached_in(_cache_folder(_sources(function.__code__.co_filename))):
+        return compiler.whole(function, **{**_EXACT, **options})
 
 
 def inner(function: Callable[..., Any] | None = None, **options: Any) -> Any:
@@ -50,8 +55,22 @@ def inner(function: Callable[..., Any] | None = None, **options: Any) -> Any:
     """
     if function is None:
         return partial(inner, **options)
-    part: dict[str, Any] = {**compiler.PART, "_nrt": False, **options}
-    return numba.njit(nogil=True, error_model="numpy", **part)(function)
+    return compiler.part(function, **{**_EXACT, **options})
+
+
+@contextmanager
+def _cached_in(folder: str) -> Generator[None]:
+    """Cached functions made in this context are kept in `folder`: numba looks for the place when it makes them.
+
+    The setting is the whole process's, so that it is the user's again at once.
+    """
+    with _configuring:
+        before = _config.CACHE_DIR
+        _config.CACHE_DIR = folder
+        try:
+            yield
+        finally:
+            _config.CACHE_DIR = before
 
 
 @cache

@@ -12,7 +12,14 @@ from pathlib import Path
 import llvmlite.binding
 import platformdirs
 
-BUILD = (version("numba"), llvmlite.binding.get_host_cpu_name(), os.environ.get("NUMBA_BOUNDSCHECK"))
+QUICKER = ("0.66", "0.67", "0.68")
+"""numba's minor versions whose internals are what `compiler` and `lowering` expect; others compile by `stock`."""
+
+NUMBA = version("numba")
+IS_STOCK = os.environ.get("VIEWSPHERE_STOCK_NUMBA", "0") != "0" or ".".join(NUMBA.split(".")[:2]) not in QUICKER
+"""Whether numba compiles kernels in its own way, which `VIEWSPHERE_STOCK_NUMBA=1` asks for."""
+
+BUILD = (NUMBA, IS_STOCK, llvmlite.binding.get_host_cpu_name(), os.environ.get("NUMBA_BOUNDSCHECK"))
 """What turns sources into the machine's code, and for which processor."""
 
 

@@ -240,8 +240,10 @@ class _Hand:
 def _serve(pipe: Connection, root: Path, portion: Portion) -> None:
     """A worker's life: take a job, answer, until the other side is gone."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's to handle
+    from viewsphere.run.allocator import keep_freed_memory
     from viewsphere.run.tasks import Worker
 
+    keep_freed_memory()
     worker = Worker(root, portion)
     with suppress(EOFError, BrokenPipeError):
         while True:

@@ -21,7 +21,6 @@ from viewsphere.model.model_spec import ModelSpec, Size
 from viewsphere.model.sample import Float, Sample
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
-from viewsphere.run.allocator import keep_freed_memory
 from viewsphere.sampling.camera import inside_box
 from viewsphere.store import Store
 from viewsphere.truth.channels import observe
@@ -67,16 +66,13 @@ class StoredBoxes:
 
 @dataclass(eq=False)
 class Stages:
-    """Renders shots; keeps the last shot's stage, and the models used last, warm, and the memory of a frame for the next."""
+    """Renders shots; keeps the last shot's stage, and the models used last, warm."""
 
     _stage: Stage | None = None
     _stage_key: str = ""
     _models: dict[str, Mesh] = field(default_factory=dict[str, Mesh])
     _boxes: dict[str, Float] = field(default_factory=dict[str, Float])
     _sizes: dict[str, Size] = field(default_factory=dict[str, Size])
-
-    def __post_init__(self) -> None:
-        keep_freed_memory()
 
     def model(self, spec: ModelSpec) -> Mesh:
         """The normalised model; raises ModelError if its file cannot be used."""

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from viewsphere.kernels.jit import inner, njit
+from viewsphere.kernels.kernel_cache import IS_STOCK
 
 
 @inner
@@ -45,6 +46,7 @@ print("numba.np.arraymath" in sys.modules)
 
 
 @pytest.mark.slow
+@pytest.mark.skipif(IS_STOCK, reason="numba's own cache does")
 def test_a_cached_kernel_is_not_prepared_for_compiling(tmp_path):
     """numba prepares for a second, which each of a run's processes would pay."""
     environment = {**os.environ, "VIEWSPHERE_CACHE": str(tmp_path)}

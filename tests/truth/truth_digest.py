@@ -1,0 +1,99 @@
+"""Digests of truth over random scenes, and what they took; `scripts/numba_releases` compares them from numba to numba.
+
+python truth_digest.py    # one line of JSON
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+import math
+import time
+from itertools import pairwise
+
+import numpy as np
+from truth_scenes import LENSES, cube, lens, orbit_camera, placed, random_soup, sphere
+
+import viewsphere as vs
+from viewsphere.kernels.kernel_cache import IS_STOCK, NUMBA
+from viewsphere.model.channel import CHANNELS, PICTURES
+from viewsphere.truth.channels import observe
+from viewsphere.truth.visibility import rasterize, silhouette
+
+LABELS = [name for name in CHANNELS if name not in PICTURES]
+SEEDS = range(3)
+RECIPES = (
+    {
+        "models": [{"source": "zoo:car", "count": 2}],
+        "viewpoints": {"azimuth": [20, 200], "elevation": 8, "distance": 9},
+        "scene": {"place": {"source": "zoo:neighbourhood", "labels": "own"}, "company": 1},
+    },
+    {
+        "models": [{"source": "zoo:tree", "count": 2}],
+        "viewpoints": {"azimuth": [0, 90], "elevation": [10, 90], "distance": 9, "tilt": 10},
+        "camera": {"distortion": {"model": "brown_conrady", "coefficients": [-0.21, 0.06, 0.001, -0.002, -0.004]}},
+        "scene": {"company": 1, "ground": "on"},
+    },
+)
+"""Cars on a street, behind what stands there; leaves that are cut out of pictures, seen through a lens."""
+
+
+def visibility_digest() -> str:
+    """Of the visibility buffers and all channels of soups of triangles, seen through each lens from in and outside."""
+    seen = hashlib.sha256()
+    for seed in SEEDS:
+        for name in LENSES:
+            rng = np.random.default_rng(seed)
+            soups = random_soup(rng, 200), random_soup(rng, 200, spread=1.0), sphere(3, 0.8), cube(0.7)
+            geometry = placed(*soups, ground=seed % 2 == 0, scenery=1)
+            fov = math.radians(rng.uniform(20, 100) if name != "fisheye" else rng.uniform(100, 250))
+            intrinsics = lens(120, 90, fov, LENSES[name], skew=rng.uniform(-2, 2))
+            camera = orbit_camera(intrinsics, *rng.uniform(-3, 3, 2), 10 ** rng.uniform(-1, 1), tilt=rng.uniform(-1, 1))
+            whole, alone = rasterize(geometry, camera), rasterize(geometry, camera, subdivision=2, object_id=2)
+            arrays = [whole.triangle, whole.inverse_depth, alone.triangle, alone.inverse_depth]
+            arrays.append(silhouette(geometry, camera, 1, (-120, -90, 240, 180)))
+            add(seen, [arrays, observe(geometry, camera, whole, LABELS)])
+    return seen.hexdigest()
+
+
+def sample_digest() -> str:
+    """Of all channels and annotations of recipes' frames."""
+    seen = hashlib.sha256()
+    for recipe in RECIPES:
+        camera = {"size": [320, 240], "fov_deg": 50, **recipe.get("camera", {})}
+        for sample in vs.render(
+            vs.Recipe.model_validate({**recipe, "camera": camera, "channels": LABELS, "splits": {"by": "frame"}})
+        ):
+            add(seen, [dict(sample.channels), sample.objects, [each.polygons for each in sample.objects]])
+    return seen.hexdigest()
+
+
+def add(seen, value) -> None:
+    """Add a value's kind and all of its bits to a digest."""
+    if dataclasses.is_dataclass(value):
+        value = {field.name: getattr(value, field.name) for field in dataclasses.fields(value)}
+    if isinstance(value, np.ndarray):
+        seen.update(repr((value.dtype.str, value.shape)).encode() + np.ascontiguousarray(value).tobytes())
+    elif isinstance(value, dict):
+        add(seen, [part for name in sorted(value) for part in (name, value[name])])
+    elif isinstance(value, list | tuple):
+        seen.update(b"[%d" % len(value))
+        for part in value:
+            add(seen, part)
+    else:
+        seen.update(repr(value).encode())
+
+
+def measured() -> dict[str, object]:
+    """The digests, and the CPU seconds of computing them the first time, which may compile, and once more."""
+    seconds = [time.process_time()]
+    for _ in range(2):
+        found = {"visibility": visibility_digest(), "samples": sample_digest()}
+        seconds.append(time.process_time())
+    first, again = (round(b - a, 2) for a, b in pairwise(seconds))
+    return {"numba": NUMBA, "stock": IS_STOCK, "first": first, "again": again, **found}
+
+
+if __name__ == "__main__":
+    print(json.dumps(measured()))
