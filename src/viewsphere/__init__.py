@@ -18,7 +18,8 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from viewsphere.recipe.recipe import Recipe
-    from viewsphere.run.generate import export, generate
+    from viewsphere.run.exporting import export
+    from viewsphere.run.generate import generate
     from viewsphere.run.memory import render
     from viewsphere.sampling.plan import plan
     from viewsphere.store import Dataset
@@ -29,7 +30,7 @@ __all__ = ["Dataset", "Recipe", "export", "generate", "open", "plan", "render"]
 _HOMES = {
     "Dataset": "store.Dataset",
     "Recipe": "recipe.recipe.Recipe",
-    "export": "run.generate.export",
+    "export": "run.exporting.export",
     "generate": "run.generate.generate",
     "open": "store.Dataset",
     "plan": "sampling.plan.plan",

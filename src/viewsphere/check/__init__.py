@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from dataclasses import asdict, dataclass
 from functools import partial
 from typing import Any
 
-from viewsphere.check.exports import FrameTruth, check_coco, check_native, frame_truth
+from viewsphere import plugins
 from viewsphere.check.failure import failure
 from viewsphere.check.frames import FRAME_PROOFS
 from viewsphere.check.rays import RayCaster
 from viewsphere.errors import MissingExtraError, ViewsphereError
+from viewsphere.formats import Remark, Verified
 from viewsphere.model.sample import Sample
 from viewsphere.store import Dataset, Row
 
@@ -49,12 +50,12 @@ class Report:
 
 
 def check(dataset: Dataset, *, sample: int = 50, rays: bool | None = None, frames: int | None = None) -> Report:
-    """Prove the finished frames of a data set, its COCO annotations and, if it was exported, its native JSON.
+    """Prove the finished frames of a data set, and all its exports whose formats have a `verify`.
 
     Every frame is read whole, or with `frames` at most so many, spread evenly, and the exports are left to a whole check. On
     `sample` frames, spread evenly, stored depth is lifted to points and compared with rays that Embree casts at the
-    exported models: `rays` False leaves that out, None does too (with a note) where embreex is not installed. COCO
-    annotations are made afresh if the data set has no such export. Nothing is changed.
+    exported models: `rays` False leaves that out, None does too (with a note) where embreex is not installed. Nothing is
+    changed.
 
     Raises MissingExtraError for `rays` True without embreex.
     """
@@ -68,7 +69,6 @@ def check(dataset: Dataset, *, sample: int = 50, rays: bool | None = None, frame
     read_ones = range(0, len(dataset), max(1, -(-len(dataset) // frames)) if frames else 1)
     chosen = set(read_ones[:: max(1, -(-len(read_ones) // sample))]) if caster and sample else set[int]()
     checked = dict.fromkeys(FRAME_PROOFS, 0)
-    truths: list[FrameTruth] = []
     for position, index, read in _frames(dataset, read_ones):
         if not isinstance(read, Sample):
             findings.append(Finding("files", index, read))
@@ -78,21 +78,33 @@ def check(dataset: Dataset, *, sample: int = 50, rays: bool | None = None, frame
         for name, messages in _proofs(dataset, read, caster if position in chosen else None):
             checked[name] = checked.get(name, 0) + 1
             findings += [Finding(name, index, message) for message in messages]
-        truths += frame_truth(read)
     notes += [] if caster is None else caster.notes
+    exports = _exports(dataset)
     if len(read_ones) < len(dataset):
-        notes.append(
-            f"{len(read_ones):,} of {len(dataset):,} frames were read; coco, native: not checked, they need all of them"
-        )
+        notes.append(f"{len(read_ones):,} of {len(dataset):,} frames were read")
+        notes += [f"{name}: not checked, that needs all frames" for name in exports]
         return Report(checked, tuple(findings), tuple(notes))
-    checked["coco"] = len(truths)
-    findings += [Finding("coco", frame, message) for frame, message in check_coco(dataset, truths, notes)]
-    if (dataset.root / "native").is_dir():
-        checked["native"] = len(truths)
-        findings += [Finding("native", frame, message) for frame, message in check_native(dataset, truths)]
-    else:
-        notes.append("native: not exported, not checked")
+    sampled = read_ones[:: max(1, -(-len(read_ones) // sample))] if sample else ()
+    for name, module in exports.items():
+        if not hasattr(module, "verify"):
+            notes.append(f"{name}: not checked, the format has no proof")
+            continue
+        checked[name] = len(dataset)
+        findings += [Finding(name, frame, message) for frame, message in _export_proof(dataset, name, module, sampled)]
     return Report(checked, tuple(findings), tuple(notes))
+
+
+def _exports(dataset: Dataset) -> dict[str, Any]:
+    """The formats, by their names, that lie in the data set's folder."""
+    return {name: plugins.load("formats", name) for name in plugins.names("formats") if (dataset.root / name).is_dir()}
+
+
+def _export_proof(dataset: Dataset, name: str, module: Verified, sampled: Collection[int]) -> Iterator[Remark]:
+    """What a format finds in its export; a proof that cannot be carried out counts as failed."""
+    try:
+        yield from module.verify(dataset, dataset.root / name, sampled)
+    except Exception as error:
+        yield None, failure("an export that can be checked", error)
 
 
 def _counts(dataset: Dataset, notes: list[str]) -> Iterator[str]:

@@ -38,7 +38,7 @@ def export(
     json_: AsJson = False,
 ) -> None:
     """Write a finished or half-finished data set, or some of its frames, in other formats, without rendering."""
-    from viewsphere.run.generate import export as write_formats
+    from viewsphere.run.exporting import export as write_formats
     from viewsphere.store import Choice, frame_ranges
 
     names = split(format_)

@@ -79,7 +79,7 @@ def _needed(output: Path | None) -> Path:
 
 
 def _exported(folder: Path, formats: str | None) -> list[str]:
-    from viewsphere.run.generate import export
+    from viewsphere.run.exporting import export
 
     names = split(formats)
     return list(export(folder, names)) if names else []

@@ -16,7 +16,8 @@ from viewsphere.errors import UserError, ViewsphereError
 if TYPE_CHECKING:
     from viewsphere.check import Report
     from viewsphere.run.estimate import Estimate
-    from viewsphere.run.generate import Listener, Progress, Summary
+    from viewsphere.run.generate import Summary
+    from viewsphere.run.progress import Listener, Progress
     from viewsphere.sampling.plan import Plan
 
 MOST_FINDINGS = 20

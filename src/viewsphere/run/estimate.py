@@ -16,10 +16,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from viewsphere import plugins
-from viewsphere.formats import Format
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.recipe.recipe import Recipe
+from viewsphere.run.exporting import write
 from viewsphere.run.opening import prepare, to_render
 from viewsphere.run.tasks import Worker
 from viewsphere.run.warm import load_kernels
@@ -114,13 +113,10 @@ def _export(store: Store, formats: Sequence[str], stopwatch: _Stopwatch) -> floa
     """Write the formats; gives the seconds, less those for looking through the whole plan for frames."""
     dataset = Dataset(store.root)
     assert len(dataset) > 0
-    seconds = 0.0
-    for name in formats:
-        writer: Format = plugins.load("formats", name)
-        folder = store.root / name
+    folders = {name: store.root / name for name in formats}
+    for folder in folders.values():
         folder.mkdir()
-        seconds += stopwatch(lambda writer=writer, folder=folder: writer.export(dataset, folder))
-    return seconds
+    return stopwatch(lambda: write(dataset, folders))
 
 
 def _spread(planned: Plan) -> dict[int, list[Row]]:

@@ -5,19 +5,20 @@ from __future__ import annotations
 import json
 import time
 from collections import Counter, defaultdict
-from collections.abc import Callable, Container, Iterable, Iterator, Sequence
+from collections.abc import Container, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import chain
 from pathlib import Path
 
 from viewsphere import plugins
 from viewsphere.errors import ModelError, RecipeError, UserError, ViewsphereError
-from viewsphere.formats import Format
 from viewsphere.model.channel import missing
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.recipe.recipe import Recipe
+from viewsphere.run.exporting import export, writable
 from viewsphere.run.opening import commit, prepare, to_append, to_render
 from viewsphere.run.pool import Crew, Job, Listed, Outcome
+from viewsphere.run.progress import Listener, Progress, unheard
 from viewsphere.run.skies import check_skies
 from viewsphere.run.stages import Stages, StoredBoxes
 from viewsphere.run.tasks import Kind, ModelTask
@@ -26,22 +27,8 @@ from viewsphere.run.warm import compile_kernels
 from viewsphere.sampling.distances import Distances
 from viewsphere.sampling.extension import Portion
 from viewsphere.sampling.plan import Plan
-from viewsphere.store import Choice, Dataset, Row, Store, new_folder
+from viewsphere.store import Dataset, Row, Store
 from viewsphere.store.index import Index
-
-
-@dataclass(frozen=True)
-class Progress:
-    """Where a run stands: `done` of `total`; `resumed` of them were there before this run.
-
-    Phases are skies (their pictures are looked at), models, kernels (compiled once on a machine, then cached), frames and
-    exports; those without anything to do are left out.
-    """
-
-    phase: str
-    done: int
-    total: int
-    resumed: int = 0
 
 
 @dataclass(frozen=True)
@@ -58,9 +45,6 @@ class Summary:
     formats: tuple[str, ...]
     notes: tuple[str, ...] = field(default=())
     warnings: dict[str, tuple[str, ...]] = field(default_factory=dict[str, tuple[str, ...]])
-
-
-Listener = Callable[[Progress], None]
 
 
 def generate(
@@ -83,7 +67,7 @@ def generate(
     mistakes; whatever was finished stays, and the same call goes on from there.
     """
     begun = time.monotonic()
-    tell = listener or _unheard
+    tell = listener or unheard
     wanted = tuple(formats if formats is not None else recipe.formats)
     planned = prepare(recipe)
     store = Store(Path(out))
@@ -118,24 +102,13 @@ def generate(
 
 def _check_channels(name: str, channels: Sequence[str]) -> None:
     """Raises UserError for a format that is not known, does not work here, or needs a channel which is not kept."""
-    needed: Sequence[str] = getattr(_check_writable(name), "CHANNELS", ())
+    needed: Sequence[str] = getattr(writable(name), "CHANNELS", ())
     lacking = missing(needed, channels)
     if lacking:
         raise RecipeError(
             f"channels: expected {lacking[0]}, which format {name} needs; found {', '.join(channels)}: "
             f"add it, or leave {name} out of formats"
         )
-
-
-def _check_writable(name: str) -> Format:
-    """The format of this name; raises UserError for one that is not known or does not work here."""
-    module: Format = plugins.load("formats", name)
-    getattr(module, "check", lambda: None)()
-    return module
-
-
-def _unheard(progress: Progress) -> None:
-    """Nobody listens."""
 
 
 def _check_skies(portion: Portion, store: Store, tell: Listener) -> tuple[str, ...]:
@@ -320,49 +293,3 @@ def _note_skipped(portion: Portion, store: Store, skipped: dict[str, str]) -> No
 def _is_of(portion: Portion, key: str) -> bool:
     row = portion.record.find(key)
     return row is not None and row.part == portion.number
-
-
-def _check_choice(dataset: Dataset, is_own: bool) -> None:
-    """Raise UserError for a choice that would take the place of an export of everything, or that leaves nothing."""
-    if dataset.choice.is_some and is_own:
-        raise UserError("--output: expected another folder than the data set's, beside --models or --frames; found none")
-    if dataset.choice.is_some and not len(dataset):
-        raise UserError(f"{dataset.root}: expected finished frames that --models and --frames fit; found none")
-
-
-def export(
-    out: Path | str,
-    formats: Sequence[str],
-    *,
-    output: Path | str | None = None,
-    choice: Choice | None = None,
-    listener: Listener | None = None,
-) -> tuple[str, ...]:
-    """Write the finished frames of a data set in these formats, each to OUT/<format>, or OUTPUT/<format>; gives notes for the
-    user.
-
-    An older export of the same format is replaced only when the new one is whole; one of all frames is not replaced by a
-    choice of them. Raises UserError for an unknown format or a choice without output or frames, StoreError if `out` is no data
-    set or one of the folders cannot be written.
-    """
-    tell = listener or _unheard
-    dataset = Dataset(out, choice)
-    place = dataset.root if output is None else Path(output)
-    is_own = place.resolve() == dataset.root.resolve()
-    _check_choice(dataset, is_own)
-    if place.resolve().is_relative_to(dataset.store.folder.resolve()):
-        raise UserError(f"--output: expected a folder outside of the data set's store; found {place}")
-    names = tuple(dict.fromkeys(formats))
-    for name in names:  # before the first of them is written
-        _check_writable(name)
-    notes: list[str] = []
-    for done, name in enumerate(names):
-        tell(Progress("exports", done, len(names)))
-        writer: Format = plugins.load("formats", name)
-        with dataset.store.replacing(dataset.root / name) if is_own else new_folder(place / name) as folder:
-            notes += writer.export(dataset, folder) or ()
-    tell(Progress("exports", len(names), len(names)))
-    kinds = dataset.link_kinds - {"hard link"}
-    return tuple(dict.fromkeys(notes)) + tuple(
-        f"{dataset.root}: files of the exports are made as a {kind}, hard links do not work here" for kind in sorted(kinds)
-    )

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from viewsphere import plugins
 from viewsphere.errors import UserError
-from viewsphere.run.generate import Listener, Progress
+from viewsphere.run.progress import Listener, Progress
 from viewsphere.store import Block, Part, PlanRecord, Store
 from viewsphere.store.foreign import ForeignDataset
 from viewsphere.store.linking import link_model, link_shot

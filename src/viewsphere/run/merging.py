@@ -18,7 +18,7 @@ from viewsphere.errors import StoreError, UserError
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.channel import CHANNELS
 from viewsphere.model.sample import ObjectAnnotation, Sample
-from viewsphere.run.generate import Listener, Progress
+from viewsphere.run.progress import Listener, Progress
 from viewsphere.sampling.pose_numbers import kept, names_of
 from viewsphere.store import Block, Category, Dataset, ModelInfo, Part, PlanRecord, Row, Store, encode
 from viewsphere.store.foreign import ForeignFrame

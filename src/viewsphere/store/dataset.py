@@ -197,12 +197,17 @@ class Dataset(Sequence[Sample]):
         destination.parent.mkdir(parents=True, exist_ok=True)
         self.link_kinds.add(link_file(self.root / relative, destination))
 
-    def link_models(self, folder: Path) -> None:
-        """Put every finished model's OBJ, GLB, materials and textures into `folder`/<key>, as `link` does."""
+    def model_files(self) -> Iterator[tuple[str, str]]:
+        """Every finished model's OBJ, GLB, materials and textures: `<key>/<name>`, and the path from the data set's root."""
         for info in self.models:
             for file in sorted(self.path(info.obj).parent.iterdir()):
                 if file.name != "model.json":
-                    self.link(file.relative_to(self.root).as_posix(), folder / info.key / file.name)
+                    yield f"{info.key}/{file.name}", file.relative_to(self.root).as_posix()
+
+    def link_models(self, folder: Path) -> None:
+        """Put the files of every finished model into `folder`/<key>, as `link` does."""
+        for inside, stored in self.model_files():
+            self.link(stored, folder / inside)
 
 
 class _ChannelFiles(Mapping[str, NDArray[Any]]):

@@ -12,10 +12,12 @@ data sets made elsewhere may have, are left out.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Generator, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import lru_cache, partial
+from hashlib import sha256
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -32,10 +34,8 @@ from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.model.scene import Matrix4, Scene
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Motion, Thing
+from viewsphere.store import Dataset
 from viewsphere.zoo import build
-
-if TYPE_CHECKING:
-    from viewsphere.store import Dataset
 
 ENGINE = "cycles"
 """The engine that has a Blender."""
@@ -46,26 +46,30 @@ def check() -> None:
     plugins.load("engines", ENGINE).check({})
 
 
-def export(dataset: Dataset, folder: Path) -> tuple[str, ...]:
-    """Write the finished frames that have a camera; gives notes on what could not be carried over.
+@contextmanager
+def writer(dataset: Dataset, folder: Path, note: Callable[[str], None]) -> Generator[Callable[[Sample], None]]:
+    """Write the frames that have a camera; notes say what could not be carried over.
 
-    Raises UserError where Blender cannot be used or no frame can be written, ModelError for scenery that cannot be read any
-    more.
+    Blender wants all frames of a scene at once: of each only its place is kept until all were seen, then those of one scene
+    after another are read again. Raises UserError where Blender cannot be used or no frame can be written, ModelError for
+    scenery that cannot be read any more.
     """
-    groups = list(_groups(dataset))
-    counts = Counter(group.model for group in groups)
-    notes = dict.fromkeys(_left_out(dataset, groups))
-    for group in groups:
-        frames, samples = zip(*_views(dataset, group), strict=True)
-        name = group.model if counts[group.model] == 1 else f"{group.model}-{samples[0].index:06d}"
-        own = group.shot.model_copy(update={"instants": frames})
-        load = _Models(dataset, {p.model: o.key for p, o in zip(own.objects, samples[0].objects, strict=False)})
-        said = plugins.load("engines", ENGINE).save(own, samples, load, folder / f"{name}.blend", dataset.name)
-        notes |= dict.fromkeys(f"format blend: {note}" for note in said)
-    return tuple(notes)
+    groups: dict[object, _Group] = {}
+    places = ((key, place) for key, places in dataset.shots() for place in places)
+    stored = lru_cache(maxsize=1)(partial(_stored, dataset))
+
+    def add(sample: Sample) -> None:
+        key, place = next(places)
+        if sample.known_camera and sample.known_pose and sample.objects and all(o.model for o in sample.objects):
+            group = groups.setdefault(_scene(*stored(key), key, place, sample), _Group(sample.objects[0].key))
+            group.places.setdefault(key, []).append(place)
+
+    yield add
+    for line in dict.fromkeys((*_left_out(dataset, groups.values()), *_save(dataset, folder, groups.values()))):
+        note(f"format blend: {line}")
 
 
-def _left_out(dataset: Dataset, groups: Sequence[_Group]) -> Iterator[str]:
+def _left_out(dataset: Dataset, groups: Collection[_Group]) -> Iterator[str]:
     """What is said of frames that are not written, or not as they were."""
     total = len(dataset)
     written = sum(len(places) for group in groups for places in group.places.values())
@@ -73,48 +77,55 @@ def _left_out(dataset: Dataset, groups: Sequence[_Group]) -> Iterator[str]:
     if total and not written:
         raise UserError(f"{dataset.root}: expected frames for format blend, with known {needs}; found none")
     if written < total:
-        yield f"format blend: {total - written:,} of {total:,} frames are left out: their {needs} are not known"
+        yield f"{total - written:,} of {total:,} frames are left out: their {needs} are not known"
     unlit = sum(len(group.places[key]) for group in groups for key in group.places if dataset.store.shot(key) is None)
     if unlit:
-        yield f"format blend: nothing is known of the light of {unlit:,} frames: they have the default sun and sky"
+        yield f"nothing is known of the light of {unlit:,} frames: they have the default sun and sky"
+
+
+def _save(dataset: Dataset, folder: Path, groups: Collection[_Group]) -> Iterator[str]:
+    """Write a file for each group; gives what Blender's files cannot hold."""
+    counts = Counter(group.model for group in groups)
+    for group in groups:
+        shots, instants, samples = zip(*_views(dataset, group), strict=True)
+        name = group.model if counts[group.model] == 1 else f"{group.model}-{samples[0].index:06d}"
+        own = shots[0].model_copy(update={"instants": instants})
+        load = _Models(dataset, {p.model: o.key for p, o in zip(own.objects, samples[0].objects, strict=False)})
+        yield from plugins.load("engines", ENGINE).save(own, samples, load, folder / f"{name}.blend", dataset.name)
 
 
 @dataclass(eq=False)
 class _Group:
-    """A model's frames of one scene: of which shots, and their places there. What the shot says of frames does not count."""
+    """A model's frames of one scene: of which shots, and their places there."""
 
     model: str
-    shot: Shot
     places: dict[str, list[int]] = field(default_factory=dict[str, list[int]])
 
 
-def _groups(dataset: Dataset) -> Iterator[_Group]:
-    """In the order of their first frames."""
-    groups: dict[tuple[object, ...], _Group] = {}
-    for key, places in dataset.shots():
-        known = dataset.store.shot(key)
-        alike = known and _alike(known)
-        for place, sample in zip(places, dataset.samples_of(key, places), strict=True):
-            if not (sample.known_camera and sample.known_pose and sample.objects and all(o.model for o in sample.objects)):
-                continue
-            shot = known or _lit_anyhow(key, sample)
-            scene = alike or _alike(shot), *_seen(shot, place if known else 0, sample)
-            group = groups.setdefault(scene, _Group(sample.objects[0].key, shot))
-            group.places.setdefault(key, []).append(place)
-    return iter(groups.values())
-
-
-def _views(dataset: Dataset, group: _Group) -> Iterator[tuple[Instant, Sample]]:
-    """A group's frames and samples, read once more: those of all groups would be too many to keep."""
+def _views(dataset: Dataset, group: _Group) -> Iterator[tuple[Shot, Instant, Sample]]:
+    """A group's frames; what their shots say of single frames does not count."""
     for key, places in group.places.items():
         known = dataset.store.shot(key)
         for place, sample in zip(places, dataset.samples_of(key, places), strict=True):
-            yield known.instants[place] if known else group.shot.instants[0], sample
+            shot = known or _lit_anyhow(key, sample)
+            yield shot, shot.instants[place if known else 0], sample
 
 
-def _alike(shot: Shot) -> str:
-    """Equal for shots of one scene."""
-    return shot.model_copy(update={"key": "", "first": 0, "instants": (), "channels": (), "files": Files()}).model_dump_json()
+def _stored(dataset: Dataset, key: str) -> tuple[Shot | None, bytes]:
+    """A shot, where it is known, and what is equal for shots of one scene."""
+    shot = dataset.store.shot(key)
+    return shot, _alike(shot) if shot else b""
+
+
+def _scene(known: Shot | None, alike: bytes, key: str, place: int, sample: Sample) -> object:
+    """Equal for frames that can share a file."""
+    shot = known or _lit_anyhow(key, sample)
+    return alike or _alike(shot), *_seen(shot, place if known else 0, sample)
+
+
+def _alike(shot: Shot) -> bytes:
+    scene = shot.model_copy(update={"key": "", "first": 0, "instants": (), "channels": (), "files": Files()})
+    return sha256(scene.model_dump_json().encode()).digest()
 
 
 def _seen(shot: Shot, instant: int, sample: Sample) -> tuple[object, ...]:

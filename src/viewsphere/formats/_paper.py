@@ -1,6 +1,4 @@
-"""The pieces of JSON that Ruiz et al. 2019 (VipIMAGE) write, in their native format and in their COCO files
-alike.
-"""
+"""The pieces of JSON that Ruiz et al. 2019 (VipIMAGE) write, in their native format and in their COCO files alike."""
 
 from __future__ import annotations
 
@@ -8,16 +6,14 @@ import json
 import math
 from collections.abc import Iterable
 from pathlib import PurePosixPath
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.geometry.box import FACES
 from viewsphere.model.camera import Camera
-
-if TYPE_CHECKING:
-    from viewsphere.store import ModelInfo
+from viewsphere.store import ModelInfo
 
 
 def json_bytes(value: Any) -> bytes:

@@ -1,0 +1,85 @@
+"""What the files of an export hold, to write them and to prove them."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Collection, Iterable, Iterator
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.codecs.png_tiff import decode_png, encode_png
+from viewsphere.errors import UserError
+from viewsphere.formats import Remark
+from viewsphere.store import Dataset
+
+Content = str | NDArray[np.bool_]
+"""A stored file, by its path from the data set's root, or a mask (H, W), which becomes a PNG."""
+
+Expected = tuple[int | None, str, Content]
+"""The frame that a file belongs to (None: to no single one), the file's path from the export's folder, and its content."""
+
+BLOCK = 1 << 20
+"""Bytes of a file that are compared at once."""
+
+
+def put(dataset: Dataset, content: Content, file: Path) -> None:
+    """Make a file of this content."""
+    if isinstance(content, str):
+        dataset.link(content, file)
+    else:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_bytes(encode_png(content))
+
+
+def models(dataset: Dataset) -> Iterator[Expected]:
+    """The files of the normalised models, as `Dataset.link_models` puts them into MODELS."""
+    return ((None, f"MODELS/{inside}", stored) for inside, stored in dataset.model_files())
+
+
+def check_files(
+    dataset: Dataset, folder: Path, expected: Iterable[Expected], again: Iterable[Expected], besides: Collection[str]
+) -> Iterator[Remark]:
+    """Every expected file is there and holds what it should, and there is no other but those of the names `besides`.
+
+    `again`: the expected files once more; that is read only where there are more files than expected, so that their names need
+    not be kept.
+    """
+    there = sum((folder / name).is_file() for name in besides)
+    for frame, name, content in expected:
+        problem = _problem(dataset, content, folder / name)
+        there += (folder / name).is_file()
+        if problem:
+            yield frame, f"{name}: {problem}: export again"
+    if sum(len(names) for _, _, names in os.walk(folder)) > there:
+        known = {*besides, *(name for _, name, _ in again)}
+        found = (file.relative_to(folder).as_posix() for file in sorted(folder.rglob("*")) if not file.is_dir())
+        yield from ((None, f"{name}: expected no such file, found one") for name in found if name not in known)
+
+
+def _problem(dataset: Dataset, content: Content, file: Path) -> str | None:
+    if not file.is_file():
+        return "expected a file, found none"
+    if isinstance(content, str):
+        return None if same_bytes(dataset.path(content), file) else f"expected the bytes of {content}, found others"
+    data = file.read_bytes()
+    if data == encode_png(content):
+        return None
+    try:  # another version of the encoder may have written the same mask in other bytes
+        return None if np.array_equal(decode_png(data), content) else "expected the mask of its object, found another"
+    except UserError as error:
+        return f"expected the mask of its object, found: {error}"
+
+
+def same_bytes(one: Path, other: Path) -> bool:
+    """Whether two files hold the same bytes; hard links of one file do, and are not read."""
+    if one.samefile(other):
+        return True
+    if one.stat().st_size != other.stat().st_size:
+        return False
+    with one.open("rb") as a, other.open("rb") as b:
+        while block := a.read(BLOCK):
+            if block != b.read(BLOCK):
+                return False
+    return True

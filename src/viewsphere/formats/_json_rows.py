@@ -1,0 +1,113 @@
+"""JSON files of any size, row by row; which values are rows is the format's to say."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Collection, Iterator
+from pathlib import Path
+from typing import IO, Any
+
+BLOCK = 1 << 16
+LONGEST = 1 << 24
+"""Characters that are read at once at least, and that a row has at most."""
+
+LONGEST_NUMBER = 32
+"""Characters behind a number that may belong to it, too."""
+
+Where = tuple[str, ...]
+"""Keys from the top of a file to a value in it; that of a list's item is its `id`, or else its place."""
+
+Row = tuple[Where, Any]
+
+
+def rows(file: Path, opened: Collection[Where]) -> Iterator[Row]:
+    """The values of a JSON file; in the place of those that are `opened` (whose keys are these; "*" is any) their items.
+
+    Raises ValueError for what is no JSON, OSError where the file cannot be read.
+    """
+    with file.open(encoding="utf-8", newline="") as text:
+        reader = _Reader(text)
+        yield from _below((), reader, opened, numbered=False)
+        reader.end()
+
+
+def _below(where: Where, reader: _Reader, opened: Collection[Where], *, numbered: bool) -> Iterator[Row]:
+    kind = reader.peek()
+    if kind in "{[" and any(len(p) == len(where) and all(a in ("*", b) for a, b in zip(p, where, strict=True)) for p in opened):
+        yield from _items(where, reader, opened, named=kind == "{")
+        return
+    value = reader.value()
+    if numbered and isinstance(value, dict) and "id" in value:
+        where = (*where[:-1], f"id {value['id']}")
+    yield where, value
+
+
+def _items(where: Where, reader: _Reader, opened: Collection[Where], *, named: bool) -> Iterator[Row]:
+    """Those of an object (`named`) or of a list."""
+    reader.take("{" if named else "[")
+    place = 0
+    while reader.peek() != ("}" if named else "]"):
+        if place:
+            reader.take(",")
+        key = str(place)
+        if named:
+            key = str(reader.value())
+            reader.take(":")
+        yield from _below((*where, key), reader, opened, numbered=not named)
+        place += 1
+    reader.take("}" if named else "]")
+
+
+class _Reader:
+    """What is not read yet of a text; no more is held than the next value needs."""
+
+    def __init__(self, text: IO[str]) -> None:
+        self._text = text
+        self._buffer, self._at, self._gone = "", 0, 0
+        self._decoder = json.JSONDecoder()
+
+    def peek(self) -> str:
+        """The next character that is no white space; raises ValueError where there is none."""
+        while True:
+            while self._at < len(self._buffer) and self._buffer[self._at] in " \t\n\r":
+                self._at += 1
+            if self._at < len(self._buffer):
+                return self._buffer[self._at]
+            if not self._more():
+                raise ValueError("expected more JSON, found the file's end: it is cut off")
+
+    def take(self, character: str) -> None:
+        """Go past the next character, which has to be this one."""
+        found = self.peek()
+        if found != character:
+            raise ValueError(f"character {self._gone + self._at:,}: expected {character!r}, found {found!r}")
+        self._at += 1
+
+    def value(self) -> Any:
+        """The next value, whole."""
+        self.peek()
+        while True:
+            try:
+                value, end = self._decoder.raw_decode(self._buffer, self._at)
+                if len(self._buffer) - end > LONGEST_NUMBER or not self._more():
+                    self._at = end
+                    return value
+            except json.JSONDecodeError as error:
+                if len(self._buffer) > LONGEST or not self._more():
+                    raise ValueError(f"character {self._gone + error.pos:,}: {error.msg}") from None
+
+    def end(self) -> None:
+        """Raises ValueError where anything but white space is left."""
+        try:
+            found = self.peek()
+        except ValueError:
+            return
+        raise ValueError(f"character {self._gone + self._at:,}: expected the file's end, found {found!r}")
+
+    def _more(self) -> bool:
+        """Read on, behind a long value more; False at the file's end."""
+        block = self._text.read(max(BLOCK, len(self._buffer) - self._at))
+        if block:
+            self._gone += self._at
+            self._buffer, self._at = self._buffer[self._at :] + block, 0
+        return bool(block)

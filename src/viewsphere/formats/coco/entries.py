@@ -1,0 +1,140 @@
+"""A sample as COCO's image and annotations, and the files beside them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.formats._contents import Expected
+from viewsphere.formats._paper import faces, transformation_matrix
+from viewsphere.geometry.mask import mask_polygons
+from viewsphere.model.sample import Box, ObjectAnnotation, Sample
+from viewsphere.store import Dataset
+
+FOLDER_SIZE = 10_000
+
+Masks = Mapping[int, NDArray[np.bool_]]
+"""Visible pixels (H, W) of a sample's objects by their ids, but for objects that are not seen."""
+
+
+def seen(sample: Sample) -> Masks:
+    """Every object's mask, decoded once."""
+    return {o.id: o.mask for o in sample.objects if o.area}
+
+
+def files(dataset: Dataset, sample: Sample, masks: Masks) -> Iterator[Expected]:
+    """Picture and masks, by their paths from the export's folder; of a frame without a picture none."""
+    if sample.picture_file is None:
+        return
+    yield sample.index, f"{sample.split}/{_image_file(dataset, sample)}", sample.picture_file
+    for o in sample.objects:
+        if o.source is None and o.area:
+            yield sample.index, f"{sample.split}/{_mask_file(dataset, sample, o)}", masks[o.id]
+
+
+def annotations_of(dataset: Dataset, sample: Sample, ids: Mapping[int, int], masks: Masks) -> Iterator[dict[str, Any]]:
+    """Of the objects that are seen, or were imported with a box; `ids`: COCO's of the data set's categories."""
+    for o in sample.objects:
+        if o.source is not None and (o.area or o.box2d is not None):
+            yield _foreign_annotation(dataset, sample, o, ids)
+        elif o.source is None and o.area:
+            yield _annotation(dataset, sample, o, ids, masks[o.id])
+
+
+def _image_file(dataset: Dataset, sample: Sample) -> str:
+    """Name of a frame's image in its split's folder."""
+    return f"{_stem(dataset, sample)}{Path(sample.picture_file or '.png').suffix}"
+
+
+def _mask_file(dataset: Dataset, sample: Sample, annotation: ObjectAnnotation) -> str:
+    """Name of an object's mask in its split's folder."""
+    several = f"_{annotation.id:03d}" if dataset.plan.most_objects(sample.index) > 1 else ""
+    return f"MASK/{_stem(dataset, sample)}{several}.png"
+
+
+def _stem(dataset: Dataset, sample: Sample) -> str:
+    number = dataset.plan.folder_of(sample.index, FOLDER_SIZE)
+    inside = "" if number is None else f"{number:04d}/"
+    return f"{inside}{sample.index + 1:012d}"
+
+
+def image(dataset: Dataset, sample: Sample) -> dict[str, Any]:
+    """COCO's image of a sample, with the paper's keys; one that was imported as it came, but for id and file."""
+    if sample.known_camera is None:
+        source = dict(sample.source or {})
+        named = {"imported_file_name": source["file_name"]} if "file_name" in source else {}
+        size = {"width": sample.width, "height": sample.height}
+        return {**source, **named, "id": sample.index + 1, "file_name": _image_file(dataset, sample), **size}
+    camera, pose = sample.camera, sample.pose
+    keys = [o.key for o in sample.objects]
+    lens = camera.distortion
+    return {
+        "id": sample.index + 1,
+        "file_name": _image_file(dataset, sample),
+        "width": camera.width,
+        "height": camera.height,
+        "id_model": keys[0] if len(keys) == 1 else keys,
+        "id_pose": pose.index,
+        "pose_category": pose.category,
+        **({"frame": pose.time.frame, "seconds": pose.time.seconds} if pose.time else {}),
+        "render_resolution": [camera.width, camera.height],
+        "render_scale": 1.0,
+        "distance": pose.distance,
+        "elevation": pose.elevation_deg,
+        "azimuth": pose.azimuth_deg,
+        "tilt": pose.tilt_deg,
+        "transformation_matrix": {**transformation_matrix(camera), "P": camera.P.tolist()},
+        "distortion": None if lens is None else lens.model_dump(mode="json"),
+    }
+
+
+def _foreign_annotation(dataset: Dataset, sample: Sample, o: ObjectAnnotation, ids: Mapping[int, int]) -> dict[str, Any]:
+    """An imported object's annotation as it was, but for its ids, and without the file of a mask that did not come with it."""
+    source = {k: v for k, v in (o.source or {}).items() if k != "path_mask"}
+    own = {
+        "id": dataset.plan.annotation_id(sample.index, o.id),
+        "image_id": sample.index + 1,
+        "category_id": ids[o.category_id],
+    }
+    return {"iscrowd": 0, "area": o.area, **source, **own}
+
+
+def _annotation(
+    dataset: Dataset, sample: Sample, o: ObjectAnnotation, ids: Mapping[int, int], mask: NDArray[np.bool_]
+) -> dict[str, Any]:
+    return {
+        "id": dataset.plan.annotation_id(sample.index, o.id),
+        "image_id": sample.index + 1,
+        "category_id": ids[o.category_id],
+        "iscrowd": 0,
+        "area": o.area,
+        "bbox": _corner_and_size(o.box2d),
+        "segmentation": [[int(c) for c in polygon] for polygon in mask_polygons(mask)],
+        "width": sample.camera.width,
+        "height": sample.camera.height,
+        "path_mask": _mask_file(dataset, sample, o),
+        "bbox_3D_pxs": faces(o.box3d_pixels),
+        "bbox_projected": _corner_and_size(o.box2d_projected),
+        "bbox_unclipped": _corner_and_size(o.box2d_unclipped),
+        "visibility": o.visibility,
+        "truncation": o.truncation,
+        "id_object": o.id,
+        "id_model": o.key,
+        **({"id_track": o.track} if o.track else {}),
+        "world_from_object": o.world_from_object.tolist(),
+        "camera_from_object": o.camera_from_object.tolist(),
+        "quaternion": o.quaternion,
+        "view": o.view.__dict__,
+        "pose_category": o.pose_category,
+        "size": o.size,
+        "real_size": o.real_size,
+    }
+
+
+def _corner_and_size(box: Box | None) -> list[float] | None:
+    """COCO's [x, y, width, height] of (x0, y0, x1, y1)."""
+    return None if box is None else [box[0], box[1], box[2] - box[0], box[3] - box[1]]

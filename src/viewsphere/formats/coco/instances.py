@@ -1,0 +1,65 @@
+"""The files `annotations/instances_<split>.json`, written frame by frame."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable, Generator, Iterator, Mapping
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from tempfile import TemporaryFile
+from typing import Any
+
+from viewsphere.formats._paper import json_bytes, vehicles
+from viewsphere.formats.coco.categories import category_ids
+from viewsphere.formats.coco.entries import Masks, annotations_of, image
+from viewsphere.model.sample import Sample
+from viewsphere.store import Dataset
+
+
+def file_name(split: str) -> str:
+    """Of a split's file."""
+    return f"instances_{split}.json"
+
+
+@contextmanager
+def instances(dataset: Dataset, folder: Path) -> Generator[Callable[[Sample, Masks], None]]:
+    """Write the files of all splits into this folder: gives a function that appends a frame to its split's."""
+    folder.mkdir(exist_ok=True)
+    ids = category_ids(dataset)
+    head = json_bytes(_head(dataset, ids))[:-1]
+    with ExitStack() as stack:
+        files = {split: stack.enter_context(_instances(folder / file_name(split), head)) for split in dataset.splits}
+
+        def add(sample: Sample, masks: Masks) -> None:
+            files[sample.split](image(dataset, sample), annotations_of(dataset, sample, ids, masks))
+
+        yield add
+
+
+@contextmanager
+def _instances(file: Path, head: bytes) -> Generator[Callable[[dict[str, Any], Iterator[dict[str, Any]]], None]]:
+    """One file: annotations wait in a file of their own until its images are complete."""
+    with file.open("wb") as images, TemporaryFile(dir=file.parent) as waiting:
+        images.write(head + b',"images":[')
+        separators = {images: b"\n", waiting: b"\n"}
+
+        def append(image: dict[str, Any], annotations: Iterator[dict[str, Any]]) -> None:
+            for part, values in ((images, [image]), (waiting, annotations)):
+                for value in values:
+                    part.write(separators[part] + json_bytes(value))
+                    separators[part] = b",\n"
+
+        yield append
+        images.write(b'\n],"annotations":[')
+        waiting.seek(0)
+        shutil.copyfileobj(waiting, images)
+        images.write(b"\n]}\n")
+
+
+def _head(dataset: Dataset, ids: Mapping[int, int]) -> dict[str, Any]:
+    return {
+        "info": {"description": dataset.name, "version": "1.0", "contributor": f"viewsphere {dataset.plan.version}"},
+        "licenses": [],
+        "categories": [{"id": ids[c.id], "name": c.name, "supercategory": c.supercategory} for c in dataset.categories],
+        "models": vehicles(dataset.models),
+    }

@@ -1,0 +1,52 @@
+"""The proof of an export: each file beside what would be written now, and what pycocotools, another reader, makes of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterator
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from viewsphere.formats import Remark
+from viewsphere.formats._contents import Expected, check_files, models
+from viewsphere.formats._json_proof import check_json
+from viewsphere.formats._json_rows import Where
+from viewsphere.formats.coco.entries import Masks, files, seen
+from viewsphere.formats.coco.instances import file_name, instances
+from viewsphere.formats.coco.witness import testify
+from viewsphere.model.sample import Sample
+from viewsphere.store import Dataset
+
+OPENED: tuple[Where, ...] = ((), ("categories",), ("models",), ("images",), ("annotations",))
+"""What of an instances file is compared, and read, item by item."""
+
+
+def verify(dataset: Dataset, folder: Path, sampled: Collection[int]) -> Iterator[Remark]:
+    """All that is not as it would be exported now. Of the `sampled` frames pycocotools' masks have to be those of the stored
+    instance maps, and detections made from the latter have to score AP 1.
+    """
+    names = [file_name(split) for split in dataset.splits]
+    with TemporaryDirectory() as aside:
+        with instances(dataset, Path(aside)) as append:
+            expected, again = _expected(dataset, append), _expected(dataset, lambda sample, masks: None)
+            yield from check_files(dataset, folder, expected, again, [f"annotations/{name}" for name in names])
+        for name in names:
+            yield from check_json(Path(aside) / name, folder / "annotations" / name, OPENED, _frame)
+        for split in dataset.splits:
+            yield from testify(dataset, folder / "annotations" / file_name(split), split, sampled)
+
+
+def _expected(dataset: Dataset, append: Callable[[Sample, Masks], None]) -> Iterator[Expected]:
+    """All files but the instances, for which every frame is appended elsewhere."""
+    for sample in dataset:
+        masks = seen(sample)
+        append(sample, masks)
+        yield from files(dataset, sample, masks)
+    yield from models(dataset)
+
+
+def _frame(where: Where, value: Any) -> int | None:
+    """Ids of images are frames, counted from 1."""
+    key = {"images": "id", "annotations": "image_id"}.get(where[0] if where else "")
+    number = value.get(key) if key and isinstance(value, dict) else None
+    return number - 1 if isinstance(number, int) else None

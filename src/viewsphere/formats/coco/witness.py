@@ -1,0 +1,126 @@
+"""What pycocotools, which knows nothing of this package, makes of an exported file."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import json
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.errors import ViewsphereError
+from viewsphere.formats import Remark
+from viewsphere.formats._json_rows import rows
+from viewsphere.formats.coco.categories import category_ids
+from viewsphere.geometry.mask import encode_rle, mask_box
+from viewsphere.model.sample import Sample
+from viewsphere.store import Dataset
+
+MOST_FRAMES = 2000
+"""Frames of a split that are looked at, spread evenly: COCOeval keeps all of them in memory."""
+
+MISTAKES = (LookupError, TypeError, ValueError, AttributeError, AssertionError, OSError)
+"""What pycocotools raises for files that are not as they should be."""
+
+
+@dataclass(frozen=True)
+class _Truth:
+    """An object that is seen: what the stored instance map says of it."""
+
+    frame: int
+    category: int
+    mask: NDArray[np.bool_]
+    box: list[int]  # x, y, width, height
+
+
+def testify(dataset: Dataset, file: Path, split: str, sampled: Collection[int]) -> Iterator[Remark]:
+    """Masks, areas and boxes that differ from those of the instance maps, and an AP below 1 of detections made from these.
+
+    Imported frames are left out: nobody knows their true masks.
+    """
+    positions = sorted(sampled)
+    samples = (dataset[i] for i in positions[:: max(1, -(-len(positions) // MOST_FRAMES))])
+    ids = category_ids(dataset)
+    truths = {
+        dataset.plan.annotation_id(sample.index, number): truth
+        for sample in samples
+        if sample.split == split and all(o.source is None for o in sample.objects)
+        for number, truth in _truths(sample, ids)
+    }
+    if not truths or not file.is_file():
+        return
+    try:
+        coco = _loaded(file, {truth.frame + 1 for truth in truths.values()})
+        for number in truths.keys() & coco.anns.keys():
+            yield from _differences(coco, coco.anns[number], truths[number])
+        yield from _precision(coco, list(truths.values()), file)
+    except Exception as error:  # pycocotools raises bare ones for wrong polygons
+        if type(error) is not Exception and not isinstance(error, MISTAKES):
+            raise
+        yield None, f"{file.name}: expected COCO instances, found {type(error).__name__}: {error}"
+
+
+def _truths(sample: Sample, ids: Mapping[int, int]) -> Iterator[tuple[int, _Truth]]:
+    """By the objects' ids; from the run lengths where there is no map to read."""
+    try:
+        instances = sample.channels["instances"]
+    except (KeyError, ViewsphereError):
+        instances = None
+    for o in sample.objects:
+        mask = o.mask if instances is None else instances == o.id
+        if box := mask_box(mask):
+            x0, y0, x1, y1 = box
+            yield o.id, _Truth(sample.index, ids[o.category_id], mask, [x0, y0, x1 - x0, y1 - y0])
+
+
+def _loaded(file: Path, images: Collection[int]) -> Any:
+    """The exported file as pycocotools reads it, with these images alone."""
+    from pycocotools.coco import COCO
+
+    value: dict[str, Any] = {"images": [], "annotations": []}
+    for (name, *_), row in rows(file, ((), ("images",), ("annotations",))):
+        if name not in {"images", "annotations"}:
+            value[name] = row
+        elif row["id" if name == "images" else "image_id"] in images:
+            value[name].append(row)
+    with TemporaryDirectory() as aside, contextlib.redirect_stdout(io.StringIO()):
+        part = Path(aside) / file.name
+        part.write_text(json.dumps(value), "utf-8")
+        return COCO(part)
+
+
+def _differences(coco: Any, annotation: dict[str, Any], truth: _Truth) -> Iterator[Remark]:
+    code = coco.annToRLE(annotation)
+    if not np.array_equal(coco.annToMask(annotation), truth.mask):
+        yield truth.frame, f"annotation {annotation['id']}: its segmentation differs from the instance map"
+    if code["counts"] != encode_rle(truth.mask).encode("ascii"):
+        yield truth.frame, f"annotation {annotation['id']}: its run lengths differ from the instance map's"
+    said, area = (annotation["area"], annotation["bbox"]), int(np.count_nonzero(truth.mask))
+    if said != (area, truth.box):
+        yield truth.frame, f"annotation {annotation['id']}: expected area {area} and bbox {truth.box}, found {said}"
+
+
+def _precision(coco: Any, truths: Collection[_Truth], file: Path) -> Iterator[Remark]:
+    """Average precision of detections made from the stored maps; it must be 1."""
+    from pycocotools.cocoeval import COCOeval
+
+    for kind in ("segm", "bbox"):
+        with contextlib.redirect_stdout(io.StringIO()):
+            evaluation: Any = COCOeval(coco, coco.loadRes([_detection(truth) for truth in truths]), kind)
+            evaluation.evaluate()
+            evaluation.accumulate()
+            evaluation.summarize()
+        if not evaluation.stats[0] > 1 - 1e-9:
+            found = f"{evaluation.stats[0]:.4f}"
+            yield None, f"{file.name}: {kind}: expected AP 1.0 of detections made from the instance maps, found {found}"
+
+
+def _detection(truth: _Truth) -> dict[str, Any]:
+    code = {"size": list(truth.mask.shape), "counts": encode_rle(truth.mask)}
+    return {"image_id": truth.frame + 1, "category_id": truth.category, "score": 1.0, "bbox": truth.box, "segmentation": code}

@@ -1,0 +1,106 @@
+"""A sample as the native JSON's pose and rendered vehicles, and the files beside them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from viewsphere.formats._contents import Expected
+from viewsphere.formats._paper import faces, transformation_matrix
+from viewsphere.model.channel import picture_of
+from viewsphere.model.sample import ObjectAnnotation, Sample
+from viewsphere.store import Dataset
+
+FOLDER_SIZE = 10_000
+
+
+def is_of_a_pose(sample: Sample) -> bool:
+    """Whether the layout, which is one of poses, has a place for a sample."""
+    return sample.known_camera is not None and sample.known_pose is not None
+
+
+def files(dataset: Dataset, sample: Sample) -> Iterator[Expected]:
+    """Picture, depth and masks, by their paths from the export's folder."""
+    folder = _pose_folder(dataset, sample)
+    names = _shared_files(dataset, sample)
+    for channel, kind in ((picture_of(names), "RGB"), ("depth", "DEPTH")):
+        if channel in names:
+            yield sample.index, f"{folder}/{kind}/{names[channel]}", sample.files[channel]
+    for o in sample.objects:
+        yield sample.index, f"{folder}/MASK/{_stem(dataset, sample, o)}.png", o.mask
+
+
+def rendered(dataset: Dataset, sample: Sample) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Name and entry of every object."""
+    files = _shared_files(dataset, sample)
+    for o in sample.objects:
+        yield _object_name(dataset, sample, o), _rendered(sample, o, f"{_stem(dataset, sample, o)}.png", files)
+
+
+def _shared_files(dataset: Dataset, sample: Sample) -> dict[str, str]:
+    """Names of a frame's files by channel: all objects share those of the first one."""
+    if not sample.objects:
+        return {}
+    stem = _stem(dataset, sample, sample.objects[0])
+    return {channel: stem + Path(file).suffix for channel, file in sample.files.items()}
+
+
+def _stem(dataset: Dataset, sample: Sample, o: ObjectAnnotation) -> str:
+    return f"{_group(dataset, sample)}{_object_name(dataset, sample, o)}-{sample.pose.index:04d}"
+
+
+def _object_name(dataset: Dataset, sample: Sample, o: ObjectAnnotation) -> str:
+    """An object's name in its pose: its model's key, with numbers where that is not unique."""
+    plan = dataset.plan
+    one_a_pose = dataset.max_objects == 1 and plan.frames <= len(plan.models) * plan.poses
+    return o.key if one_a_pose else f"{o.key}_{sample.index + 1}_{o.id}"
+
+
+def _pose_folder(dataset: Dataset, sample: Sample) -> str:
+    index = sample.pose.index
+    group = f"Poses-{index // FOLDER_SIZE:04d}/" if dataset.plan.poses > FOLDER_SIZE - 2 else ""
+    return f"{group}Pose-{index}"
+
+
+def _group(dataset: Dataset, sample: Sample) -> str:
+    """Sub-folder of a pose's folders, where they would hold too many files."""
+    plan = dataset.plan
+    number, count = (n * dataset.max_objects // max(plan.poses, 1) for n in (sample.index, plan.frames))
+    return f"{number // FOLDER_SIZE:04d}/" if count > FOLDER_SIZE else ""
+
+
+def pose(dataset: Dataset, sample: Sample) -> dict[str, Any]:
+    """The keys of a sample's pose, but for what was rendered of it."""
+    viewpoint = sample.pose
+    return {
+        "distance": viewpoint.distance,
+        "elevation": viewpoint.elevation_deg,
+        "azimuth": viewpoint.azimuth_deg,
+        "tilt": viewpoint.tilt_deg,
+        "pose_category": viewpoint.category,
+        **({"frame": viewpoint.time.frame, "seconds": viewpoint.time.seconds} if viewpoint.time else {}),
+        "folder": _pose_folder(dataset, sample),
+        "transformation_matrix": transformation_matrix(sample.camera),
+    }
+
+
+def _rendered(sample: Sample, o: ObjectAnnotation, mask: str, files: Mapping[str, str]) -> dict[str, Any]:
+    """An object's entry; all objects of a frame share the files of its first one, but for the mask."""
+    lens = sample.camera.distortion
+    return {
+        "path_rgb": files.get(picture_of(files) or ""),
+        "path_mask": mask,
+        "path_depth": files.get("depth"),
+        "render_resolution": [sample.camera.width, sample.camera.height],
+        "render_scale": 1.0,
+        "bbox_3D_pxs": faces(o.box3d_pixels),
+        "bbox_2D": o.box2d,
+        "visibility": o.visibility,
+        "truncation": o.truncation,
+        "id_model": o.key,
+        **({"id_track": o.track} if o.track else {}),
+        "split": sample.split,
+        "transformation_matrix": transformation_matrix(sample.camera),
+        **({"distortion": lens.model_dump(mode="json")} if lens else {}),
+    }

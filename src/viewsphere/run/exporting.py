@@ -1,0 +1,88 @@
+"""A data set on disk in other formats: one pass over its samples for all of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager, ExitStack
+from pathlib import Path
+
+from viewsphere import plugins
+from viewsphere.errors import UserError
+from viewsphere.formats import Format
+from viewsphere.run.progress import Listener, Progress, unheard
+from viewsphere.store import Choice, Dataset, new_folder
+
+
+def export(
+    out: Path | str,
+    formats: Sequence[str],
+    *,
+    output: Path | str | None = None,
+    choice: Choice | None = None,
+    listener: Listener | None = None,
+) -> tuple[str, ...]:
+    """Write the finished frames of a data set in these formats, each to OUT/<format>, or OUTPUT/<format>; gives notes for the
+    user.
+
+    All are put in place, and take that of older exports, only when all are whole; an export of all frames is not replaced by
+    one of a choice of them. Raises UserError for an unknown format or a choice without output or frames, StoreError if `out`
+    is no data set or one of the folders cannot be written.
+    """
+    dataset = Dataset(out, choice)
+    place = dataset.root if output is None else Path(output)
+    is_own = place.resolve() == dataset.root.resolve()
+    _check_choice(dataset, is_own)
+    if place.resolve().is_relative_to(dataset.store.folder.resolve()):
+        raise UserError(f"--output: expected a folder outside of the data set's store; found {place}")
+    names = tuple(dict.fromkeys(formats))
+    for name in names:  # before the first of them is written
+        writable(name)
+    with ExitStack() as whole:
+        folders = {name: whole.enter_context(_folder(dataset, place / name, is_own)) for name in names}
+        notes = write(dataset, folders, listener or unheard)
+    kinds = dataset.link_kinds - {"hard link"}
+    return tuple(dict.fromkeys(notes)) + tuple(
+        f"{dataset.root}: files of the exports are made as a {kind}, hard links do not work here" for kind in sorted(kinds)
+    )
+
+
+def _folder(dataset: Dataset, target: Path, is_own: bool) -> AbstractContextManager[Path]:
+    return dataset.store.replacing(dataset.root / target.name) if is_own else new_folder(target)
+
+
+def write(dataset: Dataset, folders: Mapping[str, Path], tell: Listener = unheard) -> tuple[str, ...]:
+    """Write the data set in formats, by their names, into these empty folders; gives notes for the user.
+
+    Every sample is read once, and so is each of its channels.
+    """
+    if not folders:
+        return ()
+    notes: list[str] = []
+    total = len(dataset)
+    with ExitStack() as stack:
+        adds = [stack.enter_context(_format(name).writer(dataset, folder, notes.append)) for name, folder in folders.items()]
+        for done, sample in enumerate(dataset):
+            tell(Progress("exports", done, total))
+            for add in adds:
+                add(sample)
+    tell(Progress("exports", total, total))
+    return tuple(notes)
+
+
+def writable(name: str) -> Format:
+    """The format of this name; raises UserError for one that is not known or does not work here."""
+    module = _format(name)
+    getattr(module, "check", lambda: None)()
+    return module
+
+
+def _format(name: str) -> Format:
+    return plugins.load("formats", name)
+
+
+def _check_choice(dataset: Dataset, is_own: bool) -> None:
+    """Raise UserError for a choice that would take the place of an export of everything, or that leaves nothing."""
+    if dataset.choice.is_some and is_own:
+        raise UserError("--output: expected another folder than the data set's, beside --models or --frames; found none")
+    if dataset.choice.is_some and not len(dataset):
+        raise UserError(f"{dataset.root}: expected finished frames that --models and --frames fit; found none")

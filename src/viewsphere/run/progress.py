@@ -1,0 +1,27 @@
+"""How far a run is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Progress:
+    """Where a run stands: `done` of `total`; `resumed` of them were there before this run.
+
+    Phases are skies (their pictures are looked at), models, kernels (compiled once on a machine, then cached), frames and
+    exports (counted in frames, too); those without anything to do are left out.
+    """
+
+    phase: str
+    done: int
+    total: int
+    resumed: int = 0
+
+
+Listener = Callable[[Progress], None]
+
+
+def unheard(progress: Progress) -> None:
+    """Nobody listens."""
