@@ -9,23 +9,16 @@ from cube_dataset import LENS, make
 from viewsphere.check import check
 from viewsphere.check.frames import FRAME_PROOFS
 from viewsphere.errors import MissingExtraError
-from viewsphere.formats import coco, native
 from viewsphere.geometry.mask import encode_rle
 from viewsphere.model.camera import Distortion
 from viewsphere.model.channel import CHANNELS
+from viewsphere.run.exporting import export
 from viewsphere.store import Dataset, encode
-
-
-def export(dataset):
-    for name, module in (("coco", coco), ("native", native)):
-        (dataset.root / name).mkdir()
-        module.export(dataset, dataset.root / name)
-    return dataset
 
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory):
-    return export(make(tmp_path_factory.mktemp("check") / "out", ground=True))
+    return make(tmp_path_factory.mktemp("check") / "out", ground=True)
 
 
 @pytest.fixture
@@ -55,17 +48,11 @@ def edit_channel(dataset, frame, name, change):
     dataset.path(sample.files[name]).write_bytes(encode(CHANNELS[name], array))
 
 
-def edit_json(file, change):
-    value = json.loads(file.read_text())
-    change(value)
-    file.write_text(json.dumps(value))
-
-
 def test_a_whole_data_set_passes(whole):
     report = check(whole)
     assert report.ok, report.findings
     assert report.notes == ()
-    names = ["files", "ids", "masks", "boxes", "projection", "poses", "surface", "coco", "native"]
+    names = ["files", "ids", "masks", "boxes", "projection", "poses", "surface"]
     assert report.checked == dict.fromkeys(names, 12)
     assert json.loads(json.dumps(report.to_json()))["ok"] is True
 
@@ -82,14 +69,45 @@ def test_bent_pictures_pass(tmp_path, lens):
     assert report.ok, report.findings
 
 
-def test_several_objects_pass_with_and_without_exports(tmp_path):
-    dataset = make(tmp_path, several=True)
-    report = check(dataset)
+def test_several_objects_pass(tmp_path):
+    report = check(make(tmp_path, several=True))
     assert report.ok, report.findings
-    assert any(note.startswith("coco: not exported") for note in report.notes)
-    assert any(note.startswith("native: not exported") for note in report.notes)
-    assert "native" not in report.checked
-    assert check(export(dataset)).ok
+    assert report.notes == ()
+
+
+def test_every_export_that_is_there_is_proved_by_its_format(dataset):
+    assert "coco" not in check(dataset, rays=False).checked
+    export(dataset.root, ["coco", "native"])
+    report = check(Dataset(dataset.root), rays=False)
+    assert report.ok, report.findings
+    assert (report.checked["coco"], report.checked["native"]) == (12, 12)
+    (dataset.root / "coco" / "train" / "000000000003.png").unlink()
+    (dataset.root / "native" / "more.txt").touch()
+    assert failures(dataset, rays=False) == {("coco", 2), ("native", None)}
+    part = check(Dataset(dataset.root), rays=False, frames=6)
+    assert part.ok and "coco: not checked, that needs all frames" in part.notes
+
+
+def test_a_format_without_a_proof_is_a_note(dataset):
+    (dataset.root / "blend").mkdir()
+    report = check(dataset, rays=False)
+    assert report.ok and report.notes == ("blend: not checked, the format has no proof",)
+
+
+@pytest.mark.parametrize(
+    ("error", "message"),
+    [
+        (IndexError("7"), "expected an export that can be checked, found IndexError: 7"),
+        (RuntimeError("no luck"), "the check itself failed: RuntimeError: no luck"),
+    ],
+)
+def test_an_export_s_proof_that_breaks_off(dataset, monkeypatch, error, message):
+    def broken(*_):
+        raise error
+
+    (dataset.root / "native").mkdir()
+    monkeypatch.setattr("viewsphere.formats.native.verify", broken)
+    assert [(f.check, f.message) for f in check(dataset, rays=False).findings] == [("native", message)]
 
 
 def test_pictures_alone_pass_with_notes(tmp_path):
@@ -160,7 +178,7 @@ def test_a_wrong_category(dataset):
 def test_a_pixel_more_in_the_map(dataset):
     edit_channel(dataset, 9, "instances", lambda a: a.__setitem__((0, 0), 1))
     edit_channel(dataset, 9, "categories", lambda a: a.__setitem__((0, 0), 3))
-    assert {("masks", 9), ("coco", 9)} <= failures(dataset)
+    assert ("masks", 9) in failures(dataset)
 
 
 def test_wrong_run_lengths(dataset):
@@ -181,7 +199,7 @@ def test_run_lengths_that_are_none(dataset):
 def test_run_lengths_that_are_none_where_there_is_no_map(tmp_path):
     dataset = make(tmp_path, channels=("rgb",))
     edit_record(dataset, 1, lambda r: r["objects"][0]["rle"].update(counts="?!"))
-    assert {("masks", 1), ("boxes", 1), ("coco", None)} <= failures(dataset)
+    assert {("masks", 1), ("boxes", 1)} <= failures(dataset)
 
 
 @pytest.mark.parametrize("text", ["", "{}"])
@@ -203,7 +221,7 @@ def test_a_wrong_2d_box(dataset, name):
         record["objects"][0][name] = [box[0] + 2, *box[1:]]
 
     edit_record(dataset, 3, change)
-    assert {f for f in failures(dataset) if f[0] != "coco"} == {("boxes", 3)}
+    assert failures(dataset) == {("boxes", 3)}
 
 
 @pytest.mark.parametrize("name", ["box3d_object", "box3d", "box3d_camera", "box3d_pixels", "camera_from_object"])
@@ -237,7 +255,7 @@ def test_a_wrong_camera(dataset):
 @pytest.mark.parametrize("name", ["azimuth_deg", "elevation_deg", "tilt_deg", "distance"])
 def test_a_wrong_pose(dataset, name):
     edit_record(dataset, 3, lambda r: r["pose"].update({name: r["pose"][name] + 0.01}))
-    assert {f for f in failures(dataset) if f[0] != "native"} == {("poses", 3)}
+    assert failures(dataset) == {("poses", 3)}
 
 
 def test_a_wrong_view(dataset):
@@ -256,124 +274,6 @@ def test_another_model_than_was_drawn(dataset):
     assert failures(dataset) == {("surface", i) for i in range(4)}
 
 
-def instances_file(dataset, split="train"):
-    return dataset.root / "coco" / "annotations" / f"instances_{split}.json"
-
-
-def spoil_segmentation(value):
-    value["annotations"][2]["segmentation"][0][0] += 3
-
-
-def spoil_area(value):
-    value["annotations"][2]["area"] += 1
-
-
-def spoil_bbox(value):
-    value["annotations"][2]["bbox"][2] += 1
-
-
-def spoil_category(value):
-    value["annotations"][2]["category_id"] = 92
-
-
-def drop_annotation(value):
-    del value["annotations"][2]
-
-
-def drop_image(value):
-    del value["images"][2], value["annotations"][2]
-
-
-@pytest.mark.parametrize("spoil", [spoil_segmentation, spoil_area, spoil_bbox, spoil_category, drop_annotation, drop_image])
-def test_a_wrong_coco_annotation(dataset, spoil):
-    edit_json(instances_file(dataset), spoil)
-    found = failures(dataset, rays=False)
-    assert ("coco", 2) in found
-    assert {name for name, _ in found} == {"coco"}
-
-
-def test_average_precision_is_demanded(dataset):
-    edit_json(instances_file(dataset), lambda v: v["annotations"][2].update(segmentation=[[0, 0, 3, 0, 3, 3, 0, 3]]))
-    messages = [f.message for f in check(dataset, rays=False).findings]
-    assert any(m.startswith("segm: expected AP 1.0") for m in messages)
-
-
-@pytest.mark.parametrize("kind", ["images", "annotations"])
-def test_coco_ids_that_are_not_unique_or_start_at_0(dataset, kind):
-    edit_json(instances_file(dataset), lambda v: v[kind][2].update(id=v[kind][1]["id"]))
-    assert any("unique" in f.message for f in check(dataset, rays=False).findings)
-    edit_json(instances_file(dataset), lambda v: v[kind][2].update(id=0))
-    assert any("from 1" in f.message for f in check(dataset, rays=False).findings)
-
-
-@pytest.mark.parametrize("name", ["000000000003.png", "MASK/000000000003.png"])
-def test_a_missing_coco_file(dataset, name):
-    (dataset.root / "coco" / "train" / name).unlink()
-    assert failures(dataset, rays=False) == {("coco", 2)}
-
-
-def test_a_coco_file_that_is_none(dataset):
-    instances_file(dataset, "val").write_text("{}")
-    assert failures(dataset, rays=False) == {("coco", None)}
-
-
-def native_entry(value):
-    return value["poses"]["2"]["vehicles_rendered"]["block-1"]  # frame 6
-
-
-def drop_key(value):
-    del native_entry(value)["render_scale"]
-
-
-def drop_entry(value):
-    del value["poses"]["2"]["vehicles_rendered"]["block-1"]
-
-
-def negative_distance(value):
-    value["poses"]["2"]["distance"] *= -1
-
-
-def rename_mask(value):
-    native_entry(value)["path_mask"] = "nowhere.png"
-
-
-def move_box(value):
-    native_entry(value)["bbox_2D"][0] += 1
-
-
-@pytest.mark.parametrize("spoil", [drop_key, drop_entry, negative_distance, rename_mask, move_box])
-def test_a_wrong_native_entry(dataset, spoil):
-    edit_json(dataset.root / "native" / "dataset1.json", spoil)
-    found = failures(dataset, rays=False)
-    assert ("native", 6) in found
-    assert {name for name, _ in found} == {"native"}
-
-
-def drop_vehicle(value):
-    del value["vehicles"]["block-0"]
-
-
-def drop_face(value):
-    del value["vehicles"]["block-0"]["bbox3D_model"]["left"]
-
-
-def drop_poses(value):
-    del value["poses"]
-
-
-@pytest.mark.parametrize("spoil", [drop_vehicle, drop_face, drop_poses])
-def test_a_wrong_native_file(dataset, spoil):
-    edit_json(dataset.root / "native" / "dataset1.json", spoil)
-    assert failures(dataset, rays=False) == {("native", None)}
-
-
-def test_wrong_polygons_are_the_file_s_fault(dataset):
-    edit_json(instances_file(dataset), lambda v: v["annotations"][2].update(segmentation=[[1, 2]]))
-    messages = [f.message for f in check(dataset, rays=False).findings]
-    assert len(messages) == 1
-    assert messages[0].startswith(f"{instances_file(dataset)}: expected COCO instances, found Exception: ")
-
-
 @pytest.mark.parametrize(
     ("error", "message"),
     [
@@ -389,17 +289,6 @@ def test_a_proof_that_breaks_off_blames_the_data_only_for_what_data_causes(whole
     findings = check(whole, rays=False).findings
     assert {(f.check, f.message) for f in findings} == {("boxes", message)}
     assert len(findings) == len(whole)
-
-
-def test_exports_that_cannot_be_checked(whole, monkeypatch):
-    def broken(*_):
-        raise RuntimeError("no luck")
-
-    monkeypatch.setattr("viewsphere.check.exports._load", broken)
-    monkeypatch.setattr("viewsphere.check.exports._native", broken)
-    messages = [f.message for f in check(whole, rays=False).findings]
-    assert len(messages) == len(whole.splits) + 1
-    assert all(m.endswith(".json: the check itself failed: RuntimeError: no luck") for m in messages)
 
 
 def test_findings_say_where(dataset):

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from viewsphere import Dataset, Recipe, generate
-from viewsphere.run.generate import export
+from viewsphere.run.exporting import export
 from viewsphere.run.merging import merge
 from viewsphere.store import Choice
 

@@ -10,8 +10,9 @@ from pycocotools.cocoeval import COCOeval
 
 from cube_dataset import MESHES, make
 from viewsphere.errors import UserError
-from viewsphere.formats import coco
+from viewsphere.formats.coco.categories import CATEGORY_IDS, category_ids, official_ids
 from viewsphere.geometry.mask import encode_rle
+from viewsphere.run.exporting import write
 from viewsphere.store import Category
 
 
@@ -20,7 +21,7 @@ def exported(request, tmp_path_factory):
     root = tmp_path_factory.mktemp("coco")
     dataset = make(root / "out", request.param)
     (root / "coco").mkdir()
-    coco.export(dataset, root / "coco")
+    write(dataset, {"coco": root / "coco"})
     return dataset, root / "coco"
 
 
@@ -39,7 +40,7 @@ def average_precision(truth, detections, kind):
 
 
 def test_the_80_categories_of_coco():
-    ids = coco.CATEGORY_IDS
+    ids = CATEGORY_IDS
     assert len(ids) == len(set(ids.values())) == 80
     assert sorted(set(range(1, 91)) - set(ids.values())) == [12, 26, 29, 30, 45, 66, 68, 69, 71, 83]
     known = {"person": 1, "bicycle": 2, "car": 3, "boat": 9, "traffic light": 10, "bench": 15, "giraffe": 25}
@@ -51,14 +52,14 @@ def test_the_80_categories_of_coco():
 @pytest.mark.parametrize("name", ["hair drier", "hair_drier", "Hair-Drier", "hairdrier", "hairdryer", "hair dryer"])
 def test_categories_keep_coco_ids_however_spelled(name):
     categories = (Category(1, "gizmo", ""), Category(2, name, ""), Category(3, "hair drier", ""))
-    assert coco.official_ids(categories) == {1: 91, 2: 89, 3: 93}
+    assert official_ids(categories) == {1: 91, 2: 89, 3: 93}
 
 
 def test_detections_rebuilt_from_the_stored_maps_score_one(exported):
     dataset, folder = exported
     for split in dataset.splits:
         truth, detections = load(folder, split), []
-        ids = coco.category_ids(dataset)
+        ids = category_ids(dataset)
         for sample in dataset:
             if sample.split != split:
                 continue
@@ -165,7 +166,7 @@ def test_models_and_categories(exported):
 def test_ids_do_not_depend_on_what_is_finished(tmp_path):
     for name, left_out in (("whole", ()), ("part", (0,))):
         (tmp_path / name).mkdir()
-        coco.export(make(tmp_path / f"{name}-store", leave_out=left_out), tmp_path / name)
+        write(make(tmp_path / f"{name}-store", leave_out=left_out), {"coco": tmp_path / name})
     whole, part = load(tmp_path / "whole", "train"), load(tmp_path / "part", "train")
     assert sorted(part.imgs) == sorted(whole.imgs)[4:]
     for number, annotation in part.anns.items():
@@ -174,7 +175,7 @@ def test_ids_do_not_depend_on_what_is_finished(tmp_path):
 
 def test_equal_bytes(exported, tmp_path):
     dataset, folder = exported
-    coco.export(dataset, tmp_path)
+    write(dataset, {"coco": tmp_path})
     names = sorted(p.relative_to(folder) for p in folder.rglob("*") if p.is_file())
     assert names == sorted(p.relative_to(tmp_path) for p in tmp_path.rglob("*") if p.is_file())
     for name in names:
@@ -183,8 +184,8 @@ def test_equal_bytes(exported, tmp_path):
 
 def test_large_data_sets_have_numbered_folders(exported, monkeypatch, tmp_path):
     dataset, _ = exported
-    monkeypatch.setattr(coco, "_FOLDER_SIZE", 3)
-    coco.export(dataset, tmp_path)
+    monkeypatch.setattr("viewsphere.formats.coco.entries.FOLDER_SIZE", 3)
+    write(dataset, {"coco": tmp_path})
     for folder in [p for s in dataset.splits for p in [tmp_path / s, *(tmp_path / s).rglob("*")] if p.is_dir()]:
         assert sum(p.is_file() for p in folder.iterdir()) <= 3
     for split in dataset.splits:
@@ -195,4 +196,4 @@ def test_large_data_sets_have_numbered_folders(exported, monkeypatch, tmp_path):
 
 def test_a_data_set_without_pictures_is_refused(tmp_path):
     with pytest.raises(UserError, match="expected channel rgb"):
-        coco.export(make(tmp_path / "out", channels=("instances",)), tmp_path)
+        write(make(tmp_path / "out", channels=("instances",)), {"coco": tmp_path})

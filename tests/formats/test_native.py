@@ -5,8 +5,8 @@ import pytest
 from PIL import Image
 
 from cube_dataset import MESHES, POSES, make
-from viewsphere.formats import native
 from viewsphere.model.camera import Intrinsics
+from viewsphere.run.exporting import write
 
 TOP = ["vehicles", "poses"]
 VEHICLE = ["supercategory", "category", "model_file", "bbox3D_model", "real_size"]
@@ -19,7 +19,7 @@ FACES = {
 
 def export(dataset, folder):
     folder.mkdir(exist_ok=True)
-    native.export(dataset, folder)
+    write(dataset, {"native": folder})
     return json.loads((folder / "dataset1.json").read_text())
 
 
@@ -140,7 +140,7 @@ def test_equal_bytes(exported, tmp_path):
 
 def test_large_data_sets_have_numbered_folders(exported, monkeypatch, tmp_path):
     dataset, _, _ = exported
-    monkeypatch.setattr(native, "_FOLDER_SIZE", 2)
+    monkeypatch.setattr("viewsphere.formats.native.entries.FOLDER_SIZE", 2)
     value = export(dataset, tmp_path / "large")
     for folder in tmp_path.rglob("*"):
         assert not folder.is_dir() or folder.name == "large" or len(list(folder.iterdir())) <= 3

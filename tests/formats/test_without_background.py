@@ -10,11 +10,11 @@ from PIL import Image
 
 from cube_dataset import make
 from viewsphere.errors import UserError
-from viewsphere.formats import coco, native
 from viewsphere.model.channel import CHANNELS, missing, picture_of
 from viewsphere.preview import PAPER, draw_sample
 from viewsphere.report.frames import frame_data
 from viewsphere.report.pictures import SCALES, layers
+from viewsphere.run.exporting import write
 
 
 @pytest.fixture(scope="module")
@@ -40,7 +40,7 @@ def test_the_store_gives_back_what_it_got(dataset):
 
 
 def test_coco_links_it(dataset, tmp_path):
-    coco.export(dataset, tmp_path)
+    write(dataset, {"coco": tmp_path})
     for sample in dataset:
         (image,) = (
             i
@@ -55,11 +55,11 @@ def test_coco_links_it(dataset, tmp_path):
 
 def test_coco_needs_one(tmp_path):
     with pytest.raises(UserError, match="expected channel rgb, found none"):
-        coco.export(make(tmp_path / "out", channels=("instances",)), tmp_path / "coco")
+        write(make(tmp_path / "out", channels=("instances",)), {"coco": tmp_path})
 
 
 def test_native_links_it(dataset, tmp_path):
-    native.export(dataset, tmp_path)
+    write(dataset, {"native": tmp_path})
     poses = json.loads((tmp_path / "dataset1.json").read_text())["poses"]
     for sample in dataset:
         pose = poses[str(sample.pose.index)]

@@ -14,7 +14,9 @@ import pytest
 import viewsphere as vs
 from small import small_recipe, tree_hash
 from viewsphere.errors import ModelError, RecipeError, StoreError, UserError
-from viewsphere.run.generate import Progress, export, generate
+from viewsphere.run.exporting import export
+from viewsphere.run.generate import generate
+from viewsphere.run.progress import Progress
 
 
 def command(recipe_file, out, workers):

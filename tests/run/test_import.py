@@ -10,7 +10,7 @@ from small import small_recipe, tree_hash
 from viewsphere import Dataset, generate
 from viewsphere.check import check
 from viewsphere.errors import StoreError, UserError
-from viewsphere.run.generate import export
+from viewsphere.run.exporting import export
 from viewsphere.run.importing import import_dataset
 from viewsphere.run.merging import merge
 from viewsphere.sampling.extension import extend

@@ -10,8 +10,8 @@ from small import small_recipe, tree_hash
 from viewsphere import Dataset, generate
 from viewsphere.check import check
 from viewsphere.errors import StoreError, UserError
-from viewsphere.formats.coco import category_ids
-from viewsphere.run.generate import export
+from viewsphere.formats.coco.categories import category_ids
+from viewsphere.run.exporting import export
 from viewsphere.run.merging import merge
 
 

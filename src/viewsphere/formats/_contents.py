@@ -46,7 +46,9 @@ def check_files(
     `again`: the expected files once more; that is read only where there are more files than expected, so that their names need
     not be kept.
     """
-    there = sum((folder / name).is_file() for name in besides)
+    lacking = [name for name in besides if not (folder / name).is_file()]
+    yield from ((None, f"{name}: expected a file, found none: export again") for name in lacking)
+    there = len(besides) - len(lacking)
     for frame, name, content in expected:
         problem = _problem(dataset, content, folder / name)
         there += (folder / name).is_file()
