@@ -19,7 +19,8 @@ from viewsphere.model.scene import Ground, Scene
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Motion, Thing
 from viewsphere.sampling.camera import looking
-from viewsphere.store import Category, Dataset, ModelInfo, PlanRecord, Store
+from viewsphere.store import Block, Category, Dataset, ModelInfo, Part, PlanRecord, Store
+from viewsphere.store.records import PRODUCT
 from viewsphere.truth.channels import observe
 from viewsphere.truth.geometry import build_geometry
 from viewsphere.truth.visibility import rasterize
@@ -82,14 +83,14 @@ def render(shot: Shot):
 def shots(several: bool, channels: tuple[str, ...], intrinsics: Intrinsics, ground: bool) -> list[Shot]:
     """Three models by four poses, or four frames of three boxes, one of them always out of sight."""
     scenes = [{0: (0, 0, 0), 1: (0.5, 0.8, 0), 2: (0, 50, 0)}] if several else [{m: (0, 0, 0)} for m in range(3)]
-    made = []
+    names, made = subjects(several), []
     for s, offsets in enumerate(scenes):
         splits = ["val" if (p.index if several else s) == 2 else "train" for p in POSES]
         first = s * len(POSES)
         instants = (looking(p, (0, 0, 0), index=first + p.index, split=split) for p, split in zip(POSES, splits, strict=True))
         made.append(
             Shot(
-                key=f"shot-{s}", things=placed(offsets), rig=Rig.of(intrinsics), channels=channels, first=first,
+                key=f"{names[s]}-000000", things=placed(offsets), rig=Rig.of(intrinsics), channels=channels, first=first,
                 instants=tuple(instants),
                 scene=Scene(ground=Ground() if ground else None),
             )
@@ -97,16 +98,27 @@ def shots(several: bool, channels: tuple[str, ...], intrinsics: Intrinsics, grou
     return made
 
 
+def subjects(several: bool) -> tuple[str, ...]:
+    return ("several",) if several else tuple(f"block-{i}" for i in range(3))
+
+
 def make(root: Path, several=False, channels=tuple(CHANNELS), intrinsics=LENS, ground=False, leave_out=()) -> Dataset:
     """Write the data set; shots whose number is in `leave_out` stay unfinished."""
     planned = shots(several, channels, intrinsics, ground)
+    frames = sum(len(s.instants) for s in planned)
     store = Store(root)
     store.open_for(
         PlanRecord(
             version="1", digest="d", name="blocks", recipe={}, categories=CATEGORIES, splits=("train", "val"),
             channels=channels, models=tuple(f"block-{i}" for i in range(3)), poses=len(POSES),
-            frames=sum(len(s.instants) for s in planned), max_objects=3 if several else 1,
-            shots=tuple((s.key, s.first, len(s.instants)) for s in planned),
+            frames=frames, max_objects=3 if several else 1,
+            parts=(
+                Part(
+                    "d", "1", "blocks", {}, channels, 0, frames, 3 if several else 1,
+                    blocks=(Block(subjects(several), ((0, len(POSES)),)),), sampler="scenes" if several else PRODUCT,
+                    shot_frames=len(POSES), settings={"recipe": "d"},  # imported parts have none
+                ),
+            ),
         )
     )  # fmt: skip
     for i, mesh in enumerate(MESHES):

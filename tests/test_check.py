@@ -35,7 +35,7 @@ def failures(dataset, **options):
 
 def edit_record(dataset, frame, change):
     """Change the record of a frame; all shots have four frames."""
-    file = dataset.store.shot_folder(f"shot-{frame // 4}") / "frames.json"
+    file = dataset.store.shot_folder(f"block-{frame // 4}-000000") / "frames.json"
     records = json.loads(file.read_text())
     change(records[frame % 4])
     file.write_text(json.dumps(records))
@@ -138,12 +138,12 @@ def test_a_file_of_another_size(dataset):
 
 
 def test_a_broken_record(dataset):
-    (dataset.store.shot_folder("shot-1") / "frames.json").write_text("[{}")
+    (dataset.store.shot_folder("block-1-000000") / "frames.json").write_text("[{}")
     assert {("files", i) for i in range(4, 8)} <= failures(dataset)
 
 
 def test_a_missing_shot_and_model(dataset):
-    shutil.rmtree(dataset.store.shot_folder("shot-2"))
+    shutil.rmtree(dataset.store.shot_folder("block-2-000000"))
     dataset.path("store/models/block-1/block-1.glb").unlink()
     report = check(Dataset(dataset.root), rays=False)
     messages = [f.message for f in report.findings if f.check == "counts"]
@@ -154,10 +154,10 @@ def test_a_missing_shot_and_model(dataset):
 def test_what_was_left_out_on_purpose_is_a_note(tmp_path):
     dataset = make(tmp_path, leave_out=(2,))
     assert failures(dataset) == {("counts", None)}
-    (dataset.store.folder / "skipped.json").write_text(json.dumps({"shot-2": "no triangles"}))
+    (dataset.store.folder / "skipped.json").write_text(json.dumps({"block-2-000000": "no triangles"}))
     report = check(Dataset(dataset.root))
     assert report.ok
-    assert "shot-2 was left out: no triangles" in report.notes
+    assert "block-2-000000 was left out: no triangles" in report.notes
 
 
 def test_a_record_of_another_frame(dataset):
