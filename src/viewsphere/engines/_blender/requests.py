@@ -80,10 +80,12 @@ def told_scene(
 
 
 def kinds_of(things: Sequence[Thing], meshes: Sequence[Mesh], scene: Scene) -> tuple[Kind, ...]:
-    """The models that are put into the scene, each with its changes to materials; without what a .blend scene brings."""
+    """The models that are put into the scene, each with its changes to materials; without what is not there, or what a .blend
+    scene brings.
+    """
     found: dict[tuple[int, tuple[Repaint, ...]], tuple[Mesh, list[Thing]]] = {}
     for thing, mesh in zip(things, meshes, strict=True):
-        if scene.blend is None or thing.model.parts is None:
+        if thing.is_there and (scene.blend is None or thing.model.parts is None):
             found.setdefault((id(mesh), thing.repaints), (mesh, []))[1].append(thing)
     return tuple(Kind(mesh, repaints, tuple(own)) for (_, repaints), (mesh, own) in found.items())
 
