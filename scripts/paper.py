@@ -25,6 +25,7 @@ from viewsphere.preview import INK, PALETTE, PAPER, draw_sample
 from viewsphere.run.opening import prepare
 from viewsphere.run.stages import Stages
 from viewsphere.sampling.camera import looking
+from viewsphere.sampling.distances import Distances
 
 ROOT = Path(__file__).parent.parent
 IMAGES = ROOT / "docs" / "images"
@@ -329,7 +330,7 @@ def pose_sphere(made_of: Recipe, size: int) -> Picture:
     )
     (sample,) = stages.render(shot)
     things = (Thing(id=1, model=spec),)
-    cameras = planned.cameras(things, stages.box)
+    cameras = Distances(planned, stages.box).cameras(things, range(planned.poses))
     return bigger(_dots(sample, cameras), size)
 
 

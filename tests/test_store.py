@@ -12,19 +12,36 @@ import pytest
 
 from viewsphere.errors import StoreError
 from viewsphere.model.channel import CHANNELS
-from viewsphere.store import Category, Dataset, PlanRecord, Store, decode, encode, new_folder
+from viewsphere.store import Block, Category, Dataset, Part, PlanRecord, Store, decode, encode, new_folder
+
+PART = Part(
+    digest="d", version="1", name="n", recipe={"a": 1.5}, channels=("rgb",), first=0, frames=1, max_objects=1,
+    blocks=(Block(("m",), ((0, 1),)),), new_poses=1, model_splits={"m": "train"},
+)  # fmt: skip
 
 
 def plan_record(**changes):
     record = PlanRecord(
         version="1", digest="d", name="n", recipe={"a": 1.5}, categories=(Category(1, "car", "vehicle"),), splits=("train",),
-        channels=("rgb",), models=("m",), poses=1, frames=1, max_objects=1, shots=(("m-0", 0, 1),),
+        channels=("rgb",), models=("m",), poses=1, frames=1, max_objects=1, parts=(PART,),
     )  # fmt: skip
     return replace(record, **changes)
 
 
 def test_plan_record_round_trip():
     assert PlanRecord.from_json(plan_record().to_json()) == plan_record()
+
+
+def test_a_store_of_the_old_layout_is_one_line(tmp_path):
+    store = Store(tmp_path / "out")
+    store.open_for(plan_record())
+    value = json.loads(store.plan_file.read_text())
+    store.plan_file.write_text(json.dumps(value | {"store": 1}))
+    with pytest.raises(StoreError, match="version 1, where this viewsphere reads 2: render the recipe anew") as caught:
+        store.plan()
+    assert "\n" not in str(caught.value)
+    with pytest.raises(StoreError, match="version 1"):
+        Dataset(tmp_path / "out")
 
 
 @pytest.mark.parametrize("name", [n for n in CHANNELS])
@@ -50,10 +67,10 @@ def test_wrong_arrays_are_refused():
 def test_an_interrupted_write_leaves_nothing(tmp_path):
     store = Store(tmp_path / "out")
     store.open_for(plan_record())
-    with pytest.raises(RuntimeError), store.aside(store.shot_folder("m-0")) as folder:
+    with pytest.raises(RuntimeError), store.aside(store.shot_folder("m-000000")) as folder:
         (folder / "half").write_text("x")
         raise RuntimeError
-    assert not store.has_shot("m-0")
+    assert not store.has_shot("m-000000")
     assert list((store.folder / "writing").iterdir()) == []
 
 
@@ -61,9 +78,9 @@ def test_two_writers_of_one_shot(tmp_path):
     store = Store(tmp_path / "out")
     store.open_for(plan_record())
     for _ in range(2):
-        with store.aside(store.shot_folder("m-0")) as folder:
+        with store.aside(store.shot_folder("m-000000")) as folder:
             (folder / "frames.json").write_text("[]")
-    assert store.has_shot("m-0")
+    assert store.has_shot("m-000000")
     assert list((store.folder / "writing").iterdir()) == []
 
 
@@ -82,7 +99,7 @@ def test_leftovers_of_the_dead_are_swept_and_those_of_the_living_stay(tmp_path):
 def test_data_of_another_plan_are_refused(tmp_path, changes):
     store = Store(tmp_path / "out")
     store.open_for(plan_record())
-    store.shot_folder("m-0").mkdir(parents=True)
+    store.shot_folder("m-000000").mkdir(parents=True)
     with pytest.raises(StoreError, match="another output folder"):
         store.open_for(plan_record(**changes))
 
@@ -148,9 +165,9 @@ def test_a_broken_plan_is_said(tmp_path, text):
 def test_a_full_disk_is_one_line_and_loses_nothing(tmp_path):
     store = Store(tmp_path / "out")
     store.open_for(plan_record())
-    with pytest.raises(StoreError, match="No space left"), store.aside(store.shot_folder("m-0")):
+    with pytest.raises(StoreError, match="No space left"), store.aside(store.shot_folder("m-000000")):
         raise OSError(28, "No space left on device")
-    assert not store.has_shot("m-0")
+    assert not store.has_shot("m-000000")
 
 
 def test_link_is_a_hard_link_where_it_can_be(small_dataset):

@@ -8,7 +8,7 @@ import pytest
 from small import small_recipe, tree_hash
 from viewsphere.errors import RecipeError, StoreError
 from viewsphere.run.generate import generate
-from viewsphere.sampling.extension import LOOK
+from viewsphere.sampling.fitting import LOOK
 from viewsphere.sampling.look import engine_look
 from viewsphere.store import Store
 
@@ -31,7 +31,7 @@ def finished(whole, tmp_path):
 def half(finished):
     """A data set that lacks a shot."""
     store = Store(finished)
-    shutil.rmtree(store.shot_folder(store.plan().shots[-1][0]))
+    shutil.rmtree(store.shot_folder(list(store.plan().rows)[-1].key))
     return finished
 
 

@@ -13,6 +13,7 @@ from viewsphere.errors import StoreError, UserError
 from viewsphere.formats.coco.categories import category_ids
 from viewsphere.run.exporting import export
 from viewsphere.run.merging import merge
+from viewsphere.store.index import numbers
 
 
 def recipe(**changes):
@@ -143,7 +144,7 @@ def test_what_cannot_be_merged_says_so_and_changes_nothing(sources, tmp_path):
 def test_an_unfinished_data_set_is_refused_unless_asked_for(sources, small_dataset, tmp_path):
     import shutil
 
-    first = next(iter(small_dataset.plan.shots))[0]
+    first = next(small_dataset.plan.rows).key
     shutil.rmtree(small_dataset.store.shot_folder(first))
     with pytest.raises(StoreError, match=r"expected 12 frames, found 10: render it to the end, or .*--keep-going"):
         merge([sources[0], small_dataset.root], tmp_path / "e", mixed=True)
@@ -151,7 +152,7 @@ def test_an_unfinished_data_set_is_refused_unless_asked_for(sources, small_datas
     assert len(joined) == joined.plan.frames == 22
     assert [s.index for s in joined] == list(range(22))
     known = [
-        (key, pose) for row in joined.plan.parts[1].rows for key in row.models for a, b in row.poses for pose in range(a, b)
+        (key, pose) for block in joined.plan.parts[1].blocks for key in block.subjects for pose in numbers(block.positions)
     ]
     assert known == [(s.objects[0].key, s.pose.index) for s in joined][12:]
     assert joined.plan.parts[1].digest == ""  # else its recipe would take it for whole
@@ -166,7 +167,7 @@ def test_channels_that_were_not_added_to_the_end_are_an_unfinished_data_set(sour
     more = ["rgb", "depth", "instances", "categories", "normals"]
     generate(recipe(viewpoints=one, channels=more), tmp_path / "a", append=True)
     grown = Dataset(tmp_path / "a")
-    shutil.rmtree(grown.store.shot_folder(next(row for row, _ in grown.plan.supplements)[0]))
+    shutil.rmtree(grown.store.shot_folder(next(row for index, _ in grown.plan.supplements for row in index).key))
     with pytest.raises(StoreError, match=r"expected all channels, found 1 frames that lack those that were added last"):
         merge([sources[0], tmp_path / "a"], tmp_path / "e", mixed=True)
     assert not (tmp_path / "e").exists()

@@ -11,6 +11,7 @@ from viewsphere.errors import RecipeError
 from viewsphere.geometry.box import box_vertices
 from viewsphere.model.shot import Shot
 from viewsphere.recipe.recipe import Recipe
+from viewsphere.sampling.distances import Distances
 from viewsphere.sampling.plan import check_images, plan
 from viewsphere.zoo.places import Piece, Place, standing
 
@@ -160,7 +161,7 @@ def test_company_comes_from_the_same_split_and_follows_from_names_alone(draw):
         assert len(splits_there) == 1 == len({f.split for f in shot.instants} | splits_there)
     counts = {len(found) for found in by_model.values()}
     assert counts == {1} if draw != "per_frame" else max(counts) > 1
-    more = plan(recipe(13, splits=splits, scene=scene))
+    more = plan(recipe(13, splits=splits, scene=scene)).keeping(planned.model_splits)
     new = more.model_specs[12].key
     same = 0
     for shot in planned.shots(box_of):
@@ -276,11 +277,11 @@ def test_a_camera_in_company_is_found_whoever_it_is():
     viewpoints = {"azimuth": [0, 90], "elevation": 0, "distance": 2.0}
     planned = plan(recipe(viewpoints=viewpoints, scene={"company": {"layout": [[4, 0, 0]]}}))
     spec = planned.model_specs[0]
-    problem = str(planned.distance_problem(spec, box_of))
+    problem = str(Distances(planned, box_of).problem(spec))
     assert "distance 2 m (pose 1) inside its box" in problem
     assert problem.endswith(f"(model {planned.cast(spec)[1].key})")
     far = plan(recipe(viewpoints={**viewpoints, "distance": 20}, scene={"company": {"layout": [[4, 0, 0]]}}))
-    assert far.distance_problem(spec, box_of) is None
+    assert Distances(far, box_of).problem(spec) is None
 
 
 def test_the_digest_follows_the_pictures_on_the_planes(tmp_path):

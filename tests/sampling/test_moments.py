@@ -9,6 +9,7 @@ from viewsphere.assets.timeline import Blenders, Timeline
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.box import box_vertices
 from viewsphere.recipe.recipe import Recipe
+from viewsphere.sampling.distances import Distances
 from viewsphere.sampling.extension import extend, whole
 from viewsphere.sampling.plan import plan
 
@@ -63,7 +64,7 @@ def test_every_pose_at_every_time_step():
     # The cameras look where the model's centre is at the first frame.
     middle = tuple(box_of(planned.model_specs[0]).mean(axis=0).tolist())
     assert {f.viewpoint.target for s in shots for f in s.instants} == {middle}
-    assert [row[0] for row in planned.shot_table()] == [s.key for s in shots]
+    assert [row.key for row in planned.rows] == [s.key for s in shots]
     assert [spec.key for spec in planned.kept_specs] == ["walk", *(s.things[0].model.key for s in shots)]
 
 
@@ -130,11 +131,11 @@ def test_the_ground_is_where_the_lowest_moment_touches_it():
 def test_shots_never_span_time_steps_and_records_say_the_same():
     planned = plan(recipe(shot_frames=2))
     portion = whole(planned)
-    assert list(portion.record.shots) == list(planned.shot_table())
-    for row in portion.record.shots:
+    assert list(portion.record.rows) == list(planned.rows)
+    for row in portion.record.rows:
         shot = portion.shot(row, box_of)
         assert len({f.viewpoint.time for f in shot.instants}) == 1
-        assert [f.index for f in shot.instants] == list(range(row[1], row[1] + row[2]))
+        assert [f.index for f in shot.instants] == list(range(row.first, row.first + row.count))
     assert portion.record.models == tuple(spec.key for spec in planned.kept_specs)
 
 
@@ -144,7 +145,7 @@ def test_time_steps_are_added_to_those_there_are():
     assert again.adds_nothing
     more = extend(plan(recipe(walker(frames=[1, 13, 25]))), first)
     assert more.part.frames == 3
-    shown = [portion_shot for row in more.record.shots_of(1) for portion_shot in more.shot(row, box_of).instants]
+    shown = [portion_shot for row in more.record.rows_of(1) for portion_shot in more.shot(row, box_of).instants]
     assert [(f.index, f.viewpoint.index, f.viewpoint.time.frame) for f in shown] == [(6, 6, 13), (7, 7, 13), (8, 8, 13)]
 
 
@@ -153,11 +154,11 @@ def test_a_camera_inside_at_any_time_step_is_found():
         return box_vertices((-0.5, -0.5, 0.0), (0.5, 0.5 if spec.frame < 30 else 9.0, 1.0))
 
     planned = plan(recipe(viewpoints={"azimuth": [0, 180], "distance": 5, "elevation": 0}))
-    problem = planned.distance_problem(planned.model_specs[0], growing)
+    problem = Distances(planned, growing).problem(planned.model_specs[0])
     assert problem is not None
     assert "walk-f0037" in str(problem)
-    assert planned.distance_problem(planned.model_specs[0], box_of) is None
-    assert np.isfinite(planned.cameras(planned.shot(0, box_of).things, box_of)).all()
+    assert Distances(planned, box_of).problem(planned.model_specs[0]) is None
+    assert np.isfinite(Distances(planned, box_of).cameras(planned.shot(0, box_of).things, range(planned.poses))).all()
 
 
 @pytest.mark.parametrize(

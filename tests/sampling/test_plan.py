@@ -62,7 +62,9 @@ def test_shots_are_even_chunks_in_index_order():
     assert [f.viewpoint.index for s in shots for f in s.instants] == 3 * list(range(36))
     assert [s.key for s in shots[:4]] == ["car_000-000000", "car_000-000012", "car_000-000024", "car_001-000000"]
     assert shots[3] == planned.shot(3, unit_box)
-    assert list(planned.shot_table()) == [(s.key, s.instants[0].index, len(s.instants)) for s in shots]
+    assert [(row.key, row.first, row.count) for row in planned.rows] == [
+        (s.key, s.instants[0].index, len(s.instants)) for s in shots
+    ]
     assert [s.key.rpartition("-")[0] for s in shots] == [s.things[0].model.key for s in shots]
     assert planned.max_objects == max(len(s.things) for s in shots) == 1
     with pytest.raises(IndexError):
@@ -135,16 +137,18 @@ def test_splits_have_their_shares_and_keep_together_what_they_should(by, units):
 
 
 def test_adding_models_and_poses_moves_nothing_to_another_split():
-    def splits(by, models, azimuths):
+    def splits(by, models, azimuths, kept):
         planned = plan(
             recipe(models=models, viewpoints={"azimuth": azimuths, "distance": 5}, splits={"by": by, "a": 0.5, "b": 0.5})
-        )
+        ).keeping(kept)
+        kept |= planned.model_splits
         return {(s.things[0].model.key, f.viewpoint.azimuth_deg): f.split for s in planned.shots(unit_box) for f in s.instants}
 
     cars = {"source": "zoo:car", "count": 20}
     for by in ("model", "pose", "frame"):
-        few = splits(by, [cars], [10, 20, 30])
-        many = splits(by, [{"source": "zoo:boat", "count": 7}, {**cars, "count": 30}], [0, 10, 15, 20, 30])
+        kept = {}
+        few = splits(by, [cars], [10, 20, 30], kept)
+        many = splits(by, [{"source": "zoo:boat", "count": 7}, {**cars, "count": 30}], [0, 10, 15, 20, 30], kept)
         assert len(set(few.values())) == 2
         assert all(many[frame] == split for frame, split in few.items())
 

@@ -37,7 +37,7 @@ def to_render(planned: Plan, store: Store) -> Portion:
     number = found and found.part_with(planned.digest)
     if found is None or number is None:
         return whole(planned)
-    if len(found.parts) == 1 and (found.version != version("viewsphere") or not _is_finished(store, found, number, True)):
+    if len(found.parts) == 1 and (found.version != version("viewsphere") or not _is_begun(store, found, number)):
         return whole(planned)  # which the store refuses, or puts in the place of the one without frames
     return _resumed(planned, store, found, number)
 
@@ -86,8 +86,7 @@ def _check_look(planned: Plan, store: Store, found: PlanRecord, number: int) -> 
     then, now = found.parts[number].settings.get(LOOK), engine_look(planned.recipe.engine.name)
     if then in (None, now):
         return
-    finished = [_is_finished(store, found, number, state) for state in (True, False)]
-    if all(finished):
+    if _is_begun(store, found, number) and not _is_whole(store, found, number):
         engine = planned.recipe.engine.name
         raise StoreError(
             f"{store.root}: expected pictures as the {engine} engine that is installed paints them, found another's: "
@@ -105,6 +104,11 @@ def _check_versions(store: Store, found: PlanRecord) -> None:
             )
 
 
-def _is_finished(store: Store, found: PlanRecord, number: int, state: bool) -> bool:
-    """Whether any shot of a part is finished, or with `state` False, whether any is not."""
-    return any(store.has_shot(row.key) == state for row in found.indices[number])
+def _is_begun(store: Store, found: PlanRecord, number: int) -> bool:
+    """Whether any shot of a part is finished; takes as long as there are finished shots, however many are planned."""
+    return any(found.indices[number].find(key) for key in store.finished())
+
+
+def _is_whole(store: Store, found: PlanRecord, number: int) -> bool:
+    """Whether all shots of a part are finished."""
+    return all(store.has_shot(row.key) for row in found.indices[number])

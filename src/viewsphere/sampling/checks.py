@@ -91,6 +91,14 @@ def check_listed(recipe: Recipe, specs: tuple[ModelSpec, ...]) -> None:
         raise RecipeError(f"splits: expected every model to be listed; found no split for {min(keys - seen.keys())!r}")
 
 
+def check_splits(recipe: Recipe) -> None:
+    """Splits by place need a place."""
+    if recipe.splits.by == "place" and recipe.scene.place is None:
+        raise RecipeError(
+            "splits.by: expected scene.place, whose draws it tells apart; found none: set one, or split by model, pose or frame"
+        )
+
+
 def check_materials(recipe: Recipe, specs: tuple[ModelSpec, ...]) -> None:
     """Every change of materials is for some model."""
     for i, entry in enumerate(recipe.scene.materials):

@@ -33,6 +33,7 @@ from viewsphere.sampling.checks import (
     check_materials,
     check_moments,
     check_names,
+    check_splits,
 )
 from viewsphere.sampling.composition import BoxOf, Composition, compose
 from viewsphere.sampling.doubts import hidden_by_exposure, no_light, out_of_view
@@ -422,6 +423,7 @@ def plan(recipe: Recipe, shot_frames: int | None = None) -> Plan:
         check_names(recipe)
         check_blend(recipe)
         check_catcher(recipe)
+        check_splits(recipe)
         views = poses(recipe.viewpoints, recipe.seed, recipe.folder)
         _lens(recipe, views)
         check_frames(recipe, views)
