@@ -11,14 +11,17 @@ import numpy as np
 import pytest
 
 from viewsphere.errors import StoreError
-from viewsphere.model.channel import CHANNELS
-from viewsphere.store import Category, Dataset, PlanRecord, Store, decode, encode, new_folder
+from viewsphere.labels import channels
+from viewsphere.store import Category, Dataset, Part, PlanRecord, Store, decode, encode, new_folder
+from viewsphere.store.index import Block
+
+PART = Part("d", "1", "n", {"a": 1.5}, ("rgb",), 0, 1, 1, blocks=(Block(("m",), ((0, 1),)),))
 
 
 def plan_record(**changes):
     record = PlanRecord(
         version="1", digest="d", name="n", recipe={"a": 1.5}, categories=(Category(1, "car", "vehicle"),), splits=("train",),
-        channels=("rgb",), models=("m",), poses=1, frames=1, max_objects=1, shots=(("m-0", 0, 1),),
+        channels=("rgb",), models=("m",), poses=1, frames=1, max_objects=1, parts=(PART,),
     )  # fmt: skip
     return replace(record, **changes)
 
@@ -27,9 +30,9 @@ def test_plan_record_round_trip():
     assert PlanRecord.from_json(plan_record().to_json()) == plan_record()
 
 
-@pytest.mark.parametrize("name", [n for n in CHANNELS])
+@pytest.mark.parametrize("name", [n for n in channels()])
 def test_channel_files_round_trip(name, tmp_path):
-    channel, rng = CHANNELS[name], np.random.default_rng(1)
+    channel, rng = channels()[name], np.random.default_rng(1)
     array = rng.integers(0, 200, channel.shape(7, 11)).astype(channel.dtype)
     if channel.encoding == "tiff" and np.issubdtype(channel.dtype, np.floating):
         array = (array / 7).astype(channel.dtype)
@@ -42,18 +45,18 @@ def test_channel_files_round_trip(name, tmp_path):
 
 def test_wrong_arrays_are_refused():
     with pytest.raises(ValueError, match="depth"):
-        encode(CHANNELS["depth"], np.zeros((2, 2), np.float64))
+        encode(channels()["depth"], np.zeros((2, 2), np.float64))
     with pytest.raises(StoreError, match="65535"):
-        encode(CHANNELS["instances"], np.full((2, 2), 70_000, np.int32))
+        encode(channels()["instances"], np.full((2, 2), 70_000, np.int32))
 
 
 def test_an_interrupted_write_leaves_nothing(tmp_path):
     store = Store(tmp_path / "out")
     store.open_for(plan_record())
-    with pytest.raises(RuntimeError), store.aside(store.shot_folder("m-0")) as folder:
+    with pytest.raises(RuntimeError), store.aside(store.shot_folder("m-000000")) as folder:
         (folder / "half").write_text("x")
         raise RuntimeError
-    assert not store.has_shot("m-0")
+    assert not store.has_shot("m-000000")
     assert list((store.folder / "writing").iterdir()) == []
 
 
@@ -61,9 +64,9 @@ def test_two_writers_of_one_shot(tmp_path):
     store = Store(tmp_path / "out")
     store.open_for(plan_record())
     for _ in range(2):
-        with store.aside(store.shot_folder("m-0")) as folder:
+        with store.aside(store.shot_folder("m-000000")) as folder:
             (folder / "frames.json").write_text("[]")
-    assert store.has_shot("m-0")
+    assert store.has_shot("m-000000")
     assert list((store.folder / "writing").iterdir()) == []
 
 
@@ -82,7 +85,7 @@ def test_leftovers_of_the_dead_are_swept_and_those_of_the_living_stay(tmp_path):
 def test_data_of_another_plan_are_refused(tmp_path, changes):
     store = Store(tmp_path / "out")
     store.open_for(plan_record())
-    store.shot_folder("m-0").mkdir(parents=True)
+    store.shot_folder("m-000000").mkdir(parents=True)
     with pytest.raises(StoreError, match="another output folder"):
         store.open_for(plan_record(**changes))
 
@@ -148,9 +151,9 @@ def test_a_broken_plan_is_said(tmp_path, text):
 def test_a_full_disk_is_one_line_and_loses_nothing(tmp_path):
     store = Store(tmp_path / "out")
     store.open_for(plan_record())
-    with pytest.raises(StoreError, match="No space left"), store.aside(store.shot_folder("m-0")):
+    with pytest.raises(StoreError, match="No space left"), store.aside(store.shot_folder("m-000000")):
         raise OSError(28, "No space left on device")
-    assert not store.has_shot("m-0")
+    assert not store.has_shot("m-000000")
 
 
 def test_link_is_a_hard_link_where_it_can_be(small_dataset):

@@ -237,7 +237,7 @@ def test_check_reads_no_more_frames_than_asked_for(small_dataset):
 
     some = check(small_dataset, frames=4, rays=False)
     assert some.ok
-    assert some.checked["boxes"] == 4
+    assert some.checked["box2d"] == 4
     assert "coco" not in some.checked
     assert any(note.startswith("4 of 12 frames were read") for note in some.notes)
     assert check(small_dataset, frames=12, rays=False).checked["coco"] == 12

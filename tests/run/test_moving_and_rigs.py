@@ -62,7 +62,7 @@ SHOTS = {"moving": moving_shot, "rig": rig_shot}
 
 
 def world_triangles(stages: Stages, shot: Shot, instant: int):
-    """Corners (T, 3, 3) of all that is there at an instant, the owner of each triangle, and the object-space mesh of each id."""
+    """Corners (T, 3, 3) of all that is there at an instant, each triangle's owner, and the object-space mesh of each id."""
     corners, owners = [], []
     for thing in shot.things:
         pose = thing.motion.poses[0] if len(thing.motion.poses) == 1 else thing.motion.poses[instant]
