@@ -24,11 +24,11 @@ from bench_opengl import NoOpenGL, opengl
 from bench_scene import reference_recipe, write_reference
 
 from viewsphere import generate, plan, plugins
-from viewsphere.annotate import annotate
 from viewsphere.assets.mesh import Mesh
 from viewsphere.engines import Engine, Stage
 from viewsphere.engines.raster import painting, staging
 from viewsphere.geometry.box import box_vertices
+from viewsphere.labels import annotate, observe
 from viewsphere.model.camera import Camera
 from viewsphere.model.sample import Sample
 from viewsphere.model.shot import Shot
@@ -36,7 +36,6 @@ from viewsphere.run.allocator import keep_freed_memory
 from viewsphere.run.stages import Stages
 from viewsphere.sampling.plan import SHOT_FRAMES
 from viewsphere.store import Store
-from viewsphere.truth.channels import observe
 from viewsphere.truth.geometry import Geometry
 from viewsphere.truth.visibility import Visibility, rasterize
 

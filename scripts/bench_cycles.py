@@ -20,16 +20,15 @@ import numpy as np
 from bench_scene import write_reference
 
 from viewsphere import Recipe, plan, plugins
-from viewsphere.annotate import annotate
 from viewsphere.blender.interpreter import find_blender
 from viewsphere.engines import Engine
 from viewsphere.engines._blender.staging import CyclesStage
 from viewsphere.geometry.box import box_vertices
+from viewsphere.labels import annotate, observe
 from viewsphere.model.shot import Shot
 from viewsphere.run.stages import Stages
 from viewsphere.surroundings.sky import sky_pictures
 from viewsphere.surroundings.sun import sun_light
-from viewsphere.truth.channels import observe
 from viewsphere.truth.visibility import rasterize
 
 HERE = Path(__file__).parent

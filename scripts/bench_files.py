@@ -16,7 +16,7 @@ import numpy as np
 from PIL import Image
 
 from viewsphere.errors import MissingExtraError
-from viewsphere.model.channel import CHANNELS
+from viewsphere.labels import channels
 from viewsphere.model.files import Files
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.run.allocator import keep_freed_memory
@@ -85,7 +85,7 @@ def main() -> None:
 
     def row(name: str, channel: str, files: Files, *arrays: Sequence[Any]) -> None:
         try:
-            print(f"| {name} |", *(cost(lambda a: encode(CHANNELS[channel], a, files), each) for each in arrays), sep="")
+            print(f"| {name} |", *(cost(lambda a: encode(channels()[channel], a, files), each) for each in arrays), sep="")
         except MissingExtraError as error:
             print(f"| {name} | {error}")
 
@@ -99,7 +99,7 @@ def main() -> None:
     depth, normals, ids = ([frame[name] for frame in made] for name in ("depth", "normals", "instances"))
     for kind, name in NUMBERS:
         cells = (("depth", Files(depth=kind), depth), ("normals", Files(geometry=kind), normals))
-        print(f"| {name} |", *(cost(lambda a: encode(CHANNELS[c], a, f), each) for c, f, each in cells), sep="")  # noqa: B023
+        print(f"| {name} |", *(cost(lambda a: encode(channels()[c], a, f), each) for c, f, each in cells), sep="")  # noqa: B023
     print("| NPZ (`np.savez_compressed`) |", cost(by_numpy, depth), cost(by_numpy, normals), sep="")
     row("16-bit PNG, 1 mm (ours)", "depth", Files(depth="png16"), depth)
     print("\n| masks | instances |\n|---|---|")

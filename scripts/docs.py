@@ -14,7 +14,7 @@ import numpy as np
 from typer.models import ArgumentInfo
 
 from viewsphere.cli.commands import app
-from viewsphere.model.channel import CHANNELS
+from viewsphere.labels import Field, channels, object_labels
 from viewsphere.recipe.file import schema
 
 DOCS = Path(__file__).parent.parent / "docs"
@@ -65,14 +65,23 @@ def default(value: Any) -> str:
 
 def channels_page() -> str:
     text = NOTE + (
-        "# Channels\n\nA recipe's `channels` name what is kept of each frame. Arrays have the image's height and width; "
-        "channels of several components have them last. The files are the default ones, and lossless; a recipe's `files` "
-        "choose others, see [formats.md](formats.md#files).\n\n"
+        "# Channels and annotations\n\nA recipe's `channels` name what is kept of each frame. Arrays have the image's height "
+        "and width; channels of several components have them last. The files are the default ones, and lossless; a recipe's "
+        "`files` choose others, see [formats.md](formats.md#files). Each but the pictures is one file in "
+        "`src/viewsphere/labels/`.\n\n"
         "| channel | type | components | unit | empty | file | what it is |\n|---|---|---|---|---|---|---|\n"
     )
-    for c in CHANNELS.values():
+    for c in channels().values():
         file = {"png": "PNG", "png16": "16-bit PNG", "tiff": "TIFF"}[c.encoding]
         text += f"| `{c.name}` | {np.dtype(c.dtype)} | {c.components} | {c.unit} | {c.empty:g} | {file} | {c.meaning} |\n"
+    text += (
+        "\n## Annotations\n\nEvery object of a frame, seen or not, has these fields. They are computed for every data set. "
+        "Beside its shot and models, the store keeps only what does not follow from them.\n\n"
+        "| field | type | unit | axes | what it is |\n|---|---|---|---|---|\n"
+    )
+    for label in object_labels():
+        for f in label.fields:
+            text += f"| `{f.name}` | {field_type(f)} | {f.unit} | {f.axes or label.axes} | {f.meaning} |\n"
     return text
 
 
@@ -110,11 +119,19 @@ def value(default: Any) -> str:
     return "" if default is None else str(default).lower() if isinstance(default, bool) else f"{default:g}"
 
 
+def field_type(field: Field) -> str:
+    """A field's type in words."""
+    names = {str: "text", int: "number", float: "float64" if field.is_array else "number", bool: "bool"}
+    kind = names.get(field.type, f"`{field.type.__name__}`")
+    shape = f" {field.shape[0] if len(field.shape) == 1 else field.shape}" if field.shape else ""
+    return f"{kind}{shape}" + (" or None" if field.optional else "")
+
+
 PAGES = {
     "cli.md": cli_page,
     "channels.md": channels_page,
     "recipe.md": recipe_page,
-    "recipe.schema.json": lambda: json.dumps(schema(), indent=1) + "\n",
+    "recipe.schema.json": lambda: json.dumps(schema(tuple(channels())), indent=1) + "\n",
 }
 
 

@@ -14,6 +14,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 from viewsphere import Recipe
 from viewsphere.geometry.box import EDGES, FACES
+from viewsphere.labels._paint import PALETTE
 from viewsphere.model.camera import Camera, Intrinsics
 from viewsphere.model.instant import Viewpoint
 from viewsphere.model.rig import Rig
@@ -21,7 +22,7 @@ from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.model.scene import Background, Finish, Scene
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
-from viewsphere.preview import INK, PALETTE, PAPER, draw_sample
+from viewsphere.preview import INK, PAPER, draw_sample
 from viewsphere.run.opening import prepare
 from viewsphere.run.stages import Stages
 from viewsphere.sampling.camera import looking

@@ -4,13 +4,15 @@ from pathlib import Path
 
 import numpy as np
 
-from viewsphere.annotate import annotate
 from viewsphere.assets.export import export_glb, export_obj
 from viewsphere.assets.mesh import Mesh
 from viewsphere.geometry.box import FACES, box_vertices
 from viewsphere.geometry.pose_category import pose_category
+from viewsphere.labels import annotate, observe
+from viewsphere.labels import channels as known_channels
 from viewsphere.model.camera import Intrinsics
-from viewsphere.model.channel import CHANNELS, PICTURES
+from viewsphere.model.channel import PASSES
+from viewsphere.model.files import Files
 from viewsphere.model.instant import Viewpoint
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.rig import Rig
@@ -21,12 +23,13 @@ from viewsphere.model.thing import Motion, Thing
 from viewsphere.sampling.camera import looking
 from viewsphere.store import Block, Category, Dataset, ModelInfo, Part, PlanRecord, Store
 from viewsphere.store.records import PRODUCT
-from viewsphere.truth.channels import observe
 from viewsphere.truth.geometry import build_geometry
 from viewsphere.truth.visibility import rasterize
 
 HALVES = ((0, 1, 2), (0, 2, 3))
 TRIANGLES = np.array([[face[i] for i in half] for face in FACES.values() for half in HALVES], np.int32)
+CHANNELS = tuple(known_channels())
+PLAIN = Files()
 LENS = Intrinsics(width=96, height=72, fx=80, fy=80, cx=48, cy=36)
 CATEGORIES = (Category(1, "hair_drier", "appliance"), Category(2, "gizmo", ""), Category(3, "car", "vehicle"))
 
@@ -71,7 +74,7 @@ def render(shot: Shot):
     for number, instant, _ in shot.samples:
         now, camera = shot.instants[instant], shot.camera(instant)
         visibility = rasterize(geometry, camera)
-        channels = dict(observe(geometry, camera, visibility, {"instances", *shot.channels} - set(PICTURES)))
+        channels = dict(observe(geometry, camera, visibility, {"instances", *shot.channels} - set(PASSES)))
         colors = (channels["instances"][..., None] * np.array([90, 60, 30])).astype(np.uint8)
         alpha = np.where(channels["instances"] > 0, 255, 0).astype(np.uint8)
         channels |= {"rgb": colors, "rgba": np.dstack([colors, alpha])}
@@ -80,7 +83,7 @@ def render(shot: Shot):
         yield Sample(number, now.split, camera, now.viewpoint, objects, channels, {})
 
 
-def shots(several: bool, channels: tuple[str, ...], intrinsics: Intrinsics, ground: bool) -> list[Shot]:
+def shots(several: bool, channels: tuple[str, ...], intrinsics: Intrinsics, ground: bool, files: Files) -> list[Shot]:
     """Three models by four poses, or four frames of three boxes, one of them always out of sight."""
     scenes = [{0: (0, 0, 0), 1: (0.5, 0.8, 0), 2: (0, 50, 0)}] if several else [{m: (0, 0, 0)} for m in range(3)]
     names, made = subjects(several), []
@@ -92,7 +95,7 @@ def shots(several: bool, channels: tuple[str, ...], intrinsics: Intrinsics, grou
             Shot(
                 key=f"{names[s]}-000000", things=placed(offsets), rig=Rig.of(intrinsics), channels=channels, first=first,
                 instants=tuple(instants),
-                scene=Scene(ground=Ground() if ground else None),
+                scene=Scene(ground=Ground() if ground else None), files=files,
             )
         )  # fmt: skip
     return made
@@ -102,9 +105,11 @@ def subjects(several: bool) -> tuple[str, ...]:
     return ("several",) if several else tuple(f"block-{i}" for i in range(3))
 
 
-def make(root: Path, several=False, channels=tuple(CHANNELS), intrinsics=LENS, ground=False, leave_out=()) -> Dataset:
-    """Write the data set; shots whose number is in `leave_out` stay unfinished."""
-    planned = shots(several, channels, intrinsics, ground)
+def make(
+    root: Path, several=False, channels=CHANNELS, intrinsics=LENS, ground=False, leave_out=(), short=True, files=PLAIN
+) -> Dataset:
+    """Write the data set; shots whose number is in `leave_out` stay unfinished. Records are `short`, or whole without shots."""
+    planned = shots(several, channels, intrinsics, ground, files)
     frames = sum(len(s.instants) for s in planned)
     store = Store(root)
     store.open_for(
@@ -135,5 +140,5 @@ def make(root: Path, several=False, channels=tuple(CHANNELS), intrinsics=LENS, g
             store.write_model_info(folder, info)
     for i, shot in enumerate(planned):
         if i not in leave_out:
-            store.write_shot(shot.key, render(shot))
+            store.write_shot(shot.key, render(shot), kinds=files, shot=shot if short else None)
     return Dataset(root)

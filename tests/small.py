@@ -11,7 +11,7 @@ ROOT = Path(__file__).parent.parent
 def small_recipe(**changes):
     """Two post boxes from six sides on 96 x 72 pixels, with ground and all channels."""
     from viewsphere import Recipe
-    from viewsphere.model.channel import CHANNELS
+    from viewsphere.labels import channels
 
     values = {
         "name": "small",
@@ -19,7 +19,7 @@ def small_recipe(**changes):
         "viewpoints": {"azimuth": [0, 120, 240], "elevation": [15, 50], "distance": 1.0},
         "camera": {"size": [96, 72], "fov_deg": 35},
         "scene": {"ground": True},
-        "channels": list(CHANNELS),
+        "channels": list(channels()),
         "formats": ["native", "coco"],
         "shot_frames": 2,
     }

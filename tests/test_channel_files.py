@@ -14,7 +14,7 @@ from small import small_recipe
 from viewsphere import Dataset, Recipe, generate
 from viewsphere.check import check
 from viewsphere.errors import MissingExtraError, RecipeError, StoreError
-from viewsphere.model.channel import CHANNELS
+from viewsphere.labels import channels
 from viewsphere.model.files import Files
 from viewsphere.run.importing import import_dataset
 from viewsphere.run.merging import merge
@@ -34,7 +34,7 @@ ENDINGS = {"png8": "png", "png16": "png", "jpeg": "jpg"}
 
 def picture(name, size=(48, 64)):
     """Flat areas, a ramp and noise; numbers have empty pixels."""
-    channel, rng = CHANNELS[name], np.random.default_rng(4)
+    channel, rng = channels()[name], np.random.default_rng(4)
     array = rng.integers(0, 200, channel.shape(*size)).astype(channel.dtype)
     array[:20] = array[0, 0]
     array[20:40] = np.arange(size[1]).reshape((-1,) + (1,) * (array.ndim - 2))
@@ -53,11 +53,11 @@ def needs_codecs(kinds):
 def test_lossless_files_come_back(name, kinds, tmp_path):
     needs_codecs(kinds)
     files, array = Files(**kinds), picture(name)
-    file = tmp_path / f"x{files.suffix(CHANNELS[name])}"
-    file.write_bytes(encode(CHANNELS[name], array, files))
+    file = tmp_path / f"x{files.suffix(channels()[name])}"
+    file.write_bytes(encode(channels()[name], array, files))
     kind = next(iter(kinds.values()))
     assert file.suffix == f".{ENDINGS.get(kind, kind)}"
-    back = decode(CHANNELS[name], file)
+    back = decode(channels()[name], file)
     assert (back.dtype, back.shape) == (array.dtype, array.shape)
     assert back.tobytes() == array.tobytes()
 
@@ -67,7 +67,7 @@ def test_lossless_files_come_back(name, kinds, tmp_path):
 def test_pillow_reads_pictures(name, kind):
     needs_codecs({name: kind})
     array = picture(name)
-    with Image.open(io.BytesIO(encode(CHANNELS[name], array, Files(**{name: kind})))) as image:
+    with Image.open(io.BytesIO(encode(channels()[name], array, Files(**{name: kind})))) as image:
         np.testing.assert_array_equal(np.asarray(image), array)
 
 
@@ -78,26 +78,26 @@ def test_lossy_pictures_are_near_and_better_ones_nearer(kind, quality, most, tmp
     array = np.stack([3 * x, 4 * y, 2 * x + 2 * y], -1).astype(np.uint8)
 
     def off(value):
-        (tmp_path / "x").write_bytes(encode(CHANNELS["rgb"], array, Files(rgb=kind, quality=value)))
-        return np.abs(decode(CHANNELS["rgb"], tmp_path / "x").astype(int) - array).mean()
+        (tmp_path / "x").write_bytes(encode(channels()["rgb"], array, Files(rgb=kind, quality=value)))
+        return np.abs(decode(channels()["rgb"], tmp_path / "x").astype(int) - array).mean()
 
     assert 0 < off(quality) < most
     assert off(quality) < off(10)
 
 
 def test_jpeg_is_not_subsampled():
-    with Image.open(io.BytesIO(encode(CHANNELS["rgb"], picture("rgb"), Files(rgb="jpeg")))) as image:
+    with Image.open(io.BytesIO(encode(channels()["rgb"], picture("rgb"), Files(rgb="jpeg")))) as image:
         assert [part[1:3] for part in image.layer] == [(1, 1)] * 3
 
 
 def test_depth_in_steps(tmp_path):
     depth = np.array([[np.inf, 0.0004, 0.0006, 1.2344, 1.2346, 65.535, 70.0, -2.0, 2e9]], np.float32)
-    data = encode(CHANNELS["depth"], depth, Files(depth="png16"))
+    data = encode(channels()["depth"], depth, Files(depth="png16"))
     with Image.open(io.BytesIO(data)) as image:
         assert image.mode == "I;16"
         assert np.asarray(image).tolist() == [[0, 1, 1, 1234, 1235, 65535, 65535, 0, 65535]]
     (tmp_path / "x.png").write_bytes(data)
-    back = decode(CHANNELS["depth"], tmp_path / "x.png")
+    back = decode(channels()["depth"], tmp_path / "x.png")
     expected = [np.inf, 0.001, 0.001, 1.234, 1.235, 65.535, 65.535, np.inf, 65.535]
     np.testing.assert_allclose(back, [expected], rtol=1e-6)
     assert depth_step(tmp_path / "x.png") == pytest.approx(0.001)
@@ -106,8 +106,8 @@ def test_depth_in_steps(tmp_path):
 @pytest.mark.parametrize("unit", [1e-4, 0.002, 0.25, 1 / 3])
 def test_a_depth_file_knows_its_unit(unit, tmp_path):
     depth = picture("depth")
-    (tmp_path / "x.png").write_bytes(encode(CHANNELS["depth"], depth, Files(depth="png16", depth_unit=unit)))
-    back, seen = decode(CHANNELS["depth"], tmp_path / "x.png"), np.isfinite(depth) & (depth > unit) & (depth < 60000 * unit)
+    (tmp_path / "x.png").write_bytes(encode(channels()["depth"], depth, Files(depth="png16", depth_unit=unit)))
+    back, seen = decode(channels()["depth"], tmp_path / "x.png"), np.isfinite(depth) & (depth > unit) & (depth < 60000 * unit)
     assert seen.any()
     np.testing.assert_array_equal(np.isinf(back), np.isinf(depth) | (depth == 0))
     assert np.abs(back[seen] - depth[seen]).max() <= unit / 2 * (1 + 1e-5) + 2e-6
@@ -117,17 +117,17 @@ def test_a_depth_file_knows_its_unit(unit, tmp_path):
 def test_a_16_bit_png_that_names_no_unit_is_no_depth(tmp_path):
     Image.fromarray(np.full((4, 4), 700, np.uint16)).save(tmp_path / "x.png")
     with pytest.raises(StoreError, match=r"x\.png: .*pCAL"):
-        decode(CHANNELS["depth"], tmp_path / "x.png")
+        decode(channels()["depth"], tmp_path / "x.png")
 
 
 def test_exact_depth_has_no_step(tmp_path):
-    (tmp_path / "x.tiff").write_bytes(encode(CHANNELS["depth"], picture("depth")))
+    (tmp_path / "x.tiff").write_bytes(encode(channels()["depth"], picture("depth")))
     assert depth_step(tmp_path / "x.tiff") == 0
 
 
 def test_indexed_masks_are_ids_and_distinct_colours(tmp_path):
     ids = np.arange(256, dtype=np.int32).reshape(16, 16)
-    data = encode(CHANNELS["instances"], ids, Files(masks="png8"))
+    data = encode(channels()["instances"], ids, Files(masks="png8"))
     with Image.open(io.BytesIO(data)) as image:
         assert image.mode == "P"
         np.testing.assert_array_equal(np.asarray(image), ids)
@@ -136,35 +136,35 @@ def test_indexed_masks_are_ids_and_distinct_colours(tmp_path):
     assert len(np.unique(colors, axis=0)) == 256
     assert colors[:4].tolist() == [[0, 0, 0], [128, 0, 0], [0, 128, 0], [128, 128, 0]]
     ids[0, 0] = 256
-    (tmp_path / "x.png").write_bytes(encode(CHANNELS["instances"], ids, Files(masks="png8")))
+    (tmp_path / "x.png").write_bytes(encode(channels()["instances"], ids, Files(masks="png8")))
     with Image.open(tmp_path / "x.png") as image:
         assert image.mode == "I;16"
-    np.testing.assert_array_equal(decode(CHANNELS["instances"], tmp_path / "x.png"), ids)
+    np.testing.assert_array_equal(decode(channels()["instances"], tmp_path / "x.png"), ids)
 
 
 @pytest.mark.parametrize("number", [-1, 65536])
 @pytest.mark.parametrize("masks", ["png8", "png16"])
 def test_ids_that_no_mask_can_hold_are_refused(number, masks):
     with pytest.raises(StoreError, match=rf"parts.*65535.*{number}"):
-        encode(CHANNELS["parts"], np.full((3, 3), number, np.int32), Files(masks=masks))
+        encode(channels()["parts"], np.full((3, 3), number, np.int32), Files(masks=masks))
 
 
 @pytest.mark.parametrize(("name", "kinds"), [*LOSSLESS, ("rgb", {"rgb": "jpeg"}), ("depth", {"depth": "png16"})], ids=str)
 def test_truncated_files_are_named_with_a_way_out(name, kinds, tmp_path):
     needs_codecs(kinds)
-    data = encode(CHANNELS[name], picture(name), Files(**kinds))
-    file = tmp_path / "shot" / name / f"x{Files(**kinds).suffix(CHANNELS[name])}"
+    data = encode(channels()[name], picture(name), Files(**kinds))
+    file = tmp_path / "shot" / name / f"x{Files(**kinds).suffix(channels()[name])}"
     file.parent.mkdir(parents=True)
     for cut in (0, 5, len(data) // 2, len(data) - 30):
         file.write_bytes(data[:cut])
         with pytest.raises(StoreError, match=f"{re.escape(str(file))}: expected a readable .*delete .*shot and render again"):
-            decode(CHANNELS[name], file)
+            decode(channels()[name], file)
 
 
 def test_a_file_of_another_channel_is_refused(tmp_path):
-    (tmp_path / "x.tiff").write_bytes(encode(CHANNELS["triangles"], picture("triangles")))
+    (tmp_path / "x.tiff").write_bytes(encode(channels()["triangles"], picture("triangles")))
     with pytest.raises(StoreError, match="expected float32, found int32"):
-        decode(CHANNELS["depth"], tmp_path / "x.tiff")
+        decode(channels()["depth"], tmp_path / "x.tiff")
 
 
 def test_a_missing_codec_names_the_extra(tmp_path, monkeypatch):
@@ -172,11 +172,11 @@ def test_a_missing_codec_names_the_extra(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "imagecodecs", None)
     for kind in ("qoi", "jxl"):
         with pytest.raises(MissingExtraError, match=r"viewsphere\[codecs\]"):
-            encode(CHANNELS["rgb"], picture("rgb"), Files(rgb=kind))
+            encode(channels()["rgb"], picture("rgb"), Files(rgb=kind))
         with pytest.raises(MissingExtraError, match=rf"files.rgb: {kind}.*viewsphere\[codecs\]"):
             generate(small_recipe(files={"rgb": kind}), tmp_path / "out")
     with pytest.raises(MissingExtraError, match=r"x\.qoi: QOI.*viewsphere\[codecs\]"):
-        decode(CHANNELS["rgb"], tmp_path / "x.qoi")
+        decode(channels()["rgb"], tmp_path / "x.qoi")
     check_codecs(["depth"], Files(rgb="jxl"))
     assert not (tmp_path / "out").exists()
 
@@ -280,7 +280,7 @@ def test_appended_frames_and_channels_may_have_other_files(tmp_path):
 @pytest.mark.parametrize(("name", "kinds"), [*LOSSLESS, ("rgb", {"rgb": "jpeg"}), ("depth", {"depth": "png16"})], ids=str)
 def test_spoilt_files_are_arrays_or_store_errors(name, kinds, tmp_path):
     needs_codecs(kinds)
-    data, rng = encode(CHANNELS[name], picture(name), Files(**kinds)), np.random.default_rng(1)
+    data, rng = encode(channels()[name], picture(name), Files(**kinds)), np.random.default_rng(1)
     refused = 0
     for i in range(30):
         spoilt = bytearray(data)
@@ -288,7 +288,7 @@ def test_spoilt_files_are_arrays_or_store_errors(name, kinds, tmp_path):
             spoilt[place] ^= int(rng.integers(1, 256))
         (tmp_path / "x").write_bytes(spoilt)
         try:
-            decode(CHANNELS[name], tmp_path / "x")
+            decode(channels()[name], tmp_path / "x")
         except StoreError:
             refused += 1
     assert refused or "qoi" in kinds.values()  # which has no checksum

@@ -9,9 +9,11 @@ from cube_dataset import LENS, make
 from viewsphere.check import check
 from viewsphere.check.frames import FRAME_PROOFS
 from viewsphere.errors import MissingExtraError
-from viewsphere.geometry.mask import encode_rle
+from viewsphere.geometry.mask import decode_rle, encode_rle
+from viewsphere.labels import channel_labels, channels, labels, object_labels
+from viewsphere.labels._label import nothing
 from viewsphere.model.camera import Distortion
-from viewsphere.model.channel import CHANNELS
+from viewsphere.model.files import Files
 from viewsphere.run.exporting import export
 from viewsphere.store import Dataset, encode
 
@@ -25,6 +27,17 @@ def whole(tmp_path_factory):
 def dataset(whole, tmp_path):
     """A copy, free to be spoilt."""
     return Dataset(shutil.copytree(whole.root, tmp_path / "out"))
+
+
+@pytest.fixture(scope="module")
+def whole_records(tmp_path_factory):
+    return make(tmp_path_factory.mktemp("check") / "out", ground=True, short=False)
+
+
+@pytest.fixture
+def spelled(whole_records, tmp_path):
+    """A copy whose records say everything, as those of data sets that were merged do; so it has no shots."""
+    return Dataset(shutil.copytree(whole_records.root, tmp_path / "spelled"))
 
 
 def failures(dataset, **options):
@@ -41,18 +54,24 @@ def edit_record(dataset, frame, change):
     file.write_text(json.dumps(records))
 
 
+def edit_json(file, change):
+    value = json.loads(file.read_text())
+    change(value)
+    file.write_text(json.dumps(value))
+
+
 def edit_channel(dataset, frame, name, change):
     sample = dataset[frame]
     array = np.array(sample.channels[name])
     change(array)
-    dataset.path(sample.files[name]).write_bytes(encode(CHANNELS[name], array))
+    dataset.path(sample.files[name]).write_bytes(encode(channels()[name], array))
 
 
 def test_a_whole_data_set_passes(whole):
     report = check(whole)
     assert report.ok, report.findings
     assert report.notes == ()
-    names = ["files", "ids", "masks", "boxes", "projection", "poses", "surface"]
+    names = ["files", "ids", "camera", *labels(), "surface"]
     assert report.checked == dict.fromkeys(names, 12)
     assert json.loads(json.dumps(report.to_json()))["ok"] is True
 
@@ -133,7 +152,7 @@ def test_a_missing_or_broken_file(dataset, spoil):
 
 def test_a_file_of_another_size(dataset):
     file = dataset.path(dataset[5].files["depth"])
-    file.write_bytes(encode(CHANNELS["depth"], np.ones((9, 9), np.float32)))
+    file.write_bytes(encode(channels()["depth"], np.ones((9, 9), np.float32)))
     assert ("files", 5) in failures(dataset, rays=False)
 
 
@@ -167,39 +186,62 @@ def test_a_record_of_another_frame(dataset):
 
 def test_an_unknown_id_in_the_map(dataset):
     edit_channel(dataset, 2, "instances", lambda a: a.__setitem__((0, 0), 9))
-    assert ("ids", 2) in failures(dataset)
+    assert ("instances", 2) in failures(dataset, sample=0)
 
 
 def test_a_wrong_category(dataset):
     edit_channel(dataset, 2, "categories", lambda a: a.__setitem__(dataset[2].instances > 0, 3))
-    assert failures(dataset) == {("ids", 2)}
+    assert failures(dataset) == failures(dataset, sample=0) == {("categories", 2)}
 
 
 def test_a_pixel_more_in_the_map(dataset):
     edit_channel(dataset, 9, "instances", lambda a: a.__setitem__((0, 0), 1))
     edit_channel(dataset, 9, "categories", lambda a: a.__setitem__((0, 0), 3))
-    assert ("masks", 9) in failures(dataset)
+    assert ("mask", 9) in failures(dataset, sample=0)
 
 
-def test_wrong_run_lengths(dataset):
-    def change(record):
-        mask = dataset[1].objects[0].mask.copy()
-        mask[mask.any(axis=1).argmax()] = False
-        record["objects"][0]["rle"]["counts"] = encode_rle(mask)
+def with_a_hole(record):
+    """Its mask without a row, its area right."""
+    o = record["objects"][0]
+    counts = o["mask"] if "mask" in o else o["rle"]["counts"]
+    mask = decode_rle(72, 96, counts)
+    mask[mask.any(axis=1).argmax()] = False
+    if "mask" in o:
+        o["mask"] = encode_rle(mask)
+    else:
+        o["rle"]["counts"], o["area"] = encode_rle(mask), int(mask.sum())
+    return mask
 
-    edit_record(dataset, 1, change)
-    assert {("masks", 1), ("boxes", 1)} <= failures(dataset)
+
+def test_wrong_run_lengths(dataset, spelled):
+    for some in (dataset, spelled):
+        edit_record(some, 1, with_a_hole)
+        assert ("mask", 1) in failures(some, sample=0)
+    assert ("box2d", 1) in failures(spelled, sample=0)
 
 
-def test_run_lengths_that_are_none(dataset):
-    edit_record(dataset, 1, lambda r: r["objects"][0]["rle"].update(counts="?!"))
-    assert ("masks", 1) in failures(dataset)
+def test_a_hole_that_is_cut_consistently(dataset):
+    holes = []
+    edit_record(dataset, 1, lambda r: holes.append(with_a_hole(r)))
+    hole = (dataset[1].instances > 0) & ~holes[0]
+    for name in channel_labels():
+        edit_channel(dataset, 1, name, lambda a, empty=channels()[name].empty: a.__setitem__(hole, empty))
+    found = failures(dataset)
+    assert {(name, 1) for name in (*channel_labels(), "mask", "box2d")} == found
+
+
+@pytest.mark.parametrize("counts", ["?!", "", "o"])
+def test_run_lengths_that_are_none(dataset, spelled, counts):
+    edit_record(dataset, 1, lambda r: r["objects"][0].update(mask=counts))
+    assert ("mask", 1) in failures(dataset)
+    edit_record(spelled, 1, lambda r: r["objects"][0]["rle"].update(counts=counts))
+    assert ("mask", 1) in failures(spelled)
 
 
 def test_run_lengths_that_are_none_where_there_is_no_map(tmp_path):
     dataset = make(tmp_path, channels=("rgb",))
-    edit_record(dataset, 1, lambda r: r["objects"][0]["rle"].update(counts="?!"))
-    assert {("masks", 1), ("boxes", 1)} <= failures(dataset)
+    edit_record(dataset, 1, lambda r: r["objects"][0].update(mask="?!"))
+    assert {("mask", 1), ("box2d", 1)} <= failures(dataset)
 
 
 @pytest.mark.parametrize("text", ["", "{}"])
@@ -208,70 +250,142 @@ def test_a_model_without_its_facts(dataset, text):
     assert failures(dataset) == {("counts", None)}
 
 
-@pytest.mark.parametrize(("key", "value"), [("area", 7), ("visibility", 0.0), ("truncation", 1.5)])
-def test_a_wrong_number_of_pixels(dataset, key, value):
-    edit_record(dataset, 1, lambda r: r["objects"][0].update({key: value}))
-    assert ("masks", 1) in failures(dataset)
+@pytest.mark.parametrize(
+    ("key", "value", "name"), [("area", 7, "mask"), ("visibility", 0.0, "visibility"), ("truncation", 1.5, "visibility")]
+)
+def test_a_wrong_number_of_pixels(spelled, key, value, name):
+    edit_record(spelled, 1, lambda r: r["objects"][0].update({key: value}))
+    assert (name, 1) in failures(spelled)
 
 
 @pytest.mark.parametrize("name", ["box2d", "box2d_projected", "box2d_unclipped"])
-def test_a_wrong_2d_box(dataset, name):
+def test_a_wrong_2d_box(spelled, name):
     def change(record):
         box = record["objects"][0][name]
         record["objects"][0][name] = [box[0] + 2, *box[1:]]
 
-    edit_record(dataset, 3, change)
-    assert failures(dataset) == {("boxes", 3)}
+    edit_record(spelled, 3, change)
+    assert failures(spelled) == {("box2d" if name == "box2d" else "box2d_projected", 3)}
 
 
 @pytest.mark.parametrize("name", ["box3d_object", "box3d", "box3d_camera", "box3d_pixels", "camera_from_object"])
-def test_a_wrong_3d_box_or_pose(dataset, name):
+def test_a_wrong_3d_box_or_pose(spelled, name):
     def change(record):
         record["objects"][0][name][1][1] += 3e-6
 
-    edit_record(dataset, 3, change)
-    assert ("projection", 3) in failures(dataset)
+    edit_record(spelled, 3, change)
+    assert ("pose" if name == "camera_from_object" else "box3d", 3) in failures(spelled)
 
 
-def test_a_vertex_that_is_not_behind(dataset):
+def test_a_vertex_that_is_not_behind(spelled):
     def change(record):
         record["objects"][0]["box3d_in_front"][0] = False
 
-    edit_record(dataset, 3, change)
-    assert failures(dataset) == {("projection", 3)}
+    edit_record(spelled, 3, change)
+    assert failures(spelled) == {("box3d", 3)}
 
 
-def test_a_wrong_quaternion_and_size(dataset):
-    edit_record(dataset, 3, lambda r: r["objects"][0].update(quaternion=[1, 0, 0, 0]))
-    edit_record(dataset, 4, lambda r: r["objects"][0].update(size=[1, 2, 3]))
-    assert failures(dataset) == {("projection", 3), ("projection", 4)}
+def test_a_wrong_quaternion_size_and_category(spelled):
+    edit_record(spelled, 3, lambda r: r["objects"][0].update(quaternion=[1, 0, 0, 0]))
+    edit_record(spelled, 4, lambda r: r["objects"][0].update(size=[1, 2, 3]))
+    edit_record(spelled, 5, lambda r: r["objects"][0].update(real_size=[1, 2, 3]))
+    edit_record(spelled, 6, lambda r: r["objects"][0].update(pose_category="bottom"))
+    edit_record(spelled, 7, lambda r: r["objects"][0].update(category="car"))
+    edit_record(spelled, 8, lambda r: r["objects"][0].update(model="elsewhere.obj"))
+    expected = {("pose", 3), ("size", 4), ("size", 5), ("pose_category", 6), ("category", 7), ("model", 8)}
+    assert failures(spelled) == expected
 
 
-def test_a_wrong_camera(dataset):
-    edit_record(dataset, 3, lambda r: r["camera"]["t"].__setitem__(2, 2.5))
-    assert {("projection", 3), ("poses", 3)} <= failures(dataset)
+def test_a_wrong_camera(spelled):
+    edit_record(spelled, 3, lambda r: r["camera"]["t"].__setitem__(2, 2.5))
+    assert {("box3d", 3), ("pose", 3), ("camera", 3)} <= failures(spelled)
 
 
 @pytest.mark.parametrize("name", ["azimuth_deg", "elevation_deg", "tilt_deg", "distance"])
-def test_a_wrong_pose(dataset, name):
-    edit_record(dataset, 3, lambda r: r["pose"].update({name: r["pose"][name] + 0.01}))
-    assert failures(dataset) == {("poses", 3)}
+def test_a_wrong_pose(spelled, name):
+    edit_record(spelled, 3, lambda r: r["pose"].update({name: r["pose"][name] + 0.01}))
+    assert failures(spelled) == {("camera", 3)}
 
 
-def test_a_wrong_view(dataset):
-    edit_record(dataset, 3, lambda r: r["objects"][0]["view"].update(azimuth_deg=11))
-    assert failures(dataset) == {("poses", 3)}
+def test_a_wrong_view(spelled):
+    edit_record(spelled, 3, lambda r: r["objects"][0]["view"].update(azimuth_deg=11))
+    assert failures(spelled) == {("view", 3)}
 
 
 def test_depth_that_is_not_the_models(dataset):
     edit_channel(dataset, 7, "depth", lambda a: a.__imul__(np.float32(1.001)))
-    assert failures(dataset) == {("surface", 7)}
-    assert failures(dataset, rays=False) == set()
+    assert failures(dataset) == {("surface", 7), ("depth", 7)}
+    assert failures(dataset, rays=False) == {("depth", 7)}
+
+
+def nudged(array):
+    """One pixel of the object is another number."""
+    first = array if array.ndim == 2 else array[..., 0]
+    y, x = np.argwhere(np.isfinite(first) & (first != 0))[0]
+    array[y, x] = np.nextafter(array[y, x], np.float32(9)) if array.dtype == np.float32 else array[y, x] + 1
+
+
+@pytest.mark.parametrize("name", channel_labels())
+def test_every_label_of_pixels_is_computed_again_to_the_last_bit(dataset, name):
+    edit_channel(dataset, 5, name, nudged)
+    assert (name, 5) in failures(dataset, rays=False)
+
+
+@pytest.mark.parametrize("name", ["normals", "coordinates"])
+def test_channels_that_are_wrong_all_over(dataset, name):
+    edit_channel(dataset, 5, name, lambda a: a.__imul__(-1) if name == "normals" else a.__iadd__(0.1))
+    assert failures(dataset, rays=False) == {(name, 5)}
+
+
+def test_background_without_depth(dataset):
+    edit_channel(dataset, 5, "depth", lambda a: a.__setitem__(dataset[5].instances == 0, np.inf))
+    assert failures(dataset, rays=False) == {("depth", 5)}
+
+
+KEPT = [label.name for label in object_labels() if label.keep is not nothing]
+
+
+@pytest.mark.parametrize("name", KEPT)
+def test_all_that_is_kept_of_objects_is_computed_again(dataset, name):
+    def change(record):
+        kept = record["objects"][0][name]
+        other = encode_rle(np.eye(72, 96, dtype=bool)) if isinstance(kept, str) else [kept[0] * 0.9, *kept[1:]]
+        record["objects"][0][name] = other
+
+    edit_record(dataset, 6, change)
+    assert (name, 6) in failures(dataset, rays=False)
+
+
+@pytest.mark.parametrize("where", ["motion", "instant", "lens"])
+def test_a_shot_that_was_changed(dataset, where):
+    def change(shot):
+        if where == "motion":
+            shot["things"][0]["motion"]["poses"][0][0][3] += 0.01
+        elif where == "instant":
+            shot["instants"][2]["world_from_rig"][0][3] += 0.01
+        else:
+            shot["rig"]["sensors"][0]["intrinsics"]["fx"] *= 1.01
+
+    edit_json(dataset.store.shot_folder("block-1-000000") / "shot.json", change)
+    found = {frame for name, frame in failures(dataset, rays=False) if name in labels()}
+    assert found == ({6} if where == "instant" else {4, 5, 6, 7})
+
+
+def test_rounded_depth_is_compared_to_its_step(tmp_path):
+    dataset = make(tmp_path, files=Files(depth="png16", depth_unit=0.01), ground=True)
+    assert check(dataset).ok
+    sample = dataset[3]
+    file, far = dataset.path(sample.files["depth"]), sample.depth.copy()
+    far[sample.instances > 0] += np.float32(0.01)
+    file.write_bytes(encode(channels()["depth"], far, Files(depth="png16", depth_unit=0.01)))
+    assert failures(dataset, rays=False) == {("depth", 3)}
 
 
 def test_another_model_than_was_drawn(dataset):
     shutil.copy(dataset.path("store/models/block-2/block-2.glb"), dataset.path("store/models/block-0/block-0.glb"))
-    assert failures(dataset) == {("surface", i) for i in range(4)}
+    found = failures(dataset)
+    assert {("surface", i) for i in range(4)} | {("depth", i) for i in range(4)} <= found
+    assert {frame for _, frame in found} == {0, 1, 2, 3}
 
 
 @pytest.mark.parametrize(
@@ -285,14 +399,14 @@ def test_a_proof_that_breaks_off_blames_the_data_only_for_what_data_causes(whole
     def broken(*_):
         raise error
 
-    monkeypatch.setitem(FRAME_PROOFS, "boxes", broken)
+    monkeypatch.setitem(FRAME_PROOFS, "camera", broken)
     findings = check(whole, rays=False).findings
-    assert {(f.check, f.message) for f in findings} == {("boxes", message)}
+    assert {(f.check, f.message) for f in findings} == {("camera", message)}
     assert len(findings) == len(whole)
 
 
-def test_findings_say_where(dataset):
-    edit_record(dataset, 3, lambda r: r["objects"][0].update(area=1))
-    finding = next(f for f in check(dataset, rays=False).findings if f.check == "masks")
-    assert str(finding).startswith("masks: frame 3: object 1: expected area")
+def test_findings_say_where(spelled):
+    edit_record(spelled, 3, lambda r: r["objects"][0].update(area=1))
+    finding = next(f for f in check(spelled, rays=False).findings if f.check == "mask")
+    assert str(finding).startswith("mask: frame 3: object 1: expected area")
     assert viewsphere.check.Finding("counts", None, "x").__str__() == "counts: x"

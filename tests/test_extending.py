@@ -1,9 +1,12 @@
 """The worked example of docs/extending.md is real: its code is taken from the page and run."""
 
 import csv
+import json
+import pickle
 import re
 import sys
 import types
+from collections.abc import Callable, Iterator
 from importlib.metadata import EntryPoint
 from pathlib import Path
 
@@ -11,22 +14,104 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from viewsphere import Dataset, plugins
+from small import small_recipe
+from viewsphere import Dataset, generate, labels, plan, plugins, render
 from viewsphere.check import check
+from viewsphere.errors import RecipeError
 from viewsphere.run.exporting import export
+from viewsphere.store.sample_records import from_whole_sample, whole_sample
 
 PAGE = Path(__file__).parent.parent / "docs" / "extending.md"
 
 
+EXAMPLES = {
+    text.split(":")[0].split('"')[-1]: text for text in re.findall(r"```python\n(.*?)```", PAGE.read_text("utf-8"), re.DOTALL)
+}
+
+
+def install(monkeypatch: pytest.MonkeyPatch, name: str, group: str, code: str) -> None:
+    """Make code a module that an entry point names."""
+    module = types.ModuleType(f"my_{name}")
+    exec(code, module.__dict__)
+    monkeypatch.setitem(sys.modules, f"my_{name}", module)
+    entry = EntryPoint(name, f"my_{name}", group)
+    monkeypatch.setattr(plugins, "entry_points", lambda group: (entry,) if group == entry.group else ())
+
+
 @pytest.fixture
 def csv_boxes(monkeypatch: pytest.MonkeyPatch) -> None:
-    code = re.search(r"```python\n(.*?)```", PAGE.read_text("utf-8"), re.DOTALL)
-    assert code is not None
-    module = types.ModuleType("my_csv_boxes")
-    exec(code[1], module.__dict__)
-    monkeypatch.setitem(sys.modules, "my_csv_boxes", module)
-    entry = EntryPoint("csv_boxes", "my_csv_boxes", "viewsphere.formats")
-    monkeypatch.setattr(plugins, "entry_points", lambda group: (entry,) if group == entry.group else ())
+    install(monkeypatch, "csv_boxes", "viewsphere.formats", EXAMPLES["One row an object"])
+
+
+@pytest.fixture
+def labelled(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[str, str], None]]:
+    """Installs a label; what is kept of the table of labels is forgotten before and after."""
+    tables = (labels.labels, labels.channel_labels, labels.object_labels, labels.channels)
+
+    def forget() -> None:
+        for table in tables:
+            table.cache_clear()
+
+    def add(name: str, code: str) -> None:
+        install(monkeypatch, name, "viewsphere.labels", code)
+        forget()
+
+    yield add
+    monkeypatch.undo()
+    forget()
+
+
+def test_a_label_of_pixels_is_one_file(labelled, tmp_path):
+    labelled("borders", EXAMPLES["borders"])
+    generate(small_recipe(channels=["rgb", "instances", "borders"], formats=[]), tmp_path / "out")
+    dataset = Dataset(tmp_path / "out")
+    for sample in dataset:
+        assert sample.borders.dtype == np.int32
+        across, down = (np.diff(sample.instances, axis=axis) != 0 for axis in (1, 0))
+        assert np.array_equal(sample.borders[:-1, :-1] > 0, across[:-1] | down[:, :-1])
+    report = check(dataset)
+    assert report.ok, report.findings
+    assert report.checked["borders"] == len(dataset) > 0
+
+
+ASPECT = """
+from viewsphere.labels import Field, ObjectLabel
+
+def of(placement):
+    low, high = placement.box.min(axis=0), placement.box.max(axis=0)
+    return {"aspect": float((high - low)[2] / (high - low)[0])}
+
+LABEL = ObjectLabel.derived(of, name="aspect", meaning="how tall", fields=(Field("aspect", "height over width", float),))
+"""
+
+
+def test_a_label_of_objects_is_one_file(labelled, tmp_path):
+    labelled("aspect", ASPECT)
+    generate(small_recipe(formats=[]), tmp_path / "out")
+    sample = next(iter(render(small_recipe())))
+    kept = Dataset(tmp_path / "out")[0]
+    width, height, _ = sample.objects[0].size
+    assert sample.objects[0].aspect == kept.objects[0].aspect == pytest.approx(height / width)
+    assert kept.objects[0].more == {"aspect": kept.objects[0].aspect}
+    spelled = json.loads(json.dumps(whole_sample(kept)))
+    assert from_whole_sample(spelled, kept.channels, kept.files).objects[0].aspect == kept.objects[0].aspect
+    assert "aspect" not in (next((tmp_path / "out").rglob("frames.json"))).read_text()
+    assert pickle.loads(pickle.dumps(kept.objects[0])).aspect == kept.objects[0].aspect
+    with pytest.raises(AttributeError, match="no 'aspekt'"):
+        _ = kept.objects[0].aspekt
+
+
+def test_a_label_of_another_name_than_its_file_is_refused(labelled):
+    labelled("other", EXAMPLES["borders"])
+    with pytest.raises(ValueError, match="label 'other': expected the name of its file, found 'borders'"):
+        labels.labels()
+
+
+def test_a_channel_that_needs_its_neighbours_is_refused_for_still_pictures(labelled):
+    code = EXAMPLES["borders"].replace("import ChannelLabel", "import ChannelLabel, Needs")
+    labelled("borders", code.replace("compute=compute,", "compute=compute, needs=Needs(instants=(-1, 1)),"))
+    with pytest.raises(RecipeError, match=r"channels\[1\]: expected a label of single pictures; found 'borders', .* -1, \+1"):
+        plan(small_recipe(channels=["rgb", "borders"]))
 
 
 @pytest.mark.usefixtures("csv_boxes")

@@ -7,8 +7,10 @@ import pytest
 
 from small import small_recipe
 from viewsphere.geometry.box import EDGES
+from viewsphere.labels._paint import PALETTE
+from viewsphere.labels.depth import picture as depth_picture
 from viewsphere.model.model_spec import ModelSpec
-from viewsphere.preview import PALETTE, contact_sheet, depth_picture, draw_sample, four_sides, preview_samples
+from viewsphere.preview import contact_sheet, draw_sample, four_sides, preview_samples
 
 
 @pytest.fixture(scope="module")

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from viewsphere.errors import StoreError
-from viewsphere.model.channel import CHANNELS
+from viewsphere.labels import channels
 from viewsphere.store import Block, Category, Dataset, Part, PlanRecord, Store, decode, encode, new_folder
 
 PART = Part(
@@ -44,9 +44,9 @@ def test_a_store_of_the_old_layout_is_one_line(tmp_path):
         Dataset(tmp_path / "out")
 
 
-@pytest.mark.parametrize("name", [n for n in CHANNELS])
+@pytest.mark.parametrize("name", [n for n in channels()])
 def test_channel_files_round_trip(name, tmp_path):
-    channel, rng = CHANNELS[name], np.random.default_rng(1)
+    channel, rng = channels()[name], np.random.default_rng(1)
     array = rng.integers(0, 200, channel.shape(7, 11)).astype(channel.dtype)
     if channel.encoding == "tiff" and np.issubdtype(channel.dtype, np.floating):
         array = (array / 7).astype(channel.dtype)
@@ -59,9 +59,9 @@ def test_channel_files_round_trip(name, tmp_path):
 
 def test_wrong_arrays_are_refused():
     with pytest.raises(ValueError, match="depth"):
-        encode(CHANNELS["depth"], np.zeros((2, 2), np.float64))
+        encode(channels()["depth"], np.zeros((2, 2), np.float64))
     with pytest.raises(StoreError, match="65535"):
-        encode(CHANNELS["instances"], np.full((2, 2), 70_000, np.int32))
+        encode(channels()["instances"], np.full((2, 2), 70_000, np.int32))
 
 
 def test_an_interrupted_write_leaves_nothing(tmp_path):

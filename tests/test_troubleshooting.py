@@ -93,7 +93,7 @@ COMMANDS = {
     "gives none in": "plan r.yaml --set 'models=[{source: \"*.glb\", category: x}]'",
     "only zoo families have one": "plan r.yaml --set 'models=[{source: here/ok.obj}]'",
     "shares that add up to 1": "plan r.yaml --set splits.train=0.7",
-    "split <name> is empty": "plan r.yaml --set splits.by=model --set splits.train=0.999 --set splits.val=0.001",
+    "split <name> is empty": "plan r.yaml --set splits.train=0.8 --set splits.val=0.1 --set splits.test=0.1",
     "the ground hides the models": "plan r.yaml --set viewpoints.elevation=-10 --set scene.ground=on",
     "no light<in some>": "plan r.yaml --set scene.sun=off --set scene.sky.strength=0",
     "white is black": "plan r.yaml --set scene.view.exposure=-16",

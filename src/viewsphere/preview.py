@@ -4,19 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
-from viewsphere.geometry.box import EDGES, FACES
+from viewsphere.labels import drawings
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.channel import picture_of
 from viewsphere.model.instant import Viewpoint
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.rig import Rig
-from viewsphere.model.sample import ObjectAnnotation, Sample
+from viewsphere.model.sample import Sample
 from viewsphere.model.scene import Ground, Scene
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
@@ -27,10 +26,8 @@ from viewsphere.sampling.camera import looking
 from viewsphere.sampling.plan import Plan
 from viewsphere.store import Dataset
 
-Drawing = Literal["boxes", "boxes3d", "masks", "depth"]
 Picture = NDArray[np.uint8]
 
-PALETTE = ((230, 75, 60), (50, 130, 220), (45, 165, 95), (240, 170, 40), (150, 90, 200), (20, 170, 180))
 INK = (30, 32, 36)
 PAPER = (250, 250, 248)
 MARGIN = 8
@@ -125,7 +122,7 @@ def four_sides(spec: ModelSpec, size: int = 320) -> Picture:
     return _sheet(tiles, columns=4)
 
 
-def contact_sheet(samples: Sequence[Sample], draw: Sequence[Drawing] = (), columns: int = 4, width: int = 320) -> Picture:
+def contact_sheet(samples: Sequence[Sample], draw: Sequence[str] = (), columns: int = 4, width: int = 320) -> Picture:
     """All samples side by side with what was asked for drawn over them, (H, W, 3) uint8 sRGB."""
     return _sheet([(draw_sample(s, draw, width), _caption(s)) for s in samples], columns)
 
@@ -139,36 +136,23 @@ def _caption(sample: Sample) -> str:
     return f"{key}az {pose.azimuth_deg:.4g}  el {pose.elevation_deg:.4g}  d {pose.distance:.4g}"
 
 
-def draw_sample(sample: Sample, draw: Sequence[Drawing] = (), width: int | None = None) -> Picture:
-    """One frame with 2D boxes, 3D boxes (front face filled), masks or depth (beside the picture) drawn."""
+def draw_sample(sample: Sample, draw: Sequence[str] = (), width: int | None = None) -> Picture:
+    """One frame with what labels are drawn as (`labels.drawings`): masks, 3D boxes (front face filled) and 2D boxes over the
+    picture, depth beside it.
+    """
+    chosen = [drawing for drawing in drawings() if drawing.name in draw]
     rgb = _on_paper(sample.picture)
-    if "masks" in draw:
-        rgb = _tint(rgb, sample.objects)
+    for drawing in chosen:
+        rgb = drawing.pixels(rgb, sample) if drawing.pixels else rgb
     scale = 1.0 if width is None else min(1.0, width / rgb.shape[1])
     size = (round(rgb.shape[1] * scale), round(rgb.shape[0] * scale))
     picture = Image.fromarray(rgb).resize(size, Image.Resampling.LANCZOS) if scale < 1 else Image.fromarray(rgb)
     pen = ImageDraw.Draw(picture, "RGBA")
-    for o in sample.objects:
-        color = PALETTE[(o.id - 1) % len(PALETTE)]
-        if "boxes3d" in draw:
-            _draw_box3d(pen, o, scale, tuple(int(0.55 * c) for c in color))
-        if "boxes" in draw and o.box2d is not None:
-            x0, y0, x1, y1 = (v * scale for v in o.box2d)
-            pen.rectangle((x0, y0, x1 - 1, y1 - 1), outline=color, width=2)
-    pictures = [np.asarray(picture)]
-    if "depth" in draw:
-        pictures.append(np.asarray(Image.fromarray(depth_picture(sample.depth)).resize(size, Image.Resampling.BILINEAR)))
-    return np.hstack(pictures)
-
-
-def depth_picture(depth: NDArray[np.float32]) -> Picture:
-    """Near is light, far is dark, nothing is black; (H, W, 3) uint8."""
-    seen = np.isfinite(depth)
-    grey = np.zeros(depth.shape, np.float64)
-    if seen.any():
-        near, far = np.percentile(depth[seen], (0, 98))
-        grey[seen] = 1.0 - 0.85 * np.clip((depth[seen] - near) / max(far - near, 1e-9), 0, 1)
-    return np.repeat((grey * 255).astype(np.uint8)[..., None], 3, axis=2)
+    for drawing in chosen:
+        if drawing.lines:
+            drawing.lines(pen, sample, scale)
+    others = [Image.fromarray(drawing.beside(sample)) for drawing in chosen if drawing.beside]
+    return np.hstack([np.asarray(picture), *(np.asarray(other.resize(size, Image.Resampling.BILINEAR)) for other in others)])
 
 
 def _on_paper(picture: Picture) -> Picture:
@@ -178,25 +162,6 @@ def _on_paper(picture: Picture) -> Picture:
     sheet, clear = Image.new("RGB", picture.shape[1::-1], PAPER), Image.fromarray(picture)
     sheet.paste(clear, mask=clear)
     return np.asarray(sheet)
-
-
-def _tint(rgb: Picture, objects: Sequence[ObjectAnnotation]) -> Picture:
-    tinted = rgb.astype(np.float64)
-    for o in objects:
-        mask = o.mask
-        tinted[mask] = 0.5 * tinted[mask] + 0.5 * np.array(PALETTE[(o.id - 1) % len(PALETTE)])
-    return tinted.round().astype(np.uint8)
-
-
-def _draw_box3d(pen: ImageDraw.ImageDraw, o: ObjectAnnotation, scale: float, color: tuple[int, ...]) -> None:
-    corners = o.box3d_pixels * scale
-    points = {i: tuple(p) for i, p in enumerate(corners.tolist()) if np.isfinite(p).all()}
-    front = [points[i] for i in FACES["front"] if i in points]
-    if len(front) == 4:
-        pen.polygon(front, fill=(*color, 70))
-    for a, b in EDGES:
-        if a in points and b in points:
-            pen.line((points[a], points[b]), fill=(*color, 255), width=2)
 
 
 def _sheet(tiles: Sequence[tuple[Picture, str]], columns: int) -> Picture:

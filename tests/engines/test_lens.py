@@ -15,11 +15,11 @@ from viewsphere.assets.mesh import Material
 from viewsphere.assets.srgb import encoded, linear
 from viewsphere.engines import raster
 from viewsphere.geometry.camera import pixel_rays, project
+from viewsphere.labels import observe
 from viewsphere.model.camera import Camera, Distortion, Intrinsics
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Background, Finish, Scene, View
 from viewsphere.model.thing import Motion, Thing
-from viewsphere.truth.channels import observe
 from viewsphere.truth.visibility import rasterize
 
 pytest.importorskip("embreex")

@@ -88,7 +88,7 @@ def test_the_models_are_the_stores(asked, small_run, tmp_path):
 
 
 def test_a_data_set_without_scenes_is_lit_anyhow(asked, tmp_path):
-    dataset = make(tmp_path / "blocks", several=True)
+    dataset = make(tmp_path / "blocks", several=True, short=False)
     assert dataset.store.shot("several-000000") is None
     export(dataset.root, ["blend"])
     (told,) = asked.values()
@@ -186,7 +186,7 @@ def test_frames_that_cannot_be_staged_are_one_line(asked, foreign, tmp_path):
 
 
 def test_frames_that_are_left_out_and_unknown_light_are_notes(asked, tmp_path):
-    dataset = make(tmp_path / "blocks", several=True)
+    dataset = make(tmp_path / "blocks", several=True, short=False)
     file = dataset.store.shot_folder("several-000000") / "frames.json"
     records = json.loads(file.read_text())
     for o in records[0]["objects"]:

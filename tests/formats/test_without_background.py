@@ -10,7 +10,8 @@ from PIL import Image
 
 from cube_dataset import make
 from viewsphere.errors import UserError
-from viewsphere.model.channel import CHANNELS, missing, picture_of
+from viewsphere.labels import channels
+from viewsphere.model.channel import missing, picture_of
 from viewsphere.preview import PAPER, draw_sample
 from viewsphere.report.frames import frame_data
 from viewsphere.report.pictures import SCALES, layers
@@ -33,7 +34,7 @@ def test_which_picture_is_shown():
 
 def test_the_store_gives_back_what_it_got(dataset):
     for sample in dataset:
-        assert sample.rgba.shape == CHANNELS["rgba"].shape(sample.height, sample.width)
+        assert sample.rgba.shape == channels()["rgba"].shape(sample.height, sample.width)
         np.testing.assert_array_equal(sample.rgba[..., 3] > 0, sample.instances > 0)
         assert sample.picture is sample.rgba
         assert sample.picture_file == sample.files["rgba"]

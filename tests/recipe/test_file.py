@@ -208,7 +208,6 @@ def test_the_recipes_of_the_paper_are_valid(name):
         {"models": [{"source": "zoo:car", "categry": "x"}]},
         {"viewpoints": {"distance": "far"}},
         {"viewpoints": {"kind": "gird", "distance": 1}},
-        {"channels": ["rgbb"]},
         {"scene": {"ground": 3}},
         {"scene": {"effects": {"blur": "much"}}},
         {"scene": {"sun": {"strength": {"unifrom": [1, 2]}}}},
@@ -223,6 +222,12 @@ def test_the_schema_refuses_what_the_recipe_refuses(fields):
     assert list(validator().iter_errors(data))
     with pytest.raises(RecipeError):
         Recipe(**data)
+
+
+def test_the_schema_knows_the_channels_it_is_told():
+    data = {"models": [{"source": "zoo:car"}], "viewpoints": {"distance": 5}, "channels": ["rgb", "rgbb"]}
+    assert not list(validator().iter_errors(data))
+    assert list(jsonschema.Draft202012Validator(schema(("rgb", "depth"))).iter_errors(data))
 
 
 def test_the_template_loads_and_explains_itself(write):

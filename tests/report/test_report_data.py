@@ -233,11 +233,14 @@ def test_mistakes_are_named(small_dataset, tmp_path):
 
 
 def test_check_reads_no_more_frames_than_asked_for(small_dataset):
+    from viewsphere import export
     from viewsphere.check import check
 
     some = check(small_dataset, frames=4, rays=False)
     assert some.ok
-    assert some.checked["boxes"] == 4
+    assert some.checked["box2d"] == 4
     assert "coco" not in some.checked
     assert any(note.startswith("4 of 12 frames were read") for note in some.notes)
+    export(small_dataset.root, ["coco"])
+    assert check(small_dataset, frames=4, rays=False).checked.keys() == some.checked.keys()
     assert check(small_dataset, frames=12, rays=False).checked["coco"] == 12

@@ -9,7 +9,7 @@ import subprocess
 import sys
 import time
 from collections import Counter
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -24,6 +24,7 @@ from small import small_recipe, tree_hash
 from viewsphere import Dataset, generate
 from viewsphere.check import check
 from viewsphere.errors import ModelError, RecipeError, StoreError, UserError
+from viewsphere.model.sample import ObjectAnnotation
 from viewsphere.sampling.extension import extend, whole
 from viewsphere.sampling.pose_numbers import kept, names_of
 from viewsphere.store import PlanRecord, Store
@@ -105,10 +106,8 @@ def assert_same_frame(a, b):
     for name in ("K", "R", "t"):
         assert np.array_equal(getattr(a.camera, name), getattr(b.camera, name))
     for o, p in zip(a.objects, b.objects, strict=True):
-        assert {**o.__dict__, "category_id": 0}.keys() == p.__dict__.keys()
-        for name, value in o.__dict__.items():
-            if name != "category_id":
-                np.testing.assert_equal(p.__dict__[name], value, err_msg=name)
+        for name in (field.name for field in fields(ObjectAnnotation) if field.name != "category_id"):
+            np.testing.assert_equal(getattr(p, name), getattr(o, name), err_msg=name)
 
 
 @pytest.mark.parametrize(

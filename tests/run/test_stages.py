@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from viewsphere import zoo
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.run import stages
 from viewsphere.run.stages import Stages
@@ -22,8 +23,8 @@ def test_the_real_size_is_the_one_set_or_that_of_the_file_before_scaling():
 
 def test_a_model_at_its_own_scale_is_built_once(monkeypatch):
     built = []
-    build = stages.build
-    monkeypatch.setattr(stages, "build", lambda *words: built.append(words) or build(*words))
+    build = zoo.build
+    monkeypatch.setattr(zoo, "build", lambda *words: built.append(words) or build(*words))
     warm, spec = Stages(), DRIER.model_copy(update={"real_size": "file"})
     warm.model(spec)
     warm.real_size(spec)
@@ -32,8 +33,8 @@ def test_a_model_at_its_own_scale_is_built_once(monkeypatch):
 
 def test_models_used_last_are_kept_as_far_as_there_is_room(monkeypatch):
     built = []
-    build = stages.build
-    monkeypatch.setattr(stages, "build", lambda family, rng: built.append(family) or build(family, rng))
+    build = zoo.build
+    monkeypatch.setattr(zoo, "build", lambda family, rng: built.append(family) or build(family, rng))
     specs = [DRIER.model_copy(update={"key": f"d{i}", "seed": i}) for i in range(12)]
     warm = Stages()
     for spec in (*specs, *specs):

@@ -5,11 +5,11 @@ import pytest
 from truth_scenes import FISHEYE, LENSES, cube, lens, mesh_of, orbit_camera, placed, random_soup, sphere
 
 from viewsphere.geometry.camera import pixel_rays
-from viewsphere.model.channel import CHANNELS, PICTURES
-from viewsphere.truth.channels import observe
+from viewsphere.labels import channels, observe
+from viewsphere.model.channel import PASSES
 from viewsphere.truth.visibility import rasterize
 
-ALL = tuple(name for name in CHANNELS if name not in PICTURES)
+ALL = tuple(name for name in channels() if name not in PASSES)
 
 
 def scene(name, seed=0):
@@ -29,11 +29,11 @@ def test_table_says_what_comes_out(name):
     geometry, camera, visibility, observed = scene(name)
     assert list(observed) == list(ALL)
     for key, array in observed.items():
-        assert array.dtype == CHANNELS[key].dtype, key
-        assert array.shape == CHANNELS[key].shape(72, 96), key
+        assert array.dtype == channels()[key].dtype, key
+        assert array.shape == channels()[key].shape(72, 96), key
         assert np.array_equal(
             array[visibility.triangle < 0],
-            np.full_like(array[visibility.triangle < 0], CHANNELS[key].empty),
+            np.full_like(array[visibility.triangle < 0], channels()[key].empty),
             equal_nan=key == "coordinates",
         ), key
     assert list(observe(geometry, camera, visibility, iter(["parts"]))) == ["parts"]

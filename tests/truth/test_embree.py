@@ -10,7 +10,7 @@ import pytest
 from truth_scenes import LENSES, cube, lens, mesh_of, orbit_camera, placed, sphere
 
 from viewsphere.geometry.camera import pixel_rays
-from viewsphere.truth.channels import observe
+from viewsphere.labels import observe
 from viewsphere.truth.visibility import rasterize
 
 pytest.importorskip("embreex")

@@ -5,7 +5,7 @@ import pytest
 from truth_scenes import LENSES, cube, lens, mesh_of, orbit_camera, placed
 
 from viewsphere.assets.mesh import Image, Material, Texture
-from viewsphere.truth.channels import observe
+from viewsphere.labels import observe
 from viewsphere.truth.cutouts import NEVER, SURFACE
 from viewsphere.truth.visibility import rasterize
 

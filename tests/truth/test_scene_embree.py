@@ -8,12 +8,11 @@ from test_embree import compare, embree, trace, turned
 from truth_scenes import LENSES, cube, lens, mesh_of, orbit_camera, placed, sphere
 
 from shots import still_shot
-from viewsphere.annotate import annotate
 from viewsphere.geometry.box import box_vertices
+from viewsphere.labels import annotate, observe
 from viewsphere.model.camera import Camera
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.thing import Motion, Thing
-from viewsphere.truth.channels import observe
 from viewsphere.truth.geometry import build_geometry
 from viewsphere.truth.visibility import rasterize
 

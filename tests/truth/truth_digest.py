@@ -17,11 +17,10 @@ from truth_scenes import LENSES, cube, lens, orbit_camera, placed, random_soup, 
 
 import viewsphere as vs
 from viewsphere.kernels.kernel_cache import IS_STOCK, NUMBA
-from viewsphere.model.channel import CHANNELS, PICTURES
-from viewsphere.truth.channels import observe
+from viewsphere.labels import channel_labels, observe
 from viewsphere.truth.visibility import rasterize, silhouette
 
-LABELS = [name for name in CHANNELS if name not in PICTURES]
+LABELS = list(channel_labels())
 SEEDS = range(3)
 RECIPES = (
     {

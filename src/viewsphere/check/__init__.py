@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Collection, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass
 from functools import partial
 from typing import Any
 
 from viewsphere import plugins
+from viewsphere.check.again import Again
 from viewsphere.check.failure import failure
 from viewsphere.check.frames import FRAME_PROOFS
 from viewsphere.check.rays import RayCaster
+from viewsphere.check.scenery import Scenery
 from viewsphere.errors import MissingExtraError, ViewsphereError
 from viewsphere.formats import Remark, Verified
+from viewsphere.labels import channel_labels, labels
 from viewsphere.model.sample import Sample
-from viewsphere.store import Dataset, Row
+from viewsphere.store import Dataset, ModelInfo, Row
 
 
 @dataclass(frozen=True)
@@ -53,9 +56,9 @@ def check(dataset: Dataset, *, sample: int = 50, rays: bool | None = None, frame
     """Prove the finished frames of a data set, and all its exports whose formats have a `verify`.
 
     Every frame is read whole, or with `frames` at most so many, spread evenly, and the exports are left to a whole check. On
-    `sample` frames, spread evenly, stored depth is lifted to points and compared with rays that Embree casts at the
-    exported models: `rays` False leaves that out, None does too (with a note) where embreex is not installed. Nothing is
-    changed.
+    `sample` frames, spread evenly, all labels are computed again from the exported models; and stored depth is lifted to
+    points and compared with rays that Embree casts at these models: `rays` False leaves that out, None does too (with a note)
+    where embreex is not installed. Nothing is changed.
 
     Raises MissingExtraError for `rays` True without embreex.
     """
@@ -65,20 +68,26 @@ def check(dataset: Dataset, *, sample: int = 50, rays: bool | None = None, frame
         findings += [Finding("counts", None, message) for message in _counts(dataset, notes)]
     except (ViewsphereError, LookupError, TypeError, ValueError) as error:
         return Report({}, (Finding("counts", None, f"expected models that can be read, found {error}"),), ())
-    caster = None if rays is False else _caster(dataset, rays is True, notes)
+    scenery, models = Scenery(dataset), {info.key: info for info in dataset.models}
+    caster = None if rays is False else _caster(dataset, scenery, rays is True, notes)
+    again = Again(dataset, scenery, models)
     read_ones = range(0, len(dataset), max(1, -(-len(dataset) // frames)) if frames else 1)
-    chosen = set(read_ones[:: max(1, -(-len(read_ones) // sample))]) if caster and sample else set[int]()
-    checked = dict.fromkeys(FRAME_PROOFS, 0)
+    chosen = set(read_ones[:: max(1, -(-len(read_ones) // sample))]) if sample else set[int]()
+    checked = dict.fromkeys([*FRAME_PROOFS, *(name for name in labels() if _is_kept(dataset, name))], 0)
     for position, index, read in _frames(dataset, read_ones):
         if not isinstance(read, Sample):
             findings.append(Finding("files", index, read))
             continue
         if read.index != index:
             findings.append(Finding("ids", index, f"expected a record of frame {index}, found one of {read.index}"))
-        for name, messages in _proofs(dataset, read, caster if position in chosen else None):
-            checked[name] = checked.get(name, 0) + 1
+        found = [*_proofs(models, read)]
+        if position in chosen:
+            found += _proofs_by_models(read, again, caster)
+        for name, messages in found:
             findings += [Finding(name, index, message) for message in messages]
-    notes += [] if caster is None else caster.notes
+        for name in dict.fromkeys(name for name, _ in found):
+            checked[name] = checked.get(name, 0) + 1
+    notes += scenery.notes
     exports = _exports(dataset)
     if len(read_ones) < len(dataset):
         notes.append(f"{len(read_ones):,} of {len(dataset):,} frames were read")
@@ -169,26 +178,44 @@ def _frames(dataset: Dataset, positions: range) -> Iterator[tuple[int, int, Samp
         position += row.count
 
 
-def _proofs(dataset: Dataset, sample: Sample, caster: RayCaster | None) -> Iterator[tuple[str, list[str]]]:
-    """Every check of one frame and what it found; a proof that cannot be carried out counts as failed."""
-    models = {info.key: info for info in dataset.models}
-    proofs: dict[str, Callable[[], Iterable[str]]] = {n: partial(p, sample, models) for n, p in FRAME_PROOFS.items()}
-    placed = all(o.is_placed for o in sample.objects)
-    if caster is not None and placed and {"depth", "instances"} <= sample.files.keys():
-        proofs["surface"] = partial(caster.off_surface, sample)
+def _is_kept(dataset: Dataset, name: str) -> bool:
+    return name in dataset.plan.channels or name not in channel_labels()
+
+
+def _proofs(models: Mapping[str, ModelInfo], sample: Sample) -> Iterator[tuple[str, list[str]]]:
+    """Every check of one frame against itself and what it found; a proof that cannot be carried out counts as failed."""
+    proofs: dict[str, Callable[[], Iterable[str]]] = {name: partial(proof, sample) for name, proof in FRAME_PROOFS.items()}
+    kept = {name: label for name, label in labels().items() if name in sample.files or name not in channel_labels()}
+    proofs |= {name: partial(label.prove, sample, models) for name, label in kept.items()}
     for name, proof in proofs.items():
+        yield name, _carried_out(proof)
+
+
+def _proofs_by_models(sample: Sample, again: Again, caster: RayCaster | None) -> Iterator[tuple[str, list[str]]]:
+    """What a frame's labels are, computed again, and what Embree sees."""
+    if again.is_possible(sample):
         try:
-            yield name, list(proof())
+            for name, message in again.differences(sample):
+                yield name, [message]
         except Exception as error:
-            yield name, [failure("data that can be checked", error)]
+            yield "models", [failure("models and shots from which labels can be computed", error)]
+    if caster and all(o.is_placed for o in sample.objects) and {"depth", "instances"} <= sample.files.keys():
+        yield "surface", _carried_out(partial(caster.off_surface, sample))
 
 
-def _caster(dataset: Dataset, demanded: bool, notes: list[str]) -> RayCaster | None:
+def _carried_out(proof: Callable[[], Iterable[str]]) -> list[str]:
+    try:
+        return list(proof())
+    except Exception as error:
+        return [failure("data that can be checked", error)]
+
+
+def _caster(dataset: Dataset, scenery: Scenery, demanded: bool, notes: list[str]) -> RayCaster | None:
     if not {"depth", "instances"} <= set(dataset.plan.channels):
         notes.append("surface: not checked, it needs the channels depth and instances")
         return None
     try:
-        return RayCaster(dataset)
+        return RayCaster(dataset, scenery)
     except MissingExtraError as error:
         if demanded:
             raise

@@ -10,12 +10,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.errors import MissingExtraError, ViewsphereError
+from viewsphere.assets.mesh import Mesh
+from viewsphere.check.scenery import Scenery
+from viewsphere.errors import MissingExtraError
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.geometry.rotation import transform
+from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.sample import Sample
-from viewsphere.run.stages import Stages
-from viewsphere.run.tasks import SceneryRecord, mesh_digest
+from viewsphere.run.tasks import SceneryRecord
 from viewsphere.store import Dataset, depth_step
 from viewsphere.store.channel_files import MOST_STEPS
 
@@ -42,26 +44,22 @@ class _Soup:
 class RayCaster:
     """Casts rays at a data set's scenes; the last one is kept, because frames of one scene follow one another.
 
-    Scenery that is background is no part of a data set; it is made again from what its shot says of it. `notes` says where
-    that cannot be.
+    Scenery that is background is made again from what its shot says of it; where that cannot be, only objects are looked at.
     """
 
-    def __init__(self, dataset: Dataset) -> None:
+    def __init__(self, dataset: Dataset, scenery: Scenery) -> None:
         if find_spec("embreex") is None:
             raise MissingExtraError("expected embreex, found none: pip install 'viewsphere[check]'")
-        self.notes: list[str] = []
-        self._dataset = dataset
+        self._dataset, self._scenery = dataset, scenery
         self._files = {info.key: dataset.path(info.glb) for info in dataset.models}
-        self._stages = Stages()
         self._known: dict[str, _Soup] = {}
-        self._scenery_known: dict[str, _Soup | None] = {}
+        self._around: dict[str, _Soup | None] = {}
         self._key: object = None
         self._all: Any = None
         self._solid: Any = None
         self._owner = np.zeros(0, np.int64)
         self._middle = np.zeros(3)
         self._lowest = 0.0
-        self._last: tuple[str, float | None] = "", None
         self._complete = True
 
     def off_surface(self, sample: Sample) -> Iterator[str]:
@@ -104,7 +102,8 @@ class RayCaster:
         with np.errstate(invalid="ignore"):
             there = (np.abs(found - s) <= slack) & (np.append(self._owner, -1)[owner] == ids)
             height = (eye + s[:, None] * directions)[:, 2]
-            there |= (ids == 0) & np.isfinite(s) & (np.abs(height - self._lowest) <= slack)
+            off = np.abs(height - self._lowest)
+            there |= (ids == 0) & np.isfinite(s) & (off <= slack * np.maximum(1.0, np.abs(directions[:, 2])))
         there |= np.isinf(s) & (ids == 0)
         wrong = ~there | (first < np.where(np.isfinite(s), s - slack, np.inf))
         if wrong.sum() > max(2, OUTLIERS * len(s)):
@@ -116,17 +115,17 @@ class RayCaster:
             )
 
     def _build(self, sample: Sample) -> None:
-        scenery, floor = self._scenery(sample.index), self._floor(sample.index)
+        shot_key = self._scenery.key_of(sample.index)
+        scenery, shot = self._scenery.around(shot_key), self._scenery.shot(shot_key)
+        floor = None if shot is None else shot.scene.floor
         key = [(o.key, o.world_from_object.tobytes()) for o in sample.objects], scenery, floor
         if key == self._key:
             return
         self._middle = np.mean([o.box3d.mean(axis=0) for o in sample.objects], axis=0)
         placed = [(o.id, o.world_from_object, self._exported(o.key)) for o in sample.objects]
-        self._complete = True
-        if scenery is not None:
-            remade = [(p.world_from_object, self._remade(scenery, p.model.key)) for p in scenery.things]
-            self._complete = all(soup is not None for _, soup in remade)
-            placed += [(0, np.array(world), soup) for world, soup in remade if soup is not None]
+        remade = [(p.world_from_object, self._remade(scenery, p.model)) for p in scenery.things]
+        self._complete = all(soup is not None for _, soup in remade)
+        placed += [(0, np.array(world), soup) for world, soup in remade if soup is not None]
         corners = np.concatenate([transform(world, soup.corners) - self._middle for _, world, soup in placed])
         opaque = np.concatenate([soup.opaque for _, _, soup in placed])
         self._owner = np.repeat([i for i, _, _ in placed], [len(soup.corners) for _, _, soup in placed])
@@ -134,43 +133,23 @@ class RayCaster:
         self._all, self._solid = _scene(corners), _scene(corners[opaque])
         self._key = key
 
-    def _shot_key(self, frame: int) -> str:
-        return self._dataset.plan.row_at(frame).key
-
-    def _scenery(self, frame: int) -> SceneryRecord | None:
-        text = self._dataset.store.scenery(self._shot_key(frame))
-        return SceneryRecord.model_validate_json(text) if text else None
-
-    def _floor(self, frame: int) -> float | None:
-        """How high the ground of a frame is at most; the last shot's is kept."""
-        key = self._shot_key(frame)
-        if key != self._last[0]:
-            shot = self._dataset.store.shot(key)
-            self._last = key, None if shot is None else shot.scene.floor
-        return self._last[1]
-
     def _exported(self, key: str) -> _Soup:
         soup = self._known.get(key) or _read(self._files[key])
         self._known[key] = soup
         return soup
 
-    def _remade(self, record: SceneryRecord, key: str) -> _Soup | None:
-        """A piece of scenery, None where it is not what it was. Merged data sets have several of one key."""
-        digest = record.digests[key]
-        if digest not in self._scenery_known:
-            spec = next(p.model for p in record.things if p.model.key == key)
-            self._scenery_known[digest] = None
-            try:
-                mesh = self._stages.model(spec)
-                if mesh_digest(mesh) == digest:
-                    solid = np.array([m.alpha_mode == "OPAQUE" for m in mesh.materials])
-                    corners = mesh.vertices[mesh.triangles].astype(np.float64)
-                    self._scenery_known[digest] = _Soup(corners, solid[mesh.triangle_material])
-                else:
-                    self.notes.append(f"surface: background not checked where {key} stands: it is not what it was")
-            except ViewsphereError as error:
-                self.notes.append(f"surface: background not checked where {key} stands: {error}")
-        return self._scenery_known[digest]
+    def _remade(self, record: SceneryRecord, spec: ModelSpec) -> _Soup | None:
+        """A piece of scenery, None where it is not what it was."""
+        digest = record.digests[spec.key]
+        if digest not in self._around:
+            mesh = self._scenery.mesh(record, spec)
+            self._around[digest] = mesh and _soup_of(mesh)
+        return self._around[digest]
+
+
+def _soup_of(mesh: Mesh) -> _Soup:
+    solid = np.array([m.alpha_mode == "OPAQUE" for m in mesh.materials])
+    return _Soup(mesh.vertices[mesh.triangles].astype(np.float64), solid[mesh.triangle_material])
 
 
 def _scene(corners: Float) -> Any:

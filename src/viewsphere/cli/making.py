@@ -46,9 +46,10 @@ def schema() -> None:
     """Print the recipe's JSON schema, for editors."""
     import json
 
+    from viewsphere.labels import channels
     from viewsphere.recipe.file import schema as recipe_schema
 
-    typer.echo(json.dumps(recipe_schema(), indent=2))
+    typer.echo(json.dumps(recipe_schema(tuple(channels())), indent=2))
 
 
 def inspect(

@@ -89,7 +89,7 @@ def print_report(report: Report) -> None:
     """Print what `check` found."""
     failed = Counter(finding.check for finding in report.findings)
     for name, count in report.checked.items():
-        typer.echo(f"{name:12} {f'{failed[name]:,} findings' if failed[name] else 'ok':14} {count:,} checked")
+        typer.echo(f"{name:17} {f'{failed[name]:,} findings' if failed[name] else 'ok':14} {count:,} checked")
     for note in report.notes:
         typer.echo(f"note: {note}")
     for finding in report.findings[:MOST_FINDINGS]:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator
-from contextlib import AbstractContextManager
-from pathlib import Path
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
-from viewsphere.model.sample import Sample
-from viewsphere.store import Dataset
+if TYPE_CHECKING:
+    from collections.abc import Callable, Collection, Iterator
+    from contextlib import AbstractContextManager
+    from pathlib import Path
+
+    from viewsphere.model.sample import Sample
+    from viewsphere.store import Dataset
 
 Remark = tuple[int | None, str]
 """What is wrong with an export, and with which frame of the plan; None: with the export as a whole."""

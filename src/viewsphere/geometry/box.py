@@ -61,7 +61,7 @@ def box_vertices(low: ArrayLike, high: ArrayLike) -> Float:
 
 def box_size(vertices: Float) -> tuple[float, float, float]:
     """(width along X, height along Z, length along Y) of an axis-aligned box given by its vertices (8, 3)."""
-    x, y, z = (float(v) for v in vertices[4] - vertices[2])
+    x, y, z = (vertices[4] - vertices[2]).tolist()
     return x, z, y
 
 

@@ -33,6 +33,29 @@ def decode_rle(height: int, width: int, counts: str) -> Mask:
     return mask
 
 
+def rle_area(height: int, width: int, counts: str) -> int:
+    """Number of pixels in a compressed run-length code; raises ValueError for what is none."""
+    from pycocotools import mask as coco
+
+    return int(coco.area(_code(height, width, counts)))
+
+
+def rle_box(height: int, width: int, counts: str) -> tuple[int, int, int, int] | None:
+    """`mask_box` of a compressed run-length code, without its pixels; raises ValueError for what is none."""
+    from pycocotools import mask as coco
+
+    x, y, w, h = coco.toBbox(_code(height, width, counts)).astype(int).tolist()
+    return (x, y, x + w, y + h) if w and h else None
+
+
+def _code(height: int, width: int, counts: str) -> Any:
+    """The code as pycocotools takes it, which reads past the end of one whose last number goes on."""
+    code = counts.encode("ascii", "replace")
+    if not code or min(code) < 48 or max(code) > 111 or (code[-1] - 48) & 32:
+        raise ValueError(f"RLE: expected a run-length code of {width} x {height} pixels, found {counts[:40]!r}")
+    return {"size": [height, width], "counts": code}
+
+
 def rle_of_id(ids: NDArray[np.int32], wanted: int, box: tuple[int, int, int, int]) -> str:
     """`encode_rle(ids == wanted)`, where all such pixels lie in the half-open box (x0, y0, x1, y1); reads
     only the box.

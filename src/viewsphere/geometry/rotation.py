@@ -7,6 +7,9 @@ from numpy.typing import ArrayLike, NDArray
 
 Float = NDArray[np.float64]
 
+_IDENTITY = np.eye(3)
+_ROTATION_TOLERANCE = 1e-6 + 1e-5 * _IDENTITY
+
 
 def matrix_from_quaternion(quaternion: ArrayLike) -> Float:
     """Rotation matrix (3, 3) of the quaternion (w, x, y, z), of any length but zero."""
@@ -32,18 +35,17 @@ def quaternion_from_matrix(matrix: ArrayLike) -> tuple[float, float, float, floa
     ill-conditioned (Shepperd 1978).
     """
     m = np.asarray(matrix, np.float64)
-    if m.shape != (3, 3) or not np.allclose(m @ m.T, np.eye(3), atol=1e-6) or np.linalg.det(m) < 0:
+    if m.shape != (3, 3) or not (np.abs(m @ m.T - _IDENTITY) <= _ROTATION_TOLERANCE).all() or np.linalg.det(m) < 0:
         raise ValueError(f"quaternion_from_matrix: expected a (3, 3) rotation, got {m.tolist()}")
+    (a, b, c), (d, e, f), (g, h, i) = m.tolist()
     # Row i holds 4 q_i (w, x, y, z): the row of the largest q_i has the most digits.
-    products = np.array(
-        [
-            [1 + m[0, 0] + m[1, 1] + m[2, 2], m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1]],
-            [m[2, 1] - m[1, 2], 1 + m[0, 0] - m[1, 1] - m[2, 2], m[0, 1] + m[1, 0], m[0, 2] + m[2, 0]],
-            [m[0, 2] - m[2, 0], m[0, 1] + m[1, 0], 1 - m[0, 0] + m[1, 1] - m[2, 2], m[1, 2] + m[2, 1]],
-            [m[1, 0] - m[0, 1], m[0, 2] + m[2, 0], m[1, 2] + m[2, 1], 1 - m[0, 0] - m[1, 1] + m[2, 2]],
-        ]
+    products = (
+        (1 + a + e + i, h - f, c - g, d - b),
+        (h - f, 1 + a - e - i, b + d, c + g),
+        (c - g, b + d, 1 - a + e - i, f + h),
+        (d - b, c + g, f + h, 1 - a - e + i),
     )
-    q = products[np.argmax(np.diag(products))]
+    q = np.array(products[max(range(4), key=lambda k: products[k][k])])
     q = q / np.sqrt((q * q).sum())
     q[np.abs(q) < 1e-15] = 0.0
     w, x, y, z = (q * np.sign(q[np.flatnonzero(q)[0]]) + 0.0).tolist()
@@ -56,19 +58,23 @@ def transform(matrix: ArrayLike, points: ArrayLike) -> Float:
     Written out, because BLAS rounds differently from processor to processor.
     """
     m, p = np.asarray(matrix, np.float64), np.asarray(points, np.float64)
-    x, y, z = p[..., 0], p[..., 1], p[..., 2]
-    rows = [m[r, 0] * x + m[r, 1] * y + m[r, 2] * z for r in range(3)]
-    return np.stack([row + m[r, 3] if m.shape[1] == 4 else row for r, row in enumerate(rows)], axis=-1)
+    columns = m[:3].T.reshape(m.shape[1], 3, *[1] * (p.ndim - 1))
+    moved = columns[0] * p[..., 0] + columns[1] * p[..., 1] + columns[2] * p[..., 2]
+    if m.shape[1] == 4:
+        moved += columns[3]
+    return np.ascontiguousarray(moved.transpose(*range(1, moved.ndim), 0))
 
 
 def rigid(rotation: ArrayLike, translation: ArrayLike) -> Float:
     """The (4, 4) matrix of x -> rotation x + translation."""
-    matrix = np.eye(4)
-    matrix[:3, :3], matrix[:3, 3] = rotation, translation
+    matrix = np.zeros((4, 4))
+    matrix[:3, :3], matrix[:3, 3], matrix[3, 3] = rotation, translation, 1.0
     return matrix
 
 
 def compose(a: ArrayLike, b: ArrayLike) -> Float:
     """The affine motion `b` followed by `a`, (4, 4) each; no BLAS, as in `transform`."""
     a, b = np.asarray(a, np.float64), np.asarray(b, np.float64)
-    return rigid(transform(a[:3, :3], b[:3, :3].T).T, transform(a, b[:3, 3]))
+    moved = a[:3, :1] * b[0] + a[:3, 1:2] * b[1] + a[:3, 2:3] * b[2]
+    moved[:, 3] += a[:3, 3]
+    return rigid(moved[:, :3], moved[:, 3])

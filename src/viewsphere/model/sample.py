@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from viewsphere.errors import StoreError
 from viewsphere.model.camera import Camera
-from viewsphere.model.channel import CHANNELS, picture_of
+from viewsphere.model.channel import picture_of
 from viewsphere.model.instant import Viewpoint
 from viewsphere.model.model_spec import Size
 from viewsphere.model.rig import CAMERA
@@ -62,6 +62,8 @@ class ObjectAnnotation:
 
     An object of an imported data set has `source`, its annotation there; what that does not say is NaN, and its
     key and model may be empty. Where it says no mask, the mask is empty, but `box2d` and `area` are the source's.
+
+    `more` are fields of labels that others than viewsphere bring; they are attributes, too.
     """
 
     id: int
@@ -90,7 +92,16 @@ class ObjectAnnotation:
     visibility: float
     truncation: float
     source: Mapping[str, Any] | None = None
-    track: str = ""
+    # Factories leave no attribute on the class, so that `__getattr__` of a subclass is asked for these, too.
+    track: str = field(default_factory=str)
+    more: Mapping[str, Any] = field(default_factory=dict[str, Any])
+
+    def __getattr__(self, name: str) -> Any:
+        """Fields in `more`; raises AttributeError for other names."""
+        try:
+            return self.__dict__["more"][name]
+        except KeyError:
+            raise AttributeError(f"an object has no {name!r}, or its data set does not keep it") from None
 
     @property
     def is_placed(self) -> bool:
@@ -116,7 +127,7 @@ class ObjectAnnotation:
 
 @dataclass(frozen=True, eq=False)
 class Sample:
-    """One frame: camera, pose, objects and channels. `channels` maps names of `CHANNELS` to arrays (loaded
+    """One sensor's picture at one instant: camera, pose, objects and channels. `channels` maps names to arrays (loaded
     when asked). Pictures that were imported may have no known camera and pose; `image_size` is theirs.
     """
 
@@ -175,11 +186,11 @@ class Sample:
 
     def __getattr__(self, name: str) -> NDArray[Any]:
         """Any channel by name: `sample.rgb`, `sample.depth`, `sample.instances`, ..."""
-        if name in CHANNELS:
-            try:
-                return self.channels[name]
-            except KeyError:
-                raise AttributeError(
-                    f"this sample has no channel {name!r}; it has {', '.join(self.channels)}: add it to the recipe's channels"
-                ) from None
-        raise AttributeError(f"Sample has no attribute {name!r}")
+        if name.startswith("_") or "channels" not in self.__dict__:
+            raise AttributeError(f"Sample has no attribute {name!r}")
+        try:
+            return self.channels[name]
+        except KeyError:
+            raise AttributeError(
+                f"this sample has no channel {name!r}; it has {', '.join(self.channels)}: add it to the recipe's channels"
+            ) from None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Sequence
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -181,11 +182,13 @@ def dump(data: dict[str, Any]) -> str:
     return yaml.dump(data, Dumper=_Dumper, sort_keys=False, default_flow_style=None, allow_unicode=True, width=110)
 
 
-def schema() -> dict[str, Any]:
-    """JSON schema (draft 2020-12) of recipe files, with a description of every field."""
+def schema(channels: Sequence[str] = ()) -> dict[str, Any]:
+    """JSON schema (draft 2020-12) of recipe files, with a description of every field; `channels`, if any, are all there are."""
     from viewsphere.recipe.recipe import Recipe
 
     whole = Recipe.model_json_schema()
+    if channels:
+        whole["properties"]["channels"]["items"]["enum"] = list(channels)
     path = {"type": "string", "minLength": 1}
     extends = {
         "anyOf": [path, {"type": "array", "items": path}],

@@ -27,10 +27,10 @@ from pydantic import (
 )
 
 from viewsphere.errors import RecipeError
-from viewsphere.model.channel import CHANNELS, DEFAULT_CHANNELS
+from viewsphere.model.channel import DEFAULT_CHANNELS
 from viewsphere.model.files import Files
 from viewsphere.model.frozen import Frozen
-from viewsphere.model.mistakes import Marks, one_of, report, shown
+from viewsphere.model.mistakes import Marks, report, shown
 from viewsphere.model.numbers import Count, Natural, Number
 from viewsphere.recipe.models import ModelEntry
 from viewsphere.recipe.scene import CameraEntry, EngineEntry, SceneEntry, engine_entry
@@ -84,20 +84,11 @@ class Splits(Frozen):
         return dict(self.__pydantic_extra__)
 
 
-def _channel(name: str) -> str:
-    if name not in CHANNELS:
-        raise ValueError(one_of(name, tuple(CHANNELS)))
-    return name
-
-
 def _distinct(names: tuple[str, ...]) -> tuple[str, ...]:
     for i, name in enumerate(names):
         if name in names[:i]:
             raise ValueError(f"expected distinct names; found {shown(name)} twice")
     return names
-
-
-ChannelName = Annotated[str, AfterValidator(_channel), Field(json_schema_extra={"enum": list[Any](CHANNELS)})]
 
 
 class Recipe(Frozen):
@@ -117,7 +108,7 @@ class Recipe(Frozen):
         default=EngineEntry(),
         description="what paints the pictures: a name, or a mapping of name and the engine's options",
     )
-    channels: Annotated[tuple[ChannelName, ...], AfterValidator(_distinct)] = Field(
+    channels: Annotated[tuple[str, ...], AfterValidator(_distinct)] = Field(
         default=DEFAULT_CHANNELS, min_length=1, validate_default=True, description="what to keep of every frame"
     )
     files: Files = Field(default=Files(), description="how each channel is written: lossless PNG and TIFF by default")

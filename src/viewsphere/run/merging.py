@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 
 from viewsphere.errors import StoreError, UserError
+from viewsphere.labels import channels
 from viewsphere.model.camera import Intrinsics
-from viewsphere.model.channel import CHANNELS
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.run.progress import Listener, Progress
 from viewsphere.sampling.pose_numbers import kept, names_of
@@ -197,7 +197,7 @@ def _plan_record(sources: Sequence[_Source], categories: tuple[Category, ...], m
         recipe=last.plan.recipe,
         categories=categories,
         splits=tuple(dict.fromkeys(split for plan in plans for split in plan.splits)),
-        channels=tuple(name for name in CHANNELS if any(name in plan.channels for plan in plans)),
+        channels=tuple(name for name in channels() if any(name in plan.channels for plan in plans)),
         models=models,
         poses=sum(plan.poses for plan in plans),
         frames=sum(len(source.dataset) for source in sources),
@@ -290,4 +290,4 @@ def _with_category_ids(source: _Source, sample: Sample) -> bytes:
     for old, new in source.categories.items():
         if old < len(table):
             table[old] = new.id
-    return encode(CHANNELS["categories"], table[array])
+    return encode(channels()["categories"], table[array])

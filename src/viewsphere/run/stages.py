@@ -9,21 +9,20 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from viewsphere import plugins
-from viewsphere.annotate import annotate
 from viewsphere.assets.cache import load_normalised, read_ahead
 from viewsphere.assets.mesh import Mesh
 from viewsphere.assets.parts import taken
 from viewsphere.errors import ModelError, RecipeError
 from viewsphere.geometry.box import box_size, box_vertices
 from viewsphere.geometry.rotation import transform
-from viewsphere.model.channel import PICTURES
+from viewsphere.labels import annotate, observe
+from viewsphere.model.channel import PASSES
 from viewsphere.model.model_spec import ModelSpec, Size
 from viewsphere.model.sample import Float, Sample
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
 from viewsphere.sampling.camera import inside_box
 from viewsphere.store import Store
-from viewsphere.truth.channels import observe
 from viewsphere.truth.enclosure import sky_hidden
 from viewsphere.truth.visibility import rasterize
 from viewsphere.zoo import build_zoo_model
@@ -206,9 +205,9 @@ def render_sample(
     number, instant, sensor = sample
     now, camera, geometry = shot.instants[instant], shot.camera(instant, sensor), stage.at(instant)
     visibility = rasterize(geometry, camera)
-    names = [name for name in shot.channels if name not in PICTURES]
+    names = [name for name in shot.channels if name not in PASSES]
     observed = observe(geometry, camera, visibility, names)
-    for name in PICTURES:
+    for name in PASSES:
         if name in shot.channels:
             observed[name] = stage.color(instant, sensor, visibility, name == "rgba")
     files = [model_files(p.model.key)[0] for p in shot.objects]

@@ -18,8 +18,8 @@ from viewsphere.engines import Engine
 from viewsphere.geometry.box import box_vertices
 from viewsphere.kernels.garbage import pause_collection
 from viewsphere.kernels.kernel_cache import kernel_folder, sources_digest
+from viewsphere.labels import channels
 from viewsphere.model.camera import Intrinsics
-from viewsphere.model.channel import CHANNELS
 from viewsphere.model.instant import Viewpoint
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.rig import Rig, Sensor
@@ -106,7 +106,7 @@ def _render(shot: Shot) -> None:
     for number in shot.samples:
         sample = render_sample(shot, number, stage, boxes, [None] * len(boxes))
         for name, array in sample.channels.items():
-            encode(CHANNELS[name], array, shot.files)
+            encode(channels()[name], array, shot.files)
 
 
 def _card() -> Mesh:

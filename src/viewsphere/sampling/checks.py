@@ -7,6 +7,7 @@ from fnmatch import fnmatchcase
 
 from viewsphere import plugins
 from viewsphere.errors import RecipeError
+from viewsphere.labels import channel_labels, channels
 from viewsphere.model.mistakes import nearest, one_of
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.recipe.draws import alternatives
@@ -17,7 +18,7 @@ from viewsphere.sampling.viewpoints import Poses
 
 
 def check_names(recipe: Recipe) -> None:
-    """The engine, the formats and the placer are known."""
+    """The engine, the formats, the placer and the channels are known, and still pictures are enough for these."""
     engines = plugins.names("engines")
     if recipe.engine.name not in engines:
         raise RecipeError(f"engine: {one_of(recipe.engine.name, engines)}")
@@ -28,6 +29,12 @@ def check_names(recipe: Recipe) -> None:
     company = recipe.scene.company
     if company is not None and company.placer not in (placers := plugins.names("placers")):
         raise RecipeError(f"scene.company.layout: {one_of(company.placer, placers)}")
+    for i, name in enumerate(recipe.channels):
+        if name not in channels():
+            raise RecipeError(f"channels[{i}]: {one_of(name, tuple(channels()))}")
+        if name in channel_labels() and channel_labels()[name].needs.is_some:
+            needs = channel_labels()[name].needs
+            raise RecipeError(f"channels[{i}]: expected a label of single pictures; found {name!r}, which needs {needs}")
 
 
 def check_blend(recipe: Recipe) -> None:

@@ -6,6 +6,7 @@ import json
 import os
 from bisect import bisect_right
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any, overload
@@ -13,9 +14,8 @@ from typing import Any, overload
 from numpy.typing import NDArray
 
 from viewsphere.errors import StoreError
-from viewsphere.model.channel import CHANNELS
+from viewsphere.labels import channels
 from viewsphere.model.files import Files
-from viewsphere.model.record import sample_from_record
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.store.channel_files import decode
 from viewsphere.store.choice import Choice
@@ -23,6 +23,7 @@ from viewsphere.store.folder import Store
 from viewsphere.store.index import Row
 from viewsphere.store.linking import link_file
 from viewsphere.store.records import Category, ModelInfo
+from viewsphere.store.sample_records import ShotRecords, from_whole_sample
 
 
 class Dataset(Sequence[Sample]):
@@ -39,6 +40,7 @@ class Dataset(Sequence[Sample]):
         self.plan = self.store.plan()
         self.link_kinds: set[str] = set()
         self._records = lru_cache(maxsize=8)(self._read_records)
+        self._facts = lru_cache(maxsize=10_000)(self._model_facts)
 
     def __reduce__(self) -> tuple[type[Dataset], tuple[Path, Choice]]:
         """A data set travels to other processes (data loaders) as its folder."""
@@ -111,7 +113,7 @@ class Dataset(Sequence[Sample]):
         shots, starts = self._shots
         number = bisect_right(starts, i) - 1
         key, places = shots[number]
-        return self._sample(key, self._records(key)[places[i - starts[number]]])
+        return self._sample(self._records(key), places[i - starts[number]])
 
     def __iter__(self) -> Iterator[Sample]:
         for key, places in self._shots[0]:
@@ -125,7 +127,7 @@ class Dataset(Sequence[Sample]):
         """Some of a finished shot's samples."""
         records = self._read_records(key)
         for place in places:
-            yield self._sample(key, records[place])
+            yield self._sample(records, place)
 
     def _places(self, row: Row) -> Sequence[int]:
         """Which of a finished shot's frames the choice means, by the model's key, or by that of its moment where it moves.
@@ -153,34 +155,49 @@ class Dataset(Sequence[Sample]):
         """Keys of the models that the choice names, moments of models that move among them."""
         return tuple(key for key in self.plan.models if self.choice.has_model(key))
 
-    def _read_records(self, key: str) -> list[dict[str, Any]]:
+    def _read_records(self, key: str) -> _Records:
         file = self.store.shot_folder(key) / "frames.json"
         try:
             records: list[dict[str, Any]] = json.loads(file.read_text("utf-8"))
             row = self.plan.find(key)
             if row is None or len(records) != row.count:
                 raise ValueError(f"{len(records)} frames instead of {row and row.count}")
+            is_short = any("camera" not in record for record in records)
         except (OSError, TypeError, ValueError) as error:
             raise _damaged(file, error) from None
-        return records
+        shot = self.store.labelled(key) if is_short else None
+        if shot is None:
+            return _Records(file, records)
+        return _Records(file, records, ShotRecords(shot, self._facts, str(file)), self.store.channel_files(key, shot))
 
-    def _sample(self, key: str, record: dict[str, Any]) -> Sample:
+    def _model_facts(self, key: str) -> ModelInfo:
+        info = self.store.model_info(key)
+        if info is None:
+            raise ValueError(f"no model {key}")
+        return info
+
+    def _sample(self, records: _Records, place: int) -> Sample:
+        record = records.records[place]
         try:
-            files: dict[str, str] = record["files"] | self._supplied(record)
-            return sample_from_record(record, channels=_ChannelFiles(self.root, files), files=files)
+            if "camera" in record or records.shot is None:
+                files: dict[str, str] = record["files"] | self._supplied(record)
+                return from_whole_sample(record, _ChannelFiles(self.root, files), files)
+            files = {name: head + f"{record['index']:08d}" + tail for name, head, tail in records.files}
+            files |= self._supplied(record)
+            return records.shot.sample(place, record, _ChannelFiles(self.root, files), files)
         except (LookupError, TypeError, ValueError, AttributeError) as error:
-            raise _damaged(self.store.shot_folder(key) / "frames.json", error) from None
+            raise _damaged(records.file, error) from None
 
     def _supplied(self, record: dict[str, Any]) -> dict[str, str]:
         """Files of channels that were added to a frame later."""
         files: dict[str, str] = {}
         number = record["index"]
-        for index, channels in self.plan.supplements:
+        for index, added in self.plan.supplements:
             if index.first <= number < index.first + index.samples:
                 key = index.at(number).key
                 if self.store.has_shot(key):
                     kinds = self._kinds[index.part]
-                    files |= {name: self.store.channel_file(key, name, number, kinds) for name in channels}
+                    files |= {name: self.store.channel_file(key, name, number, kinds) for name in added}
         return files
 
     @cached_property
@@ -210,6 +227,18 @@ class Dataset(Sequence[Sample]):
             self.link(stored, folder / inside)
 
 
+@dataclass(frozen=True, eq=False)
+class _Records:
+    """What a shot's frames.json says, and what makes samples of it where that is not all: the shot, and how its channels' files
+    are called (channel, what comes before a sample's number, what after it).
+    """
+
+    file: Path
+    records: list[dict[str, Any]]
+    shot: ShotRecords | None = None
+    files: tuple[tuple[str, str, str], ...] = ()
+
+
 class _ChannelFiles(Mapping[str, NDArray[Any]]):
     """A frame's channels, each read from its file the first time it is asked for."""
 
@@ -219,7 +248,10 @@ class _ChannelFiles(Mapping[str, NDArray[Any]]):
 
     def __getitem__(self, name: str) -> NDArray[Any]:
         if name not in self._arrays:
-            self._arrays[name] = decode(CHANNELS[name], self._root / self._files[name])
+            file = self._root / self._files[name]
+            if name not in channels():
+                raise StoreError(f"{file}: expected a label that is installed, found {name!r}: install the package that has it")
+            self._arrays[name] = decode(channels()[name], file)
         return self._arrays[name]
 
     def __iter__(self) -> Iterator[str]:

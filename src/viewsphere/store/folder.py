@@ -17,15 +17,15 @@ from typing import Any
 import numpy as np
 
 from viewsphere.errors import StoreError
-from viewsphere.model.channel import CHANNELS
+from viewsphere.labels import channels
 from viewsphere.model.files import Files
-from viewsphere.model.record import sample_to_record
 from viewsphere.model.sample import Sample
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
 from viewsphere.store.channel_files import encode
 from viewsphere.store.index import Row
 from viewsphere.store.records import ModelInfo, PlanRecord
+from viewsphere.store.sample_records import short_sample, whole_sample
 
 
 class Store:
@@ -163,6 +163,13 @@ class Store:
         """Where a finished shot's channel of a sample, written as `kinds` say, lies; relative to the data set's root."""
         return f"{self.shot_folder(key).relative_to(self.root).as_posix()}/{channel_path(channel, sample, kinds)}"
 
+    def channel_files(self, key: str, shot: Shot) -> tuple[tuple[str, str, str], ...]:
+        """How the files of a finished shot's channels are called: the channel, what comes before a sample's number of eight
+        digits, and what after it.
+        """
+        folder, table = self.shot_folder(key).relative_to(self.root).as_posix(), channels()
+        return tuple((name, f"{folder}/{name}/", shot.files.suffix(table[name])) for name in shot.channels)
+
     def model_folder(self, key: str) -> Path:
         """Where a normalised model lies."""
         return self.folder / "models" / key
@@ -234,7 +241,7 @@ class Store:
         prefix = target.relative_to(self.root).as_posix()
         records: list[dict[str, Any]] = []
         made: set[str] = set()
-        kinds = kinds or Files()
+        kinds, table = kinds or Files(), channels()
         with self.aside(target) as folder:
             for sample in samples:
                 files: dict[str, str] = {}
@@ -243,9 +250,10 @@ class Store:
                     if name not in made:
                         (folder / name).mkdir()
                         made.add(name)
-                    _write(f"{folder}/{inside}", encode(CHANNELS[name], array, kinds))
+                    _write(f"{folder}/{inside}", encode(table[name], array, kinds))
                     files[name] = f"{prefix}/{inside}"
-                records.append(sample_to_record(replace(sample, files=files)))
+                short = shot is not None and shot.channels == tuple(files) and shot.files == kinds
+                records.append(short_sample(sample) if short else whole_sample(replace(sample, files=files)))
             lines = (json.dumps(r, separators=(",", ":"), allow_nan=False) for r in records)
             text = "[\n" + ",\n".join(lines) + "\n]\n"
             (folder / "frames.json").write_text(text, "utf-8")
@@ -256,17 +264,27 @@ class Store:
                 (folder / "shot.json").write_text(labelled.model_dump_json(), "utf-8")
         return len(records)
 
-    def shot(self, key: str) -> Shot | None:
-        """A finished shot as it was rendered; None where that is not known. Raises StoreError if it cannot be read."""
+    def labelled(self, key: str) -> Shot | None:
+        """A finished shot with what is labelled of its things; None where that is not known. Raises StoreError if it cannot be
+        read.
+        """
         file = self.shot_folder(key) / "shot.json"
         try:
-            shot = Shot.model_validate_json(file.read_bytes())
-            scenery = json.loads(self.scenery(key) or '{"things": []}')["things"]
-            return shot.model_copy(update={"things": (*shot.things, *(Thing.model_validate(thing) for thing in scenery))})
+            return Shot.model_validate_json(file.read_bytes())
         except FileNotFoundError:
             return None
+        except (OSError, ValueError) as error:
+            raise _no_scene(file, error) from None
+
+    def shot(self, key: str) -> Shot | None:
+        """A finished shot as it was rendered, otherwise as `labelled`."""
+        shot, file = self.labelled(key), self.shot_folder(key) / "scenery.json"
+        try:
+            scenery = json.loads(self.scenery(key) or '{"things": []}')["things"]
+            around = tuple(Thing.model_validate(thing) for thing in scenery)
         except (OSError, LookupError, TypeError, ValueError) as error:
-            raise StoreError(f"{file}: expected the scene of a shot, found {type(error).__name__}: {error}") from None
+            raise _no_scene(file, error) from None
+        return shot and shot.model_copy(update={"things": (*shot.things, *around)})
 
     def known_of(self, key: str) -> list[Path]:
         """The files that say what a finished shot's scene was."""
@@ -301,6 +319,12 @@ class Store:
                 f"{file}: expected what is known of a model, found {type(error).__name__}: {error}: "
                 f"delete {file.parent} and render again"
             ) from None
+
+
+def _no_scene(file: Path, error: Exception) -> StoreError:
+    return StoreError(
+        f"{file}: expected the scene of a shot, found {type(error).__name__}: {error}: delete {file.parent} and render again"
+    )
 
 
 def _remove_of_dead(paths: Iterable[Path]) -> None:
@@ -339,7 +363,7 @@ def new_folder(target: Path) -> Generator[Path]:
 
 def channel_path(channel: str, sample: int, kinds: Files | None = None) -> str:
     """Where a channel of a sample (its number in the data set), written as `kinds` say, lies in its shot's folder."""
-    return f"{channel}/{sample:08d}{(kinds or Files()).suffix(CHANNELS[channel])}"
+    return f"{channel}/{sample:08d}{(kinds or Files()).suffix(channels()[channel])}"
 
 
 def _write(file: str, data: bytes) -> None:

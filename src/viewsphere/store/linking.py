@@ -10,11 +10,11 @@ from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
-from viewsphere.model.channel import CHANNELS
-from viewsphere.model.record import sample_to_record
+from viewsphere.labels import channels
 from viewsphere.store.folder import Store
 from viewsphere.store.foreign import ForeignFrame
 from viewsphere.store.records import ModelInfo
+from viewsphere.store.sample_records import whole_sample
 
 
 def link_file(source: Path, destination: Path) -> str:
@@ -58,7 +58,7 @@ def link_shot(store: Store, key: str, frames: Iterable[ForeignFrame], known: Ite
         for frame in frames:
             files: dict[str, str] = {}
             for name, source in frame.files.items():
-                suffix = CHANNELS[name].suffix if isinstance(source, bytes) else source.suffix.lower()
+                suffix = channels()[name].suffix if isinstance(source, bytes) else source.suffix.lower()
                 inside = f"{name}/{frame.sample.index:08d}{suffix}"
                 (folder / name).mkdir(exist_ok=True)
                 if isinstance(source, bytes):
@@ -66,7 +66,7 @@ def link_shot(store: Store, key: str, frames: Iterable[ForeignFrame], known: Ite
                 else:
                     link_file(source.resolve(), folder / inside)
                 files[name] = f"{prefix}/{inside}"
-            record = sample_to_record(replace(frame.sample, files=files))
+            record = whole_sample(replace(frame.sample, files=files))
             records.append(json.dumps(record, separators=(",", ":"), allow_nan=False))
         (folder / "frames.json").write_text("[\n" + ",\n".join(records) + "\n]\n", "utf-8")
         for file in known:

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from viewsphere.errors import StoreError, UserError
 from viewsphere.geometry.box import box_size
 from viewsphere.geometry.mask import mask_box, mask_polygons
+from viewsphere.labels import channels
 from viewsphere.model.camera import Camera, Distortion, Intrinsics
-from viewsphere.model.channel import CHANNELS
 from viewsphere.model.instant import Viewpoint
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.store import Category, ModelInfo, decode
@@ -212,7 +212,7 @@ def _picture(root: Path, file: Path, camera: Camera) -> Path:
 def _is_depth(file: Path, camera: Camera) -> bool:
     """Whether this is depth as this package keeps it: metres along z, of whatever kind of file."""
     try:
-        array = decode(CHANNELS["depth"], file)
+        array = decode(channels()["depth"], file)
     except UserError:
         return False
     return array.shape == (camera.height, camera.width)

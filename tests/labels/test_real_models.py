@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from pycocotools import mask as coco
-from test_annotate import scene
+from test_object_labels import scene
 
 from viewsphere.assets.cache import load_normalised
 from viewsphere.model.camera import Intrinsics

@@ -1,22 +1,23 @@
 import itertools
 import json
+from dataclasses import fields
 
 import numpy as np
 import pytest
 
 from shots import still_shot
-from viewsphere.annotate import annotate
-from viewsphere.annotate.view import view_of
 from viewsphere.assets.mesh import Mesh
 from viewsphere.geometry.box import FACES, box_vertices
 from viewsphere.geometry.camera import orbit_center, orbit_rotation
 from viewsphere.geometry.rotation import matrix_from_quaternion, rigid
+from viewsphere.labels import annotate
+from viewsphere.labels._placement import view_of
 from viewsphere.model.camera import Camera, Distortion, Intrinsics
 from viewsphere.model.instant import Viewpoint
 from viewsphere.model.model_spec import ModelSpec
-from viewsphere.model.record import sample_from_record, sample_to_record
-from viewsphere.model.sample import Sample
+from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.model.thing import Motion, Thing
+from viewsphere.store.sample_records import from_whole_sample, whole_sample
 from viewsphere.truth.geometry import build_geometry
 from viewsphere.truth.visibility import rasterize, silhouette
 
@@ -234,23 +235,23 @@ def test_a_record_gives_back_every_bit():
     objects, camera, _, visibility, pose = scene([UNIT] * 3, motions, tilted, lens)
     channels = {"instances": visibility.triangle}
     sample = Sample(5, "train", camera, pose, objects, channels, {"instances": "a/b.png"})
-    text = json.dumps(sample_to_record(sample), allow_nan=False)
-    back = sample_from_record(json.loads(text), channels=channels, files=sample.files)
+    text = json.dumps(whole_sample(sample), allow_nan=False)
+    back = from_whole_sample(json.loads(text), channels=channels, files=sample.files)
     assert (back.index, back.split, back.pose, back.files) == (5, "train", pose, sample.files)
     assert back.camera.intrinsics == lens
     np.testing.assert_array_equal(back.camera.P, camera.P)
     np.testing.assert_array_equal(back.instances, visibility.triangle)
     assert len(back.objects) == 3
     for a, b in zip(objects, back.objects, strict=True):
-        for name, value in a.__dict__.items():
-            other = getattr(b, name)
+        for name in (field.name for field in fields(ObjectAnnotation)):
+            value, other = getattr(a, name), getattr(b, name)
             assert type(other) is type(value), name
             if isinstance(value, np.ndarray):
                 assert other.dtype == value.dtype
                 np.testing.assert_array_equal(other, value, err_msg=name)
             else:
                 assert other == value, name
-    assert json.dumps(sample_to_record(back)) == json.dumps(json.loads(text))
+    assert json.dumps(whole_sample(back)) == json.dumps(json.loads(text))
 
 
 def test_an_object_that_fills_the_whole_field_of_a_lens():

@@ -1,0 +1,81 @@
+"""An exported GLB read back: the very mesh, as far as labels need it, that `glb.glb_bytes` wrote."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.assets.folder import ModelFolder
+from viewsphere.assets.gltf.document import Document
+from viewsphere.assets.gltf.field import Field
+from viewsphere.assets.gltf.material import read_materials
+from viewsphere.assets.mesh import Mesh
+
+Part = tuple[int, Field]
+"""A part's number, and one of its primitives."""
+
+FROM_GLTF = np.array([0, 2, 1]), np.array([1, -1, 1], np.float32)
+"""Which of glTF's axes are the object's, and their signs."""
+
+
+def read_exported(file: Path, parts: Sequence[str]) -> Mesh:
+    """The mesh of a GLB file that this package wrote, in object axes; every number is equal to the last bit.
+
+    `parts` names all parts of the model, those without triangles too. Materials that cannot be seen through are left plain.
+    Raises ModelError for a file that cannot be read, or that has other parts.
+    """
+    document = Document.read(ModelFolder(file))
+    primitives = list(_primitives(document, parts))
+    vertices = [_accessor(document, p, "POSITION", 3) for _, p in primitives]
+    triangles = [document.accessor(p.integer("indices"), (1,)).reshape(-1, 3).astype(np.int64) for _, p in primitives]
+    firsts = np.cumsum([0, *(len(own) for own in vertices)])
+    counts = [len(own) for own in triangles]
+    materials = document.root.items("materials")
+    seen_through = {i for i, entry in enumerate(materials) if entry.text("alphaMode", "OPAQUE") != "OPAQUE"}
+    axes, signs = FROM_GLTF
+    try:
+        return Mesh(
+            vertices=_joined(vertices, 3)[:, axes] * signs,
+            triangles=np.concatenate([own + first for own, first in zip(triangles, firsts, strict=False)]).astype(np.int32),
+            normals=_joined([_accessor(document, p, "NORMAL", 3) for _, p in primitives], 3)[:, axes] * signs,
+            triangle_material=np.repeat([p.integer("material") for _, p in primitives], counts).astype(np.int32),
+            triangle_part=np.repeat([part for part, _ in primitives], counts).astype(np.int32),
+            materials=tuple(read_materials(document, seen_through)[:-1]),
+            parts=tuple(parts),
+            uv0=_optional(document, primitives, "TEXCOORD_0", 2),
+            uv1=_optional(document, primitives, "TEXCOORD_1", 2),
+            colors=_optional(document, primitives, "COLOR_0", 4),
+            images=tuple(document.folder.images),
+        )
+    except ValueError as error:
+        raise document.folder.error(f"expected an exported model, found {error}") from None
+
+
+def _primitives(document: Document, parts: Sequence[str]) -> Iterator[Part]:
+    """All primitives in order; meshes are the parts that have triangles."""
+    part = -1
+    for mesh in document.root.items("meshes"):
+        name = mesh.text("name")
+        if name not in parts[part + 1 :]:
+            raise document.folder.error(f"expected the parts {', '.join(parts)} in order, found {name!r}")
+        part = parts.index(name, part + 1)
+        for primitive in mesh.items("primitives"):
+            yield part, primitive
+
+
+def _accessor(document: Document, primitive: Field, name: str, width: int) -> NDArray[np.float32]:
+    return document.accessor(primitive.get("attributes").integer(name), (width,)).astype(np.float32)
+
+
+def _optional(document: Document, primitives: Sequence[Part], name: str, width: int) -> NDArray[np.float32] | None:
+    if not all(name in p.get("attributes") for _, p in primitives):
+        return None
+    return _joined([_accessor(document, p, name, width) for _, p in primitives], width)
+
+
+def _joined(arrays: Sequence[NDArray[Any]], width: int) -> NDArray[np.float32]:
+    return np.concatenate([np.zeros((0, width), np.float32), *arrays])

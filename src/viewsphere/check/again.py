@@ -1,0 +1,153 @@
+"""Labels computed again: from the exported models, where shots say that they stand, and compared with those that are kept."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.assets.exported import read_exported
+from viewsphere.assets.mesh import Mesh
+from viewsphere.check.scenery import Scenery
+from viewsphere.errors import ViewsphereError
+from viewsphere.labels import Placement, Sight, annotated, channel_labels, object_labels
+from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.sample import ObjectAnnotation, Sample
+from viewsphere.model.scene import Matrix4
+from viewsphere.model.shot import Shot
+from viewsphere.model.thing import Motion, Thing
+from viewsphere.store import Dataset, ModelInfo, depth_step
+from viewsphere.store.channel_files import MOST_STEPS
+from viewsphere.truth.geometry import Geometry, build_geometry, present
+from viewsphere.truth.visibility import rasterize
+
+Findings = Iterator[tuple[str, str]]
+"""Names of labels, and what is wrong with them."""
+
+MODELS = 200
+"""Exported models that are kept in memory."""
+
+
+class Again:
+    """Computes labels of a data set again; the last geometry is kept, because samples of one follow one another."""
+
+    def __init__(self, dataset: Dataset, scenery: Scenery, models: Mapping[str, ModelInfo]) -> None:
+        self._dataset, self._scenery, self._models = dataset, scenery, models
+        self._mesh = lru_cache(maxsize=MODELS)(self._read)
+        self._geometry: tuple[object, Geometry | None] = None, None
+
+    def is_possible(self, sample: Sample) -> bool:
+        """Whether it is known what was seen: the shot is kept, and the objects are placed."""
+        known = self._scenery.shot(self._scenery.key_of(sample.index)) is not None
+        return known and sample.known_camera is not None and all(o.source is None for o in sample.objects)
+
+    def differences(self, sample: Sample) -> Findings:
+        """What is kept of a sample and what is computed again, where they differ; nothing where scenery is not what it was."""
+        key = self._scenery.key_of(sample.index)
+        shot = self._scenery.shot(key)
+        assert shot is not None
+        geometry = self._built(sample, shot, key)
+        if geometry is None:
+            return
+        camera, by_id = sample.camera, {o.id: o for o in sample.objects}
+        placed = tuple(self._placement(by_id.get(i + 1), sample, shot) for i in range(geometry.object_count))
+        sight = Sight(geometry, camera, rasterize(geometry, camera), placed)
+        for name, label in channel_labels().items():
+            if name in sample.files:
+                yield from ((name, problem) for problem in self._pixels(sample, name, label.compute(sight)))
+        for o, again in zip(sample.objects, annotated(sight), strict=True):
+            yield from _fields(o, again)
+
+    def _pixels(self, sample: Sample, name: str, again: NDArray[Any]) -> Iterator[str]:
+        """Where a channel is not what it should be; what cannot be read, or has another size, is said elsewhere."""
+        try:
+            kept = sample.channels[name]
+        except ViewsphereError:
+            return
+        if kept.shape != again.shape:
+            return
+        step = depth_step(self._dataset.path(sample.files[name])) if name == "depth" else 0.0
+        wrong = _beyond(kept, again, step) if step else _unequal(kept, again)
+        if wrong.any():
+            y, x = (int(i[0]) for i in np.nonzero(wrong))
+            yield (
+                f"{wrong.sum()} of {wrong.size} pixels are not those of the exported models: at pixel ({x}, {y}) expected "
+                f"{again[y, x].tolist()}, found {kept[y, x].tolist()}"
+            )
+
+    def _placement(self, o: ObjectAnnotation | None, sample: Sample, shot: Shot) -> Placement | None:
+        if o is None:
+            return None
+        info = self._models[o.key]
+        return Placement(_spec(o, info), _matrix(o.world_from_object), sample.camera, shot.category_deg, lambda: info)
+
+    def _built(self, sample: Sample, shot: Shot, key: str) -> Geometry | None:
+        """The geometry that a sample shows; None where scenery is not what it was."""
+        around = self._scenery.around(key)
+        there = {o.id: o for o in sample.objects}
+        objects = tuple(self._thing(there.get(thing.id), thing) for thing in shot.objects)
+        ground = shot.scene.ground is not None
+        now = objects, around.things, ground, shot.label_alpha, shot.scene.floor
+        if self._geometry[0] != now:
+            meshes = [self._mesh(thing.model.key) for thing in objects]
+            scenery = [self._scenery.mesh(around, thing.model) for thing in around.things]
+            whole = [mesh for mesh in scenery if mesh is not None]
+            things = (*objects, *around.things)
+            built = None
+            if len(whole) == len(scenery):
+                built = build_geometry(things, present(things, [*meshes, *whole]), ground, shot.label_alpha, shot.scene.floor)
+            self._geometry = now, built
+        return self._geometry[1]
+
+    def _thing(self, o: ObjectAnnotation | None, thing: Thing) -> Thing:
+        """An object as a sample says that it stands, or not there."""
+        if o is None:
+            return Thing(id=thing.id, model=thing.model, motion=Motion(poses=(None,)))
+        return Thing(id=o.id, model=_spec(o, self._models[o.key]), motion=Motion.still(_matrix(o.world_from_object)))
+
+    def _read(self, key: str) -> Mesh:
+        info = self._models[key]
+        return read_exported(self._dataset.path(info.glb), info.parts)
+
+
+def _spec(o: ObjectAnnotation, info: ModelInfo) -> ModelSpec:
+    """The model as labels know it: what the data set says of it, but for the object's track."""
+    return ModelSpec(
+        key=o.key,
+        source="",
+        category=info.category,
+        supercategory=info.supercategory,
+        category_id=info.category_id,
+        track=o.track,
+    )
+
+
+def _matrix(values: NDArray[np.float64]) -> Matrix4:
+    a, b, c, d = ((w, x, y, z) for w, x, y, z in values.tolist())
+    return a, b, c, d
+
+
+def _unequal(kept: NDArray[Any], again: NDArray[Any]) -> NDArray[np.bool_]:
+    """(H, W): where any component differs; NaN equals itself."""
+    different = kept != again
+    if np.issubdtype(kept.dtype, np.floating):
+        different &= ~(np.isnan(kept) & np.isnan(again))
+    return different if different.ndim == 2 else different.any(axis=2)
+
+
+def _beyond(kept: NDArray[Any], again: NDArray[Any], step: float) -> NDArray[np.bool_]:
+    """(H, W): where a depth kept in whole steps is not the nearest one; what is behind the camera is kept as nothing."""
+    seen = np.isfinite(again) & (again > 0)
+    rounded = np.clip(np.rint(np.where(seen, again, 1.0).astype(np.float64) / step), 1, MOST_STEPS)
+    return np.where(seen, kept != (rounded * step).astype(np.float32), np.isfinite(kept))
+
+
+def _fields(o: ObjectAnnotation, again: ObjectAnnotation) -> Findings:
+    for label in object_labels():
+        for known in label.fields:
+            kept, computed = getattr(o, known.name), getattr(again, known.name)
+            if not known.equals(kept, computed):
+                yield label.name, f"object {o.id}: expected {known.name} {computed!r} of the exported models, found {kept!r}"

@@ -1,0 +1,56 @@
+"""What stands behind the objects of a data set's shots: it is no part of the data set, so it is made again."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import lru_cache
+
+from viewsphere.assets.mesh import Mesh
+from viewsphere.errors import ViewsphereError
+from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.shot import Shot
+from viewsphere.run.stages import Stages
+from viewsphere.run.tasks import SceneryRecord, mesh_digest
+from viewsphere.store import Dataset
+
+NONE = SceneryRecord(things=(), digests={})
+
+
+@dataclass(eq=False)
+class Scenery:
+    """Gives shots as they were rendered and the meshes of their scenery. `notes` says what is not what it was."""
+
+    dataset: Dataset
+    notes: list[str] = field(default_factory=list[str])
+    _stages: Stages = field(default_factory=Stages)
+    _known: dict[str, Mesh | None] = field(default_factory=dict[str, Mesh | None])
+
+    def __post_init__(self) -> None:
+        self.shot = lru_cache(maxsize=4)(self._shot)
+        self.around = lru_cache(maxsize=4)(self._around)
+
+    def key_of(self, frame: int) -> str:
+        """Key of the shot that a frame is of."""
+        return self.dataset.plan.row_at(frame).key
+
+    def _shot(self, key: str) -> Shot | None:
+        return self.dataset.store.labelled(key)
+
+    def _around(self, key: str) -> SceneryRecord:
+        text = self.dataset.store.scenery(key)
+        return SceneryRecord.model_validate_json(text) if text else NONE
+
+    def mesh(self, record: SceneryRecord, spec: ModelSpec) -> Mesh | None:
+        """A model of a shot's scenery, None where it is not what it was. Merged data sets have several of one key."""
+        digest = record.digests[spec.key]
+        if digest not in self._known:
+            self._known[digest] = None
+            try:
+                mesh = self._stages.model(spec)
+                if mesh_digest(mesh) == digest:
+                    self._known[digest] = mesh
+                else:
+                    self.notes.append(f"background not checked where {spec.key} stands: it is not what it was")
+            except ViewsphereError as error:
+                self.notes.append(f"background not checked where {spec.key} stands: {error}")
+        return self._known[digest]

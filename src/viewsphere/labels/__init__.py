@@ -1,0 +1,154 @@
+"""Labels: everything that is said of a picture and computed from truth's triangles; one file a label, which states `LABEL`.
+
+`ChannelLabel`s are arrays of pixels, which a recipe's `channels` ask for; `ObjectLabel`s are fields of objects, which always
+are computed. Third parties add one by an entry point of the group `viewsphere.labels` that names such a module.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere import plugins
+from viewsphere.labels._label import ChannelLabel, Drawing, Field, Label, ModelFacts, Needs, ObjectLabel
+from viewsphere.labels._placement import Placement
+from viewsphere.labels._record import annotation_of, from_short_record, from_whole_record, short_record, whole_record
+from viewsphere.labels._sight import Sight
+from viewsphere.model.camera import Camera
+from viewsphere.model.channel import DEFAULT_CHANNELS, PASSES, Channel
+from viewsphere.model.model_spec import Size
+from viewsphere.model.sample import ObjectAnnotation
+from viewsphere.model.shot import Shot
+from viewsphere.truth.geometry import Geometry
+from viewsphere.truth.visibility import Visibility
+
+__all__ = [
+    "ChannelLabel",
+    "Drawing",
+    "Field",
+    "Label",
+    "ModelFacts",
+    "Needs",
+    "ObjectLabel",
+    "Placement",
+    "Sight",
+    "annotate",
+    "annotated",
+    "channel_labels",
+    "channels",
+    "drawings",
+    "from_short_record",
+    "from_whole_record",
+    "labels",
+    "object_labels",
+    "observe",
+    "short_record",
+    "whole_record",
+]
+
+
+@cache
+def labels() -> dict[str, Label]:
+    """All labels by name, the channels that recipes keep by default first, then by the alphabet."""
+    names = sorted(plugins.names("labels"), key=lambda name: (name not in DEFAULT_CHANNELS, name))
+    found: dict[str, Label] = {name: plugins.load("labels", name).LABEL for name in names}
+    for name, label in found.items():
+        if label.name != name:
+            raise ValueError(f"label {name!r}: expected the name of its file, found {label.name!r}")
+    return found
+
+
+@cache
+def channel_labels() -> dict[str, ChannelLabel]:
+    """Labels of pixels by name."""
+    return {name: label for name, label in labels().items() if isinstance(label, ChannelLabel)}
+
+
+@cache
+def object_labels() -> tuple[ObjectLabel, ...]:
+    """Labels of objects."""
+    return tuple(label for label in labels().values() if isinstance(label, ObjectLabel))
+
+
+@cache
+def channels() -> dict[str, Channel]:
+    """All that a recipe's `channels` may name, passes first."""
+    return PASSES | {name: label.channel for name, label in channel_labels().items()}
+
+
+def drawings() -> tuple[Drawing, ...]:
+    """How labels are shown, in the order of the labels' names."""
+    return tuple(label.drawing for _, label in sorted(labels().items()) if label.drawing)
+
+
+def observe(geometry: Geometry, camera: Camera, visibility: Visibility, names: Iterable[str]) -> dict[str, NDArray[Any]]:
+    """The named labels of pixels, each (H, W) or (H, W, components) as its file says.
+
+    `visibility` is `rasterize(geometry, camera)`. `instances` are those that the visibility keeps, so not to be written to.
+    Raises ValueError for other names.
+    """
+    known, sight, names = channel_labels(), Sight(geometry, camera, visibility), tuple(names)
+    unknown = [name for name in names if name not in known]
+    if unknown:
+        raise ValueError(f"channel {unknown[0]!r}: expected one of {', '.join(known)}")
+    return {name: known[name].compute(sight) for name in names}
+
+
+def annotate(
+    shot: Shot,
+    instant: int,
+    camera: Camera,
+    geometry: Geometry,
+    visibility: Visibility,
+    boxes: Sequence[NDArray[np.float64]],
+    models: Sequence[str],
+    real_sizes: Sequence[Size | None] | None = None,
+) -> tuple[ObjectAnnotation, ...]:
+    """Annotations of all objects (things of an id) that are there at an instant (counted from 0 in the shot), seen or not, in
+    the order of their ids.
+
+    `boxes[i]` is the 3D box (8, 3) of object i + 1's model in the object's axes, `models[i]` the path of that model in the data
+    set and `real_sizes[i]` its true size (by default the one its spec gives in numbers); `geometry` is the shot's stage and
+    `visibility` what this camera sees of it. An object that covers no pixel has an empty mask, no `box2d` and visibility 0.
+    """
+    objects = shot.objects
+    if not len(objects) == len(boxes) == len(models) == geometry.object_count:
+        raise ValueError(
+            f"annotate: shot {shot.key}: expected {geometry.object_count} objects, boxes and models, "
+            f"got {len(objects)}, {len(boxes)}, {len(models)}"
+        )
+    sizes = real_sizes or [None if isinstance(thing.model.real_size, str) else thing.model.real_size for thing in objects]
+    facts = [
+        Rendered(model, box, size, thing.model.category, thing.model.category_id)
+        for thing, box, model, size in zip(objects, boxes, models, sizes, strict=True)
+    ]
+    placed = tuple(
+        None if pose is None else Placement(thing.model, pose, camera, shot.category_deg, lambda known=known: known)
+        for thing, known in zip(objects, facts, strict=True)
+        for pose in (thing.motion.at(instant),)
+    )
+    return annotated(Sight(geometry, camera, visibility, placed))
+
+
+def annotated(sight: Sight) -> tuple[ObjectAnnotation, ...]:
+    """Annotations of the objects that are placed in a sight."""
+    known = object_labels()
+    return tuple(
+        annotation_of(i + 1, [label.compute(sight, i) for label in known]) for i, place in enumerate(sight.placements) if place
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Rendered:
+    """`ModelFacts` of a model that is rendered."""
+
+    obj: str
+    box3d_object: NDArray[np.float64]
+    real_size: Size | None
+    category: str
+    category_id: int

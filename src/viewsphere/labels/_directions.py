@@ -1,0 +1,27 @@
+"""What holds of all directions that are kept: the two kinds of normals."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from viewsphere.labels._label import Models, channel_of
+from viewsphere.model.sample import Sample
+
+TOLERANCE = 1e-5
+
+
+def unit_proof(name: str) -> Callable[[Sample, Models], Iterator[str]]:
+    """The proof that a channel of directions holds unit vectors, or 0 where there is none."""
+
+    def prove(sample: Sample, models: Models) -> Iterator[str]:
+        array = channel_of(sample, name)
+        if array is None:
+            return
+        length = np.sqrt((array.astype(np.float64) ** 2).sum(axis=-1))
+        wrong = ~((np.abs(length - 1) < TOLERANCE) | (length == 0))
+        if wrong.any():
+            yield f"expected directions of length 1, or 0 where there is none; found others at {wrong.sum()} pixels"
+
+    return prove

@@ -1,0 +1,215 @@
+"""What a label is: one file in `viewsphere.labels` states one as `LABEL`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.errors import ViewsphereError
+from viewsphere.labels._placement import ModelFacts, Placement
+from viewsphere.labels._sight import Sight
+from viewsphere.model.channel import Channel
+from viewsphere.model.sample import ObjectAnnotation, Sample
+
+if TYPE_CHECKING:
+    from PIL.ImageDraw import ImageDraw
+
+Array = NDArray[Any]
+Picture = NDArray[np.uint8]
+
+
+Models = Mapping[str, ModelFacts]
+"""Models of a data set by their keys."""
+
+Proof = Callable[[Sample, Models], Iterator[str]]
+"""Yields a message for whatever of a stored sample contradicts the rest of it."""
+
+
+def trusted(sample: Sample, models: Models) -> Iterator[str]:
+    """The proof of a label that nothing else in a sample says anything of: only computing it again proves it."""
+    yield from ()
+
+
+@dataclass(frozen=True)
+class Needs:
+    """What a label is computed from besides its own instant and sensor: offsets of instants (-1 is the one before), and names
+    of other sensors.
+    """
+
+    instants: tuple[int, ...] = ()
+    sensors: tuple[str, ...] = ()
+
+    def __str__(self) -> str:
+        instants = ", ".join(f"{offset:+d}" for offset in self.instants)
+        return " and ".join(
+            [*([f"instants {instants}"] if instants else []), *([f"sensors {', '.join(self.sensors)}"] if self.sensors else [])]
+        )
+
+    @property
+    def is_some(self) -> bool:
+        """Whether it needs anything else."""
+        return bool(self.instants or self.sensors)
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """How `preview` shows a label, by what name: pixels of the picture changed, lines drawn over it at a scale, or another
+    picture (of the sample's size) beside it.
+    """
+
+    name: str
+    pixels: Callable[[Picture, Sample], Picture] | None = None
+    lines: Callable[[ImageDraw, Sample, float], None] | None = None
+    beside: Callable[[Sample], Picture] | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Label:
+    """What all labels state: the name of their file, what they mean, and their frame of reference.
+
+    `prove` compares a stored sample with itself, which is quick; besides, `check` computes every label again.
+    """
+
+    name: str
+    meaning: str
+    axes: str = ""
+    needs: Needs = Needs()
+    prove: Proof = trusted
+    drawing: Drawing | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class ChannelLabel(Label):
+    """A label of pixels, kept as a file of its own: (height, width) or (height, width, components); `empty` where nothing is
+    seen. `encoding` is the default kind of file: png16 for ids, tiff for whatever has to be exact.
+    """
+
+    compute: Callable[[Sight], Array]
+    dtype: type[np.generic]
+    components: int = 1
+    unit: str = "1"
+    empty: float = 0
+    encoding: Any = "tiff"
+
+    @property
+    def channel(self) -> Channel:
+        """What files are written by."""
+        return Channel(self.name, self.dtype, self.components, self.unit, self.empty, self.encoding, self.meaning)
+
+
+@dataclass(frozen=True)
+class Field:
+    """One field of an object: a number, a text or a plain dataclass of these (`shape` is empty), a tuple of numbers, or an
+    array. `optional`: None says that there is none.
+    """
+
+    name: str
+    meaning: str
+    type: Any
+    shape: tuple[int, ...] = ()
+    unit: str = ""
+    axes: str = ""
+    is_array: bool = False
+    optional: bool = False
+
+    def plain(self, value: Any) -> Any:
+        """The value as JSON has it; NaN becomes null."""
+        if hasattr(value, "__dataclass_fields__"):
+            return {name: _without_nan(part) for name, part in value.__dict__.items()}
+        if isinstance(value, np.ndarray):
+            return _without_nan(value.tolist())
+        return _without_nan(list(value) if isinstance(value, tuple) else value)
+
+    def value(self, plain: Any) -> Any:
+        """The value that `plain` was made of, to the last bit."""
+        if self.is_array:
+            return np.array(plain, self.type)
+        if plain is None:
+            return None if self.optional else math.nan
+        if self.shape:
+            return tuple(map(_number, plain))
+        if hasattr(self.type, "__dataclass_fields__"):
+            return self.type(**{name: _number(part) for name, part in plain.items()})
+        return plain
+
+    def equals(self, one: Any, other: Any) -> bool:
+        """Whether two values are the same number for number; NaN equals itself."""
+        return np.array_equal(one, other, equal_nan=True) if self.is_array and self.type is not bool else _plainly(one, other)
+
+
+def _number(value: Any) -> Any:
+    return math.nan if value is None else value
+
+
+def _without_nan(value: Any) -> Any:
+    if isinstance(value, list):
+        return [_without_nan(v) for v in value]
+    return None if isinstance(value, float) and math.isnan(value) else value
+
+
+def _plainly(one: Any, other: Any) -> bool:
+    if isinstance(one, np.ndarray):
+        return np.array_equal(one, other)
+    return bool(one == other)
+
+
+def nothing(annotation: ObjectAnnotation) -> None:
+    """What is kept of a label that follows from the shot and its models."""
+    return
+
+
+@dataclass(frozen=True, kw_only=True)
+class ObjectLabel(Label):
+    """A label of objects: one field or several that are computed together.
+
+    `compute(sight, i)` gives the fields of the object of id i + 1. `keep` gives, as JSON, what of them does not follow from the
+    shot and its models, None where nothing is left; `restore(kept, placement, annotation)` makes all fields of that again,
+    equal to the last bit: other labels' fields are there as attributes of the annotation.
+    """
+
+    fields: tuple[Field, ...]
+    compute: Callable[[Sight, int], Mapping[str, Any]]
+    restore: Callable[[Any, Placement, ObjectAnnotation], Mapping[str, Any]]
+    keep: Callable[[ObjectAnnotation], Any] = nothing
+
+    @staticmethod
+    def derived(
+        of: Callable[[Placement], Mapping[str, Any]],
+        *,
+        name: str,
+        meaning: str,
+        fields: Sequence[Field],
+        prove: Proof = trusted,
+        axes: str = "",
+        drawing: Drawing | None = None,
+    ) -> ObjectLabel:
+        """A label that follows from where an object and the camera are and from the model: nothing of it is kept."""
+        return ObjectLabel(
+            name=name,
+            meaning=meaning,
+            fields=tuple(fields),
+            axes=axes,
+            compute=lambda sight, i: of(sight.placement(i)),
+            restore=lambda kept, placement, o: of(placement),
+            prove=prove,
+            drawing=drawing,
+        )
+
+
+def rendered(sample: Sample) -> list[ObjectAnnotation]:
+    """The objects that were not imported."""
+    return [o for o in sample.objects if o.source is None]
+
+
+def channel_of(sample: Sample, name: str) -> Array | None:
+    """A channel, None if it is not there or cannot be read, which another proof says."""
+    try:
+        array = sample.channels[name]
+    except (KeyError, ViewsphereError):
+        return None
+    return array if array.shape[:2] == (sample.height, sample.width) else None

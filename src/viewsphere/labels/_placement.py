@@ -1,0 +1,127 @@
+"""Where an object is in a picture, as its shot and its model say: what labels share that need no pixel."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.geometry.rotation import compose, rigid
+from viewsphere.model.camera import Camera
+from viewsphere.model.model_spec import ModelSpec, Size
+from viewsphere.model.sample import View
+from viewsphere.model.scene import Matrix4
+
+Float = NDArray[np.float64]
+
+
+class ModelFacts(Protocol):
+    """What is known of a normalised model: its OBJ file (relative to the data set's root), its box (8, 3) in its own axes, its
+    true size if known (metres), and its category.
+    """
+
+    @property
+    def obj(self) -> str: ...
+    @property
+    def box3d_object(self) -> NDArray[np.float64]: ...
+    @property
+    def real_size(self) -> Size | None: ...
+    @property
+    def category(self) -> str: ...
+    @property
+    def category_id(self) -> int: ...
+
+
+@dataclass(frozen=True, eq=False)
+class Placement:
+    """One object in one picture: its model and pose (world from object), the camera, and the angular resolution of pose
+    categories. `known` gives what is known of its model, and is asked when that is needed.
+    """
+
+    spec: ModelSpec
+    pose: Matrix4
+    camera: Camera
+    category_deg: float
+    known: Callable[[], ModelFacts]
+
+    @cached_property
+    def facts(self) -> ModelFacts:
+        """What is known of the model."""
+        return self.known()
+
+    @property
+    def box(self) -> Float:
+        """The model's 3D box (8, 3) in its own axes, metres."""
+        return self.facts.box3d_object
+
+    @cached_property
+    def world_from_object(self) -> Float:
+        """(4, 4)."""
+        return np.array(self.pose, np.float64)
+
+    @cached_property
+    def camera_from_world(self) -> Float:
+        """(4, 4)."""
+        return rigid(self.camera.R, self.camera.t)
+
+    @cached_property
+    def camera_from_object(self) -> Float:
+        """(4, 4)."""
+        return compose(self.camera_from_world, self.world_from_object)
+
+    @cached_property
+    def view(self) -> View:
+        """The camera as the object sees it, around the centre of its box."""
+        return view_of(self.camera_from_object, (self.box[2] + self.box[4]) / 2)
+
+
+def view_of(camera_from_object: Float, center: Float) -> View:
+    """Orbit angles, distance and tilt of the camera around the point `center` (3,) of the object's own axes.
+
+    Azimuth is in [0, 360). Tilt is in [-180, 180]: the camera's roll once it is turned, by the shortest
+    way, to look at the point; so for a camera that looks at it anyway these are the numbers of its pose.
+    Straight above or below, where azimuth and tilt are one, tilt is 0.
+    """
+    rows: list[list[float]] = camera_from_object[:3].tolist()
+    columns = [[row[k] for row in rows] for k in range(3)]
+    middle = center.tolist()
+    seen = [_dot(row, middle) + row[3] for row in rows]
+    distance = math.hypot(*seen)
+    if distance == 0:
+        return View(0.0, 0.0, 0.0, 0.0)
+    direction = [value / distance for value in seen]
+    x, y, z = (-_dot(column, direction) for column in columns)
+    level = math.hypot(x, y)
+    elevation = math.atan2(z, level)
+    first = _shortest_turn(*direction)
+    facing = [_dot(first, column) for column in columns]
+    if level > 1e-9:
+        azimuth = math.atan2(x, -y)
+        right = math.cos(azimuth), math.sin(azimuth), 0.0
+        down = z * math.sin(azimuth), -z * math.cos(azimuth), -level
+        tilt = math.atan2(_dot(facing, down), _dot(facing, right))
+    else:
+        azimuth, tilt = math.atan2(facing[1], facing[0]), 0.0
+    return View(_degrees(azimuth) % 360.0, _degrees(elevation), distance, _degrees(tilt))
+
+
+def _degrees(angle: float) -> float:
+    """Degrees to 1e-9, so that a full turn less the last digit is 0 and not 360."""
+    return round(math.degrees(angle), 9) + 0.0
+
+
+def _shortest_turn(x: float, y: float, z: float) -> tuple[float, float, float]:
+    """The first row of the rotation that takes the unit vector (x, y, z) to +z by the shortest way."""
+    if z < -1 + 1e-12:
+        return 1.0, 0.0, 0.0
+    k = 1 / (1 + z)
+    return 1 - k * x * x, -k * x * y, -x
+
+
+def _dot(a: Sequence[float], b: Sequence[float]) -> float:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]

@@ -1,0 +1,89 @@
+"""Objects as plain JSON and back, exactly: whole, or only what does not follow from their shot and models."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import fields
+from typing import Any
+
+from viewsphere.errors import StoreError
+from viewsphere.labels._label import Field, ObjectLabel
+from viewsphere.labels._placement import Placement
+from viewsphere.model.sample import ObjectAnnotation
+
+_OWN = frozenset(f.name for f in fields(ObjectAnnotation))
+
+
+def annotation_of(object_id: int, values: Iterable[Mapping[str, Any]], source: Mapping[str, Any] | None = None) -> Any:
+    """The annotation with these fields; those that `ObjectAnnotation` does not name go to `more`."""
+    own: dict[str, Any] = {}
+    for some in values:
+        own.update(some)
+    if own.keys() <= _OWN:
+        return ObjectAnnotation(id=object_id, source=source, **own)
+    more = {name: own.pop(name) for name in own.keys() - _OWN}
+    return ObjectAnnotation(id=object_id, source=source, more=more, **own)
+
+
+def whole_record(o: ObjectAnnotation, labels: Sequence[ObjectLabel]) -> dict[str, Any]:
+    """All that is said of an object, as `json.dumps(..., allow_nan=False)` takes it."""
+    known = {**o.more, **{name: getattr(o, name) for name in _OWN}}
+    record = {"id": o.id, **{f.name: f.plain(known[f.name]) for f in _fields(labels) if f.name in known}}
+    return record if o.source is None else {**record, "source": dict(o.source)}
+
+
+def from_whole_record(record: Mapping[str, Any], labels: Sequence[ObjectLabel]) -> ObjectAnnotation:
+    """The object that a whole record was made of."""
+    values = {f.name: f.value(record[f.name]) for f in _fields(labels) if f.name in record}
+    return annotation_of(record["id"], [values], record.get("source"))
+
+
+def _fields(labels: Sequence[ObjectLabel]) -> Iterable[Field]:
+    return (field for label in labels for field in label.fields)
+
+
+def short_record(o: ObjectAnnotation, labels: Sequence[ObjectLabel]) -> dict[str, Any]:
+    """What labels keep of a rendered object, by their names."""
+    kept = {label.name: label.keep(o) for label in labels}
+    return {"id": o.id, **{name: value for name, value in kept.items() if value is not None}}
+
+
+def from_short_record(
+    record: Mapping[str, Any], placement: Placement, makers: Mapping[str, ObjectLabel], where: str
+) -> ObjectAnnotation:
+    """The object that a short record was made of; a field is made again when it is first asked for. `makers` are labels by
+    their fields, `where` names the record.
+    """
+    made = object.__new__(_Restored)
+    made.__dict__.update(id=record["id"], source=None, _record=record, _placement=placement, _makers=makers, _where=where)
+    return made
+
+
+class _Restored(ObjectAnnotation):
+    """An object whose fields are made when they are asked for."""
+
+    def __getattr__(self, name: str) -> Any:
+        own = self.__dict__
+        label = own["_makers"].get(name) if "_makers" in own else None
+        if label is None:
+            return self._other(name)
+        try:
+            own.update(label.restore(own["_record"].get(label.name), own["_placement"], self))
+            return own[name]
+        except (LookupError, TypeError, ValueError, AttributeError, ArithmeticError) as error:
+            raise StoreError(
+                f"{own['_where']}: object {own['id']}: expected what {label.name} is made of, found "
+                f"{type(error).__name__}: {error}"
+            ) from None
+
+    def _other(self, name: str) -> Any:
+        if name != "more":
+            return super().__getattr__(name)
+        beyond = [field for field in self.__dict__.get("_makers", {}) if field not in _OWN]
+        self.__dict__["more"] = {}
+        self.__dict__["more"] = {field: getattr(self, field) for field in beyond}
+        return self.__dict__["more"]
+
+    def __getstate__(self) -> dict[str, Any]:
+        """All fields, so that an object travels to other processes without its shot."""
+        return {name: getattr(self, name) for name in _OWN}

@@ -1,0 +1,85 @@
+"""What one camera sees of a geometry: what the labels of a picture share, computed when first asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.geometry.box import Bounds, projected_bounds
+from viewsphere.geometry.camera import inverse_camera_matrix
+from viewsphere.labels._placement import Placement
+from viewsphere.model.camera import Camera
+from viewsphere.truth.geometry import Geometry
+from viewsphere.truth.visibility import Instances, Visibility, homogeneous, lens_rays
+
+
+@dataclass(frozen=True, eq=False)
+class Sight:
+    """A camera's view of a geometry: `visibility` is `rasterize(geometry, camera)`. `placements` are those of the objects 1, 2,
+    ..., None for one that is not there; labels of pixels need none.
+    """
+
+    geometry: Geometry
+    camera: Camera
+    visibility: Visibility
+    placements: Sequence[Placement | None] = ()
+
+    @cached_property
+    def rays(self) -> NDArray[np.float64]:
+        """A distorted lens' ray of each pixel (H, W, 3); (0, 0, 3) for a pinhole."""
+        rays = lens_rays(self.camera)
+        if rays is None:
+            rays = np.empty((0, 0, 3))
+            rays.setflags(write=False)  # as a lens' are: the kernels are compiled once for both
+        return rays
+
+    @cached_property
+    def corners(self) -> NDArray[np.float64]:
+        """All vertices before the perspective division, as `truth.visibility.homogeneous` gives them."""
+        return homogeneous(self.geometry, self.camera) if self.visibility.corners is None else self.visibility.corners
+
+    @cached_property
+    def camera_from_ray(self) -> NDArray[np.float64]:
+        """Camera axes of a pixel's ray: K^-1 for a pinhole, whose rays are pixels."""
+        return inverse_camera_matrix(self.camera.intrinsics) if self.camera.distortion is None else np.eye(3)
+
+    @property
+    def instances(self) -> Instances:
+        """Which object each pixel shows, and what pixels each one has."""
+        return self.visibility.instances(self.geometry)
+
+    @cached_property
+    def projected(self) -> tuple[tuple[Bounds | None, bool], ...]:
+        """Of each object, the 2D box of its projected triangles, and whether the lens shows all of them."""
+        g, count = self.geometry, self.geometry.object_count
+        parts, points = pairwise(g.triangle_start[: count + 1]), pairwise(g.vertex_start[: count + 1])
+        return tuple(
+            projected_bounds(self.camera, g.vertices, g.triangles, part, corners, g.is_used)
+            for part, corners in zip(parts, points, strict=True)
+        )
+
+    def placement(self, i: int) -> Placement:
+        """Where the object of id i + 1 is; raises ValueError where it is not there."""
+        found = self.placements[i]
+        if found is None:
+            raise ValueError(f"object {i + 1}: expected one that is there")
+        return found
+
+    def empty(self, dtype: type[np.generic], components: int = 1) -> NDArray[Any]:
+        """Room for a channel of this picture."""
+        shape = self.visibility.triangle.shape
+        return np.empty(shape if components == 1 else (*shape, components), dtype)
+
+    def per_triangle(self, table: NDArray[np.int32], empty: int) -> NDArray[np.int32]:
+        """An int32 channel: the number that a table has for the triangle seen, `empty` where nothing is."""
+        from viewsphere.truth import kernels_channels as kernels
+
+        out = self.empty(np.int32)
+        kernels.labels(self.visibility.triangle, table, np.int32(empty), out)
+        return out

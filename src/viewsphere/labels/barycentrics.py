@@ -1,0 +1,44 @@
+"""barycentrics: where in its triangle the seen point is."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.labels._label import ChannelLabel, Models, channel_of
+from viewsphere.labels._sight import Sight
+from viewsphere.model.sample import Sample
+
+TOLERANCE = 1e-5
+
+
+def compute(sight: Sight) -> NDArray[np.float32]:
+    """Weights (H, W, 3) of the seen triangle's corners; 0 where nothing is seen."""
+    from viewsphere.truth import kernels_channels as kernels
+
+    out = sight.empty(np.float32, 3)
+    kernels.barycentrics(sight.visibility.triangle, sight.geometry.triangles, sight.corners, sight.rays, out)
+    return out
+
+
+def prove(sample: Sample, models: Models) -> Iterator[str]:
+    """Weights add up to 1, or are 0 where nothing is seen."""
+    weights = channel_of(sample, "barycentrics")
+    if weights is None:
+        return
+    total = weights.astype(np.float64).sum(axis=-1)
+    wrong = ~((np.abs(total - 1) < TOLERANCE) | (weights == 0).all(axis=-1))
+    if wrong.any():
+        yield f"expected weights that add up to 1, found others at {wrong.sum()} pixels"
+
+
+LABEL = ChannelLabel(
+    name="barycentrics",
+    meaning="weights of the triangle's corners at the seen point",
+    dtype=np.float32,
+    components=3,
+    compute=compute,
+    prove=prove,
+)

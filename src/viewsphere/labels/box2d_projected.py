@@ -1,0 +1,84 @@
+"""box2d_projected: the box of an object's projected model, whether it is visible or not."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from viewsphere.geometry.box import Bounds, clip_to_image
+from viewsphere.geometry.mask import mask_box
+from viewsphere.labels._label import Field, Models, ObjectLabel, rendered
+from viewsphere.labels._placement import Placement
+from viewsphere.labels._sight import Sight
+from viewsphere.model.camera import Camera
+from viewsphere.model.sample import ObjectAnnotation, Sample
+
+
+def compute(sight: Sight, i: int) -> Mapping[str, Any]:
+    """Both boxes; where the lens shows only a part of the model, its visible pixels count too."""
+    bounds, whole = sight.projected[i]
+    projected = _clipped(bounds, sight.camera)
+    if not whole and sight.instances.area[i + 1]:
+        x0, y0, x1, y1 = map(float, sight.instances.box[i + 1].tolist())
+        a = projected or (x0, y0, x1, y1)
+        projected = min(a[0], x0), min(a[1], y0), max(a[2], x1), max(a[3], y1)
+    return {"box2d_projected": projected, "box2d_unclipped": bounds if whole else None}
+
+
+def _clipped(bounds: Bounds | None, camera: Camera) -> Bounds | None:
+    return bounds and clip_to_image(bounds, camera.width, camera.height)
+
+
+def keep(o: ObjectAnnotation) -> Any:
+    """The unclipped box, from which the other follows; the other, named, where there is none."""
+    if o.box2d_unclipped is not None:
+        return list(o.box2d_unclipped)
+    return None if o.box2d_projected is None else {"cut": list(o.box2d_projected)}
+
+
+def restore(kept: Any, placement: Placement, o: ObjectAnnotation) -> Mapping[str, Any]:
+    """Both boxes, of what is kept."""
+    if isinstance(kept, dict):
+        return {"box2d_projected": tuple(kept["cut"]), "box2d_unclipped": None}
+    bounds = None if kept is None else (kept[0], kept[1], kept[2], kept[3])
+    return {"box2d_projected": _clipped(bounds, placement.camera), "box2d_unclipped": bounds}
+
+
+def prove(sample: Sample, models: Models) -> Iterator[str]:
+    """The projected box holds the visible pixels, is the clipped one, and lies in the box of the projected 3D box."""
+    for o in rendered(sample):
+        tight, around, unclipped = mask_box(o.mask), o.box2d_projected, o.box2d_unclipped
+        if tight and (around is None or not _within(tight, around, 1.0)):
+            yield f"object {o.id}: expected the visible box in the projected one, found {tight} and {around}"
+        if unclipped and around != _clipped(unclipped, sample.camera):
+            yield f"object {o.id}: expected box2d_projected to be the clipped {unclipped}, found {around}"
+        if unclipped and sample.camera.distortion is None and o.box3d_in_front.all():
+            x, y = o.box3d_pixels.T
+            if not _within(unclipped, (x.min(), y.min(), x.max(), y.max()), 1e-3):
+                yield f"object {o.id}: expected box2d_unclipped within the projected 3D box, found {unclipped}"
+
+
+def _within(inner: tuple[float, ...], outer: tuple[float, ...], slack: float) -> bool:
+    return (
+        inner[0] >= outer[0] - slack
+        and inner[1] >= outer[1] - slack
+        and inner[2] <= outer[2] + slack
+        and inner[3] <= outer[3] + slack
+    )
+
+
+_CORNERS = "corners (x0, y0, x1, y1) of the projected model"
+
+LABEL = ObjectLabel(
+    name="box2d_projected",
+    meaning="the box of its projected model, seen or hidden",
+    axes="image",
+    fields=(
+        Field("box2d_projected", f"{_CORNERS}, clipped to the image; None outside of it", float, (4,), "px", optional=True),
+        Field("box2d_unclipped", f"{_CORNERS}; None where it reaches behind the camera", float, (4,), "px", optional=True),
+    ),
+    compute=compute,
+    keep=keep,
+    restore=restore,
+    prove=prove,
+)

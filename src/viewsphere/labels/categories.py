@@ -1,0 +1,34 @@
+"""categories: the category of the object seen."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from viewsphere.labels._label import ChannelLabel, Models, channel_of
+from viewsphere.model.sample import Sample
+
+
+def prove(sample: Sample, models: Models) -> Iterator[str]:
+    """The map holds the categories of the objects that the instance map shows."""
+    instances, categories = channel_of(sample, "instances"), channel_of(sample, "categories")
+    if instances is None or categories is None:
+        return
+    by_id = np.zeros(max([0, *(o.id for o in sample.objects), int(instances.max(initial=0))]) + 1, np.int64)
+    for o in sample.objects:
+        by_id[o.id] = o.category_id
+    wrong = categories != by_id[instances]
+    if wrong.any():
+        yield f"expected those of the objects seen, found others at {wrong.sum()} pixels"
+
+
+LABEL = ChannelLabel(
+    name="categories",
+    meaning="category of the object seen; 0 is background",
+    dtype=np.int32,
+    unit="category id",
+    encoding="png16",
+    compute=lambda sight: sight.per_triangle(sight.geometry.triangle_category, 0),
+    prove=prove,
+)

@@ -1,0 +1,40 @@
+"""category: what kind of thing an object is."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from viewsphere.labels._label import Field, Models, ObjectLabel, rendered
+from viewsphere.labels._placement import Placement
+from viewsphere.model.sample import Sample
+
+
+def of(placement: Placement) -> Mapping[str, Any]:
+    """The category, as the model's entry in the recipe says."""
+    spec = placement.spec
+    return {"category": spec.category, "supercategory": spec.supercategory, "category_id": spec.category_id}
+
+
+def prove(sample: Sample, models: Models) -> Iterator[str]:
+    """Objects are of their models' categories."""
+    for o in rendered(sample):
+        facts = models.get(o.key)
+        if facts is not None and (facts.category, facts.category_id) != (o.category, o.category_id):
+            yield (
+                f"object {o.id}: expected {facts.category!r} ({facts.category_id}), as its model {o.key} is; "
+                f"found {o.category!r} ({o.category_id})"
+            )
+
+
+LABEL = ObjectLabel.derived(
+    of,
+    name="category",
+    meaning="what kind of thing it is",
+    fields=(
+        Field("category", "name of the category", str),
+        Field("supercategory", "name of what the category belongs to; may be empty", str),
+        Field("category_id", "number of the category, from 1", int),
+    ),
+    prove=prove,
+)

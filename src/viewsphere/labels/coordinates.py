@@ -1,0 +1,54 @@
+"""coordinates: where on its object the seen point is."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.labels._label import ChannelLabel, Models, channel_of, rendered
+from viewsphere.labels._sight import Sight
+from viewsphere.model.sample import Sample
+
+TOLERANCE = 1e-5
+"""Share of an object's size by which float32 may leave its box."""
+
+
+def compute(sight: Sight) -> NDArray[np.float32]:
+    """The seen point in its object's axes, (H, W, 3) metres; NaN on scenery, ground and where nothing is seen."""
+    from viewsphere.truth import kernels_channels as kernels
+
+    out, g = sight.empty(np.float32, 3), sight.geometry
+    seen = sight.visibility.triangle
+    kernels.coordinates(seen, g.triangles, g.triangle_object, sight.corners, sight.rays, g.coordinates, out)
+    return out
+
+
+def prove(sample: Sample, models: Models) -> Iterator[str]:
+    """Points lie in their objects' boxes; the background has none."""
+    points, instances = channel_of(sample, "coordinates"), channel_of(sample, "instances")
+    if points is None or instances is None:
+        return
+    if (np.isfinite(points).all(axis=-1) != (instances > 0)).any():
+        yield "expected points where an object is seen, NaN elsewhere; found others"
+    for o in rendered(sample):
+        own = points[instances == o.id].astype(np.float64)
+        low, high = o.box3d_object.min(axis=0), o.box3d_object.max(axis=0)
+        slack = TOLERANCE * float((high - low).max())
+        outside = ((own < low - slack) | (own > high + slack)).any(axis=-1).sum()
+        if outside:
+            yield f"object {o.id}: expected points in its box, found {outside} outside"
+
+
+LABEL = ChannelLabel(
+    name="coordinates",
+    meaning="the seen point in its object's own axes",
+    axes="object",
+    dtype=np.float32,
+    components=3,
+    unit="m",
+    empty=np.nan,
+    compute=compute,
+    prove=prove,
+)

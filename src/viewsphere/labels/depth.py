@@ -1,0 +1,55 @@
+"""depth: distance along the camera's z axis."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.labels._label import ChannelLabel, Drawing, Models, Picture, channel_of
+from viewsphere.labels._sight import Sight
+from viewsphere.model.sample import Sample
+
+
+def compute(sight: Sight) -> NDArray[np.float32]:
+    """z of the seen point, (H, W) metres, infinite where nothing is seen; behind a fisheye it is negative."""
+    from viewsphere.truth import kernels_channels as kernels
+
+    out = sight.empty(np.float32)
+    kernels.depths(sight.visibility.inverse_depth, sight.rays, out)
+    return out
+
+
+def prove(sample: Sample, models: Models) -> Iterator[str]:
+    """Depth is metres, and finite wherever an object is seen."""
+    depth, instances = channel_of(sample, "depth"), channel_of(sample, "instances")
+    if depth is None:
+        return
+    if np.isnan(depth).any():
+        yield "expected metres, or infinity where nothing is seen; found NaN"
+    elif instances is not None and np.isinf(depth[instances > 0]).any():
+        yield f"expected metres where an object is seen; found infinity at {np.isinf(depth[instances > 0]).sum()} pixels"
+
+
+def picture(depth: NDArray[np.float32]) -> Picture:
+    """Near is light, far is dark, nothing is black; (H, W, 3) uint8."""
+    seen = np.isfinite(depth)
+    grey = np.zeros(depth.shape, np.float64)
+    if seen.any():
+        near, far = np.percentile(depth[seen], (0, 98))
+        grey[seen] = 1.0 - 0.85 * np.clip((depth[seen] - near) / max(far - near, 1e-9), 0, 1)
+    return np.repeat((grey * 255).astype(np.uint8)[..., None], 3, axis=2)
+
+
+LABEL = ChannelLabel(
+    name="depth",
+    meaning="distance along the camera's z axis",
+    axes="camera",
+    dtype=np.float32,
+    unit="m",
+    empty=np.inf,
+    compute=compute,
+    prove=prove,
+    drawing=Drawing("depth", beside=lambda sample: picture(sample.channels["depth"])),
+)

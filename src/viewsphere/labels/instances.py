@@ -1,0 +1,32 @@
+"""instances: which object is seen."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from viewsphere.labels._label import ChannelLabel, Models, channel_of
+from viewsphere.model.sample import Sample
+
+
+def prove(sample: Sample, models: Models) -> Iterator[str]:
+    """The map holds ids of objects that are there."""
+    instances = channel_of(sample, "instances")
+    if instances is None or not instances.size:
+        return
+    known = np.array([0, *(o.id for o in sample.objects)])
+    found = np.unique(instances)
+    if not np.isin(found, known).all():
+        yield f"expected ids {known.tolist()}, found {np.setdiff1d(found, known)[:5].tolist()} among them"
+
+
+LABEL = ChannelLabel(
+    name="instances",
+    meaning="which object is seen; 0 is background",
+    dtype=np.int32,
+    unit="object id",
+    encoding="png16",
+    compute=lambda sight: sight.instances.ids,
+    prove=prove,
+)

@@ -1,0 +1,76 @@
+"""mask: the visible pixels of an object."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+from viewsphere.geometry.mask import mask_polygons, rle_area, rle_of_id
+from viewsphere.labels._label import Drawing, Field, Models, ObjectLabel, Picture, channel_of
+from viewsphere.labels._paint import color_of
+from viewsphere.labels._placement import Placement
+from viewsphere.labels._sight import Sight
+from viewsphere.model.sample import ObjectAnnotation, Rle, Sample
+
+
+def compute(sight: Sight, i: int) -> Mapping[str, Any]:
+    """Run lengths and area of the pixels that show the object."""
+    seen, camera = sight.instances, sight.camera
+    area = int(seen.area[i + 1])
+    x0, y0, x1, y1 = seen.box[i + 1].tolist() if area else (0, 0, 0, 0)
+    return {"rle": Rle(camera.height, camera.width, rle_of_id(seen.ids, i + 1, (x0, y0, x1, y1))), "area": area}
+
+
+def restore(counts: str, placement: Placement, o: ObjectAnnotation) -> Mapping[str, Any]:
+    """The fields, of the code that is kept."""
+    height, width = placement.camera.height, placement.camera.width
+    return {"rle": Rle(height, width, counts), "area": rle_area(height, width, counts)}
+
+
+def prove(sample: Sample, models: Models) -> Iterator[str]:
+    """Run lengths and polygons are the instance map's pixels, and their number is the area."""
+    from pycocotools import mask as coco
+
+    instances = channel_of(sample, "instances")
+    for o in sample.objects:
+        mask = o.mask
+        if mask.shape != (sample.height, sample.width):
+            yield f"object {o.id}: expected a mask of the image's size, found {mask.shape}"
+            continue
+        if instances is not None and not np.array_equal(mask, instances == o.id):
+            yield f"object {o.id}: run lengths differ from the instance map at {(mask != (instances == o.id)).sum()} pixels"
+        if o.source is not None and not mask.any():
+            continue  # it came with a box alone
+        if o.area != mask.sum():
+            yield f"object {o.id}: expected area {mask.sum()}, found {o.area}"
+        polygons: Any = mask_polygons(mask)
+        if polygons:
+            code: Any = coco.merge(coco.frPyObjects(polygons, *mask.shape))
+            if not np.array_equal(coco.decode(code), mask):
+                yield f"object {o.id}: polygons differ from the mask"
+
+
+def tinted(picture: Picture, sample: Sample) -> Picture:
+    """The picture with every object in its colour."""
+    out = picture.astype(np.float64)
+    for o in sample.objects:
+        mask = o.mask
+        out[mask] = 0.5 * out[mask] + 0.5 * np.array(color_of(o.id))
+    return out.round().astype(np.uint8)
+
+
+LABEL = ObjectLabel(
+    name="mask",
+    meaning="its visible pixels; polygons are made of them",
+    fields=(
+        Field("rle", "COCO's compressed run-length code", Rle),
+        Field("area", "number of visible pixels", int, unit="px"),
+    ),
+    compute=compute,
+    keep=lambda o: o.rle.counts,
+    restore=restore,
+    prove=prove,
+    drawing=Drawing("masks", pixels=tinted),
+)

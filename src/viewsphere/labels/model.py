@@ -1,0 +1,38 @@
+"""model: which model an object is."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from viewsphere.labels._label import Field, Models, ObjectLabel, rendered
+from viewsphere.labels._placement import Placement
+from viewsphere.model.sample import Sample
+
+
+def of(placement: Placement) -> Mapping[str, Any]:
+    """The model's names."""
+    return {"key": placement.spec.key, "model": placement.facts.obj, "track": placement.spec.track}
+
+
+def prove(sample: Sample, models: Models) -> Iterator[str]:
+    """Models are those of the data set."""
+    for o in rendered(sample):
+        facts = models.get(o.key)
+        if facts is None:
+            yield f"object {o.id}: expected a model of the data set, found {o.key!r}"
+        elif facts.obj != o.model:
+            yield f"object {o.id}: expected the file {facts.obj} of model {o.key}, found {o.model}"
+
+
+LABEL = ObjectLabel.derived(
+    of,
+    name="model",
+    meaning="which model it is",
+    fields=(
+        Field("key", "the model's key in the data set", str),
+        Field("model", "path of the normalised model, relative to the data set's root", str),
+        Field("track", "key of the animated model that stays itself over time, else empty", str),
+    ),
+    prove=prove,
+)

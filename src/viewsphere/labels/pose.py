@@ -1,0 +1,52 @@
+"""pose: where an object is, and how it is turned."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+from viewsphere.geometry.rotation import matrix_from_quaternion, quaternion_from_matrix, rigid
+from viewsphere.labels._label import Field, Models, ObjectLabel, rendered
+from viewsphere.labels._placement import Placement
+from viewsphere.model.sample import Sample
+
+TOLERANCE = 1e-9
+
+
+def of(placement: Placement) -> Mapping[str, Any]:
+    """The pose in the world and before the camera."""
+    in_camera = placement.camera_from_object
+    return {
+        "world_from_object": placement.world_from_object,
+        "camera_from_object": in_camera,
+        "quaternion": quaternion_from_matrix(in_camera[:3, :3]),
+    }
+
+
+def prove(sample: Sample, models: Models) -> Iterator[str]:
+    """The pose before the camera is that in the world, seen by the camera, and the quaternion is its rotation."""
+    if sample.known_camera is None:
+        return
+    camera_from_world = rigid(sample.camera.R, sample.camera.t)
+    for o in rendered(sample):
+        expected = camera_from_world @ o.world_from_object
+        slack = TOLERANCE * (1 + float(np.abs(expected).max()))
+        if not np.allclose(o.camera_from_object, expected, rtol=0, atol=slack):
+            yield f"object {o.id}: camera_from_object does not follow from the pose"
+        if not np.allclose(matrix_from_quaternion(o.quaternion), o.camera_from_object[:3, :3], rtol=0, atol=TOLERANCE):
+            yield f"object {o.id}: the quaternion is not camera_from_object's rotation"
+
+
+LABEL = ObjectLabel.derived(
+    of,
+    name="pose",
+    meaning="where it is and how it is turned",
+    fields=(
+        Field("world_from_object", "rigid motion", float, (4, 4), "m", "object to world", is_array=True),
+        Field("camera_from_object", "rigid motion", float, (4, 4), "m", "object to camera", is_array=True),
+        Field("quaternion", "rotation of camera_from_object: (w, x, y, z), w >= 0", float, (4,)),
+    ),
+    prove=prove,
+)

@@ -1,0 +1,39 @@
+"""pose_category: which side of an object is seen."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from viewsphere.geometry.pose_category import pose_category
+from viewsphere.labels._label import Field, Models, ObjectLabel, rendered
+from viewsphere.labels._placement import Placement
+from viewsphere.model.sample import Sample
+
+
+def of(placement: Placement) -> Mapping[str, Any]:
+    """The named bin of the object's view."""
+    view = placement.view
+    return {"pose_category": pose_category(view.azimuth_deg, view.elevation_deg, placement.category_deg)}
+
+
+def prove(sample: Sample, models: Models) -> Iterator[str]:
+    """From 60 degrees up and down it is top and bottom, and above and below where the elevation says so."""
+    for o in rendered(sample):
+        elevation, name = round(o.view.elevation_deg, 6), o.pose_category
+        ends = {"top": elevation >= 60, "bottom": elevation <= -60}
+        tails = {"-above": 30 <= elevation < 60, "-below": -60 < elevation < -30}
+        if any((name == end) != is_so for end, is_so in ends.items()) or any(
+            name.endswith(tail) != is_so for tail, is_so in tails.items()
+        ):
+            yield f"object {o.id}: expected a pose category for an elevation of {elevation}, found {name!r}"
+
+
+LABEL = ObjectLabel.derived(
+    of,
+    name="pose_category",
+    meaning="which side of it is seen",
+    axes="object",
+    fields=(Field("pose_category", "named bin: front, front-left, ..., top", str),),
+    prove=prove,
+)

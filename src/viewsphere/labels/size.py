@@ -1,0 +1,43 @@
+"""size: how large an object is."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from viewsphere.geometry.box import box_size
+from viewsphere.labels._label import Field, Models, ObjectLabel, rendered
+from viewsphere.labels._placement import Placement
+from viewsphere.model.sample import Sample
+
+TOLERANCE = 1e-9
+"""Share of the size."""
+
+
+def of(placement: Placement) -> Mapping[str, Any]:
+    """The box's extents, and the true ones."""
+    return {"size": box_size(placement.box), "real_size": placement.facts.real_size}
+
+
+def prove(sample: Sample, models: Models) -> Iterator[str]:
+    """Sizes are those of the box and of the model."""
+    for o in rendered(sample):
+        low, high = o.box3d_object.min(axis=0), o.box3d_object.max(axis=0)
+        x, y, z = (high - low).tolist()
+        if max(abs(a - b) for a, b in zip((x, z, y), o.size, strict=True)) > TOLERANCE * max(x, y, z):
+            yield f"object {o.id}: expected size {(x, z, y)}, found {o.size}"
+        if o.key in models and models[o.key].real_size != o.real_size:
+            yield f"object {o.id}: expected real_size {models[o.key].real_size} of model {o.key}, found {o.real_size}"
+
+
+LABEL = ObjectLabel.derived(
+    of,
+    name="size",
+    meaning="how large it is: width along X, height along Z, length along Y of its own axes",
+    axes="object",
+    fields=(
+        Field("size", "width, height and length of its 3D box", float, (3,), "m"),
+        Field("real_size", "the true ones, None where nobody said", float, (3,), "m", optional=True),
+    ),
+    prove=prove,
+)

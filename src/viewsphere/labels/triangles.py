@@ -1,0 +1,41 @@
+"""triangles: which triangle of its object's model is seen."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.labels._label import ChannelLabel, Models, channel_of
+from viewsphere.labels._sight import Sight
+from viewsphere.model.sample import Sample
+
+
+def compute(sight: Sight) -> NDArray[np.int32]:
+    """Index (H, W) of the triangle within its object; -1 on scenery, ground and where nothing is seen."""
+    g = sight.geometry
+    index = np.full(len(g.triangles), -1, np.int32)
+    for first, last in pairwise(g.triangle_start[: g.object_count + 1]):
+        index[first:last] = np.arange(last - first)
+    return sight.per_triangle(index, -1)
+
+
+def prove(sample: Sample, models: Models) -> Iterator[str]:
+    """Objects have triangles, the background has none."""
+    triangles, instances = channel_of(sample, "triangles"), channel_of(sample, "instances")
+    if triangles is not None and instances is not None and ((triangles >= 0) != (instances > 0)).any():
+        wrong = ((triangles >= 0) != (instances > 0)).sum()
+        yield f"expected a triangle where an object is seen, -1 elsewhere; found {wrong} others"
+
+
+LABEL = ChannelLabel(
+    name="triangles",
+    meaning="index in the object's exported model; -1 where no object",
+    dtype=np.int32,
+    unit="triangle",
+    empty=-1,
+    compute=compute,
+    prove=prove,
+)

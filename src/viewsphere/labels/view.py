@@ -1,0 +1,34 @@
+"""view: the camera as an object sees it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from viewsphere.geometry.camera import orbit_center
+from viewsphere.labels._label import Field, Models, ObjectLabel, rendered
+from viewsphere.model.sample import Sample, View
+
+TOLERANCE = 1e-6
+
+
+def prove(sample: Sample, models: Models) -> Iterator[str]:
+    """Azimuth, elevation and distance lead from the object to the camera."""
+    for o in rendered(sample):
+        center = o.camera_from_object[:3, :3].T @ -o.camera_from_object[:3, 3] - o.box3d_object.mean(axis=0)
+        view = o.view
+        seen = orbit_center(math.radians(view.azimuth_deg), math.radians(view.elevation_deg), view.distance)
+        if not np.allclose(center, seen, rtol=0, atol=TOLERANCE * (1 + view.distance)):
+            yield f"object {o.id}: its view (azimuth {view.azimuth_deg}, ...) is not where the camera stands"
+
+
+LABEL = ObjectLabel.derived(
+    lambda placement: {"view": placement.view},
+    name="view",
+    meaning="the camera's orbit around the centre of its box",
+    axes="object",
+    fields=(Field("view", "azimuth, elevation and tilt (degrees) and distance (m)", View),),
+    prove=prove,
+)
