@@ -1,12 +1,15 @@
 import json
 import shutil
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import viewsphere.check
 from cube_dataset import LENS, make
+from sealing import seal_again
 from viewsphere.check import check
+from viewsphere.check.digests import damaged
 from viewsphere.check.frames import FRAME_PROOFS
 from viewsphere.errors import MissingExtraError
 from viewsphere.geometry.mask import decode_rle, encode_rle
@@ -16,6 +19,7 @@ from viewsphere.model.camera import Distortion
 from viewsphere.model.files import Files
 from viewsphere.run.exporting import export
 from viewsphere.store import Dataset, encode
+from viewsphere.store.manifest import MANIFEST
 
 
 @pytest.fixture(scope="module")
@@ -41,6 +45,8 @@ def spelled(whole_records, tmp_path):
 
 
 def failures(dataset, **options):
+    """What is found besides digests, which are made to fit."""
+    seal_again(dataset.root)
     report = check(Dataset(dataset.root), **options)  # afresh: an open one keeps what it has read
     assert report.ok == (not report.findings)
     return {(f.check, f.frame) for f in report.findings}
@@ -72,6 +78,7 @@ def test_a_whole_data_set_passes(whole):
     assert report.ok, report.findings
     assert report.notes == ()
     names = ["files", "ids", "camera", *labels(), "surface"]
+    assert report.checked.pop("digests") > 12 * len(whole.plan.channels)
     assert report.checked == dict.fromkeys(names, 12)
     assert json.loads(json.dumps(report.to_json()))["ok"] is True
 
@@ -410,3 +417,37 @@ def test_findings_say_where(spelled):
     finding = next(f for f in check(spelled, rays=False).findings if f.check == "mask")
     assert str(finding).startswith("mask: frame 3: object 1: expected area")
     assert viewsphere.check.Finding("counts", None, "x").__str__() == "counts: x"
+
+
+def test_a_flipped_bit_in_any_file_of_the_store_is_found(whole, tmp_path):
+    """One bit of every file that stands in a manifest, and of every manifest itself."""
+    root = Path(shutil.copytree(whole.root, tmp_path / "spoilt"))
+    rng = np.random.default_rng(4)
+    kinds = {}
+    for file in sorted(p for p in root.glob("store/*/**/*") if p.is_file()):
+        kinds.setdefault((file.parent.name if "shots" in file.parts else "model", file.suffix, file.name == MANIFEST), file)
+    assert len(kinds) > 15
+    for file in kinds.values():
+        data = bytearray(file.read_bytes())
+        for at in rng.integers(0, 8 * len(data), 8).tolist():
+            data[at // 8] ^= 1 << at % 8
+            file.write_bytes(data)
+            assert damaged(Dataset(root))[1], f"{file}: bit {at}"
+            data[at // 8] ^= 1 << at % 8
+        file.write_bytes(data)
+    assert not damaged(Dataset(root))[1]
+
+
+@pytest.mark.parametrize("change", ["lost", "longer", "strange"])
+def test_files_that_are_lost_longer_or_strange_are_found(whole, tmp_path, change):
+    root = Path(shutil.copytree(whole.root, tmp_path / "spoilt"))
+    file = next(root.glob("store/shots/*/*/depth/*"))
+    match change:
+        case "lost":
+            file.unlink()
+        case "longer":
+            file.write_bytes(file.read_bytes() + b"x")
+        case _:
+            (file.parent / "another.tiff").write_bytes(file.read_bytes())
+    findings = [f for f in check(Dataset(root), rays=False).findings if f.check == "digests"]
+    assert len(findings) == 1 and "expected " in findings[0].message

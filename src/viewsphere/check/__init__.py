@@ -10,6 +10,7 @@ from typing import Any
 
 from viewsphere import plugins
 from viewsphere.check.again import Again
+from viewsphere.check.digests import damaged
 from viewsphere.check.failure import failure
 from viewsphere.check.frames import FRAME_PROOFS
 from viewsphere.check.rays import RayCaster
@@ -68,12 +69,16 @@ def check(dataset: Dataset, *, sample: int = 50, rays: bool | None = None, frame
         findings += [Finding("counts", None, message) for message in _counts(dataset, notes)]
     except (ViewsphereError, LookupError, TypeError, ValueError) as error:
         return Report({}, (Finding("counts", None, f"expected models that can be read, found {error}"),), ())
+    checked_files, damage = damaged(dataset)
+    findings += [Finding("digests", None, message) for messages in damage.values() for message in messages]
     scenery, models = Scenery(dataset), {info.key: info for info in dataset.models}
     caster = None if rays is False else _caster(dataset, scenery, rays is True, notes)
     again = Again(dataset, scenery, models)
     read_ones = range(0, len(dataset), max(1, -(-len(dataset) // frames)) if frames else 1)
     chosen = set(read_ones[:: max(1, -(-len(read_ones) // sample))]) if sample else set[int]()
-    checked = dict.fromkeys([*FRAME_PROOFS, *(name for name in labels() if _is_kept(dataset, name))], 0)
+    checked = {"digests": checked_files} | dict.fromkeys(
+        [*FRAME_PROOFS, *(name for name in labels() if _is_kept(dataset, name))], 0
+    )
     for position, index, read in _frames(dataset, read_ones):
         if not isinstance(read, Sample):
             findings.append(Finding("files", index, read))

@@ -22,6 +22,7 @@ from viewsphere.store.choice import Choice
 from viewsphere.store.folder import Store
 from viewsphere.store.index import Row
 from viewsphere.store.linking import link_file
+from viewsphere.store.manifest import MANIFEST
 from viewsphere.store.records import Category, ModelInfo
 from viewsphere.store.sample_records import ShotRecords, from_whole_sample
 
@@ -218,7 +219,7 @@ class Dataset(Sequence[Sample]):
         """Every finished model's OBJ, GLB, materials and textures: `<key>/<name>`, and the path from the data set's root."""
         for info in self.models:
             for file in sorted(self.path(info.obj).parent.iterdir()):
-                if file.name != "model.json":
+                if file.name not in {"model.json", MANIFEST}:
                     yield f"{info.key}/{file.name}", file.relative_to(self.root).as_posix()
 
     def link_models(self, folder: Path) -> None:

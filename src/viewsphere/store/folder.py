@@ -24,6 +24,7 @@ from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
 from viewsphere.store.channel_files import encode
 from viewsphere.store.index import Row
+from viewsphere.store.manifest import MANIFEST, Manifest, Told, digest, told_of
 from viewsphere.store.records import ModelInfo, PlanRecord
 from viewsphere.store.sample_records import short_sample, whole_sample
 
@@ -93,7 +94,8 @@ class Store:
         """Keys of all shots that are there, in no order."""
         with suppress(FileNotFoundError):
             for group in os.scandir(self.folder / "shots"):
-                yield from (entry.name for entry in os.scandir(group.path))
+                shots = os.scandir(group.path)
+                yield from (shot.name for shot in shots if os.path.exists(f"{shot.path}/{MANIFEST}"))  # noqa: PTH110
 
     def wanted(self, plan: PlanRecord) -> Iterator[Row]:
         """The shots of a plan, those with channels that were added later last, but for what was left out at the user's wish."""
@@ -175,12 +177,13 @@ class Store:
         return self.folder / "models" / key
 
     def has_shot(self, key: str) -> bool:
-        """Whether this shot is finished."""
-        return self.shot_folder(key).is_dir()
+        """Whether this shot is finished: its manifest, written last, is there."""
+        return (self.shot_folder(key) / MANIFEST).is_file()
 
     @contextmanager
     def aside(self, target: Path) -> Generator[Path]:
-        """A folder to write into that becomes `target` when the block ends well, and is removed when it does not.
+        """A folder to write into that becomes `target` when the block ends well, and is removed when it does not. The last file
+        in it is the manifest.
 
         If another writer finished the same target first, that one stays: both hold the same bytes.
         """
@@ -191,6 +194,8 @@ class Store:
         try:
             with _disk_errors(self.root):
                 yield folder
+                if not (folder / MANIFEST).is_file():
+                    Manifest.of(folder).write(folder)
                 target.parent.mkdir(parents=True, exist_ok=True)
                 _become(folder, target)
         finally:
@@ -241,6 +246,7 @@ class Store:
         prefix = target.relative_to(self.root).as_posix()
         records: list[dict[str, Any]] = []
         made: set[str] = set()
+        told: dict[str, Told] = {}
         kinds, table = kinds or Files(), channels()
         with self.aside(target) as folder:
             for sample in samples:
@@ -250,7 +256,11 @@ class Store:
                     if name not in made:
                         (folder / name).mkdir()
                         made.add(name)
-                    _write(f"{folder}/{inside}", encode(table[name], array, kinds))
+                    data = encode(table[name], array, kinds)
+                    if inside in told:
+                        raise ValueError(f"shot {key}: expected samples of different numbers, found {sample.index} twice")
+                    told[inside] = len(data), digest(data)
+                    _write(f"{folder}/{inside}", data)
                     files[name] = f"{prefix}/{inside}"
                 short = shot is not None and shot.channels == tuple(files) and shot.files == kinds
                 records.append(short_sample(sample) if short else whole_sample(replace(sample, files=files)))
@@ -262,6 +272,8 @@ class Store:
             if shot is not None:
                 labelled = shot.model_copy(update={"things": shot.objects})  # the others are in scenery.json
                 (folder / "shot.json").write_text(labelled.model_dump_json(), "utf-8")
+            texts = {path.name: told_of(path) for path in sorted(folder.glob("*.json"))}
+            Manifest(texts | told).write(folder)
         return len(records)
 
     def labelled(self, key: str) -> Shot | None:
@@ -383,6 +395,8 @@ def _writer() -> str:
 
 def _become(folder: Path, target: Path) -> None:
     try:
+        if target.is_dir() and not (target / MANIFEST).is_file():
+            shutil.rmtree(target)
         folder.rename(target)
     except OSError:
         if not target.is_dir():
@@ -390,8 +404,10 @@ def _become(folder: Path, target: Path) -> None:
 
 
 def _alive(pid: int) -> bool:
-    if pid == os.getpid() or os.name == "nt":  # on Windows os.kill would end the process
+    if pid == os.getpid():
         return True
+    if os.name == "nt":  # where os.kill would end the process
+        return _alive_on_windows(pid)
     try:
         os.kill(pid, 0)
     except ProcessLookupError:
@@ -399,6 +415,22 @@ def _alive(pid: int) -> bool:
     except OSError:
         return True
     return True
+
+
+def _alive_on_windows(pid: int) -> bool:
+    """Whether a process runs: it can be opened, and has no exit code yet (OpenProcess, GetExitCodeProcess of kernel32)."""
+    import ctypes
+
+    kernel: Any = getattr(ctypes, "windll").kernel32  # noqa: B009, not in the stubs of other systems
+    query, denied, running = 0x1000, 5, 259
+    handle = kernel.OpenProcess(query, False, pid)
+    if not handle:
+        return kernel.GetLastError() == denied
+    try:
+        code = ctypes.c_ulong()
+        return not kernel.GetExitCodeProcess(handle, ctypes.byref(code)) or code.value == running
+    finally:
+        kernel.CloseHandle(handle)
 
 
 @contextmanager

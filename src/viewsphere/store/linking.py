@@ -13,6 +13,7 @@ from pathlib import Path
 from viewsphere.labels import channels
 from viewsphere.store.folder import Store
 from viewsphere.store.foreign import ForeignFrame
+from viewsphere.store.manifest import MANIFEST
 from viewsphere.store.records import ModelInfo
 from viewsphere.store.sample_records import whole_sample
 
@@ -41,7 +42,7 @@ def link_model(store: Store, info: ModelInfo, files: Iterable[Path]) -> None:
     placed = replace(info, obj=f"{prefix}/{Path(info.obj).name}", glb=f"{prefix}/{Path(info.glb).name}")
     with store.aside(store.model_folder(info.key)) as folder:
         for file in files:
-            if file.name != "model.json":
+            if file.name not in {"model.json", MANIFEST}:
                 link_file(file.resolve(), folder / file.name)
         store.write_model_info(folder, placed)
 
