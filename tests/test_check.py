@@ -346,7 +346,7 @@ def test_channels_that_are_wrong_all_over(dataset, name):
 
 def test_background_without_depth(dataset):
     edit_channel(dataset, 5, "depth", lambda a: a.__setitem__(dataset[5].instances == 0, np.inf))
-    assert failures(dataset, rays=False) == {("depth", 5)}
+    assert failures(dataset) == {("depth", 5), ("surface", 5)}
 
 
 KEPT = [label.name for label in object_labels() if label.keep is not nothing]

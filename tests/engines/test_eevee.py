@@ -208,7 +208,7 @@ def test_textures_are_there(tmp_path):
 def test_a_border_moves_no_pixel(engine):
     stage = stage_of(recipe_of(engine))
     camera = moved_camera(stage.shot, (0.12, 0.0, 0.03))
-    clip = clip_of(rasterize(stage.geometry, camera))
+    clip = clip_of(rasterize(stage.geometry, camera), stage.geometry, camera)
     x0, y0, x1, y1 = border_of(stage.geometry, camera)
     assert 0 < (x1 - x0) * (y1 - y0) < 0.6 * camera.width * camera.height
     part = stage._radiance(camera, True, clip)

@@ -190,9 +190,10 @@ def test_a_camera_sees_what_there_is_and_little_more():
     shot = shot_of({"name": "raster"}, viewpoints={"azimuth": [0], "elevation": [10], "distance": 1.5})
     geometry, _ = geometry_of(shot)
     camera = shot.camera(0)
-    near, far = clip_of(rasterize(geometry, camera))
+    near, far = clip_of(rasterize(geometry, camera), geometry, camera)
     away = (geometry.vertices @ camera.R.T + camera.t)[:, 2]
     assert near < away.min() and far > away.max()
     assert far / near < 2 * SPARE**2
-    near, far = clip_of(rasterize(geometry, moved_camera(shot, (50.0, 0, 0))))
+    beside = moved_camera(shot, (50.0, 0, 0))
+    near, far = clip_of(rasterize(geometry, beside), geometry, beside)
     assert 0 < near < far

@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from truth.truth_scenes import LENSES, cube, lens, mesh_of, orbit_camera, placed, random_soup, sphere
+from truth.truth_scenes import LENSES, cube, least_weight, lens, mesh_of, orbit_camera, placed, random_soup, sphere
 from viewsphere.assets.mesh import Image, Material, Texture
 from viewsphere.engines.raster.kernels_paint import BRIGHT, GLINT, average_samples, shared_samples
 from viewsphere.engines.raster.kernels_samples import TIE
@@ -184,7 +184,8 @@ def meets(geometry, camera, rays):
     det = np.einsum("ti,ti->t", e[:, 0], q[:, 0])
     values = np.einsum("tki,ni->ntk", e / np.where(det == 0, 1, det)[:, None, None], rays)
     inverse = values.sum(axis=-1)
-    hit = (values >= 0).all(axis=-1) & (inverse > 0) & (det != 0)
+    within = least_weight(geometry, values[..., 1] / inverse, values[..., 2] / inverse)
+    hit = (within >= 0) & (inverse > 0) & (det != 0)
     margin = np.abs(values / np.abs(values).max(axis=-1, keepdims=True)).min(axis=(1, 2))
     return hit, inverse, margin
 
@@ -205,6 +206,7 @@ def test_layers_equal_brute_force(name):
         fov = rng.uniform(0.5, 1.3) if name != "fisheye" else rng.uniform(2, 4)
         camera = orbit_camera(lens(32, 24, fov, LENSES[name]), *rng.uniform(-3, 3, 2), rng.uniform(0.5, 5))
         see_through = np.append(rng.uniform(size=len(geometry.triangles)) < 0.6, False)
+        see_through[geometry.triangle_start[-1] :] = False
         visibility = rasterize(geometry, camera)
         rays = pixel_rays(camera.intrinsics).reshape(-1, 3)
         shown = visibility.triangle.reshape(-1), visibility.inverse_depth.reshape(-1)

@@ -51,7 +51,7 @@ def scene(folder, **changes):
         "ground": {
             "choice": [
                 {"image": str(folder / "stone.png"), "normal_image": str(folder / "stone_normal.png"), "tile": [0.2, 1]},
-                "catcher",
+                {"catcher": True, "labels": True},
             ]
         },
         "materials": [{"material": "*", "tint": {"uniform": ["#606060", "white"]}, "roughness": [0.1, 0.9]}],

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
+
 import numpy as np
 import pytest
 
@@ -29,11 +31,11 @@ def stages():
     return Stages()
 
 
-def samples_of(stages: Stages, scene: Scene, channels=("rgb", "rgba", "instances"), finish=None, **options):
+def samples_of(stages: Stages, scene: Scene, channels=("rgb", "rgba", "instances"), finish=None, poses=POSES, **options):
     lens = Intrinsics(width=WIDTH, height=HEIGHT, fx=150, fy=150, cx=WIDTH / 2, cy=HEIGHT / 2)
     more = {"scene": scene, "engine_options": options, "channels": channels}
     middle = stages.box(CAR).mean(axis=0)
-    shot = still_shot([Thing(id=1, model=CAR)], lens, POSES, middle, finish=finish, **more)
+    shot = still_shot([Thing(id=1, model=CAR)], lens, poses, middle, finish=finish, **more)
     return list(stages.render(shot))
 
 
@@ -110,6 +112,23 @@ def test_a_catcher_shows_its_shadow_and_nothing_else(stages):
     assert (sample.rgba[ground][:, :3] == 0).all()
     assert np.mean(alpha < 10) > 0.3
     assert alpha.max() > 100
+
+
+@pytest.mark.parametrize("elevation", [12, -20])
+def test_a_catcher_is_there_for_labels_only_if_they_ask_for_it(stages, elevation):
+    """Its picture is the same either way; from below it hides the car in the picture alone."""
+    channels = ("rgba", "depth", "normals", "normals_geometric", "instances")
+    grounds = None, Ground(catcher=True), Ground(catcher=True, labels=True), Ground(), Ground(labels=True)
+    poses = [Viewpoint(index=0, azimuth_deg=35, elevation_deg=elevation, distance=9)]
+    bare, caught, labelled, solid, same = (samples_of(stages, Scene(ground=g), channels, poses=poses)[0] for g in grounds)
+    for one, other in ((bare, caught), (solid, labelled), (solid, same)):
+        for name in channels[1:]:
+            np.testing.assert_array_equal(one.channels[name], other.channels[name])
+        np.testing.assert_equal(asdict(one.objects[0]), asdict(other.objects[0]))
+    np.testing.assert_array_equal(caught.rgba, labelled.rgba)
+    assert (bare.objects[0].visibility, solid.objects[0].visibility) == (1, 1 if elevation > 0 else 0)
+    assert np.isinf(caught.depth[caught.instances == 0]).all()
+    assert np.isfinite(labelled.depth[-1 if elevation > 0 else 0]).all()
 
 
 def test_a_transparent_scene_asks_for_rgba_alone(stages):

@@ -55,13 +55,15 @@ def test_all_channels_tell_of_one_point(name):
     assert np.array_equal(observed["triangles"][seen], np.where(objects > 0, triangle - start[objects], -1))
 
     weights = observed["barycentrics"][seen].astype(float)
-    np.testing.assert_allclose(weights.sum(axis=1), 1, atol=1e-6)
-    assert weights.min() > -1e-6
+    largest = np.maximum(np.abs(weights).max(axis=1), 1)  # the ground goes on beyond its triangles
+    assert (np.abs(weights.sum(axis=1) - 1) < 1e-6 * largest).all()
+    assert weights[objects > 0].min() > -1e-6
     corners = geometry.vertices[geometry.triangles[triangle]]
     point = (weights[..., None] * corners).sum(axis=1)
     rays = pixel_rays(camera.intrinsics)[seen]
     along = rays / visibility.inverse_depth[seen, None]
-    np.testing.assert_allclose(point @ camera.R.T + camera.t, along, atol=1e-6 * np.abs(corners).max(axis=(1, 2)).max())
+    off = np.abs(point @ camera.R.T + camera.t - along).max(axis=1)
+    assert (off < 1e-6 * largest * np.abs(corners).max()).all()
     np.testing.assert_allclose(observed["depth"][seen], along[:, 2], rtol=1e-6)
 
     solid = objects > 0

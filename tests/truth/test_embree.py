@@ -7,10 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from truth_scenes import LENSES, cube, lens, mesh_of, orbit_camera, placed, sphere
+from truth_scenes import LENSES, cube, least_weight, lens, mesh_of, orbit_camera, placed, sphere
 
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.labels import observe
+from viewsphere.truth.cutouts import NEVER, SURFACE
 from viewsphere.truth.visibility import rasterize
 
 pytest.importorskip("embreex")
@@ -63,7 +64,7 @@ def right_by_float64(geometry, camera, ray, triangle):
         det = (p * (b - a)).sum(-1)
         u, q = -(p * a).sum(-1) / det, np.cross(-a, b - a)
         v, s = (q @ ray) / det, (q * (c - a)).sum(-1) / det
-        s = np.where((u >= 0) & (v >= 0) & (u + v <= 1) & (s > 0), s, np.inf)
+        s = np.where((least_weight(geometry, u, v) >= 0) & (s > 0), s, np.inf)
     return triangle == (int(np.argmin(s)) if np.isfinite(s).any() else -1)
 
 
@@ -84,7 +85,8 @@ def compare(geometry, cameras):
         for i in np.flatnonzero(~toss_up):
             assert right_by_float64(geometry, camera, rays[i], own[i]), (rows[i], columns[i], own[i], other_there[i])
         toss_ups += int(toss_up.sum())
-        overruled += int((~toss_up).sum())
+        beyond = (own >= geometry.triangle_start[-1]) & (other_there < 0)  # Embree's ground ends
+        overruled += int((~toss_up & ~beyond).sum())
         agreed = other == visibility.triangle
         hit = agreed & (other >= 0) & (geometry.triangle_object[other] > 0)
         z = s * pixel_rays(camera.intrinsics)[..., 2]
@@ -200,7 +202,7 @@ def opaque(geometry):
     """Without cut-outs, of which Embree knows nothing."""
     from dataclasses import replace
 
-    return replace(geometry, triangle_cutout=np.full_like(geometry.triangle_cutout, -1))
+    return replace(geometry, triangle_cutout=np.where(geometry.triangle_cutout < NEVER, geometry.triangle_cutout, SURFACE))
 
 
 @pytest.mark.slow

@@ -11,6 +11,7 @@ from viewsphere.geometry.camera import orbit_center, orbit_rotation, pixel_rays
 from viewsphere.model.camera import Camera, Distortion, Intrinsics
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.thing import Motion, Thing
+from viewsphere.truth.cutouts import ENDLESS
 from viewsphere.truth.geometry import Geometry, build_geometry
 
 BARREL = Distortion(model="brown_conrady", coefficients=(-0.21, 0.06, 0.001, -0.002, -0.004))
@@ -83,6 +84,13 @@ def cube(half: float = 0.5) -> Mesh:
     return mesh_of(corners, triangles, normals, parts=np.repeat(np.arange(6), 2))
 
 
+def least_weight(geometry: Geometry, u, v):
+    """The least weight (..., T) that has to be positive where a ray meets a triangle, by those of its corners 1 and 2."""
+    code = geometry.triangle_cutout
+    least = np.minimum(np.minimum(u, v), 1 - u - v)
+    return np.where(code == ENDLESS[0], u, np.where(code == ENDLESS[1], v, least))
+
+
 def cast(geometry: Geometry, camera: Camera, chunk: int = 256):
     """Brute force: every ray against every triangle in float64 numpy (Moller and Trumbore 1997).
 
@@ -108,7 +116,7 @@ def cast(geometry: Geometry, camera: Camera, chunk: int = 256):
             q = np.cross(-a, e1)
             v = (q * r).sum(-1) / det
             s = (q * e2).sum(-1) / det
-            least = np.minimum(np.minimum(u, v), 1 - u - v)
+            least = least_weight(geometry, u, v)
             hit = (least >= 0) & (s > 0)
             near = np.where(s > 0, np.abs(least), np.inf)
             near = np.where(np.isfinite(near), near, np.inf)

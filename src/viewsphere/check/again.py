@@ -89,7 +89,7 @@ class Again:
         around = self._scenery.around(key)
         there = {o.id: o for o in sample.objects}
         objects = tuple(self._thing(there.get(thing.id), thing) for thing in shot.objects)
-        ground = shot.scene.ground is not None
+        ground = shot.scene.ground is not None and shot.scene.ground.is_labelled
         now = objects, around.things, ground, shot.label_alpha, shot.scene.floor
         if self._geometry[0] != now:
             meshes = [self._mesh(thing.model.key) for thing in objects]

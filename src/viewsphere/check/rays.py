@@ -29,6 +29,9 @@ PIXELS = 5000
 TOLERANCE = 1e-4
 """Share of the distance by which Embree's float32 and the stored depth may differ."""
 
+LEVEL = 1e-5
+"""Slope of a ray, and metres above the ground, up to which rounding decides whether they meet."""
+
 OUTLIERS = 0.01
 """Share of the pixels that may differ: where a ray passes within rounding of a triangle's edge, or meets it at a glance."""
 
@@ -60,6 +63,7 @@ class RayCaster:
         self._owner = np.zeros(0, np.int64)
         self._middle = np.zeros(3)
         self._lowest = 0.0
+        self._has_ground = False
         self._complete = True
 
     def off_surface(self, sample: Sample) -> Iterator[str]:
@@ -67,7 +71,7 @@ class RayCaster:
 
         Each point must lie on the right object, and nothing that cannot be seen through may be in front of it; a point of the
         background must lie on scenery, or on a ground at the lowest point of all (or lower, where the shot says so); through
-        empty pixels nothing may be seen.
+        empty pixels nothing may be seen, the ground neither.
         """
         if not sample.objects:
             return
@@ -104,7 +108,7 @@ class RayCaster:
             height = (eye + s[:, None] * directions)[:, 2]
             off = np.abs(height - self._lowest)
             there |= (ids == 0) & np.isfinite(s) & (off <= slack * np.maximum(1.0, np.abs(directions[:, 2])))
-        there |= np.isinf(s) & (ids == 0)
+        there |= np.isinf(s) & (ids == 0) & ~self._meets_ground(eye, directions, rays[rows, columns, 2] > 0)
         wrong = ~there | (first < np.where(np.isfinite(s), s - slack, np.inf))
         if wrong.sum() > max(2, OUTLIERS * len(s)):
             i = int(np.flatnonzero(wrong)[0])
@@ -114,10 +118,18 @@ class RayCaster:
                 f"stored at {s[i]:.6g} m along the ray, Embree finds {np.append(self._owner, 0)[owner[i]]} at {nearest:.6g} m"
             )
 
+    def _meets_ground(self, eye: Float, directions: Float, ahead: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Which rays meet the ground beyond doubt; depth of rays that look back is not kept by all files."""
+        height = eye[2] - self._lowest
+        steep = np.abs(directions[:, 2]) > LEVEL
+        return ahead & steep & (directions[:, 2] * height < 0) & (abs(height) > LEVEL) & self._has_ground
+
     def _build(self, sample: Sample) -> None:
         shot_key = self._scenery.key_of(sample.index)
         scenery, shot = self._scenery.around(shot_key), self._scenery.shot(shot_key)
         floor = None if shot is None else shot.scene.floor
+        ground = None if shot is None else shot.scene.ground
+        self._has_ground = ground is not None and ground.is_labelled
         key = [(o.key, o.world_from_object.tobytes()) for o in sample.objects], scenery, floor
         if key == self._key:
             return

@@ -120,9 +120,9 @@ AnyLight = Annotated[PointLight | SpotLight | AreaLight | HemisphereLight, Field
 
 
 class Ground(Frozen):
-    """A horizontal plane at the lowest point of all that is placed.
+    """An endless level plane at the lowest point of all that is placed.
 
-    A catcher shows nothing but the shadows and the occlusion it receives.
+    A catcher shows nothing but the shadows and the occlusion it receives, and is not there for labels unless `labels` says so.
     """
 
     color: Srgb = Field(
@@ -135,6 +135,12 @@ class Ground(Frozen):
     metallic: Portion = Field(default=0.0, description="1: metal")
     tile: Length = Field(default=2.0, description="metres after which images repeat")
     catcher: bool = Field(default=False, description="true: only the shadows on it are seen, over the background")
+    labels: bool = Field(default=False, description="whether a catcher has depth and normals; other ground always has")
+
+    @property
+    def is_labelled(self) -> bool:
+        """Whether it is there for labels."""
+        return self.labels or not self.catcher
 
 
 class Background(Frozen):

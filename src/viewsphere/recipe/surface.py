@@ -12,7 +12,7 @@ from viewsphere.recipe.entries import entry_of, is_drawn_color
 from viewsphere.recipe.values import COLOR_FORMS, OrShort, parse_color, shape_of, switch
 
 
-class GroundEntry(entry_of(Ground, optional=("color",), fixed=("catcher",))):
+class GroundEntry(entry_of(Ground, optional=("color",), fixed=("catcher", "labels"))):
     """A horizontal plane at the lowest point of all that is placed."""
 
 

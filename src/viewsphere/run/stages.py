@@ -24,7 +24,8 @@ from viewsphere.model.thing import Thing
 from viewsphere.sampling.camera import inside_box
 from viewsphere.store import Store
 from viewsphere.truth.enclosure import sky_hidden
-from viewsphere.truth.visibility import rasterize
+from viewsphere.truth.geometry import without_ground
+from viewsphere.truth.visibility import rasterize, with_ground
 from viewsphere.zoo import build_zoo_model
 
 if TYPE_CHECKING:
@@ -198,20 +199,23 @@ def _size(mesh: Mesh) -> int:
 def render_sample(
     shot: Shot, sample: tuple[int, int, int], stage: Stage, boxes: Sequence[Float], sizes: Sequence[Size | None]
 ) -> Sample:
-    """One of `shot.samples`: colour from the engine, every label from truth.
+    """One of `shot.samples`: colour from the engine, every label from truth, for which a shadow catcher may not be there.
 
     `boxes` and `sizes`: each object's 3D box in its own axes, and its real size if known.
     """
     number, instant, sensor = sample
     now, camera, geometry = shot.instants[instant], shot.camera(instant, sensor), stage.at(instant)
-    visibility = rasterize(geometry, camera)
+    ground = shot.scene.ground
+    labelled = geometry if ground is None or ground.is_labelled else without_ground(geometry)
+    visibility = rasterize(labelled, camera)
     names = [name for name in shot.channels if name not in PASSES]
-    observed = observe(geometry, camera, visibility, names)
-    for name in PASSES:
-        if name in shot.channels:
-            observed[name] = stage.color(instant, sensor, visibility, name == "rgba")
+    observed = observe(labelled, camera, visibility, names)
+    pictures = [name for name in PASSES if name in shot.channels]
+    painted = with_ground(geometry, camera, visibility) if pictures and labelled is not geometry else visibility
+    for name in pictures:
+        observed[name] = stage.color(instant, sensor, painted, name == "rgba")
     files = [model_files(p.model.key)[0] for p in shot.objects]
-    objects = annotate(shot, instant, camera, geometry, visibility, boxes, files, sizes)
+    objects = annotate(shot, instant, camera, labelled, visibility, boxes, files, sizes)
     return Sample(
         index=number,
         split=now.split,

@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from viewsphere.assets.mesh import WRAPS, Material, Mesh, Texture, Wrap
 
 SURFACE, NEVER = -1, -2
+ENDLESS = (-3, -4)
+"""Half a plane, the triangle's, that begins at its edge opposite corner 1, or 2, and is surface all over."""
 SEEN = 1 / 512  # alpha: whatever is not clear
 _BORDERS: dict[Wrap, Literal["wrap", "symmetric", "edge"]] = {"repeat": "wrap", "mirror": "symmetric", "clamp": "edge"}
 

@@ -14,12 +14,13 @@ from numpy.typing import ArrayLike, NDArray
 from viewsphere.assets.mesh import Mesh
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.thing import Thing
-from viewsphere.truth.cutouts import NO_CUTOUTS, SURFACE, Cutouts, mesh_cutouts, stack_cutouts
+from viewsphere.truth.cutouts import ENDLESS, NO_CUTOUTS, Cutouts, mesh_cutouts, stack_cutouts
 
 BACKGROUND = 0
 """Object, part and category id of scenery and ground: they have depth and normals but are background to every label."""
 
 GROUND_REACH = 1000.0
+"""Scene sizes from the middle to the ground's corners: as far as a renderer without endless planes has to draw it."""
 
 STACKED = (
     "vertices",
@@ -44,7 +45,10 @@ class Geometry:
     triangle_normals (T, 3) float32 world, unit, by winding (zero for a degenerate triangle); triangle_side (T,) int8: 1 where
     the mean of the vertex normals agrees with the winding, -1 where it opposes it, 2 or -2 likewise where all three equal the
     triangle's own; triangle_object, triangle_part, triangle_category (T,) int32, 0 for scenery and ground; triangle_cutout
-    (T,) int32: -1 all surface, -2 never seen, else a row of `cutouts.corners`.
+    (T,) int32: -1 all surface, -2 never seen, -3 and -4 `cutouts.ENDLESS`, else a row of `cutouts.corners`.
+
+    The ground is the whole plane z = ground_z, its two triangles are halves of it. They stand for no place: under what moves
+    their corners move along, so a point of the ground is kept as its place in the world.
 
     Thing i owns vertices [vertex_start[i], vertex_start[i + 1]) and triangles [triangle_start[i], triangle_start[i + 1]);
     both have one entry more than there are things. The first `object_count` of them are the objects 1, 2, ...
@@ -96,10 +100,9 @@ def build_geometry(
     """Place the meshes in the world and, if asked, lay the ground at their lowest point (z = 0 if there are none), or at
     `floor` where that is lower: something that jumps leaves it.
 
-    `meshes[i]` is the normalised model of `things[i]`; ids are 1..N in order, then 0 for scenery. The ground is two
-    triangles that reach 1,000 scene sizes to every side. A BLEND material is surface where alpha >= label_alpha, a MASK
-    material where alpha >= its cutoff; transmission always counts as surface. Fully transparent triangles (no texel is
-    surface) are kept but never seen. Raises ValueError for other ids.
+    `meshes[i]` is the normalised model of `things[i]`; ids are 1..N in order, then 0 for scenery. A BLEND material is surface
+    where alpha >= label_alpha, a MASK material where alpha >= its cutoff; transmission always counts as surface. Fully
+    transparent triangles (no texel is surface) are kept but never seen. Raises ValueError for other ids.
 
     The last scenery is kept: where only objects change, it is not placed again.
     """
@@ -112,11 +115,21 @@ def build_geometry(
     return _stacked([*parts, _ground(parts, floor)] if ground else parts)
 
 
+def without_ground(geometry: Geometry) -> Geometry:
+    """The same, but there is no ground."""
+    if geometry.ground_z is None:
+        return geometry
+    vertices, triangles = geometry.vertex_start[-1], geometry.triangle_start[-1]
+    names = (*STACKED, "triangles", "triangle_cutout")
+    kept = {name: getattr(geometry, name)[: triangles if name.startswith("triangle") else vertices] for name in names}
+    return replace(geometry, **kept, ground_z=None)
+
+
 def with_blended_colors(geometry: Geometry, meshes: Sequence[Mesh]) -> Geometry:
     """The same, but BLEND materials are surface wherever they have a colour, which labels leave out where it is faint."""
     if not any(material.alpha_mode == "BLEND" for mesh in meshes for material in mesh.materials):
         return geometry
-    ground = np.full(len(geometry.triangles) - geometry.triangle_start[-1], SURFACE, np.int32)
+    ground = geometry.triangle_cutout[geometry.triangle_start[-1] :]
     cutouts, rows = stack_cutouts([*(mesh_cutouts(mesh, None) for mesh in meshes), (NO_CUTOUTS, ground)])
     return replace(geometry, cutouts=cutouts, triangle_cutout=rows)
 
@@ -177,7 +190,7 @@ def _labels(thing: Thing, mesh: Mesh) -> NDArray[np.int32]:
 
 
 def _ground(parts: Sequence[Geometry], floor: float | None) -> Geometry:
-    """Two triangles below all that is placed and not above `floor`, counter-clockwise seen from above."""
+    """A plane in two halves, below all that is placed and not above `floor`, counter-clockwise seen from above."""
     used = np.concatenate([part.vertices[part.is_used] for part in parts])
     low, high = (used.min(axis=0), used.max(axis=0)) if len(used) else (np.zeros(3), np.zeros(3))
     size = float(np.max(high - low)) or 1.0
@@ -198,7 +211,7 @@ def _ground(parts: Sequence[Geometry], floor: float | None) -> Geometry:
         triangle_object=background,
         triangle_part=background,
         triangle_category=background,
-        triangle_cutout=np.full(2, SURFACE, np.int32),
+        triangle_cutout=np.array(ENDLESS, np.int32),
         cutouts=NO_CUTOUTS,
         vertex_start=(0,),
         triangle_start=(0,),

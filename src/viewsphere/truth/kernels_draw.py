@@ -21,7 +21,9 @@ BEHIND = -(1 << 30)
 ROUNDED_UP = 1.0 + 1e-9  # of 1/z between a triangle's corners
 SLIVER = 1e-5  # twice the area in pixels below which the sign of a triangle's area is not trusted
 SMALL = 2 * FOUR  # pixels: the width up to which testing every pixel beats computing spans
-NEVER, CLAMP, MIRROR = -2, 1, 2  # as in cutouts.py
+NEVER, CLAMP, MIRROR = -2, 1, 2  # as in cutouts.py, below NEVER what is endless
+ENDLESS_1 = -3  # of a triangle's edges only that opposite corner 1 is one, else that opposite corner 2
+HORIZON = 1e-10  # of 1/z's coefficients: what is nearer to a plane's horizon, within rounding, is beyond it
 
 
 @njit
@@ -102,6 +104,22 @@ def negated(e):
 
 
 @inner
+def edges_inside(q0, q1, q2, normal, det, cutout):
+    """Coefficients of a triangle's edges that are not negative inside, whatever its winding; `plane` gives normal and det.
+
+    Those of an endless triangle are one of its own, and its plane's horizon, where 1/z = normal.p / det becomes 0.
+    """
+    e0, e1, e2 = edge(q1, q2), edge(q2, q0), edge(q0, q1)
+    if det < 0.0:
+        e0, e1, e2 = negated(e0), negated(e1), negated(e2)
+    if cutout >= NEVER:
+        return e0, e1, e2
+    x, y, z = normal[0] / det, normal[1] / det, normal[2] / det
+    horizon = x, y, z - HORIZON * (abs(x) + abs(y) + abs(z))
+    return horizon, e1 if cutout == ENDLESS_1 else e2, horizon
+
+
+@inner
 def _inside(a, b, c, px, f0, f1, f2):
     return a[0] * px + f0 >= 0.0 and b[0] * px + f1 >= 0.0 and c[0] * px + f2 >= 0.0
 
@@ -111,7 +129,7 @@ def draw(q, cell, triangles, span, canvas, cutout, cutouts, nearest, seen):
     """Draw triangles into nearest (1/z, 0 where none) and seen (triangle, -1 where none), both in C order.
 
     `span` is the first triangle, the one after the last, and the vertex that q[0] stands for; `canvas` the samples of a pixel's
-    side and the canvas' first sample (x, y).
+    side and the canvas' first sample (x, y). `cell` of what is endless is BEHIND.
     """
     height, width = nearest.shape
     first, last, base = span
@@ -130,7 +148,7 @@ def draw(q, cell, triangles, span, canvas, cutout, cutouts, nearest, seen):
         q0, q1, q2 = (q[i0, a], q[i0, b], q[i0, c]), (q[i1, a], q[i1, b], q[i1, c]), (q[i2, a], q[i2, b], q[i2, c])
         crossing = xa == BEHIND
         if crossing:
-            if q0[2] <= 0.0 and q1[2] <= 0.0 and q2[2] <= 0.0:
+            if q0[2] <= 0.0 and q1[2] <= 0.0 and q2[2] <= 0.0 and cutout[ut] >= NEVER:
                 continue
             xa, ya, xb, yb = 0, 0, width - 1, height - 1
         nx, ny, nz, det = plane(q0, q1, q2)
@@ -142,9 +160,7 @@ def draw(q, cell, triangles, span, canvas, cutout, cutouts, nearest, seen):
             bounds = (0.0, np.inf) if crossing else (1.0 / max(w0, w1, w2), 1.0 / min(w0, w1, w2))
             _draw_checked(t, q0, q1, q2, box, canvas, bounds, cutout[ut], cutouts, nearest, seen)
             continue
-        e0, e1, e2 = edge(q1, q2), edge(q2, q0), edge(q0, q1)
-        if det < 0.0:
-            e0, e1, e2 = negated(e0), negated(e1), negated(e2)
+        e0, e1, e2 = edges_inside(q0, q1, q2, (nx, ny, nz), det, cutout[ut])
         inverse = 1.0 / det
         n = (nx * inverse, ny * inverse, nz * inverse)
         if is_small:

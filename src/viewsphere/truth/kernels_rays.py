@@ -14,7 +14,7 @@ import math
 import numpy as np
 
 from viewsphere.kernels.jit import inner, njit
-from viewsphere.truth.kernels_draw import NEVER, edge, hits_surface, negated, plane
+from viewsphere.truth.kernels_draw import NEVER, edges_inside, hits_surface, plane
 from viewsphere.truth.kernels_row import NEARER
 
 LEAF = 8  # pixels of a leaf's side
@@ -22,6 +22,8 @@ MANY_CELLS, MANY_PIXELS = 64, 1024  # of a triangle's box: beyond them the tree 
 WIDER = 1e-9  # of a face: more than the rounding of a projection
 SLIVER = 1e-12  # of the corners' distances' product: below it the sign of det is not trusted
 ORIGIN = (0.0, 0.0, 0.0)
+NO_BOX = (0, 0, -1, -1)
+ANY_DEPTH = (0.0, np.inf)  # 1/s
 
 
 @njit(_nrt=True)
@@ -105,21 +107,20 @@ def pixel_box(cells, q0, q1, q2):
     ax, ay, az = abs(q0[0]), abs(q0[1]), abs(q0[2])
     axis = 0 if az >= ax and az >= ay else 1 if ax >= ay else 2
     face = 2 * axis + (1 if (q0[2], q0[0], q0[1])[axis] < 0.0 else 0)
-    none = (0, 0, -1, -1)
     if face >= count:
-        return False, none
+        return False, NO_BOX
     u0, v0, a0 = _on_face(face, q0[0], q0[1], q0[2])
     u1, v1, a1 = _on_face(face, q1[0], q1[1], q1[2])
     u2, v2, a2 = _on_face(face, q2[0], q2[1], q2[2])
     if not (a0 > 0.0 and a1 > 0.0 and a2 > 0.0):
-        return False, none
+        return False, NO_BOX
     ua, va = min(u0, u1, u2) - WIDER, min(v0, v1, v2) - WIDER
     ub, vb = max(u0, u1, u2) + WIDER, max(v0, v1, v2) + WIDER
     if not (ua >= -1.0 and va >= -1.0 and ub <= 1.0 and vb <= 1.0):
-        return False, none
+        return False, NO_BOX
     ia, ja, ib, jb = _cell(ua, size), _cell(va, size), _cell(ub, size), _cell(vb, size)
     if (ib - ia + 1) * (jb - ja + 1) > MANY_CELLS:
-        return False, none
+        return False, NO_BOX
     xa, ya, xb, yb = np.int32(2**30), np.int32(2**30), np.int32(-1), np.int32(-1)
     for j in range(ja, jb + 1):
         for i in range(ia, ib + 1):
@@ -165,7 +166,7 @@ def limits(q0, q1, q2, det, unit):
     """Whether the triangle's facing is uncertain, and within what 1/s has to stay."""
     sizes = _distance(q0, ORIGIN) * _distance(q1, ORIGIN) * _distance(q2, ORIGIN)
     sliver = abs(det) < SLIVER * sizes
-    return sliver, _bounds(q0, q1, q2, unit) if sliver else (0.0, np.inf)
+    return sliver, _bounds(q0, q1, q2, unit) if sliver else ANY_DEPTH
 
 
 @inner
@@ -189,18 +190,17 @@ def draw(q, triangles, span, table, origin, unit, cutout, cutouts, nearest, seen
     for t in range(first, last):
         i0, i1, i2 = triangles[t, 0] - base, triangles[t, 1] - base, triangles[t, 2] - base
         q0, q1, q2 = (q[i0, 0], q[i0, 1], q[i0, 2]), (q[i1, 0], q[i1, 1], q[i1, 2]), (q[i2, 0], q[i2, 1], q[i2, 2])
-        if cutout[t] == NEVER or (not unit and q0[2] <= 0.0 and q1[2] <= 0.0 and q2[2] <= 0.0):
+        endless = cutout[t] < NEVER
+        if cutout[t] == NEVER or (not unit and not endless and q0[2] <= 0.0 and q1[2] <= 0.0 and q2[2] <= 0.0):
             continue
-        small, box = pixel_box(cells, q0, q1, q2)
+        small, box = (False, NO_BOX) if endless else pixel_box(cells, q0, q1, q2)
         if small and box[2] < 0:
             continue
         nx, ny, nz, det = plane(q0, q1, q2)
         if det == 0.0:
             continue
-        e0, e1, e2 = edge(q1, q2), edge(q2, q0), edge(q0, q1)
-        if det < 0.0:
-            e0, e1, e2 = negated(e0), negated(e1), negated(e2)
-        sliver, bounds = limits(q0, q1, q2, det, unit)
+        e0, e1, e2 = edges_inside(q0, q1, q2, (nx, ny, nz), det, cutout[t])
+        sliver, bounds = (False, ANY_DEPTH) if endless else limits(q0, q1, q2, det, unit)
         n = (nx / det, ny / det, nz / det)
         if small:
             _draw_box(t, e0, e1, e2, n, sliver, bounds, rays, box, origin, cutout[t], cutouts, nearest, seen)

@@ -80,6 +80,14 @@ def rasterize(
     return Visibility(seen, nearest.astype(np.float32), q if part == everything else None)
 
 
+def with_ground(geometry: Geometry, camera: Camera, visibility: Visibility) -> Visibility:
+    """What is seen where the ground of this geometry is there, too: `visibility` is of all else."""
+    ground = geometry.triangle_start[-1], len(geometry.triangles), geometry.vertex_start[-1], len(geometry.vertices)
+    shown = visibility.inverse_depth.astype(np.float64), visibility.triangle.copy()
+    nearest, seen, _ = _draw(geometry, camera, 1, ground, None, shown)
+    return Visibility(seen, nearest.astype(np.float32))
+
+
 def silhouette(geometry: Geometry, camera: Camera, object_id: int, window: Window) -> NDArray[np.bool_]:
     """Pixels whose ray meets this object, were it alone: (y1 - y0, x1 - x0) bool over the window.
 
@@ -170,15 +178,23 @@ def index_rays(intrinsics: Intrinsics, rays: NDArray[np.float64], samples: int) 
 
 
 def _draw(
-    geometry: Geometry, camera: Camera, samples: int, part: tuple[int, int, int, int], window: Window | None
+    geometry: Geometry,
+    camera: Camera,
+    samples: int,
+    part: tuple[int, int, int, int],
+    window: Window | None,
+    shown: tuple[NDArray[np.float64], NDArray[np.int32]] | None = None,
 ) -> tuple[NDArray[np.float64], NDArray[np.int32], NDArray[np.float64]]:
-    """1/s (0 where none) and triangle (-1 where none) over the window, of the part's triangles; its `homogeneous` vertices."""
+    """1/s (0 where none) and triangle (-1 where none) over the window, of the part's triangles; its `homogeneous` vertices.
+
+    They are drawn into what is `shown` already, if it is given.
+    """
     from viewsphere.truth import kernels_draw as kernels
     from viewsphere.truth import kernels_rays
 
     window = window or (0, 0, camera.width, camera.height)
     x0, y0, x1, y1 = (samples * edge for edge in window)
-    nearest, seen = np.zeros((y1 - y0, x1 - x0)), np.full((y1 - y0, x1 - x0), -1, np.int32)
+    nearest, seen = shown or (np.zeros((y1 - y0, x1 - x0)), np.full((y1 - y0, x1 - x0), -1, np.int32))
     first, last, base, stop = part
     span = (first, last, base)
     q = homogeneous(geometry, camera, base, stop)
@@ -192,5 +208,6 @@ def _draw(
         return nearest, seen, q
     cell = np.empty((stop - base, 4), np.int32)
     kernels.cells(q, samples, x0, y0, x1 - x0, y1 - y0, cell)
+    cell[geometry.vertex_start[-1] - base :] = kernels.BEHIND
     kernels.draw(q, cell, geometry.triangles, span, (samples, x0, y0), *cut, nearest, seen)
     return nearest, seen, q

@@ -206,7 +206,7 @@ class Arrangement:
 
     def _drawn(self, camera: Camera, is_open: bool, visibility: Visibility) -> Float32:
         """What a renderer that draws gives, which tells depths apart that are not too far from one another."""
-        clip = clip_of(visibility)
+        clip = clip_of(visibility, self.geometry, camera)
         if self.backdrop is None:
             return self._radiance(camera, is_open, clip)
         colors = self._radiance(camera, True, clip)
@@ -275,12 +275,16 @@ class Arrangement:
             raise UserError(str(error).removeprefix("ValueError: ")) from error
 
 
-def clip_of(visibility: Visibility) -> Clip:
-    """Metres between which there is all that is seen."""
+def clip_of(visibility: Visibility, geometry: Geometry, camera: Camera) -> Clip:
+    """Metres between which there is all that is seen; the ground as far as its corners, where Blender's ends."""
     known = visibility.inverse_depth[visibility.inverse_depth > 0]
     if not len(known):
         return NEAREST, 1 / NEAREST
-    return 1 / (SPARE * float(known.max())), SPARE / float(known.min())
+    near, far = 1 / (SPARE * float(known.max())), SPARE / float(known.min())
+    if geometry.ground_z is None:
+        return near, far
+    corners = geometry.vertices[geometry.vertex_start[-1] :]
+    return near, min(far, SPARE * float(np.linalg.norm(corners - camera.center, axis=1).max()))
 
 
 def told_camera(camera: Camera, clip: Clip = (NEAREST, FARTHEST)) -> dict[str, Any]:

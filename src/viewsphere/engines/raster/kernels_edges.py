@@ -16,7 +16,7 @@ import numpy as np
 from viewsphere.engines.raster.kernels_chosen import ALIKE, LEVEL
 from viewsphere.engines.raster.kernels_four import nearer, put_before
 from viewsphere.kernels.jit import inner, njit
-from viewsphere.truth.kernels_draw import EPSILON, NEVER, crossing_at, edge, hits_surface, negated, plane
+from viewsphere.truth.kernels_draw import EPSILON, NEVER, crossing_at, edges_inside, hits_surface, plane
 
 f4 = nb.float32
 U = nb.uintp
@@ -98,6 +98,8 @@ def draw(  # noqa: PLR0912, PLR0915, one loop, whose state is not worth handing 
         q0, q1, q2 = (q[i0, a], q[i0, b], q[i0, c]), (q[i1, a], q[i1, b], q[i1, c]), (q[i2, a], q[i2, b], q[i2, c])
         w0, w1, w2 = q[i0, d], q[i1, d], q[i2, d]
         high, low = max(w0, w1, w2), min(w0, w1, w2)
+        if cutout[t] < NEVER:
+            high, low = np.inf, 0.0
         before, crossing = f4(high), high == np.inf
         xa, ya, xb, yb = 0, 0, width - 1, height - 1
         if not crossing:
@@ -106,7 +108,7 @@ def draw(  # noqa: PLR0912, PLR0915, one loop, whose state is not worth handing 
             ya = math.ceil(max(min(v0, v1, v2) - (highest + EPSILON), 0.0))
             xb = math.floor(min(max(u0, u1, u2) - (lowest - EPSILON), width - 1.0))
             yb = math.floor(min(max(v0, v1, v2) - (lowest - EPSILON), height - 1.0))
-        elif q0[2] <= 0.0 and q1[2] <= 0.0 and q2[2] <= 0.0:
+        elif q0[2] <= 0.0 and q1[2] <= 0.0 and q2[2] <= 0.0 and cutout[t] >= NEVER:
             continue
         if xa > xb or ya > yb or cutout[t] == NEVER:
             continue
@@ -121,9 +123,7 @@ def draw(  # noqa: PLR0912, PLR0915, one loop, whose state is not worth handing 
         nx, ny, nz, det = plane(q0, q1, q2)
         if det == 0.0:
             continue
-        e0, e1, e2 = edge(q1, q2), edge(q2, q0), edge(q0, q1)
-        if det < 0.0:
-            e0, e1, e2 = negated(e0), negated(e1), negated(e2)
+        e0, e1, e2 = edges_inside(q0, q1, q2, (nx, ny, nz), det, cutout[t])
         scale = 1.0 / det
         nx, ny, nz = nx * scale, ny * scale, nz * scale
         # twice the area in pixels over the longer side of the box is no less than the width

@@ -22,12 +22,11 @@ from viewsphere.truth.kernels_draw import (
     ROUNDED_UP,
     SLIVER,
     crossing_at,
-    edge,
+    edges_inside,
     hits_surface,
-    negated,
     plane,
 )
-from viewsphere.truth.kernels_rays import LEAF, leaf_list, limits, pixel_box, touched
+from viewsphere.truth.kernels_rays import ANY_DEPTH, LEAF, NO_BOX, leaf_list, limits, pixel_box, touched
 from viewsphere.truth.kernels_row import NEARER
 
 U = nb.uintp
@@ -54,7 +53,7 @@ def _box(q, i0, i1, i2, reach, width, height):
 
 
 @njit(_nrt=True)
-def around(q, triangles, left_out, window):
+def around(q, triangles, cutout, left_out, window):
     """The triangles that may touch a window (x0, y0, x1, y1; pixels, both ends included) but those left out, int64."""
     x0, y0, x1, y1 = window
     side = np.zeros(q.shape[0], np.uint8)  # a bit for each side of the window that a vertex is beyond
@@ -68,7 +67,7 @@ def around(q, triangles, left_out, window):
     for t in range(U(triangles.shape[0])):
         order[n] = t
         beyond = side[U(triangles[t, a])] & side[U(triangles[t, b])] & side[U(triangles[t, c])]
-        n += U((beyond == 0) & (not left_out[t]))
+        n += U(((beyond == 0) | (cutout[t] < NEVER)) & (not left_out[t]))
     return order[:n]
 
 
@@ -114,10 +113,11 @@ def draw(q, order, triangles, cutout, cutouts, see_through, points, solid, fragm
         t = order[i]
         ut = U(t)
         i0, i1, i2 = U(triangles[ut, a]), U(triangles[ut, b]), U(triangles[ut, c])
-        xa, ya, xb, yb = _box(q, i0, i1, i2, points[3], width, height)
+        endless = cutout[ut] < NEVER
+        xa, ya, xb, yb = (BEHIND, 0, 0, 0) if endless else _box(q, i0, i1, i2, points[3], width, height)
         if xa > xb or ya > yb or cutout[ut] == NEVER:
             continue
-        most = level(max(q[i0, d], q[i1, d], q[i2, d]) * (ROUNDED_UP + TIE))
+        most = level(np.inf if endless else max(q[i0, d], q[i1, d], q[i2, d]) * (ROUNDED_UP + TIE))
         narrow = xb - xa < NARROW and yb - ya < NARROW
         count = 0
         if xa != BEHIND and _is_hidden(tiles, xa, ya, xb, yb, most):
@@ -132,11 +132,9 @@ def draw(q, order, triangles, cutout, cutouts, see_through, points, solid, fragm
         if crossing:
             xa, ya, xb, yb = 0, 0, width - 1, height - 1
         nx, ny, nz, det = plane(q0, q1, q2)
-        if det == 0.0 or (w0 <= 0.0 and w1 <= 0.0 and w2 <= 0.0):
+        if det == 0.0 or (w0 <= 0.0 and w1 <= 0.0 and w2 <= 0.0 and not endless):
             continue
-        e0, e1, e2 = edge(q1, q2), edge(q2, q0), edge(q0, q1)
-        if det < 0.0:
-            e0, e1, e2 = negated(e0), negated(e1), negated(e2)
+        e0, e1, e2 = edges_inside(q0, q1, q2, (nx, ny, nz), det, cutout[ut])
         checked = cutout[ut] >= 0 or see_through[ut] or (not crossing and abs(det) < SLIVER * (w0 * w1 * w2))
         bounds = (0.0, np.inf)
         if checked and not crossing:
@@ -384,18 +382,17 @@ def draw_rays(q, order, triangles, cutout, cutouts, see_through, unit, table, po
             continue
         i0, i1, i2 = triangles[t, 0], triangles[t, 1], triangles[t, 2]
         q0, q1, q2 = (q[i0, 0], q[i0, 1], q[i0, 2]), (q[i1, 0], q[i1, 1], q[i1, 2]), (q[i2, 0], q[i2, 1], q[i2, 2])
-        if not unit and q0[2] <= 0.0 and q1[2] <= 0.0 and q2[2] <= 0.0:
+        endless = cutout[t] < NEVER
+        if not unit and not endless and q0[2] <= 0.0 and q1[2] <= 0.0 and q2[2] <= 0.0:
             continue
-        small, box = pixel_box(faces, q0, q1, q2)
+        small, box = (False, NO_BOX) if endless else pixel_box(faces, q0, q1, q2)
         if small and (box[2] < 0 or _is_empty(points, box)):
             continue
         nx, ny, nz, det = plane(q0, q1, q2)
         if det == 0.0:
             continue
-        e0, e1, e2 = edge(q1, q2), edge(q2, q0), edge(q0, q1)
-        if det < 0.0:
-            e0, e1, e2 = negated(e0), negated(e1), negated(e2)
-        sliver, bounds = limits(q0, q1, q2, det, unit)
+        e0, e1, e2 = edges_inside(q0, q1, q2, (nx, ny, nz), det, cutout[t])
+        sliver, bounds = (False, ANY_DEPTH) if endless else limits(q0, q1, q2, det, unit)
         surface = (t, cutout[t], see_through[t], (nx, ny, nz, det), bounds)
         count = 1 if small else touched(e0, e1, e2, sliver, levels, boxes, window, leaves)
         for i in range(count):

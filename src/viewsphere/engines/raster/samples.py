@@ -189,7 +189,7 @@ def _pile(
         if points.camera.distortion is None:
             y, x = np.divmod(points.pixels[:-1][behind], points.camera.width)
             window = x.min(), y.min(), x.max(), y.max()
-            solid = kernels.around(q, geometry.triangles, see_through, tuple(map(float, window)))
+            solid = kernels.around(q, geometry.triangles, geometry.triangle_cutout, see_through, tuple(map(float, window)))
         else:
             solid = np.flatnonzero(~see_through[:-1])
         points.draw(geometry, q, see_through, solid)
