@@ -15,6 +15,7 @@ from PIL import Image
 
 from command_line import viewsphere
 from small import ROOT
+from viewsphere.store.manifest import sealed, unsealed
 
 PAGE = (ROOT / "docs" / "troubleshooting.md").read_text("utf-8")
 HEADINGS = re.findall(r"^### `(.+)`$", PAGE, re.MULTILINE)
@@ -287,17 +288,16 @@ def test_an_unfinished_or_damaged_data_set_and_a_changed_model(said):
 def test_another_version_s_data_set(said, monkeypatch):
     said("render t.yaml -o out --workers 0")
     plan = Path("out/store/plan.json")
-    record = json.loads(plan.read_text())
-    plan.write_text(json.dumps({**record, "version": "0.0.1"}))
+    plan.write_text(sealed({**unsealed(plan.read_text()), "version": "0.0.1"}))
     assert_shown("data made by viewsphere", said("render t.yaml -o out --workers 0"))
 
 
 def test_another_state_of_the_engine(said):
     said("render t.yaml -o out --workers 0 --set shot_frames=1")
     plan = Path("out/store/plan.json")
-    record = json.loads(plan.read_text())
+    record = unsealed(plan.read_text())
     record["parts"][0]["settings"]["the engine's program"] = "another"
-    plan.write_text(json.dumps(record))
+    plan.write_text(sealed(record))
     shutil.rmtree(next(Path("out/store/shots").glob("*/*")))
     assert_shown("that is installed paints them", said("render t.yaml -o out --workers 0 --set shot_frames=1"))
 

@@ -496,7 +496,7 @@ def test_lights_at_awkward_places_give_finite_light():
         SpotLight(position=(0, 0, 3), strength=2, angle_deg=160),
         AreaLight(position=(0, 1, 0), toward=(0, 1, 0), strength=2),
         AreaLight(position=(0, 3, 0), strength=2, size=(1e-9, 1e-9)),
-        AreaLight(position=(0, 3, 2), strength=2, size=(1, 0)),
+        AreaLight(position=(0, 3, 2), strength=2, size=(1, 1e-9)),
         PointLight(position=(0, 0, 0), strength=0),
         PointLight(position=(0, 0, -3), strength=2),
         PointLight(position=(0, 0, 900), strength=2),

@@ -28,6 +28,7 @@ from viewsphere.model.sample import ObjectAnnotation
 from viewsphere.sampling.extension import extend, whole
 from viewsphere.sampling.pose_numbers import kept, names_of
 from viewsphere.store import PlanRecord, Store
+from viewsphere.store.manifest import sealed, unsealed
 
 BOX = {"source": "zoo:post_box", "category": "post box", "scale": {"length": 0.18}}
 POSES = {"azimuth": [0, 120, 240], "elevation": [15, 50], "distance": 1.0}
@@ -474,9 +475,9 @@ def test_a_new_model_that_cannot_be_read_is_refused_or_left_out(of_files, tmp_pa
 
 def test_another_version_s_data_are_refused(out):
     file = out / "store" / "plan.json"
-    text = file.read_text()
+    value = unsealed(file.read_text())
     file.unlink()
-    file.write_text(text.replace(f'"version":"{json.loads(text)["version"]}"', '"version":"0.0.1"'))
+    file.write_text(sealed(value | {"version": "0.0.1", "parts": [part | {"version": "0.0.1"} for part in value["parts"]]}))
     before = state(out)
     with pytest.raises(StoreError, match=r"expected data made by viewsphere .*, found 0\.0\.1"):
         generate(recipe(models=models(3)), out, append=True)

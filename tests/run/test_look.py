@@ -1,6 +1,5 @@
 """A data set does not get frames that the engine of another day painted."""
 
-import json
 import shutil
 
 import pytest
@@ -11,6 +10,7 @@ from viewsphere.run.generate import generate
 from viewsphere.sampling.fitting import LOOK
 from viewsphere.sampling.look import engine_look
 from viewsphere.store import Store
+from viewsphere.store.manifest import sealed, unsealed
 
 RECIPE = {"channels": ["rgb"], "formats": [], "shot_frames": 3}
 
@@ -38,12 +38,12 @@ def half(finished):
 def painted_by(out, look):
     """Let the data set say that its pictures have another look; None: that it says nothing."""
     file = Store(out).plan_file
-    value = json.loads(file.read_text())
+    value = unsealed(file.read_text())
     for part in value["parts"]:
         part["settings"].pop(LOOK)
         if look is not None:
             part["settings"][LOOK] = look
-    file.write_text(json.dumps(value))
+    file.write_text(sealed(value))
 
 
 def test_it_is_of_the_sources():

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from viewsphere.model.model_spec import Size
 from viewsphere.store.index import Block, Index, Row
+from viewsphere.store.manifest import sealed, unsealed
 
 STORE_VERSION = 2
 
@@ -209,22 +210,23 @@ class PlanRecord:
         return list(accumulate(counts, initial=0))
 
     def to_json(self) -> str:
-        """The text of plan.json."""
+        """The text of plan.json, which carries its own digest."""
         value = {f.name: getattr(self, f.name) for f in fields(self)}
         value |= {
             "store": STORE_VERSION,
             "categories": [c.__dict__ for c in self.categories],
             "parts": [asdict(part) for part in self.parts],
         }
-        return json.dumps(value, separators=(",", ":"))
+        return sealed(value)
 
     @staticmethod
     def from_json(text: str) -> PlanRecord:
         """Read plan.json's text; raises KeyError, TypeError or ValueError for anything else."""
-        value: dict[str, Any] = json.loads(text)
-        found = value.pop("store")
+        found = json.loads(text)["store"]
         if found != STORE_VERSION:
             raise ValueError(f"a store of version {found}, where this viewsphere reads {STORE_VERSION}: render the recipe anew")
+        value = unsealed(text)
+        del value["store"]
         value["categories"] = tuple(Category(**c) for c in value["categories"])
         value["parts"] = tuple(Part.from_plain(part) for part in value.get("parts", ()))
         for name in ("splits", "channels", "models"):
