@@ -132,7 +132,7 @@ def test_a_blender_killed_between_frames_costs_nothing(blender):
 
 
 def test_a_blender_killed_within_a_frame_costs_nothing(blender):
-    engine = DRAFT | {"samples": 64}
+    engine = DRAFT | {"samples": 512}  # so that a frame takes longer than the killer waits
     expected = pictures(engine=engine)
 
     def kill():
@@ -329,6 +329,7 @@ def test_company_repaints_and_scenery_look_alike():
             "materials": [{"tint": {"choice": ["#c03020", "#2040c0"]}, "roughness": 0.4}],
         },
         "channels": ["rgb", "instances"],
+        "splits": {"by": "frame"},
     }
     for cycles, raster in zip(render(recipe_of(**given)), render(recipe_of({"name": "raster"}, **given)), strict=True):
         assert cycles.channels["instances"].tobytes() == raster.channels["instances"].tobytes()

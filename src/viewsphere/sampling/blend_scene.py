@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from fnmatch import fnmatchcase
 from functools import cached_property, lru_cache
 from pathlib import Path
@@ -18,7 +18,7 @@ from viewsphere.geometry.rotation import Float, compose, transform
 from viewsphere.model.mistakes import nearest
 from viewsphere.model.model_spec import ModelSpec, Parts
 from viewsphere.model.scene import BlendScene, Matrix4
-from viewsphere.model.thing import Thing
+from viewsphere.model.thing import Motion, Thing
 from viewsphere.recipe.blend import VALUE, BlendEntry, LabelRule, VariantEntry
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.scenery import Labels
@@ -51,6 +51,10 @@ class BlendScenery:
     entry: BlendEntry
     turn_of: Turn
     frames: tuple[int, ...] = ()
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What other processes are sent: they ask Blender's cached answers themselves."""
+        return {field.name: getattr(self, field.name) for field in fields(self)}
 
     @property
     def path(self) -> Path:
@@ -204,7 +208,7 @@ class BlendScenery:
         if not thing.id or model.parts is None:
             return thing.model_copy(update={"model": model})
         moved = compose(np.array(self.world_from_file), np.array(model.parts.file_from_axes))
-        return thing.model_copy(update={"model": model, "world_from_object": _rows(moved)})
+        return thing.model_copy(update={"model": model, "motion": Motion.still(_rows(moved))})
 
     def model_at(self, spec: ModelSpec, frame: int) -> ModelSpec:
         """A model that is taken of the file, at one of the frames; anything else as it is."""

@@ -8,10 +8,11 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from importlib.metadata import version
 from itertools import chain, groupby
+from typing import Any
 
 import numpy as np
 
@@ -43,6 +44,10 @@ class Portion:
     plan: Plan
     record: PlanRecord
     number: int
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What other processes are sent: not what was computed so far."""
+        return {field.name: getattr(self, field.name) for field in fields(self)}
 
     @property
     def part(self) -> Part:

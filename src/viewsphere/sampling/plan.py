@@ -6,10 +6,11 @@ import hashlib
 import json
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from itertools import chain, groupby
 from pathlib import Path
+from typing import Any
 
 from viewsphere import plugins
 from viewsphere.errors import RecipeError
@@ -79,6 +80,10 @@ class Plan:
     composition: Composition | None = None  # of place, company and planes
     timings: tuple[Timing | None, ...] = ()  # of each model; none at all where nothing moves
     kept_splits: Mapping[str, str] = field(default_factory=dict[str, str])  # of models that a data set has already
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What other processes are sent: not what was computed so far."""
+        return {field.name: getattr(self, field.name) for field in fields(self)}
 
     @cached_property
     def intrinsics(self) -> Intrinsics:
