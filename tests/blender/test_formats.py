@@ -418,8 +418,8 @@ def test_time_and_memory_are_bounded(made, monkeypatch, tmp_path):
         with pytest.raises(ModelError, match=r"800,000,000 bytes of memory \(limit MAX_READ_BYTES\)"):
             load(spec, folder=tmp_path)
         monkeypatch.delenv("VIEWSPHERE_MAX_READ_BYTES")
-    monkeypatch.setattr(limits, "MAX_READ_SECONDS", 1.5)
-    with pytest.raises(ModelError, match=r"within 1.5 s \(limit MAX_READ_SECONDS\)"):
+    monkeypatch.setattr(limits, "MAX_READ_SECONDS", 0.2)  # Blender takes longer to start, on any machine
+    with pytest.raises(ModelError, match=r"within 0.2 s \(limit MAX_READ_SECONDS\)"):
         load(spec, folder=tmp_path)
     end = time.monotonic() + 10
     while readers() and time.monotonic() < end:
