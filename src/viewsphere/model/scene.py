@@ -244,12 +244,16 @@ class BlendScene(Frozen):
 
 
 class Scene(Frozen):
-    """Light, ground and finish; None for `sun` or `ground` means there is none. `blend` has its own light and ground."""
+    """Light, ground and finish; None for `sun` or `ground` means there is none. `blend` has its own light and ground.
+
+    `floor` (metres): the ground is at most this high. Without one the ground lies below all that is placed, at any instant of
+    the shot; where what moves is cut into several shots, it has one height only by a floor that nothing is below in any.
+    """
 
     sun: Sun | None = Sun()
     sky: AnySky = Sky()
     lights: tuple[AnyLight, ...] = ()
     ground: Ground | None = None
-    floor: float | None = None  # metres: the ground is at most this high, where something moves
+    floor: float | None = None
     finish: Finish = Finish()
     blend: BlendScene | None = None

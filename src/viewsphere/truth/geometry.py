@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from itertools import accumulate, pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from viewsphere.assets.mesh import Mesh
 from viewsphere.model.model_spec import ModelSpec
@@ -22,17 +22,12 @@ BACKGROUND = 0
 GROUND_REACH = 1000.0
 """Scene sizes from the middle to the ground's corners: as far as a renderer without endless planes has to draw it."""
 
-STACKED = (
-    "vertices",
-    "normals",
-    "coordinates",
-    "triangle_normals",
-    "triangle_side",
-    "triangle_object",
-    "triangle_part",
-    "triangle_category",
-)
+OF_VERTICES = ("vertices", "normals", "coordinates", "is_used")
+OF_TRIANGLES = ("triangle_normals", "triangle_side", "triangle_object", "triangle_part", "triangle_category")
+STACKED = (*OF_VERTICES, *OF_TRIANGLES, "bounds")
 """Arrays of a geometry that are those of its parts, one after another."""
+
+Corner = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,6 +41,9 @@ class Geometry:
     the mean of the vertex normals agrees with the winding, -1 where it opposes it, 2 or -2 likewise where all three equal the
     triangle's own; triangle_object, triangle_part, triangle_category (T,) int32, 0 for scenery and ground; triangle_cutout
     (T,) int32: -1 all surface, -2 never seen, -3 and -4 `cutouts.ENDLESS`, else a row of `cutouts.corners`.
+
+    is_used (V,): whether a vertex is a triangle's corner; bounds (N, 2, 3) float64: of each thing, world metres, the lowest and
+    the highest of its used vertices, infinite where it has none.
 
     The ground is the whole plane z = ground_z, its two triangles are halves of it. They stand for no place: under what moves
     their corners move along, so a point of the ground is kept as its place in the world.
@@ -65,6 +63,8 @@ class Geometry:
     triangle_category: NDArray[np.int32]
     triangle_cutout: NDArray[np.int32]
     cutouts: Cutouts
+    is_used: NDArray[np.bool_]
+    bounds: NDArray[np.float64]
     vertex_start: tuple[int, ...]
     triangle_start: tuple[int, ...]
     object_count: int
@@ -75,12 +75,9 @@ class Geometry:
         """Whether anything but objects and the ground is there."""
         return self.object_count < len(self.vertex_start) - 1
 
-    @cached_property
-    def is_used(self) -> NDArray[np.bool_]:
-        """(V,): whether a vertex is a triangle's corner."""
-        used = np.zeros(len(self.vertices), np.bool_)
-        used[self.triangles] = True
-        return used
+    def extent(self, things: int | None = None) -> tuple[Corner, Corner]:
+        """Lowest and highest corner (3,) of the first so many things, of all without a number; the origin if they have none."""
+        return _extent(self.bounds[:things])
 
 
 def placed_meshes(things: Sequence[Thing], load: Callable[[ModelSpec], Mesh]) -> list[Mesh]:
@@ -112,7 +109,29 @@ def build_geometry(
     parts = [_placed(tuple(things[:count]), tuple(meshes[:count]), label_alpha)]
     if count < len(meshes):
         parts.append(_scenery(tuple(things[count:]), tuple(meshes[count:]), label_alpha))
-    return _stacked([*parts, _ground(parts, floor)] if ground else parts)
+    return _stacked([*parts, _ground(np.concatenate([part.bounds for part in parts]), floor)] if ground else parts)
+
+
+def place(geometry: Geometry, i: int, thing: Thing, mesh: Mesh) -> None:
+    """Write where thing i of a geometry is, which is built for this mesh or one with the same triangles."""
+    from viewsphere.truth import kernels_place as kernels
+
+    own = slice(geometry.vertex_start[i], geometry.vertex_start[i + 1])
+    vertices, normals, is_used = geometry.vertices[own], geometry.normals[own], geometry.is_used[own]
+    geometry.coordinates[own] = mesh.vertices
+    read_only = (_read_only(mesh.vertices), _read_only(mesh.normals))
+    kernels.place(np.array(thing.world_from_object), *read_only, is_used, vertices, normals, geometry.bounds[i])
+    _face(geometry, geometry.triangle_start[i], geometry.triangle_start[i + 1])
+
+
+def lay_ground(geometry: Geometry, floor: float | None) -> Geometry:
+    """The same with its ground, if any, where `build_geometry` lays it; its corners are written in place."""
+    if geometry.ground_z is None:
+        return geometry
+    corners = _ground_corners(geometry.bounds, floor)
+    geometry.vertices[geometry.vertex_start[-1] :] = corners
+    _face(geometry, geometry.triangle_start[-1], len(geometry.triangles))
+    return replace(geometry, ground_z=float(corners[0, 2]))
 
 
 def without_ground(geometry: Geometry) -> Geometry:
@@ -120,8 +139,8 @@ def without_ground(geometry: Geometry) -> Geometry:
     if geometry.ground_z is None:
         return geometry
     vertices, triangles = geometry.vertex_start[-1], geometry.triangle_start[-1]
-    names = (*STACKED, "triangles", "triangle_cutout")
-    kept = {name: getattr(geometry, name)[: triangles if name.startswith("triangle") else vertices] for name in names}
+    kept = {name: getattr(geometry, name)[:vertices] for name in OF_VERTICES}
+    kept |= {name: getattr(geometry, name)[:triangles] for name in (*OF_TRIANGLES, "triangles", "triangle_cutout")}
     return replace(geometry, **kept, ground_z=None)
 
 
@@ -135,31 +154,34 @@ def with_blended_colors(geometry: Geometry, meshes: Sequence[Mesh]) -> Geometry:
 
 
 def _placed(things: tuple[Thing, ...], meshes: tuple[Mesh, ...], label_alpha: float) -> Geometry:
-    moves = [p.world_from_object for p in things]
     vertex_start = (0, *accumulate(len(m.vertices) for m in meshes))
-    vertices = _joined([_moved(w, m.vertices, 1.0) for w, m in zip(moves, meshes, strict=True)], (0, 3), np.float64)
-    triangles = _joined([m.triangles + s for m, s in zip(meshes, vertex_start, strict=False)], (0, 3), np.int32)
-    normals = _joined([_moved(w, m.normals, 0.0) for w, m in zip(moves, meshes, strict=True)], (0, 3), np.float32)
-    labels = _joined([_labels(p, m) for p, m in zip(things, meshes, strict=True)], (0, 3), np.int32)
+    triangles = _joined([m.triangles + s for m, s in zip(meshes, vertex_start, strict=False)], np.int32)
+    labels = _joined([_labels(p, m) for p, m in zip(things, meshes, strict=True)], np.int32)
     cutouts, rows = stack_cutouts([mesh_cutouts(m, label_alpha) for m in meshes])
-    triangle_normals = _triangle_normals(vertices, triangles)
-    return Geometry(
-        vertices=vertices,
+    is_used = np.zeros(vertex_start[-1], np.bool_)
+    is_used[triangles] = True
+    part = Geometry(
+        vertices=np.empty((vertex_start[-1], 3)),
         triangles=triangles,
-        normals=normals,
-        coordinates=_joined([m.vertices for m in meshes], (0, 3), np.float32),
-        triangle_normals=triangle_normals,
-        triangle_side=_triangle_side(triangle_normals, normals[triangles]),
+        normals=np.empty((vertex_start[-1], 3), np.float32),
+        coordinates=np.empty((vertex_start[-1], 3), np.float32),
+        triangle_normals=np.empty((len(triangles), 3), np.float32),
+        triangle_side=np.empty(len(triangles), np.int8),
         triangle_object=labels[:, 0],
         triangle_part=labels[:, 1],
         triangle_category=labels[:, 2],
         triangle_cutout=rows,
         cutouts=cutouts,
+        is_used=is_used,
+        bounds=np.empty((len(things), 2, 3)),
         vertex_start=vertex_start,
         triangle_start=(0, *accumulate(len(m.triangles) for m in meshes)),
         object_count=sum(p.id > 0 for p in things),
         ground_z=None,
     )
+    for i, (thing, mesh) in enumerate(zip(things, meshes, strict=True)):
+        place(part, i, thing, mesh)
+    return part
 
 
 _scenery = lru_cache(maxsize=1)(_placed)
@@ -189,60 +211,63 @@ def _labels(thing: Thing, mesh: Mesh) -> NDArray[np.int32]:
     return labels
 
 
-def _ground(parts: Sequence[Geometry], floor: float | None) -> Geometry:
+def _ground(bounds: NDArray[np.float64], floor: float | None) -> Geometry:
     """A plane in two halves, below all that is placed and not above `floor`, counter-clockwise seen from above."""
-    used = np.concatenate([part.vertices[part.is_used] for part in parts])
-    low, high = (used.min(axis=0), used.max(axis=0)) if len(used) else (np.zeros(3), np.zeros(3))
-    size = float(np.max(high - low)) or 1.0
-    x, y = (low[:2] + high[:2]) / 2
-    z = low[2] if floor is None else min(low[2], floor)
-    r = GROUND_REACH * size
-    corners = np.array([[x - r, y - r, z], [x + r, y - r, z], [x + r, y + r, z], [x - r, y + r, z]])
-    triangles = np.array([[0, 1, 2], [0, 2, 3]], np.int32)
-    up = np.tile(np.array([0, 0, 1], np.float32), (4, 1))
-    normals, background = _triangle_normals(corners, triangles), np.full(2, BACKGROUND, np.int32)
-    return Geometry(
+    corners = _ground_corners(bounds, floor)
+    up, background = np.tile(np.array([0, 0, 1], np.float32), (4, 1)), np.full(2, BACKGROUND, np.int32)
+    ground = Geometry(
         vertices=corners,
-        triangles=triangles,
+        triangles=np.array([[0, 1, 2], [0, 2, 3]], np.int32),
         normals=up,
         coordinates=np.zeros_like(up),
-        triangle_normals=normals,
-        triangle_side=_triangle_side(normals, up[triangles]),
+        triangle_normals=np.empty((2, 3), np.float32),
+        triangle_side=np.empty(2, np.int8),
         triangle_object=background,
         triangle_part=background,
         triangle_category=background,
         triangle_cutout=np.array(ENDLESS, np.int32),
         cutouts=NO_CUTOUTS,
+        is_used=np.ones(4, np.bool_),
+        bounds=np.empty((0, 2, 3)),
         vertex_start=(0,),
         triangle_start=(0,),
         object_count=0,
-        ground_z=float(z),
+        ground_z=float(corners[0, 2]),
     )
+    _face(ground, 0, 2)
+    return ground
 
 
-def _joined(arrays: Sequence[NDArray[Any]], empty: tuple[int, ...], dtype: type) -> NDArray[Any]:
-    return np.ascontiguousarray(np.concatenate([np.zeros(empty, dtype), *arrays]), dtype)
+def _ground_corners(bounds: NDArray[np.float64], floor: float | None) -> Corner:
+    """Corners (4, 3) of the ground below things of these bounds (N, 2, 3)."""
+    low, high = _extent(bounds)
+    x, y = (low[:2] + high[:2]) / 2
+    z = low[2] if floor is None else min(low[2], floor)
+    r = GROUND_REACH * (float(np.max(high - low)) or 1.0)
+    return np.array([[x - r, y - r, z], [x + r, y - r, z], [x + r, y + r, z], [x - r, y + r, z]])
 
 
-def _moved(matrix: ArrayLike, points: NDArray[np.float32], w: float) -> NDArray[np.float64]:
-    """Points (w = 1) or directions (w = 0) moved; written out, because BLAS rounds differently from processor to processor."""
-    m = np.asarray(matrix, np.float64)
-    x, y, z = points.astype(np.float64).T
-    return np.stack([m[r, 0] * x + m[r, 1] * y + m[r, 2] * z + m[r, 3] * w for r in range(3)], axis=1)
+def _extent(bounds: NDArray[np.float64]) -> tuple[Corner, Corner]:
+    low, high = bounds[:, 0].min(axis=0, initial=np.inf), bounds[:, 1].max(axis=0, initial=-np.inf)
+    return (low, high) if low[0] <= high[0] else (np.zeros(3), np.zeros(3))
 
 
-def _triangle_normals(vertices: NDArray[np.float64], triangles: NDArray[np.int32]) -> NDArray[np.float32]:
-    a, b, c = (vertices[triangles[:, k]] for k in range(3))
-    normal = np.cross(b - a, c - a)
-    largest = np.abs(normal).max(axis=1, initial=0.0)
-    normal /= np.where(largest > 0, largest, 1)[:, None]  # keeps the squares of tiny triangles from vanishing
-    length = np.sqrt((normal * normal).sum(axis=1))
-    return (normal / np.where(length > 0, length, 1)[:, None]).astype(np.float32)
+def _face(geometry: Geometry, first: int, stop: int) -> None:
+    """Write which way triangles [first, stop) face."""
+    from viewsphere.truth import kernels_place as kernels
+
+    own = slice(first, stop)
+    normals, side = geometry.triangle_normals[own], geometry.triangle_side[own]
+    kernels.face(geometry.vertices, geometry.normals, geometry.triangles[own], normals, side)
 
 
-def _triangle_side(own: NDArray[np.float32], corners: NDArray[np.float32]) -> NDArray[np.int8]:
-    mean = corners.sum(axis=1)
-    side = np.where((mean * own).sum(axis=1) < 0, -1, 1)
-    same = (corners == corners[:, :1]).all(axis=(1, 2))
-    flat = same & (np.abs(corners[:, 0] - side[:, None] * own).max(axis=1, initial=0) < 1e-5)
-    return np.where(flat, 2 * side, side).astype(np.int8)
+def _joined(arrays: Sequence[NDArray[Any]], dtype: type) -> NDArray[Any]:
+    """Rows of three numbers, one after another."""
+    return np.ascontiguousarray(np.concatenate([np.zeros((0, 3), dtype), *arrays]), dtype)
+
+
+def _read_only(array: NDArray[np.float32]) -> NDArray[np.float32]:
+    """A view that cannot be written to, whatever the array is: kernels are compiled once for both."""
+    view = np.ascontiguousarray(array).view()
+    view.setflags(write=False)
+    return view

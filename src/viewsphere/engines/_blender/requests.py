@@ -171,18 +171,17 @@ def extent(geometry: Geometry, has_scenery: bool) -> tuple[NDArray[np.float64], 
     """Centre (3,) and half the diagonal of all that is placed; with scenery the world's origin and the next power of two, so
     that they stay when the targets change.
     """
-    placed = geometry.vertices[geometry.triangles[: geometry.triangle_start[-1]].reshape(-1)]
-    if not len(placed):
+    if not geometry.triangle_start[-1]:
         return np.zeros(3), 1.0
-    low, high = placed.min(axis=0), placed.max(axis=0)
+    low, high = geometry.extent()
     unit = float(np.linalg.norm(high - low)) / 2 or 1.0
     return (np.zeros(3), 2.0 ** math.ceil(math.log2(unit))) if has_scenery else ((low + high) / 2, unit)
 
 
 def middle_of(geometry: Geometry, count: int) -> NDArray[np.float64]:
     """Centre (3,) of the box around the first so many things, world metres."""
-    seen = geometry.vertices[geometry.triangles[: geometry.triangle_start[count]].reshape(-1)]
-    return (seen.min(axis=0) + seen.max(axis=0)) / 2 if len(seen) else np.zeros(3)
+    low, high = geometry.extent(count)
+    return (low + high) / 2
 
 
 def _told_lights(scene: Scene, middle: NDArray[np.float64]) -> list[Told]:

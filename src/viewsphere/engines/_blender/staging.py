@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from viewsphere.assets.mesh import Mesh
 from viewsphere.blender.interpreter import GRAPHICS, find_blender
 from viewsphere.blender.process import BlenderProcess
+from viewsphere.engines._arranged import Arrangements
 from viewsphere.engines._blender.backdrop import Backdrop
 from viewsphere.engines._blender.file_frame import FileFrame
 from viewsphere.engines._blender.lens import resampled, views_of
@@ -27,10 +28,9 @@ from viewsphere.imaging.finish import finished
 from viewsphere.imaging.seen import seen_by
 from viewsphere.model.camera import Camera
 from viewsphere.model.model_spec import ModelSpec
-from viewsphere.model.scene import Matrix4
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
-from viewsphere.truth.geometry import Geometry, build_geometry, placed_meshes, present
+from viewsphere.truth.geometry import Geometry
 from viewsphere.truth.visibility import Visibility, homogeneous
 
 STAGE_SECONDS = 600.0
@@ -59,9 +59,6 @@ Clip = tuple[float, float]
 
 AllLevels = tuple[Levels, ...]
 """Of each kind of model."""
-
-Poses = tuple[Matrix4 | None, ...]
-"""Of all that moves."""
 
 Bounds = tuple[Path, ...] | None
 """The folders that Blender may read, where it opens a file of a user's; None where it opens none."""
@@ -138,28 +135,33 @@ def keeper_of(python: Path) -> Keeper:
 class CyclesStage:
     """A shot's scene for Blender."""
 
-    shot: Shot
-    meshes: Sequence[Mesh]
+    arrangements: Arrangements
     options: AnyOptions
     keeper: Keeper
-    _arranged: dict[Poses, Arrangement] = field(default_factory=dict[Poses, "Arrangement"])
+    _arranged: dict[Geometry, Arrangement] = field(default_factory=dict[Geometry, "Arrangement"])
+
+    @property
+    def shot(self) -> Shot:
+        """What is painted."""
+        return self.arrangements.shot
 
     def of(self, shot: Shot) -> CyclesStage:
         """The same for another shot, one of an equal `stage_key`."""
-        return replace(self, shot=shot)
+        return replace(self, arrangements=self.arrangements.of(shot))
 
     def at(self, instant: int) -> Geometry:
         """The world-space triangles at an instant, counted from 0 in the shot."""
-        return self.arrangement(instant).geometry
+        return self.arrangements.at(instant).geometry
 
     def arrangement(self, instant: int) -> Arrangement:
         """All things as they stand at an instant; the last one is kept."""
-        poses = self.shot.poses_at(instant)
-        if poses not in self._arranged:
-            things = self.shot.things_at(instant)
+        now = self.arrangements.at(instant)
+        if now.geometry not in self._arranged:
             self._arranged.clear()
-            self._arranged[poses] = Arrangement(self.shot, things, present(things, self.meshes), self.options, self.keeper)
-        return self._arranged[poses]
+            self._arranged[now.geometry] = Arrangement(
+                self.shot, now.things, now.meshes, now.geometry, self.options, self.keeper
+            )
+        return self._arranged[now.geometry]
 
     def color(self, instant: int, sensor: int, visibility: Visibility, transparent: bool) -> NDArray[np.uint8]:
         """The picture of a sensor at an instant, (H, W, 3) uint8 sRGB; with `transparent` (H, W, 4) with straight alpha.
@@ -183,14 +185,9 @@ class Arrangement:
     shot: Shot
     things: Sequence[Thing]
     meshes: Sequence[Mesh]
+    geometry: Geometry
     options: AnyOptions
     keeper: Keeper
-
-    @cached_property
-    def geometry(self) -> Geometry:
-        """Truth's triangles."""
-        scene = self.shot.scene
-        return build_geometry(self.things, self.meshes, scene.ground is not None, self.shot.label_alpha, scene.floor)
 
     @property
     def bounds(self) -> Bounds:
@@ -323,5 +320,4 @@ def build_stage(shot: Shot, load: Callable[[ModelSpec], Mesh]) -> CyclesStage:
             f"scene.ground: expected on, off or a material for engine: {options.renderer}, found catcher, which auto is before "
             "background: environment: set it to off, or take engine: cycles or raster"
         )
-    meshes = placed_meshes(shot.things, load)
-    return CyclesStage(shot, meshes, options, keeper_of(find_blender(options.python)))
+    return CyclesStage(Arrangements.build(shot, load), options, keeper_of(find_blender(options.python)))

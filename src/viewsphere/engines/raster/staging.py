@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import partial
 
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from viewsphere.assets.mesh import Mesh
 from viewsphere.assets.srgb import linear
+from viewsphere.engines._arranged import Arranged, Arrangements
 from viewsphere.engines.raster import kernels_paint
 from viewsphere.engines.raster.environment import bake_surrounding, lamps_on_ground, sky_lights
 from viewsphere.engines.raster.kernels_material import L_BLENDED, L_METAL, L_METAL_TEXEL, L_TRANSMISSION
@@ -25,43 +26,43 @@ from viewsphere.imaging.background import display_background
 from viewsphere.imaging.finish import finished
 from viewsphere.imaging.seen import seen_by
 from viewsphere.model.model_spec import ModelSpec
-from viewsphere.model.scene import Ground, Matrix4, Scene
+from viewsphere.model.scene import Ground, Scene
 from viewsphere.model.shot import Shot
-from viewsphere.model.thing import Thing
 from viewsphere.surroundings.ground import ground_albedo, ground_frame, ground_material, only_scatters
 from viewsphere.surroundings.sky import even_light
-from viewsphere.truth.geometry import Geometry, build_geometry, placed_meshes, present, with_blended_colors
+from viewsphere.truth.geometry import Geometry, with_blended_colors
 from viewsphere.truth.visibility import Visibility
-
-Poses = tuple[Matrix4 | None, ...]
-"""Of all that moves."""
 
 
 @dataclass(frozen=True, eq=False)
 class RasterStage:
     """A shot's scene baked for shading, as it was at the last instant that was asked for."""
 
-    shot: Shot
-    meshes: tuple[Mesh, ...]
+    arrangements: Arrangements
     options: Options
-    _baked: dict[Poses, Baked] = field(default_factory=dict[Poses, Baked])
+    _baked: dict[Geometry, Baked] = field(default_factory=dict[Geometry, Baked])
     _canvases: dict[int, Float32] = field(default_factory=dict[int, Float32])
+
+    @property
+    def shot(self) -> Shot:
+        """What is painted."""
+        return self.arrangements.shot
 
     def of(self, shot: Shot) -> RasterStage:
         """The same for another shot, one of an equal `stage_key`."""
-        return replace(self, shot=shot)
+        return replace(self, arrangements=self.arrangements.of(shot))
 
     def at(self, instant: int) -> Geometry:
         """The world-space triangles at an instant, counted from 0 in the shot."""
-        return self.baked(instant).geometry
+        return self.arrangements.at(instant).geometry
 
     def baked(self, instant: int) -> Baked:
-        """What pictures of an instant are painted from."""
-        poses = self.shot.poses_at(instant)
-        if poses not in self._baked:
+        """What pictures of an instant are painted from; the last one is kept."""
+        arranged = self.arrangements.at(instant)
+        if arranged.geometry not in self._baked:
             self._baked.clear()
-            self._baked[poses] = _bake(self.shot, self.shot.things_at(instant), self.meshes, self.options)
-        return self._baked[poses]
+            self._baked[arranged.geometry] = _baked(arranged, self.shot.scene, self.options)
+        return self._baked[arranged.geometry]
 
     def color(self, instant: int, sensor: int, visibility: Visibility, transparent: bool) -> NDArray[np.uint8]:
         """The picture of a sensor at an instant, (H, W, 3) uint8 sRGB; with `transparent` (H, W, 4) with straight alpha.
@@ -92,30 +93,19 @@ def build_stage(shot: Shot, load: Callable[[ModelSpec], Mesh]) -> RasterStage:
     options = parse_options(shot.engine_options)
     lenses = [sensor.intrinsics for sensor in shot.rig.sensors]
     size = options.for_width(max(max(lens.width, lens.height) for lens in lenses))
-    return RasterStage(shot, tuple(placed_meshes(shot.things, load)), replace(options, shadow_resolution=size))
+    return RasterStage(Arrangements.build(shot, load), replace(options, shadow_resolution=size))
 
 
-def _bake(shot: Shot, things: Sequence[Thing], meshes: Sequence[Mesh], options: Options) -> Baked:
-    """What pictures of these things, as they stand, are painted from."""
-    scene = shot.scene
-    meshes = present(things, meshes)
-    geometry = build_geometry(things, meshes, scene.ground is not None, shot.label_alpha, scene.floor)
-    return _baked(geometry, meshes, things, sum(not thing.scenery for thing in things), scene, options)
+def _baked(arranged: Arranged, scene: Scene, options: Options) -> Baked:
+    """What pictures of these things, as they stand, are painted from.
 
-
-def _baked(
-    geometry: Geometry,
-    meshes: Sequence[Mesh],
-    things: Sequence[Thing],
-    targets: int,
-    scene: Scene,
-    options: Options,
-) -> Baked:
-    """Lengths are in units of all there is; where there is scenery, from the world's origin, so that they stay the same when
-    the targets change.
+    Lengths are in units of all there is; where there is scenery, from the world's origin, so that they stay the same when the
+    targets change.
     """
+    things, meshes, geometry = arranged.things, arranged.meshes, arranged.geometry
+    targets = sum(not thing.scenery for thing in things)
     scenery = tuple(things[targets:])
-    low, high = _bounds(geometry, geometry.triangle_start[-1])
+    low, high = geometry.extent()
     origin, unit = (low + high) / 2, float(np.linalg.norm(high - low)) / 2 or 1.0
     ground_z = geometry.ground_z
     if scenery:
@@ -123,7 +113,7 @@ def _baked(
     surfaces, textures = pack_surfaces(geometry, meshes, scene.ground, origin, unit, targets, things)
     reach = float(np.abs(np.stack([low, high]) - origin).max()) / unit
     if scenery:
-        low, high = _bounds(geometry, geometry.triangle_start[targets])
+        low, high = geometry.extent(targets)
         ground_z = float(low[2])
     floor_z = None if ground_z is None else (ground_z - float(origin[2])) / unit
     has_ground = scene.ground is not None
@@ -178,11 +168,3 @@ def _floor(
     color = linear(ground.color).tolist()
     frame = ground_frame(ground, made, origin, unit)
     return np.array([*frame, material, how, *color], np.float32), ground_albedo(made, images)
-
-
-def _bounds(geometry: Geometry, triangles: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Lowest and highest corner of the first so many triangles."""
-    is_used = np.zeros(len(geometry.vertices), np.bool_)
-    is_used[geometry.triangles[:triangles]] = True
-    used = geometry.vertices[is_used]
-    return (used.min(axis=0), used.max(axis=0)) if len(used) else (np.zeros(3), np.zeros(3))

@@ -1,0 +1,65 @@
+"""What the stages of all engines have in common: a shot's things, meshes and triangles at each instant."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+from viewsphere.assets.mesh import Mesh
+from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.shot import Shot
+from viewsphere.model.thing import Thing
+from viewsphere.truth.geometry import Geometry, placed_meshes, present
+from viewsphere.truth.moving import Ring, shot_floor
+
+
+@dataclass(frozen=True, eq=False)
+class Arranged:
+    """All things of a shot as they stand at an instant. meshes[i] is that of things[i], without triangles if that is not there;
+    `whole` has the triangles of those, too. `geometry` is another object where anything is elsewhere, and only then.
+    """
+
+    things: tuple[Thing, ...]
+    whole: tuple[Mesh, ...]
+    geometry: Geometry
+
+    @property
+    def meshes(self) -> list[Mesh]:
+        """What the geometry was built from."""
+        return present(self.things, self.whole)
+
+
+@dataclass(frozen=True, eq=False)
+class Arrangements:
+    """A shot's things at each of its instants; what stands still is loaded and placed once.
+
+    The triangles of a few instants are there at once: see `truth.moving.Ring`.
+    """
+
+    shot: Shot
+    load: Callable[[ModelSpec], Mesh]
+    meshes: tuple[Mesh, ...]
+    floor: float | None
+    ring: Ring
+
+    @classmethod
+    def build(cls, shot: Shot, load: Callable[[ModelSpec], Mesh]) -> Arrangements:
+        """Of a shot, with all its models loaded; `load` gives a model's normalised mesh."""
+        ring = Ring(shot.scene.ground is not None, shot.label_alpha)
+        return cls(shot, load, tuple(placed_meshes(shot.things, load)), None, ring).of(shot)
+
+    def of(self, shot: Shot) -> Arrangements:
+        """The same for another shot, one of an equal `stage_key`."""
+        own = replace(self, shot=shot)
+        return replace(own, floor=shot_floor(shot, lambda instant: own._meshes(shot.things_at(instant))))
+
+    def at(self, instant: int) -> Arranged:
+        """As they stand at an instant, counted from 0 in the shot."""
+        things = self.shot.things_at(instant)
+        meshes = self._meshes(things)
+        return Arranged(things, meshes, self.ring.at(things, meshes, self.floor))
+
+    def _meshes(self, things: tuple[Thing, ...]) -> tuple[Mesh, ...]:
+        """Of these things: what stands still is the shot's own."""
+        held = zip(self.shot.things, things, self.meshes, strict=True)
+        return tuple(mesh if now.model is own.model else self.load(now.model) for own, now, mesh in held)

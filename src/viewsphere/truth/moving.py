@@ -1,0 +1,160 @@
+"""Geometries of one scene at one instant after another: what moves is written in place, what stands still is shared."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.assets.mesh import Mesh
+from viewsphere.model.scene import Row
+from viewsphere.model.shot import Shot
+from viewsphere.model.thing import Thing
+from viewsphere.truth.geometry import Geometry, build_geometry, lay_ground, place, present
+
+ROOMS = 3
+"""Instants whose geometries are there at once: a picture's own, the one before and the one after."""
+
+MOVED = ("vertices", "normals", "coordinates", "triangle_normals", "triangle_side", "bounds")
+"""Arrays of a geometry that change where something moves, or deforms."""
+
+KEPT = ("triangles", "triangle_material", "triangle_part", "uv0", "uv1", "colors", "materials", "images")
+"""What a mesh and its deformed self have in common."""
+
+SLACK = 1e-6
+"""By how much, in metres beside the height itself, a box that is turned may be higher than what is in it: rounding."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Room:
+    """A geometry, and what it was made for."""
+
+    things: Sequence[Thing]
+    meshes: Sequence[Mesh]
+    floor: float | None
+    geometry: Geometry
+
+    def changed(self, things: Sequence[Thing], meshes: Sequence[Mesh]) -> list[int]:
+        """Which of the things are elsewhere, or deformed."""
+        held = zip(self.things, self.meshes, things, meshes, strict=True)
+        return [i for i, (a, mesh, b, other) in enumerate(held) if mesh is not other or not stands_alike(a, b)]
+
+    def fits(self, things: Sequence[Thing], meshes: Sequence[Mesh]) -> bool:
+        """Whether these are the same things, there or not there as before, made of the same triangles."""
+        held = zip(self.things, self.meshes, things, meshes, strict=True)
+        return all(a.is_there == b.is_there and differs_in_shape_only(mesh, other) for a, mesh, b, other in held)
+
+
+@dataclass(frozen=True, eq=False)
+class Ring:
+    """Gives the geometries of one scene's things, which are the same but for where they are, and for how their meshes are
+    deformed. Arrays of a geometry are written to again when those of three other instants were asked for since.
+
+    `ground` and `label_alpha`: see `build_geometry`, to whose result all are equal to the bit.
+    """
+
+    ground: bool
+    label_alpha: float
+    _rooms: list[_Room] = field(default_factory=list[_Room])
+
+    def at(self, things: Sequence[Thing], meshes: Sequence[Mesh], floor: float | None = None) -> Geometry:
+        """The geometry of these still things; `meshes[i]` is that of `things[i]` at this instant, whether it is there or not.
+
+        The same object again where nothing moved. Where a thing comes or goes, or has other triangles, all is built anew.
+        """
+        room = self._held(things, meshes, floor) or self._made(things, meshes, floor)
+        self._rooms.append(room)  # the last asked for comes last
+        return room.geometry
+
+    def _held(self, things: Sequence[Thing], meshes: Sequence[Mesh], floor: float | None) -> _Room | None:
+        for number, room in enumerate(self._rooms):
+            if room.floor == floor and not room.changed(things, meshes):
+                return self._rooms.pop(number)
+        return None
+
+    def _made(self, things: Sequence[Thing], meshes: Sequence[Mesh], floor: float | None) -> _Room:
+        fitting = [room for room in self._rooms if room.fits(things, meshes)]
+        free = self._rooms.pop(0) if len(self._rooms) == ROOMS else None
+        if not fitting:
+            geometry = build_geometry(things, present(things, meshes), self.ground, self.label_alpha, floor)
+            return _Room(things, meshes, floor, geometry)
+        room = fitting[0] if fitting[0] is free else fitting[-1]
+        geometry = room.geometry
+        if room is not free:
+            geometry = replace(geometry, **{name: getattr(geometry, name).copy() for name in MOVED})
+        for i in room.changed(things, meshes):
+            place(geometry, i, things[i], meshes[i])
+        return _Room(things, meshes, floor, replace(lay_ground(geometry, floor)))
+
+
+def stands_alike(a: Thing, b: Thing) -> bool:
+    """Whether two still things are in one place."""
+    return a is b or a.motion.poses == b.motion.poses
+
+
+def differs_in_shape_only(a: Mesh, b: Mesh) -> bool:
+    """Whether meshes differ in where their vertices are, and in their normals, at most."""
+    return a is b or all(_is_same(getattr(a, name), getattr(b, name)) for name in KEPT)
+
+
+def _is_same(a: object, b: object) -> bool:
+    if isinstance(a, np.ndarray) and isinstance(b, np.ndarray):
+        return a is b or np.array_equal(a, b)
+    return a is b or a == b
+
+
+def shot_floor(shot: Shot, meshes_at: Callable[[int], Sequence[Mesh]]) -> float | None:
+    """How high a shot's ground is at most, metres, None where nothing says: not above what moves is at any instant, nor above
+    `scene.floor`. So its height is one for the whole shot; `meshes_at` gives the mesh of each thing at an instant.
+
+    Where a sequence is cut into shots, its maker gives a `scene.floor` that nothing is below in any of them.
+    """
+    floor = shot.scene.floor
+    if shot.scene.ground is None or all(thing.motion.is_still for thing in shot.things):
+        return floor
+    lowest = math.inf if floor is None else floor
+    models: dict[int, _Underside] = {}
+    for instant in range(len(shot.instants)):
+        held = zip(shot.things, shot.things_at(instant), meshes_at(instant), strict=True)
+        moving = ((i, now, mesh) for i, (thing, now, mesh) in enumerate(held) if not thing.motion.is_still and now.is_there)
+        for i, thing, mesh in moving:
+            if i not in models or models[i].mesh is not mesh:
+                models[i] = _Underside(mesh)
+            lowest = models[i].lowest(thing.world_from_object[2], lowest)
+    return None if lowest == math.inf else lowest
+
+
+@dataclass(eq=False)
+class _Underside:
+    """How low a mesh reaches."""
+
+    mesh: Mesh
+    _row: Row | None = None
+
+    @cached_property
+    def _corners(self) -> NDArray[np.float64]:
+        """Of its triangles, (3, n)."""
+        used = np.zeros(len(self.mesh.vertices), np.bool_)
+        used[self.mesh.triangles] = True
+        return self.mesh.vertices[used].astype(np.float64).T
+
+    @cached_property
+    def _box(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Centre and half the sides."""
+        low, high = self._corners.min(axis=1), self._corners.max(axis=1)
+        return (low + high) / 2, (high - low) / 2
+
+    def lowest(self, row: Row, known: float) -> float:
+        """The least height in a pose with this third row, or `known`, whichever is lower."""
+        if row == self._row or not self._corners.size:
+            return known
+        self._row = row
+        turn, (middle, half) = np.array(row[:3]), self._box
+        if float(turn @ middle - np.abs(turn) @ half) + row[3] - SLACK * (1 + abs(row[3])) >= known:
+            return known
+        x, y, z = self._corners
+        return min(known, float((row[0] * x + row[1] * y + row[2] * z + row[3]).min()))

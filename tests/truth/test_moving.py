@@ -1,0 +1,167 @@
+"""What moves is written in place, and equals what is built of the same things at that instant, to the bit."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from truth_scenes import cube, lens, mesh_of, orbit_camera, random_soup, sphere
+
+from shots import AHEAD, still_shot
+from viewsphere.geometry.rotation import matrix_from_quaternion
+from viewsphere.labels import observe
+from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.scene import Ground, Scene
+from viewsphere.model.thing import Motion, Thing
+from viewsphere.truth.geometry import Geometry, build_geometry, present
+from viewsphere.truth.moving import MOVED, ROOMS, Ring, shot_floor
+from viewsphere.truth.visibility import rasterize
+
+ARRAYS = [field.name for field in dataclasses.fields(Geometry) if field.name != "cutouts"]
+
+
+def pose(rng):
+    """Any turn, and a place that is far away at times."""
+    turned = np.eye(4)
+    q = rng.normal(size=4)
+    turned[:3, :3] = matrix_from_quaternion(q / np.linalg.norm(q))
+    turned[:3, 3] = rng.normal(size=3) * 10 ** rng.uniform(-1, 4)
+    return tuple(map(tuple, turned.tolist()))
+
+
+def thing(number, where, scenery=False):
+    spec = ModelSpec(key=f"m{number}", source=f"m{number}", category="thing", category_id=0 if scenery else number + 3)
+    return Thing(id=0 if scenery else number + 1, model=spec, motion=Motion(poses=(where,)), scenery=scenery)
+
+
+def deformed(mesh, rng):
+    return dataclasses.replace(
+        mesh,
+        vertices=mesh.vertices + rng.normal(size=mesh.vertices.shape).astype(np.float32) / 10,
+        normals=mesh.normals[::-1].copy(),
+        triangles=mesh.triangles.copy(),
+    )
+
+
+def same(geometry, things, meshes, ground, floor):
+    built = build_geometry(things, present(things, meshes), ground, 0.3, floor)
+    for name in ARRAYS:
+        own, other = getattr(geometry, name), getattr(built, name)
+        if isinstance(own, np.ndarray):
+            assert own.dtype == other.dtype and own.tobytes() == other.tobytes(), name
+        else:
+            assert own == other, name
+    for own, other in zip(geometry.cutouts.arrays, built.cutouts.arrays, strict=True):
+        assert np.array_equal(own, other)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_what_moved_is_what_is_built_there(seed):
+    """Random walks of five things: some stand, turn, deform, go and come back; one changes its triangles."""
+    rng = np.random.default_rng(seed)
+    ground = seed % 3 > 0
+    floor = -2.0 if seed % 3 == 2 else None
+    shapes = [random_soup(rng, 60), sphere(2, 0.8), cube(0.7), mesh_of(np.zeros((0, 3)), []), cube(0.2)]
+    others = [cube(0.1), sphere(2, 0.4), cube(0.3), shapes[3], random_soup(rng, 5)]
+    poses, meshes, ring = [pose(rng) for _ in shapes], list(shapes), Ring(ground, 0.3)
+    for _ in range(14):
+        for i in rng.permutation(5)[: rng.integers(0, 4)].tolist():
+            what = rng.uniform()
+            poses[i] = None if what < 0.12 else pose(rng) if what < 0.8 else poses[i]
+            meshes[i] = others[i] if 0.8 < what < 0.84 else deformed(meshes[i], rng) if what > 0.85 else meshes[i]
+        things = [thing(i, where, scenery=i == 4) for i, where in enumerate(poses)]
+        same(ring.at(things, list(meshes), floor), things, meshes, ground, floor)
+
+
+def walk(count, standing=pose(np.random.default_rng(5))):
+    rng = np.random.default_rng(3)
+    return [[thing(0, pose(rng)), thing(1, standing)] for _ in range(count)]
+
+
+MESHES = [sphere(2, 0.8), cube(0.5)]
+
+
+def test_as_many_instants_as_there_are_rooms_live_at_once_and_share_what_stays():
+    ring, steps = Ring(True, 0.3), walk(ROOMS + 4)
+    for first in range(len(steps) - ROOMS + 1):
+        now = [ring.at(things, MESHES) for things in steps[first : first + ROOMS]]
+        for geometry, things in zip(now, steps[first:], strict=False):
+            same(geometry, things, MESHES, True, None)
+        for name in ARRAYS:
+            own = [getattr(geometry, name) for geometry in now]
+            if isinstance(own[0], np.ndarray):
+                assert all(np.shares_memory(own[0], each) for each in own[1:]) == (name not in MOVED), name
+
+
+def test_what_is_asked_for_again_is_the_same_object_and_what_moved_is_not():
+    ring, (a, b, *_) = Ring(True, 0.3), walk(3)
+    first, second = ring.at(a, MESHES), ring.at(b, MESHES)
+    assert ring.at(list(a), list(MESHES)) is first and ring.at(b, MESHES) is second and first is not second
+    assert ring.at(a, MESHES, -50000.0) is not first
+    assert ring.at(a, MESHES, -50000.0).ground_z == -50000.0 and first.ground_z > -50000.0
+
+
+def test_labels_of_what_moved_are_those_of_what_is_built_there():
+    """A visibility that was counted for one instant says nothing of another's, though rooms are used again."""
+    names = ["instances", "depth", "normals", "normals_geometric", "coordinates", "triangles"]
+    rng, ring = np.random.default_rng(0), Ring(True, 0.3)
+    for _ in range(3 * ROOMS):
+        near = np.array(pose(rng))
+        near[:3, 3] = rng.uniform(-0.8, 0.8, 3)
+        things = [
+            thing(0, tuple(map(tuple, near.tolist()))),
+            thing(1, ((1, 0, 0, 0.3), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1))),
+        ]
+        camera = orbit_camera(lens(48, 36), rng.uniform(-1, 1), rng.uniform(0.4, 1), 4.0)
+        geometry, built = ring.at(things, MESHES), build_geometry(things, MESHES, True, 0.3)
+        own, other = (observe(g, camera, rasterize(g, camera), names) for g in (geometry, built))
+        assert len(np.unique(own["instances"])) > 1
+        assert all(np.array_equal(own[name], other[name], equal_nan=True) for name in names)
+
+
+def lifted(*heights, turn=0.0):
+    c, s = np.cos(turn), np.sin(turn)
+    return tuple(h if h is None else ((1, 0, 0, h), (0, c, -s, 0), (0, s, c, h), (0, 0, 0, 1)) for h in heights)
+
+
+def moving(*poses, floor=None, ground=True):
+    things = [
+        Thing(id=i + 1, model=ModelSpec(key=str(i), source="m", category="c", category_id=1), motion=Motion(poses=own))
+        for i, own in enumerate(poses)
+    ]
+    return still_shot(things, viewpoints=[AHEAD] * 3, scene=Scene(ground=Ground() if ground else None, floor=floor))
+
+
+def floor_of(shot, meshes):
+    return shot_floor(shot, lambda _: meshes)
+
+
+def test_the_ground_is_as_high_as_at_the_lowest_instant():
+    shot = moving(lifted(2, -1, 3, turn=0.3), lifted(0))
+    assert floor_of(shot, [cube(0.5), cube(9.0)]) == -1 - (np.float64(0.5) * np.sin(0.3) + 0.5 * np.cos(0.3))
+    grounds = {
+        Ring(True, 0.3).at(shot.things_at(i), [cube(0.5), cube(0.5)], floor_of(shot, [cube(0.5), cube(0.5)])).ground_z
+        for i in range(3)
+    }
+    assert grounds == {floor_of(shot, [cube(0.5)] * 2)}
+
+
+def test_a_scene_says_that_its_ground_is_lower():
+    assert floor_of(moving(lifted(2, -1, 3), floor=-4.0), [cube()]) == -4.0
+    assert floor_of(moving(lifted(2, -1, 3), floor=4.0), [cube()]) == -1.5
+
+
+def test_what_is_not_there_or_stands_still_lays_no_ground():
+    assert floor_of(moving(lifted(2, None, 3)), [cube()]) == 1.5
+    assert floor_of(moving(lifted(2)), [cube()]) is None
+    assert floor_of(moving(lifted(2), floor=1.0), [cube()]) == 1.0
+    assert floor_of(moving(lifted(2, 0, 3), ground=False), [cube()]) is None
+    assert floor_of(moving((None, None, None)), [cube()]) is None
+
+
+def test_no_point_of_what_turns_is_below():
+    rng = np.random.default_rng(2)
+    for _ in range(20):
+        poses = tuple(pose(rng) for _ in range(3))
+        meshes = [random_soup(rng, 30)]
+        world = [Ring(False, 0.3).at(moving(poses).things_at(i), meshes).extent()[0][2] for i in range(3)]
+        assert floor_of(moving(poses), meshes) == min(world)
