@@ -134,6 +134,8 @@ def tampered(value: Any, where: Where, other: Any) -> Any:
 @pytest.mark.parametrize("name", FORMATS)
 def test_every_field_is_compared(exported, name, every):
     values = {file: json.loads(file.read_text()) for file in sorted((exported.root / name).rglob("*.json"))}
+    if not values:
+        pytest.skip("the format has no JSON; the bits of its files are flipped")
     cases = [
         (file, where, other)
         for file, value in values.items()
