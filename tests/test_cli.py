@@ -11,6 +11,7 @@ from PIL import Image
 
 from command_line import viewsphere
 from small import ROOT, small_recipe
+from viewsphere import plugins
 
 
 def fails(*words):
@@ -158,4 +159,4 @@ def test_a_part_is_exported_beside_the_data_set(small_run, tmp_path):
 
 
 def test_an_export_to_no_format_is_a_mistake(small_run):
-    assert "expected one or more of blend, coco, native" in fails("export", small_run, "-f", ",")
+    assert f"expected one or more of {', '.join(plugins.names('formats'))}" in fails("export", small_run, "-f", ",")
