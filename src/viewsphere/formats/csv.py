@@ -1,0 +1,132 @@
+"""A table for spreadsheets and data frames: one row an object, all of it plain numbers and words.
+
+    objects.csv                  a head, then a row an object; UTF-8, commas, RFC 4180 but for line ends, which are \n
+    <split>/<index>.png, ...     the pictures that the rows name
+
+Empty cells say that nothing is known, or that there is none. Frames without objects have a row with their picture alone.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Callable, Collection, Generator, Iterator
+from contextlib import contextmanager
+from itertools import zip_longest
+from pathlib import Path, PurePosixPath
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from viewsphere.formats import Remark
+from viewsphere.formats._contents import Expected, check_files, put
+from viewsphere.model.sample import ObjectAnnotation, Sample
+from viewsphere.store import Dataset
+
+TABLE = "objects.csv"
+BOXES = ("box2d", "box2d_projected", "box2d_unclipped")  # x0, y0, x1, y1 in pixels
+OF_SAMPLE = ("image", "index", "split", "width", "height", "sequence", "sensor", "instant", "time")
+OF_OBJECT = (
+    "id",
+    "category",
+    "supercategory",
+    "category_id",
+    "key",
+    "track",
+    "area",
+    "visibility",
+    "truncation",
+    "pose_category",
+)
+OF_VIEW = ("azimuth_deg", "elevation_deg", "distance", "tilt_deg")  # of the camera, as the object sees it
+LISTS = {
+    **dict.fromkeys(BOXES, ("x0", "y0", "x1", "y1")),
+    "quaternion": ("w", "x", "y", "z"),  # of camera_from_object
+    "translation": ("x", "y", "z"),
+    "size": ("width", "height", "length"),
+}
+HEAD = (*OF_SAMPLE, *OF_OBJECT, *OF_VIEW, *(f"{name}_{part}" for name, parts in LISTS.items() for part in parts))
+
+
+@contextmanager
+def writer(dataset: Dataset, folder: Path, note: Callable[[str], None]) -> Generator[Callable[[Sample], None]]:
+    """Write the table and the pictures."""
+    with _table(folder / TABLE) as append:
+
+        def add(sample: Sample) -> None:
+            append(sample)
+            for _, name, content in _picture(sample):
+                put(dataset, content, folder / name)
+
+        yield add
+
+
+def verify(dataset: Dataset, folder: Path, sampled: Collection[int]) -> Iterator[Remark]:
+    """All that is not as it would be exported now."""
+    with TemporaryDirectory() as aside:
+        with _table(Path(aside) / TABLE) as append:
+            yield from check_files(
+                dataset, folder, _expected(dataset, append), _expected(dataset, lambda sample: None), [TABLE]
+            )
+        if (folder / TABLE).is_file():
+            yield from _rows_that_differ(Path(aside) / TABLE, folder / TABLE)
+
+
+def _expected(dataset: Dataset, append: Callable[[Sample], None]) -> Iterator[Expected]:
+    for sample in dataset:
+        append(sample)
+        yield from _picture(sample)
+
+
+def _picture(sample: Sample) -> Iterator[Expected]:
+    if sample.picture_file is not None:
+        yield sample.index, _name(sample), sample.picture_file
+
+
+def _name(sample: Sample) -> str:
+    """Where the sample's picture lies in the export; empty where there is none."""
+    if sample.picture_file is None:
+        return ""
+    return f"{sample.split or 'all'}/{sample.index:08d}{PurePosixPath(sample.picture_file).suffix}"
+
+
+@contextmanager
+def _table(file: Path) -> Generator[Callable[[Sample], None]]:
+    """An open table with its head, and the function that appends a sample's rows."""
+    with file.open("w", encoding="utf-8", newline="") as out:
+        rows = csv.writer(out, lineterminator="\n")
+        rows.writerow(HEAD)
+        yield lambda sample: rows.writerows(_rows(sample))
+
+
+def _rows(sample: Sample) -> Iterator[list[Any]]:
+    own = [_name(sample), *(getattr(sample, name) for name in OF_SAMPLE[1:])]
+    for o in sample.objects:
+        yield [*own, *map(_cell, _values(o))]
+    if not sample.objects:
+        yield [*own, *[""] * (len(HEAD) - len(own))]
+
+
+def _values(o: ObjectAnnotation) -> Iterator[Any]:
+    yield from (getattr(o, name) for name in OF_OBJECT)
+    yield from (getattr(o.view, name) for name in OF_VIEW)
+    for name, parts in LISTS.items():
+        values = o.camera_from_object[:3, 3].tolist() if name == "translation" else getattr(o, name)
+        yield from [None] * len(parts) if values is None else values
+
+
+def _cell(value: Any) -> Any:
+    """Numbers in as many digits as they need to be read back equal; NaN and None are empty."""
+    return "" if value is None or (isinstance(value, float) and math.isnan(value)) else value
+
+
+def _rows_that_differ(wanted: Path, found: Path) -> Iterator[Remark]:
+    """Rows of two tables, one after another."""
+    with wanted.open("rb") as ours, found.open("rb") as theirs:
+        for number, (one, other) in enumerate(zip_longest(ours, theirs, fillvalue=b"")):
+            if one != other:
+                yield _frame_of(one), f"{TABLE}: row {number}: expected {one[:200]!r}, found {other[:200]!r}: export again"
+
+
+def _frame_of(row: bytes) -> int | None:
+    cells = next(csv.reader([row.decode("utf-8")]), [])
+    return int(cells[1]) if len(cells) == len(HEAD) and cells[1].isdecimal() else None
