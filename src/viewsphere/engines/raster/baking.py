@@ -94,7 +94,9 @@ def still_lengths(arranged: Arranged) -> Lengths:
 
 
 def sequence_lengths(meshes: Sequence[Mesh]) -> Lengths:
-    """Of all pictures of a sequence, wherever its things are: about half the size of the largest, from the world's origin."""
+    """Of all pictures of a sequence, wherever its things are, and however it is cut into shots: about half the size of the
+    largest thing, from the world's origin.
+    """
     sizes = [np.linalg.norm(np.subtract(*mesh.bounds)) for mesh in {id(m): m for m in meshes}.values() if len(mesh.triangles)]
     unit = float(max(sizes, default=0.0)) / 2 or 1.0
     return Lengths((0.0, 0.0, 0.0), 2.0 ** math.ceil(math.log2(unit)))
@@ -107,7 +109,7 @@ def bake(packed: Packed, scene: Scene, options: Options) -> Baked:
     casters = _casters(packed, has_ground)
     distant = sky_lights(scene.sky, scene.sun, has_ground)
     lights = bake_lights(distant, scene.lights, casters, lengths.unit, has_ground, options.shadow_resolution)
-    floor, albedo = _floor(scene.ground, lengths, len(surfaces.looks) - 1)
+    floor, albedo = _floor(scene.ground, lengths, still_lengths(packed.arranged), len(surfaces.looks) - 1)
     lamps = lamps_on_ground(lights, casters.extent)
     surrounding = bake_surrounding(scene.sky, scene.sun, albedo, distant, even_light(scene.lights), lamps)
     occlusion = bake_occlusion(casters, has_ground, options.ambient_occlusion)
@@ -163,12 +165,16 @@ def _is_see_through(looks: Float32) -> NDArray[np.bool_]:
     return (looks[:, L_BLENDED] > 0) | (looks[:, L_TRANSMISSION] * (1 - metal) > 0)
 
 
-def _floor(ground: Ground | None, lengths: Lengths, material: int) -> tuple[Float32, NDArray[np.float64] | None]:
-    """`Baked.floor`, and the ground's mean colour; zeros and None where there is none."""
+def _floor(
+    ground: Ground | None, lengths: Lengths, around: Lengths, material: int
+) -> tuple[Float32, NDArray[np.float64] | None]:
+    """`Baked.floor`, and the ground's mean colour; zeros and None where there is none. around: the extent of all there is."""
     if ground is None:
-        return np.zeros(8, np.float32), None
+        return np.zeros(12, np.float32), None
     made, images = ground_material(ground)
     how = 2.0 if ground.catcher else float(only_scatters(ground))
     color = linear(ground.color).tolist()
     frame = ground_frame(ground, made, lengths.origin, lengths.unit)
-    return np.array([*frame, material, how, *color], np.float32), ground_albedo(made, images)
+    middle = (np.array(around.origin) - lengths.origin) / lengths.unit
+    floor = np.array([*frame, material, how, *color, *middle, lengths.unit / around.unit], np.float32)
+    return floor, ground_albedo(made, images)
