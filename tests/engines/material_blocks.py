@@ -9,7 +9,7 @@ from viewsphere.assets.mesh import Image, Material, Mesh
 from viewsphere.engines.raster import kernels_block as block
 from viewsphere.engines.raster.kernels_material import material
 from viewsphere.engines.raster.records import View
-from viewsphere.engines.raster.surface import pack_surfaces
+from viewsphere.engines.raster.surface import Lengths, pack_materials, pack_surfaces
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Ground
 from viewsphere.model.thing import Thing
@@ -45,7 +45,9 @@ def packed(mesh: Mesh, ground: Ground | None = None, repaints=()):
     """Surfaces and textures of the mesh alone, in metres from the world's origin."""
     thing = Thing(id=1, model=SPEC, repaints=repaints)
     geometry = build_geometry((thing,), (mesh,), ground is not None, 0.01)
-    return pack_surfaces(geometry, (mesh,), ground, np.zeros(3), 1.0, 1, (thing,))
+    metres = Lengths((0.0, 0.0, 0.0), 1.0)
+    materials = pack_materials((mesh,), ground, metres, 1, (thing,))
+    return pack_surfaces(geometry, (mesh,), materials, metres), materials.textures
 
 
 def view_of(rotation, rays=None) -> View:

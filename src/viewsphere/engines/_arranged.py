@@ -10,23 +10,42 @@ from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
 from viewsphere.truth.geometry import Geometry, placed_meshes, present
-from viewsphere.truth.moving import Ring, shot_floor
+from viewsphere.truth.moving import Ring, changed, shot_floor
 
 
 @dataclass(frozen=True, eq=False)
 class Arranged:
     """All things of a shot as they stand at an instant. meshes[i] is that of things[i], without triangles if that is not there;
     `whole` has the triangles of those, too. `geometry` is another object where anything is elsewhere, and only then.
+
+    moving: which of the things are not still in the shot; is_sequence: whether the shot is part of one, else it has pictures
+    that have nothing to do with one another.
     """
 
     things: tuple[Thing, ...]
     whole: tuple[Mesh, ...]
     geometry: Geometry
+    moving: tuple[int, ...]
+    is_sequence: bool
 
     @property
     def meshes(self) -> list[Mesh]:
         """What the geometry was built from."""
         return present(self.things, self.whole)
+
+    @property
+    def targets(self) -> int:
+        """How many of the things, which come first, are not scenery."""
+        return sum(not thing.scenery for thing in self.things)
+
+    @property
+    def has_scenery(self) -> bool:
+        """Whether there is any."""
+        return self.targets < len(self.things)
+
+    def changed_since(self, before: Arranged) -> list[int]:
+        """Which of the same things are elsewhere, or deformed."""
+        return changed(before.things, before.whole, self.things, self.whole)
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +76,8 @@ class Arrangements:
         """As they stand at an instant, counted from 0 in the shot."""
         things = self.shot.things_at(instant)
         meshes = self._meshes(things)
-        return Arranged(things, meshes, self.ring.at(things, meshes, self.floor))
+        moving = tuple(i for i, thing in enumerate(self.shot.things) if not thing.motion.is_still)
+        return Arranged(things, meshes, self.ring.at(things, meshes, self.floor), moving, bool(self.shot.sequence))
 
     def _meshes(self, things: tuple[Thing, ...]) -> tuple[Mesh, ...]:
         """Of these things: what stands still is the shot's own."""

@@ -40,8 +40,7 @@ class _Room:
 
     def changed(self, things: Sequence[Thing], meshes: Sequence[Mesh]) -> list[int]:
         """Which of the things are elsewhere, or deformed."""
-        held = zip(self.things, self.meshes, things, meshes, strict=True)
-        return [i for i, (a, mesh, b, other) in enumerate(held) if mesh is not other or not stands_alike(a, b)]
+        return changed(self.things, self.meshes, things, meshes)
 
     def fits(self, things: Sequence[Thing], meshes: Sequence[Mesh]) -> bool:
         """Whether these are the same things, there or not there as before, made of the same triangles."""
@@ -91,9 +90,10 @@ class Ring:
         return _Room(things, meshes, floor, replace(lay_ground(geometry, floor)))
 
 
-def stands_alike(a: Thing, b: Thing) -> bool:
-    """Whether two still things are in one place."""
-    return a is b or a.motion.poses == b.motion.poses
+def changed(before: Sequence[Thing], own: Sequence[Mesh], now: Sequence[Thing], meshes: Sequence[Mesh]) -> list[int]:
+    """Which of the same still things are elsewhere now, or have other meshes."""
+    held = zip(before, own, now, meshes, strict=True)
+    return [i for i, (a, m, b, n) in enumerate(held) if m is not n or (a is not b and a.motion.poses != b.motion.poses)]
 
 
 def differs_in_shape_only(a: Mesh, b: Mesh) -> bool:

@@ -217,9 +217,9 @@ def _face_viewer(b):
 
 @inner(fastmath=FAST)
 def gather_ground(view, floor, count, b, material):
-    """The same for samples of the ground: its texture repeats in the world, and it fades into the sky far behind the origin.
+    """The same for samples of the ground: its texture repeats in the world, and it fades into the sky far behind all there is.
 
-    floor: uv per length, u and v at the origin, its material.
+    floor: see `painting.Baked`.
     """
     own = nb.int32(floor[3])
     for i in range(U(count)):
@@ -239,7 +239,8 @@ def _stand(eye, floor, b):
     per, place, origin = floor.one(0), b.get(PX, PY, PZ), tuple(eye.one(k) for k in range(3))
     b[U0], b[V0] = place[0] * per + floor.one(1), floor.one(2) - place[1] * per
     way = tuple(place[k] - origin[k] for k in range(3))
-    far = 1 - clamp((root(dot(way, way)) - root(dot(origin, origin)) - 4) * (1 / 26))
+    middle = tuple(origin[k] - floor.one(8 + k) for k in range(3))
+    far = 1 - clamp(((root(dot(way, way)) - root(dot(middle, middle))) * floor.one(11) - 4) * (1 / 26))
     far = 1 - far * far
     low = least(most(0.09 - size(b[VZ]), 0) * 12, 1)
     b[FADE] = 1 - (1 - far * far * (3 - far - far)) * (1 - low * low * (3 - low - low))

@@ -54,10 +54,10 @@ def _alpha(surfaces, textures, t, g, h):
 
 
 @njit
-def see_vertices(vertices, matrix, corners):
-    """(V, 4): a view's matrix times each vertex. No BLAS: its threads wait for one another on busy cores."""
-    for i in range(U(vertices.shape[0])):
-        x, y, z = vertices[i, U(11)], vertices[i, U(12)], vertices[i, U(13)]
+def see_vertices(places, matrix, corners):
+    """(V, 4): a view's matrix times each place (V, 3). No BLAS: its threads wait for one another on busy cores."""
+    for i in range(U(places.shape[0])):
+        x, y, z = places[i, U(0)], places[i, U(1)], places[i, U(2)]
         for k in range(U(4)):
             corners[i, k] = matrix[k, U(0)] * x + matrix[k, U(1)] * y + matrix[k, U(2)] * z + matrix[k, U(3)]
 

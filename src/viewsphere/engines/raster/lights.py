@@ -15,6 +15,7 @@ from viewsphere.engines.raster import kernels_shadow as kernels
 from viewsphere.engines.raster.kernels_arrive import AREA, DISTANT, POINT, SPOT
 from viewsphere.engines.raster.kernels_material import L_CASTS_FROM
 from viewsphere.engines.raster.records import Float32, Int32, Surfaces, Textures
+from viewsphere.engines.raster.still_maps import StillMaps, rounded, snapped
 from viewsphere.model.scene import AnyLight, AreaLight, HemisphereLight, PointLight, SpotLight
 from viewsphere.surroundings.sun import Distant
 
@@ -97,7 +98,8 @@ class View:
 @dataclass(frozen=True)
 class Casters:
     """What casts shadows. `scenery` stands for what is scenery, None if there is none, and `targets` for the targets as they
-    are placed, None if unknown: equal where those are equal.
+    are placed, None if unknown: equal where those are equal. In a sequence, `maps` are those of what stands still, and corners
+    (n, 3) those of the targets' boxes.
     """
 
     surfaces: Surfaces
@@ -105,6 +107,12 @@ class Casters:
     extent: Extent
     scenery: Hashable = None
     targets: Hashable = None
+    maps: StillMaps | None = None
+    corners: Float | None = None
+
+    def alone(self, surfaces: Surfaces) -> Casters:
+        """The same, but only these cast shadows."""
+        return replace(self, surfaces=surfaces, maps=None)
 
 
 @dataclass(frozen=True)
@@ -184,7 +192,9 @@ def _level_axes(axis: Float) -> tuple[Float, Float]:
 
 
 def _casting_points(casters: Casters) -> Float:
-    """Vertices of the targets' triangles that cast shadows, (n, 3)."""
+    """Vertices of the targets' triangles that cast shadows, (n, 3); in a sequence boxes around them will do."""
+    if casters.corners is not None:
+        return casters.corners
     surfaces, stop = casters.surfaces, casters.extent.triangles
     casts = surfaces.looks[surfaces.material[:stop], L_CASTS_FROM] <= 1
     is_used = np.zeros(len(surfaces.vertices), np.bool_)
@@ -253,9 +263,9 @@ def _backdrop(source: _Source, casters: Casters, size: int) -> _Backdrop:
     low, high = casters.extent.low, casters.extent.high
     span = 2.0 ** math.ceil(math.log2(float(np.linalg.norm(high - low)) or 1.0))
     surfaces, start = casters.surfaces, casters.extent.triangles
-    alone = surfaces._replace(triangles=surfaces.triangles[start:], material=surfaces.material[start:])
-    scenery = replace(casters, surfaces=alone)
-    return _Backdrop(casters.scenery, (x, y, z), math.tan(source.radius), span, casters.extent.reach, size, scenery)
+    scenery = casters.alone(surfaces._replace(triangles=surfaces.triangles[start:], material=surfaces.material[start:]))
+    reach = casters.extent.reach if casters.maps is None else rounded(casters.extent.reach)
+    return _Backdrop(casters.scenery, (x, y, z), math.tan(source.radius), span, reach, size, scenery)
 
 
 @lru_cache(maxsize=2)
@@ -301,7 +311,10 @@ def _fitted_from_afar(source: _Source, points: Float, casters: Casters, size: in
     span += 2 * min(tangent * behind, span / 2)
     if casters.scenery is not None:
         span *= _ROUND_TARGETS
-    return parallel_view(away, axes.T @ ((low + high) / 2), span, tangent, size)
+    middle = (low + high) / 2
+    if casters.maps is not None:
+        span, middle[:2] = snapped(span, middle[:2])
+    return parallel_view(away, axes.T @ middle, span, tangent, size)
 
 
 def _perspective(source: _Source, axes: Float, tangent: float, size: int, guard: float) -> View:
@@ -369,20 +382,35 @@ def draw_views(views: Sequence[View], casters: Casters, opposite: bool = False) 
         form[i] = _form_row(view, i >= len(views))
     result = Views(form, grid, np.empty(texels, np.float32), np.empty((cells, 4), np.float32))
     result.bounds[:] = np.inf, -np.inf, 0, 0
-    corners = np.empty((len(casters.surfaces.vertices), 4))
+    places = np.ascontiguousarray(casters.surfaces.vertices[:, 11:14])
+    corners = np.empty((len(places), 4))
     for i, view in enumerate(views):
-        kernels.see_vertices(casters.surfaces.vertices, view.matrix, corners)
+        kernels.see_vertices(places, view.matrix, corners)
         nearest = _level(result, i, view.size)
-        nearest.fill(np.inf)
         farthest = _level(result, i + len(views), view.size) if opposite else np.empty((0, 0), np.float32)
         farthest.fill(-np.inf)
         tilt = float(form[i, kernels.TILT]) if view.is_round else 0.0
-        kernels.draw_depth(corners, casters.surfaces, casters.textures, view.near, tilt, nearest, farthest)
+        last = _begin(view, tilt, casters, corners, nearest)
+        kernels.draw_depth(corners, last, casters.textures, view.near, tilt, nearest, farthest)
         np.negative(farthest, out=farthest)
     for i in range(count):
         _thin_out(result, i)
         form[i, kernels.NEAREST] = kernels.finish_view(grid[i], form[i], result.depth, result.bounds)
     return result
+
+
+def _begin(view: View, tilt: float, casters: Casters, corners: Float, nearest: Float32) -> Surfaces:
+    """Draw what stands still in a sequence into an empty map; returns what is still to be drawn."""
+    maps, key = casters.maps, (view.matrix.tobytes(), view.near, tilt, view.size)
+    kept = None if maps is None else maps.begun(key)
+    nearest[:] = np.inf if kept is None else kept
+    if maps is None:
+        return casters.surfaces
+    if kept is None:
+        nothing = np.empty((0, 0), np.float32)
+        kernels.draw_depth(corners, maps.still, casters.textures, view.near, tilt, nearest, nothing)
+        maps.keep(key, nearest)
+    return maps.moving
 
 
 def _joined(parts: Sequence[Views]) -> Views:

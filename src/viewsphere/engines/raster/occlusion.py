@@ -141,9 +141,9 @@ def _sky_views(casters: Casters, quality: Literal["fast", "fine"]) -> tuple[Floa
         replace(parallel_view(-d.astype(np.float64), (low + high) / 2, span, tangent, _MAP[quality], 4), is_fine=False)
         for d in directions[: _AXES[quality]]
     ]
-    surfaces, stop = casters.surfaces, casters.extent.triangles
-    targets = replace(casters, surfaces=surfaces._replace(triangles=surfaces.triangles[:stop]))
-    return directions, draw_views(views, targets, opposite=True)
+    surfaces, triangles = casters.surfaces, casters.surfaces.triangles[: casters.extent.triangles]
+    own = surfaces._replace(vertices=surfaces.vertices[: int(triangles.max()) + 1], triangles=triangles)
+    return directions, draw_views(views, casters.alone(own), opposite=True)
 
 
 def _volume(

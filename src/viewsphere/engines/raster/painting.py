@@ -27,9 +27,10 @@ _AROUND = np.array([[-1, -1, -1, 0, 0, 1, 1, 1], [-1, 0, 1, -1, 1, -1, 0, 1]], n
 class Baked:
     """All that a picture is painted from; lengths are in `unit`s from `origin`.
 
-    floor (8,): texture repeats per length of the ground, its texture coordinates at the origin, its material, 1 if it only
-    scatters, 2 if it is a shadow catcher, its colour. kind (T + 1,) uint8: of each triangle, see `kernels_paint`; owner (T,)
-    int32: equal where neighbouring triangles look alike; see_through (T + 1,). blended: `with_blended_colors`.
+    floor (12,): texture repeats per length of the ground, its texture coordinates at the origin, its material, 1 if it only
+    scatters, 2 if it is a shadow catcher, its colour; the middle of all there is, and one over half its size. kind (T + 1,)
+    uint8: of each triangle, see `kernels_paint`; owner (T,) int32: equal where neighbouring triangles look alike; see_through
+    (T + 1,). blended: `with_blended_colors`.
     """
 
     geometry: Geometry

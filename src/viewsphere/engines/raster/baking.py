@@ -1,0 +1,180 @@
+"""All that pictures of an instant are painted from, and what of it outlives the instant."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.assets.mesh import Mesh
+from viewsphere.assets.srgb import linear
+from viewsphere.engines._arranged import Arranged
+from viewsphere.engines.raster import kernels_paint
+from viewsphere.engines.raster.environment import bake_surrounding, lamps_on_ground, sky_lights
+from viewsphere.engines.raster.kernels_material import L_BLENDED, L_METAL, L_METAL_TEXEL, L_TRANSMISSION
+from viewsphere.engines.raster.lights import Casters, Extent, bake_lights
+from viewsphere.engines.raster.occlusion import bake_occlusion, with_ground_light
+from viewsphere.engines.raster.options import Options
+from viewsphere.engines.raster.painting import Baked
+from viewsphere.engines.raster.records import Float32, Int32, Surfaces
+from viewsphere.engines.raster.still_maps import StillMaps
+from viewsphere.engines.raster.surface import Lengths, Materials, made_of, move_surfaces, pack_materials, pack_surfaces
+from viewsphere.model.scene import Ground, Scene
+from viewsphere.surroundings.ground import ground_albedo, ground_frame, ground_material, only_scatters
+from viewsphere.surroundings.sky import even_light
+from viewsphere.truth.geometry import Geometry, with_blended_colors
+
+
+@dataclass(frozen=True, eq=False)
+class Packed:
+    """What things are made of, as they are arranged. kind, owner, see_through, blended: see `Baked`; maps: of a sequence."""
+
+    arranged: Arranged
+    lengths: Lengths
+    materials: Materials
+    surfaces: Surfaces
+    kind: NDArray[np.uint8]
+    owner: Int32
+    see_through: NDArray[np.bool_]
+    blended: Geometry
+    maps: StillMaps | None
+
+    def at(self, arranged: Arranged, ground: Ground | None, lengths: Lengths) -> Packed:
+        """The same where things are elsewhere. Nothing of this one may be used then: what moved is written in place."""
+        geometry, same_lengths = arranged.geometry, lengths == self.lengths
+        materials = self.materials if same_lengths and self.materials.made_of == made_of(arranged.whole) else None
+        is_alike = geometry.triangles is self.arranged.geometry.triangles and arranged.moving == self.arranged.moving
+        if materials is None or not is_alike:
+            return pack(arranged, ground, lengths, materials)
+        is_blended = self.blended is not self.arranged.geometry
+        blended = {"cutouts": self.blended.cutouts, "triangle_cutout": self.blended.triangle_cutout}
+        return replace(
+            self,
+            arranged=arranged,
+            surfaces=move_surfaces(self.surfaces, geometry, arranged.changed_since(self.arranged), lengths),
+            blended=replace(geometry, **blended) if is_blended else geometry,
+        )
+
+
+def pack(arranged: Arranged, ground: Ground | None, lengths: Lengths, materials: Materials | None = None) -> Packed:
+    """All of it anew but for the materials, if they are known."""
+    geometry, meshes = arranged.geometry, arranged.meshes
+    if materials is None:
+        materials = pack_materials(arranged.whole, ground, lengths, arranged.targets, arranged.things)
+    surfaces = pack_surfaces(geometry, meshes, materials, lengths)
+    see_through = np.append(_is_see_through(surfaces.looks)[surfaces.material], False)
+    kind = np.where(see_through[:-1], kernels_paint.SEE_THROUGH, kernels_paint.SOLID).astype(np.uint8)
+    kind[geometry.triangle_start[-1] :] = kernels_paint.FLOOR
+    return Packed(
+        arranged=arranged,
+        lengths=lengths,
+        materials=materials,
+        surfaces=surfaces,
+        kind=np.append(kind, np.uint8(kernels_paint.NOTHING)),
+        owner=(geometry.triangle_object * len(surfaces.looks) + surfaces.material).astype(np.int32),
+        see_through=see_through,
+        blended=with_blended_colors(geometry, meshes),
+        maps=StillMaps.of(surfaces, geometry.triangle_start, arranged.moving) if arranged.is_sequence else None,
+    )
+
+
+def still_lengths(arranged: Arranged) -> Lengths:
+    """Of a still picture: half the diagonal of all there is, from its middle; where there is scenery the next power of two,
+    from the world's origin, so that they stay the same when the targets change.
+    """
+    low, high = arranged.geometry.extent()
+    unit = float(np.linalg.norm(high - low)) / 2 or 1.0
+    if arranged.has_scenery:
+        return Lengths((0.0, 0.0, 0.0), 2.0 ** math.ceil(math.log2(unit)))
+    x, y, z = ((low + high) / 2).tolist()
+    return Lengths((x, y, z), unit)
+
+
+def sequence_lengths(meshes: Sequence[Mesh]) -> Lengths:
+    """Of all pictures of a sequence, wherever its things are, and however it is cut into shots: about half the size of the
+    largest thing, from the world's origin.
+    """
+    sizes = [np.linalg.norm(np.subtract(*mesh.bounds)) for mesh in {id(m): m for m in meshes}.values() if len(mesh.triangles)]
+    unit = float(max(sizes, default=0.0)) / 2 or 1.0
+    return Lengths((0.0, 0.0, 0.0), 2.0 ** math.ceil(math.log2(unit)))
+
+
+def bake(packed: Packed, scene: Scene, options: Options) -> Baked:
+    """What pictures of things are painted from, as they are arranged."""
+    geometry, surfaces, lengths = packed.arranged.geometry, packed.surfaces, packed.lengths
+    has_ground = scene.ground is not None
+    casters = _casters(packed, has_ground)
+    distant = sky_lights(scene.sky, scene.sun, has_ground)
+    lights = bake_lights(distant, scene.lights, casters, lengths.unit, has_ground, options.shadow_resolution)
+    floor, albedo = _floor(scene.ground, lengths, still_lengths(packed.arranged), len(surfaces.looks) - 1)
+    lamps = lamps_on_ground(lights, casters.extent)
+    surrounding = bake_surrounding(scene.sky, scene.sun, albedo, distant, even_light(scene.lights), lamps)
+    occlusion = bake_occlusion(casters, has_ground, options.ambient_occlusion)
+    return Baked(
+        geometry=geometry,
+        origin=np.array(lengths.origin),
+        unit=lengths.unit,
+        surfaces=surfaces,
+        textures=packed.materials.textures,
+        floor=floor,
+        surrounding=surrounding,
+        lights=lights,
+        occlusion=with_ground_light(occlusion, lights, math.pi * float(surrounding.up.sum())),
+        kind=packed.kind,
+        owner=packed.owner,
+        see_through=packed.see_through,
+        blended=packed.blended,
+    )
+
+
+def _casters(packed: Packed, has_ground: bool) -> Casters:
+    arranged, (corner, unit) = packed.arranged, packed.lengths
+    geometry, origin, targets = arranged.geometry, np.array(corner), arranged.targets
+    low, high = geometry.extent()
+    reach = float(np.abs(np.stack([low, high]) - origin).max()) / unit
+    ground_z = geometry.ground_z
+    if arranged.has_scenery:
+        low, high = geometry.extent(targets)
+        ground_z = float(low[2])
+    floor_z = None if ground_z is None else (ground_z - float(origin[2])) / unit
+    extent = Extent((low - origin) / unit, (high - origin) / unit, floor_z, geometry.triangle_start[targets], reach)
+    return Casters(
+        packed.surfaces,
+        packed.materials.textures,
+        extent,
+        (arranged.things[targets:], arranged.whole[targets:], unit) if arranged.has_scenery else None,
+        (arranged.things[:targets], arranged.whole[:targets], has_ground, floor_z, packed.lengths),
+        packed.maps,
+        None if packed.maps is None else (_corners(geometry.bounds[:targets]) - origin) / unit,
+    )
+
+
+def _corners(bounds: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Of the boxes (N, 2, 3) of things that are there: (8 n, 3)."""
+    there = bounds[np.isfinite(bounds).all(axis=(1, 2))]
+    which = np.indices((2, 2, 2)).reshape(3, 8).T
+    return there[:, which, np.arange(3)].reshape(-1, 3)
+
+
+def _is_see_through(looks: Float32) -> NDArray[np.bool_]:
+    """Of each material: whether anything behind it shows."""
+    metal = looks[:, L_METAL] + looks[:, L_METAL_TEXEL]
+    return (looks[:, L_BLENDED] > 0) | (looks[:, L_TRANSMISSION] * (1 - metal) > 0)
+
+
+def _floor(
+    ground: Ground | None, lengths: Lengths, around: Lengths, material: int
+) -> tuple[Float32, NDArray[np.float64] | None]:
+    """`Baked.floor`, and the ground's mean colour; zeros and None where there is none. around: the extent of all there is."""
+    if ground is None:
+        return np.zeros(12, np.float32), None
+    made, images = ground_material(ground)
+    how = 2.0 if ground.catcher else float(only_scatters(ground))
+    color = linear(ground.color).tolist()
+    frame = ground_frame(ground, made, lengths.origin, lengths.unit)
+    middle = (np.array(around.origin) - lengths.origin) / lengths.unit
+    floor = np.array([*frame, material, how, *color, *middle, lengths.unit / around.unit], np.float32)
+    return floor, ground_albedo(made, images)
