@@ -107,6 +107,38 @@ class Manifest:
         return (path for path in sorted(folder.rglob("*")) if path.is_file() and path not in known)
 
 
+KNOWN = ("model.json", "shot.json", "scenery.json")
+"""Files that say what a folder's others are made of."""
+
+
+def refuse_another(damaged: Path, again: Path) -> None:
+    """Raise StoreError where a folder that was made again is not equal to what the damaged one is known to have been.
+
+    That is what its manifest says, or where that was damaged, too, what its files say that can be read. Where all files fit
+    the manifest, and are wrong all the same, nothing is known.
+    """
+    try:
+        manifest = Manifest.read(damaged)
+        known = manifest.files if any(manifest.damage(damaged)) else {}
+    except StoreError:
+        known = {name: told_of(damaged / name) for name in KNOWN if _is_json(damaged / name)}
+    made = Manifest.read(again).files
+    other = [path for path, told in known.items() if made.get(path) != told]
+    if other:
+        raise StoreError(
+            f"{damaged}: expected what was made before, found another {other[0]}: the models or what is around them changed "
+            "since: put the old ones back, or delete the folder and render again"
+        )
+
+
+def _is_json(file: Path) -> bool:
+    try:
+        json.loads(file.read_bytes())
+    except (OSError, ValueError):
+        return False
+    return True
+
+
 REPAIR = "mend it with viewsphere check --repair"
 """What a user can do about damaged files."""
 
