@@ -82,9 +82,7 @@ class Mender:
         if row is None:
             raise StoreError(f"{key}: expected a shot of the plan, found another")
         if _is_linked(self.store.shot_folder(key)):
-            raise StoreError(
-                f"{key}: expected a shot that was rendered here, found one of another data set: merge or import anew"
-            )
+            raise StoreError(f"{key}: expected a shot that was rendered here, found another's: merge or import it anew")
         self._portion(row.part)
         return row.part
 

@@ -85,7 +85,7 @@ class Manifest:
         (folder / MANIFEST).write_text(sealed({"files": {path: list(told) for path, told in self.files.items()}}), "utf-8")
 
     def check(self, path: str, data: bytes, file: Path) -> None:
-        """Raises StoreError where the bytes of a file are not those that were written."""
+        """Raises StoreError where the bytes of a file, by its path in the folder, are not those that were written."""
         told = self.files.get(path)
         if told != (len(data), digest(data)):
             raise StoreError(f"{file}: expected {said(told)}, found {said((len(data), digest(data)))}: {REPAIR}")
