@@ -19,6 +19,7 @@ from viewsphere.model.camera import Distortion
 from viewsphere.model.files import Files
 from viewsphere.run.exporting import export
 from viewsphere.store import Dataset, encode
+from viewsphere.store.checksums import write_checksums
 from viewsphere.store.manifest import MANIFEST
 
 
@@ -116,8 +117,12 @@ def test_every_export_that_is_there_is_proved_by_its_format(dataset):
 
 def test_a_format_without_a_proof_is_a_note(dataset):
     (dataset.root / "blend").mkdir()
+    (dataset.root / "blend" / "a.blend").write_text("scene")
+    write_checksums(dataset.root / "blend")
     report = check(dataset, rays=False)
-    assert report.ok and report.notes == ("blend: not checked, the format has no proof",)
+    assert report.ok and report.notes == ("blend: only digests are checked, the format has no proof",)
+    (dataset.root / "blend" / "a.blend").write_text("scena")
+    assert [finding.check for finding in check(dataset, rays=False).findings] == ["blend"]
 
 
 @pytest.mark.parametrize(
@@ -132,6 +137,7 @@ def test_an_export_s_proof_that_breaks_off(dataset, monkeypatch, error, message)
         raise error
 
     (dataset.root / "native").mkdir()
+    write_checksums(dataset.root / "native")
     monkeypatch.setattr("viewsphere.formats.native.verify", broken)
     assert [(f.check, f.message) for f in check(dataset, rays=False).findings] == [("native", message)]
 

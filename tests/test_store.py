@@ -146,7 +146,7 @@ def test_a_damaged_picture_is_named_with_a_way_out(small_dataset):
     data = file.read_bytes()
     file.unlink()
     file.write_bytes(data[:-20])
-    with pytest.raises(StoreError, match=f"{re.escape(str(file))}.*delete .* and render again"):
+    with pytest.raises(StoreError, match=f"{re.escape(str(file))}.*mend it with viewsphere check --repair"):
         [s.instances for s in small_dataset]
 
 

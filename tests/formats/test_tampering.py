@@ -28,6 +28,7 @@ from viewsphere.model.camera import Distortion
 from viewsphere.model.instant import Moment
 from viewsphere.run.exporting import export
 from viewsphere.run.importing import import_dataset
+from viewsphere.store.checksums import CHECKSUMS
 
 FORMATS = [name for name in plugins.names("formats") if hasattr(plugins.load("formats", name), "verify")]
 SPREAD = 31
@@ -195,10 +196,10 @@ def swapped(one: Path, other: Path) -> Iterator[None]:
 
 
 def kinds(folder: Path) -> dict[str, list[Path]]:
-    """The files of an export by their paths, in which numbers do not count."""
+    """The files of an export by their paths, in which numbers do not count; the list of digests is proved elsewhere."""
     groups: defaultdict[str, list[Path]] = defaultdict(list)
     for file in sorted(folder.rglob("*")):
-        if file.is_file():
+        if file.is_file() and file.name != CHECKSUMS:
             groups[re.sub(r"\d+", "#", file.relative_to(folder).as_posix())].append(file)
     return groups
 

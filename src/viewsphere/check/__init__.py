@@ -20,6 +20,7 @@ from viewsphere.formats import Remark, Verified
 from viewsphere.labels import channel_labels, labels
 from viewsphere.model.sample import Sample
 from viewsphere.store import Dataset, ModelInfo, Row
+from viewsphere.store.checksums import damaged_files
 
 
 @dataclass(frozen=True)
@@ -53,70 +54,82 @@ class Report:
         return {"ok": self.ok, **asdict(self)}
 
 
-def check(dataset: Dataset, *, sample: int = 50, rays: bool | None = None, frames: int | None = None) -> Report:
-    """Prove the finished frames of a data set, and all its exports whose formats have a `verify`.
+def check(dataset: Dataset, *, sample: int | None = 50, rays: bool | None = None, frames: int | None = None) -> Report:
+    """Prove the finished frames of a data set, and all its exports.
 
-    Every frame is read whole, or with `frames` at most so many, spread evenly, and the exports are left to a whole check. On
-    `sample` frames, spread evenly, all labels are computed again from the exported models; and stored depth is lifted to
-    points and compared with rays that Embree casts at these models: `rays` False leaves that out, None does too (with a note)
-    where embreex is not installed. Nothing is changed.
+    Every file is compared with its digest, and every frame is read whole, or with `frames` at most so many, spread evenly; the
+    exports are then left to a whole check. On `sample` frames, spread evenly (None: on all), all labels are computed again from
+    the exported models; and stored depth is lifted to points and compared with rays that Embree casts at these models: `rays`
+    False leaves that out, None does too (with a note) where embreex is not installed. Nothing is changed.
 
     Raises MissingExtraError for `rays` True without embreex.
     """
-    findings: list[Finding] = []
+    files, damage = damaged(dataset)
+    findings = [Finding("digests", None, message) for messages in damage.values() for message in messages]
     notes: list[str] = []
     try:
         findings += [Finding("counts", None, message) for message in _counts(dataset, notes)]
     except (ViewsphereError, LookupError, TypeError, ValueError) as error:
-        return Report({}, (Finding("counts", None, f"expected models that can be read, found {error}"),), ())
-    checked_files, damage = damaged(dataset)
-    findings += [Finding("digests", None, message) for messages in damage.values() for message in messages]
-    scenery, models = Scenery(dataset), {info.key: info for info in dataset.models}
-    caster = None if rays is False else _caster(dataset, scenery, rays is True, notes)
-    again = Again(dataset, scenery, models)
-    read_ones = range(0, len(dataset), max(1, -(-len(dataset) // frames)) if frames else 1)
-    chosen = set(read_ones[:: max(1, -(-len(read_ones) // sample))]) if sample else set[int]()
-    checked = {"digests": checked_files} | dict.fromkeys(
-        [*FRAME_PROOFS, *(name for name in labels() if _is_kept(dataset, name))], 0
-    )
-    for position, index, read in _frames(dataset, read_ones):
-        if not isinstance(read, Sample):
-            findings.append(Finding("files", index, read))
-            continue
-        if read.index != index:
-            findings.append(Finding("ids", index, f"expected a record of frame {index}, found one of {read.index}"))
-        found = [*_proofs(models, read)]
-        if position in chosen:
-            found += _proofs_by_models(read, again, caster)
-        for name, messages in found:
-            findings += [Finding(name, index, message) for message in messages]
-        for name in dict.fromkeys(name for name, _ in found):
-            checked[name] = checked.get(name, 0) + 1
-    notes += scenery.notes
-    exports = _exports(dataset)
-    if len(read_ones) < len(dataset):
-        notes.append(f"{len(read_ones):,} of {len(dataset):,} frames were read")
-        notes += [f"{name}: not checked, that needs all frames" for name in exports]
+        findings.append(Finding("counts", None, f"expected models that can be read, found {error}"))
+        return Report({"digests": files}, tuple(findings), ())
+    positions = _spread(range(len(dataset)), frames)
+    sampled = _spread(positions, sample)
+    checked = {"digests": files}
+    findings += _frame_proofs(dataset, positions, sampled, rays, checked, notes)
+    names = exports(dataset)
+    if len(positions) < len(dataset):
+        notes.append(f"{len(positions):,} of {len(dataset):,} frames were read")
+        notes += [f"{name}: not checked, that needs all frames" for name in names]
         return Report(checked, tuple(findings), tuple(notes))
-    sampled = read_ones[:: max(1, -(-len(read_ones) // sample))] if sample else ()
-    for name, module in exports.items():
-        if not hasattr(module, "verify"):
-            notes.append(f"{name}: not checked, the format has no proof")
-            continue
+    for name, module in names.items():
         checked[name] = len(dataset)
-        findings += [Finding(name, frame, message) for frame, message in _export_proof(dataset, name, module, sampled)]
+        findings += [Finding(name, frame, message) for frame, message in _export_proof(dataset, name, module, sampled, notes)]
     return Report(checked, tuple(findings), tuple(notes))
 
 
-def _exports(dataset: Dataset) -> dict[str, Any]:
+def _spread(positions: range, most: int | None) -> range:
+    """At most so many of the positions, spread evenly; None: all."""
+    return positions if most is None else positions[:: max(1, -(-len(positions) // most))] if most else positions[:0]
+
+
+def _frame_proofs(
+    dataset: Dataset, positions: range, sampled: range, rays: bool | None, checked: dict[str, int], notes: list[str]
+) -> Iterator[Finding]:
+    """What is wrong with frames; `checked` counts those behind each proof."""
+    scenery, models = Scenery(dataset), {info.key: info for info in dataset.models}
+    caster = None if rays is False else _caster(dataset, scenery, rays is True, notes)
+    again = Again(dataset, scenery, models)
+    checked |= dict.fromkeys([*FRAME_PROOFS, *(name for name in labels() if _is_kept(dataset, name))], 0)
+    for position, index, read in _frames(dataset, positions):
+        if not isinstance(read, Sample):
+            yield Finding("files", index, read)
+            continue
+        if read.index != index:
+            yield Finding("ids", index, f"expected a record of frame {index}, found one of {read.index}")
+        found = [*_proofs(models, read), *(_proofs_by_models(read, again, caster) if position in sampled else ())]
+        for name, messages in found:
+            yield from (Finding(name, index, message) for message in messages)
+        for name in dict.fromkeys(name for name, _ in found):
+            checked[name] = checked.get(name, 0) + 1
+    notes += scenery.notes
+
+
+def exports(dataset: Dataset) -> dict[str, Any]:
     """The formats, by their names, that lie in the data set's folder."""
     return {name: plugins.load("formats", name) for name in plugins.names("formats") if (dataset.root / name).is_dir()}
 
 
-def _export_proof(dataset: Dataset, name: str, module: Verified, sampled: Collection[int]) -> Iterator[Remark]:
-    """What a format finds in its export; a proof that cannot be carried out counts as failed."""
+def _export_proof(
+    dataset: Dataset, name: str, module: Verified, sampled: Collection[int], notes: list[str]
+) -> Iterator[Remark]:
+    """What digests and its format find in an export; a proof that cannot be carried out counts as failed."""
+    folder = dataset.root / name
+    yield from ((None, message) for message in damaged_files(folder))
+    if not hasattr(module, "verify"):
+        notes.append(f"{name}: only digests are checked, the format has no proof")
+        return
     try:
-        yield from module.verify(dataset, dataset.root / name, sampled)
+        yield from module.verify(dataset, folder, sampled)
     except Exception as error:
         yield None, failure("an export that can be checked", error)
 
@@ -132,16 +145,17 @@ def _counts(dataset: Dataset, notes: list[str]) -> Iterator[str]:
         if part.frames != index.samples:
             yield f"part {number}: expected {index.samples} frames, found a plan of {part.frames}"
     yield from _missing_shots(dataset)
-    finished = {info.key: info for info in dataset.models}
-    for key in plan.models:
-        if key in skipped:
-            continue
-        if key not in finished:
-            yield f"expected model {key}, found none: render again to go on"
-            continue
-        for file in (finished[key].obj, finished[key].glb):
+    yield from (f"expected model {key}, found none: render again to go on" for key in lacking_models(dataset))
+    for info in dataset.models:
+        for file in (info.obj, info.glb):
             if not dataset.path(file).is_file():
-                yield f"model {key}: expected {file}, found none"
+                yield f"model {info.key}: expected {file}, found none"
+
+
+def lacking_models(dataset: Dataset) -> list[str]:
+    """Keys of the models that the plan asks for, and that were not left out on purpose, of which there is nothing."""
+    skipped, folder = dataset.store.skipped(), dataset.store.model_folder
+    return [key for key in dataset.plan.models if key not in skipped and not (folder(key) / "model.json").is_file()]
 
 
 def _missing_shots(dataset: Dataset) -> Iterator[str]:

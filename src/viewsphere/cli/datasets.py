@@ -9,7 +9,7 @@ import typer
 
 from viewsphere.cli import completion
 from viewsphere.cli.arguments import AsJson, DataFolder, cores, split
-from viewsphere.cli.terminal import print_json, print_report
+from viewsphere.cli.terminal import ProgressBar, print_json, print_report
 from viewsphere.errors import UserError
 
 if TYPE_CHECKING:
@@ -62,18 +62,35 @@ def export(
 
 def check(
     folder: DataFolder,
-    sample: Annotated[int, typer.Option(min=0, help="Frames for the costly proofs (rays).")] = 50,
+    sample: Annotated[int, typer.Option(min=0, help="Frames whose labels are computed again.")] = 50,
+    all_: Annotated[bool, typer.Option("--all", help="Compute the labels of all frames again.")] = False,
+    mend: Annotated[
+        bool, typer.Option("--repair", help="Render damaged shots again, and write damaged models and exports again.")
+    ] = False,
+    workers: Annotated[
+        int | None,
+        typer.Option(min=0, help="Processes for --repair; default: one a core. 0: this one.", show_default=False),
+    ] = None,
     json_: AsJson = False,
 ) -> None:
-    """Prove a data set: files, counts, boxes, masks, polygons, 3D boxes, depth and exports. Exit status 1 if it fails."""
+    """Prove a data set: digests of all files, labels computed again from the exported models, rays, exports. Exit status 1 if
+    it fails.
+    """
     from viewsphere.check import check as prove
+    from viewsphere.check.repair import repair
     from viewsphere.store import Dataset
 
-    report = prove(Dataset(folder), sample=sample)
-    if json_:
-        print_json(report.to_json())
+    asked = None if all_ else sample
+    if mend:
+        with ProgressBar(quiet=json_) as bar:
+            repaired = repair(folder, workers=cores() if workers is None else workers, listener=bar.show, sample=asked)
+        done, report = repaired.done, repaired.report
     else:
-        print_report(report)
+        done, report = (), prove(Dataset(folder), sample=asked)
+    if json_:
+        print_json({**({"repaired": list(done)} if mend else {}), **report.to_json()})
+    else:
+        print_report(report, done)
     if not report.ok:
         raise typer.Exit(1)
 

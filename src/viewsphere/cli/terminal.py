@@ -85,8 +85,10 @@ def _size(count: float) -> str:
     return f"{count / unit:.1f} {name}" if 1e9 <= count < 1e10 else f"{math.ceil(count / unit)} {name}"
 
 
-def print_report(report: Report) -> None:
-    """Print what `check` found."""
+def print_report(report: Report, repaired: Sequence[str] = ()) -> None:
+    """Print what `check` found, and before what it made again."""
+    for line in repaired:
+        typer.echo(f"repaired: {line}")
     failed = Counter(finding.check for finding in report.findings)
     for name, count in report.checked.items():
         typer.echo(f"{name:17} {f'{failed[name]:,} findings' if failed[name] else 'ok':14} {count:,} checked")

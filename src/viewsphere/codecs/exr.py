@@ -86,7 +86,8 @@ def decode_exr(data: bytes) -> NDArray[Any]:
     """
     width, height, components, dtype, position = _layout(data)
     blocks = -(-height // _LINES)
-    position += 8 * blocks
+    table, position = position, position + 8 * blocks
+    places: list[int] = []
     rows = np.empty((height, 4 * width * components), np.uint8)
     try:
         for y in range(0, height, _LINES):
@@ -98,7 +99,10 @@ def decode_exr(data: bytes) -> NDArray[Any]:
                 raise UserError(f"EXR: expected {wanted} bytes of line {y}, found others: the file is damaged")
             flat = np.frombuffer(raw, np.uint8)
             rows[y : y + _LINES] = (flat if size == wanted else _unmixed(flat)).reshape(-1, rows.shape[1])
+            places.append(position)
             position += 8 + size
+        if data[table : table + 8 * blocks] != np.array(places, "<u8").tobytes() or position != len(data):
+            raise UserError("EXR: expected the places of all lines, found others: the file is damaged")
     except (struct.error, isal_zlib.error) as error:  # pyright: ignore[reportGeneralTypeIssues]
         raise UserError(f"EXR: expected {height} lines, found damage ({error}): the file is cut off or damaged") from error
     planes = rows.view(dtype.newbyteorder("<")).reshape(height, components, width)

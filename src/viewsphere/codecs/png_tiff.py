@@ -92,6 +92,12 @@ def decode_png(data: bytes) -> NDArray[Any]:
     return _png_pixels(header, body)
 
 
+def check_png(data: bytes) -> None:
+    """Raise UserError where a PNG file, of whatever program, is damaged: every chunk carries a checksum."""
+    if not any(kind == b"IEND" for kind, _ in _chunks(data)):
+        raise UserError("PNG: expected its last chunk, found the file's end: it is cut off")
+
+
 def png_unit(data: bytes) -> float | None:
     """Metres in a step of a PNG file's numbers, None where `encode_png` was not told; raises UserError as `decode_png` does."""
     for kind, content in _chunks(data):
@@ -121,6 +127,8 @@ def _chunks(data: bytes) -> Iterator[tuple[bytes, bytes]]:
         if check != struct.pack(">I", isal_zlib.crc32(content, isal_zlib.crc32(kind))):
             raise UserError(f"PNG: expected a whole {kind!r} chunk, its checksum is wrong: the file is damaged")
         yield kind, content
+        if kind == b"IEND":
+            return
         position += 12 + length
 
 
@@ -163,6 +171,11 @@ def encode_tiff(array: NDArray[Any]) -> bytes:
     height, width = array.shape[:2]
     little = np.ascontiguousarray(array, array.dtype.newbyteorder("<"))
     strip = (b"\x78\x01", deflate(little), struct.pack(">I", isal_zlib.adler32(little)))
+    return b"".join((_tiff_head(height, width, components, array.dtype, sum(map(len, strip))), *strip))
+
+
+def _tiff_head(height: int, width: int, components: int, dtype: np.dtype[Any], size: int) -> bytes:
+    """All that comes before the strip of so many bytes."""
     tags = {
         _WIDTH: ("I", [width]),
         _HEIGHT: ("I", [height]),
@@ -172,14 +185,14 @@ def encode_tiff(array: NDArray[Any]) -> bytes:
         _OFFSET: ("I", [0]),
         _SAMPLES: ("H", [components]),
         _ROWS: ("I", [height]),
-        _BYTES: ("I", [sum(map(len, strip))]),
+        _BYTES: ("I", [size]),
         _PLANAR: ("H", [1]),
-        _FORMAT: ("H", [_SAMPLE_FORMATS[array.dtype]] * components),
+        _FORMAT: ("H", [_SAMPLE_FORMATS[dtype]] * components),
     }
     if components == 2:
         tags[_EXTRA] = ("H", [0])
     tags[_OFFSET] = ("I", [8 + len(_directory(tags))])
-    return b"".join((struct.pack("<2sHI", b"II", 42, 8), _directory(tags), *strip))
+    return struct.pack("<2sHI", b"II", 42, 8) + _directory(tags)
 
 
 def _directory(tags: dict[int, tuple[str, list[int]]]) -> bytes:
@@ -203,21 +216,23 @@ def decode_tiff(data: bytes) -> NDArray[Any]:
     Raises UserError when the file is damaged or was written by another program.
     """
     try:
-        magic, version, position = struct.unpack_from("<2sHI", data)
+        (position,) = struct.unpack_from("<I", data, 4)
         (count,) = struct.unpack_from("<H", data, position)
         tags = {
             tag: (numbers, value if kind == 4 else value & 0xFFFF)
             for tag, kind, numbers, value in struct.iter_unpack("<HHII", data[position + 2 : position + 2 + 12 * count])
         }
-        height, width, components = tags[_HEIGHT][1], tags[_WIDTH][1], tags[_SAMPLES][1]
-        offset, length = tags[_OFFSET][1], tags[_BYTES][1]
+        height, width, components, offset = (tags[tag][1] for tag in (_HEIGHT, _WIDTH, _SAMPLES, _OFFSET))
+        if components not in (1, 2, 3):
+            raise UserError(_FOREIGN_TIFF)
         formats, where = tags[_FORMAT]
         sample = struct.unpack_from("<H", data, where)[0] if formats > 2 else where
+        dtype = {number: dtype for dtype, number in _SAMPLE_FORMATS.items()}[sample]
+        head = _tiff_head(height, width, components, dtype, len(data) - offset)
     except (struct.error, KeyError) as error:
         raise UserError(_FOREIGN_TIFF) from error
-    dtypes = {number: dtype for dtype, number in _SAMPLE_FORMATS.items()}
-    if (magic, version, tags.get(_COMPRESSION)) != (b"II", 42, (1, 8)) or sample not in dtypes:
+    if data[:offset] != head:
         raise UserError(_FOREIGN_TIFF)
-    pixels = _inflated(data[offset : offset + length], 4 * height * width * components, "TIFF")
+    pixels = _inflated(data[offset:], 4 * height * width * components, "TIFF")
     shape = (height, width) if components == 1 else (height, width, components)
-    return np.frombuffer(pixels, dtypes[sample].newbyteorder("<")).reshape(shape).astype(dtypes[sample])
+    return np.frombuffer(pixels, dtype.newbyteorder("<")).reshape(shape).astype(dtype)

@@ -13,6 +13,7 @@ from viewsphere.codecs.png_tiff import decode_png, encode_png
 from viewsphere.errors import UserError
 from viewsphere.formats import Remark
 from viewsphere.store import Dataset
+from viewsphere.store.checksums import CHECKSUMS
 
 Content = str | NDArray[np.bool_]
 """A stored file, by its path from the data set's root, or a mask (H, W), which becomes a PNG."""
@@ -54,8 +55,9 @@ def check_files(
         there += (folder / name).is_file()
         if problem:
             yield frame, f"{name}: {problem}: export again"
-    if sum(len(names) for _, _, names in os.walk(folder)) > there:
-        known = {*besides, *(name for _, name, _ in again)}
+    listed = (folder / CHECKSUMS).is_file()
+    if sum(len(names) for _, _, names in os.walk(folder)) > there + listed:
+        known = {CHECKSUMS, *besides, *(name for _, name, _ in again)}
         found = (file.relative_to(folder).as_posix() for file in sorted(folder.rglob("*")) if not file.is_dir())
         yield from ((None, f"{name}: expected no such file, found one") for name in found if name not in known)
 

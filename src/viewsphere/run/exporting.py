@@ -11,6 +11,7 @@ from viewsphere.errors import UserError
 from viewsphere.formats import Format
 from viewsphere.run.progress import Listener, Progress, unheard
 from viewsphere.store import Choice, Dataset, new_folder
+from viewsphere.store.checksums import write_checksums
 
 
 def export(
@@ -53,7 +54,7 @@ def _folder(dataset: Dataset, target: Path, is_own: bool) -> AbstractContextMana
 def write(dataset: Dataset, folders: Mapping[str, Path], tell: Listener = unheard) -> tuple[str, ...]:
     """Write the data set in formats, by their names, into these empty folders; gives notes for the user.
 
-    Every sample is read once, and so is each of its channels.
+    Every sample is read once, and so is each of its channels. At last the digests of all files are listed.
     """
     if not folders:
         return ()
@@ -65,6 +66,8 @@ def write(dataset: Dataset, folders: Mapping[str, Path], tell: Listener = unhear
             tell(Progress("exports", done, total))
             for add in adds:
                 add(sample)
+    for folder in folders.values():
+        write_checksums(folder)
     tell(Progress("exports", total, total))
     return tuple(notes)
 

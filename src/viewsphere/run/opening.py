@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from contextlib import suppress
 from importlib.metadata import version
 
@@ -11,7 +12,7 @@ from viewsphere.sampling.extension import Portion, extend, resumed, whole
 from viewsphere.sampling.fitting import LOOK
 from viewsphere.sampling.look import engine_look
 from viewsphere.sampling.plan import Plan, check_engine, check_images, plan
-from viewsphere.store import PlanRecord, Store, check_codecs
+from viewsphere.store import Part, PlanRecord, Store, check_codecs
 
 
 def prepare(recipe: Recipe) -> Plan:
@@ -52,7 +53,7 @@ def to_append(planned: Plan, store: Store) -> Portion:
     number = found.part_with(planned.digest)
     if number is not None:
         return _resumed(planned, store, found, number)
-    _check_versions(store, found)
+    _check_versions(store, found.parts)
     if found.frames and not found.parts:
         raise StoreError(f"{store.root}: expected a data set whose plan names its parts, found an older one: render it anew")
     left = store.missing(found)
@@ -76,7 +77,7 @@ def commit(portion: Portion, store: Store) -> None:
 
 
 def _resumed(planned: Plan, store: Store, found: PlanRecord, number: int) -> Portion:
-    _check_versions(store, found)
+    _check_versions(store, found.parts)
     _check_look(planned, store, found, number)
     return resumed(planned, found, number)
 
@@ -87,16 +88,27 @@ def _check_look(planned: Plan, store: Store, found: PlanRecord, number: int) -> 
     if then in (None, now):
         return
     if _is_begun(store, found, number) and not _is_whole(store, found, number):
-        engine = planned.recipe.engine.name
-        raise StoreError(
-            f"{store.root}: expected pictures as the {engine} engine that is installed paints them, found another's: "
-            "install the one that made them to go on, or choose another output folder"
-        )
+        raise _painted_otherwise(store, planned.recipe.engine.name)
 
 
-def _check_versions(store: Store, found: PlanRecord) -> None:
+def check_whether_same(store: Store, part: Part) -> None:
+    """Raise StoreError where a part's frames would not be rendered as they were: by another version, or painted otherwise."""
+    _check_versions(store, (part,))
+    engine = part.recipe.get("engine", {}).get("name")
+    if engine and part.settings.get(LOOK) not in (None, engine_look(engine)):
+        raise _painted_otherwise(store, engine)
+
+
+def _painted_otherwise(store: Store, engine: str) -> StoreError:
+    return StoreError(
+        f"{store.root}: expected pictures as the {engine} engine that is installed paints them, found another's: "
+        "install the one that made them to go on, or choose another output folder"
+    )
+
+
+def _check_versions(store: Store, parts: Iterable[Part]) -> None:
     installed = version("viewsphere")
-    for part in found.parts:
+    for part in parts:
         if part.is_product and part.version != installed:
             raise StoreError(
                 f"{store.root}: expected data made by viewsphere {installed}, found {part.version}: "

@@ -21,15 +21,24 @@ from viewsphere.run.stages import Stages, StoredBoxes, model_files
 from viewsphere.sampling.extension import Portion
 from viewsphere.store import ModelInfo, Row, Store
 
-Kind = Literal["model", "same model"]
+Kind = Literal["model", "same model", "damaged model"]
 
 
 @dataclass(frozen=True)
 class ModelTask:
-    """A model, with its moments behind it; the "same model" has to be what the store holds, if it is there."""
+    """A model, with its moments behind it; the "same model" has to be what the store holds, if it is there. What is made of a
+    "damaged model" takes its place.
+    """
 
     kind: Kind
     specs: tuple[ModelSpec, ...]
+
+
+@dataclass(frozen=True)
+class Damaged:
+    """A shot that is there, and is to be made again."""
+
+    row: Row
 
 
 class SceneryRecord(Frozen):
@@ -49,18 +58,27 @@ class Worker:
         self._boxes = StoredBoxes(self.store)
         self._digests: dict[str, str] = {}
 
-    def do(self, task: ModelTask | Row) -> int:
+    def do(self, task: ModelTask | Row | Damaged) -> int:
         """Make models, or the shot of a row; gives the number of frames that were made."""
         if isinstance(task, Row):
             return self.make_shot(task)
+        if isinstance(task, Damaged):
+            return self.make_shot(task.row, again=True)
+        if task.kind == "damaged model":
+            for spec in task.specs:
+                mesh = self.stages.model(spec)
+                self._export(spec, mesh, mesh_digest(mesh), again=True)
+            return 0
         self.make_models(task.specs, trusted=task.kind == "model")
         return 0
 
-    def make_shot(self, row: Row) -> int:
-        """Make the shot of a row and render it into the store; gives the number of its frames."""
+    def make_shot(self, row: Row, again: bool = False) -> int:
+        """Make the shot of a row and render it into the store; gives the number of its frames. Errors of one that takes the
+        place of a damaged one (`again`) as for `Store.aside`.
+        """
         with self._portion.plan.recipe.located():
             shot = self._portion.shot(row, self._boxes)
-        return self.store.write_shot(shot.key, self.stages.render(shot), self._scenery(shot), shot.files, shot)
+        return self.store.write_shot(shot.key, self.stages.render(shot), self._scenery(shot), shot.files, shot, again)
 
     def _scenery(self, shot: Shot) -> str:
         """What is background in a shot, and digests of its meshes, as `SceneryRecord` reads it; empty if nothing is."""
@@ -92,6 +110,9 @@ class Worker:
         if known is not None:
             self._compare(spec, known, digest)
             return
+        self._export(spec, mesh, digest)
+
+    def _export(self, spec: ModelSpec, mesh: Mesh, digest: str, again: bool = False) -> None:
         box = box_vertices(*mesh.bounds)
         obj, glb = model_files(spec.key)
         info = ModelInfo(
@@ -109,7 +130,7 @@ class Worker:
             digest=digest,
             warnings=mesh.warnings,
         )
-        with self.store.aside(self.store.model_folder(spec.key)) as folder:
+        with self.store.aside(self.store.model_folder(spec.key), again) as folder:
             export_obj(mesh, folder, spec.key)
             export_glb(mesh, folder / f"{spec.key}.glb")
             self.store.write_model_info(folder, info)

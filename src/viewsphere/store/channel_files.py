@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Container
+from collections.abc import Callable, Container
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -94,18 +94,23 @@ def palette() -> NDArray[np.uint8]:
     return np.stack(colors, axis=1).astype(np.uint8)
 
 
-def decode(channel: Channel, file: Path) -> NDArray[Any]:
+def decode(channel: Channel, file: Path, written: Callable[[bytes], None] | None = None) -> NDArray[Any]:
     """The array a channel's file holds, with the channel's dtype, whatever kind of file it is.
 
-    Pictures that were imported may be anything that Pillow reads. Raises StoreError if the file is missing or broken,
-    MissingExtraError where its codec is not installed.
+    Pictures that were imported may be anything that Pillow reads. `written` raises StoreError for bytes that are not those that
+    were written. Raises StoreError if the file is missing or broken, MissingExtraError where its codec is not installed.
     """
     try:
-        array = _decoded(channel, file.read_bytes())
+        data = file.read_bytes()
+        if written:
+            written(data)
+        array = _decoded(channel, data)
         if np.issubdtype(channel.dtype, np.floating) != np.issubdtype(array.dtype, np.floating):
             raise UserError(f"expected {np.dtype(channel.dtype)}, found {array.dtype}")
     except MissingExtraError as error:
         raise MissingExtraError(f"{file}: {error}") from None
+    except StoreError:
+        raise
     except (OSError, ValueError, SyntaxError, UserError) as error:
         problem = (error.strerror if isinstance(error, OSError) else None) or error
         raise StoreError(
@@ -123,6 +128,8 @@ def _decoded(channel: Channel, data: bytes) -> NDArray[Any]:
         if _is_own_png(data, channel.components):
             with suppress(UserError):
                 return png_tiff.decode_png(data)
+        if data[:4] == b"\x89PNG":
+            png_tiff.check_png(data)  # which Pillow leaves out
         return pictures.decode_picture(data, channel.components)
     match data[:4]:
         case b"\x76\x2f\x31\x01":

@@ -5,9 +5,9 @@ from __future__ import annotations
 import json
 import os
 from bisect import bisect_right
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, partial
 from pathlib import Path
 from typing import Any, overload
 
@@ -22,7 +22,7 @@ from viewsphere.store.choice import Choice
 from viewsphere.store.folder import Store
 from viewsphere.store.index import Row
 from viewsphere.store.linking import link_file
-from viewsphere.store.manifest import MANIFEST
+from viewsphere.store.manifest import MANIFEST, Manifest
 from viewsphere.store.records import Category, ModelInfo
 from viewsphere.store.sample_records import ShotRecords, from_whole_sample
 
@@ -41,6 +41,7 @@ class Dataset(Sequence[Sample]):
         self.plan = self.store.plan()
         self.link_kinds: set[str] = set()
         self._records = lru_cache(maxsize=8)(self._read_records)
+        self._manifests = lru_cache(maxsize=8)(partial(_manifest_of, self.root))
         self._facts = lru_cache(maxsize=10_000)(self._model_facts)
 
     def __reduce__(self) -> tuple[type[Dataset], tuple[Path, Choice]]:
@@ -182,10 +183,10 @@ class Dataset(Sequence[Sample]):
         try:
             if "camera" in record or records.shot is None:
                 files: dict[str, str] = record["files"] | self._supplied(record)
-                return from_whole_sample(record, _ChannelFiles(self.root, files), files)
+                return from_whole_sample(record, _ChannelFiles(self.root, files, self._manifests), files)
             files = {name: head + f"{record['index']:08d}" + tail for name, head, tail in records.files}
             files |= self._supplied(record)
-            return records.shot.sample(place, record, _ChannelFiles(self.root, files), files)
+            return records.shot.sample(place, record, _ChannelFiles(self.root, files, self._manifests), files)
         except (LookupError, TypeError, ValueError, AttributeError) as error:
             raise _damaged(records.file, error) from None
 
@@ -243,16 +244,22 @@ class _Records:
 class _ChannelFiles(Mapping[str, NDArray[Any]]):
     """A frame's channels, each read from its file the first time it is asked for."""
 
-    def __init__(self, root: Path, files: Mapping[str, str]) -> None:
-        self._root, self._files = root, files
+    def __init__(self, root: Path, files: Mapping[str, str], manifest_of: ManifestOf) -> None:
+        self._root, self._files, self._manifest_of = root, files, manifest_of
         self._arrays: dict[str, NDArray[Any]] = {}
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What other processes are sent: they read manifests anew."""
+        return {**self.__dict__, "_manifest_of": partial(_manifest_of, self._root)}
 
     def __getitem__(self, name: str) -> NDArray[Any]:
         if name not in self._arrays:
             file = self._root / self._files[name]
             if name not in channels():
                 raise StoreError(f"{file}: expected a label that is installed, found {name!r}: install the package that has it")
-            self._arrays[name] = decode(channels()[name], file)
+            folder, inside = _parted(self._files[name])
+            written = partial(self._manifest_of(folder).check, inside, file=file)
+            self._arrays[name] = decode(channels()[name], file, written)
         return self._arrays[name]
 
     def __iter__(self) -> Iterator[str]:
@@ -260,6 +267,20 @@ class _ChannelFiles(Mapping[str, NDArray[Any]]):
 
     def __len__(self) -> int:
         return len(self._files)
+
+
+ManifestOf = Callable[[str], Manifest]
+"""Gives the manifest of a folder, by its path from the data set's root."""
+
+
+def _manifest_of(root: Path, folder: str) -> Manifest:
+    return Manifest.read(root / folder)
+
+
+def _parted(file: str) -> tuple[str, str]:
+    """A channel's file by its shot's folder, and by its path there."""
+    folder, channel, name = file.rsplit("/", 2)
+    return folder, f"{channel}/{name}"
 
 
 def _damaged(file: Path, error: Exception) -> StoreError:

@@ -24,7 +24,7 @@ from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
 from viewsphere.store.channel_files import encode
 from viewsphere.store.index import Row
-from viewsphere.store.manifest import MANIFEST, Manifest, Told, digest, told_of
+from viewsphere.store.manifest import MANIFEST, Manifest, Told, digest, refuse_another, told_of
 from viewsphere.store.records import ModelInfo, PlanRecord
 from viewsphere.store.sample_records import short_sample, whole_sample
 
@@ -181,11 +181,12 @@ class Store:
         return (self.shot_folder(key) / MANIFEST).is_file()
 
     @contextmanager
-    def aside(self, target: Path) -> Generator[Path]:
+    def aside(self, target: Path, again: bool = False) -> Generator[Path]:
         """A folder to write into that becomes `target` when the block ends well, and is removed when it does not. The last file
         in it is the manifest.
 
-        If another writer finished the same target first, that one stays: both hold the same bytes.
+        If another writer finished the same target first, that one stays: both hold the same bytes. With `again` it takes the
+        place of a damaged one; raises StoreError where it is not equal to what that was before, as far as that is known.
         """
         folder = self.folder / "writing" / f"{_writer()}{target.name}"
         with _disk_errors(self.root):
@@ -197,9 +198,22 @@ class Store:
                 if not (folder / MANIFEST).is_file():
                     Manifest.of(folder).write(folder)
                 target.parent.mkdir(parents=True, exist_ok=True)
-                _become(folder, target)
+                if again and target.is_dir():
+                    refuse_another(target, folder)
+                    self._replace(folder, target)
+                else:
+                    _become(folder, target)
         finally:
             shutil.rmtree(folder, ignore_errors=True)
+
+    def _replace(self, folder: Path, target: Path) -> None:
+        """Put a folder in the place of another, which is removed."""
+        old = self.folder / "writing" / f"{_writer()}old~{target.name}"
+        shutil.rmtree(old, ignore_errors=True)
+        if target.exists():
+            target.rename(old)
+        folder.rename(target)
+        shutil.rmtree(old, ignore_errors=True)
 
     @contextmanager
     def replacing(self, target: Path) -> Generator[Path]:
@@ -207,8 +221,6 @@ class Store:
         if target == self.folder:
             raise StoreError(f"{target}: expected a format's name, found the store's")
         self._make(self.folder / "writing")
-        old = self.folder / "writing" / f"{_writer()}old~{target.name}"
-        shutil.rmtree(old, ignore_errors=True)
         folder = self.folder / "writing" / f"{_writer()}{target.name}"
         with _disk_errors(self.root):
             shutil.rmtree(folder, ignore_errors=True)
@@ -216,12 +228,9 @@ class Store:
         try:
             with _disk_errors(self.root):
                 yield folder
-                if target.exists():
-                    target.rename(old)
-                folder.rename(target)
+                self._replace(folder, target)
         finally:
             shutil.rmtree(folder, ignore_errors=True)
-            shutil.rmtree(old, ignore_errors=True)
 
     def write_file(self, name: str, text: str) -> None:
         """Write a small file of the store in one step."""
@@ -235,9 +244,15 @@ class Store:
             return {}
 
     def write_shot(
-        self, key: str, samples: Iterable[Sample], scenery: str = "", kinds: Files | None = None, shot: Shot | None = None
+        self,
+        key: str,
+        samples: Iterable[Sample],
+        scenery: str = "",
+        kinds: Files | None = None,
+        shot: Shot | None = None,
+        again: bool = False,
     ) -> int:
-        """Write all frames of a shot, with the channels their samples hold; gives their number.
+        """Write all frames of a shot, with the channels their samples hold; gives their number. `again` as for `aside`.
 
         `scenery`, if any, is a text that says what stands there that is no object; `kinds` of files are the default ones.
         What is known of the `shot` besides is kept for those who make its scene anew.
@@ -248,7 +263,7 @@ class Store:
         made: set[str] = set()
         told: dict[str, Told] = {}
         kinds, table = kinds or Files(), channels()
-        with self.aside(target) as folder:
+        with self.aside(target, again) as folder:
             for sample in samples:
                 files: dict[str, str] = {}
                 for name, array in sample.channels.items():

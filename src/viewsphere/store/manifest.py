@@ -85,7 +85,7 @@ class Manifest:
         (folder / MANIFEST).write_text(sealed({"files": {path: list(told) for path, told in self.files.items()}}), "utf-8")
 
     def check(self, path: str, data: bytes, file: Path) -> None:
-        """Raises StoreError where the bytes of a file are not those that were written."""
+        """Raises StoreError where the bytes of a file, by its path in the folder, are not those that were written."""
         told = self.files.get(path)
         if told != (len(data), digest(data)):
             raise StoreError(f"{file}: expected {said(told)}, found {said((len(data), digest(data)))}: {REPAIR}")
@@ -105,6 +105,38 @@ class Manifest:
     def _strangers(self, folder: Path) -> Iterable[Path]:
         known = {folder / path for path in (*self.files, MANIFEST)}
         return (path for path in sorted(folder.rglob("*")) if path.is_file() and path not in known)
+
+
+KNOWN = ("model.json", "shot.json", "scenery.json")
+"""Files that say what a folder's others are made of."""
+
+
+def refuse_another(damaged: Path, again: Path) -> None:
+    """Raise StoreError where a folder that was made again is not equal to what the damaged one is known to have been.
+
+    That is what its manifest says, or where that was damaged, too, what its files say that can be read. Where all files fit
+    the manifest, and are wrong all the same, nothing is known.
+    """
+    try:
+        manifest = Manifest.read(damaged)
+        known = manifest.files if any(manifest.damage(damaged)) else {}
+    except StoreError:
+        known = {name: told_of(damaged / name) for name in KNOWN if _is_json(damaged / name)}
+    made = Manifest.read(again).files
+    other = [path for path, told in known.items() if made.get(path) != told]
+    if other:
+        raise StoreError(
+            f"{damaged}: expected what was made before, found another {other[0]}: the models or what is around them changed "
+            "since: put the old ones back, or delete the folder and render again"
+        )
+
+
+def _is_json(file: Path) -> bool:
+    try:
+        json.loads(file.read_bytes())
+    except (OSError, ValueError):
+        return False
+    return True
 
 
 REPAIR = "mend it with viewsphere check --repair"

@@ -1,0 +1,105 @@
+"""Damaged shots, models and exports of a data set are made again; what is whole is not touched."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from viewsphere.check import Finding, Report, check, exports, lacking_models
+from viewsphere.check.digests import damaged
+from viewsphere.errors import UserError, ViewsphereError
+from viewsphere.run.exporting import export
+from viewsphere.run.mending import Mender
+from viewsphere.run.progress import Listener, unheard
+from viewsphere.store import Dataset
+
+
+@dataclass(frozen=True)
+class Repaired:
+    """What was made again, in words, and what `check` says of the data set now; what could not be made again is a finding."""
+
+    done: tuple[str, ...]
+    report: Report
+
+
+def repair(root: Path | str, *, workers: int = 0, listener: Listener | None = None, **options: Any) -> Repaired:
+    """Check a data set, and make again what is not as it was: models, shots that are damaged, are missing or do not agree with
+    what is computed again, and exports. `options` are those of `check`.
+
+    A shot is rendered by its part's recipe, whose models have to be what they were; it takes the place of the damaged one when
+    it is whole and equal to what the manifest says of it. What cannot be made again stays as it is. `workers` 0 renders in the
+    calling process. Raises StoreError where there is no plan that can be read.
+    """
+    dataset = Dataset(root)
+    mending = _Mending(dataset, Mender(dataset.store, dataset.plan, workers, listener or unheard))
+    with dataset.store.occupied():
+        mending.models(mending.damaged_models())
+        mending.shots(mending.damaged_shots())
+        report = check(Dataset(root), **options)
+        mending.shots(_found_shots(dataset, report.findings))
+        mending.exports(report.findings)
+    report = check(Dataset(root), **options) if mending.done else report
+    return Repaired(tuple(mending.done), replace(report, findings=(*report.findings, *mending.refused)))
+
+
+class _Mending:
+    """What was made again so far, in words, and what could not be."""
+
+    def __init__(self, dataset: Dataset, mender: Mender) -> None:
+        self.done: list[str] = []
+        self.refused: list[Finding] = []
+        self._dataset, self._mender = dataset, mender
+        self._tried: set[str] = set()
+
+    def damaged_models(self) -> Iterator[str]:
+        """Keys of models that are not as they were written, or are missing."""
+        folders = damaged(self._dataset)[1]
+        lacking = set(lacking_models(self._dataset))
+        plan, store = self._dataset.plan, self._dataset.store
+        return (key for key in plan.models if store.model_folder(key) in folders or key in lacking)
+
+    def damaged_shots(self) -> Iterator[str]:
+        """Keys of shots that are not as they were written, or are missing."""
+        store, folders = self._dataset.store, damaged(self._dataset)[1]
+        wanted = (row.key for row in store.wanted(self._dataset.plan))
+        return (key for key in wanted if store.shot_folder(key) in folders or not store.has_shot(key))
+
+    def models(self, keys: Iterable[str]) -> None:
+        """Make them again."""
+        self._note("model", "made again", keys, self._mender.models)
+
+    def shots(self, keys: Iterable[str]) -> None:
+        """Render them again."""
+        self._note("shot", "rendered again", keys, self._mender.shots)
+
+    def _note(self, what: str, how: str, keys: Iterable[str], mend: Any) -> None:
+        wanted = [key for key in dict.fromkeys(keys) if key not in self._tried]
+        errors: Mapping[str, ViewsphereError] = mend(wanted) if wanted else {}
+        self._tried.update(wanted)
+        self.done += [f"{what} {key}: {how}" for key in wanted if key not in errors]
+        self.refused += [Finding("repair", None, f"{what} {key} cannot be {how}: {why}") for key, why in errors.items()]
+
+    def exports(self, findings: Iterable[Finding]) -> None:
+        """Write those again of which something was found: also where their files are links of what was damaged."""
+        names = exports(self._dataset).keys() & {finding.check for finding in findings}
+        for name in sorted(names):
+            try:
+                export(self._dataset.root, [name])
+                self.done.append(f"export {name}: written again")
+            except UserError as error:
+                self.refused.append(Finding("repair", None, f"export {name} cannot be written again: {error}"))
+
+
+def _found_shots(dataset: Dataset, findings: Iterable[Finding]) -> Iterator[str]:
+    """Keys of the shots that findings are about; where a channel was added to a frame later, it lies in a shot of its own."""
+    names = exports(dataset).keys()
+    for finding in findings:
+        if finding.frame is not None and finding.check not in names:
+            added = [
+                index.at(finding.frame).key
+                for index, channels in dataset.plan.supplements
+                if finding.check in channels and index.first <= finding.frame < index.first + index.samples
+            ]
+            yield from added or [dataset.plan.row_at(finding.frame).key]

@@ -1,0 +1,155 @@
+"""Damaged shots and models of a data set, made again by the recipes that made them; nothing else is touched."""
+
+from __future__ import annotations
+
+import json
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from viewsphere.errors import StoreError, UserError, ViewsphereError
+from viewsphere.recipe.recipe import Recipe
+from viewsphere.run.opening import check_whether_same
+from viewsphere.run.pool import Crew, Job, Listed
+from viewsphere.run.progress import Listener, Progress
+from viewsphere.run.stages import StoredBoxes
+from viewsphere.run.tasks import Damaged, ModelTask
+from viewsphere.run.warm import compile_kernels
+from viewsphere.sampling.extension import Portion, resumed
+from viewsphere.sampling.plan import plan
+from viewsphere.store import PlanRecord, Row, Store
+
+Errors = dict[str, ViewsphereError]
+"""What could not be made again, by its key, and why; it stays as it was."""
+
+MOST_FOLDERS = 8
+"""Folders above a model's file in which its recipe is looked for."""
+
+MOST_SHOTS = 100
+"""Shots of a part that are asked where its models' files lay."""
+
+
+@dataclass(frozen=True, eq=False)
+class Mender:
+    """Makes what is damaged again, by so many worker processes (0: in this one)."""
+
+    store: Store
+    record: PlanRecord
+    workers: int
+    tell: Listener
+    _portions: dict[int, Portion] = field(default_factory=dict[int, Portion])
+
+    def models(self, keys: Iterable[str]) -> Errors:
+        """Make the models of these keys again; gives what could not be done."""
+        errors, wanted = _sorted(keys, self._part_of_model)
+        for number, found in wanted.items():
+            specs = {spec.key: spec for spec in self._portion(number).model_specs}
+            self._run(number, [Job(key, key, ModelTask("damaged model", (specs[key],))) for key in found], errors)
+        return errors
+
+    def shots(self, keys: Iterable[str]) -> Errors:
+        """Render the shots of these keys again, if their models are what they were; gives what could not be done."""
+        errors, wanted = _sorted(keys, self._part_of_shot)
+        for number, found in wanted.items():
+            rows = [row for row in map(self.record.find, found) if row is not None]
+            changed = self._changed_models(number, rows)
+            casts = {row.key: [spec.key for spec in self._portion(number).cast(row) if spec.key in changed] for row in rows}
+            errors |= {key: changed[cast[0]] for key, cast in casts.items() if cast}
+            whole = [row for row in rows if not casts[row.key]]
+            if whole:
+                compile_kernels(self._portion(number).shot(whole[0], StoredBoxes(self.store)))
+            self._run(number, [Job(row.key, row.subject, Damaged(row)) for row in whole], errors)
+        return errors
+
+    def _changed_models(self, number: int, rows: Sequence[Row]) -> Errors:
+        """Those in the shots that are no longer what the data set shows."""
+        errors: Errors = {}
+        specs = {spec.key: spec for row in rows for spec in self._portion(number).cast(row)}
+        self._run(number, [Job(key, key, ModelTask("same model", (spec,))) for key, spec in specs.items()], errors)
+        return errors
+
+    def _run(self, number: int, jobs: Sequence[Job], errors: Errors) -> None:
+        with Crew(self.store.root, min(self.workers, len(jobs)), self._portion(number)) as crew:
+            for done, outcome in enumerate(crew.run(Listed(tuple(jobs))), 1):
+                if outcome.error is not None:
+                    errors[outcome.key] = outcome.error
+                self.tell(Progress("repair", done, len(jobs)))
+
+    def _part_of_shot(self, key: str) -> int:
+        """Number of the part that renders it; raises StoreError where none does."""
+        row = self.record.find(key)
+        if row is None:
+            raise StoreError(f"{key}: expected a shot of the plan, found another")
+        if _is_linked(self.store.shot_folder(key)):
+            raise StoreError(f"{key}: expected a shot that was rendered here, found another's: merge or import it anew")
+        self._portion(row.part)
+        return row.part
+
+    def _part_of_model(self, key: str) -> int:
+        """Number of the last part that has it; raises UserError where none can be made again."""
+        problem: UserError = StoreError(f"model {key}: expected a recipe that has it, found none")
+        for number in reversed(range(len(self.record.parts))):
+            try:
+                if key in {spec.key for spec in self._portion(number).model_specs}:
+                    return number
+            except UserError as error:
+                problem = error
+        raise problem
+
+    def _portion(self, number: int) -> Portion:
+        """A part, with its recipe's plan; raises UserError where that is not what it was."""
+        if number not in self._portions:
+            self._portions[number] = self._planned(number)
+        return self._portions[number]
+
+    def _planned(self, number: int) -> Portion:
+        part = self.record.parts[number]
+        check_whether_same(self.store, part)
+        problem: object = "another recipe"
+        for folder in dict.fromkeys(self._folders(number)):
+            try:
+                planned = plan(Recipe.model_validate(part.recipe, context={"folder": folder}), part.shot_frames)
+            except UserError as error:
+                problem = error
+                continue
+            if planned.digest == part.digest:
+                return resumed(planned, self.record, number)
+        raise StoreError(
+            f"{self.store.root}: recipe {part.name!r}: expected its files where they were, found {problem}: put them back, or "
+            "delete the damaged folders and render the recipe again"
+        )
+
+    def _folders(self, number: int) -> Iterator[Path]:
+        """Where the recipe's file may have been: here, or above a model's."""
+        yield Path.cwd()
+        for row, _ in zip(self.record.rows_of(number), range(MOST_SHOTS), strict=False):
+            try:
+                shot = self.store.labelled(row.key)
+            except StoreError:
+                continue
+            if shot is not None:
+                for thing in shot.things:
+                    yield from Path(thing.model.source).parents[:MOST_FOLDERS]
+                return
+
+
+def _sorted(keys: Iterable[str], part_of: Callable[[str], int]) -> tuple[Errors, dict[int, list[str]]]:
+    """The keys of each part; and of those that none can make again, why."""
+    errors: Errors = {}
+    found: defaultdict[int, list[str]] = defaultdict(list)
+    for key in keys:
+        try:
+            found[part_of(key)].append(key)
+        except UserError as error:
+            errors[key] = error
+    return errors, found
+
+
+def _is_linked(folder: Path) -> bool:
+    """Whether a shot came from another data set: its records say everything."""
+    try:
+        records = json.loads((folder / "frames.json").read_text("utf-8"))
+        return all("camera" in record for record in records)
+    except (OSError, ValueError, TypeError):
+        return False
