@@ -97,7 +97,7 @@ def _check_look(planned: Plan, store: Store, found: PlanRecord, number: int) -> 
 def _check_versions(store: Store, found: PlanRecord) -> None:
     installed = version("viewsphere")
     for part in found.parts:
-        if part.is_product and part.version != installed:
+        if part.is_sampled and part.version != installed:
             raise StoreError(
                 f"{store.root}: expected data made by viewsphere {installed}, found {part.version}: "
                 "install that version to go on, or choose another output folder"
