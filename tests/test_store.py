@@ -16,7 +16,7 @@ from viewsphere.store import Block, Category, Dataset, Part, PlanRecord, Store, 
 
 PART = Part(
     digest="d", version="1", name="n", recipe={"a": 1.5}, channels=("rgb",), first=0, frames=1, max_objects=1,
-    blocks=(Block(("m",), ((0, 1),)),), new_poses=1, model_splits={"m": "train"},
+    blocks=(Block(("m",), ((0, 1),)),), new_poses=1, dealt_splits={"m": "train"},
 )  # fmt: skip
 
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 from collections.abc import Iterator, Sequence
+from itertools import accumulate, groupby
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +27,7 @@ from viewsphere.run.stages import Stages
 from viewsphere.sampling.camera import looking
 from viewsphere.sampling.plan import Plan
 from viewsphere.store import Dataset
+from viewsphere.store.index import Ranges, length, nth, numbers
 
 Picture = NDArray[np.uint8]
 
@@ -36,16 +39,14 @@ SIDES = (("front", 0.0), ("left side", 90.0), ("back", 180.0), ("right side", 27
 
 
 def preview_samples(recipe: Recipe, count: int = 12, width: int = 320) -> Iterator[Sample]:
-    """Render `count` frames spread over all models and poses, `width` pixels wide, in memory."""
+    """Render `count` frames spread over all models (or scenes) and poses, `width` pixels wide, in memory."""
     planned = prepare(recipe)
     stages = Stages()
-    for model, poses in _spread(planned, count):
-        stages.read_ahead(planned, planned.model_specs[model])
-        stages.check_distances(planned, planned.model_specs[model])
-        schedule = planned.schedules[model]
-        groups = [[pose] for pose in poses] if recipe.scene.is_new_each_frame else schedule.together(poses)
-        for group in groups:
-            shot = planned.take(planned.model_specs[model].key, group, stages.box)
+    for subject, groups in _spread(planned, count):
+        stages.read_ahead(planned, planned.cast(subject))
+        stages.check_distances(planned, subject)
+        for poses in [[pose] for group in groups for pose in group] if recipe.scene.is_new_each_frame else groups:
+            shot = planned.take(subject, poses, stages.box)
             channels = tuple(dict.fromkeys((*shot.channels, picture_of(shot.channels) or "rgb", "depth", "instances")))
             small = shot.model_copy(update={"rig": _scaled(shot.rig, width), "channels": channels})
             yield from stages.render(small)
@@ -57,19 +58,28 @@ def dataset_samples(dataset: Dataset, count: int = 12) -> list[Sample]:
     return [dataset[int(i)] for i in picks]
 
 
-def _spread(planned: Plan, count: int) -> list[tuple[int, list[int]]]:
-    """Model and pose indices such that models follow in order and poses step through the grid; all where there are so few."""
-    own = (
-        [list(schedule.poses) for schedule in planned.schedules] if planned.timings else [range(planned.poses)] * planned.models
-    )
+def _spread(planned: Plan, count: int) -> list[tuple[str, list[list[int]]]]:
+    """Subjects and their poses, those of one time step together, such that subjects follow in order and poses step through
+    the grid; all where there are so few.
+    """
+    subjects, taken = planned.subjects, planned.rows.taken
     if count >= planned.frames:
-        return [(model, list(poses)) for model, poses in enumerate(own)]
-    models = np.linspace(0, planned.models - 1, count).round().astype(int)
-    chosen: dict[int, list[int]] = {}
-    for i, model in enumerate(models.tolist()):
-        poses = own[model]
-        chosen.setdefault(model, []).append(poses[int(i * len(poses) / count * (1 + 1 / max(count, 1))) % len(poses)])
-    return list(chosen.items())
+        return [(subject, [list(numbers(poses)) for poses in taken(subject)]) for subject in subjects]
+    chosen: dict[str, list[int]] = {}
+    for i, number in enumerate(np.linspace(0, len(subjects) - 1, count).round().astype(int).tolist()):
+        size = sum(map(length, taken(subjects[number])))
+        chosen.setdefault(subjects[number], []).append(int(i * size / count * (1 + 1 / max(count, 1))) % size)
+    return [(subject, _grouped(taken(subject), places)) for subject, places in chosen.items()]
+
+
+def _grouped(steps: Sequence[Ranges], places: Sequence[int]) -> list[list[int]]:
+    """The poses at some places of all time steps' poses, parted where the time step changes."""
+    edges = list(accumulate(map(length, steps), initial=0))
+    found: list[tuple[int, int]] = []
+    for place in places:
+        step = bisect_right(edges, place) - 1
+        found.append((step, nth(steps[step], place - edges[step])))
+    return [[pose for _, pose in group] for _, group in groupby(found, lambda pair: pair[0])]
 
 
 def _scaled(rig: Rig, width: int) -> Rig:

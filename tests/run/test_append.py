@@ -92,7 +92,7 @@ def known_by(sample):
 
 
 def splits_of_models(record):
-    return {key: split for part in record.parts for key, split in part.model_splits.items()}
+    return {key: split for part in record.parts for key, split in part.dealt_splits.items()}
 
 
 def assert_same_frame(a, b):

@@ -157,11 +157,11 @@ def test_company_comes_from_the_same_split_and_follows_from_names_alone(draw):
         keys = tuple(p.model.key for p in shot.things)
         by_model.setdefault(keys[0], set()).add(keys[1:])
         assert keys[0] not in keys[1:]
-        splits_there = {planned.split(p.model, 0) for p in shot.things}
+        splits_there = {planned.split(p.model.key, 0) for p in shot.things}
         assert len(splits_there) == 1 == len({f.split for f in shot.instants} | splits_there)
     counts = {len(found) for found in by_model.values()}
     assert counts == {1} if draw != "per_frame" else max(counts) > 1
-    more = plan(recipe(13, splits=splits, scene=scene)).keeping(planned.model_splits)
+    more = plan(recipe(13, splits=splits, scene=scene)).keeping(planned.dealt_splits)
     new = more.model_specs[12].key
     same = 0
     for shot in planned.shots(box_of):
@@ -178,7 +178,7 @@ def test_shots_do_not_depend_on_the_order_they_are_asked_for():
     again = plan(recipe(scene={"company": {"count": 3, "draw": "per_frame"}}))
     assert [again.shot(i, box_of) for i in reversed(range(again.shot_count))] == shots[::-1]
     for shot in shots:
-        beside = planned.cast(shot.things[0].model, shot.instants[0].viewpoint.index)
+        beside = planned.cast(shot.things[0].model.key, shot.instants[0].viewpoint.index)
         assert [m.key for m in beside] == [p.model.key for p in shot.things]
 
 
@@ -267,7 +267,7 @@ def test_where_there_is_no_room_is_said(tmp_path, tiny):
     assert problem(at).startswith("scene.planes[0].at: expected the plane clear of the models")
     around = {"planes": {"image": picture, "height": 4, "around": {"distance": [0.1, 0.2]}}}
     assert problem(around).startswith("scene.planes[0].around: expected room")
-    assert "found car_000 and " in problem({"company": {"layout": [[0.5, 0, 0]]}})
+    assert " and the model that it joins nearer" in problem({"company": {"layout": [[0.5, 0, 0]]}})
     assert "expected room for 6 models" in problem({"place": tiny, "company": {"count": 5, "gap": 20}})
     assert "free part of the place" in problem({"place": tiny, "company": {"layout": [[9, 0, 0]]}})
 
@@ -277,11 +277,11 @@ def test_a_camera_in_company_is_found_whoever_it_is():
     viewpoints = {"azimuth": [0, 90], "elevation": 0, "distance": 2.0}
     planned = plan(recipe(viewpoints=viewpoints, scene={"company": {"layout": [[4, 0, 0]]}}))
     spec = planned.model_specs[0]
-    problem = str(Distances(planned, box_of).problem(spec))
+    problem = str(Distances(planned, box_of).problem(spec.key))
     assert "distance 2 m (pose 1) inside its box" in problem
-    assert problem.endswith(f"(model {planned.cast(spec)[1].key})")
+    assert problem.endswith(f"(model {planned.cast(spec.key)[1].key})")
     far = plan(recipe(viewpoints={**viewpoints, "distance": 20}, scene={"company": {"layout": [[4, 0, 0]]}}))
-    assert Distances(far, box_of).problem(spec) is None
+    assert Distances(far, box_of).problem(spec.key) is None
 
 
 def test_the_digest_follows_the_pictures_on_the_planes(tmp_path):

@@ -154,10 +154,10 @@ def test_a_camera_inside_at_any_time_step_is_found():
         return box_vertices((-0.5, -0.5, 0.0), (0.5, 0.5 if spec.frame < 30 else 9.0, 1.0))
 
     planned = plan(recipe(viewpoints={"azimuth": [0, 180], "distance": 5, "elevation": 0}))
-    problem = Distances(planned, growing).problem(planned.model_specs[0])
+    problem = Distances(planned, growing).problem(planned.subjects[0])
     assert problem is not None
     assert "walk-f0037" in str(problem)
-    assert Distances(planned, box_of).problem(planned.model_specs[0]) is None
+    assert Distances(planned, box_of).problem(planned.subjects[0]) is None
     assert np.isfinite(Distances(planned, box_of).cameras(planned.shot(0, box_of).things, range(planned.poses))).all()
 
 

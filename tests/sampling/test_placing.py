@@ -32,8 +32,13 @@ def spec(key):
 
 
 def place(name, boxes, keys, seed=0, names=(), **room):
-    """What the placer of this name answers for things of these boxes and keys."""
-    shapes = [Shape(b, lambda b=b: b) for b in boxes]
+    """Where things of these boxes and keys stand: the first at the origin, the others as the placer of this name says."""
+    own, *shapes = [Shape(b, lambda b=b: b) for b in boxes]
+    first = standing(own.box)
+    return first, *alone(name, shapes, keys[1:], seed, names, taken=((own, first),), **room)
+
+
+def alone(name, shapes, keys, seed=0, names=(), **room):
     rng = partial(generator, seed, "layout", *names)
     return tuple(plugins.load("placers", name).place([spec(key) for key in keys], Room(**room), shapes, (), rng))
 
@@ -118,12 +123,38 @@ def test_a_row_is_side_by_side_at_the_gap_right_and_left_in_turn():
     assert all(m[0][:2] == (1, 0) for m in moves)
 
 
+@pytest.mark.parametrize("how", ["scatter", "row"])
+def test_with_nobody_there_before_the_first_stands_at_the_origin(how):
+    boxes = [box(2, 4), box(1, 1), box(3, 1), box(1, 1)]
+    shapes = [Shape(b, lambda b=b: b) for b in boxes]
+    turns = set()
+    for seed in range(20):
+        moves = alone(how, shapes, "abcd", seed, gap=0.5)
+        assert moves[0][0][3] == moves[0][1][3] == 0
+        floors = [polygon(b, m) for b, m in zip(boxes, moves, strict=True)]
+        assert min(distance(a, b) for a, b in itertools.combinations(floors, 2)) >= 0.5 - 1e-9
+        turns.add(moves[0][0][:2])
+    assert len(turns) == (1 if how == "row" else 20)
+    if how == "row":
+        assert moves == place("row", boxes, "abcd", gap=0.5)
+
+
+def test_all_listed_spots_are_taken_where_nobody_is_there_before():
+    shapes = [Shape(box(1, 1), lambda: box(1, 1))] * 2
+    moves = alone("listed", shapes, "ab", spots=((1.0, 0.0, 0.0), (-1.0, 0.0, 90.0)))
+    assert [move[0][3] for move in moves] == [1, -1]
+    with pytest.raises(RecipeError, match=r"scenes\.layout: expected 0.3 m between all models; found b and a nearer"):
+        alone("listed", shapes, "ab", spots=((1.0, 0.0, 0.0), (1.5, 0.0, 0.0)), gap=0.3, field="scenes")
+
+
 def test_a_listed_layout_is_taken_as_it_is_and_refused_where_two_meet():
     listed = partial(place, "listed", [box(2, 4), box(2, 4)], ("own", "other"))
     moves = listed(spots=((4.0, 1.0, 90.0),), gap=0.3)
     assert moves[1] == ((0, -1, 0, 4), (1, 0, 0, 1), (0, 0, 1, 0.5), (0, 0, 0, 1))
     np.testing.assert_allclose(np.array(moves[1])[:3, :3] @ [0, -1, 0], [1, 0, 0])  # faces a camera of azimuth 90
-    with pytest.raises(RecipeError, match=r"layout: expected 0.3 m between all models; found own and other nearer"):
+    with pytest.raises(
+        RecipeError, match=r"layout: expected 0.3 m between all models; found other and the model that it joins nearer"
+    ):
         listed(spots=((2.2, 0.0, 0.0),), gap=0.3)
     listed(spots=((2.2, 0.0, 0.0),), gap=0.2)
     with pytest.raises(RecipeError, match="nearer or in one another"):
@@ -237,7 +268,7 @@ from viewsphere.sampling.placing import standing
 
 def place(cast, room, shapes, views, rng):
     reaches = [float(shape.hull[:, 0].max()) for shape in shapes]
-    assert all(len(shape.hull) > 8 for shape in shapes) and list(views) == []
+    assert len(shapes) == 3 and all(len(shape.hull) > 8 for shape in shapes) and list(views) == []
     return [standing(shape.box, x) for shape, x in zip(shapes, reaches)]
 """,
     )
@@ -250,7 +281,7 @@ def place(cast, room, shapes, views, rng):
 
     things = plan(recipe("leaning")).shot(0, box_of).things
     assert len({thing.model.key for thing in things}) == 4
-    for thing in things:
+    for thing in things[1:]:
         reach = boxes[thing.model.key][4, 0]
         assert reach > 0.05 and thing.world_from_object[0][3] == pytest.approx(reach, abs=1e-9)
 

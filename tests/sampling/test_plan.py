@@ -141,7 +141,7 @@ def test_adding_models_and_poses_moves_nothing_to_another_split():
         planned = plan(
             recipe(models=models, viewpoints={"azimuth": azimuths, "distance": 5}, splits={"by": by, "a": 0.5, "b": 0.5})
         ).keeping(kept)
-        kept |= planned.model_splits
+        kept |= planned.dealt_splits
         return {(s.things[0].model.key, f.viewpoint.azimuth_deg): f.split for s in planned.shots(unit_box) for f in s.instants}
 
     cars = {"source": "zoo:car", "count": 20}

@@ -365,12 +365,12 @@ def test_a_jittered_target_lies_around_the_models_centre_or_the_given_one():
 
 def test_jitter_into_a_model_is_found_before_rendering():
     found = planned({"jitter": {"distance": [-0.8, 0], "target": [0, 0, [0, 0.1]]}})
-    problem = Distances(found, box_of).problem(found.model_specs[1])
+    problem = Distances(found, box_of).problem("car_001")
     assert problem is not None
     assert str(problem).startswith("viewpoints.distance: expected the camera outside the model; found distance ")
     assert str(problem).endswith("(model car_001)")
     calm = planned({"jitter": {"distance": [-0.2, 0.1]}})
-    assert Distances(calm, box_of).problem(calm.model_specs[1]) is None
+    assert Distances(calm, box_of).problem("car_001") is None
 
 
 def test_a_shot_of_a_random_scene_is_plain_json():

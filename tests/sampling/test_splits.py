@@ -11,7 +11,7 @@ from small import small_recipe
 from viewsphere.errors import RecipeError
 from viewsphere.recipe.recipe import Splits
 from viewsphere.sampling.extension import extend, whole
-from viewsphere.sampling.splits import model_splits, quotas
+from viewsphere.sampling.splits import dealt, quotas
 
 SHARES = st.lists(st.integers(1, 50), min_size=1, max_size=6).map(
     lambda parts: {f"split_{i}": part / sum(parts) for i, part in enumerate(parts)}
@@ -29,7 +29,7 @@ def recipe(models, **fields):
 
 def test_70_to_30_of_ten_is_seven_and_three():
     assert quotas({"train": 0.7, "val": 0.3}, 10) == {"train": 7, "val": 3}
-    found = model_splits(splits_of({"train": 0.7, "val": 0.3}), 1, [f"car_{i}" for i in range(10)], {})
+    found = dealt(splits_of({"train": 0.7, "val": 0.3}), 1, [f"car_{i}" for i in range(10)], {})
     assert Counter(found.values()) == {"train": 7, "val": 3}
 
 
@@ -46,13 +46,13 @@ def test_quotas_are_all_of_them_near_their_shares_and_none_is_empty(shares, coun
 @given(SHARES, KEYS, st.integers(0, 9), st.randoms())
 def test_the_order_of_models_does_not_matter(shares, keys, seed, random):
     shuffled = random.sample(keys, len(keys))
-    assert model_splits(splits_of(shares), seed, shuffled, {}) == model_splits(splits_of(shares), seed, keys, {})
+    assert dealt(splits_of(shares), seed, shuffled, {}) == dealt(splits_of(shares), seed, keys, {})
 
 
 @given(SHARES, KEYS, st.integers(0, 30), st.integers(0, 9))
 def test_models_that_come_later_move_none(shares, keys, cut, seed):
-    before = model_splits(splits_of(shares), seed, keys[:cut], {})
-    after = model_splits(splits_of(shares), seed, keys[::-1], before)
+    before = dealt(splits_of(shares), seed, keys[:cut], {})
+    after = dealt(splits_of(shares), seed, keys[::-1], before)
     assert {key: after[key] for key in before} == before
     new = Counter(after[key] for key in keys[cut:])
     assert new == Counter({name: n for name, n in quotas(shares, len(keys[cut:])).items() if n})
@@ -62,10 +62,10 @@ def test_company_is_of_one_split_after_appending_too():
     fields = {"scene": {"company": 1}}
     first = whole(vs.plan(recipe([{"source": "zoo:post_box", "count": 6}], **fields)))
     more = extend(vs.plan(recipe([{"source": "zoo:post_box", "count": 11}], **fields)), first.record)
-    assert {key: more.plan.model_splits[key] for key in first.plan.model_splits} == first.plan.model_splits
-    assert Counter(more.part.model_splits.values()) in ({"train": 3, "val": 2}, {"train": 2, "val": 3})
+    assert {key: more.plan.dealt_splits[key] for key in first.plan.dealt_splits} == first.plan.dealt_splits
+    assert Counter(more.part.dealt_splits.values()) in ({"train": 3, "val": 2}, {"train": 2, "val": 3})
     for spec in more.plan.model_specs:
-        assert len({more.plan.model_splits[member.key] for member in more.plan.cast(spec)}) == 1
+        assert len({more.plan.dealt_splits[member.key] for member in more.plan.cast(spec.key)}) == 1
 
 
 @pytest.mark.parametrize(("draw", "units"), [("fixed", 1), ("per_model", 12), ("per_frame", 12 * 6)])
@@ -78,7 +78,7 @@ def test_a_place_is_in_one_split(draw, units):
     for spec in planned.model_specs:
         for pose in planned.schedule(spec).poses:
             place = {"fixed": None, "per_model": spec.key, "per_frame": (spec.key, pose)}[draw]
-            found[place].add(planned.split(spec, pose))
+            found[place].add(planned.split(spec.key, pose))
     assert len(found) == units
     assert {len(names) for names in found.values()} == {1}
     assert len(set.union(*found.values())) == (1 if draw == "fixed" else 2)

@@ -34,6 +34,7 @@ from viewsphere.model.mistakes import Marks, report, shown
 from viewsphere.model.numbers import Count, Natural, Number
 from viewsphere.recipe.models import ModelEntry
 from viewsphere.recipe.scene import CameraEntry, EngineEntry, SceneEntry, engine_entry
+from viewsphere.recipe.scenes import ScenesField
 from viewsphere.recipe.values import OrShort, shape_of
 from viewsphere.recipe.viewpoints import Viewpoints
 
@@ -56,7 +57,9 @@ class Splits(Frozen):
     model_config = ConfigDict(extra="allow")
     __pydantic_extra__: dict[str, Share] = Field(init=False)  # pyright: ignore[reportIncompatibleVariableOverride]
 
-    by: Literal["model", "pose", "frame", "place"] = Field(default="model", description="what is kept together in one split")
+    by: Literal["model", "scene", "pose", "frame", "place"] = Field(
+        default="model", description="what is kept together in one split"
+    )
 
     @model_validator(mode="before")
     @classmethod
@@ -102,6 +105,11 @@ class Recipe(Frozen):
     seed: Natural = Field(default=0, description="every random choice follows from it")
     models: tuple[ModelEntry, ...] = Field(min_length=1, description="the models to place, each entry of one category")
     viewpoints: Viewpoints = Field(description="where the camera stands; kind: grid (default), sphere, normal or jitter")
+    scenes: ScenesField | None = Field(
+        default=None,
+        description="how many random scenes to make of the models, or a mapping of count, objects, layout and more; by default "
+        "each model is taken alone, or with its company",
+    )
     camera: CameraEntry = Field(default=CameraEntry(fov_deg=40.0), description="image size and lens")
     scene: SceneEntry = Field(default=SceneEntry(), description="light, ground, background, effects, what stands around")
     engine: Annotated[EngineEntry, BeforeValidator(engine_entry), OrShort({"type": "string"})] = Field(
@@ -117,7 +125,7 @@ class Recipe(Frozen):
     )
     splits: Splits = Field(
         default=Splits(),
-        description="shares of train, val, ... by model, pose or frame; 70/30 train/val by model by default",
+        description="shares of train, val, ... by model, scene, pose, place or frame; 70/30 train/val by model by default",
     )
     shot_frames: Count | None = Field(default=None, description="most frames that are rendered and resumed as one unit")
     label_alpha: Annotated[Number, Field(gt=0, le=1)] = Field(
@@ -191,9 +199,15 @@ class Recipe(Frozen):
         return cls.model_validate(data, context={"marks": marks, "folder": Path(path).parent})
 
     @property
+    def sampler(self) -> str:
+        """Name of the sampler that makes shots of the recipe."""
+        return "product" if self.scenes is None else self.scenes.sampler
+
+    @property
     def digest(self) -> str:
         """SHA-256 (hexadecimal) of all that changes a picture or a label; formats, for one, do not."""
-        text = json.dumps(self.model_dump(mode="json", exclude=BEFORE_RENDERING), separators=(",", ":"))
+        unused = BEFORE_RENDERING | ({"scenes"} if self.scenes is None else set[str]())
+        text = json.dumps(self.model_dump(mode="json", exclude=unused), separators=(",", ":"))
         return hashlib.sha256(text.encode()).hexdigest()
 
     def to_yaml(self) -> str:

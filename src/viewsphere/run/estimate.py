@@ -3,8 +3,8 @@
     seconds = (models x model + scenes x scene + frames x frame) / workers + frames x export
     bytes   = models x model + frames x frame
 
-A scene is built once for each model (by every worker, if there are fewer models), or for each frame where the recipe draws
-scenes for each. Exports are written by one process. Not counted: starting the workers, and compiling kernels the first time.
+A scene is built once for each model or random scene (by every worker, if there are fewer), or for each frame where the recipe
+draws scenes for each. Exports are written by one process. Not counted: starting the workers, and compiling kernels.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ from viewsphere.sampling.extension import Portion
 from viewsphere.sampling.plan import Plan
 from viewsphere.store import Dataset, Row, Store
 
-MODELS = 3
-SHOTS_PER_MODEL = 4
+SUBJECTS = 3
+SHOTS_OF_EACH = 4
 SHOT_FRAMES = 2
 BLOCK = 4096
 """Bytes that a file system gives out at once, on most."""
@@ -57,7 +57,7 @@ class Estimate:
 
 
 def estimate(recipe: Recipe, workers: int = 1, clock: Callable[[], float] = time.perf_counter) -> Estimate:
-    """Time and disk space for a whole data set, from at most 24 frames of three of its models, spread over the poses.
+    """Time and disk space for a whole data set, from at most 24 frames of three of its models or scenes, spread over the poses.
 
     Takes some seconds. Raises UserError for what `generate` would also refuse: a model that cannot be used, for one.
     """
@@ -67,7 +67,8 @@ def estimate(recipe: Recipe, workers: int = 1, clock: Callable[[], float] = time
 def extrapolate(planned: Plan, rates: Rates, workers: int) -> Estimate:
     """The cost of a whole plan; no workers count as one, for then the calling process works."""
     crew, models = max(workers, 1), len(planned.kept_specs)
-    scenes = planned.frames if planned.recipe.scene.is_new_each_frame else max(planned.models, min(crew, planned.shot_count))
+    scenes = len(planned.subjects)
+    scenes = planned.frames if planned.recipe.scene.is_new_each_frame else max(scenes, min(crew, planned.shot_count))
     shared = models * rates.model + scenes * rates.scene + planned.frames * rates.frame
     seconds = shared / crew + planned.frames * rates.export
     return Estimate(seconds, models * rates.model_bytes + planned.frames * rates.frame_bytes, crew)
@@ -83,11 +84,10 @@ def measure(recipe: Recipe, clock: Callable[[], float] = time.perf_counter) -> R
 def _measure_in(planned: Plan, store: Store, stopwatch: _Stopwatch) -> Rates:
     portion = to_render(planned, store)
     store.open_for(portion.record)
-    chosen = _spread(planned)
-    specs = [planned.model_specs[model] for model in chosen]
+    rows = list(_spread(planned))
+    specs = {spec.key: spec for row in rows for spec in portion.cast(row)}.values()
     model = stopwatch.mean([_model_work(store, portion, spec) for spec in specs])
     worker = Worker(store.root, portion)  # one that did not make the models: in a run that is seldom the one that renders them
-    rows = [row for some in chosen.values() for row in some]
     shots = [planned.shot(row, worker.stages.box) for row in rows]
     load_kernels(shots[0])
     begun = frame = 0.0
@@ -119,16 +119,14 @@ def _export(store: Store, formats: Sequence[str], stopwatch: _Stopwatch) -> floa
     return stopwatch(lambda: write(dataset, folders))
 
 
-def _spread(planned: Plan) -> dict[int, list[Row]]:
-    """Models, evenly over the plan, and some shots of each: together evenly over the poses."""
-    models = min(MODELS, planned.models)
-    chosen: dict[int, list[Row]] = {}
-    for i in range(models):
-        model = i * (planned.models - 1) // max(models - 1, 1)
-        shots = list(planned.rows.of(planned.model_specs[model].key))
-        parts = {int((i * SHOTS_PER_MODEL + k + 1) * GOLDEN % 1 * len(shots)) for k in range(SHOTS_PER_MODEL)}
-        chosen[model] = [shots[part] for part in sorted(parts)]
-    return chosen
+def _spread(planned: Plan) -> Iterator[Row]:
+    """Some shots of subjects evenly over the plan: together evenly over the poses."""
+    count = min(SUBJECTS, len(planned.subjects))
+    for i in range(count):
+        subject = planned.subjects[i * (len(planned.subjects) - 1) // max(count - 1, 1)]
+        shots = planned.rows.count_of(subject)
+        parts = {int((i * SHOTS_OF_EACH + k + 1) * GOLDEN % 1 * shots) for k in range(SHOTS_OF_EACH)}
+        yield from (planned.rows.row_of(subject, part) for part in sorted(parts))
 
 
 def disk_bytes(folders: Sequence[Path]) -> int:

@@ -30,6 +30,9 @@ from viewsphere.sampling.plan import Plan
 from viewsphere.store import Dataset, Row, Store
 from viewsphere.store.index import Index
 
+MOST_SUBJECTS = 10_000
+"""Models or scenes whose cameras are looked at before rendering, evenly over all; the others are when their turn comes."""
+
 
 @dataclass(frozen=True)
 class Summary:
@@ -147,7 +150,7 @@ def _prepare_models(portion: Portion, store: Store, crew: Crew, keep_going: bool
         tell(Progress("models", done, total))
     for key, problem in _distance_problems(planned, store, failed):
         failed.setdefault(key, problem)
-    own = {m.key for m in planned.model_specs}
+    own = {m.key for m in planned.model_specs} | set(planned.subjects)
     stops = [e for k, e in failed.items() if not (keep_going and k in own and isinstance(e, (ModelError, RecipeError)))]
     if stops or own <= failed.keys():
         raise _joined(stops or list(failed.values()))
@@ -172,17 +175,17 @@ def _compare_models(portion: Portion, store: Store, crew: Crew) -> None:
 
 
 def _distance_problems(planned: Plan, store: Store, failed: Container[str]) -> Iterator[tuple[str, ViewsphereError]]:
-    """Models that some pose's camera would stand inside of, or that have no room; each is named once."""
+    """Models or scenes that some pose's camera would stand inside of, or that have no room; each is named once."""
     distances = Distances(planned, StoredBoxes(store))
-    for spec in planned.model_specs:
-        if any(member.key in failed for member in planned.cast(spec)):
+    for subject in planned.subjects[:: -(-len(planned.subjects) // MOST_SUBJECTS)]:
+        if any(member.key in failed for member in planned.cast(subject)):
             continue
         try:
-            problem = distances.problem(spec)
+            problem = distances.problem(subject)
         except RecipeError as error:
             problem = error
         if problem:
-            yield spec.key, problem
+            yield subject, problem
 
 
 def _joined(errors: Sequence[ViewsphereError]) -> ViewsphereError:
@@ -262,9 +265,11 @@ class Missing:
         """Whether a model that was left out is in a shot; a shot that lacks company lands in `skipped`."""
         if not self.skipped:
             return False
+        if row.subject in self.skipped:
+            return True
         lacking = [member.key for member in self.portion.cast(row) if member.key in self.skipped]
-        if lacking and row.subject not in self.skipped:
-            self.skipped[row.key] = f"beside its model stands {lacking[0]}, which was left out"
+        if lacking:
+            self.skipped[row.key] = f"in it stands {lacking[0]}, which was left out"
         return bool(lacking)
 
     @property
@@ -283,7 +288,7 @@ def _accept(outcome: Outcome, keep_going: bool, skipped: dict[str, str]) -> None
 
 def _note_skipped(portion: Portion, store: Store, skipped: dict[str, str]) -> None:
     """Keep what was left out, of other parts too."""
-    own = {spec.key for spec in portion.model_specs}
+    own = {spec.key for spec in portion.model_specs} | set(portion.plan.subjects)
     others = {key: why for key, why in store.skipped().items() if key not in own and not _is_of(portion, key)}
     others = others if portion.number else {}
     moments = {spec.key: skipped[spec.track] for spec in portion.model_specs if spec.track in skipped}

@@ -13,6 +13,7 @@ from viewsphere.run.progress import Listener, Progress
 from viewsphere.store import Block, Part, PlanRecord, Store
 from viewsphere.store.foreign import ForeignDataset
 from viewsphere.store.linking import link_model, link_shot
+from viewsphere.store.records import IMPORT
 
 SHOT_FRAMES = 1000
 """Frames that are kept in one folder and written at once."""
@@ -21,7 +22,6 @@ SHOT_FRAMES = 1000
 NAME_BYTES = 8
 """A pose's name in `Part.pose_names`; zeros are that of no pose a recipe can mean."""
 
-SAMPLER = "import"
 """Frames in the order of another data set; how they were chosen nobody knows."""
 
 
@@ -77,8 +77,8 @@ def _plan_record(foreign: ForeignDataset) -> PlanRecord:
         first=0,
         frames=foreign.count,
         max_objects=foreign.max_objects,
-        blocks=(Block((SAMPLER,), ((0, foreign.count),)),),
-        sampler=SAMPLER,
+        blocks=(Block((IMPORT,), ((0, foreign.count),)),),
+        sampler=IMPORT,
         shot_frames=SHOT_FRAMES,
         new_poses=foreign.poses,
         pose_names=b64encode(bytes(NAME_BYTES * foreign.poses)).decode(),

@@ -17,8 +17,8 @@ def render(recipe: Recipe) -> Iterator[Sample]:
     """
     planned = prepare(recipe)
     stages = Stages()
-    for spec in planned.model_specs:
-        stages.read_ahead(planned, spec)
-        stages.check_distances(planned, spec)
-        for row in planned.rows.of(spec.key):
+    for subject in planned.subjects:
+        stages.read_ahead(planned, planned.cast(subject))
+        stages.check_distances(planned, subject)
+        for row in planned.rows.of(subject):
             yield from stages.render(planned.shot(row, stages.box))

@@ -228,14 +228,14 @@ def _parts(source: _Source) -> Iterator[Part]:
                 supplies=(),
                 new_poses=plan.poses if first == source.first_frame else 0,
                 pose_names=names if first == source.first_frame else "",
-                model_splits={source.model_keys.get(key, key): split for key, split in part.model_splits.items()},
+                dealt_splits={source.model_keys.get(key, key): split for key, split in part.dealt_splits.items()},
             )
         first += frames
 
 
 def _moved(source: _Source, part: Part, block: Block) -> Block:
     """The block with its models' new keys and its poses' new numbers; where poses are not known, positions are frames."""
-    by = source.first_pose if part.is_product else source.first_frame
+    by = source.first_pose if part.is_sampled else source.first_frame
     subjects = tuple(source.model_keys.get(key, key) for key in block.subjects)
     return replace(block, subjects=subjects, positions=tuple((a + by, b + by) for a, b in block.positions))
 

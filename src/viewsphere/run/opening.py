@@ -109,7 +109,7 @@ def _painted_otherwise(store: Store, engine: str) -> StoreError:
 def _check_versions(store: Store, parts: Iterable[Part]) -> None:
     installed = version("viewsphere")
     for part in parts:
-        if part.is_product and part.version != installed:
+        if part.is_sampled and part.version != installed:
             raise StoreError(
                 f"{store.root}: expected data made by viewsphere {installed}, found {part.version}: "
                 "install that version to go on, or choose another output folder"

@@ -106,17 +106,18 @@ class Stages:
             self._sizes[name] = box_size(self.box(spec.model_copy(update={"scale": "as_is"})))
         return self._sizes[name]
 
-    def read_ahead(self, planned: Plan, spec: ModelSpec) -> None:
-        """Read all moments of a model of the plan at once, where it moves, instead of one after another."""
-        moments = planned.moments_of(spec)
-        if moments:
-            read_ahead((spec, *moments))
+    def read_ahead(self, planned: Plan, specs: Sequence[ModelSpec]) -> None:
+        """Read all moments of each model of the plan at once, where it moves, instead of one after another."""
+        for spec in specs:
+            moments = planned.moments_of(spec)
+            if moments:
+                read_ahead((spec, *moments))
 
-    def check_distances(self, planned: Plan, spec: ModelSpec) -> None:
-        """Raise RecipeError if a pose's camera would stand inside this model, or one that stands beside it."""
+    def check_distances(self, planned: Plan, subject: str) -> None:
+        """Raise RecipeError if a pose's camera would stand inside what stands in a subject's frames."""
         from viewsphere.sampling.distances import Distances
 
-        problem = Distances(planned, self.box).problem(spec)
+        problem = Distances(planned, self.box).problem(subject)
         with planned.recipe.located():
             if problem:
                 raise problem
@@ -131,9 +132,11 @@ class Stages:
         scene = planned.recipe.scene
         if planned.composition is None or not scene.has_fixed_scenery:
             return
-        spec = planned.model_specs[0]
-        things = planned.composition.things(spec, None, self.box)
-        cameras = Distances(planned, self.box).cameras(things, range(0, planned.poses, -(-planned.poses // MOST_CAMERAS)))
+        subject = planned.subjects[0]
+        there = next(planned.sampler.standing(planned, subject, self.box))
+        things = planned.composition.things(subject, there.things, None, self.box)
+        poses = range(0, planned.poses, -(-planned.poses // MOST_CAMERAS))
+        cameras = Distances(planned, self.box).cameras(things, poses, views=there.views)
         with planned.recipe.located():
             self._check_cameras(things, cameras)
 

@@ -23,7 +23,7 @@ from viewsphere.recipe.scenery import Labels
 from viewsphere.sampling.blend_scene import BlendScenery
 from viewsphere.sampling.cast import companions
 from viewsphere.sampling.moments import TimedPoses
-from viewsphere.sampling.placing import Placer, Room, Shape, footprint, standing
+from viewsphere.sampling.placing import Draws, Footprint, Placer, Room, Shape, footprint, standing
 from viewsphere.sampling.scenery import (
     Piece,
     draw_names,
@@ -47,11 +47,11 @@ BoxOf = Callable[[ModelSpec], NDArray[np.float64]]
 class Composition:
     """What a recipe with a place, company or planes puts into its frames; no mesh is touched before `things`.
 
-    `groups` are the models that may meet: those of one split where splits are by model.
+    `subjects`: what the frames are about. `groups` are the models that may meet: those of one split where splits are by model.
     """
 
     recipe: Recipe
-    specs: tuple[ModelSpec, ...]
+    subjects: tuple[str, ...]
     groups: dict[str, tuple[ModelSpec, ...]]  # model key -> those of its split
     images: tuple[tuple[str, ...], ...]
     recipe_categories: tuple[Category, ...]
@@ -84,7 +84,7 @@ class Composition:
     @cached_property
     def _place_draws(self) -> tuple[tuple[str, ...], ...]:
         place = self.recipe.scene.place
-        return tuple(dict.fromkeys(draw_names(place.draw, s.key, None) for s in self.specs)) if place else ()
+        return tuple(dict.fromkeys(draw_names(place.draw, subject, None) for subject in self.subjects)) if place else ()
 
     def _category_id(self, category: str, labels: Labels, /) -> int:
         return self._ids[category] if labels == "own" else 0
@@ -110,11 +110,10 @@ class Composition:
                 yield from (plane_spec(self.recipe, entry, file, self._category_id) for file in files)
 
     @cached_property
-    def max_objects(self) -> int:
-        """Most objects in one frame: targets and labelled scenery."""
+    def most_scenery(self) -> int:
+        """Most pieces of labelled scenery in one frame."""
         scene = self.recipe.scene
-        count = 1 + (scene.company.number if scene.company else 0)
-        count += sum(entry.count for entry in scene.planes if entry.labels == "own")
+        count = sum(entry.count for entry in scene.planes if entry.labels == "own")
         count += 0 if self.blend is None else len(self.blend.labelled)
         if scene.place is not None and scene.place.labels == "own":
             seed, name = self.recipe.seed, scene.place.name
@@ -134,46 +133,42 @@ class Composition:
 
     def targets(self, spec: ModelSpec, pose: str | None, box_of: BoxOf) -> tuple[Thing, ...]:
         """The targets where they stand, the frame's model at the origin; raises RecipeError where there is no room."""
-        cast = self.cast(spec, pose)
-        poses = self._poses(cast, pose, box_of) if self.recipe.scene.company else (standing(box_of(spec)),)
-        return tuple(Thing(id=i, model=m, motion=Motion.still(w)) for i, (m, w) in enumerate(zip(cast, poses, strict=True), 1))
-
-    def _poses(self, cast: Sequence[ModelSpec], pose: str | None, box_of: BoxOf) -> Sequence[Matrix4]:
-        """Where the recipe's placer puts the cast."""
-        entry, place, key = self.recipe.scene.company, self.recipe.scene.place, cast[0].key
-        assert entry is not None
-        free = free_floor(self.recipe, place, draw_names(place.draw, key, pose)) if place else None
-        shapes = [Shape(box_of(member), partial(_vertices, member)) for member in cast]
-        rng = partial(generator, self.recipe.seed, "layout", *draw_names(entry.draw, key, pose))
-        return self._placer.place(cast, Room(free, entry.gap, entry.spots), shapes, (), rng)
-
-    @cached_property
-    def _placer(self) -> Placer:
+        own = standing(box_of(spec))
+        cast, poses = (spec,), [own]
         entry = self.recipe.scene.company
-        assert entry is not None
-        return plugins.load("placers", entry.placer)
+        if entry is not None:
+            cast = self.cast(spec, pose)
+            taken = ((shape(spec, box_of), own),)
+            room = Room(self.free_floor(spec.key, pose), entry.gap, entry.spots, taken, "scene.company")
+            rng = partial(generator, self.recipe.seed, "layout", *draw_names(entry.draw, spec.key, pose))
+            poses += placed(entry.placer, cast[1:], room, box_of, rng)
+        return still(cast, poses)
 
-    def things(self, spec: ModelSpec, pose: str | None, box_of: BoxOf) -> tuple[Thing, ...]:
+    def free_floor(self, subject: str, pose: str | None) -> Footprint | None:
+        """The floor that the place leaves free, None for all of it."""
+        place = self.recipe.scene.place
+        return free_floor(self.recipe, place, draw_names(place.draw, subject, pose)) if place else None
+
+    def things(self, subject: str, targets: Sequence[Thing], pose: str | None, box_of: BoxOf) -> tuple[Thing, ...]:
         """All that is placed: targets, labelled scenery, then the scenery that is background."""
-        targets = self.targets(spec, pose, box_of)
-        pieces = self._pieces(targets, pose, box_of)
+        pieces = self._pieces(subject, targets, pose, box_of)
         labelled = [p for p in pieces if p.labels == "own"]
         rest = [p for p in pieces if p.labels != "own"]
         ids = [*range(len(targets) + 1, len(targets) + len(labelled) + 1), *[0] * len(rest)]
-        return targets + tuple(
+        return tuple(targets) + tuple(
             Thing(id=i, model=p.model, motion=Motion.still(p.world_from_piece), scenery=True)
             for i, p in zip(ids, labelled + rest, strict=True)
         )
 
-    def _pieces(self, targets: Sequence[Thing], pose: str | None, box_of: BoxOf) -> list[Piece]:
-        spec, place = targets[0].model, self.recipe.scene.place
+    def _pieces(self, subject: str, targets: Sequence[Thing], pose: str | None, box_of: BoxOf) -> list[Piece]:
+        place = self.recipe.scene.place
         pieces: list[Piece] = []
         if place is not None:
-            pieces += self._place(draw_names(place.draw, spec.key, pose))
+            pieces += self._place(draw_names(place.draw, subject, pose))
         if self.blend is not None:
-            pieces += self.blend.pieces(spec.key, pose, self._category_id)
+            pieces += self.blend.pieces(subject, pose, self._category_id)
         prints = [footprint(box_of(t.model), t.world_from_object) for t in targets]
-        return pieces + list(plane_pieces(self.recipe, self.images, spec.key, pose, prints, self._category_id))
+        return pieces + list(plane_pieces(self.recipe, self.images, subject, pose, prints, self._category_id))
 
     @cached_property
     def _place(self) -> Callable[[Names], tuple[Piece, ...]]:
@@ -189,28 +184,24 @@ class Composition:
 
     def center(self, targets: Sequence[Thing], box_of: BoxOf) -> Vector | None:
         """What the camera looks at: the centre of the box around all targets; None, which says the same, for one."""
-        if len(targets) == 1:
-            return None
-        corners = np.concatenate([transform(t.world_from_object, box_of(t.model)) for t in targets])
-        x, y, z = ((corners.min(axis=0) + corners.max(axis=0)) / 2).tolist()
-        return x, y, z
+        return None if len(targets) == 1 else center_of_all(targets, box_of)
 
 
 @dataclass(frozen=True, eq=False)
 class Turns:
-    """The number of what a draw is for, in the data set's order: of a model, or of a frame."""
+    """The number of what a draw is for, in the data set's order: of a subject, or of a frame."""
 
-    specs: tuple[ModelSpec, ...]
+    subjects: tuple[str, ...]
     views: Poses
 
     def __call__(self, names: Names) -> int:
-        """The number of a model's key, or of a model's key and a pose's name."""
-        model = self._models[names[0]]
-        return model if len(names) == 1 else model * len(self.views) + self._poses[names[1]]
+        """The number of a subject's name, or of a subject's and a pose's."""
+        subject = self._subjects[names[0]]
+        return subject if len(names) == 1 else subject * len(self.views) + self._poses[names[1]]
 
     @cached_property
-    def _models(self) -> dict[str, int]:
-        return {spec.key: i for i, spec in enumerate(self.specs)}
+    def _subjects(self) -> dict[str, int]:
+        return {subject: i for i, subject in enumerate(self.subjects)}
 
     @cached_property
     def _poses(self) -> dict[str, int]:
@@ -218,10 +209,15 @@ class Turns:
 
 
 def compose(
-    recipe: Recipe, specs: tuple[ModelSpec, ...], own: tuple[Category, ...], splits: Sequence[str], views: Poses
+    recipe: Recipe,
+    subjects: tuple[str, ...],
+    specs: tuple[ModelSpec, ...],
+    own: tuple[Category, ...],
+    splits: Sequence[str],
+    views: Poses,
 ) -> Composition:
-    """The composition of a recipe with these poses; `splits[i]` is what keeps `specs[i]` from the others: its split, or one
-    name for all.
+    """The composition of a recipe with these subjects and poses; `splits[i]` is what keeps `specs[i]` from the others: its
+    split, or one name for all.
 
     Raises RecipeError for pictures and places that are not there, and where there are too few models for company.
     """
@@ -238,15 +234,44 @@ def compose(
             )
     made = Composition(
         recipe,
-        specs,
+        subjects,
         {spec.key: tuple(members[split]) for spec, split in zip(specs, splits, strict=True)},
         plane_images(recipe),
         own,
-        _blend(recipe, specs, views),
+        _blend(recipe, subjects, views),
     )
     if place is not None:
-        place_pieces(recipe, place, draw_names(place.draw, specs[0].key, ""), lambda category, labels: 1)
+        place_pieces(recipe, place, draw_names(place.draw, subjects[0], ""), lambda category, labels: 1)
     return made
+
+
+def placed(placer: str, cast: Sequence[ModelSpec], room: Room, box_of: BoxOf, rng: Draws) -> Sequence[Matrix4]:
+    """Where the placer of this name puts the models; raises RecipeError where there is no room."""
+    module: Placer = plugins.load("placers", placer)
+    return module.place(cast, room, [shape(spec, box_of) for spec in cast], (), rng)
+
+
+def shape(spec: ModelSpec, box_of: BoxOf) -> Shape:
+    """A model's shape for a placer."""
+    return Shape(box_of(spec), partial(_vertices, spec))
+
+
+def still(cast: Sequence[ModelSpec], poses: Sequence[Matrix4]) -> tuple[Thing, ...]:
+    """Objects 1, 2, ... that stand still."""
+    return tuple(Thing(id=i, model=m, motion=Motion.still(w)) for i, (m, w) in enumerate(zip(cast, poses, strict=True), 1))
+
+
+def center(thing: Thing, box_of: BoxOf) -> Vector:
+    """What a camera looks at that has no target of its own: the centre of the object's box, world metres."""
+    x, y, z = transform(thing.world_from_object, box_of(thing.model).mean(axis=0)).tolist()
+    return x, y, z
+
+
+def center_of_all(things: Sequence[Thing], box_of: BoxOf) -> Vector:
+    """The centre of the box around all of them, world metres."""
+    corners = np.concatenate([transform(t.world_from_object, box_of(t.model)) for t in things])
+    x, y, z = ((corners.min(axis=0) + corners.max(axis=0)) / 2).tolist()
+    return x, y, z
 
 
 def _vertices(spec: ModelSpec) -> NDArray[np.float64]:
@@ -254,7 +279,7 @@ def _vertices(spec: ModelSpec) -> NDArray[np.float64]:
     return load_normalised(spec, build_zoo_model).vertices.astype(np.float64)
 
 
-def _blend(recipe: Recipe, specs: tuple[ModelSpec, ...], views: Poses) -> BlendScenery | None:
+def _blend(recipe: Recipe, subjects: tuple[str, ...], views: Poses) -> BlendScenery | None:
     """The recipe's .blend file; frames take turns in the data set's order. Raises RecipeError where it does not fit."""
     entry = recipe.scene.blend
     if entry is None:
@@ -262,7 +287,7 @@ def _blend(recipe: Recipe, specs: tuple[ModelSpec, ...], views: Poses) -> BlendS
 
     moments = views.moments if isinstance(views, TimedPoses) and entry.frames is not None else ()
     made = BlendScenery(
-        recipe, entry, Turns(specs, views), tuple(sorted({moment.frame for moment in moments if moment is not None}))
+        recipe, entry, Turns(subjects, views), tuple(sorted({moment.frame for moment in moments if moment is not None}))
     )
     made.check()
     return made

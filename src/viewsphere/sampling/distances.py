@@ -13,12 +13,12 @@ from viewsphere.errors import RecipeError
 from viewsphere.geometry.camera import orbit_center
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.instant import Viewpoint
-from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Vector
 from viewsphere.model.thing import Thing
 from viewsphere.sampling.camera import distance_problem, inside_box
 from viewsphere.sampling.composition import BoxOf
 from viewsphere.sampling.plan import Plan
+from viewsphere.sampling.viewpoints import Poses
 
 Float = NDArray[np.float64]
 
@@ -37,55 +37,63 @@ class Distances:
     box_of: BoxOf
     _offsets: dict[range, tuple[Float, Float]] = field(default_factory=dict[range, tuple[Float, Float]])
 
-    def problem(self, spec: ModelSpec) -> RecipeError | None:
-        """The first pose whose camera would stand inside a target's box, in words; None if there is none.
+    def problem(self, subject: str) -> RecipeError | None:
+        """The first pose whose camera would stand inside an object's box, in words; None if there is none.
 
-        Company that is drawn for each frame is not looked at: that is left to whoever renders the frame.
+        What is drawn for each frame is not looked at: that is left to whoever renders the frame.
         """
-        plan = self.plan
-        things, target = (Thing(id=1, model=spec),), None
-        if plan.composition is not None and not plan.recipe.scene.is_moved_each_frame:
-            things = plan.composition.targets(spec, None, self.box_of)
-            target = plan.composition.center(things, self.box_of)
-        step = -(-plan.poses // max(1, min(MOST_CAMERAS, MOST_PAIRS // plan.models)))
-        for run in plan.schedule(spec).runs:
-            at, moved = plan.target(things[0], run, target, self.box_of), plan.at(things, run)
-            poses = range(run.first, run.stop, step)
-            cameras = self.cameras(moved, poses, at)
-            for thing in moved:
+        step = -(-self.plan.poses // max(1, min(MOST_CAMERAS, MOST_PAIRS // len(self.plan.subjects))))
+        for there in self.plan.sampler.standing(self.plan, subject, self.box_of):
+            poses = there.poses[::step]
+            cameras = self.cameras(there.things, poses, there.target, subject, there.views)
+            for thing in there.things:
                 box = transform(thing.world_from_object, self.box_of(thing.model))
                 inside = inside_box(box, cameras)
                 if inside.any():
-                    pose = plan.pose(spec, poses[int(np.flatnonzero(inside)[0])], at)
+                    view = there.views[poses[int(np.flatnonzero(inside)[0])]]
+                    pose = self.plan.viewpoint(subject, view, there.target)
                     return RecipeError(f"viewpoints.distance: {distance_problem(pose, box)} (model {thing.model.key})")
         return None
 
-    def cameras(self, things: Sequence[Thing], poses: range, target: Vector | None = None) -> Float:
-        """Where the cameras of these poses stand, (poses, 3) world metres, when these things are placed; they look at `target`,
-        by default at the middle of what is placed.
+    def cameras(
+        self,
+        things: Sequence[Thing],
+        poses: range,
+        target: Vector | None = None,
+        subject: str | None = None,
+        views: Poses | None = None,
+    ) -> Float:
+        """Where the cameras of these poses of a subject (by default the plan's first) stand, (poses, 3) world metres, when
+        these things are placed; they look at `target`, by default at the middle of what is placed.
         """
         targets = [thing for thing in things if thing.id and not thing.scenery]
         corners = np.concatenate([transform(t.world_from_object, self.box_of(t.model)) for t in targets])
         middle = corners.mean(axis=0) if len(targets) == 1 else (corners.min(axis=0) + corners.max(axis=0)) / 2
         middle = middle if target is None else np.array(target)
+        subject, views = subject or self.plan.subjects[0], views or self.plan.pose_list
         if not self.plan.scenes.is_jittered:
-            offsets, own = self._stand(poses)
+            offsets, own = self._stand(poses, views)
             return offsets + np.where(np.isnan(own), middle, own)
         x, y, z = middle.tolist()
-        base = self.plan.spec(targets[0].model.track or targets[0].model.key)
-        return np.array([_stand(self.plan.pose(base, i, (x, y, z))) for i in poses])
+        return np.array([_stand(self.plan.viewpoint(subject, views[i], (x, y, z))) for i in poses])
 
-    def _stand(self, poses: range) -> tuple[Float, Float]:
+    def _stand(self, poses: range, views: Poses) -> tuple[Float, Float]:
         """From what the cameras look at to where they stand, and what they look at: NaN where that is the models' centre."""
+        if views is not self.plan.pose_list:
+            return _standing(poses, views)
         if poses not in self._offsets:
-            views = [self.plan.pose_list.view(i) for i in poses]
-            values = np.array([(view.azimuth, view.elevation, view.distance) for view in views])
-            azimuth, elevation = np.radians(values[:, :2]).T
-            level = np.cos(elevation)
-            direction = np.stack([level * np.sin(azimuth), -level * np.cos(azimuth), np.sin(elevation)], axis=1)
-            targets = np.array([self.plan.pose_list.target(i) or (math.nan,) * 3 for i in poses])
-            self._offsets[poses] = values[:, 2:] * direction, targets
+            self._offsets[poses] = _standing(poses, views)
         return self._offsets[poses]
+
+
+def _standing(poses: range, views: Poses) -> tuple[Float, Float]:
+    found = [views.view(i) for i in poses]
+    values = np.array([(view.azimuth, view.elevation, view.distance) for view in found])
+    azimuth, elevation = np.radians(values[:, :2]).T
+    level = np.cos(elevation)
+    direction = np.stack([level * np.sin(azimuth), -level * np.cos(azimuth), np.sin(elevation)], axis=1)
+    targets = np.array([views.target(i) or (math.nan,) * 3 for i in poses])
+    return values[:, 2:] * direction, targets
 
 
 def _stand(pose: Viewpoint) -> Float:

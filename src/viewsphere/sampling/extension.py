@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
-from functools import cached_property
+from functools import cache, cached_property
 from importlib.metadata import version
 from itertools import chain, groupby
 from typing import Any
@@ -81,7 +81,7 @@ class Portion:
 
     def cast(self, row: Row) -> tuple[ModelSpec, ...]:
         """The recipe's models in a shot, that of its frames first."""
-        return self.plan.cast(self.plan.spec(row.subject), self._of_recipe(row.positions[0][0]))
+        return self.plan.cast(row.subject, self._of_recipe(row.positions[0][0]))
 
     def shot(self, row: Row, box_of: BoxOf) -> Shot:
         """The shot of a row; `box_of` and errors as for `Plan.shot`."""
@@ -162,12 +162,13 @@ def extend(planned: Plan, there: PlanRecord) -> Portion:
         frames=sum(block.samples for block in blocks),
         max_objects=planned.max_objects,
         blocks=blocks,
+        sampler=planned.recipe.sampler,
         supplies=supplies,
         shot_frames=planned.shot_frames,
         settings=settings(planned),
         new_poses=poses,
         pose_names=None if not there.poses and follows_from_recipe(planned.pose_list) else kept(names),
-        model_splits={key: name for key, name in planned.model_splits.items() if key not in held_splits},
+        dealt_splits={key: name for key, name in planned.dealt_splits.items() if key not in held_splits},
     )
     record = PlanRecord(
         version=part.version,
@@ -187,8 +188,8 @@ def extend(planned: Plan, there: PlanRecord) -> Portion:
 
 
 def _splits(parts: Sequence[Part]) -> dict[str, str]:
-    """The split of every model that these parts brought, where splits are by model."""
-    return {key: split for part in parts for key, split in part.model_splits.items()}
+    """The split of every model or scene that these parts brought, where splits are by these."""
+    return {key: split for part in parts for key, split in part.dealt_splits.items()}
 
 
 def _categories(planned: Plan, there: PlanRecord) -> tuple[Category, ...]:
@@ -211,53 +212,49 @@ def _categories(planned: Plan, there: PlanRecord) -> tuple[Category, ...]:
 
 
 def _missing(planned: Plan, there: PlanRecord, wanted: Sequence[int]) -> Iterator[Block]:
-    """Blocks of the frames that the data set lacks: models in the recipe's order, poses in the data set's."""
+    """Blocks of the frames that the data set lacks: subjects in the plan's order, poses in the data set's."""
     if not there.parts:
         yield from planned.blocks
         return
     held: defaultdict[str, list[Ranges]] = defaultdict(list)
-    for block in chain.from_iterable(part.blocks for part in there.parts if part.is_product):
+    for block in chain.from_iterable(part.blocks for part in there.parts if part.is_sampled):
         for key in block.subjects:
             held[key].append(block.positions)
     first_of, asked = first_numbers(there), np.array(wanted, np.int64)
-    lacks: dict[tuple[int, tuple[Ranges, ...]], tuple[Ranges, ...]] = {}
 
-    def lack(model: int) -> tuple[Ranges, ...]:
-        """Of each time step."""
-        has, schedule = tuple(held[planned.model_specs[model].key]), planned.schedules[model]
-        known = id(schedule), has
-        if known not in lacks:
-            there = first_of[flat(chain.from_iterable(has))]
-            found = (as_ranges(np.setdiff1d(asked[run.first : run.stop], there)) for run in schedule.runs)
-            lacks[known] = tuple(poses for poses in found if poses)
-        return lacks[known]
+    @cache
+    def lack(positions: Ranges, has: tuple[Ranges, ...]) -> Ranges:
+        return as_ranges(np.setdiff1d(asked[flat(positions)], first_of[flat(chain.from_iterable(has))]))
 
-    for steps, models in groupby(range(planned.models), lack):
-        keys = tuple(planned.model_specs[model].key for model in models)
-        for group in (keys,) if len(steps) == 1 else ((key,) for key in keys):
-            yield from (Block(group, poses) for poses in steps)
+    for block in planned.blocks:
+        for poses, subjects in groupby(block.subjects, lambda key, block=block: lack(block.positions, tuple(held[key]))):
+            if poses:
+                yield Block(tuple(subjects), poses)
 
 
 def _supplies(planned: Plan, there: PlanRecord, wanted: Sequence[int]) -> Iterator[tuple[int, tuple[str, ...]]]:
     """Channels that frames of earlier parts lack: their part's number, and the channels in the table's order."""
-    models = {spec.key for spec in planned.model_specs}
+    subjects = set(planned.subjects)
     for number, part in enumerate(there.parts):
-        if not part.is_product or not part.frames:
+        if not part.is_sampled or not part.frames:
             continue
         lacking = tuple(c for c in planned.recipe.channels if c not in there.channels_of(number))
         if not lacking:
             continue
-        absent = set(part.models) - models
+        shown = {subject for block in part.blocks for subject in block.subjects}
+        absent = shown - subjects
         poses = np.unique(first_numbers(there)[flat(chain.from_iterable(block.positions for block in part.blocks))])
         asked = np.array(wanted, np.int64)
-        with_company = planned.recipe.scene.company is not None
+        together = planned.recipe.scene.company is not None and subjects != shown
+        if not part.is_product:
+            together = planned.recipe.model_dump(mode="json")["models"] != part.recipe["models"]
         problem = (
-            f"no model {min(absent)!r}"
+            f"no {'model' if part.is_product else 'scene'} {min(absent)!r}"
             if absent
             else f"only {len(np.intersect1d(asked, poses)):,} of {len(poses):,} poses"
             if not np.isin(poses, asked).all()
-            else "company drawn from other models"
-            if with_company and models != set(part.models)
+            else f"{'company' if part.is_product else 'scenes'} drawn from other models"
+            if together
             else None
         )
         if problem:

@@ -62,13 +62,13 @@ def _value(recipe: object, name: str) -> str:
 
 def _check_splits(planned: Plan, part: Part) -> None:
     """Splits stay what they are, but for the lists of models that are new."""
-    if not part.is_product:
+    if not part.is_sampled:
         return
     before, now = Splits.model_validate(part.recipe["splits"]), planned.recipe.splits
     if _shares(before) != _shares(now):
         raise RecipeError(f"splits: expected {_shares(before)}, as the data set has; found {_shares(now)}: {FITTING}")
     listed = {key: name for name, some in now.shares.items() if isinstance(some, tuple) for key in some}
-    for key, split in part.model_splits.items():
+    for key, split in part.dealt_splits.items():
         if listed.get(key, split) != split:
             raise RecipeError(
                 f"splits: expected model {key!r} in {split!r}, where the data set has it; found it in {listed[key]!r}"

@@ -6,26 +6,16 @@ import hashlib
 import json
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import chain, groupby
+from itertools import chain
 from pathlib import Path
-from typing import Any
 
 from viewsphere import plugins
-from viewsphere.errors import RecipeError
-from viewsphere.geometry.rotation import transform
-from viewsphere.model.camera import Intrinsics
-from viewsphere.model.instant import Instant, Viewpoint
 from viewsphere.model.model_spec import ModelSpec
-from viewsphere.model.rig import Rig
-from viewsphere.model.scene import Scene, Vector
 from viewsphere.model.shot import Shot
-from viewsphere.model.thing import Thing
 from viewsphere.recipe.draws import alternatives, span
 from viewsphere.recipe.recipe import Recipe
-from viewsphere.sampling.blend_scene import BlendScenery
-from viewsphere.sampling.camera import looking
 from viewsphere.sampling.checks import (
     check_blend,
     check_catcher,
@@ -36,25 +26,15 @@ from viewsphere.sampling.checks import (
     check_names,
     check_splits,
 )
-from viewsphere.sampling.composition import BoxOf, Composition, compose
+from viewsphere.sampling.composition import BoxOf, compose
 from viewsphere.sampling.doubts import hidden_by_exposure, no_light, out_of_view
 from viewsphere.sampling.models import categories, numbered_specs
-from viewsphere.sampling.moments import (
-    Run,
-    Schedule,
-    TimedPoses,
-    Timing,
-    at_frame,
-    at_step,
-    check_keys,
-    schedules,
-    timed,
-)
-from viewsphere.sampling.pictures import Pictures, check_pictures, proportions, scene_pictures
-from viewsphere.sampling.scenery import draw_names
-from viewsphere.sampling.scenes import Scenes, is_night
-from viewsphere.sampling.splits import expected, hashed, model_splits
-from viewsphere.sampling.viewpoints import Poses, poses
+from viewsphere.sampling.moments import check_keys, timed
+from viewsphere.sampling.pictures import check_pictures, proportions, scene_pictures
+from viewsphere.sampling.samplers import Sampler, Stock, lens
+from viewsphere.sampling.scenes import is_night
+from viewsphere.sampling.splits import expected
+from viewsphere.sampling.viewpoints import poses
 from viewsphere.store import Block, Category, Row
 from viewsphere.store.index import Index, numbers
 
@@ -66,34 +46,16 @@ SHOT_FRAMES = 16
 
 
 @dataclass(frozen=True, eq=False)
-class Plan:
-    """What will be rendered: of every model, in order, its poses, by time steps where something moves (else frame index =
-    model index * poses + pose index). Nothing here grows with the frames.
-    """
+class Plan(Stock):
+    """What will be rendered: of every subject, in order, its poses. Nothing here grows with the frames."""
 
-    recipe: Recipe
-    model_specs: tuple[ModelSpec, ...]
-    pose_list: Poses
-    categories: tuple[Category, ...]
-    pictures: Pictures  # of the scene
-    shot_frames: int
-    composition: Composition | None = None  # of place, company and planes
-    timings: tuple[Timing | None, ...] = ()  # of each model; none at all where nothing moves
-    kept_splits: Mapping[str, str] = field(default_factory=dict[str, str])  # of models that a data set has already
-
-    def __getstate__(self) -> dict[str, Any]:
-        """What other processes are sent: not what was computed so far."""
-        return {field.name: getattr(self, field.name) for field in fields(self)}
+    categories: tuple[Category, ...] = ()
+    shot_frames: int = SHOT_FRAMES
 
     @cached_property
-    def intrinsics(self) -> Intrinsics:
-        """The lens of all frames."""
-        return _lens(self.recipe, self.pose_list)
-
-    @cached_property
-    def scenes(self) -> Scenes:
-        """Where light, ground, materials, finishes and jitter are drawn."""
-        return Scenes(self.recipe, self.pictures)
+    def sampler(self) -> Sampler:
+        """What says which shots there are, and makes them."""
+        return plugins.load("samplers", self.recipe.sampler)
 
     @property
     def images(self) -> tuple[str, ...]:
@@ -101,24 +63,14 @@ class Plan:
         return tuple(file for files in self.pictures.values() for file in files)
 
     @property
-    def models(self) -> int:
-        """Number of models."""
-        return len(self.model_specs)
-
-    @property
     def poses(self) -> int:
-        """Number of poses of each model; of all time steps together where something moves."""
+        """Number of poses; of all time steps together where something moves."""
         return len(self.pose_list)
 
     @property
     def frames(self) -> int:
-        """Number of frames: models x poses, or as many as their time steps have."""
-        return sum(schedule.count for schedule in self.schedules)
-
-    @cached_property
-    def schedules(self) -> tuple[Schedule, ...]:
-        """Which poses each model is taken from, and when."""
-        return schedules(self.timings or (None,) * self.models, self.pose_list)
+        """Number of frames."""
+        return self.rows.samples
 
     @property
     def time_steps(self) -> int | None:
@@ -129,24 +81,13 @@ class Plan:
     @property
     def factors(self) -> str:
         """What its frames are the product of, in words."""
-        if not self.timings:
-            return f"{self.models:,} models x {self.poses:,} poses"
-        base = self.pose_list.base if isinstance(self.pose_list, TimedPoses) else self.pose_list
-        if self.time_steps is None:
-            return f"{self.models:,} models of different time steps, {len(base):,} poses"
-        moving = [timing.moving for timing in self.timings if timing]
-        poses = "a pose each" if all(moving) else f"{len(base):,} poses{', of some a pose each' if any(moving) else ''}"
-        return f"{self.models:,} models x {self.time_steps:,} time steps x {poses}"
+        return self.sampler.factors(self)
 
     @property
     def max_objects(self) -> int:
         """Most objects in one frame."""
-        return 1 if self.composition is None else self.composition.max_objects
-
-    @property
-    def blend(self) -> BlendScenery | None:
-        """The .blend file around the targets, if there is one."""
-        return None if self.composition is None else self.composition.blend
+        scenery = 0 if self.composition is None else self.composition.most_scenery
+        return self.sampler.most_objects(self.recipe) + scenery
 
     @property
     def kept_specs(self) -> tuple[ModelSpec, ...]:
@@ -157,11 +98,6 @@ class Plan:
         own = ((spec, *self.moments_of(spec)) for spec in self.model_specs)
         moved = ((spec, *self._moments_of_scenery(spec)) for spec in scenery)
         return tuple(chain.from_iterable((*own, *moved)))
-
-    def moments_of(self, spec: ModelSpec) -> tuple[ModelSpec, ...]:
-        """A model of the recipe at each frame of its file that is asked for."""
-        timing = self.timings[self._position[spec.key]] if self.timings else None
-        return tuple(at_frame(spec, step.model) for step in (timing.steps if timing else ()) if step.model is not None)
 
     def _moments_of_scenery(self, spec: ModelSpec) -> Iterator[ModelSpec]:
         if self.blend is not None and spec.parts is not None:
@@ -175,17 +111,17 @@ class Plan:
     @cached_property
     def split_counts(self) -> dict[str, int]:
         """Split -> number of its frames; of hashed ones what is expected, where there are more than `COUNTED` to hash."""
-        by = self.recipe.splits.by
-        both = list(zip(self.model_specs, self.schedules, strict=True))
-        if by == "model":
-            found = Counter({s: 0 for s in self.splits})
-            for spec, schedule in both:
-                found[self.split(spec, 0)] += schedule.count
-        elif by == "pose" and not self.timings and self.poses <= COUNTED:
-            found = Counter(self.split(self.model_specs[0], i) for i in range(self.poses))
-            found = Counter({name: count * self.models for name, count in found.items()})
+        by, first = self.recipe.splits.by, self.blocks[0].positions[0][0]
+        found = Counter({name: 0 for name in self.splits})
+        if by in ("model", "scene"):
+            for block in self.blocks:
+                for subject in block.subjects:
+                    found[self.split(subject, first)] += block.size
+        elif by == "pose" and len(self.blocks) == 1 and self.poses <= COUNTED:
+            for pose in numbers(self.blocks[0].positions):
+                found[self.split(self.subjects[0], pose)] += len(self.subjects)
         elif self.frames <= COUNTED:
-            found = Counter(self.split(spec, i) for spec, schedule in both for i in schedule.poses)
+            found.update(self.split(s, i) for block in self.blocks for s in block.subjects for i in numbers(block.positions))
         else:
             found = Counter(expected(self.recipe.splits, self.frames))
         return {name: found[name] for name in self.splits}
@@ -212,46 +148,19 @@ class Plan:
             found += self.blend.warnings
         return tuple(map(self.recipe.locate, (*found, *doubts)))
 
-    def split(self, spec: ModelSpec, pose: int) -> str:
+    def split(self, subject: str, pose: int) -> str:
         """The split of a frame."""
-        splits = self.recipe.splits
-        match splits.by:
-            case "model":
-                return self.model_splits[spec.key]
-            case "pose":
-                return hashed(splits, self.recipe.seed, (self.pose_list.place(pose),))
-            case "place":
-                place = self.recipe.scene.place
-                names = draw_names(place.draw, spec.key, self.pose_list.name(pose)) if place else ()
-                return hashed(splits, self.recipe.seed, ("place", *names))
-            case "frame":
-                return hashed(splits, self.recipe.seed, (spec.key, self.pose_list.name(pose)))
-
-    @cached_property
-    def model_splits(self) -> dict[str, str]:
-        """The split of every model, where splits are by model; else none."""
-        if self.recipe.splits.by != "model":
-            return {}
-        keys = (spec.key for spec in self.model_specs)
-        return model_splits(self.recipe.splits, self.recipe.seed, keys, self.kept_splits)
+        return self.sampler.split(self, subject, pose)
 
     def keeping(self, splits: Mapping[str, str]) -> Plan:
-        """The same plan for a data set that has some of its models in these splits already."""
-        kept = {key: name for key, name in splits.items() if key in self._position}
+        """The same plan for a data set that has some of its models and scenes in these splits already."""
+        kept = {key: name for key, name in splits.items() if key in self.dealt_splits}
         return _composed(replace(self, kept_splits=kept)) if kept else self
 
     @cached_property
     def blocks(self) -> tuple[Block, ...]:
-        """Which models are taken from which poses, time step by time step."""
-        found: list[Block] = []
-        for schedule, members in groupby(range(self.models), lambda model: self.schedules[model]):
-            keys = tuple(self.model_specs[model].key for model in members)
-            runs = [((run.first, run.stop),) for run in schedule.runs]
-            if len(runs) == 1:
-                found.append(Block(keys, runs[0]))
-            else:
-                found += (Block((key,), poses) for key in keys for poses in runs)
-        return tuple(found)
+        """Which subjects are taken from which poses, time step by time step."""
+        return self.sampler.blocks(self)
 
     @cached_property
     def rows(self) -> Index:
@@ -263,14 +172,6 @@ class Plan:
         """Number of shots."""
         return len(self.rows)
 
-    def schedule(self, spec: ModelSpec) -> Schedule:
-        """Which poses a model is taken from, and when."""
-        return self.schedules[self._position[spec.key]]
-
-    def spec(self, key: str) -> ModelSpec:
-        """The model of this key."""
-        return self.model_specs[self._position[key]]
-
     def shot(self, row: Row | int, box_of: BoxOf) -> Shot:
         """The shot of a row, or of its number; raises IndexError past the end.
 
@@ -280,129 +181,20 @@ class Plan:
         row = self.rows[row] if isinstance(row, int) else row
         return self.take(row.subject, tuple(numbers(row.positions)), box_of, row.key, row.first)
 
-    def take(self, subject: str, chosen: Sequence[int], box_of: BoxOf, key: str = "", first: int = 0) -> Shot:
-        """A shot of some poses (their indices) of the model of this key, of one time step: of one pose where the recipe draws
-        scenes for each frame. `first` is the number of its first sample.
+    def take(self, subject: str, poses: Sequence[int], box_of: BoxOf, key: str = "", first: int = 0) -> Shot:
+        """A shot of some poses (their numbers) of a subject, of one time step: of one pose where the recipe draws scenes for
+        each frame. `first` is the number of its first sample.
         """
-        spec, pose = self.spec(subject), self.pose_list.name(chosen[0])
-        things, target = (Thing(id=1, model=spec),), None
-        if self.composition is not None:
-            with self.recipe.located():
-                things = self.composition.things(spec, self._scene_pose(chosen[0]), box_of)
-            company = self.recipe.scene.company
-            target = self.composition.center(things[: 1 + (company.number if company else 0)], box_of)
-        if self.recipe.scene.materials:
-            things = tuple(self._repainted(p, spec, pose) for p in things)
-        run = self.schedule(spec).run_of(chosen[0])
-        target, placed = self.target(things[0], run, target, box_of), self.at(things, run)
-        focus = target or center(placed[0], box_of)
-        return Shot(
-            key=key or spec.key,
-            things=placed,
-            rig=Rig.of(self.intrinsics),
-            scene=self._scene(spec, pose, run).model_copy(update=self._floor(spec, things, box_of)),
-            first=first,
-            instants=tuple(self.instant(spec, pose, target, focus, first + i) for i, pose in enumerate(chosen)),
-            engine=self.recipe.engine.name,
-            engine_options=self.recipe.engine.options,
-            channels=self.recipe.channels,
-            files=self.recipe.files,
-            label_alpha=self.recipe.label_alpha,
-            category_deg=self.recipe.viewpoints.bins,
-        )
+        with self.recipe.located():
+            return self.sampler.shot(self, subject, poses, box_of, key or subject, first)
 
-    def target(self, first: Thing, run: Run, target: Vector | None, box_of: BoxOf) -> Vector | None:
-        """What cameras look at that have no target of their own, None for the first object's centre: where that stands at the
-        first frame, or follows it.
-        """
-        moves = run.step is not None and run.step.model is not None
-        if moves and self.recipe.viewpoints.target == "follow":
-            target, first = None, self.at((first,), run)[0]
-        elif target is None and moves:
-            return center(first, box_of)
-        if target is None and self.scenes.is_target_moved:
-            target = center(first, box_of)
-        return target
-
-    def _floor(self, spec: ModelSpec, things: Sequence[Thing], box_of: BoxOf) -> dict[str, float]:
-        """How high the ground is at most, in a scene's field: at the lowest that a model comes at its time steps."""
-        moments = self.moments_of(spec)
-        if not moments or self.recipe.scene.ground == "off":
-            return {}
-        world = things[0].world_from_object
-        return {"floor": min(float(transform(world, box_of(moment))[:, 2].min()) for moment in moments)}
-
-    def at(self, things: Sequence[Thing], run: Run) -> tuple[Thing, ...]:
-        """What is placed, as it is at a time step; company is at its own of the same number. What of the scene's file shows
-        nothing then is left out, so that others have other ids.
-        """
-        if run.step is None:
-            return tuple(things)
-        timing_of = self._timing_of
-        found: list[Thing] = []
-        for thing in things:
-            model = at_step(timing_of.get(thing.model.key), thing.model, run.number)
-            moved = thing if model is thing.model else thing.model_copy(update={"model": model})
-            if self.blend is not None and run.step.scene is not None:
-                if not self.blend.shows(moved.model, run.step.scene):
-                    continue
-                moved = self.blend.at_frame(moved, run.step.scene)
-            found.append(moved)
-        if len(found) == len(things):
-            return tuple(found)
-        return tuple(p.model_copy(update={"id": i}) if p.id else p for i, p in enumerate(found, 1))
-
-    @cached_property
-    def _timing_of(self) -> dict[str, Timing | None]:
-        return {spec.key: timing for spec, timing in zip(self.model_specs, self.timings, strict=True)}
-
-    def _scene(self, spec: ModelSpec, pose: str, run: Run) -> Scene:
-        scene = self.scenes.scene(spec.key, pose)
-        if self.blend is None:
-            return scene
-        blend = self.blend.scene(spec.key, pose)
-        if run.step is not None and run.step.scene is not None:
-            blend = blend.model_copy(update={"frame": run.step.scene})
-        return scene.model_copy(update={"blend": blend, "sun": None if blend.is_lit else scene.sun})
-
-    def _repainted(self, thing: Thing, spec: ModelSpec, pose: str) -> Thing:
-        repaints = () if thing.scenery else self.scenes.repaints(thing.model, spec.key, pose)
-        return thing.model_copy(update={"repaints": repaints}) if repaints else thing
-
-    def _scene_pose(self, pose: int) -> str | None:
-        """Name of the pose, where what stands around is drawn for each frame."""
-        return self.pose_list.name(pose) if self.recipe.scene.is_moved_each_frame else None
-
-    def cast(self, spec: ModelSpec, pose: int | None = None) -> tuple[ModelSpec, ...]:
-        """A model and those that stand beside it, in a pose (its index) where they are drawn for each frame.
-
-        Without a pose, only the model itself then.
-        """
-        if self.composition is None or (pose is None and self.recipe.scene.is_moved_each_frame):
-            return (spec,)
-        return self.composition.cast(spec, None if pose is None else self._scene_pose(pose))
+    def cast(self, subject: str, pose: int | None = None) -> tuple[ModelSpec, ...]:
+        """The recipe's models in a frame of a subject, from a pose (its number); without one, those in all of its frames."""
+        return self.sampler.cast(self, subject, pose)
 
     def shots(self, box_of: BoxOf) -> Iterator[Shot]:
         """All shots in order, made one by one."""
         return (self.shot(row, box_of) for row in self.rows)
-
-    def instant(self, spec: ModelSpec, pose: int, target: Vector | None, focus: Vector, number: int) -> Instant:
-        """The instant of a model and a pose; the camera looks at `target` unless the pose has its own, and where there is
-        neither at `focus`. `number` is the instant's own.
-        """
-        finish = self.scenes.finish(spec.key, self.pose_list.name(pose)) if self.scenes.has_finish_per_frame else None
-        return looking(self.pose(spec, pose, target), focus, index=number, split=self.split(spec, pose), finish=finish)
-
-    def pose(self, spec: ModelSpec, index: int, target: Vector | None) -> Viewpoint:
-        """The pose of a model's frame, which looks at `target` unless it has a target of its own."""
-        pose = self.pose_list[index]
-        if target is not None and pose.target is None:
-            pose = pose.model_copy(update={"target": target})
-        return self.scenes.jittered(pose, spec.key, self.pose_list.place(index)) if self.scenes.is_jittered else pose
-
-    @cached_property
-    def _position(self) -> dict[str, int]:
-        return {spec.key: i for i, spec in enumerate(self.model_specs)}
 
     @cached_property
     def digest(self) -> str:
@@ -430,14 +222,24 @@ def plan(recipe: Recipe, shot_frames: int | None = None) -> Plan:
         check_catcher(recipe)
         check_splits(recipe)
         views = poses(recipe.viewpoints, recipe.seed, recipe.folder)
-        _lens(recipe, views)
+        lens(recipe, views)
         check_frames(recipe, views)
         specs, timings, views = timed(recipe, numbered_specs(recipe), views)
         check_listed(recipe, specs)
         check_materials(recipe, specs)
         frames = 1 if recipe.scene.is_new_each_frame else recipe.shot_frames or shot_frames or SHOT_FRAMES
         timings = timings if any(timings) else ()
-        planned = Plan(recipe, specs, views, categories(recipe), scene_pictures(recipe), frames, timings=timings)
+        sampler: Sampler = plugins.load("samplers", recipe.sampler)
+        planned = Plan(
+            recipe,
+            specs,
+            views,
+            scene_pictures(recipe),
+            sampler.subjects(recipe, specs),
+            timings=timings,
+            categories=categories(recipe),
+            shot_frames=frames,
+        )
         if timings:
             check_moments(recipe, planned.frames)
             check_keys(planned.kept_specs)
@@ -449,8 +251,8 @@ def _composed(planned: Plan) -> Plan:
     recipe, specs = planned.recipe, planned.model_specs
     if not recipe.scene.is_composed:
         return planned
-    splits = [planned.model_splits.get(spec.key, "") for spec in specs]
-    composition = compose(recipe, specs, categories(recipe), splits, planned.pose_list)
+    splits = [planned.dealt_splits.get(spec.key, "") for spec in specs]
+    composition = compose(recipe, planned.subjects, specs, categories(recipe), splits, planned.pose_list)
     return replace(planned, categories=composition.categories, composition=composition)
 
 
@@ -469,17 +271,3 @@ def check_images(planned: Plan) -> None:
             field = "images" if planned.recipe.scene.planes[i].image is None else "image"
             for path in files:
                 proportions(path, f"scene.planes[{i}].{field}")
-
-
-def center(thing: Thing, box_of: BoxOf) -> Vector:
-    """What a camera looks at that has no target of its own: the centre of the first object's box, world metres."""
-    x, y, z = transform(thing.world_from_object, box_of(thing.model).mean(axis=0)).tolist()
-    return x, y, z
-
-
-def _lens(recipe: Recipe, views: Poses) -> Intrinsics:
-    if not recipe.camera.of_viewpoints:
-        return recipe.camera.intrinsics
-    if views.intrinsics is None:
-        raise RecipeError("camera.of_viewpoints: expected a file of poses that names a lens; found none: give fov_deg or K")
-    return views.intrinsics

@@ -22,18 +22,18 @@ def hashed(splits: Splits, seed: int, names: tuple[str, ...]) -> str:
     return tuple(shares)[min(bisect_right(edges, share(seed, "split", *names)), len(shares) - 1)]
 
 
-def model_splits(splits: Splits, seed: int, keys: Iterable[str], kept: Mapping[str, str]) -> dict[str, str]:
-    """The split of each model: the one it has in `kept`, or where it is listed; the others are dealt out by quotas.
+def dealt(splits: Splits, seed: int, keys: Iterable[str], kept: Mapping[str, str]) -> dict[str, str]:
+    """The split of each model or scene: the one it has in `kept`, or where it is listed; the others are dealt out by quotas.
 
     Quotas are each split's share of those others, rounded so that they add up, the largest remainders up; none is 0 where
-    there are as many models as splits. Models come in the order of their hashes, so that no list's order matters.
+    there are as many of them as splits. They come in the order of their hashes, so that no list's order matters.
     """
     shares = shared(splits)
     listed = {key: name for name, some in splits.shares.items() if isinstance(some, tuple) for key in some}
     found = {key: kept.get(key) or listed.get(key, "") for key in keys}
     rest = sorted((share(seed, "split", key), key) for key, name in found.items() if not name)
-    dealt = (name for name, count in quotas(shares, len(rest)).items() for _ in range(count))
-    return found | {key: name for (_, key), name in zip(rest, dealt, strict=True)}
+    names = (name for name, count in quotas(shares, len(rest)).items() for _ in range(count))
+    return found | {key: name for (_, key), name in zip(rest, names, strict=True)}
 
 
 def quotas(shares: Mapping[str, float], count: int) -> dict[str, int]:

@@ -96,9 +96,21 @@ class Index(Sequence[Row]):
         for number, place in self._places.get(subject, ()):
             yield from (self._row(number, place, chunk) for chunk in range(self._chunks(number)))
 
+    def row_of(self, subject: str, place: int) -> Row:
+        """One of the rows of a subject, by its place among them; raises IndexError past the end."""
+        for number, own in self._places.get(subject, ()):
+            if place < self._chunks(number):
+                return self._row(number, own, place)
+            place -= self._chunks(number)
+        raise IndexError(f"expected a shot of {subject}, found no {place} more")
+
     def count_of(self, subject: str) -> int:
         """Number of the rows of a subject."""
         return sum(self._chunks(number) for number, _ in self._places.get(subject, ()))
+
+    def taken(self, subject: str) -> tuple[Ranges, ...]:
+        """The positions at which a subject is taken, block by block."""
+        return tuple(self.blocks[number].positions for number, _ in self._places.get(subject, ()))
 
     @property
     def subjects(self) -> tuple[str, ...]:
@@ -174,6 +186,12 @@ def numbers(ranges: Ranges) -> Iterator[int]:
     """The numbers, in order."""
     for first, stop in ranges:
         yield from range(first, stop)
+
+
+def nth(ranges: Ranges, place: int) -> int:
+    """The number at a place, counted from 0; raises IndexError past the end."""
+    found = _cut(ranges, place, place + 1)
+    return found[0][0]
 
 
 def _cut(ranges: Ranges, begin: int, end: int) -> Ranges:

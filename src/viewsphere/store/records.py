@@ -22,6 +22,9 @@ STORE_VERSION = 2
 PRODUCT = "product"
 """The sampler of models x poses."""
 
+IMPORT = "import"
+"""What stands for a sampler where somebody else made the pictures."""
+
 
 @dataclass(frozen=True)
 class Category:
@@ -58,12 +61,12 @@ class ModelInfo:
 class Part:
     """What one recipe (or one source of a merge) brought: the samples [first, first + frames).
 
-    `blocks` say what each of its samples shows, in order: with the sampler `product` models and the numbers of their poses.
+    `blocks` say what each of its samples shows, in order: the subjects of its sampler (models, or scenes) and the numbers of
+    their poses.
     `supplies`: (number of an earlier part, channels) that this one added to all frames of that part; they lie in shots
     of their own. `shot_frames`: most positions of a shot. `settings`: digests of what frames that are appended have to share.
     `new_poses`: how many poses no earlier part had; `pose_names`: their digests (see `sampling.extension`), None where they
-    follow from the recipe. `model_splits`: where splits are by model, the split of every model
-    that no earlier part had.
+    follow from the recipe. `dealt_splits`: where splits are by model or by scene, the split of each that no earlier part had.
     """
 
     digest: str
@@ -81,7 +84,7 @@ class Part:
     settings: dict[str, str] = field(default_factory=dict[str, str])
     new_poses: int = 0
     pose_names: str | None = None
-    model_splits: dict[str, str] = field(default_factory=dict[str, str])
+    dealt_splits: dict[str, str] = field(default_factory=dict[str, str])
 
     @property
     def models(self) -> tuple[str, ...]:
@@ -92,6 +95,11 @@ class Part:
     def is_product(self) -> bool:
         """Whether its samples are known models at known poses."""
         return self.sampler == PRODUCT and bool(self.blocks)
+
+    @property
+    def is_sampled(self) -> bool:
+        """Whether a recipe made it: its subjects, models or scenes, are taken from known poses."""
+        return self.sampler != IMPORT and bool(self.blocks)
 
     @staticmethod
     def from_plain(value: dict[str, Any]) -> Part:

@@ -1,4 +1,4 @@
-"""Placers: where each member of a frame's cast stands. One module a placer, named as its file; no placer imports another.
+"""Placers: where models that share a frame stand. One module a placer, named as its file; no placer imports another.
 
 What a placer needs stands here: what it is asked (`Room`, `Shape`, `Draws`), and geometry on the floor (`Footprint`,
 `standing`, `checked`).
@@ -39,9 +39,8 @@ class Placer(Protocol):
     ) -> Sequence[Matrix4]:
         """World from object for each member of the cast, metres, rigid; `shapes[i]` is that of `cast[i]`.
 
-        The first member is the model that the frame is about: it stands on the floor z = 0 at the origin and faces -Y.
-        `views` are the cameras, as far as they are known before anything is placed: none for a recipe's company, since its
-        cameras look at the middle of what is placed. All randomness comes from `rng`. Raises RecipeError where the cast does
-        not fit, which names the field `scene.company` or `scene.company.layout`.
+        Things stand on the floor z = 0, clear of what stands there before (`room.taken`). `views` are the cameras, as far as
+        they are known before anything is placed: none where cameras look at the middle of what is placed. All randomness comes
+        from `rng`. Raises RecipeError where the cast does not fit, which names the field `room.field` or `room.field`.layout.
         """
         ...

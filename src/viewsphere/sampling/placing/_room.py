@@ -18,30 +18,39 @@ Spot = tuple[float, float, float]
 @dataclass(frozen=True, eq=False)
 class Room:
     """What there is room in: the floor that is free (None: all of it), the metres that stay free between any two things, at
-    least, and the spots that the recipe names.
+    least, the spots that the recipe names, what stands there before (the model that company joins, at the origin, facing -Y),
+    and the recipe's field that asks for all this, which messages begin with.
     """
 
     free: Footprint | None = None
     gap: float = 0.0
     spots: tuple[Spot, ...] = ()
+    taken: tuple[tuple[Shape, Matrix4], ...] = ()
+    field: str = "scene.company"
+
+    @property
+    def prints(self) -> tuple[Footprint, ...]:
+        """What things that stand there before cover of the floor."""
+        return tuple(footprint(shape.box, pose) for shape, pose in self.taken)
 
 
 def checked(cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], poses: Sequence[Matrix4]) -> Sequence[Matrix4]:
     """The same poses, of things that stand upright on the floor.
 
-    Raises RecipeError where two are nearer than the room's gap, by their boxes, or where one but the first is beyond the free
-    floor.
+    Raises RecipeError where two are nearer than the room's gap, by their boxes, or nearer to what stands there before, or where
+    one is beyond the free floor.
     """
-    prints = [footprint(shape.box, pose) for shape, pose in zip(shapes, poses, strict=True)]
-    for i, own in enumerate(prints):
+    names = ["the model that it joins"] * len(room.taken) + [spec.key for spec in cast]
+    prints = [*room.prints, *(footprint(shape.box, pose) for shape, pose in zip(shapes, poses, strict=True))]
+    for i in range(len(room.taken), len(prints)):
         for j in range(i):
-            if not own.apart(prints[j], room.gap):
+            if not prints[i].apart(prints[j], room.gap):
                 raise RecipeError(
-                    f"scene.company.layout: expected {room.gap:g} m between all models; found {cast[j].key} and "
-                    f"{cast[i].key} nearer or in one another: move them, or use layout: scatter"
+                    f"{room.field}.layout: expected {room.gap:g} m between all models; found {names[i]} and {names[j]} "
+                    "nearer or in one another: move them, or use layout: scatter"
                 )
-        if i and room.free and not room.free.contains(own):
+        if room.free and not room.free.contains(prints[i]):
             raise RecipeError(
-                f"scene.company.layout: expected all models in the free part of the place; found {cast[i].key} beyond it"
+                f"{room.field}.layout: expected all models in the free part of the place; found {names[i]} beyond it"
             )
     return poses

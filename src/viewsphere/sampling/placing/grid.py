@@ -30,5 +30,5 @@ def place(
 def _cells(count: int) -> list[tuple[int, int]]:
     """Columns and lines of so many cells, from the middle outwards; of those equally far, the front and the left come first."""
     reach = math.isqrt(count) + 1
-    around = product(range(-reach, reach + 1), repeat=2)
-    return sorted(around, key=lambda cell: (cell[0] ** 2 + cell[1] ** 2, cell[1], cell[0]))[:count]
+    side = range(-reach, reach + 1)
+    return sorted(product(side, side), key=lambda cell: (cell[0] ** 2 + cell[1] ** 2, cell[1], cell[0]))[:count]

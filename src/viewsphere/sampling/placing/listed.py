@@ -14,14 +14,11 @@ from viewsphere.sampling.placing import Draws, Room, Shape, checked, standing
 def place(
     cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], views: Sequence[Camera], rng: Draws
 ) -> Sequence[Matrix4]:
-    """Poses at the room's spots, one for each of the cast but the first.
+    """Poses at the room's spots, one for each of the cast.
 
     Raises RecipeError for another number of spots, and where things would stand in one another or beyond the free floor.
     """
-    if len(room.spots) != len(cast) - 1:
-        raise RecipeError(
-            f"scene.company.layout: expected a list of {len(cast) - 1} spots [x, y, azimuth]; found {len(room.spots)}"
-        )
-    spots = ((0.0, 0.0, 0.0), *room.spots)
-    poses = [standing(shape.box, *spot) for shape, spot in zip(shapes, spots, strict=True)]
+    if len(room.spots) != len(cast):
+        raise RecipeError(f"{room.field}.layout: expected a list of {len(cast)} spots [x, y, azimuth]; found {len(room.spots)}")
+    poses = [standing(shape.box, *spot) for shape, spot in zip(shapes, room.spots, strict=True)]
     return checked(cast, room, shapes, poses)

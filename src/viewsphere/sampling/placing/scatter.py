@@ -26,14 +26,14 @@ def place(
 
     Each member's draws are for its slot and its key.
     """
-    poses = [standing(shapes[0].box)]
-    prints = [footprint(shapes[0].box, poses[0])]
-    for slot, (spec, shape) in enumerate(zip(cast[1:], shapes[1:], strict=True)):
+    poses: list[Matrix4] = []
+    prints = list(room.prints)
+    for slot, (spec, shape) in enumerate(zip(cast, shapes, strict=True)):
         pose = _pose(rng(str(slot), spec.key), room, shape, prints)
         if pose is None:
             raise RecipeError(
-                f"scene.company: expected room for {len(cast)} models; found none for {spec.key}: ask for fewer, or for a "
-                "smaller gap"
+                f"{room.field}: expected room for {len(prints) + len(cast) - slot} models; found none for {spec.key}: ask for "
+                "fewer, or for a smaller gap"
             )
         poses.append(pose)
         prints.append(footprint(shape.box, pose))
@@ -43,7 +43,7 @@ def place(
 def _pose(rng: np.random.Generator, room: Room, shape: Shape, others: Sequence[Footprint]) -> Matrix4 | None:
     """A pose clear of the others, on the free floor; None where none is found."""
     box, free = shape.box, room.free
-    radius = float(others[0].half.min() + (box[4] - box[2])[:2].min() / 2) + room.gap  # nearer there is no room
+    radius = float(others[0].half.min() + (box[4] - box[2])[:2].min() / 2) + room.gap if others else 0.0  # none is nearer
     widest = math.inf if free is None else float(np.linalg.norm(free.corners, axis=1).max())
     for _ in range(TRIES):
         turn, far, azimuth = rng.random(3)

@@ -1,0 +1,83 @@
+"""How the models of a recipe become scenes, where that is not each model alone."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, ConfigDict, Discriminator, Field, JsonValue, Tag, model_validator
+
+from viewsphere.model.frozen import Frozen
+from viewsphere.model.numbers import Count, Number
+from viewsphere.recipe.draws import Drawn, span
+from viewsphere.recipe.scenery import Layout, Spot
+from viewsphere.recipe.values import OrShort
+
+
+class ScenesEntry(Frozen):
+    """Random scenes: in each some of the recipe's models are drawn and placed, none of them more than another."""
+
+    sampler: Literal["scenes"] = Field(default="scenes", description="scenes, or another sampler's name, beside its options")
+    count: Count = Field(description="how many scenes")
+    objects: Drawn[Count] = Field(default=(2, 5), validate_default=True, description="how many models stand in each")
+    repeat: bool = Field(default=False, description="whether a model may be there more than once")
+    views: Count | None = Field(
+        default=None, description="how many of the viewpoints each scene is taken from, drawn for each; by default all"
+    )
+    layout: Layout = Field(
+        default="scatter",
+        description="scatter: close by, turned at random; row: side by side; another placer's name; or where each stands: "
+        "[x, y, azimuth in degrees]",
+    )
+    gap: Annotated[Number, Field(ge=0)] = Field(default=0.3, description="metres that are free between two of them, at least")
+
+    @model_validator(mode="after")
+    def _check(self) -> ScenesEntry:
+        if not isinstance(self.layout, str) and span(self.objects) != (len(self.layout),) * 2:
+            raise ValueError(f"expected objects: {len(self.layout)}, as many as the layout lists; found another number")
+        return self
+
+    @property
+    def placer(self) -> str:
+        """Name of the placer."""
+        return self.layout if isinstance(self.layout, str) else "listed"
+
+    @property
+    def spots(self) -> tuple[Spot, ...]:
+        """Where each stands, as far as the recipe says."""
+        return () if isinstance(self.layout, str) else self.layout
+
+    @property
+    def most_objects(self) -> int:
+        """Most models in one scene."""
+        return int(span(self.objects)[1])
+
+
+class SamplerEntry(Frozen):
+    """Another sampler: its name, and options that the sampler itself checks."""
+
+    model_config = ConfigDict(extra="allow")
+    __pydantic_extra__: dict[str, JsonValue] = Field(init=False)  # pyright: ignore[reportIncompatibleVariableOverride]
+
+    sampler: str = Field(min_length=1, description="name of the sampler")
+
+    @property
+    def options(self) -> dict[str, JsonValue]:
+        """Everything but the name."""
+        return dict(self.__pydantic_extra__)
+
+
+def _counted(value: Any) -> Any:
+    return {"count": value} if isinstance(value, (int, float)) and not isinstance(value, bool) else value
+
+
+def _kind(value: Any) -> str:
+    name = value.get("sampler", "scenes") if isinstance(value, dict) else getattr(value, "sampler", "scenes")
+    return "scenes" if name == "scenes" else "other"
+
+
+ScenesField = Annotated[
+    Annotated[ScenesEntry, Tag("scenes")] | Annotated[SamplerEntry, Tag("other")],
+    Discriminator(_kind),
+    BeforeValidator(_counted),
+    OrShort({"type": "integer", "minimum": 1}),
+]

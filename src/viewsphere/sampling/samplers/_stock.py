@@ -1,0 +1,172 @@
+"""What shots are made of: a recipe's models, viewpoints, splits and pictures. No mesh is read."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from functools import cached_property
+from typing import Any
+
+from viewsphere.errors import RecipeError
+from viewsphere.model.camera import Intrinsics
+from viewsphere.model.instant import Instant, Viewpoint
+from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.rig import Rig
+from viewsphere.model.scene import Scene, Vector
+from viewsphere.model.shot import Shot
+from viewsphere.model.thing import Thing
+from viewsphere.recipe.recipe import Recipe
+from viewsphere.sampling.blend_scene import BlendScenery
+from viewsphere.sampling.camera import looking
+from viewsphere.sampling.composition import Composition
+from viewsphere.sampling.moments import Schedule, Timing, at_frame, schedules
+from viewsphere.sampling.pictures import Pictures
+from viewsphere.sampling.scenery import draw_names
+from viewsphere.sampling.scenes import Scenes
+from viewsphere.sampling.splits import dealt, hashed
+from viewsphere.sampling.viewpoints import Poses
+
+
+@dataclass(frozen=True, eq=False)
+class Stock:
+    """What a sampler makes shots of; nothing here grows with the frames.
+
+    `subjects`: what the frames are about, as the sampler says: models' keys, or scenes' names.
+    """
+
+    recipe: Recipe
+    model_specs: tuple[ModelSpec, ...]
+    pose_list: Poses
+    pictures: Pictures  # of the scene
+    subjects: tuple[str, ...]
+    composition: Composition | None = None  # of place, company and planes
+    timings: tuple[Timing | None, ...] = ()  # of each model; none at all where nothing moves
+    kept_splits: Mapping[str, str] = field(default_factory=dict[str, str])  # of models and scenes that a data set has already
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What other processes are sent: not what was computed so far."""
+        return {field.name: getattr(self, field.name) for field in fields(self)}
+
+    @cached_property
+    def intrinsics(self) -> Intrinsics:
+        """The lens of all frames."""
+        return lens(self.recipe, self.pose_list)
+
+    @cached_property
+    def scenes(self) -> Scenes:
+        """Where light, ground, materials, finishes and jitter are drawn."""
+        return Scenes(self.recipe, self.pictures)
+
+    @property
+    def models(self) -> int:
+        """Number of models."""
+        return len(self.model_specs)
+
+    @cached_property
+    def schedules(self) -> tuple[Schedule, ...]:
+        """Which poses each model is taken from, and when."""
+        return schedules(self.timings or (None,) * self.models, self.pose_list)
+
+    def schedule(self, spec: ModelSpec) -> Schedule:
+        """Which poses a model is taken from, and when."""
+        return self.schedules[self.position[spec.key]]
+
+    def moments_of(self, spec: ModelSpec) -> tuple[ModelSpec, ...]:
+        """A model of the recipe at each frame of its file that is asked for."""
+        timing = self.timings[self.position[spec.key]] if self.timings else None
+        return tuple(at_frame(spec, step.model) for step in (timing.steps if timing else ()) if step.model is not None)
+
+    def spec(self, key: str) -> ModelSpec:
+        """The model of this key."""
+        return self.model_specs[self.position[key]]
+
+    @cached_property
+    def position(self) -> dict[str, int]:
+        """The number of each model by its key."""
+        return {spec.key: i for i, spec in enumerate(self.model_specs)}
+
+    @property
+    def blend(self) -> BlendScenery | None:
+        """The .blend file around the targets, if there is one."""
+        return None if self.composition is None else self.composition.blend
+
+    @cached_property
+    def dealt_splits(self) -> dict[str, str]:
+        """The split of every model or scene, where splits are by these; else none."""
+        names: Mapping[str, Sequence[str]] = {"model": tuple(self.position), "scene": self.subjects}
+        return dealt(self.recipe.splits, self.recipe.seed, names.get(self.recipe.splits.by, ()), self.kept_splits)
+
+    def hashed_split(self, subject: str, pose: int) -> str:
+        """The split of a frame, where splits are by pose, place or frame."""
+        splits = self.recipe.splits
+        match splits.by:
+            case "pose":
+                names = (self.pose_list.place(pose),)
+            case "place":
+                place = self.recipe.scene.place
+                names = ("place", *(draw_names(place.draw, subject, self.pose_list.name(pose)) if place else ()))
+            case _:
+                names = (subject, self.pose_list.name(pose))
+        return hashed(splits, self.recipe.seed, names)
+
+    def scene(self, subject: str, pose: str) -> Scene:
+        """Light and ground of a subject's frames, and the .blend file around them; `pose` is a pose's name."""
+        scene = self.scenes.scene(subject, pose)
+        if self.blend is None:
+            return scene
+        blend = self.blend.scene(subject, pose)
+        return scene.model_copy(update={"blend": blend, "sun": None if blend.is_lit else scene.sun})
+
+    def scene_pose(self, pose: int) -> str | None:
+        """Name of the pose, where what stands around is drawn for each frame."""
+        return self.pose_list.name(pose) if self.recipe.scene.is_moved_each_frame else None
+
+    def repainted(self, things: Sequence[Thing], subject: str, pose: int) -> tuple[Thing, ...]:
+        """The things with the changes to their materials."""
+        if not self.recipe.scene.materials:
+            return tuple(things)
+        return tuple(self._repainted(thing, subject, self.pose_list.name(pose)) for thing in things)
+
+    def _repainted(self, thing: Thing, subject: str, pose: str) -> Thing:
+        repaints = () if thing.scenery else self.scenes.repaints(thing.model, subject, pose)
+        return thing.model_copy(update={"repaints": repaints}) if repaints else thing
+
+    def viewpoint(self, subject: str, view: Viewpoint, target: Vector | None) -> Viewpoint:
+        """The viewpoint of a subject's frame, jittered; it looks at `target` unless it has a target of its own."""
+        if target is not None and view.target is None:
+            view = view.model_copy(update={"target": target})
+        return self.scenes.jittered(view, subject, self.pose_list.place(view.index)) if self.scenes.is_jittered else view
+
+    def instant(self, subject: str, view: Viewpoint, target: Vector | None, focus: Vector, split: str, number: int) -> Instant:
+        """The instant of a subject and a viewpoint; the camera looks at `target` unless the viewpoint has its own, and where
+        there is neither at `focus`. `number` is the instant's own.
+        """
+        pose = self.pose_list.name(view.index)
+        finish = self.scenes.finish(subject, pose) if self.scenes.has_finish_per_frame else None
+        return looking(self.viewpoint(subject, view, target), focus, index=number, split=split, finish=finish)
+
+    def finished(self, key: str, first: int, things: Sequence[Thing], scene: Scene, instants: Sequence[Instant]) -> Shot:
+        """A shot with all that the recipe says alike for every shot."""
+        return Shot(
+            key=key,
+            things=tuple(things),
+            rig=Rig.of(self.intrinsics),
+            scene=scene,
+            first=first,
+            instants=tuple(instants),
+            engine=self.recipe.engine.name,
+            engine_options=self.recipe.engine.options,
+            channels=self.recipe.channels,
+            files=self.recipe.files,
+            label_alpha=self.recipe.label_alpha,
+            category_deg=self.recipe.viewpoints.bins,
+        )
+
+
+def lens(recipe: Recipe, views: Poses) -> Intrinsics:
+    """The lens that a recipe means with these poses; raises RecipeError where their file names none."""
+    if not recipe.camera.of_viewpoints:
+        return recipe.camera.intrinsics
+    if views.intrinsics is None:
+        raise RecipeError("camera.of_viewpoints: expected a file of poses that names a lens; found none: give fov_deg or K")
+    return views.intrinsics
