@@ -314,6 +314,7 @@ def _fitted_from_afar(source: _Source, points: Float, casters: Casters, size: in
     middle = (low + high) / 2
     if casters.maps is not None:
         span, middle[:2] = snapped(span, middle[:2])
+        middle[2] = 0.0  # any will do, but the same gives the same matrix
     return parallel_view(away, axes.T @ middle, span, tangent, size)
 
 
