@@ -44,7 +44,8 @@ def _problems(dataset: Dataset, info: ModelInfo, categories: dict[int, Category]
     folder, known = dataset.path(info.obj).parent, categories.get(info.category_id)
     mesh = read_exported(dataset.path(info.glb), info.parts, whole=True)
     yield from _facts(info, mesh)
-    if folder != dataset.store.model_folder(info.key) or dataset.path(info.glb).parent != folder:
+    places = [(dataset.path(file).parent, Path(file).suffix) for file in (info.obj, info.glb)]
+    if places != [(dataset.store.model_folder(info.key), suffix) for suffix in (".obj", ".glb")]:
         yield f"expected files in its folder, found {info.obj} and {info.glb}"
     if known is None or (known.name, known.supercategory) != (info.category, info.supercategory):
         yield f"expected a category of the plan, found {info.category_id} {info.category!r} ({info.supercategory!r})"
