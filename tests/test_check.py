@@ -328,8 +328,8 @@ def test_a_wrong_view(spelled):
 
 def test_depth_that_is_not_the_models(dataset):
     edit_channel(dataset, 7, "depth", lambda a: a.__imul__(np.float32(1.001)))
-    assert failures(dataset) == {("surface", 7), ("depth", 7)}
-    assert failures(dataset, rays=False) == {("depth", 7)}
+    assert failures(dataset) == {("surface", 7), ("depth", 7), ("depth_ray", 7)}
+    assert failures(dataset, rays=False) == {("depth", 7), ("depth_ray", 7)}
 
 
 def nudged(array):
@@ -353,7 +353,7 @@ def test_channels_that_are_wrong_all_over(dataset, name):
 
 def test_background_without_depth(dataset):
     edit_channel(dataset, 5, "depth", lambda a: a.__setitem__(dataset[5].instances == 0, np.inf))
-    assert failures(dataset) == {("depth", 5), ("surface", 5)}
+    assert failures(dataset) == {("depth", 5), ("depth_ray", 5), ("surface", 5)}
 
 
 KEPT = [label.name for label in object_labels() if label.keep is not nothing]
