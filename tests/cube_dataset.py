@@ -80,7 +80,7 @@ def render(shot: Shot):
         channels |= {"rgb": colors, "rgba": np.dstack([colors, alpha])}
         channels = {name: channels[name] for name in shot.channels}
         objects = annotate(shot, instant, camera, geometry, visibility, boxes, files)
-        yield Sample(number, now.split, camera, now.viewpoint, objects, channels, {})
+        yield Sample(number, now.split, camera, now.viewpoint, objects, channels, {}, instant=now.index)
 
 
 def shots(several: bool, channels: tuple[str, ...], intrinsics: Intrinsics, ground: bool, files: Files) -> list[Shot]:

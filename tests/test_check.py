@@ -78,8 +78,9 @@ def test_a_whole_data_set_passes(whole):
     report = check(whole)
     assert report.ok, report.findings
     assert report.notes == ()
-    names = ["files", "ids", "camera", *labels(), "surface"]
+    names = ["files", "ids", "camera", "shot", *labels(), "surface"]
     assert report.checked.pop("digests") > 12 * len(whole.plan.channels)
+    assert report.checked.pop("models") == 3
     assert report.checked == dict.fromkeys(names, 12)
     assert json.loads(json.dumps(report.to_json()))["ok"] is True
 
@@ -327,8 +328,8 @@ def test_a_wrong_view(spelled):
 
 def test_depth_that_is_not_the_models(dataset):
     edit_channel(dataset, 7, "depth", lambda a: a.__imul__(np.float32(1.001)))
-    assert failures(dataset) == {("surface", 7), ("depth", 7)}
-    assert failures(dataset, rays=False) == {("depth", 7)}
+    assert failures(dataset) == {("surface", 7), ("depth", 7), ("depth_ray", 7)}
+    assert failures(dataset, rays=False) == {("depth", 7), ("depth_ray", 7)}
 
 
 def nudged(array):
@@ -352,7 +353,7 @@ def test_channels_that_are_wrong_all_over(dataset, name):
 
 def test_background_without_depth(dataset):
     edit_channel(dataset, 5, "depth", lambda a: a.__setitem__(dataset[5].instances == 0, np.inf))
-    assert failures(dataset) == {("depth", 5), ("surface", 5)}
+    assert failures(dataset) == {("depth", 5), ("depth_ray", 5), ("surface", 5)}
 
 
 KEPT = [label.name for label in object_labels() if label.keep is not nothing]
@@ -398,7 +399,8 @@ def test_another_model_than_was_drawn(dataset):
     shutil.copy(dataset.path("store/models/block-2/block-2.glb"), dataset.path("store/models/block-0/block-0.glb"))
     found = failures(dataset)
     assert {("surface", i) for i in range(4)} | {("depth", i) for i in range(4)} <= found
-    assert {frame for _, frame in found} == {0, 1, 2, 3}
+    assert {frame for name, frame in found if name != "models"} == {0, 1, 2, 3}
+    assert ("models", None) in found
 
 
 @pytest.mark.parametrize(
@@ -457,3 +459,92 @@ def test_files_that_are_lost_longer_or_strange_are_found(whole, tmp_path, change
             (file.parent / "another.tiff").write_bytes(file.read_bytes())
     findings = [f for f in check(Dataset(root), rays=False).findings if f.check == "digests"]
     assert len(findings) == 1 and "expected " in findings[0].message
+
+
+def test_frames_without_their_shots_are_a_note(spelled):
+    report = check(spelled, rays=False)
+    assert report.ok
+    assert report.notes[0].startswith("12 frames came without their shots")
+
+
+# the fields of records, generated from the tables of labels
+
+
+def leaves(value, where=()):
+    """Places of all numbers, texts and truths in a value of JSON."""
+    if isinstance(value, dict | list) and value:
+        for key, item in value.items() if isinstance(value, dict) else enumerate(value):
+            yield from leaves(item, (*where, key))
+    else:
+        yield where
+
+
+def another(value):
+    """What looks like a value of the field, and is none."""
+    match value:
+        case bool():
+            return not value
+        case int():
+            return value + 1
+        case float():
+            return value * (1 + 1e-5) + 1e-5
+        case str():
+            return value + "x"
+        case _:
+            return 0.5
+
+
+def place_of(record, where):
+    for key in where[:-1]:
+        record = record[key]
+    return record, where[-1]
+
+
+@pytest.fixture(scope="module")
+def merged(whole, whole_records, tmp_path_factory):
+    """Records that say everything, and the shots that they are of."""
+    dataset = Dataset(shutil.copytree(whole_records.root, tmp_path_factory.mktemp("merged") / "out"))
+    for file in whole.root.glob("store/shots/*/*/shot.json"):
+        shutil.copy(file, dataset.root / file.relative_to(whole.root))
+    seal_again(dataset.root)
+    assert check(dataset).ok
+    return dataset
+
+
+def missed_leaves(dataset, frame, places):
+    """Places in a frame's record where another value is not found, although digests are made to fit."""
+    file = dataset.store.shot_folder(f"block-{frame // 4}-000000") / "frames.json"
+    text, missed = file.read_text(), []
+    for where in places:
+        records = json.loads(text)
+        inside, key = place_of(records[frame % 4], where)
+        inside[key] = another(inside[key])
+        file.write_text(json.dumps(records))
+        if not failures(dataset, rays=False, sample=None):
+            missed.append(where)
+    file.write_text(text)
+    seal_again(dataset.root)
+    return missed
+
+
+def record_of(dataset, frame):
+    file = dataset.store.shot_folder(f"block-{frame // 4}-000000") / "frames.json"
+    return json.loads(file.read_text())[frame % 4]
+
+
+@pytest.mark.parametrize("kind", ["short", "merged"])
+def test_every_field_of_every_record_is_proved(whole, merged, tmp_path, kind):
+    """One number, text or truth of each field of each label, and of each thing that is known of a frame."""
+    source = whole if kind == "short" else merged
+    dataset = Dataset(shutil.copytree(source.root, tmp_path / "out"))
+    record = record_of(dataset, 6)
+    if kind == "merged":
+        assert {field.name for label in object_labels() for field in label.fields} <= record["objects"][0].keys()
+    first = {where[:3]: where for where in leaves(record)}
+    assert missed_leaves(dataset, 6, first.values()) == []
+
+
+@pytest.mark.slow
+def test_every_leaf_of_every_record_is_proved(merged, tmp_path):
+    dataset = Dataset(shutil.copytree(merged.root, tmp_path / "out"))
+    assert missed_leaves(dataset, 6, leaves(record_of(dataset, 6))) == []

@@ -22,11 +22,12 @@ FROM_GLTF = np.array([0, 2, 1]), np.array([1, -1, 1], np.float32)
 """Which of glTF's axes are the object's, and their signs."""
 
 
-def read_exported(file: Path, parts: Sequence[str]) -> Mesh:
+def read_exported(file: Path, parts: Sequence[str], *, whole: bool = False) -> Mesh:
     """The mesh of a GLB file that this package wrote, in object axes; every number is equal to the last bit.
 
-    `parts` names all parts of the model, those without triangles too. Materials that cannot be seen through are left plain.
-    Raises ModelError for a file that cannot be read, or that has other parts.
+    `parts` names all parts of the model, those without triangles too. Materials that cannot be seen through are left plain, and
+    images that only they use are left out, unless the `whole` mesh is asked for. Raises ModelError for a file that cannot be
+    read, or that has other parts.
     """
     document = Document.read(ModelFolder(file))
     primitives = list(_primitives(document, parts))
@@ -36,6 +37,9 @@ def read_exported(file: Path, parts: Sequence[str]) -> Mesh:
     counts = [len(own) for own in triangles]
     materials = document.root.items("materials")
     seen_through = {i for i, entry in enumerate(materials) if entry.text("alphaMode", "OPAQUE") != "OPAQUE"}
+    if whole:
+        _read_images(document)
+        seen_through = set(range(len(materials)))
     axes, signs = FROM_GLTF
     try:
         return Mesh(
@@ -53,6 +57,13 @@ def read_exported(file: Path, parts: Sequence[str]) -> Mesh:
         )
     except ValueError as error:
         raise document.folder.error(f"expected an exported model, found {error}") from None
+
+
+def _read_images(document: Document) -> None:
+    """All images in the file's order, so that they keep their numbers."""
+    for i, entry in enumerate(document.root.items("images")):
+        data, _ = document.view(entry.integer("bufferView"))
+        document.folder.image(f"#{i}", entry.text("name"), bytes(data))
 
 
 def _primitives(document: Document, parts: Sequence[str]) -> Iterator[Part]:

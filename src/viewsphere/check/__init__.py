@@ -13,14 +13,17 @@ from viewsphere.check.again import Again
 from viewsphere.check.digests import damaged
 from viewsphere.check.failure import failure
 from viewsphere.check.frames import FRAME_PROOFS
+from viewsphere.check.models import differing
 from viewsphere.check.rays import RayCaster
 from viewsphere.check.scenery import Scenery
+from viewsphere.check.shots import contradictions
 from viewsphere.errors import MissingExtraError, ViewsphereError
 from viewsphere.formats import Remark, Verified
 from viewsphere.labels import channel_labels, labels
 from viewsphere.model.sample import Sample
 from viewsphere.store import Dataset, ModelInfo, Row
 from viewsphere.store.checksums import damaged_files
+from viewsphere.store.index import numbers
 
 
 @dataclass(frozen=True)
@@ -72,9 +75,10 @@ def check(dataset: Dataset, *, sample: int | None = 50, rays: bool | None = None
     except (ViewsphereError, LookupError, TypeError, ValueError) as error:
         findings.append(Finding("counts", None, f"expected models that can be read, found {error}"))
         return Report({"digests": files}, tuple(findings), ())
+    findings += [Finding("models", None, message) for _, message in differing(dataset, notes)]
     positions = _spread(range(len(dataset)), frames)
     sampled = _spread(positions, sample)
-    checked = {"digests": files}
+    checked = {"digests": files, "models": len(dataset.models)}
     findings += _frame_proofs(dataset, positions, sampled, rays, checked, notes)
     names = exports(dataset)
     if len(positions) < len(dataset):
@@ -97,6 +101,7 @@ def _frame_proofs(
 ) -> Iterator[Finding]:
     """What is wrong with frames; `checked` counts those behind each proof."""
     scenery, models = Scenery(dataset), {info.key: info for info in dataset.models}
+    notes += _alone(dataset)
     caster = None if rays is False else _caster(dataset, scenery, rays is True, notes)
     again = Again(dataset, scenery, models)
     checked |= dict.fromkeys([*FRAME_PROOFS, *(name for name in labels() if _is_kept(dataset, name))], 0)
@@ -106,7 +111,8 @@ def _frame_proofs(
             continue
         if read.index != index:
             yield Finding("ids", index, f"expected a record of frame {index}, found one of {read.index}")
-        found = [*_proofs(models, read), *(_proofs_by_models(read, again, caster) if position in sampled else ())]
+        found = [*_proofs(models, read), ("shot", _carried_out(partial(_as_shot, dataset, scenery, read)))]
+        found += _proofs_by_models(read, again, caster) if position in sampled else ()
         for name, messages in found:
             yield from (Finding(name, index, message) for message in messages)
         for name in dict.fromkeys(name for name, _ in found):
@@ -197,6 +203,14 @@ def _frames(dataset: Dataset, positions: range) -> Iterator[tuple[int, int, Samp
         position += row.count
 
 
+def _alone(dataset: Dataset) -> Iterator[str]:
+    """A note on frames of which nothing is known but what their records say."""
+    finished = ((row, dataset.store.shot_folder(row.key) / "shot.json") for row in dataset.plan.rows)
+    frames = sum(row.count for row, file in finished if dataset.store.has_shot(row.key) and not file.exists())
+    if frames:
+        yield f"{frames:,} frames came without their shots: nothing is computed again, they are proved against themselves alone"
+
+
 def _is_kept(dataset: Dataset, name: str) -> bool:
     return name in dataset.plan.channels or name not in channel_labels()
 
@@ -208,6 +222,19 @@ def _proofs(models: Mapping[str, ModelInfo], sample: Sample) -> Iterator[tuple[s
     proofs |= {name: partial(label.prove, sample, models) for name, label in kept.items()}
     for name, proof in proofs.items():
         yield name, _carried_out(proof)
+
+
+def _as_shot(dataset: Dataset, scenery: Scenery, sample: Sample) -> Iterator[str]:
+    """What a frame's record says otherwise than the plan, and than its shot if that is known."""
+    row = dataset.plan.row_at(sample.index)
+    shot, place = scenery.shot(row.key), sample.index - row.first
+    if sample.known_pose and dataset.plan.parts[row.part].is_product:
+        poses = tuple(numbers(row.positions))
+        wanted = poses[place * len(poses) // row.count]
+        if sample.pose.index != wanted:
+            yield f"expected pose {wanted} of the plan, found {sample.pose.index}"
+    if shot:
+        yield from contradictions(sample, shot, place)
 
 
 def _proofs_by_models(sample: Sample, again: Again, caster: RayCaster | None) -> Iterator[tuple[str, list[str]]]:

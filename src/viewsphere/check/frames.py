@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
+from pathlib import PurePosixPath
 
 import numpy as np
 
@@ -17,9 +18,11 @@ ANGLE_TOLERANCE = 1e-6
 
 
 def files(sample: Sample) -> Iterator[str]:
-    """Every channel's file is there and holds an array of the image's size."""
+    """Every channel's file is that of the frame, is there and holds an array of the image's size."""
     height, width = sample.height, sample.width
     for name, file in sample.files.items():
+        if file.split("/")[-2:] != [name, f"{sample.index:08d}{PurePosixPath(file).suffix}"]:
+            yield f"{name}: expected the file of frame {sample.index}, found {file}"
         try:
             array = sample.channels[name]
         except ViewsphereError as error:

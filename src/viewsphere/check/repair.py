@@ -9,6 +9,7 @@ from typing import Any
 
 from viewsphere.check import Finding, Report, check, exports, lacking_models
 from viewsphere.check.digests import damaged
+from viewsphere.check.models import differing
 from viewsphere.errors import UserError, ViewsphereError
 from viewsphere.run.exporting import export
 from viewsphere.run.mending import Mender
@@ -35,7 +36,8 @@ def repair(root: Path | str, *, workers: int = 0, listener: Listener | None = No
     dataset = Dataset(root)
     mending = _Mending(dataset, Mender(dataset.store, dataset.plan, workers, listener or unheard))
     with dataset.store.occupied():
-        mending.models(mending.damaged_models())
+        while mending.models(mending.damaged_models()):
+            pass
         mending.shots(mending.damaged_shots())
         report = check(Dataset(root), **options)
         mending.shots(_found_shots(dataset, report.findings))
@@ -54,11 +56,13 @@ class _Mending:
         self._tried: set[str] = set()
 
     def damaged_models(self) -> Iterator[str]:
-        """Keys of models that are not as they were written, or are missing."""
-        folders = damaged(self._dataset)[1]
-        lacking = set(lacking_models(self._dataset))
+        """Keys of models that are not as they were written, that are missing, or whose files say different things."""
         plan, store = self._dataset.plan, self._dataset.store
-        return (key for key in plan.models if store.model_folder(key) in folders or key in lacking)
+        folders = damaged(self._dataset)[1]
+        found = {key for key in plan.models if store.model_folder(key) in folders}.union(lacking_models(self._dataset))
+        if not found:
+            found.update(key for key, _ in differing(self._dataset, []))
+        return (key for key in plan.models if key in found)
 
     def damaged_shots(self) -> Iterator[str]:
         """Keys of shots that are not as they were written, or are missing."""
@@ -66,20 +70,21 @@ class _Mending:
         wanted = (row.key for row in store.wanted(self._dataset.plan))
         return (key for key in wanted if store.shot_folder(key) in folders or not store.has_shot(key))
 
-    def models(self, keys: Iterable[str]) -> None:
-        """Make them again."""
-        self._note("model", "made again", keys, self._mender.models)
+    def models(self, keys: Iterable[str]) -> bool:
+        """Make them again; whether any was not tried before."""
+        return self._note("model", "made again", keys, self._mender.models)
 
     def shots(self, keys: Iterable[str]) -> None:
         """Render them again."""
         self._note("shot", "rendered again", keys, self._mender.shots)
 
-    def _note(self, what: str, how: str, keys: Iterable[str], mend: Any) -> None:
+    def _note(self, what: str, how: str, keys: Iterable[str], mend: Any) -> bool:
         wanted = [key for key in dict.fromkeys(keys) if key not in self._tried]
         errors: Mapping[str, ViewsphereError] = mend(wanted) if wanted else {}
         self._tried.update(wanted)
         self.done += [f"{what} {key}: {how}" for key in wanted if key not in errors]
         self.refused += [Finding("repair", None, f"{what} {key} cannot be {how}: {why}") for key, why in errors.items()]
+        return bool(wanted)
 
     def exports(self, findings: Iterable[Finding]) -> None:
         """Write those again of which something was found: also where their files are links of what was damaged."""

@@ -1,0 +1,104 @@
+"""Proof that a model's files say the same: the OBJ with its materials and textures, the GLB, and what is known of the model."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from itertools import zip_longest
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from viewsphere.assets.export import export_obj
+from viewsphere.assets.exported import read_exported
+from viewsphere.assets.mesh import Mesh
+from viewsphere.check.failure import failure
+from viewsphere.codecs.png_tiff import decode_png
+from viewsphere.errors import UserError
+from viewsphere.geometry.box import box_size, box_vertices
+from viewsphere.store import Category, Dataset, ModelInfo
+
+PRECISION = 1e-12
+"""Share of a number by which texts may differ: brightness above 1 is kept as a product in a GLB."""
+
+Finding = tuple[str, str]
+"""A model's key, and what is wrong with it."""
+
+
+def differing(dataset: Dataset, notes: list[str]) -> Iterator[Finding]:
+    """Models whose files contradict one another; `notes` gets those that were exported elsewhere."""
+    is_imported = any(not part.settings for part in dataset.plan.parts)
+    categories = {category.id: category for category in dataset.categories}
+    for info in dataset.models:
+        if is_imported and not info.parts:
+            notes.append(f"models: the files of {info.key} are not compared, they were exported elsewhere")
+            continue
+        try:
+            yield from ((info.key, f"model {info.key}: {message}") for message in _problems(dataset, info, categories))
+        except Exception as error:
+            yield info.key, f"model {info.key}: {failure('files that can be compared', error)}"
+
+
+def _problems(dataset: Dataset, info: ModelInfo, categories: dict[int, Category]) -> Iterator[str]:
+    folder, known = dataset.path(info.obj).parent, categories.get(info.category_id)
+    mesh = read_exported(dataset.path(info.glb), info.parts, whole=True)
+    yield from _facts(info, mesh)
+    places = [(dataset.path(file).parent, Path(file).suffix) for file in (info.obj, info.glb)]
+    if places != [(dataset.store.model_folder(info.key), suffix) for suffix in (".obj", ".glb")]:
+        yield f"expected files in its folder, found {info.obj} and {info.glb}"
+    if known is None or (known.name, known.supercategory) != (info.category, info.supercategory):
+        yield f"expected a category of the plan, found {info.category_id} {info.category!r} ({info.supercategory!r})"
+    with TemporaryDirectory() as aside:
+        export_obj(mesh, Path(aside), Path(info.obj).stem)
+        for file in sorted(Path(aside).iterdir()):
+            yield from _compared(file, folder / file.name)
+
+
+def _facts(info: ModelInfo, mesh: Mesh) -> Iterator[str]:
+    box = box_vertices(*mesh.bounds)
+    if info.triangles != len(mesh.triangles):
+        yield f"expected {len(mesh.triangles)} triangles, as the GLB has, found {info.triangles}"
+    if not np.array_equal(info.box3d_object, box):
+        yield "expected the 3D box of the GLB, found another"
+    if info.size != box_size(box):
+        yield f"expected size {box_size(box)} of the GLB, found {info.size}"
+
+
+def _compared(wanted: Path, found: Path) -> Iterator[str]:
+    """The first difference of a file from what the GLB's mesh gives."""
+    if not found.is_file():
+        yield f"{found.name}: expected the file that the GLB's mesh gives, found none"
+    elif wanted.read_bytes() != found.read_bytes():
+        yield from _pixels(wanted, found) if found.suffix == ".png" else _lines(wanted, found)
+
+
+def _lines(wanted: Path, found: Path) -> Iterator[str]:
+    with wanted.open(encoding="utf-8", newline="\n") as one, found.open(encoding="utf-8", newline="\n") as other:
+        for number, (a, b) in enumerate(zip_longest(one, other, fillvalue=""), 1):
+            if a != b and not _is_same_line(a, b):
+                yield f"{found.name}, line {number}: expected {a.strip()!r:.80} of the GLB, found {b.strip()!r:.80}"
+                return
+
+
+def _is_same_line(one: str, other: str) -> bool:
+    """Whether two lines hold the same words, and numbers that are the same but for rounding."""
+    words = one.split(), other.split()
+    return len(words[0]) == len(words[1]) and all(a == b or _is_same_number(a, b) for a, b in zip(*words, strict=True))
+
+
+def _is_same_number(one: str, other: str) -> bool:
+    try:
+        return math.isclose(float(one), float(other), rel_tol=PRECISION)
+    except ValueError:
+        return False
+
+
+def _pixels(wanted: Path, found: Path) -> Iterator[str]:
+    """Another version of the encoder may have written the same texture in other bytes."""
+    try:
+        same = np.array_equal(decode_png(wanted.read_bytes()), decode_png(found.read_bytes()))
+        if not same:
+            yield f"{found.name}: expected the texture of the GLB, found another"
+    except UserError as error:
+        yield f"{found.name}: expected the texture of the GLB, found: {error}"
