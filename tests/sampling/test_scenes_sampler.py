@@ -1,13 +1,19 @@
 """Random scenes: stable under more of them, of one split each, equals among equals, kept by the whole chain."""
 
+import re
+import sys
+import tracemalloc
+import types
 from collections import Counter
+from importlib.metadata import EntryPoint
 from itertools import combinations
 
 import numpy as np
 import pytest
 
 import viewsphere as vs
-from small import small_recipe, tree_hash
+from small import ROOT, small_recipe, tree_hash
+from viewsphere import plugins
 from viewsphere.check import check
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.box import box_vertices
@@ -15,9 +21,11 @@ from viewsphere.geometry.rotation import transform
 from viewsphere.model.shot import Shot
 from viewsphere.preview import preview_samples
 from viewsphere.run.estimate import estimate
+from viewsphere.run.generate import Missing
 from viewsphere.sampling.extension import extend, whole
 from viewsphere.sampling.placing import footprint
 from viewsphere.sampling.plan import Plan
+from viewsphere.store import Store
 
 
 def box_of(spec):
@@ -264,3 +272,43 @@ def test_preview_and_estimate_know_scenes():
     assert len({(sample.objects[0].key, sample.pose.azimuth_deg) for sample in samples}) == 6
     cost = estimate(recipe(3, scenes={"objects": 2}), 2)
     assert cost.seconds > 0 and cost.bytes > 10_000
+
+
+def test_the_sampler_in_the_docs_is_one_file(monkeypatch):
+    text = (ROOT / "docs" / "extending.md").read_text("utf-8")
+    (code,) = (block for block in re.findall(r"```python\n(.*?)```", text, re.DOTALL) if "def blocks(" in block)
+    module = types.ModuleType("my_pairs")
+    exec(code, module.__dict__)
+    monkeypatch.setitem(sys.modules, "my_pairs", module)
+    entry = EntryPoint("pairs", "my_pairs", "viewsphere.samplers")
+    monkeypatch.setattr(plugins, "entry_points", lambda group: (entry,) if group == entry.group else ())
+    grid = {"azimuth": [0, 90], "distance": 4}
+    pairs = small_recipe(
+        models=[{"source": "zoo:post_box", "count": 3}],
+        scenes={"sampler": "pairs", "gap": 0.5},
+        viewpoints=grid,
+        splits={"by": "frame"},
+    )
+    planned = vs.plan(pairs)
+    assert (planned.frames, planned.factors) == (4, "2 pairs x 2 poses")
+    assert [len(shot.things) for shot in planned.shots(box_of)] == [2, 2]
+    assert [len(sample.objects) for sample in vs.render(pairs)] == [2] * 4
+
+
+@pytest.mark.parametrize(("models", "poses"), [(1, 10**8), (1000, 10**5)])
+@pytest.mark.parametrize("by", ["model", "frame"])
+def test_a_hundred_million_frames_are_planned_in_little_memory(models, poses, by, tmp_path):
+    big = small_recipe(
+        models=[{"source": "zoo:post_box", "count": models}],
+        viewpoints={"kind": "sphere", "count": poses, "distance": 4},
+        splits={"by": by, "train": 0.5, "val": 0.5},
+        max_frames=10**9,
+    )
+    vs.plan(small_recipe())  # what is loaded once does not count
+    tracemalloc.start()
+    portion = whole(vs.plan(big))
+    first = next(Missing(portion, Store(tmp_path), {}).rows())
+    assert sum(portion.plan.split_counts.values()) == portion.plan.frames == 10**8
+    assert next(iter(portion.rows)) == first and len(portion.record.to_json()) < 500_000
+    assert tracemalloc.get_traced_memory()[1] < 20_000_000
+    tracemalloc.stop()
