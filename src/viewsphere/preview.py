@@ -68,7 +68,9 @@ def _spread(planned: Plan, count: int) -> list[tuple[str, list[list[int]]]]:
     chosen: dict[str, list[int]] = {}
     for i, number in enumerate(np.linspace(0, len(subjects) - 1, count).round().astype(int).tolist()):
         size = sum(map(length, taken(subjects[number])))
-        chosen.setdefault(subjects[number], []).append(int(i * size / count * (1 + 1 / max(count, 1))) % size)
+        places = chosen.setdefault(subjects[number], [])
+        place = int(i * size / count * (1 + 1 / max(count, 1)))
+        places.append(next((p % size for p in range(place, place + size) if p % size not in places), place % size))
     return [(subject, _grouped(taken(subject), places)) for subject, places in chosen.items()]
 
 

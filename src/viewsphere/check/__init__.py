@@ -175,7 +175,8 @@ def _missing_shots(dataset: Dataset) -> Iterator[str]:
         if not missing:
             continue
         expected, lost = (sum(row.count for row in some) for some in (rows, missing))
-        what = f"{len(plan.models)} models x {plan.poses} poses"
+        scenes = {name for part in plan.parts if part.is_sampled and not part.is_product for name in part.subjects}
+        what = f"{len(scenes)} scenes x {plan.poses} poses" if scenes else f"{len(plan.models)} models x {plan.poses} poses"
         if len(plan.parts) > 1:
             channels = dict.fromkeys(name for _, names in plan.parts[number].supplies for name in names)
             what = f"{', '.join(channels)} of older frames, " if added else ""

@@ -2,15 +2,27 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, cast
 
 from pydantic import BeforeValidator, ConfigDict, Discriminator, Field, JsonValue, Tag, model_validator
 
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.numbers import Count, Number
-from viewsphere.recipe.draws import Drawn, span
+from viewsphere.recipe.draws import Distribution, Drawn, span
 from viewsphere.recipe.scenery import Layout, Spot
 from viewsphere.recipe.values import OrShort
+
+
+def _range(value: Any) -> Any:
+    """[low, high] as what it is short for."""
+    return {"uniform": value} if isinstance(value, (list, tuple)) else value
+
+
+Objects = Annotated[
+    Drawn[Count],
+    BeforeValidator(_range),
+    OrShort({"type": "array", "items": {"type": "integer", "minimum": 1}, "minItems": 2, "maxItems": 2}),
+]
 
 
 class ScenesEntry(Frozen):
@@ -18,7 +30,10 @@ class ScenesEntry(Frozen):
 
     sampler: Literal["scenes"] = Field(default="scenes", description="scenes, or another sampler's name, beside its options")
     count: Count = Field(description="how many scenes")
-    objects: Drawn[Count] = Field(default=(2, 5), validate_default=True, description="how many models stand in each")
+    objects: Objects = Field(
+        default=cast(int, Distribution(uniform=(2, 5))),
+        description="how many models stand in each: a number, [low, high] or a distribution",
+    )
     repeat: bool = Field(default=False, description="whether a model may be there more than once")
     views: Count | None = Field(
         default=None, description="how many of the viewpoints each scene is taken from, drawn for each; by default all"

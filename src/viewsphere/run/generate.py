@@ -21,9 +21,9 @@ from viewsphere.run.pool import Crew, Job, Listed, Outcome
 from viewsphere.run.progress import Listener, Progress, unheard
 from viewsphere.run.skies import check_skies
 from viewsphere.run.stages import Stages, StoredBoxes
-from viewsphere.run.tasks import Kind, ModelTask
+from viewsphere.run.tasks import KernelTask, Kind, ModelTask
 from viewsphere.run.unpainted import unpainted
-from viewsphere.run.warm import compile_kernels
+from viewsphere.run.warm import is_compiled
 from viewsphere.sampling.distances import Distances
 from viewsphere.sampling.extension import Portion
 from viewsphere.sampling.plan import Plan
@@ -204,7 +204,10 @@ def _render_shots(portion: Portion, store: Store, crew: Crew, keep_going: bool, 
         Stages().check_scenery(portion.plan)
         tell(Progress("kernels", 0, 1))
         with portion.plan.recipe.located():
-            compile_kernels(portion.shot(first, StoredBoxes(store)))
+            shot = portion.shot(first, StoredBoxes(store))
+        if not is_compiled(shot):
+            for outcome in crew.run(Listed((Job("kernels", first.subject, KernelTask(shot)),))):
+                _accept(outcome, False, skipped)
         tell(Progress("kernels", 1, 1))
     tell(Progress("frames", resumed, total, resumed))
     for outcome in crew.run(work):
@@ -228,7 +231,12 @@ class Missing:
         indices = [self.portion.record.indices[self.portion.number], *self._added]
         if not self.skipped:
             return sum(index.samples for index in indices)
-        return sum(row.count for row in self._wanted())
+        if self.portion.plan.recipe.scene.is_moved_each_frame:
+            return sum(row.count for row in self._wanted())
+        cast = self.portion.plan.cast
+        left = [name for name in self.portion.plan.subjects if name not in self.skipped]
+        whole = [name for name in left if not any(member.key in self.skipped for member in cast(name))]
+        return sum(index.samples_of(name) for index in indices for name in whole)
 
     @property
     def resumed(self) -> int:

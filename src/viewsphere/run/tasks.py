@@ -18,6 +18,7 @@ from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
 from viewsphere.run.stages import Stages, StoredBoxes, model_files
+from viewsphere.run.warm import compile_kernels
 from viewsphere.sampling.extension import Portion
 from viewsphere.store import ModelInfo, Row, Store
 
@@ -41,6 +42,13 @@ class Damaged:
     row: Row
 
 
+@dataclass(frozen=True)
+class KernelTask:
+    """The kernels that a shot needs, to be compiled before others ask for them."""
+
+    shot: Shot
+
+
 class SceneryRecord(Frozen):
     """What is background in a shot: things of id 0, and the digest of each model's mesh by its key."""
 
@@ -58,12 +66,15 @@ class Worker:
         self._boxes = StoredBoxes(self.store)
         self._digests: dict[str, str] = {}
 
-    def do(self, task: ModelTask | Row | Damaged) -> int:
-        """Make models, or the shot of a row; gives the number of frames that were made."""
+    def do(self, task: ModelTask | KernelTask | Row | Damaged) -> int:
+        """Make models, kernels, or the shot of a row; gives the number of frames that were made."""
         if isinstance(task, Row):
             return self.make_shot(task)
         if isinstance(task, Damaged):
             return self.make_shot(task.row, again=True)
+        if isinstance(task, KernelTask):
+            compile_kernels(task.shot)
+            return 0
         if task.kind == "damaged model":
             for spec in task.specs:
                 mesh = self.stages.model(spec)

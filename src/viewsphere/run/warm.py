@@ -8,13 +8,13 @@ import math
 import os
 from contextlib import suppress
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from pydantic import JsonValue
 
 from viewsphere import plugins
 from viewsphere.assets.mesh import Image, Material, Mesh, Texture
-from viewsphere.engines import Engine
 from viewsphere.geometry.box import box_vertices
 from viewsphere.kernels.garbage import pause_collection
 from viewsphere.kernels.kernel_cache import kernel_folder, sources_digest
@@ -29,6 +29,9 @@ from viewsphere.run.stages import render_sample
 from viewsphere.sampling.camera import looking
 from viewsphere.sampling.look import engine_look
 from viewsphere.store import encode
+
+if TYPE_CHECKING:
+    from viewsphere.engines import Engine  # which takes a third of a worker's start
 
 SIZE = 16
 PACKAGE = Path(plugins.__file__).parent
@@ -48,6 +51,11 @@ def compile_kernels(shot: Shot) -> None:
         with suppress(OSError):  # a folder that others may not write
             kernels = (file.relative_to(mark.parent).as_posix() for file in mark.parent.rglob("*.nbi"))
             mark.write_text("\n".join(sorted(kernels)), encoding="utf-8")
+
+
+def is_compiled(shot: Shot) -> bool:
+    """Whether the kernels a shot needs are compiled; none is loaded to tell."""
+    return _is_true(_mark(_small(shot)))
 
 
 def load_kernels(shot: Shot) -> None:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from heapq import nsmallest
 
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.sampling.seeds import Names, share
@@ -20,3 +21,16 @@ def companions(seed: int, spec: ModelSpec, others: Iterable[ModelSpec], count: i
         key = min(left, key=lambda k: (share(seed, "company", *names, str(slot), k), k))
         chosen.append(left.pop(key))
     return tuple(chosen)
+
+
+def mixed(seed: int, models: Sequence[ModelSpec], count: int, names: Names, repeat: bool) -> tuple[ModelSpec, ...]:
+    """`count` of the models to stand together, each once at most unless they may `repeat`.
+
+    They are those whose numbers are lowest: one model more in the recipe takes only places of its own, one at most
+    where none repeats.
+    """
+    if not repeat:
+        return tuple(nsmallest(count, models, key=lambda spec: (share(seed, "cast", *names, spec.key), spec.key)))
+    return tuple(
+        min(models, key=lambda spec: (share(seed, "cast", *names, str(slot), spec.key), spec.key)) for slot in range(count)
+    )

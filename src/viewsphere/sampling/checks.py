@@ -12,13 +12,14 @@ from viewsphere.model.mistakes import nearest, one_of
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.recipe.draws import alternatives
 from viewsphere.recipe.recipe import Recipe
+from viewsphere.recipe.scenes import ScenesEntry
 from viewsphere.recipe.surface import GroundEntry
 from viewsphere.sampling.models import count_models
 from viewsphere.sampling.viewpoints import Poses
 
 
 def check_names(recipe: Recipe) -> None:
-    """The engine, the formats, the placer and the channels are known, and still pictures are enough for these."""
+    """The engine, the formats, the sampler, the placer and the channels are known, and still pictures are enough for these."""
     engines = plugins.names("engines")
     if recipe.engine.name not in engines:
         raise RecipeError(f"engine: {one_of(recipe.engine.name, engines)}")
@@ -29,6 +30,11 @@ def check_names(recipe: Recipe) -> None:
     company = recipe.scene.company
     if company is not None and company.placer not in (placers := plugins.names("placers")):
         raise RecipeError(f"scene.company.layout: {one_of(company.placer, placers)}")
+    samplers = plugins.names("samplers")
+    if recipe.sampler not in samplers:
+        raise RecipeError(f"scenes.sampler: {one_of(recipe.sampler, samplers)}")
+    if isinstance(recipe.scenes, ScenesEntry) and recipe.scenes.placer not in (placers := plugins.names("placers")):
+        raise RecipeError(f"scenes.layout: {one_of(recipe.scenes.placer, placers)}")
     for i, name in enumerate(recipe.channels):
         if name not in channels():
             raise RecipeError(f"channels[{i}]: {one_of(name, tuple(channels()))}")
@@ -63,7 +69,9 @@ def _engine_says(recipe: Recipe, name: str, default: bool) -> bool:
 
 
 def check_frames(recipe: Recipe, views: Poses) -> None:
-    """Not more frames than are wanted at most."""
+    """Not more models x poses than are wanted at most, where these are what is taken."""
+    if recipe.scenes is not None:
+        return
     models, count = count_models(recipe), math.prod(views.counts.values())
     if models * count > recipe.max_frames:
         factors = " x ".join(f"{n:,} {what}" for what, n in {"models": models, **views.counts}.items())
@@ -73,11 +81,11 @@ def check_frames(recipe: Recipe, views: Poses) -> None:
         )
 
 
-def check_moments(recipe: Recipe, frames: int) -> None:
-    """Not more frames with all time steps than are wanted at most."""
+def check_all_frames(recipe: Recipe, frames: int, factors: str) -> None:
+    """Not more frames than are wanted at most, with all time steps or scenes."""
     if frames > recipe.max_frames:
         raise RecipeError(
-            f"models: expected at most {recipe.max_frames:,} frames; found {frames:,}, with all time steps: "
+            f"models: expected at most {recipe.max_frames:,} frames; found {frames:,} ({factors}): "
             f"set max_frames: {frames} in the recipe if that is meant"
         )
 

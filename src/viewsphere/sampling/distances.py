@@ -58,7 +58,7 @@ class Distances:
     def cameras(
         self,
         things: Sequence[Thing],
-        poses: range,
+        poses: Sequence[int],
         target: Vector | None = None,
         subject: str | None = None,
         views: Poses | None = None,
@@ -77,16 +77,16 @@ class Distances:
         x, y, z = middle.tolist()
         return np.array([_stand(self.plan.viewpoint(subject, views[i], (x, y, z))) for i in poses])
 
-    def _stand(self, poses: range, views: Poses) -> tuple[Float, Float]:
+    def _stand(self, poses: Sequence[int], views: Poses) -> tuple[Float, Float]:
         """From what the cameras look at to where they stand, and what they look at: NaN where that is the models' centre."""
-        if views is not self.plan.pose_list:
+        if views is not self.plan.pose_list or not isinstance(poses, range):
             return _standing(poses, views)
         if poses not in self._offsets:
             self._offsets[poses] = _standing(poses, views)
         return self._offsets[poses]
 
 
-def _standing(poses: range, views: Poses) -> tuple[Float, Float]:
+def _standing(poses: Sequence[int], views: Poses) -> tuple[Float, Float]:
     found = [views.view(i) for i in poses]
     values = np.array([(view.azimuth, view.elevation, view.distance) for view in found])
     azimuth, elevation = np.radians(values[:, :2]).T

@@ -241,7 +241,7 @@ def _supplies(planned: Plan, there: PlanRecord, wanted: Sequence[int]) -> Iterat
         lacking = tuple(c for c in planned.recipe.channels if c not in there.channels_of(number))
         if not lacking:
             continue
-        shown = {subject for block in part.blocks for subject in block.subjects}
+        shown = set(part.subjects)
         absent = shown - subjects
         poses = np.unique(first_numbers(there)[flat(chain.from_iterable(block.positions for block in part.blocks))])
         asked = np.array(wanted, np.int64)

@@ -21,6 +21,7 @@ LOOK = "the engine's program"
 def check_fit(planned: Plan, there: PlanRecord) -> None:
     """Raises RecipeError where the recipe's pictures, splits or models would not fit those that are there."""
     for part in there.parts:
+        _check_sampler(planned, part)
         _check_settings(planned, part)
         _check_splits(planned, part)
     _check_models(planned, there)
@@ -38,8 +39,19 @@ def settings(planned: Plan) -> dict[str, str]:
         "viewpoints.bins": viewpoints.get("bins"),
         "scene's images": [file.rpartition("/")[2] for files in (planned.images, *planes) for file in files],
     }
+    if recipe.scenes is not None:
+        options = recipe.scenes.model_dump(mode="json", exclude={"count"})
+        value |= {f"scenes.{name}": options[name] for name in options}
     digests = {name: hashlib.sha256(json.dumps(value[name]).encode()).hexdigest()[:16] for name in value}
     return digests | {LOOK: engine_look(recipe.engine.name)}
+
+
+def _check_sampler(planned: Plan, part: Part) -> None:
+    """Scenes are added to scenes, and models x poses to models x poses."""
+    if part.is_sampled and part.sampler != planned.recipe.sampler:
+        raise RecipeError(
+            f"scenes: expected frames of sampler {part.sampler}, as the data set has; found {planned.recipe.sampler}: {FITTING}"
+        )
 
 
 def _check_settings(planned: Plan, part: Part) -> None:

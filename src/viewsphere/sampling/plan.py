@@ -17,12 +17,12 @@ from viewsphere.model.shot import Shot
 from viewsphere.recipe.draws import alternatives, span
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.sampling.checks import (
+    check_all_frames,
     check_blend,
     check_catcher,
     check_frames,
     check_listed,
     check_materials,
-    check_moments,
     check_names,
     check_splits,
 )
@@ -240,8 +240,8 @@ def plan(recipe: Recipe, shot_frames: int | None = None) -> Plan:
             categories=categories(recipe),
             shot_frames=frames,
         )
+        check_all_frames(recipe, planned.frames, planned.factors)
         if timings:
-            check_moments(recipe, planned.frames)
             check_keys(planned.kept_specs)
         return _composed(planned)
 

@@ -17,7 +17,11 @@ def shared(splits: Splits) -> dict[str, float]:
 
 def hashed(splits: Splits, seed: int, names: tuple[str, ...]) -> str:
     """The split of what has these names: each split gets about its share of all names, and no name minds the others."""
-    shares = shared(splits)
+    return drawn_split(shared(splits), seed, names)
+
+
+def drawn_split(shares: Mapping[str, float], seed: int, names: tuple[str, ...]) -> str:
+    """The same, of splits with these shares."""
     edges = tuple(accumulate(shares.values()))
     return tuple(shares)[min(bisect_right(edges, share(seed, "split", *names)), len(shares) - 1)]
 

@@ -91,6 +91,10 @@ class Poses(Sequence[Viewpoint]):
     def view(self, index: int) -> View:
         """Where the camera stands."""
 
+    def drawn_for(self, name: str) -> Poses:
+        """The same poses, random ones drawn anew for this name."""
+        return replace(self, seed=int(generator(self.seed, "viewpoints", name).integers(2**63)))
+
     @cached_property
     def _length(self) -> int:
         return math.prod(self.counts.values())
@@ -128,6 +132,10 @@ class GridPoses(Poses):
     """All combinations of a grid: tilt outermost, then distance, elevation, azimuth innermost."""
 
     viewpoints: Grid | Jitter
+
+    def drawn_for(self, name: str) -> Poses:
+        """The same: nothing is random."""
+        return self
 
     @property
     def counts(self) -> dict[str, int]:
@@ -256,6 +264,10 @@ class ListedPoses(Poses):
 
     viewpoints: PoseList
     file: PoseFile
+
+    def drawn_for(self, name: str) -> Poses:
+        """The same: nothing is random."""
+        return self
 
     @property
     def counts(self) -> dict[str, int]:

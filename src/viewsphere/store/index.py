@@ -108,6 +108,10 @@ class Index(Sequence[Row]):
         """Number of the rows of a subject."""
         return sum(self._chunks(number) for number, _ in self._places.get(subject, ()))
 
+    def samples_of(self, subject: str) -> int:
+        """Number of the samples of a subject."""
+        return sum(self.blocks[number].size * self.blocks[number].each for number, _ in self._places.get(subject, ()))
+
     def taken(self, subject: str) -> tuple[Ranges, ...]:
         """The positions at which a subject is taken, block by block."""
         return tuple(self.blocks[number].positions for number, _ in self._places.get(subject, ()))

@@ -87,9 +87,9 @@ class Part:
     dealt_splits: dict[str, str] = field(default_factory=dict[str, str])
 
     @property
-    def models(self) -> tuple[str, ...]:
-        """Keys of the models that it shows, each once; none where they are not known."""
-        return tuple(dict.fromkeys(key for block in self.blocks for key in block.subjects)) if self.is_product else ()
+    def subjects(self) -> tuple[str, ...]:
+        """What its samples are about, each once: keys of models, or names of scenes."""
+        return tuple(dict.fromkeys(name for block in self.blocks for name in block.subjects))
 
     @property
     def is_product(self) -> bool:

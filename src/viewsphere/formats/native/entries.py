@@ -53,7 +53,8 @@ def _stem(dataset: Dataset, sample: Sample, o: ObjectAnnotation) -> str:
 def _object_name(dataset: Dataset, sample: Sample, o: ObjectAnnotation) -> str:
     """An object's name in its pose: its model's key, with numbers where that is not unique."""
     plan = dataset.plan
-    one_a_pose = dataset.max_objects == 1 and plan.frames <= len(plan.models) * plan.poses
+    is_product = all(part.is_product or not part.is_sampled for part in plan.parts)
+    one_a_pose = is_product and dataset.max_objects == 1 and plan.frames <= len(plan.models) * plan.poses
     return o.key if one_a_pose else f"{o.key}_{sample.index + 1}_{o.id}"
 
 

@@ -31,7 +31,7 @@ class Standing:
     things: tuple[Thing, ...]
     target: Vector | None
     views: Poses
-    poses: range
+    poses: Sequence[int]
 
 
 class Sampler(Protocol):
