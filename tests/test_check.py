@@ -328,8 +328,8 @@ def test_a_wrong_view(spelled):
 
 def test_depth_that_is_not_the_models(dataset):
     edit_channel(dataset, 7, "depth", lambda a: a.__imul__(np.float32(1.001)))
-    assert failures(dataset) == {("surface", 7), ("depth", 7), ("depth_ray", 7)}
-    assert failures(dataset, rays=False) == {("depth", 7), ("depth_ray", 7)}
+    assert failures(dataset) == {("surface", 7), ("depth", 7)}
+    assert failures(dataset, rays=False) == {("depth", 7)}
 
 
 def nudged(array):
