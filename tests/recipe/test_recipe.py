@@ -249,7 +249,7 @@ MISTAKES = [
     ({"engine": 3}, "engine: expected a mapping; found 3", ""),
     ({"channels": ["rgb", "rgb"]}, "channels: expected distinct names; found 'rgb' twice", ""),
     ({"channels": "rgb"}, "channels: expected a list; found 'rgb'", ""),
-    ({"splits": {"by": "mdel"}}, "splits.by: expected one of model, pose, frame", "; did you mean 'model'?"),
+    ({"splits": {"by": "mdel"}}, "splits.by: expected one of model, scene, pose, frame", "; did you mean 'model'?"),
     ({"splits": {"train": 0.7, "val": 0.2}}, "splits: expected shares that add up to 1; found train 0.7", "0.9"),
     ({"splits": {"train": "most"}}, "splits.train: expected a share of 0 to 1 or a list", ""),
     ({"splits": {"by": "pose", "train": 1, "val": ["a"]}}, "splits: expected by: model", ""),
