@@ -32,7 +32,9 @@ class Cell:
 
 @dataclass(frozen=True)
 class Greenhouse:
-    """The cabin above the belt, metres; roof (y, z) is the roof's line in side view, drop how much lower its edge lies."""
+    """The cabin above the belt, metres; roof (y, z) is the roof's line in side view, drop is how much lower the roof's edge
+    lies.
+    """
 
     hull: Hull
     base: Outline
@@ -104,7 +106,7 @@ class Greenhouse:
         return around, seal, grid(self._inset(u, v))
 
     def _inset(self, u: Float, v: Float) -> Float:
-        """Points behind the surface, for the glass."""
+        """Points behind the surface by the inset of the panes."""
         points = self.surface(u, v)
         points[..., :2] -= GLASS_DEPTH * self.base.normal(u)
         return points
