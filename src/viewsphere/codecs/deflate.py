@@ -9,14 +9,12 @@ from isal import isal_zlib
 from numpy.typing import NDArray
 
 FAST, STEADY = 1, 3
-"""ISA-L's levels: level 1 is an order of magnitude faster than zlib's usual one, its output hardly larger; level 3 is half as
-fast.
-"""
+"""ISA-L's levels: FAST is ten times as fast as zlib's usual level, its output hardly larger; STEADY takes twice as long."""
 
 SMALL_BYTES = 1 << 16
-"""Bytes of input below which level 3 is used: of some short inputs, small masks among them, levels 1 and 2 of ISA-L make other
-bytes one time in some thousand, depending on where in memory ISA-L's own state lies (measured with isal 1.9.1). Level 3 never
-does, nor were levels 1 and 2 seen to with longer inputs.
+"""Bytes of input below which STEADY is used. Of some short inputs, small masks among them, ISA-L's levels 1 and 2 make other
+bytes one time in some thousand, depending on where in memory ISA-L's own state lies (measured with isal 1.9.1). STEADY, which
+is level 3, never did so, nor did levels 1 and 2 with longer inputs.
 """
 
 

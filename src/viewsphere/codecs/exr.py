@@ -64,9 +64,7 @@ def _header(width: int, height: int, components: int, kind: int) -> bytes:
 
 
 def _mixed(raw: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """EXR's prediction: bytes at even places, then those at odd ones, each replaced by its difference from the last, plus
-    128.
-    """
+    """EXR's prediction: bytes at even places, then those at odd ones, each as its difference from the last, plus 128."""
     parted = np.concatenate([raw[::2], raw[1::2]])
     parted[1:] = np.diff(parted) + np.uint8(128)
     return parted

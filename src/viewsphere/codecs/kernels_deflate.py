@@ -21,8 +21,7 @@ STORED = 65535
 
 @cache
 def match_codes(distance: int) -> tuple[np.ndarray, np.ndarray]:
-    """Codes of a match of each length (0 to 258) at a distance of 4 or 12 bytes, as bits in the order sent, and their numbers
-    of bits.
+    """Codes of a match of each length (0 to 258) at a distance of 4 or 12 bytes, bits in the order sent, and their widths.
 
     RFC 1951, 3.2.5 and 3.2.6.
     """

@@ -134,8 +134,7 @@ def project(intrinsics: Intrinsics, points: ArrayLike) -> tuple[Float, NDArray[n
 
 
 def lens_limit(lens: Distortion) -> float:
-    """How far from the axis the lens map is one-to-one: a radius r/z for Brown-Conrady (may be infinite), an angle for a
-    fisheye.
+    """Where the lens map stops being one-to-one: a radius r/z for Brown-Conrady (may be infinite), an angle for a fisheye.
 
     Beyond this limit a distortion polynomial folds the picture back on itself, as no real lens does. A fisheye's radius must
     rise with the angle. Brown-Conrady's Jacobian is symmetric (the map is the gradient of a potential); inside the limit it

@@ -61,9 +61,7 @@ def _bend(fisheye, k, off):
 
 @njit
 def tabulate(fisheye, k, limit, table):
-    """Fill table (n + 1,) with upper bounds of the bend from the axis to `off`: off / (1 + off) = i / n of its value at the
-    limit.
-    """
+    """Fill table (n + 1,) with upper bounds of the bend up to `off`: off / (1 + off) = i / n of its value at the limit."""
     most, last = 0.0, limit / (1.0 + limit)
     for i in range(table.shape[0]):
         share = last * i / (table.shape[0] - 1)
@@ -178,9 +176,7 @@ def _cut(lens, box, inside, outside):
 
 @inner
 def _turning(lens, a, b):
-    """Where between two directions the edge is nearest to the axis or farthest from it, and whether such a place is between
-    them.
-    """
+    """Where between two directions the edge is nearest to the axis or farthest from it, and whether that is between them."""
     aa = a[0] * a[0] + a[1] * a[1] + a[2] * a[2]
     x, y, z = b[0] - a[0], b[1] - a[1], b[2] - a[2]
     along, square = a[0] * x + a[1] * y + a[2] * z, x * x + y * y + z * z
@@ -238,9 +234,7 @@ def _edges(lens, box, corners):
 
 @njit
 def look(vertices, is_used, base, r, t, lens, points):
-    """Fill points (n, 6) with `_look` of the used vertices from `base` on; returns their box, and whether all of them are
-    seen.
-    """
+    """Fill points (n, 6) with `_look` of the used vertices from `base` on; returns their box, and whether all are seen."""
     box, whole = (np.inf, np.inf, -np.inf, -np.inf), True
     for j in range(points.shape[0]):
         if not is_used[j]:
@@ -274,8 +268,7 @@ def _rimmed(lens, box, a, b, c, rim):
 
 @njit
 def bent_bounds(vertices, is_used, base, triangles, first, last, r, t, lens, rim, points):
-    """Bounds (u0, v0, u1, v1) in pixels of the part of triangles [first, last) that a lens sees, and whether it sees all of
-    them.
+    """Bounds (u0, v0, u1, v1) in pixels of what a lens sees of triangles [first, last), and whether it sees all of them.
 
     The triangles' corners are vertices [base, base + n), of which some are used; points (n, 6) is scratch. `rim` (M, 3) are the
     directions at the lens' limit where its picture turns back along u or v. (inf, inf, -inf, -inf) where nothing is seen.

@@ -142,7 +142,7 @@ def trace_rings(mask):
 
 @njit(_nrt=True)
 def decode_runs(codes, height, width):
-    """The mask (height, width) bool of a compressed run-length code's characters, and whether the code is complete and fills
+    """The mask (height, width) bool of a compressed run-length code's characters, and whether the code is whole and fills
     it.
     """
     mask = np.zeros((height, width), np.bool_)

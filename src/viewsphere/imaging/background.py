@@ -78,9 +78,7 @@ def _display_linear() -> Float32:
 
 
 def _part(background: Background, size: Size, proportions: float) -> Box:
-    """The visible part of a picture: left, top, right, bottom in its pixels. `proportions`: the frame's width over its
-    height.
-    """
+    """The visible part of a picture: left, top, right, bottom in its pixels. `proportions`: the frame's width / height."""
     width, height = float(size[0]), float(size[1])
     if background.fit == "stretch":
         return 0.0, 0.0, width, height

@@ -50,8 +50,8 @@ def _cycle(values: Float32, right: Float32, levels: list[Float32]) -> None:
 
 
 def _levels(free: Mask, fixed: Mask) -> list[Float32]:
-    """1 / (number of neighbours that are free or fixed) of free pixels, else 0, with a rim; each level half the size of the
-    last.
+    """1 / (number of neighbours that are free or fixed) of free pixels, else 0, with a rim; each level half the last one's
+    size.
 
     A coarse cell is fixed if any of its pixels is fixed, else free if any is free.
     """

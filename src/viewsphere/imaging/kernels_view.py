@@ -24,8 +24,7 @@ SHARE_R, SHARE_G, SHARE_B = f4(0.04235), f4(0.07845), f4(0.0792)  # weights of t
 
 @njit(fastmath=FAST)
 def expose(radiance, matrix, p):
-    """Light of radiance (4 n,), unpremultiplied, balanced and exposed, and alpha; flat, so the compiler knows pixels are
-    adjacent.
+    """Unpremultiplied, balanced, exposed light and alpha of radiance (4 n,), flat so that its pixels are known to be adjacent.
 
     Where light exceeds what its coverage can show, as in a glint on clear glass, its alpha grows: it outshines what is behind.
     """
@@ -103,9 +102,7 @@ def _byte(x, curve):
 
 @njit(fastmath=FAST)
 def over_bytes(p, background, curve, out):
-    """A block over the background (n or 1, 3), as bytes (n, 3). The block's colours are overwritten by indices into the
-    curve.
-    """
+    """A block over the background (n or 1, 3), as bytes (n, 3). The block's colours become indices into the curve."""
     step = U(0) if background.shape[0] == 1 else U(1)
     at = p.view(np.int32)
     for c in range(U(3)):

@@ -103,9 +103,7 @@ def _resolved(function: Any, context: Any, args: tuple[Any, ...], _how: tuple[An
 
 
 def _resolve_once(function: Any, context: Any, args: tuple[Any, ...], kws: dict[str, Any]) -> Any:
-    """numba's signature of a function for these operand types; kept, since numba would try all overloads at every call
-    again.
-    """
+    """numba's signature of a function for these types; kept, since numba would try all overloads at every call again."""
     if kws or not all(isinstance(arg, _PLAIN) for arg in args):
         return _resolve(function, context, args, kws)
     flags = ConfigStack().top()
@@ -143,9 +141,7 @@ _QUICKER = (
 
 @contextmanager
 def _quickly() -> Generator[None]:
-    """While the context lasts, types are resolved once, numba's functions become parts like ours, and no garbage is
-    collected.
-    """
+    """Meanwhile types are resolved once, numba's functions become parts like ours, and no garbage is collected."""
     with global_compiler_lock, pause_collection(), ExitStack() as then:
         for owner, name, quicker in _QUICKER:
             then.callback(setattr, owner, name, getattr(owner, name))
@@ -165,9 +161,7 @@ class _Whole(JITCodeLibrary):
 
 
 class _Part(_Whole):
-    """Code that is neither optimized nor translated by itself: the kernels that call it do both, for all of their parts at
-    once.
-    """
+    """Code that is neither optimized nor translated by itself: its callers do both, for all of their parts at once."""
 
     def finalize(self) -> None:
         for library in dict.fromkeys(self._linking_libraries):
@@ -212,9 +206,7 @@ class Part(Kernel):
 
 
 class _Cached(JITCodeLibrary):
-    """Code from the cache, which takes half the time: other code's symbols are read only when they link it, and never
-    listed.
-    """
+    """Code from the cache. Its bitcode is parsed only when others link it, and its symbols are not listed: half the time."""
 
     def __init__(self, codegen: Any, name: str, bitcode: bytes) -> None:
         super().__init__(codegen, name)

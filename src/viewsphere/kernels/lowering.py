@@ -70,9 +70,7 @@ class KernelLower(Lower):
         return store_item(self.context, self.builder, array, self._cast_var(value_var, array.dtype), place)
 
     def _place(self, variable: Any, index: Any) -> Any:
-        """The address of the one indexed element; None for other things than arrays, for slices, or where bounds are
-        checked.
-        """
+        """The address of the one indexed element; None for slices, other types than arrays, or where bounds are checked."""
         array, kind = self.typeof(variable.name), self.typeof(index.name)
         kinds = kind.types if isinstance(kind, types.BaseTuple) else (kind,)
         is_plain = isinstance(array, types.Array) and isinstance(array.dtype, (types.Number, types.Boolean))

@@ -43,8 +43,7 @@ def read_small(glb: Path, most: int) -> SmallMesh:
 
 
 def simplified(vertices: Float, triangles: NDArray[np.int64], colors: NDArray[np.uint8], most: int) -> SmallMesh:
-    """At most `most` triangles and edges: unchanged if there are no more, else vertices that share a grid cell become one
-    vertex.
+    """At most `most` triangles and edges: unchanged if there are no more, else vertices that share a grid cell become one.
 
     The merged vertex lies where the sum of squared distances to the planes of the cell's triangles is least (Lindstrom,
     Out-of-core simplification of large polygonal models, SIGGRAPH 2000), clamped to the cell. The grid is the finest that meets

@@ -49,9 +49,7 @@ def summary(dataset: Dataset, table: FrameTable) -> dict[str, Any]:
 
 
 def hues(counts: Sequence[tuple[int, int]]) -> dict[int, int]:
-    """The number of each category id's colour, from (id, objects): the most frequent ids get 0 to 5 in order of ids, others
-    -1.
-    """
+    """The number of each category id's colour, from (id, objects): the most frequent get 0 to 5 in order of ids, others -1."""
     ranked = sorted(counts, key=lambda c: (-c[1], c[0]))[:HUES]
     colored = sorted(identifier for identifier, _ in ranked)
     return {identifier: colored.index(identifier) if identifier in colored else -1 for identifier, _ in counts}

@@ -62,9 +62,7 @@ Listener = Callable[[int, int], None]
 
 @dataclass(frozen=True, eq=False)
 class FrameTable:
-    """All finished frames in order and their objects, rows of `FRAME` and `OBJECT`, and the names that their indices stand
-    for.
-    """
+    """All finished frames in order and their objects, rows of `FRAME` and `OBJECT`, and the names that indices stand for."""
 
     frames: NDArray[Any]
     objects: NDArray[Any]

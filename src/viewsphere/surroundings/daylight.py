@@ -1,6 +1,4 @@
-"""The sky in daylight, by the sun's elevation: Preetham et al. 1999 (*A Practical Analytic Model for Daylight*), CIE
-overcast.
-"""
+"""The sky in daylight: Preetham et al. 1999 (*A Practical Analytic Model for Daylight*), and CIE's overcast sky."""
 
 from __future__ import annotations
 
@@ -45,8 +43,7 @@ _ZENITH = np.array(
 
 
 def opening(elevation_deg: float, daylight: Daylight) -> float:
-    """Factor of all daylight, sun and sky alike: a photographer opens the lens for evenings and clouds, so that they can be
-    seen.
+    """Factor of all daylight, sun and sky alike: how far a photographer opens the lens, so that evenings and clouds are seen.
 
     A hemisphere measures the light, as an exposure meter does; three quarters of the stops that the light lacks compared with
     a clear sky and the sun at 60 degrees are made up for. `strength` does not count: a sky that a user makes brighter stays so.
@@ -64,9 +61,7 @@ def _measured(elevation_deg: float, daylight: Daylight) -> float:
 
 
 def air(elevation_deg: float, daylight: Daylight) -> Float:
-    """Share of the sun's red, green and blue that passes the air, (3,): about 1 at 60 degrees in ordinary air, 0 behind
-    clouds.
-    """
+    """Share of the sun's red, green and blue that passes the air, (3,): about 1 at 60 degrees in ordinary air, 0 in cloud."""
     through = _transmittance(elevation_deg, daylight.turbidity) / _transmittance(60.0, 3.0)
     return through * (1 - daylight.clouds)
 

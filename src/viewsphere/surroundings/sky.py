@@ -42,8 +42,7 @@ def sky_pictures(sky: AnySky, sun: Sun | None, lights: Sequence[AnyLight], has_g
     """The sky with the light of all hemisphere lights, without the sun unless a photograph shows it.
 
     Without a ground there is grey below a made sky, which reflects the light that it receives. Raises RecipeError when a
-    picture
-    cannot be read.
+    picture cannot be read.
     """
     even = even_light(lights)
     if isinstance(sky, Environment):

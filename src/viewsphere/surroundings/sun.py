@@ -12,9 +12,7 @@ from viewsphere.surroundings.daylight import air, opening
 
 @dataclass(frozen=True)
 class Distant:
-    """A light so far away that its rays are parallel: unit direction to the light, irradiance facing it, its angular
-    diameter.
-    """
+    """A light so far away that its rays are parallel: unit direction to it, irradiance facing it, angular diameter."""
 
     direction: tuple[float, float, float]
     irradiance: tuple[float, float, float]

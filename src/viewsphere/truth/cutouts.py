@@ -53,8 +53,7 @@ NO_CUTOUTS = Cutouts(
 def mesh_cutouts(mesh: Mesh, label_alpha: float | None) -> tuple[Cutouts, NDArray[np.int32]]:
     """The mesh's cut-outs and, for each triangle (T,), SURFACE, NEVER or its row of `corners`.
 
-    Without `label_alpha`, a BLEND material is surface wherever it has a colour, and one texel beyond, where filtering carries
-    it.
+    Without `label_alpha`, a BLEND material is surface wherever it has a colour, and one texel beyond, which filtering colours.
     """
     rows = np.full(len(mesh.triangles), SURFACE, np.int32)
     cutouts = NO_CUTOUTS

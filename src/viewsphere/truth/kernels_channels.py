@@ -41,9 +41,7 @@ def labels(seen, table, empty, out):
 
 @njit
 def instances(seen, objects, ids, area, box):
-    """Ids of the objects seen; adds to each object's pixel count (count + 1,) and widens its tight half-open box (count + 1,
-    4).
-    """
+    """Ids of the objects seen; adds to each id's pixel count (count + 1,), widens its tight half-open box (count + 1, 4)."""
     height, width = np.uintp(seen.shape[0]), np.uintp(seen.shape[1])
     for y in range(height):
         for x in range(width):
@@ -172,8 +170,7 @@ def _rotated(r, x, y, z):
 
 @njit
 def normals_shading(seen, triangles, q, rays, values, side, triangle_normals, camera_from_p, rotation, out):
-    """Interpolated vertex normals (`values`, world) in camera axes, on the visible side of the triangle, never away from the
-    ray.
+    """Interpolated vertex normals (`values`, world) in camera axes, on the triangle's visible side, never away from the ray.
 
     `side` is 1 where a triangle's vertex normals agree with its winding, -1 where they oppose it, 2 or -2 likewise where all
     three vertex normals equal the triangle's own.
@@ -199,8 +196,7 @@ def normals_shading(seen, triangles, q, rays, values, side, triangle_normals, ca
             px, py, pz = (rays[uy, ux, a], rays[uy, ux, b], rays[uy, ux, c]) if table else (x + 0.5, y + 0.5, 1.0)
             i0, i1, i2 = np.uintp(triangles[ut, a]), np.uintp(triangles[ut, b]), np.uintp(triangles[ut, c])
             e0, e1, e2 = _edges(q, i0, i1, i2, px, py, pz)
-            # The e_i have the sign of g . ray, where g is the normal by winding: so their sum says which side is
-            # seen.
+            # The e_i have the sign of g . ray, g being the normal by winding: the sum turns with the visible side.
             sign = -np.float64(side[ut])
             wx = sign * (e0 * values[i0, a] + e1 * values[i1, a] + e2 * values[i2, a])
             wy = sign * (e0 * values[i0, b] + e1 * values[i1, b] + e2 * values[i2, b])

@@ -41,9 +41,7 @@ class Visibility:
     _instances: dict[Geometry, Instances] = field(default_factory=dict[Geometry, Instances], repr=False)
 
     def instances(self, geometry: Geometry) -> Instances:
-        """The visible pixels of each object; `geometry` must be the one drawn. Counted once: the arrays must not be written
-        to.
-        """
+        """The visible pixels of each object; `geometry` must be the one drawn. The arrays are kept: do not write to them."""
         if geometry not in self._instances:
             self._instances[geometry] = _count_instances(geometry, self.triangle)
         return self._instances[geometry]

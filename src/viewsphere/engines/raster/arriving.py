@@ -14,9 +14,7 @@ from viewsphere.engines.raster.records import Float32
 
 
 def arriving(lights: Lights, which: int, places: NDArray[np.floating[Any]], width: float) -> tuple[Float32, Float32]:
-    """Unshadowed irradiance (N, 3) at places (N, 3) that face up and are `width` apart; the share (N,) that shadows leave of
-    it.
-    """
+    """Unshadowed irradiance (N, 3) at places (N, 3) that face up, `width` apart; the share (N,) that shadows leave of it."""
     b = np.zeros((rows.ROWS, rows.BLOCK), np.float32)
     for row, value in ((rows.NZ, 1), (rows.GZ, 1), (rows.PIXEL, width)):
         b[row // rows.BLOCK] = value

@@ -37,9 +37,7 @@ KEPT_BYTES = 1 << 27
 
 @dataclass(frozen=True)
 class _Use:
-    """Where a texture's channels go: kind of plane, pairs (channel of the image, channel of the plane), whether they are
-    sRGB.
-    """
+    """Where a texture's channels go: kind of plane, pairs (channel of the image, channel of the plane), whether sRGB."""
 
     kind: int
     channels: tuple[tuple[int, int], ...] = ()

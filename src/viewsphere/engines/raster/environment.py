@@ -221,9 +221,7 @@ def _sky_parts(sky: AnySky, sun: Sun | None, has_ground: bool) -> tuple[_Maps, F
 
 
 def _visible_sun(sky: AnySky, sun: Sun | None) -> tuple[Float, float]:
-    """(3, 3): the sun's direction, its glow on a gradient, the radiance of its disc in daylight; the disc's half angle,
-    radians.
-    """
+    """(3, 3): the sun's direction, its glow on a gradient, its disc's radiance in daylight; the disc's half angle, radians."""
     light = None if isinstance(sky, Environment) else sun_light(sky, sun)
     if light is None:
         return np.array([[0.0, 0.0, 1.0], np.zeros(3), np.zeros(3)]), 0.0
@@ -267,8 +265,7 @@ def _photographed(key: tuple[str, int, int], has_ground: bool) -> _Photographed:
 
 
 def without_sun(pixels: Float32) -> tuple[Float32, Distant | None]:
-    """An equirectangular picture without its sun, and that sun; the picture as it was and None if no small bright spot stands
-    out.
+    """An equirectangular picture without its sun, and that sun; the same picture and None if no small bright spot stands out.
 
     The light of the spot beyond that of the sky around it goes to the sun, so that both together light a scene as before.
     """
@@ -365,9 +362,7 @@ def _solid_angles(size: int) -> Float32:
 
 
 def _frames(size: int) -> Float32:
-    """For each texel of an octahedral map two axes across its direction, and the direction, (size * size, 9); Duff et al.
-    2017.
-    """
+    """Two axes across the direction of each texel of an octahedral map, and that direction, (size * size, 9); Duff et al. 2017."""
     x, y, z = _directions(size).T
     sign = np.where(z >= 0, 1.0, -1.0)
     a = -1 / (sign + z)

@@ -102,9 +102,7 @@ def _read_cells(count, at, bounds, b):
 
 @lanewise
 def _judge(row, b):
-    """STATE of samples that lie before all texels within RADIUS (1) or behind all of them (0); a smaller RADIUS for the
-    others.
-    """
+    """STATE of samples before all texels within RADIUS (1) or behind all of them (0); a smaller RADIUS for the others."""
     near, radius, across, down, low = b.get(NEAR, RADIUS, ACROSS_, DOWN_, LOW_)
     tilt = (size(across - b[DU]) + size(down - b[DV])) * (radius + 0.5)
     b[STATE] = where(near + tilt <= low, 1, where(near - tilt > b[HIGH_], 0, -1))

@@ -53,9 +53,7 @@ def begin(pixels, total, triangle, depth, grid, limit, bound, nearest, seen, wan
 
 @njit
 def spread(pixels, count, limit, around):
-    """Lower around (H, W), a copy of limit, beside numbered pixels to their limit, since small triangles there may reach
-    them.
-    """
+    """Lower around (H, W), a copy of limit, beside numbered pixels to their limit: small triangles there may reach them."""
     height, width = limit.shape
     for k in range(U(count)):
         y, x = pixels[k] // width, pixels[k] % width

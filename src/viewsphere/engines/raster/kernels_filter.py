@@ -75,9 +75,7 @@ def _fetch(typing, array, index):
 
 
 def _sums(*parts):
-    """A function that sums neighbouring channels, as vectors of these widths: the compiler does not vectorise them by
-    itself.
-    """
+    """A function that sums neighbouring channels as vectors of these widths: the compiler would not vectorise the sums."""
 
     @intrinsic
     def add_up(typing, texels, channel, q, places, begin, end, c, i):

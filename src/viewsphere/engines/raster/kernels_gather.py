@@ -203,9 +203,7 @@ def _find(b):
 
 @lanewise
 def _face_viewer(b):
-    """Turn both normals to the side that is seen, whatever the winding; the smooth one looks at the viewer at least a
-    little.
-    """
+    """Turn both normals to the visible side, whatever the winding; the smooth one looks at the viewer at least a little."""
     g, n = b.get(GX, GY, GZ), b.get(NX, NY, NZ)
     side = sign(dot(g, b.get(VX, VY, VZ)))
     g = tuple(x * side for x in g)

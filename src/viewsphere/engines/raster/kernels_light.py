@@ -55,8 +55,7 @@ def _any(count, row, b):
 
 @lanewise
 def _place_in_albedo(normal, rough, size, b):
-    """T0: index of the first of four texels of the albedo around a layer's cosine to the viewer and roughness; T1 to T4: the
-    weights of the four.
+    """T0: the first of four texels of the albedo around a layer's cosine to the viewer and roughness; T1 to T4: their weights.
 
     Bilinear in the root of the cosine and in roughness. normal: row of the normal's x.
     """
@@ -268,8 +267,7 @@ def light_around(count, surrounding, b):
 
 @lanewise
 def _mirror(normal, rough, b):
-    """T0, T1, T2: the middle of a layer's lobe; T6: its roughness; T7: the share of the lobe that neither the surface itself
-    nor its occlusion blocks.
+    """T0, T1, T2: the middle of a layer's lobe; T6: its roughness; T7: the share that surface and occlusion do not block.
 
     normal: row of the normal's x; rough: row of the roughness.
     """

@@ -27,8 +27,7 @@ NARROW = 1.0  # pixels: a line as wide as this is seen at some centre
 
 @njit
 def on_others(q, triangles, cutout, owner, triangle, depth, shown, lines):
-    """Mark in `lines` (T,) triangles with a vertex at a visible surface of another owner that hides this vertex at most a
-    little.
+    """Mark in `lines` (T,) triangles with a vertex on a visible surface of another owner that hides it at most a little.
 
     shown (V,) int32 is scratch.
     """

@@ -15,9 +15,7 @@ ZERO_NORMAL = 32768.0  # the word that stands for 0 in a normal's component; 65,
 
 @njit
 def fill(texels, channel, pixels, source, table, factor):
-    """Put a channel of an image (H, W, 4) uint8 into uint16 texels, by a table of 256 words: means of factor x factor
-    squares.
-    """
+    """Put a channel of an image (H, W, 4) uint8 into uint16 texels, by a table of 256 words: means of `factor` squares."""
     for y in range(texels.shape[0]):
         for x in range(texels.shape[1]):
             if factor == 1:

@@ -81,9 +81,7 @@ def see(points, views, directions, b, out):
 
 @lanewise
 def _place_on_floor(frame, across, b):
-    """T0: 1 more than the index of the first of four cells, 0 beyond the map; T1 to T4: their weights. `across`: cells a
-    row.
-    """
+    """T0: 1 more than the index of the first of four cells, 0 beyond the map; T1 to T4: weights. `across`: cells a row."""
     # A wall is lit by the ground in front of it, not by the ground beneath it.
     u = (b[PX] - frame.one(1)) * frame.one(0) + b[NX] - 0.5
     v = (b[PY] - frame.one(2)) * frame.one(0) + b[NY] - 0.5
@@ -144,9 +142,7 @@ def _place_in_volume(frame, columns, rows, layers, b):
 
 @inner
 def _read_volume(count, volume, frame, b):
-    """The volume's coefficients into T0..T7: read a little off each sample's surface, from the points in front of the
-    surface.
-    """
+    """The volume's coefficients into T0..T7: read a little off each sample's surface, from points in front of it."""
     layers, rows, columns = U(volume.shape[0]), U(volume.shape[1]), U(volume.shape[2])
     _place_in_volume(count, frame, f4(columns), f4(rows), f4(layers), b)
     for i in range(count):

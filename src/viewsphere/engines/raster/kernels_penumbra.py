@@ -266,8 +266,7 @@ def _filter_aslant(form, b):
         radius_a, radius_b = light.half_a * past * per, most(light.half_b * past, soft) * per
         disc = clamp((radius_a + soft_a + 0.5) * 0.5 - (a * a + b * b) * (0.5 * per * per) / radius_a)
         square = clamp(radius_a + soft_a - a * per) * clamp(radius_b + soft_b - b * per)
-        # Weight of a texel: the nearer the plane of blockers is to the sample there, the more of the light one texel stands
-        # for.
+        # Weight of a texel: the nearer the plane is to the sample there, the more of the light one texel stands for.
         denser = least(first / past, 2)
         weight = (square + (disc - square) * light.is_round) * denser * denser * denser
         weight = where(is_above, weight, 0)
@@ -289,9 +288,7 @@ def _start(is_fine, b):
 
 @lanewise
 def _place_windows(radius, wide_from, margin, side, b):
-    """Place the window of texels within a radius: 8 x 8, beyond `wide_from` 16 x 16, or fewer rows. radius: row of the
-    radius.
-    """
+    """Place the window of texels within a radius: 8 x 8, beyond `wide_from` 16 x 16, or fewer rows. radius: its row."""
     radius = b[radius]
     is_wide = radius > wide_from
     step = power(radius / where(is_wide, NARROW, 2.25) * 1.999999)  # the least power that makes the window wide enough

@@ -253,9 +253,7 @@ def _span(edges, scales, y, xa, xb, reach):
 
 @inner
 def _draw_solid(surface, edges, found, count, points, solid):
-    """Draw a solid triangle at these pixels: four points are tested at once, single points only where any of the four is
-    covered.
-    """
+    """Draw a solid triangle at these pixels: four points are tested at once, single points only where any is covered."""
     grid, _, offsets, _ = points
     nearest, seen, farthest, _ = solid
     t, _, _, (nx, ny, nz, det), _ = surface

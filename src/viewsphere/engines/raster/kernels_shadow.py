@@ -32,8 +32,7 @@ STEEP = 15.0
 TEXELS, BIAS_FAR, BIAS_NEAR, NEAREST, READ, MIDDLE, ROUND, TILT, SIDES = range(16, 25)
 SPAN_U, SPAN_V, MORE, FINE, SHARPEST, DARKER = range(SIDES + 6, SIDES + 12)
 FORM = SIDES + 12
-# Columns of Views.grid: size, where the view's bounds begin, cells a side (a power of two), where each level of the depths
-# begins.
+# Columns of Views.grid: size, where the view's bounds begin, cells a side (a power of two), where each level of depths begins.
 SIZE, BOUNDS_AT, CELLS, DEPTH_AT = 0, 1, 2, 3
 GRID = 3 + LEVELS
 # Columns of Views.bounds: everything in a cell lies between two parallel planes; q of both in the cell's middle, slopes per

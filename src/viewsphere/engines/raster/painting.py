@@ -124,9 +124,7 @@ def _shade(
     radiance: Float32,
     samples: Samples | None = None,
 ) -> list[Layer]:
-    """Fill `radiance` (S, 4) with what the samples show, shading what is behind see-through surfaces first. Returns the
-    layers.
-    """
+    """Fill `radiance` (S, 4) with what the samples show, surfaces behind see-through ones first. Returns the layers."""
     solid, ground = np.empty((2, len(triangle)), np.int32)
     materials = baked.surfaces.material, np.zeros(len(baked.surfaces.looks) + 1, np.uint64)
     solids, grounds = kernels_paint.sorted_samples(triangle, baked.kind, *materials, radiance, solid, ground)

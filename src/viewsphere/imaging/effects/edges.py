@@ -43,9 +43,7 @@ def lines(seen: Seen) -> Float32:
 
 
 def crease(inverse_depth: Float32, focal: float) -> Float32:
-    """Change of the surface's slope from a pixel to the next, roughly the tangent of the angle; (H, W), 0 where nothing is
-    seen.
-    """
+    """Change of the surface's slope from a pixel to the next, about the tangent of the angle; (H, W), 0 where empty."""
     q = np.pad(inverse_depth, 1, mode="edge")
     middle = q[1:-1, 1:-1]
     across = np.abs(q[1:-1, :-2] - 2 * middle + q[1:-1, 2:])

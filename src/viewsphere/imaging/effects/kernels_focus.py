@@ -24,9 +24,7 @@ MADE_UP = f4(0.05)  # weight of colours filled in behind something near: it coun
 
 @inner(fastmath=FAST)
 def _reaches(radius, near, margin, slack, y0, x0, rows):
-    """The largest disc that reaches some lines of pixels, and the largest of those in front of the focus; -1 where none
-    does.
-    """
+    """The largest disc that reaches some lines of pixels, and the largest in front of the focus; -1 where none does."""
     largest, nearest = f4(-1), f4(-1)
     for y in range(y0, y0 + rows + 2 * margin):
         down = max(y0 + margin - y, y - (y0 + rows - 1 + margin))

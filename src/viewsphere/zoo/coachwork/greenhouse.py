@@ -32,9 +32,7 @@ class Cell:
 
 @dataclass(frozen=True)
 class Greenhouse:
-    """The cabin above the belt, metres; roof (y, z) is the roof's line in side view, drop is how much lower the roof's edge
-    lies.
-    """
+    """The cabin above the belt, metres; roof (y, z) is the roof's line in side view, drop how much lower its edge lies."""
 
     hull: Hull
     base: Outline

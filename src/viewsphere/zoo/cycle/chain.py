@@ -16,9 +16,7 @@ PITCH = 0.0127
 
 @dataclass(frozen=True)
 class Pulley:
-    """A wheel that the chain runs over: centre (y, z) and pitch radius in metres; turn +1 if it turns from +y to +z, else
-    -1.
-    """
+    """A wheel that the chain runs over: centre (y, z) and pitch radius, metres; turn: +1 from +y to +z, -1 the other way."""
 
     y: float
     z: float

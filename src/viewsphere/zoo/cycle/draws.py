@@ -80,9 +80,7 @@ def _shade(rng: np.random.Generator, color: Color) -> Color:
 
 
 def _colors(rng: np.random.Generator, dark_parts: float, dark_rims: float, other_fork: float) -> Colors:
-    """Paint with its accent; dark_parts, dark_rims, other_fork: probability that parts, rims are black, the fork another
-    colour.
-    """
+    """Paint with its accent; the numbers are probabilities of black parts, of black rims, and of a fork in another colour."""
     paint, accent = _one(rng, _PAINTS)
     frame = _shade(rng, paint)
     fork = _one(rng, (_BLACK, accent, _SILVER)) if _coin(rng, other_fork) else frame

@@ -36,9 +36,7 @@ class Frame:
 
 @dataclass(frozen=True)
 class Room:
-    """Half widths that the wheels need, metres: half that between the rear dropouts' middles, and half that of tyre and
-    mudguard.
-    """
+    """Half widths that the wheels need, metres: between the rear dropouts' middles, and of tyre and mudguard."""
 
     half: float = 0.066
     clearance: float = 0.019

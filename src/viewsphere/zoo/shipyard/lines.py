@@ -125,9 +125,7 @@ class Lines:
         return t, v, self.point(t, v)
 
     def waterline(self, z: float) -> Float:
-        """The left skin at a height: (T, 4) of x, y, t, v, from bow to stern; the keel or sheer where the skin does not reach
-        z.
-        """
+        """The left skin at a height: (T, 4) of x, y, t, v, from bow to stern; keel or sheer where the skin does not reach z."""
         t, v, points = self._table
         k = np.clip((points[..., 2] < z).sum(axis=1), 1, v.size - 1)
         row = np.arange(t.size)
@@ -147,9 +145,7 @@ class Lines:
         return np.interp(np.asarray(y, np.float64), line[:, 1], line[:, 0])
 
     def within(self, points: Float, z: float, gap: float) -> Float:
-        """The points of the left side moved to the height z, and, where that place lies outside the hull, to `gap` inside
-        it.
-        """
+        """The points of the left side moved to the height z, and, where this leaves the hull, to `gap` inside the hull."""
         line = self.waterline(z)
         inside = line[line[:, 0] > gap, :2]
         y = np.clip(points[..., 1], inside[0, 1] + gap, inside[-1, 1] - gap)

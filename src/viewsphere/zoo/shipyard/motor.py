@@ -243,9 +243,7 @@ def _gauges(c: Coats, at: tuple[float, float, float]) -> list[Piece]:
 
 
 def _seat_width(deck: Deck, well: Opening, back: float, ahead: float) -> float:
-    """Width of a bench across a well's rear, `back` (t) ahead of the well's end, clear of the hull `ahead` metres from
-    there.
-    """
+    """Width of a bench across a well's rear, `back` (t) ahead of the well's end, clear of the hull `ahead` metres on."""
     end = float(deck.lines.sheer_line(well.stop)[1])
     inside = float(well.half(deck.lines, np.array(well.stop - back)))
     return 2 * min(inside, float(deck.lines.half_at(end - ahead, well.floor))) - 0.12

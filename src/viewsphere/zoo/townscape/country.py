@@ -123,8 +123,8 @@ def _crown(relief: Relief, x: float, y: float, size: float, rng: np.random.Gener
 
 
 def around(points: Float) -> Float:
-    """uv (N, 2) of points: metres along the horizon seen from the origin, and down; for leaves on woods, seen from one side
-    only.
+    """uv (N, 2) of points: metres along the horizon seen from the origin, and down; for leaves on woods, never seen from
+    behind.
     """
     reach = np.hypot(points[:, 0], points[:, 1])
     return np.stack([reach * np.arctan2(points[:, 1], points[:, 0]), -points[:, 2]], axis=1)

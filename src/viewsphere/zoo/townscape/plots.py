@@ -22,8 +22,7 @@ SETBACK = 15.2
 
 @dataclass(frozen=True)
 class Plot:
-    """One house's plot: its middle along the street, and the places of house, driveway and door on it, metres; seed draws the
-    house."""
+    """One house's plot: its middle along the street, where house, driveway and door are, metres; seed draws the house."""
 
     side: int
     y: float
@@ -52,9 +51,7 @@ def allotted(
     pool: dict[int, House],
     rng: np.random.Generator,
 ) -> list[Plot]:
-    """A plot for each middle: a house (a seed of `pool`) other than the one next door, with its garage, if any, at the
-    driveway.
-    """
+    """A plot for each middle: a house (a seed of `pool`) other than next door's; a garage, if any, is at the driveway."""
     plots: list[Plot] = []
     for y, driveway in zip(middles, driveways, strict=True):
         near = -side if driveway > y else side
