@@ -362,7 +362,7 @@ def _solid_angles(size: int) -> Float32:
 
 
 def _frames(size: int) -> Float32:
-    """Two axes across the direction of each texel of an octahedral map, and that direction, (size * size, 9); Duff et al. 2017."""
+    """Two axes across each texel's direction in an octahedral map, and that direction, (size * size, 9); Duff et al. 2017."""
     x, y, z = _directions(size).T
     sign = np.where(z >= 0, 1.0, -1.0)
     a = -1 / (sign + z)

@@ -217,7 +217,7 @@ def _face_viewer(b):
 
 @inner(fastmath=FAST)
 def gather_ground(view, floor, count, b, material):
-    """As `gather`, for samples of the ground: its texture repeats in the world, and it fades into the sky far behind all things.
+    """As `gather`, for samples of the ground: its texture repeats in the world, and fades into the sky far behind all things.
 
     floor: see `painting.Baked`.
     """
