@@ -47,7 +47,7 @@ class KernelLower(Lower):
         return set(set_in) - others
 
     def storevar(self, value: Any, name: str, argidx: int | None = None) -> None:
-        """Sets a variable; the old value is not released where its type has no reference count."""
+        """Sets a variable; without reference counts (`_nrt`) no old value has to be released."""
         if self.context.enable_nrt or name in self._singly_assigned_vars:
             super().storevar(value, name, argidx)
         else:

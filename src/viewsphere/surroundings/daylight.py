@@ -17,8 +17,8 @@ _OVERCAST = 7.4
 """The same for an overcast sky, which lights the floor by 0.8, since a photographer would open the lens."""
 _OPENED = 0.75  # share of the missing stops by which the lens is opened
 _LOWEST = 0.01  # sine of the lowest elevation whose colour is computed; below, the sky has this colour down to the horizon
-_GROUND_FADE = 0.09  # sine of the depression below the horizon at which the ground hides what is behind it
-_GROUND_HAZE = 0.12  # sine of the further depression over which the horizon's light fades
+_GROUND_FADE = 0.09  # sine of the depression below the horizon at which the sky begins to fade into ground
+_GROUND_HAZE = 0.12  # sine of the further depression over which it fades
 _WAVELENGTHS = np.array([0.61, 0.55, 0.465])  # of red, green and blue, micrometres
 _OZONE = np.array([0.122, 0.084, 0.009]) * 0.35  # absorption of 0.35 cm of ozone
 _RGB_FROM_XYZ = np.array(

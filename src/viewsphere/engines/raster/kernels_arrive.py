@@ -244,7 +244,7 @@ def _shine(color, b):
 
 @inner(fastmath=FAST)
 def look(count, form, grid, depth, bounds, k, b):
-    """Multiply SHARE by the share of light k's light that view k (uintp) of these `Views` leaves, where samples are on its map.
+    """Multiply SHARE by the share of its light that view k (uintp) of these `Views` lets through, where samples are on its map.
 
     FACING holds the cosine between the surface and the light, times the distance to a light at a place; the view sets FACING to
     0 where it has decided, and changes nothing where FACING is not above 0. (GX, GY, GZ) may be zero where there is no surface.
