@@ -81,7 +81,7 @@ def rasterize(
 
 
 def with_ground(geometry: Geometry, camera: Camera, visibility: Visibility) -> Visibility:
-    """Draw the ground of this geometry into `visibility`, which holds everything else."""
+    """A new buffer: `visibility`, which shows everything else, with the ground of this geometry drawn into it."""
     ground = geometry.triangle_start[-1], len(geometry.triangles), geometry.vertex_start[-1], len(geometry.vertices)
     shown = visibility.inverse_depth.astype(np.float64), visibility.triangle.copy()
     nearest, seen, _ = _draw(geometry, camera, 1, ground, None, shown)
