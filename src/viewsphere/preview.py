@@ -91,7 +91,7 @@ def _scaled(rig: Rig, width: int) -> Rig:
 
 
 def _narrowed(lens: Intrinsics, width: int) -> Intrinsics:
-    """The same view at another width; wider is never needed for a preview."""
+    """The same view at another width; a preview is never wider than its recipe's pictures."""
     k = min(1.0, width / lens.width)
     sizes = {"width": max(1, round(lens.width * k)), "height": max(1, round(lens.height * k))}
     x, y = sizes["width"] / lens.width, sizes["height"] / lens.height
@@ -110,7 +110,7 @@ def _narrowed(lens: Intrinsics, width: int) -> Intrinsics:
 def four_sides(spec: ModelSpec, size: int = 320) -> Picture:
     """A model from azimuth 0, 90, 180 and 270 at elevation 15, each view with its name; (H, W, 3) uint8 sRGB.
 
-    The first view shows the front if the model faces -Y, as everything else assumes.
+    The first view shows the front if the model faces -Y, as all labels assume.
     """
     stages = Stages()
     low, high = stages.model(spec).bounds
@@ -135,7 +135,7 @@ def four_sides(spec: ModelSpec, size: int = 320) -> Picture:
 
 
 def contact_sheet(samples: Sequence[Sample], draw: Sequence[str] = (), columns: int = 4, width: int = 320) -> Picture:
-    """All samples side by side with what was asked for drawn over them, (H, W, 3) uint8 sRGB."""
+    """All samples side by side, with the labels named in `draw` over them, (H, W, 3) uint8 sRGB."""
     return _sheet([(draw_sample(s, draw, width), _caption(s)) for s in samples], columns)
 
 
@@ -149,8 +149,8 @@ def _caption(sample: Sample) -> str:
 
 
 def draw_sample(sample: Sample, draw: Sequence[str] = (), width: int | None = None) -> Picture:
-    """One frame with what labels are drawn as (`labels.drawings`): masks, 3D boxes (front face filled) and 2D boxes over the
-    picture, depth beside it.
+    """One frame with labels as they are drawn (`labels.drawings`): masks, 3D boxes (front face filled) and 2D boxes over the
+    picture, depth beside it; (H, W, 3) uint8 sRGB.
     """
     chosen = [drawing for drawing in drawings() if drawing.name in draw]
     rgb = _on_paper(sample.picture)
@@ -168,7 +168,7 @@ def draw_sample(sample: Sample, draw: Sequence[str] = (), width: int | None = No
 
 
 def _on_paper(picture: Picture) -> Picture:
-    """The picture; one without background on paper."""
+    """The picture, laid over paper's colour where it is transparent."""
     if picture.shape[2] == 3:
         return picture
     sheet, clear = Image.new("RGB", picture.shape[1::-1], PAPER), Image.fromarray(picture)

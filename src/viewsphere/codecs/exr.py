@@ -1,6 +1,6 @@
 """Arrays to OpenEXR files and back, in memory: scan lines, ZIP compression, 32-bit channels, every bit kept.
 
-Format: https://openexr.com/en/latest/OpenEXRFileLayout.html. The reader takes what the writer makes.
+Format: https://openexr.com/en/latest/OpenEXRFileLayout.html. The reader reads only files that the writer made.
 """
 
 from __future__ import annotations
@@ -20,21 +20,21 @@ _ZIP, _LINES = 3, 16
 _KINDS = {np.dtype(np.int32): 0, np.dtype(np.float32): 2}
 _NAMES = {1: ("Z",), 3: ("R", "G", "B")}
 _WINDOW = b"dataWindow\0box2i\0" + struct.pack("<I", 16)
-MOST_DEFLATED = 1032  # times its size is what a deflated stream can hold
+MOST_DEFLATED = 1032  # greatest ratio of a deflated stream's content to its own size
 _FOREIGN = "EXR: expected viewsphere's own, found a damaged file or another program's"
 
 
 def encode_exr(array: NDArray[Any]) -> bytes:
-    """An EXR file of (H, W), channel Z, or (H, W, 3), channels R, G and B, float32 or int32, not empty.
+    """An EXR file of (H, W), as channel Z, or (H, W, 3), as channels R, G and B; float32 or int32, not empty.
 
-    EXR knows no negative whole numbers: int32 become the UINT of equal bits.
+    EXR knows no signed integers: int32 numbers become the UINT numbers of equal bits.
     """
     components = 1 if array.ndim == 2 else array.shape[-1]
     if array.ndim not in (2, 3) or array.size == 0 or components not in _NAMES or array.dtype not in _KINDS:
         raise ValueError(f"encode_exr: expected (H, W) or (H, W, 3) float32 or int32, got {array.shape} {array.dtype}")
     height, width = array.shape[:2]
     head = _header(width, height, components, _KINDS[array.dtype])
-    planes = array.reshape(height, width, components)[:, :, ::-1]  # channels lie in their names' order: B, G, R
+    planes = array.reshape(height, width, components)[:, :, ::-1]  # channels lie in the order of their names: B, G, R
     rows = np.ascontiguousarray(planes.transpose(0, 2, 1), array.dtype.newbyteorder("<")).view(np.uint8).reshape(height, -1)
     blocks: list[bytes] = []
     for y in range(0, height, _LINES):
@@ -64,7 +64,7 @@ def _header(width: int, height: int, components: int, kind: int) -> bytes:
 
 
 def _mixed(raw: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Bytes of even places before those of odd ones, each as its distance from the one before, plus 128."""
+    """EXR's prediction: bytes at even places, then those at odd ones, each as its difference from the last, plus 128."""
     parted = np.concatenate([raw[::2], raw[1::2]])
     parted[1:] = np.diff(parted) + np.uint8(128)
     return parted
@@ -80,7 +80,7 @@ def _unmixed(parted: NDArray[np.uint8]) -> NDArray[np.uint8]:
 
 
 def decode_exr(data: bytes) -> NDArray[Any]:
-    """The array `encode_exr` was given: equal shape, dtype and bits.
+    """The array that `encode_exr` was given: equal shape, dtype and bits.
 
     Raises UserError when the file is damaged or was written by another program.
     """
@@ -111,7 +111,7 @@ def decode_exr(data: bytes) -> NDArray[Any]:
 
 
 def _layout(data: bytes) -> tuple[int, int, int, np.dtype[Any], int]:
-    """Width, height, components and dtype of one of our files, and where its table of lines begins."""
+    """Width, height, components and dtype of a file that `encode_exr` made, and the offset of its table of lines."""
     at = data.find(_WINDOW) + len(_WINDOW)
     if at >= len(_WINDOW) and len(data) >= at + 16:
         right, bottom = struct.unpack_from("<2i", data, at + 8)

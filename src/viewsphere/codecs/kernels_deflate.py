@@ -1,4 +1,4 @@
-"""A compiled deflate for pixels of 32-bit numbers: runs of equal pixels are coded, all else is stored as it is.
+"""A compiled deflate for pixels of 32-bit numbers: runs of equal pixels are coded, all other bytes are stored as they are.
 
 Rendered numbers are noise where a surface bends and constant elsewhere: searching for anything but runs costs four times as
 much and saves a tenth. The stream is plain deflate (RFC 1951), blocks of type 0 and 1 in turn.
@@ -13,20 +13,20 @@ import numpy as np
 from viewsphere.kernels.jit import inner, njit
 
 U = np.uintp
-SHORTEST = 64  # bytes of a run that is worth two blocks
+SHORTEST = 64  # bytes: the shortest run that makes up for two blocks
 LONGEST = 258
-AHEAD = 96  # words that are compared at once: whole pixels of 1 and of 3, and more than compilers unroll instead
+AHEAD = 96  # words compared at once: whole pixels of 1 and of 3 words; fewer would be unrolled instead of vectorised
 STORED = 65535
 
 
 @cache
 def match_codes(distance: int) -> tuple[np.ndarray, np.ndarray]:
-    """Bits of a match of each length (0 to 258) at a distance of 4 or 12 bytes in the order they are sent, and their number.
+    """Codes of a match of each length (0 to 258) at a distance of 4 or 12 bytes, bits in the order sent, and their widths.
 
     RFC 1951, 3.2.5 and 3.2.6.
     """
     codes, widths = np.zeros(LONGEST + 1, np.uint64), np.zeros(LONGEST + 1, np.int64)
-    far, far_width = {4: (0b11000, 5), 12: (0b1101100, 7)}[distance]  # code 3; code 6 and two bits that add 3 to its 9
+    far, far_width = {4: (0b11000, 5), 12: (0b1101100, 7)}[distance]  # code 3; code 6 with extra bits 3
     for length in range(3, LONGEST + 1):
         extra = max((length - 3).bit_length() - 3, 0)
         symbol = 257 + 4 * extra + ((length - 3) >> extra) if length < LONGEST else 285
@@ -39,7 +39,7 @@ def match_codes(distance: int) -> tuple[np.ndarray, np.ndarray]:
 
 @njit
 def deflate_runs(words, step, codes, widths, data, out, at):
-    """Write the raw deflate stream of `data` (bytes, some) from out[at] on; gives its end.
+    """Write the raw deflate stream of `data` (bytes, not empty) into `out` from index `at` on; returns the index after its end.
 
     `words` are the same bytes as 32-bit words, `step` (1 or 3) of which make a pixel; `codes` and `widths` its `match_codes`.
     """
@@ -58,7 +58,7 @@ def deflate_runs(words, step, codes, widths, data, out, at):
         is_run, is_last = left >= SHORTEST, j == count
         if is_run or is_last:
             end = 4 * (i + step) if is_run else 4 * count
-            while literal < end:  # blocks of type 0, each from a whole byte on
+            while literal < end:  # blocks of type 0, each beginning at a whole byte
                 size = min(end - literal, STORED)
                 at, waiting, bits = _send(out, at, waiting, (bits + 10) // 8 * 8)
                 for k in range(2):
@@ -69,7 +69,7 @@ def deflate_runs(words, step, codes, widths, data, out, at):
                 for k in range(U(size)):
                     out[to + k] = data[begin + k]
                 at, literal = at + size, literal + size
-            waiting |= np.uint64(0b011 if is_last else 0b010) << np.uint64(bits)  # a block of type 1: the last pixel again
+            waiting |= np.uint64(0b011 if is_last else 0b010) << np.uint64(bits)  # a block of type 1, repeating a pixel
             bits += 3
             while is_run and left > 0:
                 length = left if left <= LONGEST else min(left - 3, LONGEST)
@@ -84,9 +84,9 @@ def deflate_runs(words, step, codes, widths, data, out, at):
 
 @inner
 def _next_run(words, step, i):
-    """Where the first run at or after i that is worth coding begins, or an earlier, shorter one; i is where a run begins.
+    """Start of the first run at or after i that is worth coding, or of a shorter run before it; i must be the start of a run.
 
-    One pair of neighbours is looked at where a run that is long enough has as many pairs.
+    Comparing one pair of neighbours in every SHORTEST bytes is enough to notice every run of that length.
     """
     count, first, stride = len(words), i, SHORTEST // 4 // step * step
     while i + stride + step <= count:
@@ -101,7 +101,7 @@ def _next_run(words, step, i):
 
 @inner
 def _is_like(words, step, i):
-    """Whether a pixel is like the next."""
+    """Whether pixel i equals the next one."""
     second, third = step // 3, 2 * (step // 3)
     a, b, c = U(i), U(i + second), U(i + third)
     s = U(step)
@@ -110,7 +110,7 @@ def _is_like(words, step, i):
 
 @inner
 def _repeats(words, step, j):
-    """Whether AHEAD words from j on are like those of the pixel before."""
+    """Whether each of AHEAD words from j on equals the same word of the pixel before."""
     different = np.uint32(0)
     before, own = U(j - step), U(j)
     for k in range(U(AHEAD)):
@@ -120,8 +120,8 @@ def _repeats(words, step, j):
 
 @inner
 def _send(out, at, waiting, bits):
-    """Write the whole bytes of what is waiting."""
-    for k in range(U(8)):  # one store, though most of it is written over next: loops of one to three bytes are hard to predict
+    """Write the whole bytes among the waiting bits."""
+    for k in range(U(8)):  # always 8 bytes, most of them overwritten next: loops of one to three bytes mispredict branches
         out[U(at) + k] = np.uint8(waiting >> np.uint64(8 * k))
     whole = bits >> 3
     return at + whole, waiting >> np.uint64(8 * whole), bits & 7

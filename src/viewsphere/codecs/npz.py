@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 from viewsphere.codecs.deflate import deflate
 from viewsphere.errors import UserError
 
-_DEFLATED, _VERSION, _DATE = 8, 20, 33  # ZIP 2.0; 1 January 1980, so that equal arrays make equal files
+_DEFLATED, _VERSION, _DATE = 8, 20, 33  # ZIP 2.0; dated 1 January 1980, so that equal arrays make equal files
 
 
 def encode_npz(array: NDArray[Any], name: str) -> bytes:
-    """The archive of `np.savez_compressed(file, **{name: array})`, but that runs of equal pixels alone are coded."""
+    """The archive of `np.savez_compressed(file, **{name: array})`, except that only runs of equal pixels are compressed."""
     array = np.ascontiguousarray(array)
     head = io.BytesIO()
     np.lib.format.write_array_header_1_0(head, np.lib.format.header_data_from_array_1_0(array))
@@ -39,7 +39,7 @@ def encode_npz(array: NDArray[Any], name: str) -> bytes:
 
 
 def decode_npz(data: bytes, name: str) -> NDArray[Any]:
-    """The array of this name in an archive; raises UserError where the file is damaged or has none."""
+    """The array of this name in an archive; raises UserError where the file is damaged or has no such array."""
     try:
         with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
             return arrays[name]

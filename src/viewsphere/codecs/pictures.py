@@ -1,4 +1,4 @@
-"""Colour pictures in the files of other codecs: JPEG and WebP by Pillow, QOI and JPEG XL by imagecodecs (the extra codecs)."""
+"""Colour pictures in other codecs' files: JPEG and WebP by Pillow, QOI and JPEG XL by imagecodecs (the extra `codecs`)."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ Picture = NDArray[np.uint8]
 JPEG_QUALITY = 95
 _QOI_END = bytes(7) + b"\1"  # https://qoiformat.org/qoi-specification.pdf
 EFFORT = 1
-"""JPEG XL's fastest lossless mode; higher ones take ten times as long for a tenth of the size."""
+"""JPEG XL's fastest lossless effort; higher ones take ten times as long to save a tenth of the size."""
 
 
 def encode_picture(array: Picture, kind: str, quality: int | None) -> bytes:
-    """A `jpeg`, `webp`, `qoi` or `jxl` file of a picture (H, W, 3), but for JPEG also (H, W, 4), uint8 sRGB.
+    """A `jpeg`, `webp`, `qoi` or `jxl` file of a picture (H, W, 3), or (H, W, 4) except for JPEG; uint8 sRGB.
 
-    `quality` (1 to 100) makes WebP and JPEG XL lossy; JPEG's is 95 by default, its colour is not subsampled. Raises
+    `quality` (1 to 100) makes WebP and JPEG XL lossy; JPEG's is 95 by default, and its colour is not subsampled. Raises
     MissingExtraError where the codec is not installed.
     """
     array = np.ascontiguousarray(array)
@@ -74,7 +74,7 @@ def decode_picture(data: bytes, components: int) -> Picture:
 def _decoded(kind: str, function: str, data: bytes, components: int) -> Picture:
     try:
         array: NDArray[Any] = getattr(codecs(kind), function)(data)
-    except RuntimeError as error:  # the base of all that imagecodecs raises for damage
+    except RuntimeError as error:  # base class of all errors that imagecodecs raises for damage
         raise ValueError(f"{kind}: {error}") from error
     if array.ndim != 3 or array.shape[-1] != components or array.dtype != np.uint8:
         raise ValueError(f"{kind}: expected {components} channels of 8 bits, found {array.shape} {array.dtype}")

@@ -1,7 +1,7 @@
 """Arrays to image files and back, in memory: lossless PNG and TIFF, fast and always the same bytes.
 
-Deflate is ISA-L's (`deflate`), an order of magnitude faster than zlib at PNG's usual level. The readers take
-what the writers make; other tools read the files too (Pillow, OpenCV, tifffile, imageio).
+Deflate is ISA-L's (`deflate`), an order of magnitude faster than zlib at PNG's usual level. The readers read only
+files that the writers made; other tools read the files too (Pillow, OpenCV, tifffile, imageio).
 PNG: https://www.w3.org/TR/png-3/; TIFF 6.0 with deflate:
 https://www.loc.gov/preservation/digital/formats/fdd/fdd000022.shtml.
 """
@@ -34,7 +34,8 @@ _SAMPLE_FORMATS = {np.dtype(np.int32): 2, np.dtype(np.float32): 3}
 def encode_png(array: NDArray[Any], *, palette: NDArray[np.uint8] | None = None, unit: float | None = None) -> bytes:
     """A PNG file of a picture: (H, W) bool (1 bit), uint8 or uint16, or (H, W, 3 or 4) uint8, not empty.
 
-    With a `palette` (n, 3), (H, W) uint8 are numbers of its colours. `unit` says how many metres a step of (H, W) is (pCAL).
+    With a `palette` (n, 3), (H, W) uint8 are indices of its colours. `unit` is the length in metres of one step of (H, W)
+    (pCAL).
     """
     components = 1 if array.ndim == 2 else array.shape[-1]
     dtypes = (np.bool_, np.uint8, np.uint16) if array.ndim == 2 else (np.uint8,)
@@ -55,7 +56,7 @@ def encode_png(array: NDArray[Any], *, palette: NDArray[np.uint8] | None = None,
 
 
 def _filtered(array: NDArray[Any], components: int) -> NDArray[np.uint8]:
-    """The scan lines behind their filters' numbers: Sub for bytes, None for bits and for 16-bit ids."""
+    """The scan lines, each after the number of its filter: Sub for bytes, None for bits and for 16-bit ids."""
     height = len(array)
     if array.dtype == np.bool_:
         rows = np.packbits(array, axis=1)
@@ -78,7 +79,7 @@ def _chunk(kind: bytes, body: bytes) -> bytes:
 
 
 def decode_png(data: bytes) -> NDArray[Any]:
-    """The array `encode_png` was given: equal shape, dtype and values.
+    """The array that `encode_png` was given: equal shape, dtype and values.
 
     Raises UserError when the file is damaged or was written by another program.
     """
@@ -99,7 +100,7 @@ def check_png(data: bytes) -> None:
 
 
 def png_unit(data: bytes) -> float | None:
-    """Metres in a step of a PNG file's numbers, None where `encode_png` was not told; raises UserError as `decode_png` does."""
+    """Metres in a step of a PNG file's numbers, None where the file has no unit; raises UserError as `decode_png` does."""
     for kind, content in _chunks(data):
         if kind == b"pCAL":
             name, _, rest = content.partition(b"\0")
@@ -114,7 +115,7 @@ def png_unit(data: bytes) -> float | None:
 
 
 def _chunks(data: bytes) -> Iterator[tuple[bytes, bytes]]:
-    """Kind and content of every chunk; raises UserError where the file is damaged."""
+    """Type and content of every chunk; raises UserError where the file is damaged."""
     if not data.startswith(_SIGNATURE):
         raise UserError("PNG: expected a PNG file's first 8 bytes, found others: the file is damaged or no PNG")
     position = len(_SIGNATURE)
@@ -196,7 +197,7 @@ def _tiff_head(height: int, width: int, components: int, dtype: np.dtype[Any], s
 
 
 def _directory(tags: dict[int, tuple[str, list[int]]]) -> bytes:
-    """The image file directory, to stand at byte 8; values that do not fit an entry follow it."""
+    """The image file directory, made to stand at byte 8; values that do not fit into an entry follow the directory."""
     beyond = 8 + 2 + 12 * len(tags) + 4
     entries, values = b"", b""
     for tag, (code, numbers) in sorted(tags.items()):
@@ -211,7 +212,7 @@ def _directory(tags: dict[int, tuple[str, list[int]]]) -> bytes:
 
 
 def decode_tiff(data: bytes) -> NDArray[Any]:
-    """The array `encode_tiff` was given: equal shape, dtype and bits.
+    """The array that `encode_tiff` was given: equal shape, dtype and bits.
 
     Raises UserError when the file is damaged or was written by another program.
     """

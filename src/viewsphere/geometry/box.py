@@ -45,13 +45,13 @@ EDGES = ((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4),
 """The twelve edges, as pairs of vertices."""
 
 NEAR = 1e-6
-"""Metres in front of the camera plane from which a model's projection counts."""
+"""Distance in front of the camera, metres, from which on geometry is projected; nearer parts are cut off."""
 
 KNOTS = 1024
-"""Steps of the table of how much a lens bends lines, from its axis to its limit."""
+"""Steps, from its axis to its limit, of the table that says how much the lens bends lines."""
 
 RIM = 1 << 14
-"""Directions along a lens' limit that are looked at."""
+"""Number of directions along a lens' limit at which its rim is searched."""
 
 
 def box_vertices(low: ArrayLike, high: ArrayLike) -> Float:
@@ -86,12 +86,12 @@ def projected_bounds(
     points: tuple[int, int],
     is_used: NDArray[np.bool_] | None = None,
 ) -> tuple[Bounds | None, bool]:
-    """The 2D box of triangles [faces) whose corners are world vertices [points), and whether the camera sees
-    all of them. `is_used`, if known: of all vertices, whether a triangle has them.
+    """The 2D box (x0, y0, x1, y1) in pixels of triangles [faces) whose corners are world vertices [points), and whether the
+    camera sees all of the triangles. `is_used`, if known: of all vertices, whether a triangle has them.
 
     Triangles that cross the plane z = NEAR of the camera (or the limit of a distorted lens) are cut there.
-    None if nothing of them is on the camera's side. Under lens distortion straight edges bend; the box is
-    that of the bent ones, to 1e-5 px.
+    None if no part of them is in front of the camera. Under lens distortion straight edges bend; the box is
+    that of the bent edges, to 1e-5 px.
     """
     from viewsphere.geometry import kernels_bent
     from viewsphere.geometry import kernels_box as kernels
@@ -118,7 +118,7 @@ def projected_bounds(
 
 
 def _bent_lens(lens: Distortion, matrix: Float) -> tuple[tuple[Any, ...], Float]:
-    """A lens as `kernels_bent` takes it, and its rim: the directions (M, 3) at its limit where u or v turns back."""
+    """A lens as `kernels_bent` takes it, and its rim: the directions (M, 3) at its limit where u or v is extreme."""
     from viewsphere.geometry.camera import coefficients, lens_limit
 
     fisheye, k = lens.model == "fisheye", coefficients(lens)
@@ -138,7 +138,7 @@ def _bends(fisheye: bool, k: tuple[float, ...], limit: float) -> Float:
 
 @lru_cache(maxsize=64)
 def _rim(fisheye: bool, k: tuple[float, ...], limit: float, skew: float) -> Float:
-    """Where a lens' limit, all the way round, is seen farthest left, right, up or down, or turns back."""
+    """Directions (M, 3) along a lens' limit whose pixels are locally farthest left, right, up or down."""
     from viewsphere.geometry import kernels_lens as kernels
 
     turn, within = np.linspace(0, 2 * np.pi, RIM, endpoint=False), limit * (1 - 1e-12)

@@ -1,4 +1,4 @@
-"""Where a camera stands and what it sees: orbit poses, pinhole projection, lens distortion.
+"""Where a camera stands and what it sees: orbit viewpoints, pinhole projection, lens distortion.
 
 World: right-handed, Z up, metres. Camera axes: x right, y down, z forward (OpenCV). The image spans [0, W] x [0, H];
 pixel (i, j) has its centre at (i + .5, j + .5).
@@ -38,13 +38,15 @@ def orbit_rotation(azimuth: float, elevation: float, tilt: float = 0.0) -> Float
     ca, sa, ce, se = math.cos(azimuth), math.sin(azimuth), math.cos(elevation), math.sin(elevation)
     level = np.array([[ca, sa, 0.0], [se * sa, -se * ca, -ce], [-ce * sa, ce * ca, -se]])
     c, s = math.cos(tilt), math.sin(tilt)
-    return np.array([c * level[0] + s * level[1], c * level[1] - s * level[0], level[2]])  # not @: BLAS rounds by processor
+    return np.array(
+        [c * level[0] + s * level[1], c * level[1] - s * level[0], level[2]]
+    )  # not @: BLAS' rounding varies by processor
 
 
 def orbit_angles(rotation: ArrayLike) -> tuple[float, float, float]:
     """Azimuth, elevation and tilt, radians, whose `orbit_rotation` is this world-to-camera rotation (3, 3).
 
-    Straight above and below, where azimuth and tilt are one, tilt is 0.
+    Straight above and below, where only the sum or difference of azimuth and tilt is defined, tilt is 0.
     """
     right, _, forward = np.asarray(rotation, np.float64).tolist()
     level = math.hypot(forward[0], forward[1])
@@ -59,9 +61,9 @@ def orbit_angles(rotation: ArrayLike) -> tuple[float, float, float]:
 
 
 def focal_from_fov(fov: float, extent: float, fisheye: bool = False) -> float:
-    """Focal length in pixels that makes `extent` pixels span the full angle `fov` (radians).
+    """Focal length in pixels with which `extent` pixels span the full angle `fov` (radians).
 
-    A pinhole's is extent / (2 tan(fov / 2)); a fisheye's is extent / fov (equidistant).
+    It is extent / (2 tan(fov / 2)) for a pinhole and extent / fov for an (equidistant) fisheye.
     """
     return extent / fov if fisheye else extent / (2 * math.tan(fov / 2))
 
@@ -87,7 +89,7 @@ def pixel_rays(intrinsics: Intrinsics, subdivision: int = 1, window: Window | No
     """Rays through sample centres in camera axes, (H, W, 3): `subdivision` x `subdivision` samples a pixel.
 
     z is 1 for a pinhole and for Brown-Conrady; a fisheye's rays are unit vectors and may look sideways or back. NaN where the
-    lens model has no ray for a pixel. `window` (x0, y0, x1, y1) replaces the image by other pixels, also outside it.
+    lens model has no ray for a pixel. `window` (x0, y0, x1, y1) replaces the image by other pixels, which may lie outside it.
     """
     x0, y0, x1, y1 = (subdivision * e for e in window or (0, 0, intrinsics.width, intrinsics.height))
     rays = np.empty((y1 - y0, x1 - x0, 3))
@@ -108,7 +110,7 @@ def pixel_rays(intrinsics: Intrinsics, subdivision: int = 1, window: Window | No
 
 
 def project(intrinsics: Intrinsics, points: ArrayLike) -> tuple[Float, NDArray[np.bool_]]:
-    """Where camera-axes points (..., 3) fall in the image.
+    """Pixels at which points (..., 3) in camera axes appear.
 
     Returns pixels (..., 2) float64, NaN where the lens does not show the point (behind a pinhole, folded back by Brown-Conrady,
     beyond a fisheye's largest angle), and in_front (...) bool, z > 0. A fisheye may show points that are not in front.
@@ -132,11 +134,11 @@ def project(intrinsics: Intrinsics, points: ArrayLike) -> tuple[Float, NDArray[n
 
 
 def lens_limit(lens: Distortion) -> float:
-    """How far from the axis the lens map is one-to-one: a radius r/z for Brown-Conrady (may be infinite), an angle for fisheye.
+    """Where the lens map stops being one-to-one: a radius r/z for Brown-Conrady (may be infinite), an angle for a fisheye.
 
-    Beyond it a distortion polynomial folds the picture back on itself, which no lens does. A fisheye's radius must rise with
-    the angle. Brown-Conrady's Jacobian is symmetric (the map is the gradient of a potential); inside the limit it is positive
-    definite all around, so the potential is convex and no two rays meet in a pixel.
+    Beyond this limit a distortion polynomial folds the picture back on itself, as no real lens does. A fisheye's radius must
+    rise with the angle. Brown-Conrady's Jacobian is symmetric (the map is the gradient of a potential); inside the limit it
+    is positive definite all around, so the potential is convex and no two rays meet in a pixel.
     """
     return _limit(lens.model, tuple(coefficients(lens).tolist()))
 
@@ -159,8 +161,9 @@ def _limit(model: str, k: tuple[float, ...]) -> float:
 def _tangential_limit(numerator: Float, denominator: Float, slope: Float, tangential: float, radial: float) -> float:
     """The radius, at most `radial`, up to which the Jacobian stays positive definite in spite of the tangential terms.
 
-    In polar axes at angle c = cos(psi) from their direction it is [[a + 6 m c, -2 m s], [-2 m s, b + 2 m c]]: a and b the
-    radial map's derivative and factor, m = |p| r. Its determinant is quadratic in c, its least value over c in closed form.
+    In polar axes at angle psi from these terms' direction, with c, s = cos(psi), sin(psi), the Jacobian is
+    [[a + 6 m c, -2 m s], [-2 m s, b + 2 m c]], where a and b are the radial map's derivative and factor, m = |p| r. The
+    Jacobian's determinant is quadratic in c, so its least value over c has a closed form.
     """
 
     def definite(r: Float) -> NDArray[np.bool_]:
@@ -183,9 +186,9 @@ def _tangential_limit(numerator: Float, denominator: Float, slope: Float, tangen
 
 
 def _first_positive_root(polynomial: Float) -> float:
-    """Of a polynomial whose constant term is 1, highest power first; infinite if there is none.
+    """Smallest positive root of a polynomial (highest power first) whose constant term is 1; infinite if there is none.
 
-    Solved for 1/s, which keeps its leading coefficient 1 however small the others are.
+    Solved for 1/s, which keeps the leading coefficient at 1 however small the other coefficients are.
     """
     roots = np.roots(polynomial[::-1])
     real = roots.real[(np.abs(roots.imag) <= 1e-9 * np.abs(roots)) & (roots.real > 1e-12)]
@@ -193,7 +196,7 @@ def _first_positive_root(polynomial: Float) -> float:
 
 
 def coefficients(lens: Distortion) -> Float:
-    """Padded to the model's full length with zeros."""
+    """The lens' coefficients, padded with zeros to the model's full length."""
     k = np.zeros(4 if lens.model == "fisheye" else 8)
     k[: len(lens.coefficients)] = lens.coefficients
     return k

@@ -2,10 +2,10 @@
 
 An edge is a line in the plane z = 1 (Brown-Conrady) or an arc of the unit sphere (fisheye). Where the second derivative of its
 picture by length is at most b, a piece of length L stays within b L^2 / 8 of the chord between its ends' pixels. So most edges
-cannot reach the box that the corners have, and the few that can are halved until no half can.
+cannot leave the box of the triangles' corners, and the few that can are halved until no piece can.
 
-A lens is (is a fisheye, coefficients, limit, camera matrix, table): limit as `geometry.camera.lens_limit`, reached itself;
-table as `tabulate` fills it. How far from the axis a direction is: r/z for Brown-Conrady, an angle for a fisheye.
+A lens is (is a fisheye, coefficients, limit, camera matrix, table): limit as in `geometry.camera.lens_limit`, included; table
+as `tabulate` fills it. A direction's distance from the axis is r/z for Brown-Conrady, an angle for a fisheye.
 """
 
 from __future__ import annotations
@@ -17,17 +17,17 @@ import numpy as np
 from viewsphere.geometry.kernels_lens import brown_conrady, radial_fisheye
 from viewsphere.kernels.jit import inner, njit
 
-TOLERANCE = 1e-5  # pixels by which a box may be too small
-LONGEST = 1 << 14  # pieces of an edge: only edges that reach pixels millions away from the image need as many
+TOLERANCE = 1e-5  # pixels by which a box may be too small, at most
+LONGEST = 1 << 14  # pieces of an edge, at most: only edges that reach pixels millions away from the image need as many
 HALVINGS = 60
 A, B, C, D, E, F = np.uintp(0), np.uintp(1), np.uintp(2), np.uintp(3), np.uintp(4), np.uintp(5)
-UNSURE = 1.02  # of bends, which the table knows at its knots only
-INNERMOST = 1e-3  # radians: nearer to the axis the terms of a fisheye's bend cancel
+UNSURE = 1.02  # factor of the table's bends, since the table knows them at its knots only
+INNERMOST = 1e-3  # radians: nearer to the axis the terms of a fisheye's bend cancel each other
 
 
 @inner
 def _bend_brown(k, r):
-    """Most that a line's picture bends at this radius: of rho(r) e_r its second derivative along any direction, and 6 |p|."""
+    """Upper bound of a line's bend at this radius: the second derivative of rho(r) e_r along any direction, and 6 |p|."""
     s = r * r
     n = 1.0 + s * (k[0] + s * (k[1] + s * k[4]))
     d = 1.0 + s * (k[5] + s * (k[6] + s * k[7]))
@@ -42,7 +42,7 @@ def _bend_brown(k, r):
 
 @inner
 def _bend_fisheye(k, angle):
-    """Most that a great circle's picture bends at this angle; infinite straight behind."""
+    """Upper bound of a great circle's bend at this angle; infinite straight behind the camera."""
     angle = max(angle, INNERMOST)
     if angle >= math.pi:
         return np.inf
@@ -61,7 +61,7 @@ def _bend(fisheye, k, off):
 
 @njit
 def tabulate(fisheye, k, limit, table):
-    """Fill table (n + 1,) with the most that a picture bends up to off / (1 + off) = i / n of that at the limit."""
+    """Fill table (n + 1,) with upper bounds of the bend up to `off`: off / (1 + off) = i / n of its value at the limit."""
     most, last = 0.0, limit / (1.0 + limit)
     for i in range(table.shape[0]):
         share = last * i / (table.shape[0] - 1)
@@ -71,7 +71,7 @@ def tabulate(fisheye, k, limit, table):
 
 @inner
 def _knot(lens, off):
-    """The table's last knot up to here that is not its end."""
+    """Index of the table's last knot that is not beyond `off` and not the table's last."""
     _, _, limit, _, table = lens
     last = table.shape[0] - 1
     return min(int(off / (1.0 + off) * ((1.0 + limit) / limit) * last), last - 1)
@@ -79,7 +79,7 @@ def _knot(lens, off):
 
 @inner
 def _look(lens, x, y, z):
-    """A direction scaled to z = 1 or to length 1, how far from the axis it is (infinite where no lens sees), and its pixel."""
+    """A direction scaled to z = 1 or to length 1, its distance from the axis (infinite where no lens sees), and its pixel."""
     fisheye, k, _, m, _ = lens
     r = math.sqrt(x * x + y * y)
     length = math.sqrt(r * r + z * z)
@@ -112,7 +112,7 @@ def _grown(box, u, v):
 
 @inner
 def _length(lens, a, b):
-    """Square of the length of the line or arc between two directions; an arc's is bounded by its chord."""
+    """Squared length of the line or arc between two directions; an arc's length is bounded by means of its chord."""
     x, y, z = a[0] - b[0], a[1] - b[1], a[2] - b[2]
     square = x * x + y * y + z * z
     return square * (1.0 + 0.143 * square) ** 2 if lens[0] else square
@@ -120,14 +120,14 @@ def _length(lens, a, b):
 
 @inner
 def _farthest(lens, a, b, square):
-    """How far from the axis what lies between two directions is at most: only arcs behind the camera exceed their ends."""
+    """Upper bound of the distance from the axis between two directions: only arcs behind the camera exceed their ends."""
     off = max(a[3], b[3])
     return off + 0.5 * math.sqrt(square) if lens[0] and off > 0.5 * math.pi else off
 
 
 @inner
 def _may_leave(lens, box, a, b, bend, square):
-    """Whether the picture between two directions may leave the box, if it bends by no more than this."""
+    """Whether the picture between two directions may leave the box, if it bends at most by `bend`."""
     m, out = lens[3], 0.125 * square * bend
     along_u = out * math.sqrt(m[0, 0] * m[0, 0] + m[0, 1] * m[0, 1]) - TOLERANCE
     along_v = out * m[1, 1] - TOLERANCE
@@ -141,7 +141,7 @@ def _may_leave(lens, box, a, b, bend, square):
 
 @inner
 def _followed(lens, box, a, b):
-    """The box grown by an edge that is all seen: piece i of 2^level is halved for as long as it may leave the box."""
+    """The box grown by an edge that the lens sees entirely: piece i of 2^level is halved as long as it may leave the box."""
     level, i = 0, 0
     for _ in range(LONGEST):
         step = 0.5**level
@@ -163,7 +163,7 @@ def _followed(lens, box, a, b):
 
 @inner
 def _cut(lens, box, inside, outside):
-    """The box grown by the part of an edge that the lens sees, from its one end to where it leaves the lens' field."""
+    """The box grown by the part of an edge from the end that the lens sees to where the edge leaves the lens' field."""
     low, high = 0.0, 1.0
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
@@ -187,7 +187,7 @@ def _turning(lens, a, b):
 
 @inner
 def _partly(lens, box, a, b):
-    """The box grown by an edge that may leave the lens' field, and whether all of it is seen."""
+    """The box grown by an edge that may leave the lens' field, and whether the lens sees all of the edge."""
     limit = lens[2]
     if (a[3] <= limit) != (b[3] <= limit):
         return _cut(lens, box, a, b) if a[3] <= limit else _cut(lens, box, b, a), False
@@ -206,7 +206,7 @@ def _volume(a, b, c):
 
 @inner
 def _holds(a, b, c, d):
-    """Whether a triangle is met in this direction."""
+    """Whether the ray in direction d meets the triangle a, b, c."""
     whole, x, y, z = _volume(a, b, c), _volume(d, b, c), _volume(a, d, c), _volume(a, b, d)
     return (whole > 0.0 and x >= 0.0 and y >= 0.0 and z >= 0.0) or (whole < 0.0 and x <= 0.0 and y <= 0.0 and z <= 0.0)
 
@@ -219,7 +219,7 @@ def _corner(points, j):
 
 @inner
 def _edges(lens, box, corners):
-    """The box grown by a triangle's edges, and whether they are all seen."""
+    """The box grown by a triangle's edges, and whether the lens sees all of them."""
     limit, whole = lens[2], True
     for a, b in ((corners[0], corners[1]), (corners[1], corners[2]), (corners[2], corners[0])):
         square = _length(lens, a, b)
@@ -234,7 +234,7 @@ def _edges(lens, box, corners):
 
 @njit
 def look(vertices, is_used, base, r, t, lens, points):
-    """Fill points (n, 6) with what `_look` says of the used vertices from `base` on: their box, and whether all are seen."""
+    """Fill points (n, 6) with `_look` of the used vertices from `base` on; returns their box, and whether all are seen."""
     box, whole = (np.inf, np.inf, -np.inf, -np.inf), True
     for j in range(points.shape[0]):
         if not is_used[j]:
@@ -257,7 +257,7 @@ def look(vertices, is_used, base, r, t, lens, points):
 
 @inner
 def _rimmed(lens, box, a, b, c, rim):
-    """The box grown by the directions of a lens' rim that are in a triangle."""
+    """The box grown by the directions of a lens' rim that lie in a triangle."""
     for i in range(rim.shape[0]):
         d = rim[i, 0], rim[i, 1], rim[i, 2]
         if _holds(a, b, c, d):
@@ -268,10 +268,10 @@ def _rimmed(lens, box, a, b, c, rim):
 
 @njit
 def bent_bounds(vertices, is_used, base, triangles, first, last, r, t, lens, rim, points):
-    """Bounds (u0, v0, u1, v1) in pixels of what a lens sees of triangles [first, last), and whether that is all of them.
+    """Bounds (u0, v0, u1, v1) in pixels of what a lens sees of triangles [first, last), and whether it sees all of them.
 
-    Their corners are vertices [base, base + n), of which some are used; points (n, 6) is room. `rim` (M, 3) are the directions
-    at the lens' limit where its picture turns back along u or v. (inf, inf, -inf, -inf) where nothing is seen.
+    The triangles' corners are vertices [base, base + n), of which some are used; points (n, 6) is scratch. `rim` (M, 3) are the
+    directions at the lens' limit where its picture turns back along u or v. (inf, inf, -inf, -inf) where nothing is seen.
     """
     box, whole = look(vertices, is_used, base, r, t, lens, points)
     for f in range(np.uintp(first), np.uintp(last)):

@@ -11,11 +11,11 @@ U = np.uintp
 
 @njit(_nrt=True)
 def cut_bounds(vertices, triangles, first, last, base, stop, k, r, t, near):
-    """Bounds (u0, v0, u1, v1) in pixels of the part with w >= near of triangles [first, last), and whether
-    all of them is.
+    """Bounds (u0, v0, u1, v1) in pixels of the part with w >= near of triangles [first, last), and whether this
+    part is all of them.
 
     Their corners are vertices [base, stop). Triangles that cross the plane w = near are cut there. (inf,
-    inf, -inf, -inf) where nothing is in front of it.
+    inf, -inf, -inf) where nothing is in front of that plane.
     """
     u0, v0, u1, v1 = np.inf, np.inf, -np.inf, -np.inf
     whole, front = True, True

@@ -49,7 +49,7 @@ def radial_fisheye(k, theta):
 
 @njit
 def invert_radial(k, fisheye, target, limit):
-    """r in [0, limit] with radial(r) = target, NaN if there is none; the function rises up to `limit` (may be infinite)."""
+    """r in [0, limit] with radial(r) = target, NaN if there is none; the radial map rises up to `limit` (may be infinite)."""
     low, high = 0.0, limit
     if limit == np.inf:
         high = max(1.0, target)

@@ -41,12 +41,12 @@ def _push(ring, start, count, x, y):
 
 @inner
 def _mark_loops(mask, seen, hole_below):
-    """Walk every loop once: marks its horizontal edges, notes each hole at the corner above it, counts
-    edges and rings.
+    """Walk every loop once: mark its horizontal edges, note each hole at the corner above it; returns the number
+    of edges and rings.
 
     A loop's first edge in raster order has foreground below for an outer ring and above for a hole. From a
     hole's first corner the line straight up stays inside the foreground until it meets the boundary of the
-    same component: there the hole is joined. `seen` is 2 where an outer ring starts.
+    same component: the hole is joined there. `seen` is 2 where an outer ring starts.
     """
     edges, rings = 0, 0
     height, width = mask.shape
@@ -121,7 +121,7 @@ def _walk(mask, hole_below, ring, count, sx, sy, stack):
 def trace_rings(mask):
     """Corners (n, 2) int32 of one ring per 4-connected component, and the rings' ends (rings,).
 
-    `mask` (h, w) bool is padded by one pixel of background; so are the corners' coordinates.
+    `mask` (h, w) bool is padded by one pixel of background; the corners' coordinates count from this padding.
     """
     height, width = mask.shape
     seen = np.zeros((height, width), np.uint8)
@@ -142,7 +142,9 @@ def trace_rings(mask):
 
 @njit(_nrt=True)
 def decode_runs(codes, height, width):
-    """The mask (height, width) bool of a compressed run-length code's characters, and whether it is whole and fills it."""
+    """The mask (height, width) bool of a compressed run-length code's characters, and whether the code is whole and fills
+    it.
+    """
     mask = np.zeros((height, width), np.bool_)
     runs = np.zeros(len(codes) + 1, np.int64)
     count, position, i = 0, 0, 0

@@ -1,4 +1,4 @@
-"""What the functions here ask of a camera: `viewsphere.model.camera` has the classes that answer."""
+"""What geometry asks of a camera, as protocols: `viewsphere.model.camera` has the classes that satisfy them."""
 
 # ruff: noqa: D102, the classes say what each name means
 

@@ -1,6 +1,6 @@
 """Masks as COCO keeps them: run-length codes and polygons, both exact.
 
-COCO's own rasteriser is the judge of both:
+COCO's own rasteriser decides what is right for both:
 https://github.com/cocodataset/cocoapi/blob/master/common/maskApi.c.
 """
 
@@ -34,14 +34,14 @@ def decode_rle(height: int, width: int, counts: str) -> Mask:
 
 
 def rle_area(height: int, width: int, counts: str) -> int:
-    """Number of pixels in a compressed run-length code; raises ValueError for what is none."""
+    """Number of pixels in a compressed run-length code; raises ValueError for a malformed code."""
     from pycocotools import mask as coco
 
     return int(coco.area(_code(height, width, counts)))
 
 
 def rle_box(height: int, width: int, counts: str) -> tuple[int, int, int, int] | None:
-    """`mask_box` of a compressed run-length code, without its pixels; raises ValueError for what is none."""
+    """`mask_box` of a compressed run-length code, without decoding its pixels; raises ValueError for a malformed code."""
     from pycocotools import mask as coco
 
     x, y, w, h = coco.toBbox(_code(height, width, counts)).astype(int).tolist()
@@ -49,7 +49,7 @@ def rle_box(height: int, width: int, counts: str) -> tuple[int, int, int, int] |
 
 
 def _code(height: int, width: int, counts: str) -> Any:
-    """The code as pycocotools takes it, which reads past the end of one whose last number goes on."""
+    """The code as pycocotools takes it; checked before, since pycocotools reads beyond the end of an incomplete code."""
     code = counts.encode("ascii", "replace")
     if not code or min(code) < 48 or max(code) > 111 or (code[-1] - 48) & 32:
         raise ValueError(f"RLE: expected a run-length code of {width} x {height} pixels, found {counts[:40]!r}")
@@ -57,9 +57,7 @@ def _code(height: int, width: int, counts: str) -> Any:
 
 
 def rle_of_id(ids: NDArray[np.int32], wanted: int, box: tuple[int, int, int, int]) -> str:
-    """`encode_rle(ids == wanted)`, where all such pixels lie in the half-open box (x0, y0, x1, y1); reads
-    only the box.
-    """
+    """`encode_rle(ids == wanted)`, reading only the half-open box (x0, y0, x1, y1), in which all such pixels must lie."""
     from pycocotools import mask as coco
 
     height, width = ids.shape
@@ -69,10 +67,10 @@ def rle_of_id(ids: NDArray[np.int32], wanted: int, box: tuple[int, int, int, int
 
 
 def _ends(ids: NDArray[np.int32], wanted: int, box: tuple[int, int, int, int]) -> NDArray[np.intp]:
-    """Where `ids == wanted`, in column-major order, begins and ceases to be; all of it lies in the box."""
+    """Indices in column-major order at which `ids == wanted` begins and ends to hold; all such pixels lie in the box."""
     height, width = ids.shape
     x0, y0, x1, y1 = box
-    rows = y1 - y0 if (y0, y1) == (0, height) else y1 - y0 + 1  # one more between columns, unless they touch
+    rows = y1 - y0 if (y0, y1) == (0, height) else y1 - y0 + 1  # a gap between columns unless they touch
     inside = np.zeros((x1 - x0, rows), np.bool_)
     inside[:, : y1 - y0] = (ids[y0:y1, x0:x1] == wanted).T
     x, y = np.divmod(np.flatnonzero(np.diff(inside.ravel(), prepend=False, append=False)), max(rows, 1))
@@ -91,7 +89,7 @@ def mask_box(mask: Mask) -> tuple[int, int, int, int] | None:
 def mask_polygons(mask: Mask) -> list[list[float]]:
     """COCO polygons [x0, y0, x1, y1, ...] of a (H, W) bool mask, one for each 4-connected component.
 
-    They run along pixel corners, clockwise as seen, without collinear corners; each hole is joined to the
+    The rings run along pixel corners, clockwise as seen, without collinear corners; each hole is joined to the
     boundary above it by a vertical bridge of no width. So pycocotools' `frPyObjects` and `merge` give back
     the identical mask, and the shoelace areas sum to the number of pixels. Islands in holes are components
     of their own. Empty for an empty mask.

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 Float = NDArray[np.float64]
 
 ROTATION_TOLERANCE = 1e-5
-"""How far products of a rotation's rows may be from 0 and 1."""
+"""How far scalar products of a rotation's rows may be from 0 and 1."""
 
 
 def matrix_from_quaternion(quaternion: ArrayLike) -> Float:
@@ -71,7 +71,7 @@ def _dot(a: Sequence[float], b: Sequence[float]) -> float:
 
 
 def transform(matrix: ArrayLike, points: ArrayLike) -> Float:
-    """Points (..., 3) moved by the first three rows of a (3 or 4, 4) matrix, or turned by a (3, 3) one.
+    """Points (..., 3) moved by the first three rows of a (3 or 4, 4) matrix, or turned by a (3, 3) matrix.
 
     Written out, because BLAS rounds differently from processor to processor.
     """

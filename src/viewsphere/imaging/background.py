@@ -1,4 +1,4 @@
-"""What is seen where nothing else is: a plain colour or a picture, display-linear."""
+"""The background, seen where no object, scenery or ground is: a plain colour or a picture, display-linear."""
 
 from __future__ import annotations
 
@@ -28,21 +28,21 @@ Rgb = tuple[int, int, int]
 FORMATS = ("PNG", "JPEG", "WEBP", "BMP", "GIF", "TIFF", "TGA", "PPM")
 
 KEPT_BYTES = 128 << 20
-"""Of decoded pictures, the last ones used."""
+"""Bytes of decoded pictures that are kept, the last ones used."""
 
 COARSE = 4.0
 """Sigma, in pixels, above which a picture is blurred at a lower resolution."""
 
 SMALLEST = 48
-"""Pixels a side below which it is not lowered further."""
+"""Pixels a side below which a picture's resolution is not lowered further."""
 
-_ORIENTATION = 0x0112  # EXIF's tag; from 5 on, width and height change places
+_ORIENTATION = 0x0112  # EXIF's tag; from 5 on, width and height are swapped
 
 
 def display_background(background: Background, width: int, height: int) -> Float32 | None:
     """The background as (height * width, 3) display-linear, exact in sRGB bytes; None for the sky, and for no background.
 
-    Where a picture is clear the background's colour is seen, else white. The array is kept for the next frame and not to be
+    Where a picture is clear the background's colour is seen, else white. The array is kept for the next frame and must not be
     written to. Raises RecipeError for a picture that cannot be read or has more pixels than `limits` allows.
     """
     if background.transparent or (background.color is None and background.image is None):
@@ -78,7 +78,7 @@ def _display_linear() -> Float32:
 
 
 def _part(background: Background, size: Size, proportions: float) -> Box:
-    """What is shown of a picture: left, top, right, bottom in its pixels. `proportions`: the frame's width over its height."""
+    """The visible part of a picture: left, top, right, bottom in its pixels. `proportions`: the frame's width / height."""
     width, height = float(size[0]), float(size[1])
     if background.fit == "stretch":
         return 0.0, 0.0, width, height
@@ -89,10 +89,10 @@ def _part(background: Background, size: Size, proportions: float) -> Box:
 
 
 def _reduced(part: Box, size: Size, step: int, orientation: int, found: Size) -> Box:
-    """A part of a picture of this size in pixels of the picture that was `found`, `step` times smaller.
+    """A part of a picture of this size in the pixels of the picture that was `found`, which is `step` times smaller.
 
-    Where the size is no multiple of `step`, the last pixels of the file's rows and columns are parts of one; turned, they may
-    come first.
+    Where the size is no multiple of `step`, the last pixels of the file's rows and columns stand for fewer than `step`; in a
+    turned picture these pixels may come first.
     """
     before = [
         found[axis] - size[axis] / step if orientation in turned else 0.0
@@ -104,7 +104,7 @@ def _reduced(part: Box, size: Size, step: int, orientation: int, found: Size) ->
 
 @dataclass(frozen=True)
 class _Wanted:
-    """A picture at a whole part `step` of its size, over a colour."""
+    """A picture to decode: reduced by the whole factor `step`, its clear parts laid over a colour."""
 
     path: str
     stamp: int
@@ -114,14 +114,14 @@ class _Wanted:
 
 @dataclass(eq=False)
 class _Shelf:
-    """Decoded pictures, as many as `KEPT_BYTES` allow: a run draws the same ones again and again."""
+    """Decoded pictures, as many as `KEPT_BYTES` allow, since a run draws the same ones again and again."""
 
     _pictures: dict[_Wanted, Image] = field(default_factory=dict["_Wanted", "Image"])
 
     def picture(self, wanted: _Wanted) -> Image:
         """The picture, upright, RGB; raises RecipeError when it cannot be read."""
         found = self._pictures.pop(wanted, None) or _decoded(wanted)
-        self._pictures[wanted] = found  # the last used comes last
+        self._pictures[wanted] = found  # the last used is the last to be dropped
         held = sum(4 * p.width * p.height for p in self._pictures.values())
         while held > KEPT_BYTES and len(self._pictures) > 1:
             first = self._pictures.pop(next(iter(self._pictures)))
@@ -135,7 +135,7 @@ def _shelf() -> _Shelf:
 
 
 def _stamp(path: str) -> int:
-    """Changes with the file."""
+    """The file's time of change, so that a changed file is read again."""
     try:
         return Path(path).stat().st_mtime_ns
     except OSError as error:
@@ -144,7 +144,7 @@ def _stamp(path: str) -> int:
 
 @lru_cache(maxsize=4096)
 def _head(path: str, stamp: int) -> tuple[Size, int]:
-    """Width and height as shown, and EXIF's orientation."""
+    """Width and height of the upright picture, and EXIF's orientation."""
     with _opened(path) as picture:
         width, height = picture.size
         orientation = _orientation(picture)
@@ -158,7 +158,7 @@ def _opened(path: str) -> Image:
 
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of large pictures, which a limit decides on
+            warnings.simplefilter("ignore")  # warnings of large pictures: `limits` decides on these
             return Image.open(path, formats=FORMATS)
     except UnidentifiedImageError:
         _refuse(path, f"none of {', '.join(FORMATS)}")
@@ -169,10 +169,10 @@ def _opened(path: str) -> Image:
 
 
 def _orientation(picture: Image) -> int:
-    """EXIF's orientation, 1 where it says nothing that can be read."""
+    """EXIF's orientation, 1 where there is none that can be read."""
     try:
         found = int(picture.getexif().get(_ORIENTATION, 1))
-    except Exception:  # the parser of a damaged block raises whatever it meets
+    except Exception:  # the parser of a damaged block may raise anything
         return 1
     return found if 1 <= found <= 8 else 1
 
@@ -199,7 +199,7 @@ def _decoded(wanted: _Wanted) -> Image:
                 plain = _opaque(picture, wanted.under)
         except MemoryError:
             raise
-        except Exception as error:  # decoders raise whatever their format's parser does
+        except Exception as error:  # decoders raise the errors of their formats' parsers
             _refuse(wanted.path, str(error))
     left = wanted.step * plain.width // width
     upright = plain.reduce(left) if left > 1 else plain
@@ -238,7 +238,7 @@ def _blurred(pixels: Float32, sigma: float) -> Float32:
     coarse = np.stack([_scaled(pixels[..., c], small, Image.Resampling.BILINEAR) for c in range(3)], axis=-1)
     for axis in (0, 1):
         cell = pixels.shape[axis] / coarse.shape[axis]
-        coarse = _convolved(coarse, (sigma / cell) ** 2 - 1 / 6, axis)  # less what reducing it has spread
+        coarse = _convolved(coarse, (sigma / cell) ** 2 - 1 / 6, axis)  # less the variance that the reduction has added
     fine = [_scaled(coarse[..., c], (width, height), Image.Resampling.BICUBIC) for c in range(3)]
     return np.clip(np.stack(fine, axis=-1), 0, 1)
 
@@ -250,12 +250,12 @@ def _scaled(plane: Float32, size: tuple[int, int], filter: int) -> Float32:
 
 
 def _convolved(pixels: Float32, variance: float, axis: int) -> Float32:
-    """Along one axis, with a Gaussian of this variance."""
+    """The picture blurred along one axis by a Gaussian of this variance, in pixels squared."""
     from viewsphere.imaging.spread import gaussian, spread
 
     if variance < 1 / 12:
         return pixels
-    profile = gaussian(math.sqrt(variance - 1 / 12))  # a pixel's own is 1/12
+    profile = gaussian(math.sqrt(variance - 1 / 12))  # the box of a pixel itself has the variance 1/12
     reach = len(profile) // 2
     padded = np.pad(pixels, [(reach, reach) if a == axis else (0, 0) for a in range(3)], mode="symmetric")
     inside = slice(reach, -reach)

@@ -16,7 +16,8 @@ def finished(radiance: Float32, background: Float32 | None, finish: Finish, seen
     """The picture, (H, W, 3) uint8 sRGB, or (H, W, 4) with straight alpha where the background is transparent.
 
     `radiance` (H, W, 4) float32 scene-linear, premultiplied; `background` (H * W, 3) or (1, 3) float32 display-linear, None
-    where the radiance covers all. View, smoother, effects, sRGB curve, JPEG, in this order; `seen` is asked only if need be.
+    where the radiance covers every pixel. View, smoother, effects, sRGB curve, JPEG, in this order; `seen` is called only if an
+    effect or the smoother needs it.
     """
     alpha, effects = finish.background.transparent, finish.effects
     if finish.smoother.kind == "none" and not has_effects(effects):

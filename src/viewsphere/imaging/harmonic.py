@@ -17,8 +17,8 @@ COARSEST = 6
 def harmonic(values: Float32, free: Mask, fixed: Mask) -> Float32:
     """Values (H, W, C) float32, those of free pixels (H, W) replaced by the mean of their neighbours.
 
-    Of the four neighbours those count that are free or fixed; nothing passes through others and the picture's border. To
-    about a thousandth of the spread of the fixed values; where nothing fixed is in reach, their mean.
+    Neighbours are those of the four that are free or fixed; nothing passes through other pixels and the picture's border. Exact
+    to about a thousandth of the spread of the fixed values; where no fixed pixel is in reach, the mean of the fixed values.
     """
     levels = _levels(free, fixed)
     known = values[fixed]
@@ -50,9 +50,10 @@ def _cycle(values: Float32, right: Float32, levels: list[Float32]) -> None:
 
 
 def _levels(free: Mask, fixed: Mask) -> list[Float32]:
-    """1 / (number of neighbours that count) of free pixels, else 0, with a rim; each level half the size of the one before.
+    """1 / (number of neighbours that are free or fixed) of free pixels, else 0, with a rim; each level half the last one's
+    size.
 
-    A coarse cell is fixed if anything in it is, else free if anything in it is.
+    A coarse cell is fixed if any of its pixels is fixed, else free if any is free.
     """
     counts = np.pad(free | fixed, 1)
     around = counts[:-2, 1:-1].astype(np.float32) + counts[2:, 1:-1] + counts[1:-1, :-2] + counts[1:-1, 2:]

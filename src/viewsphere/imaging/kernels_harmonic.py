@@ -33,7 +33,7 @@ def relax(values, right, inverse, sweeps):
 
 @njit(fastmath=FAST)
 def restrict(values, right, inverse, out):
-    """What is missing in the equations, summed over each coarse cell's four pixels."""
+    """The residual of the equations, summed over each coarse cell's four pixels."""
     for c in range(values.shape[0]):
         for y in range(1, values.shape[1] - 1):
             v = ((y - 1) >> 1) + 1

@@ -19,14 +19,14 @@ GREEN, BLUE, ALPHA = BLOCK, 2 * BLOCK, 3 * BLOCK
 KNEE = f4(0.6)
 GREY_IN = f4(0.723223)  # Narkowicz' curve takes 0.18 times this to 0.18
 INSET, OUTSET = f4(0.8), f4(1.25)
-SHARE_R, SHARE_G, SHARE_B = f4(0.04235), f4(0.07845), f4(0.0792)  # of red, green and blue in what AgX adds to all three
+SHARE_R, SHARE_G, SHARE_B = f4(0.04235), f4(0.07845), f4(0.0792)  # weights of the grey that AgX adds
 
 
 @njit(fastmath=FAST)
 def expose(radiance, matrix, p):
-    """Unpremultiplied, balanced, exposed light and alpha of radiance (4 n,), flat so that its pixels are known to touch.
+    """Unpremultiplied, balanced, exposed light and alpha of radiance (4 n,), flat so that its pixels are known to be adjacent.
 
-    Where light exceeds what its coverage can show, as a glint on clear glass, it covers more: it outshines what is behind.
+    Where light exceeds what its coverage can show, as in a glint on clear glass, its alpha grows: it outshines what is behind.
     """
     zero, one, a, b, c = f4(0), f4(1), U(0), U(1), U(2)
     xr, xg, xb = matrix[a, a], matrix[a, b], matrix[a, c]
@@ -73,7 +73,7 @@ def filmic(p):
 
 @njit(fastmath=FAST)
 def agx(p, sigmoid, decoded):
-    """See `view`. `sigmoid` has 256 values for each power of two from 2^-13: a float's bits say between which two it lies."""
+    """See `view`. `sigmoid` has 256 values for each power of two from 2^-13: a float's bits index the two values around it."""
     bits = p.view(np.int32)
     first = nb.int32((127 - 13) << 8)
     for i in range(U(BLOCK)):
@@ -102,7 +102,7 @@ def _byte(x, curve):
 
 @njit(fastmath=FAST)
 def over_bytes(p, background, curve, out):
-    """A block over the background (n or 1, 3), as bytes (n, 3). Its colours are lost: places in the curve stand there then."""
+    """A block over the background (n or 1, 3), as bytes (n, 3). The block's colours become indices into the curve."""
     step = U(0) if background.shape[0] == 1 else U(1)
     at = p.view(np.int32)
     for c in range(U(3)):

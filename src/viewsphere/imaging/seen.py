@@ -1,4 +1,4 @@
-"""What is known of a picture besides its colours."""
+"""Truth about a picture that effects and the smoother use: depth and targets."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class Seen:
     """Truth of one frame, from pixel centres.
 
     inverse_depth (H, W) float32: 1 / depth in metres along the camera's axis (along the ray for a fisheye), 0 where nothing
-    is; targets (H, W) bool: pixels that show an object; distance: metres to what the camera looks at.
+    is hit; targets (H, W) bool: pixels that show an object; distance: metres from the camera to its target.
     """
 
     inverse_depth: NDArray[np.float32]
@@ -31,6 +31,6 @@ def seen_by(
     triangle: NDArray[np.int32],
     triangle_object: NDArray[np.int32],
 ) -> Seen:
-    """Of truth's buffers (H, W) for this camera, which looks at `target` (3,), and of each triangle's object."""
-    is_target = np.append(triangle_object > 0, False)  # the last is for -1, where nothing is
+    """Made of truth's buffers (H, W) for this camera, which looks at `target` (3,), and of each triangle's object id."""
+    is_target = np.append(triangle_object > 0, False)  # the last entry is for triangle -1, where nothing is hit
     return Seen(inverse_depth, is_target[triangle], camera.intrinsics, float(camera.R[2] @ (target - camera.center)))

@@ -1,16 +1,16 @@
-"""The border between the targets and what is behind them, melted: Dwibedi et al., *Cut, Paste and Learn* (2017).
+"""The border between the targets and the background, melted: Dwibedi et al., *Cut, Paste and Learn* (2017).
 
 Networks find the seam of a pasted object rather than the object; several kinds of seam on the same pictures stop that. All
 kinds work on the finished picture and on truth's mask, so they are the same over photographs, skies, grounds and shadows,
-and need no picture of the background alone: what either side looks like beyond the border is drawn on from its own pixels,
-without the border pixels themselves, which show both.
+and need no picture of the background alone: beyond the border either side is continued from its own pixels, without the
+border pixels themselves, which show both sides.
 
 - `box`, `gaussian`: the mask, blurred by a box of `size` pixels to each side or a Gaussian of that sigma, becomes the object's
   opacity. Pixels out of the blur's reach do not change.
-- `poisson`: the object keeps its gradients and takes its border's colours from what is behind it (Perez et al., *Poisson Image
-  Editing*, 2003): a correction that is harmonic inside of the mask is added to it. As there, this is done on coded values
-  (square roots of light, close to the sRGB curve). `size` says nothing here. At the picture's border the correction runs out
-  level, so objects that leave the picture are safe. A transparent picture has nothing behind its objects and stays.
+- `poisson`: the object keeps its gradients and takes its border's colours from the background (Perez et al., *Poisson Image
+  Editing*, 2003): a correction that is harmonic inside the mask is added to it. As in that paper, this is done on coded values
+  (square roots of light, close to the sRGB curve). `size` has no effect here. At the picture's border the correction runs out
+  level, so objects that leave the picture are safe. A transparent picture has nothing behind its objects and stays unchanged.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ Float32 = NDArray[np.float32]
 Mask = NDArray[np.bool_]
 
 WIDER = {"box": 2.0, "gaussian": 0.6}
-"""How much larger than the mask's blur that is which draws both sides on: it has to reach beyond the border pixels."""
+"""How much wider than the mask's blur the blur is that continues both sides: it has to reach beyond the border pixels."""
 
 SIDE = 1.0
-"""Sigma, in pixels, of the Gaussian that draws both sides on for `poisson`."""
+"""Sigma, in pixels, of the Gaussian that continues both sides for `poisson`."""
 
 
 def smooth_border(picture: Float32, targets: Mask, smoother: Smoother) -> Float32:
@@ -65,9 +65,9 @@ def _window(mask: Mask, margin: int) -> tuple[slice, slice]:
 
 
 def _drawn_on(picture: Float32, mask: Mask, profile: Float32) -> Float32:
-    """The picture of a mask's pixels alone: its border pixels and those beyond are means of what is near and well inside.
+    """The picture continued from a mask's inner pixels: border pixels and those beyond become means of inner pixels nearby.
 
-    Where nothing is well inside, as in a wire, its pixels count as they are; out of reach the picture stays.
+    Where the mask has no inner pixels, as in a wire, its pixels count as they are; out of the blur's reach the picture stays.
     """
     core = mask & ~_touched(~mask)
     weight = np.where(core, np.float32(1), np.where(mask, np.float32(1e-4), np.float32(0)))[..., None]
@@ -78,7 +78,7 @@ def _drawn_on(picture: Float32, mask: Mask, profile: Float32) -> Float32:
 
 
 def _touched(mask: Mask) -> Mask:
-    """The mask and its neighbours in all eight directions."""
+    """The mask and its eight neighbours' pixels."""
     tall = mask.copy()
     tall[1:] |= mask[:-1]
     tall[:-1] |= mask[1:]
@@ -89,7 +89,7 @@ def _touched(mask: Mask) -> Mask:
 
 
 def _poisson(picture: Float32, mask: Mask, inside: Float32, outside: Float32) -> Float32:
-    """The object over its window of the picture, corrected so that it meets what is behind it; three channels."""
+    """The object in its window of the picture, corrected so that its border meets the background; three channels."""
     rim = ~mask & _touched(mask)
     step = np.sqrt(np.maximum(outside, 0)) - np.sqrt(np.maximum(inside, 0))
     light = np.sqrt(np.maximum(inside, 0)) + harmonic(step, mask, rim)

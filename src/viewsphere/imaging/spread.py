@@ -1,4 +1,4 @@
-"""Blurs that are the same everywhere: a kernel's taps applied to pictures whose border pixels go on for ever."""
+"""Blurs that are the same everywhere: a kernel's taps applied to pictures whose border pixels are repeated outwards."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ Float32 = NDArray[np.float32]
 
 
 def spread(picture: Float32, kernel: Float32) -> Float32:
-    """The picture (H, W, C) correlated with a kernel of odd sides (h, w); only its taps that are not 0 cost anything."""
+    """The picture (H, W, C) correlated with a kernel of odd sides (h, w); only taps that are not 0 cost time."""
     from viewsphere.imaging import kernels_spread as kernels
 
     height, width, channels = picture.shape

@@ -9,8 +9,8 @@ The transforms, x being the exposed light:
 - `standard`: x up to `KNEE`, above it k + (1 - k) y / (1 + y) with y = (x - k) / (1 - k), for each of red, green and blue:
   colours up to the knee are shown as they are, nothing is ever clipped.
 - `filmic`: the film-like curve of Narkowicz, *ACES Filmic Tone Mapping Curve* (2016; CC0 or MIT), x scaled so that middle grey,
-  0.18, stays where it is. The curve goes through the largest and the smallest of the three, the middle one keeps its place
-  between them, as Adobe's DNG specification has it: so the hue stays what it was.
+    0.18, stays where it is. The curve is applied to the largest and the smallest of the three channels; the middle one keeps
+  its relative place between them, as Adobe's DNG specification has it: so the hue stays.
 - `agx`: Troy Sobotka's AgX (https://github.com/sobotka/AgX) in the shape of Wrensch, *Minimal AgX Implementation* (2023; MIT):
   colours are drawn towards grey by a fifth, 16.5 stops around middle grey go through a sigmoid of their logarithm, the
   colours are drawn out again and decoded with the exponent 2.2. Bright saturated light goes to white.
@@ -42,17 +42,17 @@ KNEE = 0.6
 """Display values up to this are shown as they are by `standard`."""
 
 TRANSFORMS = ("standard", "filmic", "agx", "raw")
-"""What there is to choose from."""
+"""The names of the view transforms."""
 
 AGX_STOPS = (-10.0, 6.5)
-"""What AgX shows, in stops from middle grey, 0.18."""
+"""The range that AgX shows, in stops from middle grey, 0.18."""
 
 
 def develop(radiance: Float32, background: Float32 | None, view: View, alpha: bool = False) -> Bytes:
-    """The picture without smoother and effects, (H, W, 3) uint8 sRGB, in one pass.
+    """The picture without smoother and effects, (H, W, 3) uint8 sRGB, in one pass over the pixels.
 
     `radiance` (H, W, 4) float32; `background` display-linear, (H * W, 3) or, one colour everywhere, (1, 3); None is black.
-    With `alpha` the background does not count and the picture is (H, W, 4): straight alpha, so that edges have no fringe.
+    With `alpha` the background is ignored and the picture is (H, W, 4): straight alpha, so that edges have no fringe.
     """
     from viewsphere.imaging import kernels_view as kernels
 
@@ -85,12 +85,12 @@ def to_bytes(picture: Float32) -> Bytes:
 
 
 def exposure_matrix(view: View) -> Float32:
-    """White balance and exposure in one, (3, 3) float32: scene-linear to exposed light."""
+    """White balance and exposure in one matrix, (3, 3) float32: scene-linear to exposed light."""
     return (white_balance(view.temperature_k, view.tint) * (EXPOSURE * 2.0**view.exposure)).astype(np.float32)
 
 
 def agx_sigmoid(light: ArrayLike) -> NDArray[np.float64]:
-    """Display code values in [0, 1] of light: through (0, 0), (pivot, 1/2) and (1, 1) of the stops.
+    """Display code values in [0, 1] of light: a sigmoid of its stops through (0, 0), (pivot, 1/2) and (1, 1).
 
     Both halves are m d / (1 + c d^e)^(1/e), d the distance from the pivot, slope m = 2, exponents 3 below and 3.25 above.
     """
@@ -108,7 +108,7 @@ def agx_sigmoid(light: ArrayLike) -> NDArray[np.float64]:
 
 @cache
 def _agx_tables() -> tuple[Float32, Float32]:
-    """The sigmoid at 256 steps of each power of two from 2^-13 to 2^5, and x^2.2 at 1/1024 steps from 0 to 1 and a last one."""
+    """The sigmoid at 256 steps of each power of two from 2^-13 to 2^5; x^2.2 at steps of 1/1024 from 0 to 1, and one beyond."""
     octaves = 2.0 ** np.arange(-13, 5)[:, None] * (1 + np.arange(256) / 256)
     sigmoid = agx_sigmoid(np.append(octaves.reshape(-1), 32.0))
     decoded = np.minimum(np.arange(1026) / 1024, 1) ** 2.2
@@ -116,7 +116,7 @@ def _agx_tables() -> tuple[Float32, Float32]:
 
 
 def _blocks(radiance: Float32, background: Float32 | None, view: View) -> Iterator[tuple[Float32, slice, Float32]]:
-    """Blocks of display-linear light, as `kernels_view` has them, which of the pixels they are, and their background."""
+    """Blocks of display-linear light, as `kernels_view` has them, the pixels that each block holds, and their background."""
     from viewsphere.imaging import kernels_view as kernels
 
     rows, under, matrix = _rows(radiance), _rows(background), exposure_matrix(view)

@@ -1,4 +1,4 @@
-"""White balance: the light that shall look white, by colour temperature and tint."""
+"""White balance: the light that is to look white, given by colour temperature and tint."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 Float = NDArray[np.float64]
 
 NEUTRAL_K = 6500.0
-"""The temperature that changes nothing: that of the white of sRGB, D65."""
+"""The temperature that changes nothing: D65, the white of sRGB."""
 
 TINT = 0.02
-"""How far a tint of 1 leads from the line of temperatures, in CIE 1960 (u, v)."""
+"""Distance, in CIE 1960 (u, v), by which a tint of 1 leaves the line of temperatures."""
 
 XYZ_FROM_SRGB = np.array([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]])
-"""IEC 61966-2-1."""
+"""Linear sRGB to CIE XYZ, IEC 61966-2-1."""
 
 BRADFORD = np.array([[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0389, -0.0685, 1.0296]])
 """Cone responses of Lam's chromatic adaptation (1985), as in ICC.1:2022, annex E."""
@@ -24,7 +24,7 @@ BRADFORD = np.array([[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.03
 
 @lru_cache(maxsize=256)
 def white_balance(temperature_k: float, tint: float) -> Float:
-    """Linear sRGB to linear sRGB, (3, 3) float64: that light becomes neutral, its luminance stays.
+    """Linear sRGB to linear sRGB, (3, 3) float64: the named light becomes neutral and keeps its luminance.
 
     Exactly the identity for 6500 K without tint. A tint above 0 neutralises greener light: the picture turns towards magenta.
     """
@@ -37,10 +37,11 @@ def white_balance(temperature_k: float, tint: float) -> Float:
 
 
 def white_xyz(temperature_k: float, tint: float) -> Float:
-    """CIE XYZ with Y = 1 of the light that is named, (3,).
+    """CIE XYZ with Y = 1 of the light of this temperature and tint, (3,).
 
-    Temperatures lie on the black bodies' line of Krystek, *An algorithm to calculate correlated colour temperature* (1985),
-    from 3000 to 5000 K it leads over to daylight's, a little greener: 6500 K is D65. Tints lie across it, greener above 0.
+    Temperatures lie on the black bodies' line of Krystek, *An algorithm to calculate correlated colour temperature* (1985);
+    from 3000 to 5000 K the line crosses over to daylight's, a little greener: 6500 K is D65. Tints lie across it, greener above
+    0.
     """
     x, y, z = XYZ_FROM_SRGB @ np.ones(3)
     d65 = np.array([4 * x, 6 * y]) / (x + 15 * y + 3 * z)
@@ -54,7 +55,7 @@ def white_xyz(temperature_k: float, tint: float) -> Float:
 
 
 def _black_body(t: float) -> Float:
-    """CIE 1960 (u, v)."""
+    """CIE 1960 (u, v) of a black body at t kelvin."""
     u = (0.860117757 + 1.54118254e-4 * t + 1.28641212e-7 * t * t) / (1 + 8.42420235e-4 * t + 7.08145163e-7 * t * t)
     v = (0.317398726 + 4.22806245e-5 * t + 4.20481691e-8 * t * t) / (1 - 2.89741816e-5 * t + 1.61456053e-7 * t * t)
     return np.array([u, v])

@@ -1,12 +1,12 @@
-"""numba's compiler with the passes that kernels need and no more, each done once.
+"""numba's compiler with only the passes that kernels need, each done once.
 
-Two thirds of the time it takes is Python's own, not LLVM's.
+Two thirds of the compile time are Python's own, not LLVM's.
 """
 
 # pyright: reportAttributeAccessIssue=false, reportPrivateUsage=false, reportMissingTypeArgument=false
 # pyright: reportUnknownMemberType=false, reportUnknownVariableType=false, reportUnknownArgumentType=false
 # pyright: reportUnnecessaryComparison=false
-# Only through its internals does numba let others choose what is done when.
+# Only through its internals does numba let its users choose the passes and their order.
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ from viewsphere.kernels.garbage import pause_collection
 
 @register_pass(mutates_CFG=True, analysis_only=False)
 class Lifetimes(IRLegalization):
-    """Marks where variables end, only where that frees something: numba clears each of them there, for LLVM to take out."""
+    """Marks where variables end only where that frees memory: numba marks the end of every variable, for LLVM to remove it."""
 
     _name = "lifetimes"
 
@@ -64,13 +64,13 @@ class Lifetimes(IRLegalization):
 
 @register_pass(mutates_CFG=True, analysis_only=False)
 class KernelLowering(NativeLowering):
-    """Writes what statements are in LLVM's language."""
+    """Lowers statements to LLVM's language by `lowering.KernelLower`."""
 
     _name = "kernel_lowering"
 
     @property
     def lowering_class(self) -> Any:
-        """Returns the class that does it, which takes long to load: only those that compile need it."""
+        """Returns the class that lowers; imported here, since it takes long to load and only processes that compile need it."""
         from viewsphere.kernels.lowering import KernelLower
 
         return KernelLower
@@ -91,7 +91,7 @@ PASSES = (
     KernelLowering,
     NoPythonBackend,
 )
-"""numba's, without those for closures, `with`, `literally`, raising what is computed, and expressions of whole arrays."""
+"""numba's passes, without those for closures, `with`, `literally`, raising computed errors, and whole-array expressions."""
 
 _PLAIN = (types.Number, types.Boolean, types.Array, types.BaseTuple)
 _resolve = BaseFunction.get_call_type
@@ -103,7 +103,7 @@ def _resolved(function: Any, context: Any, args: tuple[Any, ...], _how: tuple[An
 
 
 def _resolve_once(function: Any, context: Any, args: tuple[Any, ...], kws: dict[str, Any]) -> Any:
-    """What a function of numba's makes of operands of these types: numba would try all it could mean, at every place anew."""
+    """numba's signature of a function for these types; kept, since numba would try all overloads at every call again."""
     if kws or not all(isinstance(arg, _PLAIN) for arg in args):
         return _resolve(function, context, args, kws)
     flags = ConfigStack().top()
@@ -112,7 +112,7 @@ def _resolve_once(function: Any, context: Any, args: tuple[Any, ...], kws: dict[
 
 
 def _as_part(**options: Any) -> Any:
-    """`numba.jit` for numba's own functions that kernels call, as `min` or `np.empty`."""
+    """`numba.jit` for numba's own functions that kernels call, such as `min` or `np.empty`."""
     return numba.jit(**{**options, **PART})
 
 
@@ -124,7 +124,7 @@ _post_process = PostProcessor.run
 
 
 def _tidy(self: PostProcessor, emit_dels: bool = False, extend_lifetimes: bool = False) -> None:
-    """Put blocks in order, and find out where variables live only when that is asked for: numba would after every pass."""
+    """Put blocks in order, and find where variables live only when asked; numba would do so after every pass."""
     if emit_dels:
         _post_process(self, emit_dels, extend_lifetimes)
     else:
@@ -141,7 +141,7 @@ _QUICKER = (
 
 @contextmanager
 def _quickly() -> Generator[None]:
-    """Types are resolved once, numba's functions are parts as ours are, and nobody looks for garbage among living objects."""
+    """Meanwhile types are resolved once, numba's functions become parts like ours, and no garbage is collected."""
     with global_compiler_lock, pause_collection(), ExitStack() as then:
         for owner, name, quicker in _QUICKER:
             then.callback(setattr, owner, name, getattr(owner, name))
@@ -150,7 +150,7 @@ def _quickly() -> Generator[None]:
 
 
 class _Whole(JITCodeLibrary):
-    """Code that is optimized once, with all of its parts: numba's own goes through three times."""
+    """Code that is optimized once, together with all of its parts; numba would optimize it three times."""
 
     def _optimize_functions(self, ll_module: Any) -> None:
         ll_module.data_layout = self._codegen._data_layout
@@ -161,7 +161,7 @@ class _Whole(JITCodeLibrary):
 
 
 class _Part(_Whole):
-    """Code that is neither optimized nor translated by itself: those that call it do both with all of their parts at once."""
+    """Code that is neither optimized nor translated by itself: its callers do both, for all of their parts at once."""
 
     def finalize(self) -> None:
         for library in dict.fromkeys(self._linking_libraries):
@@ -199,14 +199,14 @@ class Part(Kernel):
         state.library = _Part(state.targetctx.codegen(), func.__qualname__)
         state.flags.no_compile = True
         made = CompilerBase.compile_extra(self, func)
-        # What numba knows an overload by; there is nothing to call.
+        # numba knows an overload by this function object, which is never called.
         key = _dynfunc.make_function(made.fndesc.lookup_module(), func.__name__, "", 0, made.environment, (made.library,))
         state.targetctx.insert_user_function(key, made.fndesc, [made.library])
         return made._replace(entry_point=key)
 
 
 class _Cached(JITCodeLibrary):
-    """Code from the cache. What others link of it is read when they do, and nobody lists its symbols: half of the time."""
+    """Code from the cache. Its bitcode is parsed only when others link it, and its symbols are not listed: half the time."""
 
     def __init__(self, codegen: Any, name: str, bitcode: bytes) -> None:
         super().__init__(codegen, name)
@@ -227,15 +227,15 @@ class _Cached(JITCodeLibrary):
         return self._shared_module
 
     def get_pointer_to_function(self, name: str) -> int:
-        """Returns where the function of this name begins, one that it has."""
+        """Returns the address of the function of this name, which must be in this code."""
         return self._codegen._engine.get_function_address(name)
 
 
 class KernelCache(FunctionCache):
-    """numba's cache of a function, which does not prepare to compile before it looks whether it has to: that takes a second."""
+    """numba's cache of a function that looks for an entry before it prepares to compile, which would take a second."""
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """The compiled function for these types, None if it has none."""
+        """The compiled function for these types, None if the cache has none."""
         rtsys.initialize(target_context)
         codegen = target_context.codegen()
         codegen.unserialize_library = partial(_Cached._unserialize, codegen)
@@ -247,7 +247,7 @@ class KernelCache(FunctionCache):
 
 
 PART: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "pipeline_class": Part}
-"""Options of parts."""
+"""Options of `Part`'s compilation."""
 
 
 def whole(function: Callable[..., Any], **options: Any) -> Any:

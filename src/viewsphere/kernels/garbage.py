@@ -1,4 +1,4 @@
-"""When Python looks for garbage."""
+"""Python's garbage collection, paused."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from contextlib import contextmanager
 
 @contextmanager
 def pause_collection() -> Generator[None]:
-    """No garbage is collected while the context lasts: among millions of living objects that would be a quarter of the time."""
+    """Collect no garbage while the context lasts: among millions of living objects this would take a quarter of the time."""
     collects = gc.isenabled()
     gc.disable()
     try:

@@ -4,7 +4,7 @@ numba's own cache misses changes in functions that a kernel calls from another f
 folder keyed by a digest of its source file, of the files of all kernels it can call and of the constants they use, of
 numba's version and of the processor's name.
 
-What is compiled, and how, is `stock`'s or, with versions of numba that are known well enough, `compiler`'s.
+Which compiler is used: `compiler` for versions of numba that it is tested with, else `stock`.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ _configuring = Lock()
 def njit(function: Callable[..., Any] | None = None, **options: Any) -> Any:
     """`numba.njit` as every kernel uses it: no GIL, cached, numpy's division, exact unless `fastmath` is given.
 
-    Kernels that allocate arrays need `_nrt`: to count what refers to arrays takes long to compile.
+    Kernels that allocate arrays need `_nrt`; others go without, since counting references to arrays takes long to compile.
     """
     if function is None:
         return partial(njit, **options)
@@ -49,9 +49,9 @@ def njit(function: Callable[..., Any] | None = None, **options: Any) -> Any:
 
 
 def inner(function: Callable[..., Any] | None = None, **options: Any) -> Any:
-    """`njit` for what only kernels call: a part of each of them, neither optimized nor cached by itself.
+    """`njit` for functions that only kernels call: a part of each such kernel, neither optimized nor cached by itself.
 
-    That takes most of the time. Python cannot call it, and it allocates no arrays unless `_nrt`.
+    Optimizing would take most of the time. Python cannot call a part, and it allocates no arrays unless `_nrt`.
     """
     if function is None:
         return partial(inner, **options)
@@ -60,9 +60,9 @@ def inner(function: Callable[..., Any] | None = None, **options: Any) -> Any:
 
 @contextmanager
 def _cached_in(folder: str) -> Generator[None]:
-    """Cached functions made in this context are kept in `folder`: numba looks for the place when it makes them.
+    """Functions that are made and cached in this context are kept in `folder`: numba reads the setting when it makes them.
 
-    The setting is the whole process's, so that it is the user's again at once.
+    The setting belongs to the whole process, so the user's value is restored at once.
     """
     with _configuring:
         before = _config.CACHE_DIR
@@ -75,7 +75,7 @@ def _cached_in(folder: str) -> Generator[None]:
 
 @cache
 def _sources(file: str) -> frozenset[str]:
-    """A kernel's file, the kernels' files within its reach, and the files that those import from here for their constants."""
+    """A kernel's file, the files of the kernels it can reach, and the files from which these import their constants."""
     found, waiting = {file}, [file]
     while waiting:
         for name in _IMPORT.findall(Path(waiting.pop()).read_text(encoding="utf-8")):

@@ -1,4 +1,4 @@
-"""Where compiled kernels are kept, and what they depend on. Told without numba, which takes long to load."""
+"""Where compiled kernels are kept, and what they depend on; found without importing numba, which takes long to load."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ import llvmlite.binding
 import platformdirs
 
 QUICKER = ("0.66", "0.67", "0.68")
-"""numba's minor versions whose internals are what `compiler` and `lowering` expect; others compile by `stock`."""
+"""numba's minor versions whose internals are as `compiler` and `lowering` expect; with other versions `stock` compiles."""
 
 NUMBA = version("numba")
 IS_STOCK = os.environ.get("VIEWSPHERE_STOCK_NUMBA", "0") != "0" or ".".join(NUMBA.split(".")[:2]) not in QUICKER
-"""Whether numba compiles kernels in its own way, which `VIEWSPHERE_STOCK_NUMBA=1` asks for."""
+"""Whether numba compiles kernels in its own way, as `VIEWSPHERE_STOCK_NUMBA=1` asks."""
 
 BUILD = (NUMBA, IS_STOCK, llvmlite.binding.get_host_cpu_name(), os.environ.get("NUMBA_BOUNDSCHECK"))
-"""What turns sources into the machine's code, and for which processor."""
+"""The versions that turn sources into machine code, and the processor that the code is for."""
 
 
 def kernel_folder() -> Path:
@@ -32,8 +32,8 @@ def kernel_folder() -> Path:
 
 @cache
 def sources_digest(folder: Path) -> str:
-    """A digest of all that says which compiled kernels fit: every Python source in a folder, with its place and time, as numba
-    asks for them too; Python, numba and the processor.
+    """A digest of everything on which compiled kernels depend: place and time of every Python source in a folder, as numba
+    checks them too; Python, numba and the processor.
     """
     digest = hashlib.sha256(repr((BUILD, sys.implementation.cache_tag)).encode())
     for source in sorted(folder.rglob("*.py")):

@@ -1,11 +1,11 @@
-"""numba's lowering, with a few instructions where it takes dozens: for elements of arrays and for loops that count.
+"""numba's lowering, with a few instructions instead of dozens for elements of arrays and for counting loops.
 
-LLVM would take the others out again, and Python takes longest to write them.
+LLVM would remove the surplus instructions again, but writing them takes most of Python's time.
 """
 
 # pyright: reportAttributeAccessIssue=false, reportPrivateUsage=false, reportMissingTypeArgument=false
 # pyright: reportUnknownMemberType=false, reportUnknownVariableType=false, reportUnknownArgumentType=false
-# Only through its internals does numba let others choose how it compiles.
+# Only through its internals does numba let its users choose how it compiles.
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class KernelLower(Lower):
     """Lowers a function's statements."""
 
     def _find_singly_assigned_variable(self) -> None:
-        """Variables that are set once, before all uses, are values: numba gives those of several blocks a place in memory."""
+        """Keep variables that are set once, before all uses, as values; numba keeps those used in several blocks in memory."""
         if self.context.enable_nrt:
             super()._find_singly_assigned_variable()
         else:
@@ -47,14 +47,14 @@ class KernelLower(Lower):
         return set(set_in) - others
 
     def storevar(self, value: Any, name: str, argidx: int | None = None) -> None:
-        """Sets a variable; nothing is freed where nothing refers to what is counted."""
+        """Sets a variable; without reference counts (`_nrt`) no old value has to be released."""
         if self.context.enable_nrt or name in self._singly_assigned_vars:
             super().storevar(value, name, argidx)
         else:
             self.builder.store(value, self.getvar(name))
 
     def lower_getitem(self, resty: Any, expr: Any, value: Any, index: Any, signature: Any) -> Any:
-        """array[i, j], or whatever else is indexed."""
+        """array[i, j], or any other indexing."""
         array = self.typeof(value.name)
         place = self._place(value, index)
         if place is None:
@@ -62,7 +62,7 @@ class KernelLower(Lower):
         return self.context.cast(self.builder, load_item(self.context, self.builder, array, place), array.dtype, resty)
 
     def lower_setitem(self, target_var: Any, index_var: Any, value_var: Any, signature: Any) -> Any:
-        """array[i, j] = value, or whatever else is indexed."""
+        """array[i, j] = value, or any other indexed assignment."""
         array = self.typeof(target_var.name)
         place = self._place(target_var, index_var)
         if place is None:
@@ -70,7 +70,7 @@ class KernelLower(Lower):
         return store_item(self.context, self.builder, array, self._cast_var(value_var, array.dtype), place)
 
     def _place(self, variable: Any, index: Any) -> Any:
-        """The address of the one element that is indexed, None for what is no array, for more elements, or to check bounds."""
+        """The address of the one indexed element; None for slices, other types than arrays, or where bounds are checked."""
         array, kind = self.typeof(variable.name), self.typeof(index.name)
         kinds = kind.types if isinstance(kind, types.BaseTuple) else (kind,)
         is_plain = isinstance(array, types.Array) and isinstance(array.dtype, (types.Number, types.Boolean))
@@ -90,7 +90,7 @@ class KernelLower(Lower):
         return builder.gep(data, [offset])
 
     def _index(self, kind: Any, value: Any, array: Any, held: Any, axis: int) -> Any:
-        """An index from an axis' beginning: negative ones count from its end."""
+        """An index counted from the beginning of its axis: negative ones count from the axis' end."""
         if isinstance(kind, types.IntegerLiteral) and kind.literal_value >= 0:
             return self.context.get_constant(types.intp, kind.literal_value)
         size = self._field(array, held, "shape", axis) if kind.signed else None
@@ -100,7 +100,7 @@ class KernelLower(Lower):
         return self.builder.extract_value(value, [self.context.data_model_manager[kind].get_field_position(name), *axis])
 
     def lower_expr(self, resty: Any, expr: Any) -> Any:
-        """Whatever a variable is set to."""
+        """Any expression that a variable is set to."""
         if self._is_range(expr):
             return self._range(resty, expr)
         if expr.op == "getiter" and self._counts_by_one(expr.value):
@@ -128,7 +128,7 @@ class KernelLower(Lower):
         return self._is_range(made) and len(made.args) < 3
 
     def _counter(self, kind: Any, expr: Any) -> Any:
-        """The range's iterator: where its next value and the number of values to come are, its end, its step."""
+        """The range's iterator: a place that holds its next value and the number of values to come; its end; its step."""
         builder, bounds = self.builder, self.loadvar(expr.value.name)
         start, stop, step = (builder.extract_value(bounds, n) for n in range(3))
         kept = [cgutils.alloca_once_value(builder, n) for n in (start, builder.sub(stop, start))]

@@ -1,6 +1,6 @@
-"""Kernels as any numba compiles them, through what it documents and no more.
+"""Kernels compiled by any numba, through its documented functions alone.
 
-`compiler` is three times as quick; the code computes the same, to the bit.
+`compiler` is three times as fast; its code computes the same results, to the bit.
 """
 
 from __future__ import annotations
@@ -22,5 +22,5 @@ def part(function: Callable[..., Any], **options: Any) -> Any:
 
 
 def _compiled(function: Callable[..., Any], options: dict[str, Any]) -> Any:
-    """References to arrays are counted, with or without `_nrt`, which numba does not document."""
+    """The function compiled by numba. References to arrays are always counted: the option behind `_nrt` is not documented."""
     return numba.njit(**{name: value for name, value in options.items() if name != "_nrt"})(function)

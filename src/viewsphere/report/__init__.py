@@ -21,13 +21,13 @@ from viewsphere.report.unknown import numbers
 from viewsphere.store import Dataset, ModelInfo
 
 LIMIT = 20_000_000
-"""Bytes that the page may have."""
+"""Bytes that the page may have at most."""
 
 MODELS = 48
-"""Models with a mesh in the page, at most."""
+"""Models that are shown with a mesh, at most."""
 
 TRIANGLES = 240_000
-"""Triangles of all meshes together, and of one at most."""
+"""Triangles of all meshes together, and of one mesh, at most."""
 
 MOST_TRIANGLES = 14_000
 
@@ -56,11 +56,12 @@ def write_report(
     workers: int = 0,
     listener: Listener | None = None,
 ) -> int:
-    """Write the page of a data set, finished or half finished; gives its size in bytes, at most `LIMIT`.
+    """Write the page of a data set, finished or half finished; returns its size in bytes, at most `LIMIT`.
 
-    All frames are counted (by `workers` processes; 0: in this one, more need a `__main__` guard in the calling script), and
-    `frames` of them are shown, the same ones every time. `listener` hears phase, done and total. Raises StoreError where no
-    frame is finished or a record or picture cannot be read, UserError where the page would grow too large or cannot be written.
+    All frames are counted (by `workers` processes; 0: in this process; more need a `__main__` guard in the calling script), and
+    `frames` of them are shown, the same frames every time. `listener` is called with phase, done and total. Raises StoreError
+    where no frame is finished or a record or picture cannot be read, UserError where the page would be too large or cannot be
+    written.
     """
     tell = listener or _unheard
     if not len(dataset):
@@ -83,7 +84,7 @@ def write_report(
 def report_data(
     dataset: Dataset, table: FrameTable, positions: Sequence[int], proof: Proof | None, tell: Listener
 ) -> dict[str, Any]:
-    """All that the page shows but the pictures, as plain data."""
+    """All that the page shows except pictures, as plain data."""
     return {
         "facts": facts(dataset),
         "summary": summary(dataset, table),
@@ -110,8 +111,8 @@ def _models(dataset: Dataset, table: FrameTable, tell: Listener) -> list[dict[st
 
 
 def _cameras(info: ModelInfo, table: FrameTable) -> dict[str, Any]:
-    """How many views there are of a model, and azimuth, elevation (degrees) and distance of up to `CAMERAS` of them, around
-    its box's centre.
+    """Number of views of a model, and azimuth, elevation (degrees) and distance (metres) of up to `CAMERAS` of them, around the
+    centre of the model's box.
     """
     objects = table.objects
     if info.key not in table.models:
@@ -123,7 +124,7 @@ def _cameras(info: ModelInfo, table: FrameTable) -> dict[str, Any]:
 
 
 def _unheard(phase: str, done: int, total: int) -> None:
-    """Nobody listens."""
+    """The listener of callers who gave none."""
 
 
 __all__ = ["Proof", "report_data", "script_json", "write_report"]

@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 WIDTHS = (30.0, 24.0, 22.5, 20.0, 18.0, 15.0, 12.0, 10.0, 9.0, 7.5, 6.0, 5.0)
-"""Widths a cell may have, degrees; each divides a full turn."""
+"""Widths that a cell may have, degrees; each divides a full turn."""
 
 FREE = 10.0
 """Width for viewpoints that lie on no grid."""
 
 PER_DEGREE = 2
-"""Viewpoints count as on a grid where they meet it to half a degree."""
+"""Steps in a degree to which viewpoints are rounded before a grid is looked for."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class Cells:
 def sphere_cells(azimuth_deg: NDArray[np.floating], elevation_deg: NDArray[np.floating]) -> Cells:
     """Count viewpoints in cells that fit them: centred on a grid's steps where they lie on one, else 10 degrees wide.
 
-    So a regular grid fills its cells evenly, with no pattern of the cells' making. Viewpoints that are NaN are left out.
+    So a regular grid fills its cells evenly, and the cells add no pattern of their own. Viewpoints that are NaN are left out.
     """
     known = np.isfinite(azimuth_deg) & np.isfinite(elevation_deg)
     azimuth = np.round(azimuth_deg[known].astype(np.float64), 4) % 360
@@ -49,10 +49,10 @@ def sphere_cells(azimuth_deg: NDArray[np.floating], elevation_deg: NDArray[np.fl
 
 
 def _edges(degrees: NDArray[np.float64], turn: float) -> tuple[float, float]:
-    """First edge and width of the cells of one coordinate; `turn` is 360 for one that comes round, else 0."""
+    """First edge and width of the cells of one coordinate; `turn` is 360 for azimuth, which comes round, else 0."""
     values = np.unique(np.round(degrees * PER_DEGREE).astype(int))
     step = math.gcd(*np.diff(values).tolist(), int(turn * PER_DEGREE)) / PER_DEGREE if len(values) else 0.0
-    # A single elevation has no step of its own.
+    # A single elevation has no step.
     fitting = [w for w in WIDTHS if step == 0 or math.isclose(step / w, round(step / w))] if len(values) else []
     if not fitting or (step and step < WIDTHS[-1]):
         return (0.0 if turn else -90.0), FREE

@@ -13,10 +13,10 @@ GOLDEN = (5**0.5 - 1) / 2
 def chosen_frames(table: FrameTable, count: int) -> list[int]:
     """Positions of at most `count` frames, ascending.
 
-    Frames of one subject (model, or category where there is none) and split make a group. Each group gives at least one
-    frame if there are no more groups than `count`, and more in proportion to its size; of more groups, `count` spread evenly
-    give one each. Within a group the picks are stratified, at a place in the stratum that the golden ratio moves on, so that
-    they do not fall into step with the poses.
+    Frames of one subject (model, or category where there is none) and split make a group. If there are at most `count` groups,
+    each gives at least one frame, and more in proportion to its size; of more groups, `count` spread evenly give one each.
+    Within a group the picks are stratified, at a place in the stratum that the golden ratio moves on, so that the picks do not
+    fall into step with the poses.
     """
     total = len(table.frames)
     if count >= total:

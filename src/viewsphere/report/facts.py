@@ -17,8 +17,8 @@ PAUSE = 600.0
 
 @dataclass(frozen=True)
 class Timing:
-    """When frames were finished, from the times of their files: first and last as ISO 8601 (UTC), seconds of work between them
-    without breaks, frames finished in these seconds, runs.
+    """When frames were finished, by the times of their files: first and last as ISO 8601 (UTC), seconds of work between these
+    two without breaks, frames finished in these seconds, number of runs.
     """
 
     first: str
@@ -29,7 +29,7 @@ class Timing:
 
 
 def timing(dataset: Dataset) -> Timing | None:
-    """When the finished shots were written; None where there are none."""
+    """When the finished shots were written; None where no shot is finished."""
     found: list[tuple[float, int]] = []
     for row in dataset.plan.rows:
         try:
@@ -74,7 +74,7 @@ def facts(dataset: Dataset) -> dict[str, Any]:
 
 
 def _recipe(part: Part) -> str:
-    """The recipe of a part as YAML, under a line that says which frames it brought."""
+    """The recipe of a part as YAML, after a line that says which frames the part added."""
     import yaml
 
     frames = f"{part.frames:,} frames from {part.first:,}" if part.frames else "no frames of its own"

@@ -14,7 +14,7 @@ from viewsphere.report.unknown import number, numbers
 
 
 def frame_data(sample: Sample) -> dict[str, Any]:
-    """Frame index, split, picture's path, pose, camera and objects; what is not known is null."""
+    """Frame index, split, picture's path, pose, camera and objects; unknown values are null."""
     pose, camera = sample.known_pose, sample.known_camera
     return {
         "index": sample.index,
@@ -72,7 +72,7 @@ def _corners(o: ObjectAnnotation) -> list[list[float | None] | None]:
 
 
 def _faces_seen(o: ObjectAnnotation) -> list[str]:
-    """Names of the box's faces that are turned to the camera."""
+    """Names of the box's faces that are turned towards the camera."""
     middle = o.box3d_camera.mean(axis=0)
     centers = {name: o.box3d_camera[list(corners)].mean(axis=0) for name, corners in FACES.items()}
     return [name for name, center in centers.items() if float((center - middle) @ center) < 0]

@@ -22,8 +22,8 @@ BISECTIONS = 12
 
 @dataclass(frozen=True, eq=False)
 class SmallMesh:
-    """vertices (V, 3) float64 metres, object axes; triangles (T, 3) and the edges (E, 2) that are left of parts thinner than
-    the grid; colours (T, 3) and (E, 3) uint8 sRGB.
+    """vertices (V, 3) float64 metres, object axes; triangles (T, 3), and edges (E, 2) for parts thinner than the grid;
+    colours (T, 3) and (E, 3) uint8 sRGB.
     """
 
     vertices: Float
@@ -34,19 +34,20 @@ class SmallMesh:
 
 
 def read_small(glb: Path, most: int) -> SmallMesh:
-    """A data set's exported model with at most `most` triangles and edges together; ModelError as of any model file."""
+    """A data set's exported model with at most `most` triangles and edges together; raises ModelError as for any model file."""
     from viewsphere.assets.load import load_model
 
     mesh = load_model(glb)[0]
-    vertices = mesh.vertices.astype(np.float64)[:, (0, 2, 1)] * (1, -1, 1)  # the file has +y up and the front at +z
+    vertices = mesh.vertices.astype(np.float64)[:, (0, 2, 1)] * (1, -1, 1)  # the file has +y up, its front at +z
     return simplified(vertices, mesh.triangles.astype(np.int64), triangle_colors(mesh), most)
 
 
 def simplified(vertices: Float, triangles: NDArray[np.int64], colors: NDArray[np.uint8], most: int) -> SmallMesh:
     """At most `most` triangles and edges: unchanged if there are no more, else vertices that share a grid cell become one.
 
-    The one is where the squared distances to the planes of the cell's triangles are least (Lindstrom, Out-of-core
-    simplification of large polygonal models, SIGGRAPH 2000), but in the cell. The grid is the finest that will do.
+    The merged vertex lies where the sum of squared distances to the planes of the cell's triangles is least (Lindstrom,
+    Out-of-core simplification of large polygonal models, SIGGRAPH 2000), clamped to the cell. The grid is the finest that meets
+    `most`.
     """
     if len(triangles) <= most:
         return SmallMesh(vertices, triangles, colors, np.zeros((0, 2), np.int64), np.zeros((0, 3), np.uint8))
@@ -75,8 +76,8 @@ def _cells(vertices: Float, low: Float, cell: float) -> tuple[NDArray[np.int64],
 def _faces(
     cluster: NDArray[np.int64], triangles: NDArray[np.int64]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
-    """Triangles that stay (one of each three clusters), edges (E, 2) of those that thinned to a line where no triangle has
-    that edge, and the triangle of each edge.
+    """Triangles that stay (their corners lie in three clusters); edges (E, 2) of triangles that thinned to a line, where no
+    triangle that stays has that edge; and the triangle of each edge.
     """
     corner = np.sort(cluster[triangles], axis=1)
     whole = (corner[:, 0] != corner[:, 1]) & (corner[:, 1] != corner[:, 2])
@@ -95,7 +96,7 @@ def _faces(
 def _representatives(
     vertices: Float, triangles: NDArray[np.int64], cluster: NDArray[np.int64], low: Float, cell: float
 ) -> Float:
-    """The point of each cluster that is nearest to the planes of its triangles."""
+    """The point of each cluster that is nearest to the planes of the cluster's triangles."""
     count = len(low)
     members = np.bincount(cluster, minlength=count)[:, None]
     mean = np.column_stack([np.bincount(cluster, vertices[:, i], count) for i in range(3)]) / members

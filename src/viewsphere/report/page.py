@@ -28,12 +28,12 @@ def page(title: str, data: Mapping[str, Any]) -> str:
 
 
 def script_json(value: object) -> str:
-    """JSON that can stand in a script element: no text in it can end the element or begin a comment."""
+    """JSON that is safe in a script element: no text in it can end the element or begin a comment."""
     return json.dumps(value, ensure_ascii=False, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
 
 
 def _modules() -> dict[str, str]:
-    """The page's own modules as data URLs, by the names they import one another by."""
+    """The page's own modules as data URLs, by the names under which they import one another."""
     scripts = sorted(WEB.glob("*.js"))
     return {
         f"report/{file.name}": "data:text/javascript;base64," + base64.b64encode(file.read_bytes()).decode("ascii")

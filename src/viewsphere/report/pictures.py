@@ -35,7 +35,7 @@ VIRIDIS = np.array(
     ],
     np.float64,
 )
-"""Nine even steps of matplotlib's viridis (CC0): equal steps in lightness, the same to colour-blind eyes; near is light."""
+"""Nine even steps of matplotlib's viridis (CC0): equal steps in lightness, also to colour-blind eyes; near is light."""
 
 PART_COLORS = np.array(
     [(68, 119, 170), (238, 102, 119), (34, 136, 51), (204, 187, 68), (102, 204, 238), (170, 51, 119), (221, 170, 119)], np.uint8
@@ -44,7 +44,7 @@ PART_COLORS = np.array(
 
 @dataclass(frozen=True)
 class Scale:
-    """How large pictures are: width in pixels and WebP quality of the colours, width of the other layers."""
+    """Sizes of a frame's pictures: width in pixels and WebP quality of the colours, width of the other layers."""
 
     width: int
     quality: int
@@ -70,10 +70,10 @@ Layers = dict[str, Any]
 def layers_within(
     dataset: Sequence[Sample], positions: Sequence[int], budget: int, progress: Callable[[int], None] | None = None
 ) -> list[Layers]:
-    """The layers of the samples at these positions, as large as together fit into `budget` bytes of text.
+    """The layers of the samples at these positions, as large as fit together into `budget` bytes of text.
 
-    A sample is read when it is its turn and let go, for its arrays are many times larger than its pictures. The
-    scale is tried on a few frames first. Raises UserError if the smallest does not fit.
+    Only one sample is in memory at a time, since its arrays are many times larger than its pictures. The scale is tried on a
+    few frames first. Raises UserError if the smallest scale does not fit.
     """
     probes = [positions[i] for i in np.unique(np.linspace(0, len(positions) - 1, PROBES).astype(int))] if positions else []
     for scale in SCALES:
@@ -108,10 +108,10 @@ def _weight(found: Mapping[str, Any]) -> int:
 
 
 def layers(sample: Sample, scale: Scale) -> Layers:
-    """The frame's pictures as data URLs, by name, those whose channels are there, and the range of depth in metres.
+    """The frame's pictures as data URLs, by name, for the channels that it has, and the range of depth in metres.
 
-    `rgb` is the picture, with alpha where only that is kept; `depth`, `normals`, `coordinates` and `parts` are transparent
-    where they say nothing.
+    `rgb` is the picture, with alpha where only the picture with alpha is kept; `depth`, `normals`, `coordinates` and `parts`
+    are transparent where they have no value.
     """
     found: Layers = {}
     channels = sample.channels
@@ -140,7 +140,7 @@ def webp(picture: Picture, quality: int) -> str:
 def depth_colors(depth: NDArray[np.float32]) -> tuple[float, float, Picture]:
     """Near and far metres, and the depth between them in viridis, near light, (H, W, 4); clear where nothing is hit.
 
-    Far is the 98th percentile, so that a ground plane that runs to the horizon leaves colours for the objects.
+    Far is the 98th percentile, so that a ground plane up to the horizon leaves colours for the objects.
     """
     hit = np.isfinite(depth)
     near, far = (float(v) for v in np.percentile(depth[hit], (0, 98))) if hit.any() else (0.0, 0.0)

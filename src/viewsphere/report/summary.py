@@ -1,4 +1,4 @@
-"""What a report says in numbers, counted over all frames, as plain data."""
+"""A report's numbers, counted over all frames, as plain data."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from viewsphere.report.unknown import number, numbers
 from viewsphere.store import Dataset
 
 BINS = 24
-"""Bins that a histogram aims at."""
+"""Bins that a histogram has, about."""
 
 HUES = 6
-"""Categories with a colour of their own; further ones share a grey."""
+"""Categories with a colour of their own; all others share a grey."""
 
 UNNAMED = "unknown"
 
@@ -49,7 +49,7 @@ def summary(dataset: Dataset, table: FrameTable) -> dict[str, Any]:
 
 
 def hues(counts: Sequence[tuple[int, int]]) -> dict[int, int]:
-    """The colour's number of each category id of (id, objects): the most frequent get 0 to 5 in order of ids, others -1."""
+    """The number of each category id's colour, from (id, objects): the most frequent get 0 to 5 in order of ids, others -1."""
     ranked = sorted(counts, key=lambda c: (-c[1], c[0]))[:HUES]
     colored = sorted(identifier for identifier, _ in ranked)
     return {identifier: colored.index(identifier) if identifier in colored else -1 for identifier, _ in counts}
@@ -145,7 +145,7 @@ def _histogram(values: NDArray[np.float32], edges: NDArray[np.float64]) -> list[
 
 
 def nice_edges(values: NDArray[np.floating], bins: int = BINS) -> NDArray[np.float64]:
-    """Edges of about `bins` equal bins at round numbers that hold all the values; empty for none."""
+    """Edges of about `bins` equal bins at round numbers that contain all values; empty if there are no values."""
     if not len(values):
         return np.zeros(0)
     low, high = round(float(values.min()), 5), round(float(values.max()), 5)

@@ -29,8 +29,8 @@ FRAME = np.dtype(
         ("height", "i4"),
     ]
 )
-"""A finished frame: `split` and `subject` (its first object's model, else category) index names; degrees, metres, pixels; a
-camera that is not known is NaN, a size that is not known 0.
+"""A finished frame: `split` and `subject` (its first object's model, else category) index names; degrees, metres, pixels; an
+unknown camera is NaN, an unknown size 0.
 """
 
 OBJECT = np.dtype(
@@ -50,19 +50,19 @@ OBJECT = np.dtype(
 )
 """An object of a frame: `frame` is the row of its frame, `model` and `pose` index names, `category` is the category's id.
 
-`side` is the square root of the 2D box's area in pixels; the view's angles are degrees, its distance metres; NaN where there
-is none.
+`side` is the square root of the 2D box's area in pixels; the view's angles are degrees, its distance metres; NaN where an
+object has no such value.
 """
 
 CHUNK = 2048
-"""Frames that a process reads at a time."""
+"""Frames that a process reads in one piece."""
 
 Listener = Callable[[int, int], None]
 
 
 @dataclass(frozen=True, eq=False)
 class FrameTable:
-    """All finished frames in order and their objects, rows of `FRAME` and `OBJECT`, and the names that codes stand for."""
+    """All finished frames in order and their objects, rows of `FRAME` and `OBJECT`, and the names that indices stand for."""
 
     frames: NDArray[Any]
     objects: NDArray[Any]
@@ -153,7 +153,7 @@ def _columns(o: ObjectAnnotation) -> tuple[float, ...]:
 
 
 def _joined(tables: list[FrameTable]) -> FrameTable:
-    """Tables one behind the other, in one numbering of names."""
+    """Tables one behind the other, with one numbering of names."""
     splits, subjects, models, poses = _Names(), _Names(), _Names(), _Names()
     start = 0
     for table in tables:

@@ -1,4 +1,4 @@
-"""Numbers as JSON takes them, null for what is not known."""
+"""Numbers as JSON takes them, null for unknown ones."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The sky that the sun's place makes: Preetham et al. 1999 (*A Practical Analytic Model for Daylight*), CIE's overcast sky."""
+"""The sky in daylight: Preetham et al. 1999 (*A Practical Analytic Model for Daylight*), and CIE's overcast sky."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from viewsphere.model.scene import Daylight, Sun
 Float = NDArray[np.float64]
 
 _CLEAR = 21.0
-"""kcd/m2 that are a radiance of 1 under a clear sky: it lights a white floor by 0.5 where the sun stands at 60 degrees."""
+"""kcd/m2 of a clear sky that make a radiance of 1: so it lights a white floor by 0.5 where the sun stands at 60 degrees."""
 _OVERCAST = 7.4
-"""The same of an overcast sky: 0.8, for a photographer would open the lens."""
-_OPENED = 0.75  # of the stops that are missing
-_LOWEST = 0.01  # sine of the elevation from which on a sky is the horizon's
-_GROUND_FADE = 0.09  # sine of the elevation below the horizon from which on ground hides what is behind it
-_GROUND_HAZE = 0.12  # sine of the elevation over which the horizon's light fades below that
+"""The same for an overcast sky, which lights the floor by 0.8, since a photographer would open the lens."""
+_OPENED = 0.75  # share of the missing stops by which the lens is opened
+_LOWEST = 0.01  # sine of the lowest elevation whose colour is computed; below, the sky has this colour down to the horizon
+_GROUND_FADE = 0.09  # sine of the depression below the horizon at which the sky begins to fade into ground
+_GROUND_HAZE = 0.12  # sine of the further depression over which it fades
 _WAVELENGTHS = np.array([0.61, 0.55, 0.465])  # of red, green and blue, micrometres
-_OZONE = np.array([0.122, 0.084, 0.009]) * 0.35  # absorption, of 0.35 cm
+_OZONE = np.array([0.122, 0.084, 0.009]) * 0.35  # absorption of 0.35 cm of ozone
 _RGB_FROM_XYZ = np.array(
     [[3.2404542, -1.5371385, -0.4985314], [-0.969266, 1.8760108, 0.041556], [0.0556434, -0.2040259, 1.0572252]]
 )
 
-# Perez' five numbers of Y, x and y: turbidity's factor and the rest.
+# Perez' five coefficients of Y, x and y: the factor of turbidity, and the constant.
 _PEREZ = np.array(
     [
         [[0.1787, -1.4630], [-0.3554, 0.4275], [-0.0227, 5.3251], [0.1206, -2.5771], [-0.0670, 0.3703]],
@@ -33,7 +33,7 @@ _PEREZ = np.array(
         [[-0.0167, -0.2608], [-0.0950, 0.0092], [-0.0079, 0.2102], [-0.0441, -1.6537], [-0.0109, 0.0529]],
     ]
 )
-# x and y overhead: powers of turbidity 2, 1, 0 by powers of the sun's angle from the zenith 3, 2, 1, 0.
+# x and y at the zenith: powers of turbidity 2, 1, 0 by powers of the sun's zenith angle 3, 2, 1, 0.
 _ZENITH = np.array(
     [
         [[0.00166, -0.00375, 0.00209, 0.0], [-0.02903, 0.06377, -0.03202, 0.00394], [0.11693, -0.21196, 0.06052, 0.25886]],
@@ -45,8 +45,8 @@ _ZENITH = np.array(
 def opening(elevation_deg: float, daylight: Daylight) -> float:
     """Factor of all daylight, sun and sky alike: how far a photographer opens the lens, so that evenings and clouds are seen.
 
-    A half-ball measures the light, as an exposure meter does; three of four stops that are missing to
-    a clear sky with the sun at 60 degrees are made up for. Strengths do not count: what a user makes brighter is brighter.
+    A hemisphere measures the light, as an exposure meter does; three quarters of the stops that the light lacks compared with
+    a clear sky and the sun at 60 degrees are made up for. `strength` does not count: a sky that a user makes brighter stays so.
     """
     return (_measured(60.0, Daylight()) / _measured(elevation_deg, daylight)) ** _OPENED
 
@@ -61,13 +61,13 @@ def _measured(elevation_deg: float, daylight: Daylight) -> float:
 
 
 def air(elevation_deg: float, daylight: Daylight) -> Float:
-    """What the air leaves of the sun's red, green and blue, (3,): about 1 at 60 degrees in ordinary air, 0 behind clouds."""
+    """Share of the sun's red, green and blue that passes the air, (3,): about 1 at 60 degrees in ordinary air, 0 in cloud."""
     through = _transmittance(elevation_deg, daylight.turbidity) / _transmittance(60.0, 3.0)
     return through * (1 - daylight.clouds)
 
 
 def _transmittance(elevation_deg: float, turbidity: float) -> Float:
-    """Preetham et al. 1999, appendix A.1: Rayleigh's, haze's and ozone's; Kasten's length of the way through the air."""
+    """Preetham et al. 1999, appendix A.1: transmittance by Rayleigh scattering, haze and ozone; Kasten's relative air mass."""
     elevation = max(elevation_deg, 0.0)
     mass = 1 / (math.sin(math.radians(elevation)) + 0.15 * (3.885 + elevation) ** -1.253)
     haze = 0.04608365822050 * turbidity - 0.04586025928522
@@ -77,7 +77,7 @@ def _transmittance(elevation_deg: float, turbidity: float) -> Float:
 def daylight_picture(elevation_deg: float, daylight: Daylight, height: int) -> NDArray[np.float32]:
     """The sky, (height, 2 * height, 3): equirectangular, z up, the sun in the middle column; of strength 1.
 
-    Below the horizon its light fades into half as much, with less colour.
+    Below the horizon its light fades to half as much, with less colour.
     """
     row = (0.5 - (np.arange(height) + 0.5) / height) * np.pi
     column = (np.arange(2 * height) + 0.5) / (2 * height) * 2 * np.pi - np.pi
@@ -111,7 +111,7 @@ def _clear(sine: Float, toward: Float, sun: float, turbidity: float) -> Float:
 
 
 def _daylight_locus(x: Float) -> Float:
-    """The least y of daylight of this x: Perez' fit turns purple far from the sun, which no sky does.
+    """The least y of daylight with this x: Perez' fit turns purple far from the sun, as no sky does.
 
     The curve through all measured daylight of Judd et al. 1964, as CIE 15 has it; level where it would bend down.
     """

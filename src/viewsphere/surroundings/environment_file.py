@@ -1,4 +1,4 @@
-"""Pictures of the whole sphere: Radiance HDR (RGBE) and OpenEXR, and ordinary pictures as a makeshift."""
+"""Environment pictures, of the whole sphere: Radiance HDR (RGBE) and OpenEXR, and ordinary pictures as a makeshift."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from viewsphere.surroundings.kernels_rgbe import decode_rows
 Float32 = NDArray[np.float32]
 
 FIELD = "scene.sky.hdri"
-"""The recipe's field that names such pictures."""
+"""The recipe's field that names environment pictures, for messages."""
 
 SHARPEST = 4096
-"""Greatest width of what is kept, in texels."""
+"""Greatest width, in texels, at which an environment is kept."""
 
-_MOST_MENDED = 0.01  # share of texels that are no numbers
-_BRIGHTEST = 1e6  # anything more is as good as infinite
-_ROUNDING = -1e-3  # compression makes light as negative as this
+_MOST_MENDED = 0.01  # greatest share of texels that may be NaN
+_BRIGHTEST = 1e6  # radiance from which on a texel counts as infinite
+_ROUNDING = -1e-3  # least radiance that counts as the rounding of a compression
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,11 +37,12 @@ class EnvironmentPicture:
 
 
 def read_environment(path: Path) -> EnvironmentPicture:
-    """Read an equirectangular picture; what it is says its content, not its name. No wider than `SHARPEST`.
+    """Read an equirectangular picture, its format told by its content, not by its name; reduced to at most `SHARPEST` wide.
 
-    A few texels that are no numbers become 0, infinite ones the greatest there is, negative ones 0. PNG, JPEG and the
-    like are taken as sRGB. Raises RecipeError, beginning with the recipe's field: no such file, nothing that can be read,
-    damaged, more pixels than `limits` allows, not twice as wide as high, more than a hundredth of it no numbers.
+    A few NaN texels become 0, infinite ones the greatest radiance there is, negative ones 0. PNG, JPEG and the
+    like are taken as sRGB. Raises RecipeError, beginning with the recipe's field, for a file that does not exist, cannot be
+    read, is damaged, has more pixels than `limits` allows, is not twice as wide as high, or is NaN in more than a hundredth of
+    its texels.
     """
     try:
         return _read(path)
@@ -71,13 +72,13 @@ def _read_exr(path: Path, head: ExrHead) -> Float32:
 
     try:
         with silenced(), OpenEXR.File(str(path), separate_channels=True) as file:
-            if not file.parts:  # what the library gives for pixels that it cannot read
+            if not file.parts:  # OpenEXR returns no parts for pixels that it cannot read
                 raise _error(path, "found one whose pixels cannot be read: damaged or cut off; get or export it again")
             channels: Any = file.parts[head.part].channels
             planes = [np.asarray(channels[name].pixels, np.float32) for name in head.channels]
     except (UnreadableError, MemoryError):
         raise
-    except Exception as error:  # OpenEXR raises whatever its parser does
+    except Exception as error:  # OpenEXR's parser may raise anything
         raise _error(path, f"found one that cannot be decoded ({str(error)[:120]})") from None
     if any(plane.shape != (head.height, head.width) for plane in planes):
         raise _error(path, "found channels of different sizes")
@@ -118,14 +119,14 @@ def _read_ordinary(path: Path) -> Float32:
         raise _error(path, "found something else") from None
     except MemoryError:
         raise
-    except Exception as error:  # Pillow's decoders raise whatever their format's parser does
+    except Exception as error:  # Pillow's decoders raise the errors of their formats' parsers
         raise _error(path, f"found one that cannot be decoded ({str(error)[:120]})") from None
     curve = linear(np.arange(256) / 255).astype(np.float32)
     return curve[np.broadcast_to(eight.reshape(*eight.shape[:2], -1), (*eight.shape[:2], 3))]
 
 
 def _mended(path: Path, pixels: Float32, notes: list[str]) -> Float32:
-    """Every texel a finite number of at least 0."""
+    """The pixels with every texel made a finite number of at least 0; adds to `notes` what had to be mended."""
     low, high = float(pixels.min()), float(pixels.max())
     if low >= 0 and 0 < high <= _BRIGHTEST:
         return pixels
@@ -148,7 +149,7 @@ def _mended(path: Path, pixels: Float32, notes: list[str]) -> Float32:
 
 
 def _reduced(pixels: Float32) -> Float32:
-    """No wider than `SHARPEST`: each texel the mean of all that it covers."""
+    """The picture reduced to at most `SHARPEST` wide: each texel the mean of all that it covers."""
     from PIL import Image
 
     if pixels.shape[1] <= SHARPEST:

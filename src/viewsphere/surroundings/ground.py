@@ -1,6 +1,6 @@
 """The ground's material: its pictures repeat over the world, u along x and v against y, so that they lie as on a map.
 
-They need no rule for what is far away: a pixel there covers many repeats, and the last mip level, one texel, is their mean.
+Distance needs no special rule: a far pixel covers many repeats, and the last mip level, one texel, is their mean.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from viewsphere.errors import RecipeError
 from viewsphere.model.scene import Ground
 
 SHARPEST = 4096
-"""Longest side, in texels, of what is kept of a picture."""
+"""Longest side, in texels, at which a picture is kept."""
 
 IMAGES = ("image", "roughness_image", "normal_image")
 """Fields of `Ground` that name pictures."""
@@ -28,7 +28,7 @@ IMAGES = ("image", "roughness_image", "normal_image")
 def ground_material(ground: Ground) -> tuple[Material, tuple[Image, ...]]:
     """The ground as a glTF material and the images it names; equal grounds give the same objects while files do not change.
 
-    Textures are used with (x, -y) / tile of the world; a picture that is not square keeps the proportions of the first one
+    Textures are used with (x, -y) / tile of the world; a picture that is not square keeps the proportions of the first picture
     named. Where `image` is clear the ground's colour alone is seen; of `roughness_image` green counts, as in glTF. Raises
     RecipeError, naming the field, for a picture that cannot be read.
     """
@@ -53,7 +53,7 @@ def ground_frame(ground: Ground, material: Material, origin: ArrayLike, unit: fl
 
 
 def ground_albedo(material: Material, images: tuple[Image, ...]) -> NDArray[np.float64]:
-    """Mean linear colour (3,): what the ground throws back of the light."""
+    """Mean linear colour (3,): the share of the light that the ground reflects."""
     color = np.array(material.base_color[:3])
     if material.base_color_texture is None:
         return color
@@ -85,7 +85,7 @@ def _material(described: str, stamps: tuple[int, ...]) -> tuple[Material, tuple[
 
 
 def _image(name: str, path: str) -> Image:
-    """A picture as glTF wants it for this use, opaque, at most `SHARPEST` texels a side."""
+    """The picture that a field names, as glTF wants it for that field's use, opaque, at most `SHARPEST` texels a side."""
     from PIL import Image as Pillow
 
     try:
@@ -107,7 +107,7 @@ def _image(name: str, path: str) -> Image:
 
 
 def _stamp(ground: Ground, name: str) -> int:
-    """Changes with the file that a field names."""
+    """Time of change of the file that a field names, so that a changed file is read again."""
     path = getattr(ground, name)
     try:
         return Path(path).stat().st_mtime_ns if path else 0

@@ -9,7 +9,7 @@ from viewsphere.kernels.jit import inner, njit
 
 @njit(_nrt=True)
 def decode_rows(data, rows, columns):
-    """Pixels (rows, columns, 3) float32 of a picture's bytes, and how many of its rows were whole."""
+    """Pixels (rows, columns, 3) float32 of a picture's bytes, and the number of its undamaged rows."""
     out = np.zeros((rows, columns, 3), np.float32)
     row = np.zeros((columns, 4), np.uint8)
     at = 0
@@ -31,7 +31,7 @@ def decode_rows(data, rows, columns):
 
 @inner
 def _new_row(data, at, row):
-    """Where the next row begins, -1 if this one is damaged."""
+    """Decode a row in the new encoding; returns where the next row begins, -1 if this row is damaged."""
     at += 4
     for c in range(4):
         j = 0
@@ -53,7 +53,7 @@ def _new_row(data, at, row):
 
 @inner
 def _old_row(data, at, row):
-    """The same; (1, 1, 1, n) repeats the texel before it n times, in a row of such n times 256, and so on."""
+    """As `_new_row`, in the old encoding: (1, 1, 1, n) repeats the texel before n times, the next one n times 256, ..."""
     j, shift = 0, 0
     while j < row.shape[0]:
         if at + 4 > data.shape[0]:

@@ -1,4 +1,4 @@
-"""Any sky as pictures of the whole sphere: what lights the scene, and what is seen behind it."""
+"""Any sky as pictures of the whole sphere: the light on the scene, and the sky seen behind it."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
 
 SURROUNDINGS = 0.3
-"""Reflectance of what lies below a made sky's horizon where there is no ground."""
+"""Reflectance of the imagined ground below a made sky's horizon where the scene has no ground."""
 
 HALO = 0.32
-"""Radiance around the sun before a gradient, in the sun's irradiance."""
+"""Radiance of the glow around the sun in a gradient, as a share of the sun's irradiance."""
 
 HEIGHT = 256
-"""Rows of the picture of a made sky."""
+"""Rows of the picture that is made of a gradient or daylight."""
 
 
 class SkyPictures(NamedTuple):
@@ -39,10 +39,10 @@ class SkyPictures(NamedTuple):
 
 
 def sky_pictures(sky: AnySky, sun: Sun | None, lights: Sequence[AnyLight], has_ground: bool) -> SkyPictures:
-    """The sky with the light of all hemisphere lights; the sun is not in it, but where a photograph shows it.
+    """The sky with the light of all hemisphere lights, without the sun unless a photograph shows it.
 
-    Without a ground there is grey below a made sky, which shines with what it receives. Raises RecipeError when a picture
-    cannot be read.
+    Without a ground there is grey below a made sky, which reflects the light that it receives. Raises RecipeError when a
+    picture cannot be read.
     """
     even = even_light(lights)
     if isinstance(sky, Environment):
@@ -74,7 +74,7 @@ def even_light(lights: Sequence[AnyLight]) -> Float:
 
 
 def gradient_share(sine: Float) -> Float:
-    """How far a gradient's colour is from the horizon's towards the zenith's, 0..1, by the sine of the elevation."""
+    """Place of a gradient's colour between the horizon's (0) and the zenith's (1), by the sine of the elevation."""
     return 1 - (1 - np.maximum(sine, 0)) ** 3
 
 
@@ -97,7 +97,7 @@ def _halo(sun: Distant | None, sine: Float) -> Float32:
 
 
 def _with_even(picture: Float32, even: Float) -> Float32:
-    """The picture with more light from above and from below; itself where there is none."""
+    """The picture with more light from above and from below; the same array where there is no such light."""
     if not even.any():
         return picture
     half = len(picture) // 2
@@ -108,7 +108,7 @@ def _with_even(picture: Float32, even: Float) -> Float32:
 
 
 def _received(lighting: Float32, sine: Float, sun: Distant | None) -> Float:
-    """Radiance (3,) of a white level floor under the upper half of a picture and the sun."""
+    """Radiance (3,) of a white level floor lit by the upper half of a picture and by the sun."""
     weight = np.maximum(sine, 0) * np.sqrt(1 - sine**2) * (2 * math.pi / HEIGHT)
     up = weight @ lighting.mean(axis=1, dtype=np.float64)
     return up if sun is None else up + np.array(sun.irradiance) * sun.direction[2] / math.pi

@@ -1,4 +1,4 @@
-"""The sun, as it arrives."""
+"""The sun, as its light arrives at the scene."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from viewsphere.surroundings.daylight import air, opening
 
 @dataclass(frozen=True)
 class Distant:
-    """A light so far away that its rays are parallel: unit direction to it, irradiance facing it, how wide it is."""
+    """A light so far away that its rays are parallel: unit direction to it, irradiance facing it, angular diameter."""
 
     direction: tuple[float, float, float]
     irradiance: tuple[float, float, float]
@@ -20,14 +20,14 @@ class Distant:
 
 
 def distant_sun(sun: Sun) -> Distant:
-    """A recipe's sun."""
+    """A recipe's sun as a distant light."""
     x, y, z = orbit_center(math.radians(sun.azimuth_deg), math.radians(sun.elevation_deg), 1.0).tolist()
     r, g, b = (sun.strength * c for c in sun.color)
     return Distant((x, y, z), (r, g, b), sun.angle_deg)
 
 
 def sun_light(sky: AnySky, sun: Sun | None) -> Distant | None:
-    """The sun as it arrives: daylight's air dims and reddens it; None if it does not shine."""
+    """The sun's light as it arrives, dimmed and reddened by daylight's air; None if the sun does not shine."""
     if sun is None or sun.strength <= 0:
         return None
     light = distant_sun(sun)

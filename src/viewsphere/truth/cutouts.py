@@ -13,8 +13,8 @@ from viewsphere.assets.mesh import WRAPS, Material, Mesh, Texture, Wrap
 
 SURFACE, NEVER = -1, -2
 ENDLESS = (-3, -4)
-"""Half a plane, the triangle's, that begins at its edge opposite corner 1, or 2, and is surface all over."""
-SEEN = 1 / 512  # alpha: whatever is not clear
+"""Half of an endless plane: of the triangle's edges only the one opposite corner 1 (or 2) counts, and all of it is surface."""
+SEEN = 1 / 512  # least alpha of a texel that is not clear
 _BORDERS: dict[Wrap, Literal["wrap", "symmetric", "edge"]] = {"repeat": "wrap", "mirror": "symmetric", "clamp": "edge"}
 
 
@@ -51,9 +51,9 @@ NO_CUTOUTS = Cutouts(
 
 
 def mesh_cutouts(mesh: Mesh, label_alpha: float | None) -> tuple[Cutouts, NDArray[np.int32]]:
-    """The mesh's cut-outs and, per triangle, SURFACE, NEVER or its row of `corners`.
+    """The mesh's cut-outs and, for each triangle (T,), SURFACE, NEVER or its row of `corners`.
 
-    Without `label_alpha`, a BLEND material is surface wherever it has a colour, which filtering carries to the next texel.
+    Without `label_alpha`, a BLEND material is surface wherever it has a colour, and one texel beyond, which filtering colours.
     """
     rows = np.full(len(mesh.triangles), SURFACE, np.int32)
     cutouts = NO_CUTOUTS
@@ -76,7 +76,7 @@ def mesh_cutouts(mesh: Mesh, label_alpha: float | None) -> tuple[Cutouts, NDArra
 
 
 def stack_cutouts(parts: Sequence[tuple[Cutouts, NDArray[np.int32]]]) -> tuple[Cutouts, NDArray[np.int32]]:
-    """All meshes' cut-outs as one, and the triangles' rows in it."""
+    """The cut-outs of all meshes as one, and for each triangle (T,) SURFACE, NEVER or its row of `corners` there."""
     cutouts, rows = NO_CUTOUTS, [np.zeros(0, np.int32)]
     for own, own_rows in parts:
         rows.append(np.where(own_rows >= 0, own_rows + len(cutouts.corners), own_rows).astype(np.int32))
@@ -118,7 +118,7 @@ def _material_cutouts(mesh: Mesh, material: Material, chosen: NDArray[np.intp], 
 
 
 def _spread(texels: NDArray[np.uint8], texture: Texture) -> NDArray[np.uint8]:
-    """The highest of each texel and its eight neighbours."""
+    """The greatest alpha of each texel and its eight neighbours, (H, W), wrapped as the texture is."""
     tall = np.pad(texels, ((1, 1), (0, 0)), _BORDERS[texture.wrap_t])
     most = np.maximum(np.maximum(tall[:-2], tall[1:-1]), tall[2:])
     wide = np.pad(most, ((0, 0), (1, 1)), _BORDERS[texture.wrap_s])
@@ -126,6 +126,6 @@ def _spread(texels: NDArray[np.uint8], texture: Texture) -> NDArray[np.uint8]:
 
 
 def _transformed(matrix: NDArray[np.float64], uv: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Written out, because BLAS rounds differently from processor to processor."""
+    """`uv` (..., 2) under the matrix (2, 3). Written out, because BLAS rounds differently from processor to processor."""
     u, v = uv[..., 0], uv[..., 1]
     return np.stack([a * u + b * v + c for a, b, c in matrix], axis=-1)

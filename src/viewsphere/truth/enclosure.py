@@ -1,4 +1,4 @@
-"""Whether one stands inside of something."""
+"""Whether a point lies inside a mesh, as a camera in a house does."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ DIRECTIONS = 64
 
 
 def sky_hidden(vertices: Float, triangles: NDArray[np.int32], point: Float) -> float:
-    """The share of the upper half of all directions in which a mesh lies, seen from a point (3,) in its axes (+Z up).
+    """Share of the upper hemisphere that a mesh hides from a point (3,); point and vertices in one frame, +Z up.
 
-    1 inside a house, whether it has a floor or walls of any thickness; 0 where the mesh is not overhead, in a street or among
-    hills; in between beside a wall or below a tree.
+    1 inside a house, whatever its floor and the thickness of its walls; 0 where no part of the mesh is overhead, as in a street
+    or among hills; in between beside a wall or below a tree.
     """
     from viewsphere.truth.kernels_enclosure import hits_any
 
@@ -26,7 +26,7 @@ def sky_hidden(vertices: Float, triangles: NDArray[np.int32], point: Float) -> f
 
 
 def _upward() -> Float:
-    """Directions spread evenly over the upper half of a sphere, on a Fibonacci spiral."""
+    """Unit vectors spread evenly over the upper hemisphere, on a Fibonacci spiral."""
     z = (np.arange(DIRECTIONS) + 0.5) / DIRECTIONS
     turn = np.arange(DIRECTIONS) * math.pi * (3 - math.sqrt(5))
     level = np.sqrt(1 - z * z)

@@ -13,8 +13,8 @@ import numpy as np
 from viewsphere.kernels.jit import inner, njit
 
 ONE = np.float32(1)
-NONE = -2  # no triangle, nor the background's -1
-AHEAD = 64  # pixels that are compared at once: more than compilers unroll instead
+NONE = -2  # stands for no triangle yet; the background is -1
+AHEAD = 64  # pixels that are compared at once: so many that compilers emit vectors instead of unrolling
 
 
 @njit
@@ -31,7 +31,7 @@ def depths(inverse, rays, out):
 
 @njit
 def labels(seen, table, empty, out):
-    """table[triangle], or `empty` where none."""
+    """table[triangle] for each pixel, or `empty` where no triangle is seen."""
     height, width = seen.shape
     for y in range(height):
         for x in range(width):
@@ -41,7 +41,7 @@ def labels(seen, table, empty, out):
 
 @njit
 def instances(seen, objects, ids, area, box):
-    """Ids of the objects seen; adds to their pixels (count + 1,), widens their tight half-open boxes (count + 1, 4), by id."""
+    """Ids of the objects seen; adds to each id's pixel count (count + 1,), widens its tight half-open box (count + 1, 4)."""
     height, width = np.uintp(seen.shape[0]), np.uintp(seen.shape[1])
     for y in range(height):
         for x in range(width):
@@ -64,7 +64,7 @@ def instances(seen, objects, ids, area, box):
 
 @inner
 def _goes_on(ids, y, x, own):
-    """Whether the next AHEAD pixels of row y, from x on, are this object's too."""
+    """Whether the next AHEAD pixels of row y, from x on, show object `own`, too."""
     different = np.int32(0)
     for k in range(np.uintp(AHEAD)):
         different |= ids[y, x + k] ^ own
@@ -148,7 +148,7 @@ def normals_geometric(seen, triangle_normals, rays, camera_from_p, rotation, out
     for y in range(height):
         for x in range(width):
             t = seen[y, x]
-            if t != last:  # the camera is on one side of the triangle's plane: the sign holds for all its pixels
+            if t != last:  # the camera is on one side of the triangle's plane: the sign holds for all pixels of the triangle
                 last, nx, ny, nz = t, 0.0, 0.0, 0.0
                 if t >= 0:
                     px, py, pz = (rays[y, x, 0], rays[y, x, 1], rays[y, x, 2]) if table else (x + 0.5, y + 0.5, 1.0)
@@ -173,7 +173,7 @@ def normals_shading(seen, triangles, q, rays, values, side, triangle_normals, ca
     """Interpolated vertex normals (`values`, world) in camera axes, on the triangle's visible side, never away from the ray.
 
     `side` is 1 where a triangle's vertex normals agree with its winding, -1 where they oppose it, 2 or -2 likewise where all
-    three equal the triangle's own normal.
+    three vertex normals equal the triangle's own.
     """
     height, width = seen.shape
     table = rays.shape[0] > 0
@@ -196,7 +196,7 @@ def normals_shading(seen, triangles, q, rays, values, side, triangle_normals, ca
             px, py, pz = (rays[uy, ux, a], rays[uy, ux, b], rays[uy, ux, c]) if table else (x + 0.5, y + 0.5, 1.0)
             i0, i1, i2 = np.uintp(triangles[ut, a]), np.uintp(triangles[ut, b]), np.uintp(triangles[ut, c])
             e0, e1, e2 = _edges(q, i0, i1, i2, px, py, pz)
-            # the e_i have the sign of g . ray, g the normal by winding: the sum turns with the side that is seen
+            # The e_i have the sign of g . ray, g being the normal by winding: the sum turns with the visible side.
             sign = -np.float64(side[ut])
             wx = sign * (e0 * values[i0, a] + e1 * values[i1, a] + e2 * values[i2, a])
             wy = sign * (e0 * values[i0, b] + e1 * values[i1, b] + e2 * values[i2, b])

@@ -16,19 +16,19 @@ import numpy as np
 from viewsphere.kernels.jit import inner, njit
 from viewsphere.truth.kernels_row import FOUR, NEARER, draw_four, shows_farther
 
-EPSILON = 1e-5  # pixels a bounding box is widened by: more than the edge functions' rounding
+EPSILON = 1e-5  # pixels by which a bounding box is widened: more than the edge functions' rounding
 BEHIND = -(1 << 30)
-ROUNDED_UP = 1.0 + 1e-9  # of 1/z between a triangle's corners
+ROUNDED_UP = 1.0 + 1e-9  # bounds the rounding of 1/z between a triangle's corners
 SLIVER = 1e-5  # twice the area in pixels below which the sign of a triangle's area is not trusted
-SMALL = 2 * FOUR  # pixels: the width up to which testing every pixel beats computing spans
-NEVER, CLAMP, MIRROR = -2, 1, 2  # as in cutouts.py, below NEVER what is endless
-ENDLESS_1 = -3  # of a triangle's edges only that opposite corner 1 is one, else that opposite corner 2
-HORIZON = 1e-10  # of 1/z's coefficients: what is nearer to a plane's horizon, within rounding, is beyond it
+SMALL = 2 * FOUR  # pixels: up to this width testing every pixel is faster than computing spans
+NEVER, CLAMP, MIRROR = -2, 1, 2  # as in cutouts.py; values below NEVER stand for endless triangles
+ENDLESS_1 = -3  # of an endless triangle's edges only the one opposite corner 1 counts; else the one opposite corner 2
+HORIZON = 1e-10  # of 1/z's coefficients: a point nearer than this to a plane's horizon may be beyond it by rounding
 
 
 @njit
 def transform(vertices, start, stop, m, homogeneous):
-    """(u, v, w) = m (x, y, z, 1) of vertices [start, stop), and 1/w, (n, 4); no BLAS: its rounding depends on the processor."""
+    """(n, 4): (u, v, w) = m (x, y, z, 1) of vertices [start, stop), and 1/w. No BLAS: its rounding depends on the processor."""
     for i in range(start, stop):
         x, y, z = vertices[i, 0], vertices[i, 1], vertices[i, 2]
         homogeneous[i - start, 0] = m[0, 0] * x + m[0, 1] * y + m[0, 2] * z + m[0, 3]
@@ -39,9 +39,10 @@ def transform(vertices, start, stop, m, homogeneous):
 
 @njit
 def cells(q, samples, x0, y0, width, height, cell):
-    """First and last pixel of each vertex's own bounding box, (n, 4) int32: x, y of the first, -x, -y of the last.
+    """Range of pixels of each vertex's own bounding box, (n, 4) int32: x, y of the first pixel, -x, -y of the last.
 
-    Clamped so that the least over three vertices is the triangle's box in the canvas, empty if outside; BEHIND where w <= 0.
+    The numbers are clamped so that their minimum over three vertices is the triangle's box in the canvas, empty if the triangle
+    is outside; BEHIND where w <= 0.
     """
     for i in range(q.shape[0]):
         w = q[i, 2]
@@ -71,7 +72,7 @@ def is_surface(cutouts, row, b0, b1, b2):
 
 @inner
 def _texel(u, size, wrap):
-    """Index of the nearest texel; wrap as in `mesh.WRAPS`."""
+    """Index of the texel nearest to the coordinate u; wrap as in `mesh.WRAPS`."""
     if wrap == CLAMP:
         u = min(max(u, 0.0), 1.0)
     else:
@@ -84,7 +85,7 @@ def _texel(u, size, wrap):
 
 @inner
 def edge(a, b):
-    """Coefficients of det[p, a, b] in p; those of edge(b, a) are exactly the opposite."""
+    """Coefficients of det[p, a, b] in p; the coefficients of edge(b, a) are exactly the opposite numbers."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
@@ -107,7 +108,7 @@ def negated(e):
 def edges_inside(q0, q1, q2, normal, det, cutout):
     """Coefficients of a triangle's edges that are not negative inside, whatever its winding; `plane` gives normal and det.
 
-    Those of an endless triangle are one of its own, and its plane's horizon, where 1/z = normal.p / det becomes 0.
+    The edges of an endless triangle are one of its own, and the horizon of its plane, where 1/z = normal.p / det becomes 0.
     """
     e0, e1, e2 = edge(q1, q2), edge(q2, q0), edge(q0, q1)
     if det < 0.0:
@@ -128,8 +129,8 @@ def _inside(a, b, c, px, f0, f1, f2):
 def draw(q, cell, triangles, span, canvas, cutout, cutouts, nearest, seen):
     """Draw triangles into nearest (1/z, 0 where none) and seen (triangle, -1 where none), both in C order.
 
-    `span` is the first triangle, the one after the last, and the vertex that q[0] stands for; `canvas` the samples of a pixel's
-    side and the canvas' first sample (x, y). `cell` of what is endless is BEHIND.
+    `span` is the first triangle, the one after the last, and the vertex that q[0] stands for; `canvas` is the number of samples
+    along a pixel's side and the canvas' first sample (x, y). `cell` of the vertices of endless triangles is BEHIND.
     """
     height, width = nearest.shape
     first, last, base = span
@@ -171,7 +172,7 @@ def draw(q, cell, triangles, span, canvas, cutout, cutouts, nearest, seen):
 
 @inner
 def _hidden(nearest, xa, ya, xb, yb, most):
-    """Whether all pixels of a narrow box, and those drawn with them, already show something nearer than 1/z = most."""
+    """Whether all pixels of a narrow box, and the pixels drawn together with them, show something nearer than 1/z = most."""
     width = nearest.shape[1]
     left, right, is_wide = _fours(xa, xb, width)
     for y in range(ya, yb + 1):
@@ -184,13 +185,13 @@ def _hidden(nearest, xa, ya, xb, yb, most):
 
 @inner
 def _fours(xa, xb, width):
-    """First pixels of the fours that hold a narrow box's columns, and whether it needs the second."""
+    """First pixels of the groups of four that hold a narrow box's columns, and whether the second group is needed."""
     return min(xa, width - FOUR), min(xa + FOUR, width - FOUR), xb - xa >= FOUR
 
 
 @inner
 def _draw_small(t, e0, e1, e2, n, box, canvas, nearest, seen):
-    """Draw a narrow triangle: every pixel of its box is tested, and some beside it, which it does not cover."""
+    """Draw a narrow triangle: every pixel of its box is tested, and pixels beside the box, which it does not cover."""
     xa, ya, xb, yb = box
     samples, x0, y0 = canvas
     step, width = 1.0 / samples, nearest.shape[1]
@@ -207,9 +208,9 @@ def _draw_small(t, e0, e1, e2, n, box, canvas, nearest, seen):
 
 @inner
 def _draw_rows(t, e0, e1, e2, n, box, canvas, nearest, seen):
-    """Draw a wide triangle row by row: where it begins and ends is computed, then settled by the exact test.
+    """Draw a wide triangle row by row: first and last pixel are computed, then settled by the exact test.
 
-    The crossing -f / e uses the very f of the test, so it is off by a few roundings of itself: far less than EPSILON.
+    The crossing -f / e uses the very f of the test, so it is off by a few of its own roundings: far less than EPSILON.
     """
     xa, ya, xb, yb = box
     samples, x0, y0 = canvas
@@ -245,7 +246,7 @@ def _draw_rows(t, e0, e1, e2, n, box, canvas, nearest, seen):
 
 @inner
 def crossing_at(e, samples):
-    """What f is multiplied by to give the sample at which e x + f is 0; 0 for an edge along the row."""
+    """The factor by which f is multiplied to give the sample at which e x + f is 0; 0 for an edge along the row."""
     return -samples / e if e != 0.0 else 0.0
 
 
@@ -272,6 +273,6 @@ def _draw_checked(t, q0, q1, q2, box, canvas, bounds, cutout, cutouts, nearest, 
 
 @inner
 def hits_surface(cutouts, cutout, e0, e1, e2):
-    """Whether the triangle has no cut-out, or is surface where its edges' functions have these values."""
+    """Whether the triangle is surface where its edge functions have these values: everywhere without a cut-out."""
     total = e0 + e1 + e2
     return cutout < 0 or (total != 0.0 and is_surface(cutouts, cutout, e0 / total, e1 / total, e2 / total))

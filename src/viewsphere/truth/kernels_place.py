@@ -8,14 +8,14 @@ import numpy as np
 
 from viewsphere.kernels.jit import njit
 
-FLAT = 1e-5  # what a corner's normal may differ from its triangle's where the triangle is flat
+FLAT = 1e-5  # greatest difference of a corner's normal from its triangle's where the triangle counts as flat
 
 
 @njit
 def place(m, own, own_normals, is_used, vertices, normals, bounds):
     """World vertices (V, 3) float64 and normals (V, 3) float32 of a mesh in the pose m (4, 4).
 
-    bounds (2, 3): the lowest and the highest of its used vertices, infinite where none is.
+    bounds (2, 3) is filled with the lowest and the highest of its used vertices, infinite where no vertex is used.
     """
     for i in range(own.shape[0]):
         x, y, z = np.float64(own[i, 0]), np.float64(own[i, 1]), np.float64(own[i, 2])

@@ -1,10 +1,10 @@
 """Exact rasterisation along a table of rays (distorted lenses).
 
 A ray d meets a triangle where all e_i . d have the sign of det, e_i = X_j x X_k in camera axes: the pinhole's test without the
-projection, so it holds for rays that look sideways or back. Two indices say which rays to test. A cube around the camera, each
-face cut into cells that know the pixels whose rays pass them, serves small triangles: projected on a face they are bounded by
-their corners. A quadtree over the picture serves the others: a node keeps the box of its rays, and as products and sums are
-monotone in floating point too, the same expression over the box bounds it over the rays. No hit is lost either way.
+projection, so it holds for rays that look sideways or back. Two indices say which rays to test. Small triangles use a cube
+around the camera whose faces are cut into cells, each with the pixels whose rays pass it: projected on a face, a triangle is
+bounded by its corners. All other triangles use a quadtree over the picture: a node keeps the box of its rays, and as products
+and sums are monotone in floating point too, an edge function over the box bounds it over the rays. No hit is lost either way.
 """
 
 from __future__ import annotations
@@ -17,18 +17,18 @@ from viewsphere.kernels.jit import inner, njit
 from viewsphere.truth.kernels_draw import NEVER, edges_inside, hits_surface, plane
 from viewsphere.truth.kernels_row import NEARER
 
-LEAF = 8  # pixels of a leaf's side
-MANY_CELLS, MANY_PIXELS = 64, 1024  # of a triangle's box: beyond them the tree is faster
-WIDER = 1e-9  # of a face: more than the rounding of a projection
-SLIVER = 1e-12  # of the corners' distances' product: below it the sign of det is not trusted
+LEAF = 8  # pixels along a leaf's side
+MANY_CELLS, MANY_PIXELS = 64, 1024  # cells and pixels of a triangle's box beyond which the tree is faster
+WIDER = 1e-9  # widening of a triangle's box on a face: more than the rounding of a projection
+SLIVER = 1e-12  # det, as a share of the product of the corners' distances, below which its sign is not trusted
 ORIGIN = (0.0, 0.0, 0.0)
 NO_BOX = (0, 0, -1, -1)
-ANY_DEPTH = (0.0, np.inf)  # 1/s
+ANY_DEPTH = (0.0, np.inf)  # bounds of 1/s where nothing better is known
 
 
 @njit(_nrt=True)
 def tree_levels(height, width):
-    """Per level, leaves first: index of its first node, rows, columns. (L, 3) int64."""
+    """Index of the first node, rows and columns of each level, leaves first. (L, 3) int64."""
     rows, columns = (height + LEAF - 1) // LEAF, (width + LEAF - 1) // LEAF
     levels = np.zeros((64, 3), np.int64)
     count, start = 0, 0
@@ -43,7 +43,7 @@ def tree_levels(height, width):
 
 @njit(_nrt=True)
 def build_tree(rays, levels):
-    """Box of each node's rays, (N, 6) float64: lowest x, y, z, highest x, y, z; lowest > highest if it has none."""
+    """Box of each node's rays, (N, 6) float64: lowest x, y, z, highest x, y, z; lowest > highest if a node has no rays."""
     height, width = rays.shape[:2]
     boxes = np.empty((levels[-1, 0] + 1, 6))
     boxes[:, :3] = np.inf
@@ -141,7 +141,7 @@ def _lowest(e, box):
 
 @inner
 def _may_hit(e0, e1, e2, sliver, box):
-    """Whether some ray in the box may pass the test of all three edges, with the other sign too for a sliver."""
+    """Whether some ray in the box may pass the test of all three edges; for a sliver also with the other sign."""
     if box[0] > box[3]:
         return False
     if _highest(e0, box) >= 0.0 and _highest(e1, box) >= 0.0 and _highest(e2, box) >= 0.0:
@@ -163,7 +163,7 @@ def _bounds(q0, q1, q2, unit):
 
 @njit
 def limits(q0, q1, q2, det, unit):
-    """Whether the triangle's facing is uncertain, and within what 1/s has to stay."""
+    """Whether the triangle's facing is uncertain, and the bounds that 1/s must stay within."""
     sizes = _distance(q0, ORIGIN) * _distance(q1, ORIGIN) * _distance(q2, ORIGIN)
     sliver = abs(det) < SLIVER * sizes
     return sliver, _bounds(q0, q1, q2, unit) if sliver else ANY_DEPTH
@@ -213,7 +213,7 @@ def draw(q, triangles, span, table, origin, unit, cutout, cutouts, nearest, seen
 
 @njit(_nrt=True)
 def leaf_list(levels):
-    """Room for `touched` to list all leaves of a tree."""
+    """An array large enough for `touched` to list all leaves of a tree."""
     return np.empty((levels[0, 1] * levels[0, 2] + 256, 3), np.int32)
 
 
@@ -221,7 +221,7 @@ def leaf_list(levels):
 def touched(e0, e1, e2, sliver, levels, boxes, window, leaves):
     """Number of leaves in the window (x0, y0, x1, y1) that the triangle may touch; their first pixels (x, y) in `leaves`.
 
-    The list's end serves as the stack: a tree of L levels never has more than 3 L + 1 nodes waiting.
+    The end of the list serves as the stack: a tree of L levels never has more than 3 L + 1 nodes waiting.
     """
     found, top = 0, leaves.shape[0]
     leaves[top - 1] = (len(levels) - 1, 0, 0)

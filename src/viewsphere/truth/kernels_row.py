@@ -1,4 +1,4 @@
-"""Four neighbouring samples of a row at once, on vectors of the processor: the same sums as one by one, bit for bit."""
+"""Four neighbouring samples of a row at once, in the processor's vectors: the same sums as for single samples, bit for bit."""
 
 from __future__ import annotations
 
@@ -10,8 +10,9 @@ from numba.extending import intrinsic
 
 FOUR = 4
 NEARER = 1.0 + 2.0**-22
-"""By how much 1/z of a surface has to exceed that of the one seen so far to be seen instead: what is nearer by less lies in one
-place with it. Four times the rounding of the models' float32 coordinates, which make one plane two, and of float32 depth.
+"""Factor by which 1/z of a surface must exceed that of the surface seen so far to replace it; surfaces closer to each other
+count as lying in one place. Its excess over 1 is four times the rounding of the models' float32 coordinates, which split one
+plane into two, and of float32 depth.
 """
 _REAL, _WHOLE, _FLAGS = ir.DoubleType(), ir.IntType(32), ir.IntType(FOUR)
 _REALS, _WHOLES = ir.VectorType(_REAL, FOUR), ir.VectorType(_WHOLE, FOUR)
@@ -25,7 +26,7 @@ def _spread(builder: Any, value: Any) -> Any:
 
 
 def _from(context: Any, builder: Any, kind: Any, array: Any, at: Any, lanes: Any) -> Any:
-    """Where an array's lanes from this flat index on are."""
+    """Pointer to the lanes of an array from this flat index on."""
     data = context.make_array(kind)(context, builder, array).data
     return builder.bitcast(builder.gep(data, [at]), lanes.as_pointer())
 
@@ -47,9 +48,10 @@ def shows_farther(typing: Any, nearest: Any, at: Any, most: Any) -> Any:
 def draw_four(
     typing: Any, nearest: Any, seen: Any, at: Any, t: Any, first: Any, step: Any, e: Any, f: Any, n: Any, s: Any
 ) -> Any:
-    """Show triangle t at the samples from flat index `at` on, at (first + i) step along the row, that are inside and nearer.
+    """Show triangle t at those of four samples that are inside it and nearer; the samples begin at flat index `at`.
 
-    Inside is where e x + f is not negative for all three edges; 1/z is n x + s, which has to exceed that shown times NEARER.
+    Sample i is at (first + i) step along the row. It is inside where e x + f is not negative for all three edges; its 1/z,
+    n x + s, must exceed the 1/z shown so far times NEARER.
     """
 
     def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:

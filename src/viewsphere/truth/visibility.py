@@ -18,8 +18,8 @@ LARGEST_AROUND = 4_000_000  # pixels of a ray table that reaches beyond the imag
 
 @dataclass(frozen=True, eq=False)
 class Instances:
-    """ids (H, W) int32, the object seen, 0 where none. By id: area (N + 1,), the visible pixels, and box (N + 1, 4), the tight
-    half-open box (x0, y0, x1, y1) of what is visible; meaningless where the area is 0, and for id 0.
+    """ids (H, W) int32: the object seen, 0 where none is. By id: area (N + 1,), the number of visible pixels, and box (N + 1,
+    4), the tight half-open box (x0, y0, x1, y1) of the visible pixels; meaningless where the area is 0, and for id 0.
     """
 
     ids: NDArray[np.int32]
@@ -29,7 +29,7 @@ class Instances:
 
 @dataclass(frozen=True, eq=False)
 class Visibility:
-    """triangle (H, W) int32, -1 where no triangle; inverse_depth (H, W) float32, 1/s, 0 where none.
+    """triangle (H, W) int32: the one seen, -1 where none is; inverse_depth (H, W) float32: 1/s, 0 where no triangle is seen.
 
     The seen point is `center + R.T @ (s * ray)`, ray from `geometry.camera.pixel_rays`: its z is 1 (so s is z-depth) for a
     pinhole and for Brown-Conrady, and its length is 1 for a fisheye, whose rays may look sideways or back.
@@ -37,11 +37,11 @@ class Visibility:
 
     triangle: NDArray[np.int32]
     inverse_depth: NDArray[np.float32]
-    corners: NDArray[np.float64] | None = None  # `homogeneous` of all vertices, for those who need it next
+    corners: NDArray[np.float64] | None = None  # `homogeneous` of all vertices, which labels and the raster engine use again
     _instances: dict[Geometry, Instances] = field(default_factory=dict[Geometry, Instances], repr=False)
 
     def instances(self, geometry: Geometry) -> Instances:
-        """What is seen of the objects of this geometry, whose triangles these are; counted once, so not to be written to."""
+        """The visible pixels of each object; `geometry` must be the one drawn. The arrays are kept: do not write to them."""
         if geometry not in self._instances:
             self._instances[geometry] = _count_instances(geometry, self.triangle)
         return self._instances[geometry]
@@ -68,11 +68,11 @@ def rasterize(
     """Cast one ray through the centre of each pixel, exactly.
 
     A later triangle is seen instead of an earlier one only if it is nearer by more than 2^-22 (2.4e-7) of its depth: of
-    surfaces in one place the first is seen all over, an object before the ground it lies in.
+    surfaces in one place the first one is seen everywhere, so an object before the ground in which it lies.
 
     `subdivision` 2 gives the (2H, 2W) buffer of the centres of a pixel's 2 x 2 quarters (edge anti-aliasing). With an
-    `object_id` that object stands alone, without scenery and ground. `window` replaces the image by another rectangle of
-    pixels, which may lie outside it.
+    `object_id` only that object is drawn, without scenery and ground. `window` replaces the image by another rectangle of
+    pixels, which may lie outside the image.
     """
     everything = (0, len(geometry.triangles), 0, len(geometry.vertices))
     part = _range(geometry, object_id) if object_id else everything
@@ -81,7 +81,7 @@ def rasterize(
 
 
 def with_ground(geometry: Geometry, camera: Camera, visibility: Visibility) -> Visibility:
-    """What is seen where the ground of this geometry is there, too: `visibility` is of all else."""
+    """A new buffer: `visibility`, which shows everything else, with the ground of this geometry drawn into it."""
     ground = geometry.triangle_start[-1], len(geometry.triangles), geometry.vertex_start[-1], len(geometry.vertices)
     shown = visibility.inverse_depth.astype(np.float64), visibility.triangle.copy()
     nearest, seen, _ = _draw(geometry, camera, 1, ground, None, shown)
@@ -89,9 +89,9 @@ def with_ground(geometry: Geometry, camera: Camera, visibility: Visibility) -> V
 
 
 def silhouette(geometry: Geometry, camera: Camera, object_id: int, window: Window) -> NDArray[np.bool_]:
-    """Pixels whose ray meets this object, were it alone: (y1 - y0, x1 - x0) bool over the window.
+    """Pixels whose ray would meet this object if nothing else were there: (y1 - y0, x1 - x0) bool over the window.
 
-    Outside the image too; False where the lens has no ray for a pixel.
+    The window may reach outside the image; False where the lens has no ray for a pixel.
     """
     return _draw(geometry, camera, 1, _range(geometry, object_id), window)[1] >= 0
 
@@ -120,7 +120,7 @@ def homogeneous(geometry: Geometry, camera: Camera, base: int = 0, stop: int | N
 
 
 def lens_rays(camera: Camera) -> NDArray[np.float64] | None:
-    """The image's ray table, (H, W, 3), None for a pinhole; kept for the next frame, so not to be written to."""
+    """The image's ray table, (H, W, 3), None for a pinhole; kept for the next frame, so it must not be written to."""
     image = (0, 0, camera.width, camera.height)
     return None if camera.distortion is None else _ray_table(camera.intrinsics.model_dump_json(), 1, image).rays
 
@@ -146,7 +146,7 @@ class RayTable:
 
 
 def _canvas(camera: Camera, window: Window) -> Window:
-    """The pixels to tabulate for this window: few different ones, so that tables serve many windows and frames."""
+    """The rectangle of pixels to tabulate for this window: one of few, so that a table serves many windows and frames."""
     w, h = camera.width, camera.height
     image, around = (0, 0, w, h), (-w, -h, 2 * w, 2 * h)
     if _within(window, image):
@@ -160,13 +160,13 @@ def _within(a: Window, b: Window) -> bool:
 
 @lru_cache(maxsize=4)
 def _ray_table(lens: str, samples: int, canvas: Window) -> RayTable:
-    """Of the intrinsics with this JSON."""
+    """The table for the intrinsics with this JSON, `samples` x `samples` rays for each pixel of the canvas."""
     intrinsics = Intrinsics.model_validate_json(lens)
     return index_rays(intrinsics, pixel_rays(intrinsics, samples, canvas), samples)
 
 
 def index_rays(intrinsics: Intrinsics, rays: NDArray[np.float64], samples: int) -> RayTable:
-    """The indices over rays (H, W, 3) of a distorted lens, `samples` x `samples` of them a pixel."""
+    """The ray table of a distorted lens with its indices: rays (H, W, 3), `samples` x `samples` of them a pixel."""
     from viewsphere.truth import kernels_rays as kernels
 
     rays.setflags(write=False)
@@ -185,9 +185,10 @@ def _draw(
     window: Window | None,
     shown: tuple[NDArray[np.float64], NDArray[np.int32]] | None = None,
 ) -> tuple[NDArray[np.float64], NDArray[np.int32], NDArray[np.float64]]:
-    """1/s (0 where none) and triangle (-1 where none) over the window, of the part's triangles; its `homogeneous` vertices.
+    """Draw a part's triangles over the window: 1/s (0 where none) and triangle (-1 where none); the part's `homogeneous`
+    vertices.
 
-    They are drawn into what is `shown` already, if it is given.
+    The triangles are drawn into the arrays `shown` already, if these are given.
     """
     from viewsphere.truth import kernels_draw as kernels
     from viewsphere.truth import kernels_rays

@@ -1,7 +1,7 @@
 """Procedural models that ship with the tool, in metres, front -Y, up +Z, standing on z = 0.
 
 A family is one module of this package, named as its file: `NAME(...)` builds a Mesh from parameters and `NAME_random(rng)`
-draws the parameters. Sub-packages hold what families are built from.
+draws the parameters. Sub-packages hold the parts that families are built from.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ def build_zoo_model(spec: ModelSpec) -> Mesh:
 
 
 def real_size(mesh: Mesh) -> tuple[float, float, float]:
-    """Width, height, length (extent along x, z, y) in metres: a zoo mesh has its real size."""
+    """Width, height, length (extent along x, z, y) of a mesh in metres, since a zoo mesh is modelled at real size."""
     low, high = mesh.bounds
     x, y, z = (high - low).tolist()
     return x, z, y

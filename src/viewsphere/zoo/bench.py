@@ -25,7 +25,7 @@ class Bench:
 
 
 def bench(parameters: Bench | None = None) -> Mesh:
-    """The bench in metres: one sits facing -Y, feet on z = 0. Parts: seat, leg, and back if it has one."""
+    """The bench in metres: the sitter faces -Y, feet on z = 0. Parts: seat, leg, and back if it has one."""
     p = parameters or Bench()
     wood, iron = Material("wood", linear(p.wood), roughness=0.65), coated("iron", p.iron, "matte")
     deep, high = 0.44, 0.44
@@ -64,7 +64,7 @@ def _end(p: Bench, x: float, deep: float, high: float, lean: float) -> Solid:
 
 
 def bench_random(rng: np.random.Generator) -> Mesh:
-    """A bench with everything drawn."""
+    """A bench with all parameters drawn."""
     return bench(draw(rng))
 
 

@@ -45,12 +45,12 @@ def bicycle(parameters: Bicycle | None = None) -> Mesh:
 
 
 def bicycle_random(rng: np.random.Generator) -> Mesh:
-    """A bicycle with parameters drawn from what is ridden."""
+    """A bicycle with parameters drawn as they are found on roads."""
     return bicycle(draw(rng))
 
 
 def _grounded(pieces: Sequence[Piece], at: Layout) -> list[Piece]:
-    """Pitched about the rear axle so that the steered front wheel and the rear wheel both touch the ground."""
+    """The pieces pitched about the rear axle so that the steered front wheel and the rear wheel both touch the ground."""
     front, rear = (
         min(float(q.solid.vertices[:, 2].min()) for q in pieces if q.part == f"wheel_{end}_tyre") for end in ("front", "rear")
     )
@@ -60,13 +60,13 @@ def _grounded(pieces: Sequence[Piece], at: Layout) -> list[Piece]:
 
 
 def _room(p: Bicycle) -> Room:
-    """What the wheels need between the stays."""
+    """The room that the wheels need between the stays."""
     outermost = p.gears.line + STEP * p.gears.on
     return Room(max(0.062, outermost + 0.0135), p.wheel.tyre / 2 + (0.0055 if p.guards == "none" else 0.0125))
 
 
 def _hubs(p: Bicycle) -> tuple[Hub, Hub]:
-    """Front and rear."""
+    """Front and rear hub."""
     disc = p.brake == "disc"
     half = _room(p).half - 0.0055
     flange = 0.026 if disc else 0.0195
@@ -79,7 +79,7 @@ def _hubs(p: Bicycle) -> tuple[Hub, Hub]:
 
 
 def _front(p: Bicycle, at: Layout, c: Coats) -> list[Piece]:
-    """All that turns with the handlebar, straight ahead."""
+    """All pieces that turn with the handlebar, steering straight ahead."""
     w, axle = p.wheel, at.front_axle
     blades = unit(at.crown - axle)
     pieces = wheel_pieces(w, _hubs(p)[0], c, "wheel_front", 0.35)
@@ -100,7 +100,7 @@ def _front(p: Bicycle, at: Layout, c: Coats) -> list[Piece]:
 
 
 def _lamp(p: Bicycle, at: Layout, c: Coats) -> list[Piece]:
-    """On the fork's crown, or in front of the bar of a sports bicycle."""
+    """A front lamp, on the fork's crown, or in front of the bar of a sports bicycle."""
     if p.style == "step_through":
         place = at.crown + 0.02 * at.steering + (0, -0.085, 0)
         return fittings.front_light(place, at.crown - 0.004 * at.steering, 1.0, c)
@@ -109,7 +109,7 @@ def _lamp(p: Bicycle, at: Layout, c: Coats) -> list[Piece]:
 
 
 def _rear(p: Bicycle, at: Layout, c: Coats) -> list[Piece]:
-    """All that stays with the frame."""
+    """All pieces that stay with the frame when the bar turns."""
     w, axle, room, hub = p.wheel, at.rear_axle, _room(p), _hubs(p)[1]
     stays = unit(at.on_seat(p.geometry.seat_tube - (0.03 if p.frame.shape == "diamond" else 0.11)) - axle)
     wheel = wheel_pieces(w, hub, c, "wheel_rear", 1.2)
@@ -129,7 +129,7 @@ def _rear(p: Bicycle, at: Layout, c: Coats) -> list[Piece]:
 
 
 def _cable_entry(p: Bicycle, at: Layout) -> tuple[Float, Float]:
-    """Where cables enter the frame, and their direction there: the down tube, or the head tube above a bowed one."""
+    """Where cables enter the frame, and their direction there: in the down tube, or in the head tube above a bowed tube."""
     low, high = at.head
     if p.frame.shape in ("diamond", "mixte"):
         return shifted(between(low, at.bracket, 0.2), z=0.004), unit(at.bracket - low)

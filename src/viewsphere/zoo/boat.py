@@ -23,12 +23,12 @@ Boat = RowingBoat | MotorBoat | SailingBoat
 
 
 def boat(parameters: Boat | None = None) -> Mesh:
-    """The boat in metres: bow towards -Y, its lowest point on z = 0, centred in x and y; a sailing boat if not said.
+    """The boat in metres: bow towards -Y, its lowest point on z = 0, centred in x and y; without parameters a sailing boat.
 
-    Parts of all: hull, antifouling. Rowing boats: inside, ribs, floorboards, thwart, gunwale, rowlock_*,
+    Parts of every boat: hull, antifouling. Rowing boats: inside, ribs, floorboards, thwart, gunwale, rowlock_*,
     oar_*, transom if they have one. Motor boats: deck, cockpit, sole, windscreen or windshield_*, wheel, seats,
     rubbing_strake, cleat_*, outboard_* or stern_drive, propeller, bow_rail if fitted. Sailing boats: deck, keel, rudder,
-    cockpit, cabin and cabin_window_* if they have one, mast, boom, mainsail, jib, forestay, shrouds, and spreaders and
+    cockpit, cabin and cabin_window_* if they have one, mast, boom, mainsail, jib, forestay, shrouds, and either spreaders and
     backstay, or gaff and bowsprit.
     """
     p = parameters or SailingBoat()
@@ -38,7 +38,7 @@ def boat(parameters: Boat | None = None) -> Mesh:
 
 
 def _standing(pieces: Sequence[Piece]) -> Mesh:
-    """From the ship's frame to z = 0 under the lowest point, centred in x and y."""
+    """The mesh moved from the ship's frame to z = 0 under its lowest point, centred in x and y."""
     low = np.min([q.solid.vertices.min(axis=0) for q in pieces], axis=0)
     high = np.max([q.solid.vertices.max(axis=0) for q in pieces], axis=0)
     by = (-(low[0] + high[0]) / 2, -(low[1] + high[1]) / 2, -low[2])
@@ -46,7 +46,7 @@ def _standing(pieces: Sequence[Piece]) -> Mesh:
 
 
 def boat_random(rng: np.random.Generator) -> Mesh:
-    """A boat with parameters drawn from what lies in a small harbour."""
+    """A boat with parameters drawn as they are found in a small harbour."""
     return boat(draw(rng))
 
 
@@ -106,12 +106,12 @@ _TANNED: tuple[Color, ...] = ((0.52, 0.19, 0.11), (0.6, 0.3, 0.14), (0.85, 0.76,
 
 
 def _one(rng: np.random.Generator, choices: Sequence[T]) -> T:
-    """One of them."""
+    """One of the choices."""
     return choices[int(rng.integers(len(choices)))]
 
 
 def _hull_color(rng: np.random.Generator) -> tuple[Color, Color]:
-    """Topsides, and a stripe that shows on them."""
+    """Colour of the topsides, and of a stripe that shows on them."""
     base = np.array(_one(rng, _HULLS))
     r, g, b = np.clip(base * rng.uniform(0.88, 1.04) + rng.normal(0, 0.012, 3), 0.03, 0.96)
     dark = float(r + g + b) < 1.5
@@ -119,7 +119,7 @@ def _hull_color(rng: np.random.Generator) -> tuple[Color, Color]:
 
 
 def _drawn_rowing_boat(rng: np.random.Generator) -> RowingBoat:
-    """From a pram-like dinghy to a pointed skiff."""
+    """Any rowing boat from a pram-like dinghy to a pointed skiff."""
     length = float(rng.uniform(3.0, 5.0))
     pointed = bool(rng.random() < 0.38)
     varnished = bool(rng.random() < 0.2)
@@ -151,7 +151,7 @@ def _drawn_rowing_boat(rng: np.random.Generator) -> RowingBoat:
 
 
 def _drawn_motor_boat(rng: np.random.Generator) -> MotorBoat:
-    """Runabouts, wooden ones too, open boats with a console, cabin cruisers."""
+    """A runabout, perhaps a wooden one, an open boat with a console, or a cabin cruiser."""
     style = ("runabout", "console", "cruiser")[int(rng.choice(3, p=(0.44, 0.26, 0.3)))]
     low, high = {"runabout": (4.6, 7.0), "console": (5.2, 7.8), "cruiser": (6.2, 9.0)}[style]
     length = float(rng.uniform(low, high))
@@ -195,7 +195,7 @@ def _drawn_motor_boat(rng: np.random.Generator) -> MotorBoat:
 
 
 def _drawn_sailing_boat(rng: np.random.Generator) -> SailingBoat:
-    """Day sailers, cruising sloops, and long-keeled ones with a gaff."""
+    """A day sailer, a cruising sloop, or a long-keeled boat with a gaff."""
     style = ("cruiser", "day_sailer", "classic")[int(rng.choice(3, p=(0.5, 0.2, 0.3)))]
     low, high = {"cruiser": (6.4, 10.0), "day_sailer": (5.0, 6.4), "classic": (5.8, 9.0)}[style]
     length = float(rng.uniform(low, high))

@@ -21,10 +21,10 @@ from viewsphere.zoo.shapes.solids import both_sides
 class Car:
     """Parameters of a car; lengths in metres, colours sRGB 0..1.
 
-    length, width (without mirrors) and height (without rack and aerial) are the body's; None takes what is usual for
-    the body style. proportions: its side view; roundness: 0 boxy to 1 soft; dome: height of a bulge in the bonnet;
+    length, width (without mirrors) and height (without rack and aerial) are the body's; None takes the usual measure of
+    the body style. proportions: the car's side view; roundness: 0 boxy to 1 soft; dome: height of a bulge in the bonnet;
     windows: 1 to 3 on a side; slant: how far the rear side windows rise towards the rear, fraction of their height;
-    flare: lip of the wheel arches; flakes: 0 solid paint to 1 strong metallic; phase: turn of the rims, radians.
+    flare: height of the wheel arches' lips; flakes: 0 solid paint to 1 strong metallic; phase: turn of the rims, radians.
     """
 
     body: Body = "sedan"
@@ -110,7 +110,7 @@ def _shell(p: Car, shape: Shape, c: Coats) -> list[Piece]:
 
 
 def _fitted(p: Car, shape: Shape, c: Coats) -> list[Piece]:
-    """Everything that is screwed on."""
+    """Everything that is screwed to the shell."""
     rear_door = p.body != "pickup" or _windows(p) > 1
     pieces = [
         *lights.headlights(shape, p.lamps, c),
@@ -132,7 +132,7 @@ def _fitted(p: Car, shape: Shape, c: Coats) -> list[Piece]:
 
 
 def car_random(rng: np.random.Generator) -> Mesh:
-    """A car with parameters drawn from what drives on the roads."""
+    """A car with parameters drawn as they are found on roads."""
     return car(draw(rng))
 
 
@@ -217,7 +217,7 @@ def _drawn_color(rng: np.random.Generator) -> tuple[Color, float]:
 
 
 def _drawn_wheel(body: Body, height: float, rng: np.random.Generator) -> Wheel:
-    """Tyres that suit the car and one of many rim designs."""
+    """A wheel with a tyre that suits the car, and one of many rim designs."""
     usual = {"sedan": 0.225, "hatchback": 0.212, "van": 0.172, "pickup": 0.208}[body] * height
     design = (
         Wheel(spokes=5, spoke_width=0.55, flare=0.75),

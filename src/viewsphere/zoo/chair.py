@@ -33,7 +33,7 @@ def chair(parameters: Chair | None = None) -> Mesh:
 
 
 def _pieces(p: Chair) -> list[Piece]:
-    """What the chair is built from."""
+    """The pieces of the chair's style."""
     match p:
         case Dining():
             return dining.pieces(p)
@@ -52,7 +52,7 @@ def _pieces(p: Chair) -> list[Piece]:
 
 
 def chair_random(rng: np.random.Generator) -> Mesh:
-    """A chair with parameters drawn from what stands in homes and offices."""
+    """A chair with parameters drawn as they are found in homes and offices."""
     return chair(draw(rng))
 
 

@@ -16,7 +16,7 @@ from viewsphere.zoo.townscape.surfaces import cuboid, finished, waves
 from viewsphere.zoo.townscape.textures import textured
 
 LENGTH = 11.0
-"""Of every driveway and path, metres."""
+"""Length of every driveway and path, metres."""
 
 Surface = Literal["slabs", "bricks", "asphalt", "gravel"]
 
@@ -67,7 +67,7 @@ def _image(p: Driveway, rng: np.random.Generator) -> textures.Image:
 
 
 def driveway_random(rng: np.random.Generator) -> Mesh:
-    """A driveway or path with everything drawn."""
+    """A driveway or path with all parameters drawn."""
     return driveway(draw(rng))
 
 

@@ -14,7 +14,7 @@ from viewsphere.zoo.shapes.solids import Solid, join, lathe, moved
 from viewsphere.zoo.townscape.surfaces import cuboid, prism
 
 LENGTH = 2.0
-"""Of one piece from post to post, metres."""
+"""Length of one piece from post to post, metres."""
 
 Style = Literal["pickets", "boards", "railing"]
 
@@ -65,7 +65,7 @@ def _pickets(p: Fence) -> list[Solid]:
 
 
 def fence_random(rng: np.random.Generator) -> Mesh:
-    """A fence with everything drawn."""
+    """A fence with all parameters drawn."""
     return fence(draw(rng))
 
 

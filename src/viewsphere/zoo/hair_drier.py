@@ -91,7 +91,7 @@ def hair_drier(parameters: HairDrier | None = None) -> Mesh:
 
 
 def hair_drier_random(rng: np.random.Generator) -> Mesh:
-    """A drier with parameters drawn from what is sold."""
+    """A drier with parameters drawn as they are found in shops."""
     style: Style = "ring" if rng.random() < 0.22 else "pistol"
     ring = style == "ring"
     nozzle: Nozzle = ("concentrator", "diffuser", "plain")[int(rng.choice(3, p=(0.5, 0.22, 0.28)))]
@@ -142,7 +142,7 @@ _PALETTE: tuple[tuple[Color, Color, Color], ...] = (
 
 
 def _forward(solid: Solid, p: HairDrier) -> Solid:
-    """From z up, rear at z = 0, to the barrel's place: axis along -Y, rear at y = length / 2, axis at z = 0."""
+    """The solid moved from +z, rear at z = 0, to the barrel's place: axis along -Y at z = 0, rear at y = length / 2."""
     return moved(turned(solid, 0, np.pi / 2), (0, p.length / 2, 0))
 
 
@@ -188,7 +188,7 @@ def _pistol_head(p: HairDrier, coats: _Coats) -> list[Piece]:
 
 
 def _disc(radius: float, at: float, faces_front: bool) -> Solid:
-    """A flat disc across the axis."""
+    """A flat disc across the barrel's axis."""
     profile = [(radius, at), (radius / 2, at), (0.0, at)]
     return lathe(profile if faces_front else profile[::-1], 40)
 
@@ -207,7 +207,7 @@ def _rear_grille(radius: float, coats: _Coats) -> list[Piece]:
 
 
 def _bead(radius: float, at: float, thickness: float, segments: int) -> Solid:
-    """A thin torus about the axis."""
+    """A thin torus about the barrel's axis."""
     a = np.linspace(0, 2 * np.pi, 7)
     return lathe(np.stack([radius + thickness * np.cos(a), at + thickness * np.sin(a)], axis=1), segments)
 
@@ -224,7 +224,7 @@ def _mouth(radius: float, at: float, coats: _Coats) -> list[Piece]:
 
 
 def _nozzle(p: HairDrier, mouth: float, end: float, coats: _Coats) -> list[Piece]:
-    """What sits on the barrel's mouth, up to z = length."""
+    """The nozzle on the barrel's mouth, up to z = length."""
     if p.nozzle == "plain":
         ring = [(mouth + 0.002, end - 0.02), (mouth + 0.0035, end - 0.018), (mouth + 0.0025, p.length)]
         ring += [(mouth - 0.002, p.length), (mouth - 0.003, end - 0.02), (mouth + 0.002, end - 0.02)]
@@ -238,7 +238,7 @@ def _nozzle(p: HairDrier, mouth: float, end: float, coats: _Coats) -> list[Piece
 
 
 def _slot_rings(mouth: float, end: float, tip: float, wall: float) -> Float:
-    """Rings from the round mouth to a wide flat slot, (13, 48, 3); `wall` is taken off everywhere."""
+    """Rings from the round mouth to a wide flat slot, (13, 48, 3), each smaller by `wall` all around."""
     rings: list[Float] = []
     for f in np.linspace(0, 1, 13):
         width = float(curve(f, [(0, mouth + 0.003), (0.25, mouth + 0.003), (1, max(mouth * 1.3, 0.036))])) - wall

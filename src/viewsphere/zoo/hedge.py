@@ -15,7 +15,7 @@ from viewsphere.zoo.townscape.surfaces import finished, waves
 from viewsphere.zoo.townscape.textures import textured
 
 LENGTH = 2.0
-"""Of one piece, metres; leaves reach a little further."""
+"""Length of one piece, metres; leaves reach a little further."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ def hedge(parameters: Hedge | None = None) -> Mesh:
 
 
 def hedge_random(rng: np.random.Generator) -> Mesh:
-    """A hedge with everything drawn."""
+    """A hedge with all parameters drawn."""
     return hedge(draw(rng))
 
 
@@ -69,7 +69,7 @@ _GREENS = ((0.29, 0.38, 0.16), (0.24, 0.34, 0.15), (0.37, 0.43, 0.18), (0.25, 0.
 
 
 def _body(p: Hedge, rng: np.random.Generator) -> Solid:
-    """A rounded block along x, its sides uneven; its ends match the next piece's within the leaves' length."""
+    """A rounded block along x with uneven sides; its ends match those of the next piece to within the length of a leaf."""
     x = np.linspace(-LENGTH / 2, LENGTH / 2, 8)
     section = superellipse(p.width / 2, p.height / 2, 6.0, 14)
     rings = np.empty((len(x), len(section), 3))

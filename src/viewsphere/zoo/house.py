@@ -23,8 +23,8 @@ class House:
     """Parameters of a house; lengths in metres, colours sRGB 0..1.
 
     width, depth: of the main block; roof: gable has its ridge across the front, front_gable shows its gable there; slope: rise
-    over run; wing: a narrow gabled block stands forward of the front; garage: 1 on the house's left (+X), -1 right, 0 none;
-    upper: the wall of the upper storey or gable, None as below; seed draws what is left: curtains, grain.
+    over run; wing: whether a narrow gabled block stands before the front; garage: 1 on the house's left (+X), -1 right, 0 none;
+    upper: the wall of the upper storey or gable, None if it is as below; seed draws the rest: curtains, grain.
     """
 
     width: float = 9.5
@@ -69,8 +69,8 @@ class House:
 def house(parameters: House | None = None) -> Mesh:
     """The house in metres: front towards -Y, standing on z = 0, its walls centred in x and y.
 
-    Parts: wall, plinth, window, window_frame, sill, door, door_frame, door_handle, step, roof, fascia, gutter, and where there
-    are any curtain, shutter, garage_door, porch, chimney, chimney_pot, downpipe.
+    Parts: wall, plinth, window, window_frame, sill, door, door_frame, door_handle, step, roof, fascia, gutter, and where fitted
+    curtain, shutter, garage_door, porch, chimney, chimney_pot, downpipe.
     """
     p = parameters or House()
     rng = np.random.default_rng(p.seed)
@@ -78,7 +78,7 @@ def house(parameters: House | None = None) -> Mesh:
 
 
 def house_random(rng: np.random.Generator) -> Mesh:
-    """A house with parameters drawn from what stands in suburbs."""
+    """A house with parameters drawn as they are found in suburbs."""
     return house(draw(rng))
 
 

@@ -122,7 +122,7 @@ _HEADS = {"arm": _arm, "swan_neck": _swan_neck, "lantern": _lantern, "globe": _g
 
 
 def lamp_post_random(rng: np.random.Generator) -> Mesh:
-    """A lamp post with everything drawn."""
+    """A lamp post with all parameters drawn."""
     return lamp_post(draw(rng))
 
 

@@ -16,7 +16,7 @@ class Landscape:
     """Parameters of the country around a street of the zoo; metres.
 
     hills: height of the ridge all around; reach: its distance; woods: groups of distant trees; hamlets: distant houses;
-    seed draws where they are.
+    seed draws where trees and houses stand.
     """
 
     hills: float = 30.0
@@ -27,7 +27,7 @@ class Landscape:
 
 
 def landscape(parameters: Landscape | None = None) -> Mesh:
-    """The country, its street's 60 x 200 m left out; the road goes on to both ends.
+    """The country around a street, whose 60 x 200 m are left out; the road goes on at both ends.
 
     Parts: meadow, hill, road, thicket, wood, house.
     """
@@ -40,7 +40,7 @@ def landscape(parameters: Landscape | None = None) -> Mesh:
 
 
 def landscape_random(rng: np.random.Generator) -> Mesh:
-    """A country with everything drawn."""
+    """A country with all parameters drawn."""
     return landscape(draw(rng))
 
 

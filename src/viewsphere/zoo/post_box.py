@@ -81,7 +81,7 @@ def _box(p: PostBox, paint: Material, dark: Material, plate: Material) -> list[P
 
 
 def post_box_random(rng: np.random.Generator) -> Mesh:
-    """A post box with everything drawn."""
+    """A post box with all parameters drawn."""
     return post_box(draw(rng))
 
 

@@ -18,7 +18,7 @@ Kind = Literal["limit", "stop", "give_way", "crossing", "parking"]
 
 @dataclass(frozen=True)
 class RoadSign:
-    """Parameters of a sign; metres. height: to its top; size: the plate's height; limit: the number on a speed limit."""
+    """Parameters of a sign; metres. height: of the sign's top; size: the plate's height; limit: the number on a speed limit."""
 
     kind: Kind = "limit"
     height: float = 2.7
@@ -147,7 +147,7 @@ def _letter_p(r: float) -> Solid:
 
 
 def road_sign_random(rng: np.random.Generator) -> Mesh:
-    """A sign with everything drawn."""
+    """A sign with all parameters drawn."""
     return road_sign(draw(rng))
 
 

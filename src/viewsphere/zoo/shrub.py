@@ -54,7 +54,7 @@ def shrub(parameters: Shrub | None = None) -> Mesh:
 
 
 def shrub_random(rng: np.random.Generator) -> Mesh:
-    """A shrub with everything drawn."""
+    """A shrub with all parameters drawn."""
     return shrub(draw(rng))
 
 
@@ -82,7 +82,7 @@ def _scaled(color: Color, share: float) -> tuple[float, float, float, float]:
 
 
 def _above(solid: Solid) -> Solid:
-    """Flattened where it would reach below the ground."""
+    """The solid with everything below the ground pressed flat onto it."""
     return Solid(np.maximum(solid.vertices, (-np.inf, -np.inf, 0.0)), solid.triangles)
 
 

@@ -56,7 +56,7 @@ def street(parameters: Street | None = None) -> Mesh:
 
 
 def street_random(rng: np.random.Generator) -> Mesh:
-    """A street as they are found in towns."""
+    """A street with parameters drawn as they are found in towns."""
     return street(draw(rng))
 
 

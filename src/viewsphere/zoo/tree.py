@@ -21,8 +21,8 @@ Habit = Literal["round", "column", "conifer", "birch"]
 class Tree:
     """Parameters of a tree; lengths in metres, colours sRGB 0..1.
 
-    height: to the top of the crown; crown: its diameter; clear: height of its lower edge; masses: lumps the crown is made
-    of; count: tufts of leaves, cover: their area as a multiple of the crown's surface; seed draws where they are.
+    height: of the crown's top; crown: the crown's diameter; clear: height of its lower edge; masses: lumps that form the crown;
+    count: tufts of leaves; cover: their area as a multiple of the crown's surface; seed draws where they are.
     """
 
     habit: Habit = "round"
@@ -55,7 +55,7 @@ def tree(parameters: Tree | None = None) -> Mesh:
 
 
 def _tints(p: Tree, rng: np.random.Generator) -> dict[str, Tint]:
-    """Light comes from above, every tuft is a little different, bark is streaked (a birch's: blotched)."""
+    """Vertex colours: light comes from above, every tuft is a little different, bark is streaked (a birch's is blotched)."""
     leaf, tone, bark = rng.spawn(3)
 
     def lit(points: Float) -> Float:
@@ -73,7 +73,7 @@ def _tints(p: Tree, rng: np.random.Generator) -> dict[str, Tint]:
 
 
 def tree_random(rng: np.random.Generator) -> Mesh:
-    """A tree as they stand in gardens and along streets."""
+    """A tree with parameters drawn as they are found in gardens and along streets."""
     return tree(draw(rng))
 
 
@@ -112,7 +112,7 @@ _GREENS: dict[Habit, tuple[Color, ...]] = {
 
 
 def _green(name: str, color: Color, share: float) -> Material:
-    """Leaves: what lies deep in the crown is darker."""
+    """Material of leaves, darker deep in the crown."""
     r, g, b, a = linear(color)
     return Material(
         name, (min(1.6 * r * share, 1), min(1.6 * g * share, 1), min(1.6 * b * share, 1), a), roughness=0.85, specular=0.5

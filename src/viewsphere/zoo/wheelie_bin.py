@@ -69,7 +69,7 @@ def _lid(p: WheelieBin, top: float, hinge: float) -> Solid:
 
 
 def wheelie_bin_random(rng: np.random.Generator) -> Mesh:
-    """A bin with everything drawn."""
+    """A bin with all parameters drawn."""
     return wheelie_bin(draw(rng))
 
 

@@ -1,4 +1,4 @@
-"""What a light gives level ground, place by place: for what is baked of it."""
+"""Irradiance of a light on level ground, place by place, for the maps of the ground that are baked once."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from viewsphere.engines.raster.records import Float32
 
 
 def arriving(lights: Lights, which: int, places: NDArray[np.floating[Any]], width: float) -> tuple[Float32, Float32]:
-    """Irradiance (N, 3) at places (N, 3) that face up, `width` apart, without shadows; the share that those leave (N,)."""
+    """Unshadowed irradiance (N, 3) at places (N, 3) that face up, `width` apart; the share (N,) that shadows leave of it."""
     b = np.zeros((rows.ROWS, rows.BLOCK), np.float32)
     for row, value in ((rows.NZ, 1), (rows.GZ, 1), (rows.PIXEL, width)):
         b[row // rows.BLOCK] = value

@@ -1,5 +1,5 @@
-"""Pack the textures of all materials as bundles: those of one material that share size, coordinates and wrapping are stored
-together, texel by texel, so that one look-up reads them all.
+"""Pack the textures of all materials as bundles: textures of one material that share size, coordinates and wrapping are stored
+together, texel by texel, so that one look-up reads all of them.
 """
 
 from __future__ import annotations
@@ -25,19 +25,19 @@ from viewsphere.engines.raster.records import Int32, Textures
 Words = NDArray[np.uint16]
 
 MOST = 12
-"""Bundles of a material at most: one for each of its textures."""
+"""Bundles that a material has at most: one for each of its textures."""
 LEVELS = 16
 SHARPEST = 4096
-"""Longest side, in texels, of what is kept of a texture; larger ones are reduced by a whole factor."""
+"""Longest side, in texels, at which a texture is kept; larger textures are reduced by a whole factor."""
 MOST_WORDS = 1 << 28
-"""Words of all bundles of a stage, half a gigabyte: beyond, the largest are reduced."""
+"""Words (uint16) that the bundles of a stage have at most, half a gigabyte: beyond that the largest bundles are reduced."""
 KEPT_BYTES = 1 << 27
-"""Of texels that are kept for the next stage, which often shows the same model."""
+"""Bytes of texels that are kept for the next stage, which often shows the same model."""
 
 
 @dataclass(frozen=True)
 class _Use:
-    """Where a texture's channels go: kind of plane, (channel of the image, channel of the plane), which of them are sRGB."""
+    """Where a texture's channels go: kind of plane, pairs (channel of the image, channel of the plane), whether sRGB."""
 
     kind: int
     channels: tuple[tuple[int, int], ...] = ()
@@ -59,12 +59,12 @@ USES = {
     "clearcoat_roughness_texture": _Use(SPECULAR_COLOR, ((1, 3),)),
     "clearcoat_normal_texture": _Use(COAT_BUMP, is_normal=True),
 }
-"""Material's texture fields, and what of them is kept (glTF 2.0, section 3.9, and its extensions)."""
+"""The texture fields of `Material`, and which channels of each are kept (glTF 2.0, section 3.9, and its extensions)."""
 
 
 @dataclass(frozen=True)
 class _Content:
-    """What a bundle stores: images and the fields that use them. Colours count by their alpha if `weighted`."""
+    """What a bundle stores: images and the material's fields that use them. If `weighted`, colours count by their alpha."""
 
     uses: tuple[tuple[Image, str], ...]
     weighted: bool
@@ -81,7 +81,7 @@ class _Content:
 
     @cached_property
     def levels(self) -> Int32:
-        """Each level's first word, width and height."""
+        """First word, width and height of each mip level, (L, 3)."""
         height, width = self.shape
         found = [(0, width, height)]
         while max(width, height) > 1 and len(found) < LEVELS:
@@ -92,19 +92,19 @@ class _Content:
 
     @property
     def words(self) -> int:
-        """As many as there are, all levels."""
+        """Number of words of all levels together."""
         first, width, height = self.levels[-1].tolist()
         return first + width * height * 4 * len(self.kinds)
 
 
 @dataclass(eq=False)
 class BundlePacker:
-    """Collects the bundles of materials; equal ones share a place."""
+    """Collects the bundles of materials; equal bundles are stored once."""
 
     _slots: dict[tuple[_Content, Texture], int] = field(default_factory=dict[tuple[_Content, Texture], int])
 
     def add(self, material: Material, images: Sequence[Image], has_uv: tuple[bool, bool]) -> list[int]:
-        """Indices of the material's bundles, -1 after the last, MOST of them; textures without coordinates are left out."""
+        """Indices of the material's bundles, MOST of them, -1 after the last; textures without coordinates are left out."""
         groups: dict[tuple[tuple[int, ...], Texture], list[tuple[Image, str]]] = {}
         for name in USES:
             texture: Texture | None = getattr(material, name)
@@ -120,7 +120,7 @@ class BundlePacker:
         return found + [-1] * (MOST - len(found))
 
     def pack(self) -> Textures:
-        """All bundles; not to be written to, as the next stage of the same textures has the same array."""
+        """All bundles. The arrays must not be written to: the next stage with the same textures shares them."""
         count = max(len(self._slots), 1)
         levels = np.zeros((count, LEVELS, 3), np.int32)
         modes = np.zeros((count, 14), np.int32)
@@ -142,7 +142,7 @@ class BundlePacker:
 
 
 def _is_idle(material: Material, name: str) -> bool:
-    """Whether a texture multiplies nothing."""
+    """Whether the material's own factor is 0, so that the texture changes nothing."""
     return {
         "occlusion_texture": material.occlusion_strength == 0,
         "normal_texture": material.normal_scale == 0,
@@ -154,7 +154,7 @@ def _is_idle(material: Material, name: str) -> bool:
 
 
 def _affordable(contents: Iterable[_Content]) -> dict[_Content, _Content]:
-    """Each content reduced as far as its size and the room for all of them ask; of equally large ones the first."""
+    """Each content reduced to SHARPEST, then the largest ones until all fit in MOST_WORDS; of equally large ones the first."""
     reduced = {content: replace(content, factor=-(-max(content.shape) // SHARPEST)) for content in contents}
     total = sum(content.words for content in reduced.values())
     largest = [(-content.words, i, original) for i, (original, content) in enumerate(reduced.items())]
@@ -168,19 +168,19 @@ def _affordable(contents: Iterable[_Content]) -> dict[_Content, _Content]:
 
 
 def _firsts(contents: Iterable[_Content]) -> list[int]:
-    """Each content's first word, where they are stored one behind the other."""
+    """Each content's first word where all contents are stored one behind the other."""
     return list(accumulate((content.words for content in contents), initial=0))[:-1]
 
 
 class _Kept:
-    """The texels of stages: of the last ones, up to KEPT_BYTES of them, and of those that somebody still holds."""
+    """Texels of former stages: of the latest, up to KEPT_BYTES of them, and of every stage that is still in use."""
 
     def __init__(self) -> None:
         self._last: OrderedDict[tuple[_Content, ...], Words] = OrderedDict()
         self._held: WeakValueDictionary[tuple[_Content, ...], Words] = WeakValueDictionary()
 
     def get(self, contents: tuple[_Content, ...]) -> Words:
-        """All levels of these contents one behind the other, and room for reading PLANES at once."""
+        """All levels of these contents one behind the other, and room behind the last for reading PLANES planes at once."""
         texels = self._held.get(contents)
         if texels is None:
             texels = self._held[contents] = self._packed(contents)
@@ -192,7 +192,7 @@ class _Kept:
         return texels
 
     def _packed(self, contents: tuple[_Content, ...]) -> Words:
-        """Built where they stay: there is no second copy, whose memory would cost more than the texels."""
+        """Texels built in their final array: a second copy would cost more than the texels themselves."""
         known = {
             content: texels[first:]
             for others, texels in self._held.items()
@@ -216,12 +216,12 @@ def _kept() -> _Kept:
 
 @cache
 def _tables() -> tuple[Words, Words]:
-    """Words of the 256 bytes: as they are, and linear light of sRGB."""
+    """The words (uint16) of the 256 byte values: bytes that are plain numbers, and bytes that are sRGB, as linear light."""
     return np.arange(256, dtype=np.uint16) * np.uint16(257), np.round(linear(np.arange(256) / 255) * 65535).astype(np.uint16)
 
 
 def _build(content: _Content, words: Words) -> None:
-    """Write all levels."""
+    """Write all mip levels of a content into `words`."""
     kinds, levels = content.kinds, content.levels
     channels = 4 * len(kinds)
     first = words[: levels[0, 1] * levels[0, 2] * channels].reshape(*content.shape, channels)

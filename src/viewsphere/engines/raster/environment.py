@@ -1,4 +1,4 @@
-"""The light of all around: any sky baked into maps of what matt and shiny surfaces see of it, and into distant lights."""
+"""Light from all directions: any sky baked into maps of what matt and shiny surfaces see of it, and into distant lights."""
 
 from __future__ import annotations
 
@@ -25,36 +25,37 @@ from viewsphere.surroundings.sun import Distant, sun_light
 Float = NDArray[np.float64]
 
 _LEVELS = 8  # roughness 0 to 1
-_WIDE = 3  # level from which on a lobe is so wide that it gathers all texels of a map no wider than _COARSE
+_WIDE = 3  # level from which on a lobe is so wide that all texels of a map no wider than _COARSE are summed for it
 _COARSE = 64
 _SMALLEST = 32  # width of a map
-_SKY_WIDTH = 256  # of the sharpest map of a sky that has no detail
-_PICTURE_WIDTH = 512  # and of a photographed one
-_SKY_HEIGHT = 256  # of the picture of a made sky
-_STEPS = np.array([2.0 ** (k - 24) for k in range(32)], np.float32)  # of a packed colour, by its exponent
-_DISC = 60.0  # greatest radiance of the sun as seen: all of it is white
+_SKY_WIDTH = 256  # width of the sharpest map of a sky that has no detail
+_PICTURE_WIDTH = 512  # width of the sharpest map of a photographed sky
+_SKY_HEIGHT = 256  # height of the picture that is made of a gradient or daylight
+_STEPS = np.array([2.0 ** (k - 24) for k in range(32)], np.float32)  # factors of a packed colour (RGB9_E5), by its exponent
+_DISC = 60.0  # greatest radiance of the sun's disc where it is seen: every such pixel is white anyway
 
 # A photographed sun: a bright spot this far from its middle at most, so much above the mean and of so much of all light.
 _SPOT = math.radians(5.0)
 _AROUND = math.radians(9.0)
 _ABOVE_MEAN = 20.0
 _OF_ALL = 0.08
-_LOWEST = 0.05  # its height, as a sine
+_LOWEST = 0.05  # lowest elevation of a photographed sun, as a sine
 _NO_LIGHT: Float = np.zeros((2, 3))
 
 
 class Surrounding(NamedTuple):
-    """Light from all around, as the shading kernels read it. float32 unless said.
+    """Light from all directions, as the shading kernels read it. float32 unless said.
 
     texels (N, 4): octahedral maps with a border, one after the other; colour, and the share that lies below the horizon;
-    levels (L, 4): first texel and width of a map and of the next, the first map for matt surfaces (radiance of a white one),
-    then equal steps of roughness from 0 to 1. light (6, 3): rows of `kernels_environment`, SCALE to BEHIND. Radiance is the
-    map's times SCALE plus ABOVE and BELOW times their shares; LAMPS: radiance of the ground close by where lamps light it,
-    which is not in BELOW; TURN: cosine and sine of the maps' turn about z. up (3,): radiance of a white level floor without
-    what is below. albedo (A, A, 2): see `lobe_albedo`.
+    levels (L, 4): first texel and width of a map and of the next map. The first map is for matt surfaces (radiance of a white
+    one), the others for equal steps of roughness from 0 to 1. light (6, 3): rows of `kernels_environment`, SCALE to BEHIND.
+    Radiance is the map's times SCALE plus ABOVE and BELOW times their shares; LAMPS: radiance that lamps give the ground close
+    by, not contained in BELOW; TURN: cosine and sine of the maps' turn about z. up (3,): radiance of a white level floor lit
+    from above the horizon alone. albedo (A, A, 2): see `lobe_albedo`.
 
-    What is seen: picture (P,) uint32, equirectangular, shared exponents; picture_levels (K, 3) int32: first texel, width and
-    height; times SCALE plus BEHIND. sun (3, 3): its direction, a glow around it, a disc of half_angle radians.
+    The sky as the camera sees it: picture (P,) uint32, equirectangular, shared exponents; picture_levels (K, 3) int32: first
+    texel, width and height; radiance is the picture's times SCALE plus BEHIND. sun (3, 3): the sun's direction, a glow around
+    the sun, its disc of half_angle radians.
     """
 
     texels: Float32
@@ -74,17 +75,17 @@ class Surrounding(NamedTuple):
 
     @property
     def below(self) -> Float32:
-        """Radiance of what lies below the horizon but for the maps', (3,)."""
+        """Radiance of what lies below the horizon, (3,), without the maps' own."""
         return self.light[kernels.BELOW]
 
     @property
     def lamps(self) -> Float32:
-        """Radiance of the ground close by where lamps light it, (3,)."""
+        """Radiance that lamps give the ground close by, (3,)."""
         return self.light[kernels.LAMPS]
 
 
 class _Maps(NamedTuple):
-    """What of a sky does not depend on its strength, its turn and what is below."""
+    """The part of a baked sky that depends neither on its strength nor on its turn nor on what is below it: worth keeping."""
 
     texels: Float32
     levels: Float32
@@ -100,7 +101,7 @@ class _Photographed(NamedTuple):
 
 
 def sky_lights(sky: AnySky, sun: Sun | None, has_ground: bool) -> tuple[Distant, ...]:
-    """The scene's sun and, of a photographed sky, the one taken out of it: `bake_surrounding` has what is left.
+    """The scene's sun and, of a photographed sky, the sun that is cut out of its picture; `bake_surrounding` bakes the rest.
 
     Raises UserError when the picture cannot be read.
     """
@@ -116,14 +117,14 @@ def sky_lights(sky: AnySky, sun: Sun | None, has_ground: bool) -> tuple[Distant,
 
 
 def environment_notes(sky: AnySky) -> tuple[str, ...]:
-    """What had to be mended in a sky's picture."""
+    """What had to be mended in the picture of an environment, a sentence each."""
     return _photographed(_key(sky.file), True).notes if isinstance(sky, Environment) else ()
 
 
 def lamps_on_ground(lights: Lights, extent: Extent) -> Float:
-    """Irradiance / pi, (3,), that lamps give the ground around the targets on the mean, (3,), their shadows taken off.
+    """Mean irradiance / pi, (3,), that lamps give the ground around the targets, without what shadows take.
 
-    As far around as half the targets' box is long.
+    The mean is over a disc whose radius is half the diagonal of the targets' box.
     """
     n, size = 11, extent.high - extent.low
     reach = 0.5 * float(np.linalg.norm(size))
@@ -131,7 +132,7 @@ def lamps_on_ground(lights: Lights, extent: Extent) -> Float:
     x, y = np.repeat(steps, n), np.tile(steps, n)
     inside = x**2 + y**2 <= 1
     middle = (extent.low + extent.high) / 2
-    # A little below the ground, so that what lies on it hides the light from within.
+    # A little below the ground, so that things lying on the ground hide the light of lamps within them.
     height = np.full(int(inside.sum()), extent.low[2] - 0.01 * reach)
     places = np.stack([middle[0] + reach * x[inside], middle[1] + reach * y[inside], height], axis=1)
     lamps = [arriving(lights, k, places, reach / n) for k in np.flatnonzero(lights.kind != DISTANT).tolist()]
@@ -147,11 +148,11 @@ def bake_surrounding(
     even: Float = _NO_LIGHT,
     lamps: Float | None = None,
 ) -> Surrounding:
-    """All of the sky but `sky_lights`. What costs time is kept, by the sky alone.
+    """Bake all light of the sky except `sky_lights`. The slow part is kept and depends on the sky alone.
 
-    ground (3,): linear colour of a ground that hides the lower half and shines with what it receives of the sky and of
-    `lights`; None for none: below a made sky there is grey all the same, below a photographed one what it shows.
-    even: radiance from above and below of hemisphere lights, (2, 3); lamps (3,): `lamps_on_ground`, none if it is None.
+    ground (3,): linear colour of a ground that hides the lower half and reflects the light it receives from the sky and from
+    `lights`; None for no ground: below a made sky there is grey, below a photographed one its own lower half.
+    even: radiance from above and below of hemisphere lights, (2, 3); lamps (3,): `lamps_on_ground`, None without lamps.
     Raises UserError when a picture cannot be read.
     """
     has_ground = ground is not None
@@ -189,7 +190,7 @@ def sky_behind(view: View, surrounding: Surrounding, radiance: Float32) -> None:
     has_rays = len(view.rays) > 0
     if not has_rays:
         to_map = to_map @ np.vstack([view.lens, [0, 0, 1]])
-    # The level of the picture whose texels are about as large as a pixel.
+    # The mip level of the picture whose texels are about as large as a pixel.
     texels = float(view.pixel) * float(surrounding.picture_levels[0, 1]) / (2 * math.pi)
     level = min(math.floor(math.log2(max(texels, 1.0)) + 0.5), len(surrounding.picture_levels) - 1)
     light, sun = surrounding.light[[kernels.SCALE, kernels.BEHIND]], surrounding.sun
@@ -206,7 +207,7 @@ def _turn(degrees: float) -> tuple[float, float]:
 
 
 def _sky_parts(sky: AnySky, sun: Sun | None, has_ground: bool) -> tuple[_Maps, Float, Float, tuple[float, float]]:
-    """Maps, the factor of their colours, what is added above the horizon, and their turn."""
+    """The sky's maps, the factor of their colours, the colour added above the horizon, cosine and sine of the maps' turn."""
     if isinstance(sky, Environment):
         maps = _photographed(_key(sky.file), has_ground).maps
         return maps, np.full(3, sky.strength), np.zeros(3), _turn(sky.rotation_deg)
@@ -220,7 +221,7 @@ def _sky_parts(sky: AnySky, sun: Sun | None, has_ground: bool) -> tuple[_Maps, F
 
 
 def _visible_sun(sky: AnySky, sun: Sun | None) -> tuple[Float, float]:
-    """The sun's direction, its glow before a gradient, its disc in daylight, (3, 3); half its angle in radians."""
+    """(3, 3): the sun's direction, its glow on a gradient, its disc's radiance in daylight; the disc's half angle, radians."""
     light = None if isinstance(sky, Environment) else sun_light(sky, sun)
     if light is None:
         return np.array([[0.0, 0.0, 1.0], np.zeros(3), np.zeros(3)]), 0.0
@@ -234,7 +235,7 @@ def _visible_sun(sky: AnySky, sun: Sun | None) -> tuple[Float, float]:
 
 @lru_cache(maxsize=1)
 def _gradient_maps() -> _Maps:
-    """Of every gradient at once: how far each direction is from the horizon's colour towards the zenith's."""
+    """Maps that serve every gradient: how far each direction is from the horizon's colour towards the zenith's, 0 to 1."""
     height = _SKY_HEIGHT
     sine = np.maximum(np.sin((0.5 - (np.arange(height) + 0.5) / height) * np.pi), 0)
     share = gradient_share(sine).astype(np.float32)
@@ -248,7 +249,7 @@ def _daylight_maps(turbidity: float, clouds: float, elevation_deg: float) -> _Ma
 
 
 def _key(file: str) -> tuple[str, int, int]:
-    """A file and what changes with its content."""
+    """The file with its size and time of change, so that a changed file is read again."""
     try:
         facts = Path(file).stat()
     except OSError:
@@ -264,9 +265,9 @@ def _photographed(key: tuple[str, int, int], has_ground: bool) -> _Photographed:
 
 
 def without_sun(pixels: Float32) -> tuple[Float32, Distant | None]:
-    """An equirectangular picture without its sun, and the sun; both as they were if no small bright spot stands out.
+    """An equirectangular picture without its sun, and that sun; the same picture and None if no small bright spot stands out.
 
-    All light of the spot above that around it becomes the sun's, so that together they light as before.
+    The light of the spot beyond that of the sky around it goes to the sun, so that both together light a scene as before.
     """
     height, width = pixels.shape[:2]
     bright = pixels @ np.array([0.2126, 0.7152, 0.0722], np.float32)
@@ -303,7 +304,7 @@ def without_sun(pixels: Float32) -> tuple[Float32, Distant | None]:
 
 
 def _maps(lighting: Float32, width: int, has_ground: bool, seen: Float32 | None = None) -> _Maps:
-    """Bake equirectangular pictures of what lights and, if that differs, of what is seen."""
+    """Bake an equirectangular picture of the light, and with `seen` another one that the camera sees in its place."""
     pictures = [lighting if seen is None else seen]
     while min(pictures[-1].shape[:2]) >= 8:
         pictures.append(_half(pictures[-1]))
@@ -355,13 +356,13 @@ def _solid_angles(size: int) -> Float32:
     """Solid angle of each texel of an octahedral map, (size, size)."""
     side = np.abs((2 * np.arange(size, dtype=np.float32) + 1) / size - 1)
     a, b = side[:, None], side
-    # On the octahedron's face the area is that of its projection times sqrt 3, at distance 1 / sqrt 3 from the middle.
+    # On the octahedron's face an area is its projection's times sqrt 3, at distance 1 / sqrt 3 from the middle.
     square = np.where(a + b > 1, (1 - a) ** 2 + (1 - b) ** 2, a * a + b * b) + (1 - a - b) ** 2
     return (4 / size**2 / (square * np.sqrt(square))).astype(np.float32)
 
 
 def _frames(size: int) -> Float32:
-    """Of each texel of an octahedral map two axes across and its direction, (size * size, 9); Duff et al. 2017."""
+    """Two axes across each texel's direction in an octahedral map, and that direction, (size * size, 9); Duff et al. 2017."""
     x, y, z = _directions(size).T
     sign = np.where(z >= 0, 1.0, -1.0)
     a = -1 / (sign + z)
@@ -371,7 +372,7 @@ def _frames(size: int) -> Float32:
 
 
 def _gathered(values: Float32, size: int, square: float) -> Float32:
-    """What a wide lobe sees of a map around each direction, (size, size, 4); square: of GGX's alpha, 1 for a matt surface."""
+    """What a wide lobe around each direction receives from a map, (size, size, 4); square: GGX's alpha squared, 1 if matt."""
     area = _solid_angles(len(values)).reshape(-1, 1)
     source = np.hstack([_directions(len(values)), values.reshape(-1, 4) * area, area]).T.astype(np.float32, order="C")
     out = np.empty((size, size, 4), np.float32)
@@ -381,12 +382,12 @@ def _gathered(values: Float32, size: int, square: float) -> Float32:
 
 
 def _packed(picture: Float32) -> NDArray[np.uint32]:
-    """A picture (H, W, 3) as (H * W,) uint32, nine bits a colour and five for their exponent (as OpenGL's RGB9_E5): to 0.4 %
-    of its brightest colour.
+    """A picture (H, W, 3) as (H * W,) uint32: nine bits for each colour and five for their common exponent (OpenGL's RGB9_E5),
+    exact to 0.4 % of a pixel's brightest colour.
     """
     colors = [np.clip(picture[..., c].ravel(), 0, np.float32(65408)) for c in range(3)]
     most = np.maximum(np.maximum(colors[0], colors[1]), colors[2])
-    # float32's own exponent is 126 more than that of a mantissa below 1; 511.5 steps are no longer 511.
+    # float32's own exponent is 126 more than that of a mantissa below 1; from 511.5 steps on rounding needs the next exponent.
     shared = np.maximum((most.view(np.int32) >> 23) - (126 - 15), 0)
     shared += most >= np.float32(511.5) * _STEPS[shared]
     scale = 1 / _STEPS[shared]
@@ -395,7 +396,7 @@ def _packed(picture: Float32) -> NDArray[np.uint32]:
 
 
 def _joined(maps: Sequence[Float32]) -> tuple[Float32, Int32]:
-    """Maps with borders in one array, and where each begins and how wide it is."""
+    """Maps with their borders in one array, and first texel and width of each map."""
     parts = [_bordered(m).reshape(-1, 4) for m in maps]
     starts = np.concatenate([[0], np.cumsum([len(p) for p in parts])[:-1]])
     return np.concatenate(parts), np.column_stack([starts, [len(m) for m in maps]]).astype(np.int32)
@@ -414,7 +415,7 @@ def _half(picture: Float32) -> Float32:
 
 
 def _halved(values: Float32) -> Float32:
-    """An octahedral map at half its size; each texel counts as large as it is."""
+    """An octahedral map at half its size; each texel counts by its solid angle."""
     area = _solid_angles(len(values))[..., None]
     return _quarters(values * area) / _quarters(area)
 
@@ -431,8 +432,8 @@ def _bordered(values: Float32) -> Float32:
 def _lobe_samples(rough: float, rings: int, width: int, levels: int) -> Float32:
     """Directions around +z where GGX of this perceptual roughness mirrors a ray along its normal, (S, 5).
 
-    x, y, z; weights, as Karis 2013, which add up to 1; the level of maps of `width` whose texels are as large as what
-    each sample stands for.
+    Columns: x, y, z; weights that add up to 1 (Karis 2013); the mip level, of maps of `width`, whose texels are as large as the
+    solid angle that the sample stands for.
     """
     square, spokes = rough**4, rings + 4
     quantile, spoke = np.meshgrid((np.arange(rings) + 0.5) / rings, np.arange(spokes), indexing="ij")
@@ -451,11 +452,11 @@ def _lobe_samples(rough: float, rings: int, width: int, levels: int) -> Float32:
 
 @lru_cache(maxsize=1)
 def lobe_albedo(size: int = 32) -> Float32:
-    """What GGX with height-correlated Smith reflects in all, (size, size, 2): by perceptual roughness and by the square
-    root of the cosine to the viewer, 0 to 1 each.
+    """Share of white light that GGX with height-correlated Smith reflects altogether, (size, size, 2): by perceptual roughness
+    and by the square root of the cosine to the viewer, both from 0 to 1.
 
-    First with a Fresnel factor of 1, then with Schlick's power: a surface of reflectance f mirrors f times the first plus
-    (1 - f) times the second. Samples of the visible normals (Heitz 2018).
+    Column 0 is for a Fresnel factor of 1, column 1 for Schlick's power alone: a surface of reflectance f reflects f times
+    column 0 plus (1 - f) times column 1. Integrated over visible normals (Heitz 2018).
     """
     side = np.linspace(0, 1, size)
     a = np.maximum(side**2, 1e-4)[:, None, None, None]

@@ -1,7 +1,7 @@
 """How much of each light arrives at the samples of a block: distance, cone, and shadows that soften with distance.
 
-Most samples lie before all that is near them in the map, or behind it: planes around cells of the map tell. The others are
-searched for blockers.
+Most samples lie either before everything near them in the shadow map, or behind it: planes that enclose each cell of the map
+tell which. Only the other samples search the map for blockers.
 
 Area lights: the light vector of a polygon (Lambert 1760).
 """
@@ -29,11 +29,11 @@ from viewsphere.kernels.jit import inner, njit
 f4 = nb.float32
 U = nb.uintp
 DISTANT, POINT, SPOT, AREA = 0, 1, 2, 3
-# Rows while a view is looked at, besides those of `kernels_penumbra`.
+# Rows in use while a view is looked at, in addition to those of `kernels_penumbra`.
 CELL, OFF_U, OFF_V, DOWN_, OWN = U0, V0, U1, V1, BARY1
 LOW_, HIGH_, ACROSS_ = CELL, OFF_U, OFF_V
 BLUNTEST = 16.0  # texels: half width of a filter that a pixel's size asks for, at most
-GRAZING = 0.02  # a plane's slope in a map is limited to that of a light this far above it
+GRAZING = 0.02  # a plane's slope in a map is limited to that seen by a light this far above the plane (sine)
 
 
 def _seen(row, first, x, y, z):
@@ -43,7 +43,7 @@ def _seen(row, first, x, y, z):
 
 @inner
 def _count_on(count, b):
-    """How many samples that have light are on a view's map."""
+    """How many samples with light left lie on a view's map."""
     found = 0
     for i in range(count):
         found += 1 if b[STATE + i] == f4(-1) else 0
@@ -79,9 +79,9 @@ def _project(row, b):
 
 @lanewise
 def _find_cells(side, b):
-    """CELL: which one holds all within RADIUS of each sample; OFF_U, OFF_V: the sample's place from its middle."""
+    """CELL: the cell that holds all within RADIUS of each sample; OFF_U, OFF_V: the sample's place from the cell's middle."""
     u, v, radius = b.get(U_, V_, RADIUS)
-    # The power of two that is at most the radius: cells' steps are four times that.
+    # The power of two that is at most the radius: a cell's step is four times that power.
     level = least(most(power(radius), 1), side)
     step, last = level * STEP, side / level - 1
     x, y = (least(most((place - radius - 0.5) / step, 0).whole().real(), last) for place in (u, v))
@@ -91,7 +91,7 @@ def _find_cells(side, b):
 
 @inner(fastmath=FAST)
 def _read_cells(count, at, bounds, b):
-    """The planes of each sample's cell where the sample is, and their slopes; they take the places of CELL, OFF_U, OFF_V."""
+    """The two planes of each sample's cell, evaluated at the sample, and their slopes; they replace CELL, OFF_U, OFF_V."""
     for i in range(U(count)):
         k = at + U(nb.int32(b[U(CELL) + i]))
         across, down = bounds[k, U(ACROSS)], bounds[k, U(DOWN)]
@@ -102,7 +102,7 @@ def _read_cells(count, at, bounds, b):
 
 @lanewise
 def _judge(row, b):
-    """STATE of samples that lie before all that is within RADIUS (1) or behind it (0); of others a smaller RADIUS."""
+    """STATE of samples before all texels within RADIUS (1) or behind all of them (0); a smaller RADIUS for the others."""
     near, radius, across, down, low = b.get(NEAR, RADIUS, ACROSS_, DOWN_, LOW_)
     tilt = (size(across - b[DU]) + size(down - b[DV])) * (radius + 0.5)
     b[STATE] = where(near + tilt <= low, 1, where(near - tilt > b[HIGH_], 0, -1))
@@ -112,7 +112,7 @@ def _judge(row, b):
 
 @inner
 def _gather_on(count, b):
-    """Move the samples on the map together, OWN being what they were."""
+    """Move the samples on the map to the front of the block; OWN keeps where each came from."""
     left = U(0)
     for i in range(U(count)):
         if b[U(STATE) + i] == f4(-1):
@@ -122,14 +122,14 @@ def _gather_on(count, b):
 
 @inner
 def _all_on(count, b):
-    """`_gather_on` where all of them are."""
+    """As `_gather_on`, where all samples are on the map."""
     for i in range(count):
         b[OWN + i] = f4(i)
 
 
 @inner
 def _settle(count, b):
-    """Put what is told into SHARE and FACING, and move the other samples together; gives their number."""
+    """Put what is decided into SHARE and FACING, and move the undecided samples to the front; returns their number."""
     left = U(0)
     for i in range(U(count)):
         state, own = b[U(STATE) + i], U(nb.int32(b[U(OWN) + i]))
@@ -144,7 +144,7 @@ def _settle(count, b):
 
 @inner
 def _move(i, to, b):
-    """What is known of a sample on the map; gives the place after it."""
+    """Move all that is known of a sample on the map to row position `to`; returns the position after it."""
     for row in range(U(U_), U(SOFT + 1), U(BLOCK)):
         b[row + to] = b[row + i]
     b[U(RADIUS) + to] = b[U(RADIUS) + i]
@@ -171,7 +171,7 @@ def _from_area(place, axis, right, up, radius, b):
     scale = 0.125 / most(root(across * along), 1e-12)
     light = tuple((a + b + c + d) * scale for a, b, c, d in zip(*edges, strict=True))
     turn = where(dot(light, straight) < 0, -1, 1)
-    # In the rectangle's own plane rounding would decide between all of its light and none.
+    # In the rectangle's own plane rounding errors would decide between all of the rectangle's light and none.
     turn = where(front > wide * 1e-3, turn * close, 0)
     far = front / most(squared, radius * radius * 0.01) * (1 - close)
     light = tuple(p * turn + s * far for p, s in zip(light, straight, strict=True))
@@ -222,10 +222,10 @@ def _from_afar(place, radius, b):
 
 @lanewise
 def _turn(place, near, b):
-    """SHARE of a light before its shadows: what the surface's tilt leaves; FACING, of samples that have light.
+    """Fill SHARE, before any shadow: the share of the light that the surface's tilt leaves; FACING, of samples that have light.
 
-    near: 1 for a light at a place, 0 for a distant one. The views look from a rectangle's middle, which is not where most of
-    its light comes from.
+    near: 1 for a light at a place, 0 for a distant one. The views look from a rectangle's middle, but most of a rectangle's
+    light may come from another part of it.
     """
     way, normal = b.get(LX, LY, LZ), b.get(GX, GY, GZ)
     share = clamp(1.6 + 4 * dot(normal, way))
@@ -244,10 +244,10 @@ def _shine(color, b):
 
 @inner(fastmath=FAST)
 def look(count, form, grid, depth, bounds, k, b):
-    """Multiply SHARE by what view k (uintp) of these `Views` leaves of its light, where the samples are on its map.
+    """Multiply SHARE by the share of its light that view k (uintp) of these `Views` lets through, where samples are on its map.
 
-    FACING holds the cosine between the surface and the light, times the distance to a light at a place; it becomes 0 where
-    this view has told; where it is not above 0, nothing changes. (GX, GY, GZ) may be zero where there is no surface.
+    FACING holds the cosine between the surface and the light, times the distance to a light at a place; the view sets FACING to
+    0 where it has decided, and changes nothing where FACING is not above 0. (GX, GY, GZ) may be zero where there is no surface.
     """
     row, places = form[k], grid[k]
     _see(count, row, b)
@@ -274,8 +274,9 @@ def look(count, form, grid, depth, bounds, k, b):
 def arrive(count, lights, k, b):
     """Fill LX..LZ, IR..IB, SHARE and WIDTH of a block for light k.
 
-    The irradiance faces the light and has no shadows in it; SHARE is the share they leave. Where normals are smooth a facet
-    that is turned away a little has light like its neighbours: far away from it, bumps have none.
+    The irradiance is that of a plane facing the light, without shadows; SHARE is the share that shadows leave. Where normals
+    are smooth, a facet that is turned away a little is lit like its neighbours: seen from afar, bumps have no lit or dark
+    sides.
     """
     k = U(k)
     kind, place, radius = lights.kind[k], lights.place[k], lights.radius[k]

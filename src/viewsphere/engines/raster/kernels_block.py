@@ -7,9 +7,9 @@ from __future__ import annotations
 
 BLOCK = 128
 
-# Where the sample is: position, unit direction to the viewer, geometric normal, size of a pixel there.
+# Where the sample is: position, unit direction to the viewer, geometric normal, a pixel's size at that distance.
 PX, PY, PZ, VX, VY, VZ, GX, GY, GZ, PIXEL = range(0, 10 * BLOCK, BLOCK)
-# What it is made of: shading normal, clear coat's normal, base colour (linear) and alpha.
+# What the sample is made of: shading normal, clear coat's normal, base colour (linear) and alpha.
 NX, NY, NZ, CX, CY, CZ, RED, GREEN, BLUE, ALPHA = range(10 * BLOCK, 20 * BLOCK, BLOCK)
 # Perceptual roughness, metallic, reflectance at normal incidence of its dielectric part, clear coat, transmission, emission,
 # flags (0 or 1), share of light that its occlusion texture leaves.
@@ -17,20 +17,20 @@ ROUGH, METAL, F0R, F0G, F0B, COAT, COAT_ROUGH, TRANSMISSION = range(20 * BLOCK, 
 ER, EG, EB, UNLIT, GROUND, CATCHER, BLENDED, AO = range(28 * BLOCK, 36 * BLOCK, BLOCK)
 # Interpolated: both uv sets; barycentrics of the second and third corner.
 U0, V0, U1, V1, BARY1, BARY2 = range(36 * BLOCK, 42 * BLOCK, BLOCK)
-# What reaches it: share of the ambient light from above and of the ground's; then scratch.
+# Light around: visible share of the ambient light from above, and of the ground's light; then scratch.
 OPEN, BOUNCE, OPENX, OPENY, OPENZ = range(42 * BLOCK, 47 * BLOCK, BLOCK)
-# Until then, of textured triangles: edges from the first corner to the second and the third, how both uv sets change along
-# them; -1 where the back of the file's normals is seen.
+# Before that, for textured triangles: edges from the first corner to the second and the third, how both uv sets change along
+# these edges; -1 where the back of the file's normals is seen.
 AX, AY, AZ, UA0, VA0, UA1, VA1, BX, BY, BZ, UB0, VB0, UB1, VB1, SIDE = range(42 * BLOCK, 57 * BLOCK, BLOCK)
-# One light: unit direction to it, irradiance on a plane that faces it, the share its shadows leave, its angular radius.
+# One light: unit direction to the light, irradiance on a plane that faces it, share its shadows leave, its angular radius.
 LX, LY, LZ, IR, IG, IB, SHARE, WIDTH = range(47 * BLOCK, 55 * BLOCK, BLOCK)
 # Radiance towards the viewer: diffuse, specular (coat included); share of the background's ground that fades into the sky.
 DR, DG, DB, SR, SG, SB, FADE = range(55 * BLOCK, 62 * BLOCK, BLOCK)
 # Scratch, free between stages.
 T0, T1, T2, T3, T4, T5, T6, T7 = range(62 * BLOCK, 70 * BLOCK, BLOCK)
 # How a surface answers light (`kernels_light.weigh`): towards a light it mirrors FACE + EDGE times Schlick's power; LOBE and
-# RIM integrate the lobe and the lobe times that power; BASE is its diffuse reflectance, TAKEN what the coat reflects, THROUGH
-# what a transmissive surface lets through, before its tint.
+# RIM integrate the lobe and the lobe times that power; BASE is its diffuse reflectance, TAKEN the share that the coat reflects,
+# THROUGH the share that a transmissive surface lets through, before its tint.
 FACE_R, FACE_G, FACE_B, EDGE_R, EDGE_G, EDGE_B, BASE_R, BASE_G, BASE_B = range(70 * BLOCK, 79 * BLOCK, BLOCK)
 LOBE, RIM, TAKEN, THROUGH = range(79 * BLOCK, 83 * BLOCK, BLOCK)
 # 1 on scenery, else 0. The last row is room for vectors that begin in the row before.

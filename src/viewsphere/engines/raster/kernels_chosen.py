@@ -1,7 +1,9 @@
-"""Which pixels are worth a closer look, and what is known of them before it; `kernels_samples` draws them.
+"""Which pixels are drawn again with several points each, and what is known of these pixels before; `kernels_samples` draws
+them.
 
-Chosen pixels are numbered row by row. `grid` (H, W) int32 holds a chosen pixel's number, and for any other pixel ~k, k the
-number of the next chosen one, so that a triangle finds what it may cover in a row at once; `pixels` ends with a sentinel.
+Chosen pixels are numbered row by row. `grid` (H, W) int32 holds a chosen pixel's number, and for any other pixel ~k, where k is
+the number of the next chosen one, so that a triangle finds the pixels it may cover in a row at once; `pixels` ends with a
+sentinel.
 """
 
 from __future__ import annotations
@@ -18,22 +20,22 @@ from viewsphere.kernels.jit import inner, njit
 f4 = nb.float32
 U = nb.uintp
 BYTES = ir.VectorType(ir.IntType(8), LANES)
-ALIKE = 0.94  # cosine of 20 degrees between the planes of what passes for one surface
-LEVEL = 1.01  # greatest ratio of its depths in neighbouring pixels
+ALIKE = 0.94  # cosine of the greatest angle, 20 degrees, between the planes of two pixels that pass for one surface
+LEVEL = 1.01  # greatest ratio of such a surface's depths in neighbouring pixels
 VISIBLE = f4(0.05)  # relative difference of radiance: about five steps of 8 bits
-DARK = f4(0.02)  # radiance below which differences count as little as there
+DARK = f4(0.02)  # radiance below which differences are compared with this radiance
 TILE = 8  # pixels of a tile's side
 CLOSED = np.int32(2**31 - 1)
 
 
 @njit
 def compare(triangle, depth, owner, normals, room, owners, beside, above):
-    """Set in beside, above (H * W + 8,) uint8 where a pixel shows another surface than the one to its left (any, in the first
-    column), and than the one above (from the second row on).
+    """Set in beside, above (H * W + 8,) uint8 where a pixel shows another surface than its neighbour to the left (column 0 is
+    arbitrary), and than its neighbour above (from the second row on).
 
     owner (T,) int32: equal where neighbouring triangles look alike; normals (T, 3). room (8, W + 16) float32 and owners
-    (4, W + 16) int32 hold what this row and the last one show: normals (any, where none) and depth, owner (-1, where none) and
-    triangle.
+    (4, W + 16) int32 hold what this row and the last one show: normals (arbitrary where nothing is shown) and depth, owner (-1
+    where nothing is shown) and triangle.
     """
     height, width = triangle.shape
     a, b, c, d, eight = U(0), U(1), U(2), U(3), U(8)
@@ -55,14 +57,14 @@ def compare(triangle, depth, owner, normals, room, owners, beside, above):
 
 @lanewise
 def _differ(reals: Rows, p: Any, q: Any, wholes: Rows, k: Any, m: Any, stride: Any, flags: Rows, at: Any) -> None:
-    """Where the pixels of which `compare` has put what they show at p and k show another surface than those at q and m.
+    """Where the pixels whose data `compare` has put at p and k show another surface than the pixels at q and m.
 
-    It is the same if owners are, and planes and depths differ by less than ALIKE and LEVEL say.
+    The surface is the same if owners are equal, and planes and depths differ by less than ALIKE and LEVEL allow.
     """
     to = reals[p,] * reals[q,] + reals[p, stride] * reals[q, stride]
     bend = size(to + reals[p, stride, stride] * reals[q, stride, stride])
     z, far = reals[p, stride, stride, stride], reals[q, stride, stride, stride]
-    # one is farther by 1 %
+    # One of the two is farther by 1 %.
     apart = (z > far * LEVEL) | (far > z * LEVEL)
     same = wholes[k,].equals(wholes[m,]) & (bend >= ALIKE)
     flag = (same ^ 1 | apart) & (wholes[k, stride].equals(wholes[m, stride]) ^ 1)
@@ -71,11 +73,11 @@ def _differ(reals: Rows, p: Any, q: Any, wholes: Rows, k: Any, m: Any, stride: A
 
 @njit
 def compare_behind(slots, behind, behind_depth, triangle, depth, owner, normals, radiance, marks):
-    """Mark in marks (H * W,) pairs of neighbours, one at least in `slots`, that look alike but differ in a layer behind, and in
-    colour, since hardly anything may show of that layer.
+    """Mark in marks (H * W,) pairs of neighbours, at least one in `slots`, that look alike in front but differ in a layer
+    behind and in colour: where colours are equal, hardly anything shows of that layer.
 
-    behind, behind_depth (H * W,): what all pixels have in this layer; triangle, depth (H, W): what they show; radiance
-    (H * W, 4).
+    behind, behind_depth (H * W,): triangle and depth of each pixel in this layer; triangle, depth (H, W): those in front;
+    radiance (H * W, 4).
     """
     height, width, one = U(triangle.shape[0]), U(triangle.shape[1]), U(1)
     shown, level = triangle.reshape(-1), depth.reshape(-1)
@@ -112,7 +114,7 @@ def _passes(t, s, depth, other, owner, normals):
 
 @njit(_nrt=True)
 def numbered(marks):
-    """The grid of the marked pixels, and their flat indices behind one another with the sentinel."""
+    """The grid of the marked pixels, and their flat indices in order, followed by the sentinel."""
     height, width = marks.shape
     total = 0
     for y in range(height):
@@ -132,16 +134,16 @@ def numbered(marks):
 
 @njit
 def level(inverse):
-    """A number of 32 bits that orders positive 1/z."""
+    """A positive 1/z as an integer of 32 bits with the same order."""
     return np.float32(inverse).view(np.int32)
 
 
 @njit(_nrt=True)
 def shown_farthest(triangle, depth, pixels, height, width):
-    """Level of the farthest surface that the points of each pixel show, (H, W) int32: 0 where they show none, CLOSED where
-    there are none.
+    """The `level` of the farthest surface that the points of each pixel show, (H, W) int32: 0 where a point shows nothing,
+    CLOSED where a pixel has no points.
 
-    triangle, depth (N, M): of the points of `pixels` (N,), or of all pixels in order if that is empty.
+    triangle, depth (N, M): of the points of `pixels` (N,), or of all pixels in order if `pixels` is empty.
     """
     farthest = np.full((height, width), CLOSED)
     flat = farthest.reshape(-1)
@@ -155,8 +157,8 @@ def shown_farthest(triangle, depth, pixels, height, width):
 
 @njit(_nrt=True)
 def tiled(farthest):
-    """Least level in each tile, and in each with its neighbours to the right and below: whatever box begins in a tile and is no
-    wider is there.
+    """The least level in each tile, and the least in each tile and its neighbours to the right, below and diagonal: those four
+    contain any box that begins in the tile and is no wider than a tile.
     """
     height, width = farthest.shape
     rows, columns = height // TILE + 1, width // TILE + 1

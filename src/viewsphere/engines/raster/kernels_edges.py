@@ -1,9 +1,9 @@
 """Samples of edge pixels through a pinhole, for colour: only triangles that can matter are drawn, at few pixels.
 
 A pixel is numbered (`grid`, -1 elsewhere) if its centre looks different from a neighbour's, or, while drawing, if a surface
-comes between the centres before what they show (a thin wire). A triangle can matter if it is seen around such a pixel, or has a
-corner there or beside it that is not hidden, or one anywhere that is before what is shown. `kernels_lines` marks more of both
-before.
+passes between the centres and before what they show (a thin wire). A triangle can matter in three cases: a centre at or beside
+such a pixel shows it; it has a corner at or beside such a pixel that is not hidden; it has a corner anywhere that lies before
+what is shown there. `kernels_lines` marks more pixels and triangles before.
 """
 
 from __future__ import annotations
@@ -20,20 +20,20 @@ from viewsphere.truth.kernels_draw import EPSILON, NEVER, crossing_at, edges_ins
 
 f4 = nb.float32
 U = nb.uintp
-STEEPEST = f4(0.9)  # of 1/z: how much farther than the centres around it a sample may be
-SLACK = f4(0.01)  # relative difference of 1/z that still passes for the same surface
-FLUSH = f4(1.001)  # of 1/z: a vertex that lies in what is already drawn is not behind it
-NARROW = 8  # pixels: the size up to which every pixel of a box is looked at
-THIN = 2.0  # pixels: a triangle as wide as this is seen at some centre
+STEEPEST = f4(0.9)  # of 1/z: how much farther than the centres around its pixel a sample may be
+SLACK = f4(0.01)  # relative difference of 1/z at which two surfaces still pass for the same
+FLUSH = f4(1.001)  # of 1/z: a vertex in a surface that is already drawn does not count as behind it
+NARROW = 8  # pixels: up to this size every pixel of a triangle's box is looked at
+THIN = 2.0  # pixels: a triangle as wide as this is seen at some pixel's centre
 
 
 @njit
 def begin(pixels, total, triangle, depth, grid, limit, bound, nearest, seen, wanted):
-    """Number the `total` marked pixels, and mark in `wanted` (T,) also the triangles that the centres around them show.
+    """Number the `total` marked pixels, and mark in `wanted` (T,) also the triangles that the centres around these pixels show.
 
-    Fills grid (H, W); limit (H, W): what a surface must be before to matter to a pixel, as 1/z; bound (n,): 1/z of the farthest
-    surface that may show at each, 0 where nothing may; nearest (n, 4) float32 1/z and seen (n, 4), -1 where nothing is drawn
-    yet, for each number.
+    Fills grid (H, W); limit (H, W): 1/z that a surface must exceed to matter to a pixel; bound (n,): 1/z of the farthest
+    surface that may show at each number, 0 where none may; nearest (n, 4) float32 1/z and seen (n, 4) triangles, -1 where none
+    is drawn yet.
     """
     height, width = triangle.shape
     for k in range(U(total)):
@@ -53,7 +53,7 @@ def begin(pixels, total, triangle, depth, grid, limit, bound, nearest, seen, wan
 
 @njit
 def spread(pixels, count, limit, around):
-    """Lower around (H, W), a copy of limit, to that of numbered pixels beside, which small triangles reach from here."""
+    """Lower around (H, W), a copy of limit, beside numbered pixels to their limit: small triangles there may reach them."""
     height, width = limit.shape
     for k in range(U(count)):
         y, x = pixels[k] // width, pixels[k] % width
@@ -65,7 +65,7 @@ def spread(pixels, count, limit, around):
 
 @njit
 def with_corners_before(q, triangles, wanted, limit, near, others):
-    """Mark in `others` (T,) what is not wanted and has a vertex before the limit of its pixel; `near` (V,) is room."""
+    """Mark in `others` (T,) unwanted triangles that have a vertex before the limit of its pixel; `near` (V,) is scratch."""
     height, width = limit.shape
     a, b, c, d = U(0), U(1), U(2), U(3)
     for i in range(U(q.shape[0])):
@@ -85,13 +85,13 @@ def draw(  # noqa: PLR0912, PLR0915, one loop, whose state is not worth handing 
 ):
     """Draw these triangles at the four samples (`offsets` (2, 4)) of the `count` numbered pixels.
 
-    `room` is `samples._room`; starts (H + 1,): each row's first number; see `begin` for the others. limit becomes 1/z of a
-    numbered pixel's farthest sample. Returns how many pixels are numbered in the end.
+    `room` is `samples._room`; starts (H + 1,): each row's first number; the other arrays are those of `begin`. Raises
+    limit of a numbered pixel to 1/z of its farthest sample. Returns how many pixels are numbered in the end.
     """
     height, width = triangle.shape
     found, inverse = room
     a, b, c, d = U(0), U(1), U(2), U(3)
-    lowest, highest = offsets[a, d], offsets[a, b]  # the outermost along either axis
+    lowest, highest = offsets[a, d], offsets[a, b]  # the outermost samples along either axis
     for o in range(U(order.shape[0])):
         t = U(order[o])
         i0, i1, i2 = U(triangles[t, a]), U(triangles[t, b]), U(triangles[t, c])
@@ -126,7 +126,7 @@ def draw(  # noqa: PLR0912, PLR0915, one loop, whose state is not worth handing 
         e0, e1, e2 = edges_inside(q0, q1, q2, (nx, ny, nz), det, cutout[t])
         scale = 1.0 / det
         nx, ny, nz = nx * scale, ny * scale, nz * scale
-        # twice the area in pixels over the longer side of the box is no less than the width
+        # The width is at most twice the area in pixels over the longer side of the box.
         thin = not crossing and abs(det) * w0 * w1 * w2 < THIN * max(xb - xa, yb - ya)
         for y in range(ya, ya + 1 if narrow else yb + 1):
             if not narrow:
@@ -171,7 +171,7 @@ def draw(  # noqa: PLR0912, PLR0915, one loop, whose state is not worth handing 
 
 @inner
 def _hits(edges, x, y, offsets, cutouts, cutout):
-    """At which samples of the pixel at (x, y) a triangle that is cut out is surface: a bit each."""
+    """At which samples of the pixel at (x, y) a triangle with a cut-out is surface: one bit for each sample."""
     e0, e1, e2 = edges
     found = 0
     for i in range(U(4)):
@@ -183,7 +183,7 @@ def _hits(edges, x, y, offsets, cutouts, cutout):
 
 @inner
 def span(edges, y, xa, xb, lowest, highest):
-    """First and last pixel of a row of which a sample may be covered."""
+    """First and last pixel of a row in which a sample may be covered."""
     low, high = float(xa), float(xb)
     for e in edges:
         f = max(e[1] * (y + lowest), e[1] * (y + highest)) + e[2]
@@ -200,11 +200,11 @@ def span(edges, y, xa, xb, lowest, highest):
 def finish(
     count, pixels, nearest, seen, bound, offsets, triangle, depth, owner, normals, behind, kept, position, shown, inverses
 ):
-    """Of the pixels whose samples do not all look like the centre: pixels, position, triangle, 1/z, as `samples.Samples`.
+    """Pixels whose samples do not all look like the centre: pixels, position, triangle, 1/z, as `samples.Samples` has them.
 
-    Pixels marked in behind (H * W,), if that is not empty, are kept, too.
-    A sample at which nothing was drawn, though all centres around show something, shows what the centre does. The last four
-    arrays have room for all; returns how many pixels there are.
+    Pixels marked in behind (H * W,), if `behind` is not empty, are kept, too.
+    A sample at which nothing was drawn, though all centres around show something, shows what its pixel's centre shows. The last
+    four arrays have room for all pixels; returns how many pixels there are.
     """
     width = triangle.shape[1]
     a, b, c, d = U(0), U(1), U(2), U(3)

@@ -1,4 +1,4 @@
-"""Maps of all directions: from an equirectangular picture to octahedral maps of what rough surfaces see, and the sky seen.
+"""Maps of all directions: octahedral maps of what rough surfaces see, made of an equirectangular picture, and the visible sky.
 
 Octahedral maps (Engelhardt and Dachsbacher 2008) need no trigonometry and have no poles. z is up. The equirectangular picture
 is Blender's: its middle lies towards +X, its left quarter towards +Y; the first row is up.
@@ -19,7 +19,8 @@ f4 = nb.float32
 i4 = nb.int32
 U = nb.uintp
 CHUNK = 128
-# Directions, then colours; places in the picture; cosines to the sun; four texels around, packed, and how far from the first.
+# Directions, then colours; places in the picture; cosines to the sun; four packed texels around a place, and its offset from
+# the first of them.
 RX, RY, RZ, RU, RV, TOWARD, P, Q, R, S, FX, FY = range(0, 12 * CHUNK, CHUNK)
 ROWS = 12
 # Rows of `Surrounding.light`.
@@ -55,9 +56,9 @@ def _coordinates(x, y, z):
 
 @njit
 def octahedral(picture, has_ground, out):
-    """Add the octahedral map of an equirectangular picture (H, W, 3) to `out` (N, N, 4), which is 0.
+    """Add the octahedral map of an equirectangular picture (H, W, 3) to `out` (N, N, 4), which is 0 before.
 
-    Colour, and the share that lies below the horizon.
+    Columns: colour, and the share that lies below the horizon.
 
     With ground, that share shows no colour: the ground's light is added when the map is read.
     """
@@ -72,7 +73,7 @@ def octahedral(picture, has_ground, out):
                 share = f4(1) - t * t * (f4(3) - t - t)
                 column = (f4(0.5) - f4(math.atan2(y, x)) * f4(0.5 / math.pi)) * f4(width) - f4(0.5)
                 row = (f4(0.5) - f4(math.asin(min(max(z, f4(-1)), f4(1)))) * f4(1 / math.pi)) * f4(height) - f4(0.5)
-                most = height // 2 - 1 if has_ground else height - 1  # the horizon's own row is the last of the sky
+                most = height // 2 - 1 if has_ground else height - 1  # the row at the horizon is the sky's last
                 row = min(max(row, f4(0)), f4(most))
                 r0 = i4(row)
                 r1 = min(r0 + 1, height - 1)
@@ -90,10 +91,10 @@ def octahedral(picture, has_ground, out):
 
 @njit(fastmath=FAST)
 def gathered(source, half, targets, out):
-    """What a wide lobe sees around each of `targets` (M, 3), (M, 4): all texels of a map are counted.
+    """What a wide lobe around each of `targets` (M, 3) receives, (M, 4): the sum over all texels of a map.
 
-    source (8, K): directions of texels, their four numbers times their solid angle, that angle. half: of the square of GGX's
-    alpha less 1; the lobe is that of a ray along the normal times the cosine, so that 0 is a matt surface.
+    source (8, K): directions of texels, their four numbers times their solid angle, that angle. half: half of (GGX's alpha
+    squared less 1); the lobe is that of a ray along the normal times the cosine, so that half = 0 is a matt surface.
     """
     for i in range(U(targets.shape[0])):
         x, y, z = targets[i, 0], targets[i, 1], targets[i, 2]
@@ -113,11 +114,11 @@ def gathered(source, half, targets, out):
 
 @njit(fastmath={"contract", "nsz"})
 def blurred(texels, levels, samples, frames, out):
-    """What a lobe sees around each direction, (M, 4).
+    """What a lobe around each direction receives, (M, 4).
 
     texels, levels: bordered maps, each half the size of the one before; samples (S, 5): x, y, z around the lobe's middle,
-    weight (they add up to 1) and level; frames (M, 9): two axes across and the lobe's middle. Sums are kept in order, as the
-    compiler then works on four numbers at once.
+    weight (all add up to 1) and mip level; frames (M, 9): two axes across the lobe's middle, and that middle. The four sums are
+    added in order, since the compiler then works on four numbers at once.
     """
     one, half = f4(1), f4(0.5)
     for i in range(U(frames.shape[0])):
@@ -157,7 +158,7 @@ def _angle(y, x):
 
 @inner(fastmath=FAST)
 def _read_texels(texels, first, width, height, count, w):
-    """P to S: the four texels around column RU and row RV; FX, FY: how far that is from the first of them."""
+    """P to S: the four texels around column RU and row RV; FX, FY: the offset of that place from the first texel."""
     zero, one, packed = f4(0), f4(1), w.view(np.uint32)
     for i in range(U(count)):
         u, v = w[U(RU) + i], min(max(w[U(RV) + i], zero), f4(height - 1))
@@ -187,7 +188,7 @@ def _blend_texels(w):
 
 @inner(fastmath=FAST)
 def _rays(listed, columns, start, count, w):
-    """RX, RY, RZ: directions of some samples, or their places; those of a grid lie in one row."""
+    """RX, RY, RZ: directions of some samples, or their places in the image; samples of a grid lie in one row."""
     if listed.shape[1] == 3:
         for i in range(count):
             ray = listed[U(start + i)]
@@ -216,7 +217,7 @@ def _aim(numbers, width, height, w):
 
 @lanewise
 def _add_sun(numbers, w):
-    """RX, RY, RZ: radiance of the sky, from the picture's."""
+    """RX, RY, RZ: radiance of the sky with its sun, from the picture's radiance."""
     toward, half, edge = w[TOWARD], numbers.one(24), numbers.one(25)
     q = most(toward, 0)
     q = q * q
@@ -232,8 +233,9 @@ def _add_sun(numbers, w):
 def lay_over_sky(listed, columns, numbers, picture, first, width, height, w, radiance):
     """Lay radiance (N, 4), scene-linear and premultiplied, over the sky, in place; no sky where the lens has no ray.
 
-    listed: rays (N, 3) or places (N, 2) of the samples, or none (0, 2) for a grid of so many columns. numbers: (26,)
-    `environment.sky_behind`. picture: `Surrounding.picture`; first, width, height: its level. w: scratch of ROWS * CHUNK.
+    listed: rays (N, 3) or places (N, 2) of the samples; empty, (0, 2), for a grid of `columns` columns. numbers: (26,), put
+    together by `environment.sky_behind`. picture: `Surrounding.picture`; first, width, height: the mip level to read. w:
+    scratch of ROWS * CHUNK.
     """
     count, is_listed, one = i4(radiance.shape[0]), listed.shape[0] > 0, f4(1)
     start = i4(0)

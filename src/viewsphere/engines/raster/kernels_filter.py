@@ -1,8 +1,8 @@
-"""Filtered look-up in bundles of textures: what a pixel covers of them, and the mean of that.
+"""Filtered look-ups in bundles of textures: the part of a texture that a pixel covers, and the mean over that part.
 
-A pixel's footprint is an ellipse. Trilinear probes, one or up to eight, stand along its longer axis and are as sharp as its
-shorter axis lets them be (Schilling, Knittel and Strasser, Texram, 1996). Work is done in chunks of samples: first all places
-in memory, which are fetched early where the texture is large, then the sums.
+A pixel's footprint is an ellipse. One to eight trilinear probes stand along its longer axis, at the mip level that suits its
+shorter axis (Schilling, Knittel and Strasser, Texram, 1996). Work is done in chunks of samples: first all places in memory,
+which are fetched early where the texture is large, then the sums.
 """
 
 from __future__ import annotations
@@ -38,28 +38,28 @@ u4 = nb.uint32
 U = nb.uintp
 
 CHUNK = 32
-PROBES = 8  # at most, along a footprint's longer axis
+PROBES = 8  # most probes along a footprint's longer axis
 SPACING = 0.8  # probes per width of the footprint: a trilinear probe is wider than its level's texel
-SNAP = 0.2  # of a level: as near as that to one, the next is not looked at
-QUADS = CHUNK * PROBES * 2 + 8  # and room for what is written beyond the last
-PLANES = 3  # summed at once
-NEAR = 1 << 18  # words of a level that the processor's caches hold
+SNAP = 0.2  # of a mip level: as near as that to one level, the next level is not read
+QUADS = CHUNK * PROBES * 2 + 8  # and room for what is written beyond the last quad
+PLANES = 3  # planes that are summed at once
+NEAR = 1 << 18  # words of a mip level that still fits into the processor's caches
 
 # Rows of a chunk: how u and v change from pixel to pixel, across and down; the coordinates; the mip level, the number of probes
-# and the step between them; the sharper of two levels, what a probe's share of each is; what is read, plane by plane.
+# and the step between them; the sharper of two levels, each probe's share of either level; the texels' sums, plane by plane.
 UX, UY, VX, VY, U_AT, V_AT, LEVEL, COUNT, STEP_U, STEP_V, LOW, SHARE, NEXT_SHARE, TEXEL = range(0, 14 * CHUNK, CHUNK)
 ROWS = 13 + 4 * PLANES
 # Rows of quads, four texels each: coordinates, then the second neighbour's weight; share of the sum; texels' weights.
 Q_U, Q_V, Q_SHARE, W0, W1, W2, W3 = range(0, 7 * QUADS, QUADS)
 QUAD_ROWS = 7
-# Rows of whole numbers: level's size and first word; neighbours along u and v; texels' first words; each sample's first quad.
+# Rows of integers: level's size and first word; neighbours along u and v; texels' first words; each sample's first quad.
 Q_WIDTH, Q_HEIGHT, Q_START, X0, X1, Y0, Y1, P0, P1, P2, P3, FIRST = range(0, 12 * QUADS, QUADS)
 PLACE_ROWS = 12
 
 
 @intrinsic
 def _fetch(typing, array, index):
-    """Ask for a word of an array to be brought near."""
+    """Prefetch a word of an array into the processor's cache."""
 
     def code(context, builder, signature, arguments):
         data = context.make_array(signature.args[0])(context, builder, arguments[0]).data
@@ -75,11 +75,11 @@ def _fetch(typing, array, index):
 
 
 def _sums(*parts):
-    """A function that sums neighbouring channels, as vectors of so many: the compiler does not find them by itself."""
+    """A function that sums neighbouring channels as vectors of these widths: the compiler would not vectorise the sums."""
 
     @intrinsic
     def add_up(typing, texels, channel, q, places, begin, end, c, i):
-        """Weighted sums over the quads from `begin` to `end` of the channels from this one on, to rows TEXEL and on."""
+        """Weighted sums, over the quads from `begin` to `end`, of the channels from `channel` on, to the rows from TEXEL on."""
         return nb.void(texels, nb.uintp, q, places, nb.uintp, nb.uintp, c, nb.uintp), code
 
     def code(context, builder, signature, arguments):
@@ -110,13 +110,13 @@ _add_plane, _add_planes = _sums(4), _sums(8, 4)
 
 @lanewise
 def footprints(width, height, c):
-    """Rows LEVEL, COUNT, STEP_U and STEP_V of a chunk from its gradients, for a level 0 of this size."""
+    """Rows LEVEL, COUNT, STEP_U and STEP_V of a chunk from its gradients, for a texture whose level 0 has this size."""
     ux, uy, vx, vy = c.get(UX, UY, VX, VY)
     ax, ay, bx, by = ux * width, uy * width, vx * height, vy * height
     across, down, mixed = ax * ax + bx * bx, ay * ay + by * by, ax * ay + bx * by
     half = (across - down) * 0.5
     way = root(half * half + mixed * mixed)
-    # What is no number counts as small.
+    # NaN counts as a small footprint.
     major = most((across + down) * 0.5 + way, 1)
     area = ax * by - ay * bx
     minor = most(area * area / major, 1)
@@ -137,8 +137,8 @@ def footprints(width, height, c):
 
 @lanewise
 def _choose_levels(last, c):
-    """Rows LOW, SHARE and NEXT_SHARE, and the coordinates of each first probe. One level will do where the other would hardly
-    count.
+    """Rows LOW, SHARE and NEXT_SHARE, and the coordinates of each sample's first probe. One mip level alone is read where the
+    other one would hardly count.
     """
     level, probes = least(c[LEVEL], last), c[COUNT]
     low = level.whole().real()
@@ -168,9 +168,9 @@ def _pair(typing, array, at, first, second):
 
 @inner(fastmath=FAST)
 def _lay_out(count, levels, c, q, places):
-    """Every probe's quads: coordinates, share, level; those of sample i begin at FIRST + i.
+    """Lay out every probe's quads: coordinates, share, level; the quads of sample i begin at FIRST + i. Returns their number.
 
-    Of both levels, always; where one will do, the next probe's is written over the other.
+    Quads of both mip levels are always written; where one level will do, the next probe's quad overwrites the second one.
     """
     n = U(0)
     for i in range(U(count)):
@@ -198,7 +198,7 @@ def _lay_out(count, levels, c, q, places):
 
 @inner(fastmath=FAST)
 def place(texels, levels, mode, count, c, q, places):
-    """Lay out the quads of a chunk's probes and fetch them; those of sample i begin at FIRST + i.
+    """Lay out the quads of a chunk's probes and prefetch them; the quads of sample i begin at FIRST + i.
 
     levels (16, 3) and mode (14,): a bundle's rows of `Textures`.
     """
@@ -208,7 +208,7 @@ def place(texels, levels, mode, count, c, q, places):
     _neighbours(quads, mode[2], mode[3], U(Q_V), U(Q_HEIGHT), U(Y0), q, places)
     channels = i4(4) * mode[5]
     _corners(quads, channels, q, places)
-    level = U(u4(c[LOW]))  # neighbours read about the same
+    level = U(u4(c[LOW]))  # neighbouring samples read about the same level
     if levels[level, 1] * levels[level, 2] * channels > NEAR:
         for k in range(quads):
             _fetch(texels, U(u4(places[U(P0) + k])))
@@ -217,14 +217,14 @@ def place(texels, levels, mode, count, c, q, places):
 
 @lanewise
 def _neighbours(wrap, is_nearest, coordinate, length, first, q, places):
-    """The two texels beside each coordinate, and in its stead the second one's weight; -1 and `size` wrap as `wrap` says."""
+    """The two texels beside each coordinate, wrapped as `wrap` says; the second texel's weight replaces the coordinate."""
     repeats, mirrors, clamps = wrap.equals(REPEAT), wrap.equals(MIRROR), wrap.equals(CLAMP)
     x = q[coordinate]
-    # A way there and back is two long.
+    # Mirrored, a texture repeats after twice its length.
     x = where(mirrors, x * 0.5 + 0.5, x)
     whole = x.whole().real()
     x = x - where(clamps, 0, where(whole > x, whole - 1, whole))
-    # What is no number, or too large for a whole one, ends somewhere in the texture.
+    # NaN, and coordinates too large for an integer, end somewhere in the texture.
     x = clamp(x)
     x = where(mirrors, size(x + x - 1), x)
     width = places[length]
@@ -264,7 +264,7 @@ def mix(texels, count, first_plane, planes, q, places, c):
 
 @inner(fastmath=FAST)
 def opacity(surfaces, textures, m, u0, v0, u1, v1):
-    """Alpha of a material's base colour texture at these coordinates of both sets, of the nearest texel as labels have it."""
+    """Alpha of a material's base colour texture at coordinates in both uv sets: that of the nearest texel, as for labels."""
     for n in range(U(surfaces.bundles.shape[1])):
         if surfaces.bundles[m, n] < 0:
             break

@@ -1,6 +1,6 @@
 """A pixel's four samples side by side in one vector of the processor, as functions that kernels call: exact, without fastmath.
 
-Written as instructions, since numba makes four numbers of four numbers, and takes long for it.
+Written as LLVM instructions, since numba makes four scalars of four numbers, and takes long to compile them.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ _WHOLE = ir.IntType(32)
 def nearer(
     typing: Any, edges: Any, plane: Any, bounds: Any, x: Any, y: Any, offsets: Any, nearest: Any, row: Any, inverse: Any
 ) -> Any:
-    """Which samples of the pixel at (x, y) a triangle covers, and is before nearest[row]: a bit each.
+    """Which samples of the pixel at (x, y) a triangle covers in front of nearest[row]: one bit for each sample.
 
-    edges: three times coefficients (a, b, c), a x + b y + c >= 0 inside; plane: of 1/z, which stays within the `bounds`;
-    offsets (2, 4) float64; inverse (4,) float32 becomes 1/z at all samples.
+    edges: three times coefficients (a, b, c), a x + b y + c >= 0 inside; plane: coefficients of 1/z, which stays within
+    `bounds`; offsets (2, 4) float64; inverse (4,) float32 is filled with 1/z at all samples.
     """
     kind = nb.intp(edges, plane, bounds, x, y, offsets, nearest, row, inverse)
 
@@ -53,7 +53,7 @@ def nearer(
 
 @intrinsic
 def put_before(typing: Any, found: Any, inverse: Any, index: Any, nearest: Any, seen: Any, row: Any) -> Any:
-    """Of nearest[row] and seen[row] those whose bit is set in `found` become `inverse` and `index`; the least 1/z then."""
+    """Put `inverse` and `index` into nearest[row] and seen[row] where `found` has its bit set; returns the row's least 1/z."""
     kind = nb.float32(found, inverse, index, nearest, seen, row)
 
     def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
@@ -79,7 +79,7 @@ def _data(context: Any, builder: Any, kind: Any, array: Any) -> Any:
 
 
 def _all(builder: Any, value: Any) -> Any:
-    """A number in all four."""
+    """A number in all four lanes."""
     first = builder.insert_element(ir.Constant(ir.VectorType(value.type, FOUR), ir.Undefined), value, _WHOLE(0))
     return builder.shuffle_vector(first, first, ir.Constant(ir.VectorType(_WHOLE, FOUR), [0] * FOUR))
 

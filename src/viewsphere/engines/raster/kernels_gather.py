@@ -67,14 +67,14 @@ from viewsphere.kernels.jit import inner
 f4 = nb.float32
 U = nb.uintp
 VERTEX = 16  # numbers
-# Where the numbers of a vertex go (see `Surfaces.vertices`): of a point of a triangle, and of its edges.
+# The rows to which the numbers of a vertex go (see `Surfaces.vertices`): for a point of a triangle, and for its edges.
 ATTRIBUTES = {0: NX, 1: NY, 2: NZ, 3: U0, 4: V0, 5: U1, 6: V1, 7: RED, 8: GREEN, 9: BLUE, 10: ALPHA}
 DIFFERENCES = {3: UA0, 4: VA0, 5: UA1, 6: VA1, 11: AX, 12: AY, 13: AZ}
 
 
 @inner(fastmath=FAST)
 def _rays(view, count, own, b):
-    """Unnormalised directions in the camera's axes, into VX, VY, VZ: each ends where 1 / inverse depth says."""
+    """Rays in the camera's axes, not normalised, into VX, VY, VZ: ray / inverse depth is the point seen."""
     if view.rays.shape[0] > 0:
         for i in range(U(count)):
             ray = view.rays[U(own[i])]
@@ -95,7 +95,7 @@ def _find_centers(columns, per, own, b):
     k = own[0]
     row = (k.real() * per).whole()
     column = k - row * columns
-    # A product of float32 may be one too small or too large.
+    # A product of float32 may end up one row too far up or down.
     row, column = where(column < 0, row - 1, row), where(column < 0, column + columns, column)
     is_next = column >= columns
     row, column = where(is_next, row + 1, row), where(is_next, column - columns, column)
@@ -111,7 +111,7 @@ def _look_through_pinhole(lens, b):
 
 @inner(fastmath=FAST)
 def locate(view, start, count, slots, depth, b, own):
-    """Positions, directions and pixel sizes; own: the samples' slots."""
+    """Positions, directions to the viewer and pixel sizes of samples; own: the samples' slots."""
     for i in range(U(count)):
         own[i] = slots[U(start) + i]
         b[U(T2) + i] = depth[U(own[i])]
@@ -134,7 +134,7 @@ def _aim(eye, rotation, scale, pixel, b):
 
 @intrinsic
 def _differ(typing, vertices, i, j, b, at):
-    """How row j of the vertices differs from row i: its DIFFERENCES, to b[row + at]."""
+    """Row j of the vertices minus row i: its DIFFERENCES, to b[row + at]."""
 
     def code(context, builder, signature, arguments):
         rows, target = (context.make_array(signature.args[n])(context, builder, arguments[n]).data for n in (0, 3))
@@ -165,8 +165,8 @@ def _vertex(builder, vertices, row):
 
 @inner(fastmath=FAST)
 def gather(surfaces, count, triangle, b, own, material):
-    """Vertex attributes of located samples, their triangles, in place of their slots, and materials; normals on the viewer's
-    side; edges.
+    """For located samples: vertex attributes, edges, materials, normals on the viewer's side. The samples' triangles replace
+    their slots.
     """
     vertices, triangles, normals = surfaces.vertices, surfaces.triangles, surfaces.normals
     for i in range(U(count)):
@@ -190,7 +190,7 @@ def gather(surfaces, count, triangle, b, own, material):
 
 @lanewise
 def _find(b):
-    """Barycentric coordinates of the places in their triangles."""
+    """Barycentric coordinates of the samples' positions in their triangles."""
     first, second = b.get(AX, AY, AZ), b.get(BX, BY, BZ)
     place = tuple(b[row] - b[corner] for row, corner in ((PX, T0), (PY, T1), (PZ, T2)))
     aa, ac, cc = dot(first, first), dot(first, second), dot(second, second)
@@ -203,7 +203,7 @@ def _find(b):
 
 @lanewise
 def _face_viewer(b):
-    """Both normals on the side that is seen, whatever the winding; the smooth one at least a little."""
+    """Turn both normals to the visible side, whatever the winding; the smooth one looks at the viewer at least a little."""
     g, n = b.get(GX, GY, GZ), b.get(NX, NY, NZ)
     side = sign(dot(g, b.get(VX, VY, VZ)))
     g = tuple(x * side for x in g)
@@ -217,7 +217,7 @@ def _face_viewer(b):
 
 @inner(fastmath=FAST)
 def gather_ground(view, floor, count, b, material):
-    """The same for samples of the ground: its texture repeats in the world, and it fades into the sky far behind all there is.
+    """As `gather`, for samples of the ground: its texture repeats in the world, and fades into the sky far behind all things.
 
     floor: see `painting.Baked`.
     """
@@ -229,7 +229,7 @@ def gather_ground(view, floor, count, b, material):
 
 @lanewise
 def _stand(eye, floor, b):
-    """Rows of places on the ground."""
+    """Fill the rows of samples that lie on the ground."""
     side = sign(b[VZ])
     for row in (NX, NY, GX, GY, U1, V1, BARY1, BARY2):
         b[row] = 0

@@ -1,7 +1,7 @@
-"""Arithmetic on the processor's vectors, written as on numbers, for kernels that do the same to all samples of a block.
+"""Arithmetic on the processor's vectors, written as on single numbers, for kernels that treat all samples of a block alike.
 
-A function decorated with `lanewise` is called from kernels like any other. What it does is written down directly as vector
-instructions: numba needs no types of it, which takes most of a kernel's time to compile, and nothing is left to chance.
+A function decorated with `lanewise` is called from kernels like any other. Its operations become vector instructions directly:
+numba need not infer their types, which takes most of a kernel's compile time, and vectorisation does not depend on heuristics.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _FLAGS = tuple(sorted(FAST))
 
 
 class Lanes:
-    """Numbers side by side: float32, int32, or flags that comparisons give. The other operand may be one number for all."""
+    """Numbers side by side: float32, int32, or the flags of a comparison. The other operand may be one number for all lanes."""
 
     def __init__(self, builder: ir.IRBuilder, value: Any) -> None:
         self.builder = builder
@@ -31,18 +31,18 @@ class Lanes:
 
     @property
     def is_real(self) -> bool:
-        """Whether they are float32."""
+        """Whether the lanes are float32."""
         return self.value.type.element == REAL
 
     def like(self, other: Any) -> Any:
-        """The other operand's value."""
+        """The other operand as an LLVM value of the same type."""
         if isinstance(other, Lanes):
             return other.value
         number = float(other) if self.is_real else other
         return ir.Constant(self.value.type, [number] * self.value.type.count)
 
     def all(self, number: float) -> Lanes:
-        """A float32 in as many lanes."""
+        """A float32 in all lanes."""
         return Lanes(self.builder, ir.Constant(self._as(REAL), [number] * self.value.type.count))
 
     def _do(self, real: str, whole: str, other: Any, *, swap: bool = False) -> Lanes:
@@ -92,7 +92,7 @@ class Lanes:
         return self._do("", "ashr", other)
 
     def _compare(self, operator: str, other: Any) -> Lanes:
-        # No flags, so that what is no number compares as such; then nothing is less, equal or greater.
+        # Ordered comparisons without fast-math flags: NaN is neither less nor equal nor greater.
         compare = self.builder.fcmp_ordered if self.is_real else self.builder.icmp_signed
         return Lanes(self.builder, compare(operator, self.value, self.like(other)))
 
@@ -109,22 +109,22 @@ class Lanes:
         return self._compare(">=", other)
 
     def equals(self, other: Any) -> Lanes:
-        """Flags where both are the same."""
+        """Flags where both operands are equal."""
         return self._compare("==", other)
 
     def _as(self, element: Any) -> Any:
         return ir.VectorType(element, self.value.type.count)
 
     def whole(self) -> Lanes:
-        """Cut to int32, towards zero."""
+        """Truncated to int32, towards zero."""
         return Lanes(self.builder, self.builder.fptosi(self.value, self._as(WHOLE)))
 
     def real(self) -> Lanes:
-        """As float32."""
+        """Converted to float32."""
         return Lanes(self.builder, self.builder.sitofp(self.value, self._as(REAL)))
 
     def widened(self) -> Lanes:
-        """uint16 as int32."""
+        """uint16 converted to int32."""
         return Lanes(self.builder, self.builder.zext(self.value, self._as(WHOLE)))
 
     def bits(self) -> Lanes:
@@ -132,7 +132,7 @@ class Lanes:
         return Lanes(self.builder, self.builder.bitcast(self.value, self._as(WHOLE)))
 
     def exponent(self) -> Lanes:
-        """Two to these int32 less 127, as float32: they become its exponents."""
+        """Two to the power (int32 - 127), as float32: the integers become its exponents."""
         return Lanes(self.builder, self.builder.bitcast((self * (1 << 23)).value, self._as(REAL)))
 
     def _call(self, name: str) -> Lanes:
@@ -149,12 +149,12 @@ def where(flags: Lanes, yes: Any, no: Any) -> Lanes:
 
 
 def least(a: Lanes, b: Any) -> Lanes:
-    """The smaller; `b` where `a` is no number."""
+    """The smaller; `b` where `a` is NaN."""
     return where(a < b, a, b)
 
 
 def most(a: Lanes, b: Any) -> Lanes:
-    """The larger; `b` where `a` is no number."""
+    """The larger; `b` where `a` is NaN."""
     return where(a > b, a, b)
 
 
@@ -164,7 +164,7 @@ def root(a: Lanes) -> Lanes:
 
 
 def size(a: Lanes) -> Lanes:
-    """Without the sign."""
+    """The absolute value."""
     return a._call("fabs")
 
 
@@ -203,12 +203,12 @@ def load(builder: ir.IRBuilder, data: Any, at: Any, count: int = LANES) -> Lanes
 
 
 def store(data: Any, at: Any, lanes: Lanes) -> None:
-    """Into neighbouring numbers of an array from this index on."""
+    """Write lanes to neighbouring numbers of an array from this index on."""
     lanes.builder.store(lanes.value, _pointer(lanes.builder, data, at, lanes.value.type.count), align=4)
 
 
 def scatter(data: Any, at: Any, rows: Mapping[int, int], lanes: Lanes) -> None:
-    """Store single lanes: `rows` maps each lane to where in the array, `at` is added."""
+    """Store single lanes: `rows` maps each lane to its place in the array, counted from `at`."""
     builder = lanes.builder
     for lane, row in rows.items():
         builder.store(builder.extract_element(lanes.value, WHOLE(lane)), builder.gep(data, [builder.add(at, at.type(row))]))
@@ -219,9 +219,9 @@ def _pointer(builder: ir.IRBuilder, data: Any, at: Any, count: int) -> Any:
 
 
 class Rows:
-    """An array of rows; [row] are the lanes from `row + i` on, [row, shift] those from `row + shift + i` on.
+    """An array of rows; [row] reads the lanes from `row + i` on, [row, shift] those from `row + shift + i` on.
 
-    Where `kept` flags are given, the other lanes keep what they have.
+    Where `kept` flags are given, writing changes only lanes whose flag is set.
     """
 
     def __init__(self, builder: ir.IRBuilder, data: Any, i: Any, kept: Lanes | None) -> None:
@@ -247,7 +247,7 @@ class Rows:
         store(self.data, self._at(row), lanes)
 
     def one(self, at: int) -> Lanes:
-        """A number of the array, in all lanes."""
+        """One number of the array, in all lanes."""
         return spread(self.builder, self.builder.load(self.builder.gep(self.data, [self.i.type(at)])))
 
     def get(self, *rows: int) -> tuple[Lanes, ...]:
@@ -261,11 +261,11 @@ class Rows:
 
 
 def lanewise(function: Callable[..., None] | None = None, *, exact: bool = False) -> Any:
-    """A function of rows and numbers, as one that kernels call with a count before its arguments: it is done for that many
-    samples, or a few more.
+    """Make a function of rows and numbers callable from kernels, with a count before its arguments: it runs for that many
+    samples, or a few more, up to whole vectors.
 
-    Arrays are passed as Rows, numbers of float32 as Lanes, unsigned ones as row numbers. With `exact`, what rows have beyond
-    the count stays.
+    Arrays are passed as Rows, numbers of float32 as Lanes, unsigned ones as row numbers. With `exact`, rows keep what they have
+    beyond the count.
     """
     if function is None:
         return lambda f: lanewise(f, exact=exact)

@@ -1,7 +1,7 @@
-"""How a surface answers light: Lambert, GGX and a clear coat, lit by one light at a time and by all around.
+"""How a surface answers light: Lambert, GGX and a clear coat, lit by one light at a time and by the surroundings.
 
-A layered model with view-dependent weights (Turquin 2019; as Cycles' Principled BSDF): what a layer reflects of a white
-surrounding is taken from the layers below it, so that a white surface in a white surrounding vanishes. Walter et al. 2007
+A layered model with view-dependent weights (Turquin 2019; as Cycles' Principled BSDF): the share of a white surrounding that a
+layer reflects is taken from the layers below it, so that a white surface in a white surrounding vanishes. Walter et al. 2007
 (GGX), Heitz 2014 (height-correlated Smith), Schlick 1994 (Fresnel), Karis 2013 (split sum, lights that have a size).
 
 Order of the stages: `weigh`, then `add_light` for every light, `ambient`, `compose`.
@@ -32,12 +32,12 @@ i4 = nb.int32
 U = nb.uintp
 
 COAT_F0 = np.float32(0.04)
-SMOOTHEST = np.float32(0.03)  # perceptual roughness: a lamp in a perfect mirror would be a point
+SMOOTHEST = np.float32(0.03)  # perceptual roughness, at least: in a perfect mirror a lamp would be a single point
 BRIGHTEST = np.float32(60000.0)
-UNEXPOSED = np.float32(1 / EXPOSURE)  # an unlit colour is meant to be seen as it is
+UNEXPOSED = np.float32(1 / EXPOSURE)  # an unlit colour is shown unchanged by the exposure
 
 
-# Scratch of what a look-up in the maps needs, where a light was: rows of the texels, and their weights in the second map.
+# Scratch rows of a look-up in the maps, in the rows of a light: the maps' texels, and their weights in the second map.
 FIRST, UNDER, NEXT, NEXT_UNDER, A0, A1, A2, A3 = LX, LY, LZ, IR, IG, IB, SHARE, WIDTH
 LEVEL, WEIGHT = OPENX, OPENY
 
@@ -46,7 +46,7 @@ _blend2, _blend4 = blend(2), blend(4)
 
 @inner(fastmath=FAST)
 def _any(count, row, b):
-    """Whether a row has anything above 0. A count, as the compiler makes vectors of that."""
+    """Whether a row has anything above 0. The loop counts, since the compiler vectorises a count."""
     found = 0
     for i in range(count):
         found += 1 if b[row + i] > f4(0) else 0
@@ -55,13 +55,13 @@ def _any(count, row, b):
 
 @lanewise
 def _place_in_albedo(normal, rough, size, b):
-    """T0: which texel of the albedo's a layer's cosine to the viewer and roughness come after; T1 to T4: shares of four.
+    """T0: the first of four texels of the albedo around a layer's cosine to the viewer and roughness; T1 to T4: their weights.
 
-    Bilinear in the cosine's root and in roughness. normal: row of its x.
+    Bilinear in the root of the cosine and in roughness. normal: row of the normal's x.
     """
     x, y, z = b[normal], b[normal, BLOCK], b[normal, 2 * BLOCK]
     facing = x * b[VX] + y * b[VY] + z * b[VZ]
-    # What is no number is taken as 0.
+    # NaN is taken as 0.
     u, v = least(root(most(facing, 0)), 1) * (size - 1), least(most(b[rough], 0), 1) * (size - 1)
     column, row = least(u, size - 2).whole().real(), least(v, size - 2).whole().real()
     fx, fy = u - column, v - row
@@ -72,7 +72,7 @@ def _place_in_albedo(normal, rough, size, b):
 
 @inner(fastmath=FAST)
 def _integrals(count, normal, rough, albedo, b):
-    """T0, T1: both integrals of a layer's lobe."""
+    """T0, T1: both integrals of a layer's lobe (`lobe_albedo`)."""
     across = U(albedo.shape[0])
     _place_in_albedo(count, U(normal), U(rough), f4(albedo.shape[0]), b)
     for i in range(count):
@@ -84,7 +84,7 @@ def _integrals(count, normal, rough, albedo, b):
 
 @lanewise
 def _take_coat(is_coated, b):
-    """What the coat reflects."""
+    """TAKEN: the share of light that the coat reflects."""
     b[TAKEN] = b[COAT] * (COAT_F0 * b[T0] + (1 - COAT_F0) * b[T1]) * is_coated
 
 
@@ -109,7 +109,7 @@ def _share_out(b):
 
 @inner
 def weigh(count, albedo, b):
-    """Share out the light among a sample's layers, for any light: fills FACE_R to THROUGH, clears DR to SB.
+    """Divide the light among a sample's layers, for any light: fills FACE_R to THROUGH, clears DR to SB.
 
     albedo: `Surrounding.albedo`.
     """
@@ -122,10 +122,10 @@ def weigh(count, albedo, b):
 
 
 def _lobe(b, normal, rough):
-    """Of a layer: the cosine towards a light, GGX times visibility times that cosine, Schlick's power.
+    """Returns for one layer: the cosine towards a light, GGX times visibility times that cosine, Schlick's power.
 
-    The light is a ball of angular radius WIDTH: the lobe is that of its point nearest to the mirrored ray, and dimmed by as
-    much as this makes it larger: by 1 + pi / 2 q + q^2 for q = WIDTH / 2 alpha.
+    The light is a ball of angular radius WIDTH: the lobe is that of the ball's point nearest to the mirrored ray, dimmed by the
+    factor by which this enlarges the lobe: 1 + pi / 2 q + q^2 for q = WIDTH / 2 alpha.
     """
     view, n, light = b.get(VX, VY, VZ), b.get(*normal), b.get(LX, LY, LZ)
     nv, nl = least(most(dot(n, view), 1e-3), 1), clamp(dot(n, light))
@@ -172,7 +172,7 @@ def _add_coat(b):
 
 @inner
 def add_light(count, b):
-    """One light, rows LX to WIDTH: its diffuse reflection is added to DR, DG, DB, its mirrored image to SR, SG, SB."""
+    """Add one light, rows LX to WIDTH: its diffuse reflection to DR, DG, DB, its mirrored image to SR, SG, SB."""
     _add_base(count, b)
     if _any(count, COAT, b):
         _add_coat(count, b)
@@ -180,8 +180,8 @@ def add_light(count, b):
 
 @lanewise
 def _place(light, last, b):
-    """Octahedral coordinates T0, T1 of the directions T0, T1, T2, any length; the level of roughness T6, LEVEL, and how far it
-    lies from there to the next, WEIGHT. Matt is the level 0. last: of the levels of roughness.
+    """T0, T1: octahedral coordinates of the directions T0, T1, T2 (any length); LEVEL: the map of roughness T6; WEIGHT: how far
+    T6 lies from there to the next map. The matt map is level 0. last: the last level of roughness.
     """
     cosine, sine = light.one(3 * TURN), light.one(3 * TURN + 1)
     east, north, z = b.get(T0, T1, T2)
@@ -202,15 +202,15 @@ def _place(light, last, b):
 
 @lanewise
 def _share_texels(b):
-    """FIRST to NEXT_UNDER: first texel and width of two maps; then rows of the four texels, two by two, around T0, T1.
+    """FIRST to NEXT_UNDER: first texel and width of two maps, replaced by rows of the four texels, two by two, around T0, T1.
 
-    T3 to T6 and A0 to A3: their shares.
+    T3 to T6 and A0 to A3: the weights of the texels in the two maps.
     """
     x, y, share = b[T0] + 1, b[T1] + 1, b[WEIGHT]
     for first, weight, part in ((FIRST, T3, 1 - share), (NEXT, A0, share)):
         start, width = b[first], b[first + BLOCK]
         u, v = x * (width * 0.5) + 0.5, y * (width * 0.5) + 0.5
-        # What is no number is taken as 0.
+        # NaN is taken as 0.
         column, row = (least(most(place, 0), width).whole().real() for place in (u, v))
         fx, fy = u - column, v - row
         place = start + row * (width + 2) + column
@@ -238,7 +238,7 @@ def _read_texels(count, texels, b):
 
 @lanewise
 def _light(light, b):
-    """T3 to T5: radiance, from the map's and the share of it that lies below, T6."""
+    """T3 to T5: radiance, from the map's radiance and the share T6 of it that lies below the horizon."""
     share, bounce = b[T6], b[BOUNCE]
     down = where(b[LEVEL].equals(0), 1, clamp(-1.6 * b[T2]))
     down = down * down
@@ -250,10 +250,11 @@ def _light(light, b):
 
 @inner(fastmath=FAST)
 def light_around(count, surrounding, b):
-    """T3, T4, T5: radiance around the direction T0, T1, T2 over roughness T6 (-1: of a white matt surface that faces it).
+    """T3, T4, T5: radiance around the direction T0, T1, T2 for roughness T6 (-1: of a white matt surface facing that way).
 
-    The map's, the even light from above, the ground's as far as it reaches the sample. Lamps light the ground close by: a
-    mirrored ray that goes down but little sees none of it. LEVEL is left: 0 if matt.
+    It is the sum of the map's radiance, the even light from above, and the ground's light as far as it reaches the sample.
+    Lamps light only the ground close by: a mirrored ray that goes down but little sees none of their light. LEVEL is left: 0 if
+    matt.
     """
     levels = surrounding.levels
     _place(count, surrounding.light, f4(levels.shape[0] - 1), b)
@@ -266,15 +267,15 @@ def light_around(count, surrounding, b):
 
 @lanewise
 def _mirror(normal, rough, b):
-    """T0, T1, T2: the middle of a layer's lobe; T6: its roughness; T7: how much of it gets out of the surface and its crevice.
+    """T0, T1, T2: the middle of a layer's lobe; T6: its roughness; T7: the share that surface and occlusion do not block.
 
-    normal: row of its x; rough: of its roughness.
+    normal: row of the normal's x; rough: row of the roughness.
     """
     view, facet = b.get(VX, VY, VZ), b.get(GX, GY, GZ)
     n = b[normal], b[normal, BLOCK], b[normal, 2 * BLOCK]
     nv, r = clamp(dot(n, view)), clamp(b[rough])
     ray = tuple((nv + nv) * n[k] - view[k] for k in range(3))
-    # The shading normal may send the ray into the surface; cf. Lagarde and de Rousiers 2014 for both terms.
+    # The shading normal may send the ray into the surface; cf. Lagarde and de Rousiers 2014 for both factors.
     out = most(1 + least(dot(ray, facet), 0), 0)
     open_, smooth = b[OPEN], (1 - r) * (1 - r)
     b[T7] = clamp(open_ + smooth * open_ * (1 - open_) * (nv + nv - 1.1)) * out * out
@@ -285,14 +286,14 @@ def _mirror(normal, rough, b):
 
 @lanewise
 def _face(b):
-    """T0 to T2 and T6 of what the matt layer sees."""
+    """T0 to T2 and T6 for the light that the matt layer receives."""
     b.put((T0, T1, T2), b.get(NX, NY, NZ))
     b[T6] = -1
 
 
 @lanewise
 def _look_through(b):
-    """T0 to T2 and T6 of what is seen through a surface."""
+    """T0 to T2 and T6 for the light that passes through a surface towards the viewer."""
     b.put((T0, T1, T2), tuple(-v for v in b.get(VX, VY, VZ)))
     b[T6] = b[ROUGH]
 
@@ -319,12 +320,12 @@ def _shine_coat(b):
 
 @inner(fastmath=FAST)
 def ambient(count, surrounding, b):
-    """The light of the surroundings, once the block is weighed: added to DR to SB. Reads OPEN and BOUNCE.
+    """Add the light of the surroundings to DR to SB; the block must be weighed before. Reads OPEN and BOUNCE.
 
-    T3 to T5: the light behind what lets it through. What was in the light's rows is lost.
+    Leaves in T3 to T5 the light behind a transmissive surface, and overwrites the rows of a light.
     """
     has_coat, has_glass = _any(count, COAT, b), _any(count, THROUGH, b)
-    # Matt, mirror, coat, what is behind: one call, so that it is compiled once.
+    # The order is matt, mirror, coat, behind; one loop around one call, so that the call is compiled once.
     for layer in range(4):
         if (layer == 2 and not has_coat) or (layer == 3 and not has_glass):
             continue
@@ -367,19 +368,19 @@ def _compose(b):
 
 @inner
 def compose(count, b):
-    """What the sample sends to the viewer, in place of the base colour: RED, GREEN, BLUE premultiplied, ALPHA its opacity.
+    """Replace the base colour by what the sample sends to the viewer: RED, GREEN, BLUE premultiplied, ALPHA its opacity.
 
-    Thin glass lets through what is behind it by the least of its three tints; what the other two let through more, T0 to T2,
-    is taken from the surroundings in the line of sight, T3 to T5: `lay` puts what is known to be behind in their place. The
-    rougher, the more of it comes from the surroundings. A mirrored image does not become transparent with the surface (glass
-    made by alpha), except where that is all but clear. Call it right after `ambient`.
+    Thin glass transmits the background by the least of its three tints; the excess of the other two tints, T0 to T2, takes its
+    light from the surroundings in the line of sight, T3 to T5, until `lay` puts the known background in their place. The
+    rougher the glass, the more of its light comes from the surroundings. A mirrored image does not become transparent with the
+    surface (glass made by alpha), unless the surface is all but clear. Call `compose` right after `ambient`.
     """
     _compose(count, b)
 
 
 @inner(fastmath=FAST)
 def lay(pixel, i, b):
-    """Put a composed sample over what a pixel (4,) shows so far, premultiplied; coloured glass tints that."""
+    """Put a composed sample over what a pixel (4,) shows so far, premultiplied; coloured glass tints what lies behind it."""
     under, behind = f4(1) - b[ALPHA + i], pixel[3]
     pixel[0] = max(pixel[0] * (under + b[T0 + i]) + b[RED + i] - behind * b[T0 + i] * b[T3 + i], f4(0))
     pixel[1] = max(pixel[1] * (under + b[T1 + i]) + b[GREEN + i] - behind * b[T1 + i] * b[T4 + i], f4(0))
@@ -396,7 +397,7 @@ def _add_matte(b):
 
 @inner
 def add_light_matte(count, b):
-    """`add_light` for what only scatters, as plain ground; BASE_R, BASE_G, BASE_B are its colour."""
+    """`add_light` for a surface that only scatters, as plain ground; BASE_R, BASE_G, BASE_B are its colour."""
     _add_matte(count, b)
 
 

@@ -1,7 +1,7 @@
-"""Pixels in which a thin line that lies in a surface, or just on it, passes between the centres, unseen by `kernels_edges`.
+"""Pixels in which a thin line passes between the centres, in a surface or just on it, unseen by `kernels_edges`.
 
-A panel's seam is as far as the paint beside it, so nothing comes before what the centres show. Looked at are the narrow
-triangles of which a vertex is about as far as what its pixel shows there, and that look different from it.
+A panel's seam is as far away as the paint beside it, so nothing lies in front of what the centres show. Candidates are narrow
+triangles that have a vertex about as far away as the surface in that vertex's pixel, and that look different from that surface.
 """
 
 from __future__ import annotations
@@ -17,19 +17,19 @@ from viewsphere.truth.kernels_draw import NEVER, plane
 
 f4 = nb.float32
 U = nb.uintp
-BEFORE = f4(0.01)  # relative difference of 1/z of a vertex and the centre of its pixel: beyond it, `kernels_edges` looks
-BEHIND = f4(0.005)  # likewise: enough for steep surfaces, too
-FLUSH = 0.001  # of 1/z: how far behind the plane of what is seen a line may be
-WIDE = 8  # pixels: the width of a box beyond which a row's part of it is computed
-FOUND = 2  # in `marks`: a pixel marked here
+BEFORE = f4(0.01)  # relative difference of 1/z of a vertex and its pixel's centre: nearer vertices are left to `kernels_edges`
+BEHIND = f4(0.005)  # likewise for a vertex farther than the centre: enough for steep surfaces, too
+FLUSH = 0.001  # of 1/z: how far a line may lie behind the plane of the visible surface
+WIDE = 8  # pixels: in wider boxes the part of each row that the triangle covers is computed first
+FOUND = 2  # in `marks`: a pixel marked by this module
 NARROW = 1.0  # pixels: a line as wide as this is seen at some centre
 
 
 @njit
 def on_others(q, triangles, cutout, owner, triangle, depth, shown, lines):
-    """Mark in `lines` (T,) what has a vertex at a surface of another owner, which hides it at most a little.
+    """Mark in `lines` (T,) triangles with a vertex on a visible surface of another owner that hides it at most a little.
 
-    shown (V,) int32 is room.
+    shown (V,) int32 is scratch.
     """
     height, width = triangle.shape
     a, b, c, d = U(0), U(1), U(2), U(3)
@@ -51,10 +51,10 @@ def on_others(q, triangles, cutout, owner, triangle, depth, shown, lines):
 
 @njit
 def mark(order, q, triangles, owner, offsets, triangle, depth, marks, wanted):
-    """Mark the pixels that have a sample on one of these triangles where it is narrow, and that triangle in `wanted` (T,)."""
+    """Mark pixels that have a sample on one of these triangles where it is narrow; mark such triangles in `wanted` (T,)."""
     height, width = triangle.shape
     a, b, c, d = U(0), U(1), U(2), U(3)
-    lowest, highest = offsets[a, d], offsets[a, b]  # the outermost along either axis
+    lowest, highest = offsets[a, d], offsets[a, b]  # the outermost samples along either axis
     for k in range(U(order.shape[0])):
         t = U(order[k])
         i0, i1, i2 = U(triangles[t, a]), U(triangles[t, b]), U(triangles[t, c])
@@ -73,7 +73,7 @@ def mark(order, q, triangles, owner, offsets, triangle, depth, marks, wanted):
         ya = math.ceil(max(min(v0, v1, v2) - highest, 0.0))
         xb = math.floor(min(max(u0, u1, u2) - lowest, width - 1.0))
         yb = math.floor(min(max(v0, v1, v2) - lowest, height - 1.0))
-        # the shares of corners 1 and 2 at a point, from corner 0
+        # The shares of corners 1 and 2 at a point, counted from corner 0.
         scale = 1.0 / area
         sx, sy, tx, ty = by * scale, -bx * scale, -ay * scale, ax * scale
         s0, t0 = -(sx * u0 + sy * v0), -(tx * u0 + ty * v0)
@@ -103,7 +103,7 @@ def mark(order, q, triangles, owner, offsets, triangle, depth, marks, wanted):
 
 @inner
 def _is_flush(inverse, px, py, t, q, triangles):
-    """Whether 1/z is at (px, py) no more than a little behind a triangle's plane."""
+    """Whether 1/z `inverse` at (px, py) lies at most a little behind triangle t's plane."""
     i0, i1, i2 = triangles[t, 0], triangles[t, 1], triangles[t, 2]
     nx, ny, nz, det = plane((q[i0, 0], q[i0, 1], q[i0, 2]), (q[i1, 0], q[i1, 1], q[i1, 2]), (q[i2, 0], q[i2, 1], q[i2, 2]))
     return det != 0.0 and inverse >= (1.0 - FLUSH) * (nx * px + (ny * py + nz)) / det

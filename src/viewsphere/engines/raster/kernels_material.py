@@ -99,7 +99,7 @@ CONSTANT_ROWS = {
     TRANSMISSION: L_TRANSMISSION, UNLIT: L_UNLIT, GROUND: L_GROUND, CATCHER: L_CATCHER, BLENDED: L_BLENDED, T1: L_SPECULAR,
 }  # fmt: skip
 
-# Rows of a chunk: how barycentric coordinates change from pixel to pixel, how u and v change along the edges.
+# Rows of a chunk: how barycentric coordinates change from pixel to pixel, and how u and v change along the edges.
 G_X, H_X, G_Y, H_Y, UA, VA, UB, VB = range(FOOTPRINT_ROWS * CHUNK, (FOOTPRINT_ROWS + 8) * CHUNK, CHUNK)
 CHUNK_ROWS = FOOTPRINT_ROWS + 8
 SECOND_SET = U1 - U0  # from a row of the first uv set to that of the second
@@ -107,9 +107,9 @@ SECOND_SET = U1 - U0  # from a row of the first uv set to that of the second
 
 @inner(fastmath=FAST, _nrt=True)
 def material(count, view, surfaces, textures, b, which):
-    """Fill the rows that say what the samples are made of; normals become those of the normal maps.
+    """Fill the rows that say what the samples are made of; smooth normals become those of the normal maps.
 
-    `which` are the samples' materials. Rows read: V, N, PIXEL, uv, vertex colour in RED to ALPHA, of textured ones AX to SIDE.
+    `which` are the samples' materials. Reads rows V, N, PIXEL, uv, vertex colour in RED to ALPHA, and AX to SIDE if textured.
     """
     c = np.empty(CHUNK_ROWS * CHUNK, np.float32)
     q = np.empty(QUAD_ROWS * QUADS, np.float32)
@@ -149,7 +149,7 @@ def material(count, view, surfaces, textures, b, which):
 
 @lanewise(exact=True)
 def _factors(look, b):
-    """What a run of samples of one material is made of without its textures."""
+    """Material rows of a run of samples of one material, before its textures are applied."""
     for row, column in CONSTANT_ROWS.items():
         b[row] = look.one(column)
     for row, column in ((RED, L_RED), (GREEN, L_GREEN), (BLUE, L_BLUE)):
@@ -163,7 +163,7 @@ def _factors(look, b):
 
 @lanewise(exact=True)
 def _lay_ground(per_length, b):
-    """Edges on the ground, along which its coordinates change by 1."""
+    """Edge rows of samples on the ground: along either edge one texture coordinate changes by 1."""
     length = 1 / per_length
     for row in (AY, AZ, BX, BZ, VA0, UB0):
         b[row] = 0
@@ -176,13 +176,13 @@ def _barycentric_motion(rotation, is_lens, b, c):
     """How the two barycentric coordinates change from pixel to pixel, across (G_X, H_X) and down (G_Y, H_Y): the derivative of
     the place where the pixel's ray meets the triangle's plane (Igehy, Tracing Ray Differentials, 1999).
 
-    By Cramer's rule, as a step on the screen is a step along the edges and one along the ray.
+    Solved by Cramer's rule: a step on the screen equals a step along the two edges plus one along the ray.
     """
     v, first, second = b.get(VX, VY, VZ), b.get(AX, AY, AZ), b.get(BX, BY, BZ)
     g, h = cross(second, v), cross(v, first)
     volume = dot(first, g)
     scale = b[PIXEL] * volume / most(volume * volume, 1e-36)
-    # Across a lens's ray any two directions will do, as its pixels are about round there (Duff et al. 2017).
+    # Across a lens's ray any two perpendicular directions will do, as its pixels are about round there (Duff et al. 2017).
     x, y, z = v
     s = sign(z)
     k = -1 / (s + z)
@@ -210,7 +210,7 @@ def _coordinates(transform, uv_set, b, c):
 
 @inner(fastmath=FAST)
 def _apply(count, plane, mode, look, c, b):
-    """Four channels of the textures."""
+    """Apply four channels of a bundle to the samples' rows."""
     kind, at = mode[6 + plane], U(TEXEL + plane % PLANES * 4 * CHUNK)
     one = f4(1)
     if kind == BASE:
@@ -232,7 +232,7 @@ def _apply(count, plane, mode, look, c, b):
 
 @lanewise(exact=True)
 def _multiply(row, last, share, at, c, b):
-    """Three channels times what the samples have so far, and a fourth, which counts as far as `share` says."""
+    """Multiply three rows by three channels, and a fourth row by the fourth channel as far as `share` says."""
     for k in range(3):
         b[row, k * BLOCK] = b[row, k * BLOCK] * (c[at, k * CHUNK] * (1 / 65535))
     b[last] = b[last] * (1 + (c[at, 3 * CHUNK] * (1 / 65535) - 1) * share)
@@ -240,7 +240,7 @@ def _multiply(row, last, share, at, c, b):
 
 @lanewise(exact=True)
 def _roughen(rough, metal, at, c, b):
-    """Roughness, metallic, coat and transmission."""
+    """Multiply roughness, metallic, coat and transmission by a plane's channels."""
     b[ROUGH] = b[ROUGH] + rough * (c[at] * (1 / 65535) - 1)
     b[METAL] = b[METAL] + metal * (c[at, CHUNK] * (1 / 65535) - 1)
     b[COAT] = b[COAT] * (c[at, 2 * CHUNK] * (1 / 65535))
@@ -254,11 +254,11 @@ def _occlude(share, at, c, b):
 
 @lanewise(exact=True)
 def _bump(strength, widening, coat, at, c, b):
-    """Turn the normals as a normal map says: x along u, y against v (up in the image), also where the uv are mirrored; nothing
-    where they are degenerate. coat: CX - NX for those of the coat, else 0.
+    """Turn the normals as a normal map says: x along u, y against v (up in the image), also where the uv are mirrored; normals
+    stay where the uv are degenerate. coat: CX - NX for the coat's normals, else 0.
 
-    A mean of normals is the shorter the more they differ: bumps too small to see become roughness (Toksvig 2005; here as the
-    concentrations of von Mises-Fisher lobes, Banerjee et al. 2005, of which the inverses add up).
+    The more normals differ, the shorter is their mean: bumps too small to see become roughness (Toksvig 2005; here by adding
+    the inverse concentrations of von Mises-Fisher lobes, Banerjee et al. 2005).
     """
     p, q, z = ((c[at, k * CHUNK] - 32768) * (1 / 32767) for k in range(3))
     squared = least(p * p + q * q + z * z, 1)
@@ -287,7 +287,7 @@ def _bump(strength, widening, coat, at, c, b):
 
 
 def _seen(normal, v):
-    """The unit vector; one that looks away, and would be black, is turned until it is seen edge on."""
+    """The unit normal; one that looks away from the viewer, and would be black, is turned until it is seen edge on."""
     scale = 1 / root(dot(normal, normal) + 1e-20)
     normal = tuple(x * scale for x in normal)
     away = most(0.01 - dot(normal, v), 0)
@@ -298,7 +298,7 @@ def _seen(normal, v):
 
 @lanewise
 def _finish(b):
-    """Unit normals that do not look away, roughness with what the bumps add, reflectance and transmission of the mixture."""
+    """Unit normals that face the viewer, roughness with that of small bumps, reflectance and transmission of the mixture."""
     v = b.get(VX, VY, VZ)
     for rows in ((NX, NY, NZ), (CX, CY, CZ)):
         b.put(rows, _seen(b.get(*rows), v))

@@ -1,8 +1,8 @@
-"""How much of the sky a place can see: a volume around the targets, a map of what they stand on, and reading both.
+"""How much of the sky a place can see: a volume around the targets and a map of the ground that they stand on, and look-ups.
 
-A cell of the volume holds, for the directions above the horizon and for those below, the visible share of the sphere and the
-mean of the visible directions, which are spherical harmonics up to degree 1 (Ramamoorthi and Hanrahan 2001): the cosine-
-weighted share that a surface with normal n can see is m + 2 v . n.
+A cell of the volume holds, for the directions above the horizon and for those below, the visible share m of the sphere and the
+mean v of the visible directions, the spherical harmonics up to degree 1 (Ramamoorthi and Hanrahan 2001): the cosine-weighted
+share that a surface with normal n can see is m + 2 v . n.
 """
 
 from __future__ import annotations
@@ -45,19 +45,19 @@ f4 = nb.float32
 i4 = nb.int32
 U = nb.uintp
 _blend2, _blend8 = blend(2), blend(8)
-SKY, LIGHT, WITHIN, PLACE = LX, LY, LZ, IR  # rows that no light needs yet
+SKY, LIGHT, WITHIN, PLACE = LX, LY, LZ, IR  # rows of a light, in use before the first light
 COEFFICIENTS = 8
-BEHIND = 0.02  # what a point counts at least
-HIDDEN = 0.03  # a cell that sees less lies within something
-GAIN = 1.04  # what a plane's own horizon takes from directions that are as wide as a few dozen on the sphere
-HORIZON = 0.03  # keeps the share of a sky that a surface hardly faces from being noise
+BEHIND = 0.02  # least weight of a point of the volume that lies behind the surface
+HIDDEN = 0.03  # a cell that sees a smaller share lies within a solid thing
+GAIN = 1.04  # makes up for the directions that a plane's own horizon hides: on the sphere each stands for a wide cone
+HORIZON = 0.03  # keeps the ratio from being noise where the surface hardly faces the sky
 
 
 @njit
 def see(points, views, directions, b, out):
-    """For each point (N, 3) the visible share and mean direction above the horizon and below, into out (N, 8).
+    """For each point (N, 3) the visible share and mean direction, above the horizon and below, into out (N, 8).
 
-    b (ROWS * BLOCK,) is room.
+    b (ROWS * BLOCK,) is scratch.
     """
     per = f4(1.0 / directions.shape[0])
     for start in range(0, points.shape[0], BLOCK):
@@ -81,8 +81,8 @@ def see(points, views, directions, b, out):
 
 @lanewise
 def _place_on_floor(frame, across, b):
-    """T0: 1 more than the first of four cells, 0 beyond the map; T1 to T4: their shares. `across`: cells in a row."""
-    # A wall has the light of the ground before it, not of what it stands on.
+    """T0: 1 more than the index of the first of four cells, 0 beyond the map; T1 to T4: weights. `across`: cells a row."""
+    # A wall is lit by the ground in front of it, not by the ground beneath it.
     u = (b[PX] - frame.one(1)) * frame.one(0) + b[NX] - 0.5
     v = (b[PY] - frame.one(2)) * frame.one(0) + b[NY] - 0.5
     is_within = (u >= 0) & (v >= 0) & (u < across - 1) & (v < across - 1)
@@ -97,7 +97,7 @@ def _place_on_floor(frame, across, b):
 
 @inner
 def _read_floor(count, floor, frame, b):
-    """SKY and LIGHT, both shares of what the targets stand on, at each sample: from four cells; 1 beyond the map."""
+    """SKY and LIGHT: both shares of the ground's map at each sample, from four cells; 1 beyond the map."""
     across = U(floor.shape[0])
     _place_on_floor(count, frame, f4(across), b)
     for i in range(count):
@@ -110,9 +110,9 @@ def _read_floor(count, floor, frame, b):
 
 @lanewise
 def _place_in_volume(frame, columns, rows, layers, b):
-    """PLACE: the first of the eight points around a place a little off the surface; T0 to T7: their shares.
+    """PLACE: the first of the eight points of the volume around a place a little off the surface; T0 to T7: their weights.
 
-    WITHIN: how far inside the volume that is, 0..1.
+    WITHIN: how far inside the volume that place is, 0..1.
     """
     normal, cells, push = b.get(NX, NY, NZ), frame.one(3), frame.one(4)
     own = [(b[PX + k * BLOCK] - frame.one(k)) * cells for k in range(3)]
@@ -120,7 +120,7 @@ def _place_in_volume(frame, columns, rows, layers, b):
     near = [least(at, points - 1 - at) for at, points in zip(place, (columns, rows, layers), strict=True)]
     is_within = (near[0] > 0) & (near[1] > 0) & (near[2] > 0)
     b[WITHIN] = where(is_within, least(least(least(near[0], near[1]), near[2]) * 0.5, 1), 0)
-    # What is no number lies at the first point.
+    # NaN is placed at the first point.
     place = [where(is_within, at, 0) for at in place]
     first = [at.whole().real() for at in place]
     part = [at - low for at, low in zip(place, first, strict=True)]
@@ -142,7 +142,7 @@ def _place_in_volume(frame, columns, rows, layers, b):
 
 @inner
 def _read_volume(count, volume, frame, b):
-    """The volume's coefficients into T0..T7 at each sample: a little off its surface, from the points on its side."""
+    """The volume's coefficients into T0..T7: read a little off each sample's surface, from points in front of it."""
     layers, rows, columns = U(volume.shape[0]), U(volume.shape[1]), U(volume.shape[2])
     _place_in_volume(count, frame, f4(columns), f4(rows), f4(layers), b)
     for i in range(count):
@@ -155,7 +155,7 @@ def _read_volume(count, volume, frame, b):
 
 @lanewise
 def _shares(has_ground, b):
-    """OPEN and BOUNCE from the coefficients."""
+    """OPEN and BOUNCE from the volume's coefficients."""
     normal, within = b.get(NX, NY, NZ), b[WITHIN]
     up = b[T0] + 2 * dot(b.get(T1, T2, T3), normal)
     down = b[T4] + 2 * dot(b.get(T5, T6, T7), normal)
@@ -167,11 +167,11 @@ def _shares(has_ground, b):
 
 @lanewise
 def _near_floor(frame, b):
-    """What the targets stand on sends up less light beside them; scenery that it is, is as dark as it."""
+    """The ground beside the targets sends up less light; scenery that serves as this ground is darkened like the ground."""
     height = (b[PZ] - frame.one(3)) / (0.35 * frame.one(4))
     light, sky, above = b[LIGHT], b[SKY], b[OPEN]
     b[BOUNCE] = b[BOUNCE] * (light + (1 - light) * 0.6 * clamp(height))
-    # Scenery that faces up about as low as the targets stand is what they stand on.
+    # Scenery that faces up at about the height of the targets' lowest point serves as their ground.
     close = most(1 - size(height), 0) * most(b[NZ], 0) * b[SCENERY]
     b[OPEN] = above + (least(above, sky) - above) * close
 
@@ -189,7 +189,7 @@ def _darken(b):
 
 @inner
 def occlude(count, occlusion, b):
-    """Fill OPEN and BOUNCE of a block of the ground's samples or of others (row GROUND of its first).
+    """Fill OPEN and BOUNCE of a block of samples, either all of the ground or none (row GROUND of the first sample says which).
 
     With a ground, OPEN is the share of the cosine-weighted upper sky, BOUNCE that of the ground's light; without one both are
     the share of the whole hemisphere above the surface. The occlusion texture (row AO) is in both.

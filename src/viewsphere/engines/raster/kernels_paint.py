@@ -1,4 +1,4 @@
-"""From samples to radiance: which samples show what, every visible sample shaded once, edge pixels averaged, the sky behind."""
+"""From samples to radiance: find which samples show what, shade every visible sample once, average edge pixels."""
 
 from __future__ import annotations
 
@@ -53,8 +53,8 @@ from viewsphere.kernels.jit import inner, njit
 f4 = nb.float32
 U = nb.uintp
 NOTHING, SOLID, SEE_THROUGH, FLOOR = range(4)
-GLINT = 1.0  # radiance: what a sample of an edge pixel may have that nothing around it has
-BRIGHT = 1.1  # radiance up to which a centre's colour stands for samples beside it: a glint on a crease is narrow
+GLINT = 1.0  # radiance up to which a sample of an edge pixel counts in full, however dark its other samples are
+BRIGHT = 1.1  # radiance up to which a centre's colour stands for samples beside it: brighter glints on a crease are narrow
 # From a pixel to the centres nearest to each of its samples (`samples.OFFSETS`), three each.
 STEPS_X = (0, 0, -1, 0, 1, 0, 0, 0, 1, 0, -1, 0)
 STEPS_Y = (0, -1, 0, 0, 0, -1, 0, 1, 0, 0, 0, 1)
@@ -62,11 +62,12 @@ STEPS_Y = (0, -1, 0, 0, 0, -1, 0, 1, 0, 0, 0, 1)
 
 @njit
 def sorted_samples(triangle, kind, material, starts, radiance, solid, ground):
-    """Indices of the samples that show solid surfaces, those of one material together, and of those of the ground.
+    """Indices of the samples that show solid surfaces, those of one material together, and of the samples that show the ground.
 
-    kind (T + 1,) uint8: of each triangle; the last of triangle -1, NOTHING. material (T,): which one. starts (M + 1,): 0s;
-    of so many materials where the next begins, then. radiance (S, 4) becomes 0 but where the ground is, which is not laid over
-    anything. solid, ground (S,) int32; returns how many each of them has.
+    kind (T + 1,) uint8: of each triangle; the last, of triangle -1, is NOTHING. material (T,): each triangle's material. starts
+    (M + 1,): zeros, filled with the place where each material's samples end in `solid`. radiance (S, 4) is set to 0 except
+    where the ground is, since ground is not laid over anything. solid, ground (S,) int32 are filled; returns how many samples
+    each has.
     """
     size, materials, grounds = U(triangle.shape[0]), U(starts.shape[0] - 1), U(0)
     i = U(0)
@@ -105,14 +106,14 @@ def sorted_samples(triangle, kind, material, starts, radiance, solid, ground):
 
 @inner(fastmath=FAST)
 def _start_catcher(count, b):
-    """DR and DG collect the light that comes and the light that would come without what stands on the catcher."""
+    """DR and DG collect the light that arrives, and the light that would arrive if nothing stood on the catcher."""
     for i in range(count):
         b[DR + i], b[DG + i], b[GROUND + i], b[AO + i] = f4(0), f4(0), f4(1), f4(1)
 
 
 @inner(fastmath=FAST)
 def _catch(count, b):
-    """One light on a shadow catcher."""
+    """Add one light to the sums of a shadow catcher."""
     for i in range(count):
         nl = max(b[NX + i] * b[LX + i] + b[NY + i] * b[LY + i] + b[NZ + i] * b[LZ + i], f4(0))
         light = (b[IR + i] + b[IG + i] + b[IB + i]) * nl * f4(1 / (3 * np.pi))
@@ -122,7 +123,7 @@ def _catch(count, b):
 
 @inner(fastmath=FAST)
 def _finish_catcher(count, surrounding, b):
-    """Black, as opaque as there is light missing."""
+    """Make the catcher black, as opaque as the missing share of light."""
     even = (surrounding.up[0] + surrounding.up[1] + surrounding.up[2]) * f4(1 / 3)
     for i in range(count):
         all_light = b[DG + i] + even
@@ -148,7 +149,7 @@ def _start_matte(floor, b):
 
 @inner(fastmath=FAST)
 def _take(count, is_matte, b):
-    """One light that has arrived."""
+    """Add one light that has arrived."""
     if is_matte:
         add_light_matte(count, b)
     else:
@@ -157,7 +158,7 @@ def _take(count, is_matte, b):
 
 @inner(fastmath=FAST)
 def _lay_all(start, count, is_ground, slots, radiance, b):
-    """What the samples send and hide, over what is behind them; the ground, behind all else, as far as it has not faded."""
+    """Lay the composed samples over what is behind them; ground, which is behind all else, as far as it has not faded."""
     if not is_ground:
         for i in range(count):
             lay(radiance[U(slots[start + i])], i, b)
@@ -172,7 +173,7 @@ def _lay_all(start, count, is_ground, slots, radiance, b):
 def shade(view, surfaces, textures, floor, surrounding, lights, occlusion, is_ground, slots, triangle, depth, radiance):
     """Shade the samples in `slots` (N,) int32 over `radiance` (S, 4) float32, premultiplied, in place.
 
-    triangle (S,) int32 and depth (S,) float32 (inverse) are what is seen; all slots show the ground, or none does.
+    triangle (S,) int32 and depth (S,) float32 (inverse) are what each sample shows; all slots show the ground, or none does.
     floor: see `painting.Baked`.
     """
     b = np.zeros(ROWS * BLOCK, np.float32)
@@ -205,7 +206,7 @@ def shade(view, surfaces, textures, floor, surrounding, lights, occlusion, is_gr
 
 @njit(fastmath=FAST, _nrt=True)
 def catch(view, floor, surrounding, lights, occlusion, slots, triangle, depth, radiance):
-    """As `shade`, of ground that is a shadow catcher."""
+    """As `shade`, for ground that is a shadow catcher."""
     b = np.zeros(ROWS * BLOCK, np.float32)
     own, which = np.empty(BLOCK, np.int32), np.empty(BLOCK, np.int32)
     for start in range(0, slots.shape[0], BLOCK):
@@ -223,7 +224,7 @@ def catch(view, floor, surrounding, lights, occlusion, slots, triangle, depth, r
 
 @inner
 def _alike(t, s, depth, other, owner, normals):
-    """Whether two places look alike: same owner, planes less than 10 degrees apart, depths (1/z) less than 0.5 %."""
+    """Whether two places look alike: same owner, planes less than 10 degrees apart, depths (1/z) less than 0.5 % apart."""
     if t == s or t < 0 or s < 0:
         return t == s
     a, b, c, t, s = U(0), U(1), U(2), U(t), U(s)
@@ -234,11 +235,11 @@ def _alike(t, s, depth, other, owner, normals):
 
 @njit(_nrt=True)
 def shared_samples(pixels, triangle, depth, seen, inverse_depth, owner, normals, behind, radiance):
-    """Whose colour each of the samples, four a pixel, has: of the nearest pixel's centre that looks like it, or its own.
+    """Whose colour each sample has, four samples a pixel: that of the nearest pixel's centre that looks alike, or its own.
 
-    In pixels marked in behind (H * W,), if that is not empty, each has its own: what is behind its surface may differ.
-    seen, inverse_depth (H, W), radiance (H * W, 4): at the centres. Returns like (4N,): the centre's pixel, or ~k; rows (R,):
-    the pixels (indices in `pixels`) that have samples of their own: sample k % 4 of row k // 4.
+    In pixels marked in behind (H * W,), if `behind` is not empty, each sample has its own colour, since what lies behind its
+    surface may differ. seen, inverse_depth (H, W), radiance (H * W, 4): at the centres. Returns like (4N,): the centre's pixel,
+    or ~k for a colour of its own; rows (R,): the pixels (indices in `pixels`) with such samples: sample k % 4 of row k // 4.
     """
     height, width = seen.shape
     like, rows = np.empty(triangle.shape[0], np.int32), np.empty(pixels.shape[0], np.int32)
@@ -254,7 +255,7 @@ def shared_samples(pixels, triangle, depth, seen, inverse_depth, owner, normals,
         for i in range(4):
             m = U(4 * n + i)
             like[m] = -1
-            for k in range(3):  # its own centre, that beyond the side it is at, and beyond the next nearest
+            for k in range(3):  # the pixel's own centre, the one beyond the nearest side, and the one beyond the next nearest
                 v, u = y + STEPS_Y[3 * i + k], x + STEPS_X[3 * i + k]
                 if like[m] < 0 and 0 <= v < height and 0 <= u < width:
                     v, u = U(v), U(u)
@@ -276,10 +277,10 @@ def shared_samples(pixels, triangle, depth, seen, inverse_depth, owner, normals,
 
 @njit(fastmath=FAST, _nrt=True)
 def average_samples(pixels, like, samples, radiance):
-    """Each pixel becomes the mean of its four samples (premultiplied), whose colours `shared_samples` tells.
+    """Set each pixel to the mean of its four samples (premultiplied), whose colours `shared_samples` found.
 
-    A glint counts no more than GLINT, or than the least of them, else thin things would be dotted. Returns which of `pixels`
-    have one (G,), and their true means (G, 3).
+    A sample counts at most as GLINT, or as the darkest of the four where that is brighter, else glints would dot thin things.
+    Returns the indices in `pixels` of pixels with a dimmed glint (G,), and their true means (G, 3).
     """
     means, whole = np.empty((pixels.shape[0], 4), np.float32), np.empty((pixels.shape[0], 3), np.float32)
     glints, count = np.empty(pixels.shape[0], np.int32), U(0)

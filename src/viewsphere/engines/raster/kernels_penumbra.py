@@ -1,11 +1,12 @@
-"""How much of a light a sample sees past what the light's map shows: blockers first, then a filter as wide as its penumbra.
+"""How much of a light a sample sees where a view's map shows blockers: a search for blockers, then a filter of that width.
 
 Percentage-closer soft shadows (Fernando 2005), where a texel blocks only if it lies between the sample and some part of the
-light, as in backprojection (Guennebaud et al. 2006); the filter is a window of the map's own texels, on a coarser level the
-wider it is, so that nothing is random. A light has the shape and the size it has seen from the sample.
+light, as in backprojection (Guennebaud et al. 2006). The filter is a window of the map's own texels, on a coarser level for a
+wider penumbra, so that nothing is random. A light has the shape and the size that it has as seen from the sample.
 
-What hides a lamp often lies aslant: from beneath a table's edge, the top near the lamp would hide far more than the edge. So
-for lights at a place a plane is fitted to the blockers, and the filter is as wide, on each side, as the light past that plane.
+The edge that hides part of a lamp is often slanted: from beneath a table's edge, the part of the table top near the lamp would
+hide far more than the edge does. So for lights at a place a plane is fitted to the blockers, and the filter is as wide, on each
+side, as the light seen past that plane.
 """
 
 # ruff: isort: skip_file
@@ -34,55 +35,55 @@ from viewsphere.kernels.jit import inner
 
 f4 = nb.float32
 U = nb.uintp
-# Rows while a view is looked at; the irradiance comes after. Coordinates in textures are read by then.
+# Rows while a view is looked at. They reuse rows of irradiance, filled later, and of texture coordinates, read before.
 U_, V_, Q_, DU, DV, NEAR, SOFT, RADIUS, STATE, FACING = T1, T2, T3, T4, T5, T6, T7, IR, IG, IB
 LEFT, TOP, TEXEL, TALL, REACH = U0, V0, U1, V1, BARY2
 MEAN, SUM, COUNT = OPENX, OPENY, OPENZ
-# Between a search and its filter: how the blockers' distance grows per texel. What else is in these rows is not needed then.
+# Between the search and the filter: how the blockers' distance grows per texel. The rows' other contents are not needed then.
 SLOPE_U, SLOPE_V = SUM, RADIUS
 NARROW, WIDE = 6.5, 9.0
 
 
 def span(form: Rows, b: Rows) -> Lanes:
-    """Half the width of the light, seen from samples, across or down, in texels per q; or a little more."""
+    """Half the width of the light, seen from samples, across or down, in texels per q; an upper bound of it."""
     u, v, middle = b[U_], b[V_], form.one(MIDDLE)
     return most(form.one(SPAN_U) + size(u - middle) * form.one(MORE), form.one(SPAN_V) + size(v - middle) * form.one(MORE))
 
 
 def power(x: Lanes) -> Lanes:
-    """The power of two that is at most x > 0."""
+    """The greatest power of two that is at most x > 0."""
     return Lanes(x.builder, x.builder.bitcast((x.bits() & 0x7F800000).value, x.value.type))
 
 
 class _Disc:
-    """A distant light, which looks the same from everywhere: half its size in texels per q."""
+    """A distant light, a disc that looks the same from everywhere: half its size in texels per q."""
 
     def __init__(self, form: Rows, b: Rows) -> None:
         self.half = most(form.one(SIDES), 1e-3)
         self.q, self.near, self.du, self.dv = b.get(Q_, NEAR, DU, DV)
-        # The first search, before which STATE is above 1, is of all that there is.
+        # The first search, while STATE is above 1, covers blockers at any distance.
         self.farthest = where(b[STATE] > 1, math.inf, b[REACH] / self.half)
 
     def meet(self, z: Lanes, x: Lanes, y: Lanes) -> tuple[Lanes, Lanes, Lanes]:
-        """As `_Light.meet`; how far away a place is, squared."""
+        """As `_Light.meet`, but with the squared distance of the place from the sample in its last number."""
         gap = most(self.q - z, 0)
         return (z < self.near + self.du * x + self.dv * y) & (gap <= self.farthest), gap, x * x + y * y
 
 
 class _Light:
-    """A light at a place, as samples see it: half its sizes along two axes, in texels per q, the matrix from texels to those
-    axes, and how many times as wide or high as its half sizes it is.
+    """A light at a place, as samples see it: half its sizes along two axes, in texels per q, the matrix from texels to these
+    axes, and the factor by which its bounding box exceeds the half sizes.
     """
 
     def __init__(self, form: Rows, b: Rows) -> None:
         u, v = b[U_] - form.one(MIDDLE), b[V_] - form.one(MIDDLE)
         self.is_round = form.one(ROUND)
         is_round = self.is_round > 0
-        # A ball is an ellipse, the longer the farther from the map's middle.
+        # A ball is seen as an ellipse, the longer the farther it is from the map's middle.
         tilt = form.one(TILT)
         longer = root(1 + (u * u + v * v) * tilt)
         less = tilt / (longer * (longer + 1))
-        # What of a rectangle's sides lies along the map's axis is seen aslant.
+        # Parts of a rectangle's sides that point along the map's axis are foreshortened.
         au, av, aq, bu, bv, bq = (form.one(SIDES + k) for k in range(6))
         au, av, bu, bv = au - u * aq, av - v * aq, bu - u * bq, bv - v * bq
         long_a, long_b = most(root(au * au + av * av), 1e-3), most(root(bu * bu + bv * bv), 1e-3)
@@ -90,21 +91,21 @@ class _Light:
         per_a, per_b = 1 / long_a, 1 / long_b
         au, av, bu, bv = au * per_a, av * per_a, bu * per_b, bv * per_b
         sine = au * bv - av * bu
-        per = 1 / where(sine < 0, least(sine, -0.1), most(sine, 0.1))  # seen from its own plane it is a line
+        per = 1 / where(sine < 0, least(sine, -0.1), most(sine, 0.1))  # seen from within its own plane the rectangle is a line
         self.u_to_a, self.v_to_a = where(is_round, 1 - u * u * less, bv * per), where(is_round, -u * v * less, -bu * per)
         self.u_to_b, self.v_to_b = where(is_round, -u * v * less, -av * per), where(is_round, 1 - v * v * less, au * per)
         self.stretch = where(is_round, longer, most(size(au) + size(bu), size(av) + size(bv)))
-        # How much farther than a texel is wide its border may be along an axis that the light is seen against.
+        # By how many texels more than one the light's border is softened along an axis that is foreshortened.
         self.thin_a = most(most(size(self.u_to_a), size(self.v_to_a)) - 1, 0) * 0.5
         self.thin_b = most(most(size(self.u_to_b), size(self.v_to_b)) - 1, 0) * 0.5
 
         self.q, self.near, self.du, self.dv = b.get(Q_, NEAR, DU, DV)
-        # The first search, before which STATE is above 1, is of all that there is.
+        # The first search, while STATE is above 1, covers blockers at any distance.
         self.farthest = where(b[STATE] > 1, math.inf, b[REACH] / most(self.half_a, self.half_b))
 
     def meet(self, z: Lanes, x: Lanes, y: Lanes) -> tuple[Lanes, Lanes, Lanes, Lanes]:
-        """Whether what is at a place from the sample lies before its plane, but not so far that its penumbra is wider than
-        REACH; how far in q; how far along the light's axes.
+        """For a texel of depth z (q) at (x, y) from the sample: whether it lies before the sample's plane, but not so far that
+        its penumbra is wider than REACH; its distance before the sample in q; its offsets along the light's axes.
         """
         gap = most(self.q - z, 0)
         is_nearer = (z < self.near + self.du * x + self.dv * y) & (gap <= self.farthest)
@@ -112,18 +113,19 @@ class _Light:
 
 
 class _Sample(Rows):
-    """A block of which all lanes are one sample."""
+    """A block in which every lane reads the same sample."""
 
     def __getitem__(self, row: Any) -> Lanes:
         return spread(self.builder, self.builder.load(self.builder.gep(self.data, [self._at(row)])))
 
 
 def _over_window(*rows: int, sums: int = 2) -> Any:
-    """A function of a view's form and a sample, as one that kernels call: `(depth, at, stride, form, b, i)`.
+    """Make a kernel function from a function of a view's form and a sample; it is called with `(depth, at, stride, form, b,
+    i)`.
 
-    It returns a function of q and place (from the sample, in the map's texels) of texels, which gives as many numbers as `sums`
-    says, and one of their sums over the window of sample i (uintp), which gives what goes to the rows. The window begins at
-    depth[at], its rows are `stride` apart (uintp).
+    The decorated function returns two functions: one maps q and place (from the sample, in the map's texels) of texels to
+    `sums` numbers; the other maps the sums of these numbers over the window of sample i (uintp) to the values of `rows`. The
+    window begins at depth[at], its rows are `stride` apart (uintp).
     """
 
     def decorate(function: Callable[[Rows, Rows], tuple[Callable[..., tuple[Lanes, ...]], ...]]) -> Any:
@@ -176,7 +178,7 @@ def _as_they_are(*totals: Lanes) -> tuple[Lanes, ...]:
 
 @_over_window(COUNT, SUM)
 def _block(form, b):
-    """COUNT of texels that hide part of a distant light, less at its rim, and the SUM of their distances in q."""
+    """COUNT of texels that hide part of a distant light, weighted less at its rim, and the SUM of their distances in q."""
     disc, step = _Disc(form, b), b[TEXEL]
     soft, half_per = b[SOFT] + step, 0.5 / step
 
@@ -191,17 +193,17 @@ def _block(form, b):
 
 @_over_window(COUNT, SUM)
 def _filter(form, b):
-    """SUM of the weights of texels in a filter as wide as a distant light is past blockers at MEAN; COUNT: of those it gets
-    past.
+    """SUM of the weights of texels in a filter as wide as a distant light is past blockers at MEAN; COUNT: of texels that let
+    light pass.
 
-    What lies deep behind others that are nearer to the light hides more than its own penumbra tells.
+    A blocker far behind others that are nearer to the light hides more than its own penumbra tells.
     """
     disc, soft, step = _Disc(form, b), b[SOFT], b[TEXEL]
     radius, per = most(disc.half * b[MEAN], soft), 1 / step
-    # A disc's edge is one texel wide: near its rim (1 - d^2 / r^2) r / 2 is r - d.
+    # A disc's edge is one texel wide: near the rim (1 - d^2 / r^2) r / 2 is about r - d.
     rim, fall = radius * per * 0.5 + 0.5, 0.5 * per / radius
     deep, near = disc.half * 3, soft + step
-    left = 1 - least(b[COUNT], 1)  # blockers come and go little by little
+    left = 1 - least(b[COUNT], 1)  # blockers appear and vanish gradually
 
     def texel(z, x, y):
         is_hit, gap, squared = disc.meet(z, x, y)
@@ -213,8 +215,8 @@ def _filter(form, b):
 
 @_over_window(COUNT, MEAN, SLOPE_U, SLOPE_V, sums=10)
 def _block_aslant(form, b):
-    """COUNT of texels that hide part of the light, less at its rim, and the plane that fits their distances in q best: MEAN,
-    what it is at the sample's own texel, and its slopes, 0 where no plane fits.
+    """COUNT of texels that hide part of the light, weighted less at its rim, and the plane that best fits their distances in q:
+    MEAN, the plane's distance at the sample's own texel, and its slopes, 0 where no plane fits.
     """
     light, step = _Light(form, b), b[TEXEL]
     soft, per = b[SOFT] + step, 1 / step
@@ -233,7 +235,7 @@ def _block_aslant(form, b):
         per = 1 / most(n, 1e-6)
         g, x, y = g * per, x * per, y * per
         gx, gy, gg, xy = gx * per - g * x, gy * per - g * y, gg * per - g * g, xy * per - x * y
-        # What is but one texel wide has no slope.
+        # Blockers only one texel wide have no slope.
         least_wide = step * step * 0.25
         xx, yy = xx * per - x * x + least_wide, yy * per - y * y + least_wide
         scale = 1 / most(xx * yy - xy * xy, 1e-12)
@@ -248,7 +250,7 @@ def _block_aslant(form, b):
 
 @_over_window(COUNT, SUM)
 def _filter_aslant(form, b):
-    """`_filter` past a plane of blockers, without what part of the light lies below the sample's own plane."""
+    """As `_filter`, past a plane of blockers, and without the part of the light that lies below the sample's own plane."""
     light, soft, step = _Light(form, b), b[SOFT], b[TEXEL]
     mean, slope_u, slope_v, per = b[MEAN], b[SLOPE_U], b[SLOPE_V], 1 / step
     soft_a, soft_b = light.thin_a + 0.5, light.thin_b + 0.5
@@ -264,7 +266,7 @@ def _filter_aslant(form, b):
         radius_a, radius_b = light.half_a * past * per, most(light.half_b * past, soft) * per
         disc = clamp((radius_a + soft_a + 0.5) * 0.5 - (a * a + b * b) * (0.5 * per * per) / radius_a)
         square = clamp(radius_a + soft_a - a * per) * clamp(radius_b + soft_b - b * per)
-        # How much of the light a texel stands for: the nearer to the sample the plane, the more.
+        # Weight of a texel: the nearer the plane is to the sample there, the more of the light one texel stands for.
         denser = least(first / past, 2)
         weight = (square + (disc - square) * light.is_round) * denser * denser * denser
         weight = where(is_above, weight, 0)
@@ -277,7 +279,7 @@ def _filter_aslant(form, b):
 
 @lanewise
 def _start(is_fine, b):
-    """REACH: the widest penumbra that there may be."""
+    """REACH: the width of the widest penumbra considered."""
     radius = b[RADIUS]
     wide = power(radius * (1.999999 / NARROW)) * NARROW
     b[REACH] = where(radius * is_fine > WIDE, wide, most(radius, 1e-3))
@@ -286,10 +288,10 @@ def _start(is_fine, b):
 
 @lanewise
 def _place_windows(radius, wide_from, margin, side, b):
-    """Where the window of texels within a radius is: 8 x 8, beyond `wide_from` 16 x 16, or fewer rows. radius: its row."""
+    """Place the window of texels within a radius: 8 x 8, beyond `wide_from` 16 x 16, or fewer rows. radius: its row."""
     radius = b[radius]
     is_wide = radius > wide_from
-    step = power(radius / where(is_wide, NARROW, 2.25) * 1.999999)  # the least power that is enough
+    step = power(radius / where(is_wide, NARROW, 2.25) * 1.999999)  # the least power that makes the window wide enough
     step = most(least(step, power(side / COARSEST)), 1)
     rows = least((radius / step + margin).whole().real() * 2 + 2, where(is_wide, 16, 8))
     wide, last = where(rows > 8, 16, 8), (side / step).whole().real()
@@ -302,7 +304,7 @@ def _place_windows(radius, wide_from, margin, side, b):
 
 @lanewise
 def _tell_blocked(form, b):
-    """MEAN distance of blockers, and RADIUS of the penumbra that things so far away make."""
+    """MEAN distance of the blockers, and RADIUS of the penumbra that blockers at this distance make."""
     mean = b[SUM] / most(b[COUNT], 1)
     b[MEAN], b[SUM] = mean, 0
     b[RADIUS] = most(_Disc(form, b).half * mean, b[SOFT])
@@ -310,17 +312,17 @@ def _tell_blocked(form, b):
 
 @lanewise
 def _tell_width(form, row, b):
-    """Into a row: the radius of the penumbra that blockers at MEAN make."""
+    """Put into `row` the radius of the penumbra that blockers at MEAN make."""
     light = _Light(form, b)
     b[row] = most(most(light.half_a, light.half_b) * b[MEAN], b[SOFT]) * light.stretch
 
 
 @lanewise
 def _tell_filtered(form, b):
-    """STATE: the least share there is; half the REACH, 0 where that was narrow."""
+    """STATE: the least share of light found so far; REACH: halved for the next search, 0 where it was narrow."""
     whole, reach = b[SUM], b[REACH]
     hidden = where(whole > 0, 1 - b[COUNT] / most(whole, 1e-6), 0)
-    # Narrow filters find lit places before a wall most easily; wide penumbrae are darkened but little.
+    # Narrow filters are the likeliest to take lit places before a wall for this one; wide penumbrae are darkened but little.
     darker = 1 + (form.one(DARKER) - 1) * most(clamp(3 - b[RADIUS] / b[SOFT]), 0.15)
     b[STATE] = least(b[STATE], most(1 - hidden * darker, 0))
     b[REACH] = where(reach > WIDE, reach * 0.5, 0)
@@ -328,7 +330,7 @@ def _tell_filtered(form, b):
 
 @inner
 def _begin(grid, i, b):
-    """Where a sample's window begins in the depths, and how far its rows are apart."""
+    """Index in `depth` at which a sample's window begins, and the distance between rows of the window."""
     step, level = nb.int64(b[U(TEXEL) + i]), U(0)
     while step >> nb.int64(level) > 1:
         level += U(1)
@@ -340,7 +342,7 @@ def _begin(grid, i, b):
 def search(count, form, grid, depth, b):
     """STATE of samples on a view's map that may be in a penumbra: the share of the light that they see.
 
-    form, grid: a view's rows of `Views`. RADIUS: within which there may be blockers.
+    form, grid: a view's rows of `Views`. RADIUS: the distance in texels within which there may be blockers.
     """
     side, fine, is_near = f4(grid[SIZE]), form[FINE], form[BIAS_NEAR] > f4(0)
     none = f4(0) if fine > f4(0) else f4(math.inf)

@@ -1,9 +1,9 @@
 """Exact rasterisation of a few chosen pixels, several points each: truth's algebra, bit for bit, at any point of a pixel.
 
 Point m of chosen pixel k (see `kernels_chosen`) is at (x, y) + `offsets`[:, m]. `nearest` (1/z of the nearest solid surface, 0
-where none) and `seen` (K, M) belong to points. `farthest` (H, W) says, as a `level`, what a surface has to be nearer than to
-matter to a pixel, CLOSED for pixels that are not drawn, `tiles` the least of it in each tile. See-through surfaces are listed
-from near to far in `inverses` and `listed` (K, M, capacity), `counts` of them.
+where there is none) and `seen` (its triangle) are (K, M). `farthest` (H, W) holds, as a `level`, the 1/z that a surface must
+exceed to matter to a pixel, CLOSED for pixels that are not drawn; `tiles` holds its minimum in each tile. See-through surfaces
+are listed from near to far in `inverses` and `listed` (K, M, capacity), `counts` of them at each point.
 """
 
 from __future__ import annotations
@@ -30,14 +30,14 @@ from viewsphere.truth.kernels_rays import ANY_DEPTH, LEAF, NO_BOX, leaf_list, li
 from viewsphere.truth.kernels_row import NEARER
 
 U = nb.uintp
-TIE = 1e-5  # relative difference of 1/z below which surfaces lie on one another
-NARROW = TILE  # pixels: the size up to which every pixel of a box is looked at
-MEDIUM = 64  # likewise every tile; beyond it, rows
+TIE = 1e-5  # relative difference of 1/z below which two surfaces count as lying on one another
+NARROW = TILE  # pixels: up to this size every pixel of a triangle's box is looked at
+MEDIUM = 64  # pixels: up to this size every tile of a box is looked at, beyond it every row
 
 
 @inner
 def _box(q, i0, i1, i2, reach, width, height):
-    """First and last pixel (x0, y0, x1, y1) of which points may be covered; x0 is BEHIND if a corner is behind the camera."""
+    """First and last pixel (x0, y0, x1, y1) in which points may be covered; x0 is BEHIND if a corner is behind the camera."""
     c, d = U(2), U(3)
     if min(q[i0, c], q[i1, c], q[i2, c]) <= 0.0:
         return BEHIND, 0, 0, 0
@@ -54,9 +54,9 @@ def _box(q, i0, i1, i2, reach, width, height):
 
 @njit(_nrt=True)
 def around(q, triangles, cutout, left_out, window):
-    """The triangles that may touch a window (x0, y0, x1, y1; pixels, both ends included) but those left out, int64."""
+    """Triangles, int64, that may touch a window (x0, y0, x1, y1; pixels, both ends included), except those in `left_out`."""
     x0, y0, x1, y1 = window
-    side = np.zeros(q.shape[0], np.uint8)  # a bit for each side of the window that a vertex is beyond
+    side = np.zeros(q.shape[0], np.uint8)  # one bit for each side of the window that the vertex is beyond
     a, b, c, d = U(0), U(1), U(2), U(3)
     for i in range(U(q.shape[0])):
         if q[i, c] > 0.0:
@@ -73,7 +73,7 @@ def around(q, triangles, cutout, left_out, window):
 
 @njit(_nrt=True)
 def touched_boxes(q, order, triangles, reach, farthest):
-    """Which pixels these triangles' boxes contain that show something behind their nearest corner, (H, W) uint8."""
+    """Pixels inside these triangles' boxes that show something behind the triangle's nearest corner, (H, W) uint8."""
     height, width = farthest.shape
     marks = np.zeros((height, width), np.uint8)
     a, b, c, d = U(0), U(1), U(2), U(3)
@@ -92,7 +92,7 @@ def touched_boxes(q, order, triangles, reach, farthest):
 
 @njit
 def first(grid, y, x):
-    """Number of the first chosen pixel from here on."""
+    """Number of the first chosen pixel at or after this one."""
     k = grid[U(y), U(x)]
     return max(k, ~k)
 
@@ -172,7 +172,7 @@ def _draw_wide(surface, edges, checked, box, most, found, points, cutouts, trian
 
 @inner
 def _is_hidden(tiles, xa, ya, xb, yb, most):
-    """Whether the tiles know that no pixel of the box shows anything farther than `most`."""
+    """Whether, by the tiles' minima, no pixel of the box shows anything farther than `most`."""
     for row in range(U(ya // TILE), U(yb // TILE + 1)):
         for column in range(U(xa // TILE), U(xb // TILE + 1)):
             if tiles[row, column] < most:
@@ -218,7 +218,7 @@ def _is_outside(e, x, y):
 
 @inner
 def _open_row(farthest, points, y, span, thorough, most, found):
-    """As `_open` for a part of a row; of a long part only chosen pixels, unless `thorough`."""
+    """As `_open`, for a part of a row; of a long part only chosen pixels, unless `thorough`."""
     grid, pixels, _, _ = points
     left, right = span
     if left > right:
@@ -237,7 +237,7 @@ def _open_row(farthest, points, y, span, thorough, most, found):
 
 @inner
 def _span(edges, scales, y, xa, xb, reach):
-    """First and last pixel of a row of which a point may be covered."""
+    """First and last pixel of a row in which a point may be covered."""
     low, high = float(xa), float(xb)
     lowest, highest = reach
     for e, scale in zip(edges, scales):  # noqa: B905, numba knows no strict
@@ -253,7 +253,7 @@ def _span(edges, scales, y, xa, xb, reach):
 
 @inner
 def _draw_solid(surface, edges, found, count, points, solid):
-    """Draw a solid triangle at these pixels: four points are tested at once, and only where some is covered one by one."""
+    """Draw a solid triangle at these pixels: four points are tested at once, single points only where any is covered."""
     grid, _, offsets, _ = points
     nearest, seen, farthest, _ = solid
     t, _, _, (nx, ny, nz, det), _ = surface
@@ -293,7 +293,7 @@ def _draw_solid(surface, edges, found, count, points, solid):
 
 @inner
 def _is_before(inverse, t, old, seen):
-    """Whether triangle t is seen instead of another: what truth, which draws in order, decides by `NEARER` alone."""
+    """Whether triangle t is seen instead of triangle `seen`: truth, which draws in order, decides so by `NEARER` alone."""
     return (inverse > old * NEARER) | ((t < seen) & (inverse * NEARER >= old))
 
 
@@ -315,7 +315,7 @@ def _draw_checked(surface, edges, found, count, points, cutouts, triangles, soli
 
 @inner
 def _cast(surface, edges, ray, p, cutouts, triangles, solid, fragments):
-    """What truth does for cut-outs and slivers, for one point's ray; a see-through surface is listed."""
+    """Do for one point's ray what truth does for cut-outs and slivers; a see-through surface is listed."""
     t, cutout, is_see_through, (nx, ny, nz, det), bounds = surface
     nearest, seen = solid[0], solid[1]
     a, b, c = edges
@@ -334,7 +334,7 @@ def _cast(surface, edges, ray, p, cutouts, triangles, solid, fragments):
 
 @inner
 def _insert(t, inverse, p, triangles, fragments):
-    """List a see-through surface by distance; of those that lie on one another the last triangle is in front.
+    """List a see-through surface by distance; of surfaces that lie on one another the last triangle is in front.
 
     Only one of two triangles that share an edge and lie on one another is listed: the point is on that edge, or one
     is the other's back.

@@ -1,4 +1,4 @@
-"""Shadow maps: what is nearest to a light, drawn once a stage."""
+"""Shadow maps: the surface nearest to a light in each direction, drawn once a stage."""
 
 from __future__ import annotations
 
@@ -15,28 +15,27 @@ from viewsphere.kernels.jit import inner, njit
 f4 = nb.float32
 U = nb.uintp
 
-# A view maps a homogeneous point to (u w, v w, q w, w): u and v in texels from the map's middle, q growing with
-# the distance to the light and linear in u and v on every plane: the distance itself from afar, -1 / distance from near.
+# A view maps a homogeneous point to (u w, v w, q w, w): u and v in texels from the map's middle; q grows with the distance
+# to the light and is linear in u and v on every plane: the distance itself for a distant light, -1 / distance for a near one.
 
-STEP = 4  # texels from one of the finest cells to the next; each is two steps wide
+STEP = 4  # texels from one of the finest cells to the next; each cell is two steps wide
 COARSEST = 16  # texels a side that a map's coarsest level has at least
 LEVELS = 12
-GAP = 16  # unused texels between rows: those of a window would else push each other out of the cache
+GAP = 16  # unused texels between rows: without them the rows of a window would push each other out of the cache
 STEEP = 15.0
 # Columns of Views.form: four rows of the matrix, then what `kernels_arrive.look` needs: texels per length (at distance 1), the
-# bias in q from afar and in shares of q from near, the least q there is, how far from the middle the map is read, half its
-# size, whether the light is round, how an ellipse grows with the squared texels from the middle; a rectangle's half sides
-# along the view's axes, or the radius and zeros: texels per q, the third per q alone; bounds of the light's half width and
-# height in texels per q, how those grow per texel from the middle, whether wide penumbrae are filtered finely; the least half
-# width of a filter in texels, and how many times what it hides counts.
+# bias in q of a distant light and in shares of q of a near one, the least q in the map, how far from the middle the map is
+# read, half its size, whether the light is round, how an ellipse grows with the squared texels from the middle; a rectangle's
+# half sides along the view's axes, or the radius and zeros: texels per q, the third per q alone; bounds of the light's half
+# width and height in texels per q, how these grow per texel from the middle, whether wide penumbrae are filtered finely; the
+# least half width of a filter in texels, and the factor for what such a filter hides.
 TEXELS, BIAS_FAR, BIAS_NEAR, NEAREST, READ, MIDDLE, ROUND, TILT, SIDES = range(16, 25)
 SPAN_U, SPAN_V, MORE, FINE, SHARPEST, DARKER = range(SIDES + 6, SIDES + 12)
 FORM = SIDES + 12
-# Columns of Views.grid: size, where its bounds begin, how many cells they have a side (a power of two), where each level of the
-# depths begins.
+# Columns of Views.grid: size, where the view's bounds begin, cells a side (a power of two), where each level of depths begins.
 SIZE, BOUNDS_AT, CELLS, DEPTH_AT = 0, 1, 2, 3
 GRID = 3 + LEVELS
-# Columns of Views.bounds: all that is in a cell lies between two planes of one slope; q of both in the cell's middle, slope per
+# Columns of Views.bounds: everything in a cell lies between two parallel planes; q of both in the cell's middle, slopes per
 # texel.
 LOW, HIGH, ACROSS, DOWN = range(4)
 
@@ -55,7 +54,7 @@ def _alpha(surfaces, textures, t, g, h):
 
 @njit
 def see_vertices(places, matrix, corners):
-    """(V, 4): a view's matrix times each place (V, 3). No BLAS: its threads wait for one another on busy cores."""
+    """(V, 4): a view's matrix times each place (V, 3). Without BLAS, whose threads wait for one another on busy cores."""
     for i in range(U(places.shape[0])):
         x, y, z = places[i, U(0)], places[i, U(1)], places[i, U(2)]
         for k in range(U(4)):
@@ -80,11 +79,11 @@ def _reach(corners, i, j, k, near, axis):
 
 @njit
 def draw_depth(corners, surfaces, textures, begin, tilt, nearest, farthest):  # noqa: PLR0912, PLR0915, one loop
-    """Draw q of all triangles over the texels' centres: the least into nearest (n, n + GAP), the greatest into farthest.
+    """Draw q of all triangles at the texels' centres: the least into nearest (n, n + GAP), the greatest into farthest.
 
-    corners (V, 4) float64: the vertices seen from a view. Only what has w >= begin is drawn, or, where `tilt` is one over the
-    squared texels per length, what is as far from the eye; and only where a surface's alpha reaches its material's
-    L_CASTS_FROM. farthest may be (0, 0).
+    corners (V, 4) float64: the vertices seen from a view. Only points with w >= begin are drawn, or, where `tilt` is one over
+    the squared texels per length, points at least that far from the eye; and only where a surface's alpha reaches its
+    material's L_CASTS_FROM. farthest may be (0, 0) if it is not needed.
     """
     size = nearest.shape[0]
     half, last = 0.5 * size, size - 1.0
@@ -148,7 +147,7 @@ def draw_depth(corners, surfaces, textures, begin, tilt, nearest, farthest):  # 
 def finish_view(grid, form, depth, bounds):
     """Fill the bounds of a view's drawn map; returns its smallest q.
 
-    bounds (M, 4) come as (inf, -inf, 0, 0): nothing.
+    bounds (M, 4) are (inf, -inf, 0, 0) before: empty cells.
     """
     _find_slopes(grid, depth, form[BIAS_FAR] * f4(STEEP), form[BIAS_NEAR] * f4(STEEP), bounds)
     nearest = _enclose(grid, depth, bounds)
@@ -158,7 +157,7 @@ def finish_view(grid, form, depth, bounds):
 
 @inner
 def _find_slopes(grid, depth, far, near, bounds):
-    """ACROSS and DOWN of the finest cells: of the first STEP x STEP texels, as far as they may be one surface; else NaN."""
+    """ACROSS and DOWN of the finest cells: slopes of the first STEP x STEP texels if they may be one surface, else NaN."""
     size, side, stride, last = grid[SIZE], grid[CELLS], grid[SIZE] + GAP, STEP - 1
     for y in range(0, size, STEP):
         for x in range(0, size, STEP):
@@ -176,7 +175,7 @@ def _find_slopes(grid, depth, far, near, bounds):
 
 @inner(fastmath=FAST)
 def _mean_slope(bounds, cell, right, below):
-    """Mean ACROSS and DOWN of a cell and those to the right and below, where they are known."""
+    """Mean ACROSS and DOWN of a cell and of its neighbours to the right and below, where these are known."""
     across, down, n, m = f4(0), f4(0), f4(0), f4(0)
     for k in range(4):
         own = U(cell + (k & 1) * right + (k >> 1) * below)
@@ -190,7 +189,7 @@ def _mean_slope(bounds, cell, right, below):
 
 @inner(fastmath=FAST)
 def _enclose(grid, depth, bounds):
-    """All columns of the finest cells from their slopes; returns the smallest q."""
+    """Fill all columns of the finest cells, given their slopes; returns the smallest q."""
     size, side, stride = grid[SIZE], grid[CELLS], grid[SIZE] + GAP
     nearest, middle = f4(np.inf), f4(STEP - 0.5)
     for y in range(0, size, STEP):
@@ -214,7 +213,7 @@ def _enclose(grid, depth, bounds):
 
 @inner(fastmath=FAST)
 def _join(grid, bounds):
-    """The coarser cells, each from four of the level before that lie side by side."""
+    """Fill the coarser cells, each from four cells of the level before that lie side by side."""
     width, n, half, first = 2 * grid[CELLS], grid[CELLS] >> 1, f4(STEP), grid[BOUNDS_AT]
     at = first + 2 * n
     while n > 0:

@@ -1,4 +1,4 @@
-"""What texture look-ups and shading share: wrap modes, and what the compiler may do to colours."""
+"""Constants shared by texture look-ups and shading: wrap modes, and the compiler's liberties with colours."""
 
 from __future__ import annotations
 

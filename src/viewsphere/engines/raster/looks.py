@@ -10,7 +10,7 @@ ALWAYS, HALF, NEVER = 0.0, 0.5, 2.0
 """Alpha from which a surface casts a shadow."""
 
 CLEAR = 0.5
-"""What lets more than this share of the light through casts no shadow."""
+"""A surface that lets more than this share of the light through casts no shadow."""
 
 
 def look(
@@ -25,7 +25,7 @@ def look(
     """The material's row of `Surfaces.looks`. Metallic and roughness of `repaint` stand for the factor and its texture.
 
     per_length: texture coordinates per unit of length, for the ground. Reflectances at normal incidence are those of
-    KHR_materials_ior and KHR_materials_specular, `specular` and the limit of 1 still to come.
+    KHR_materials_ior and KHR_materials_specular, before the factor `specular` and the limit of 1 are applied.
     """
     rough, rough_texel = _replaced(m.roughness, repaint.roughness if repaint else None)
     metal, metal_texel = _replaced(m.metallic, repaint.metallic if repaint else None)
@@ -49,5 +49,5 @@ def look(
 
 
 def _replaced(factor: float, other: float | None) -> tuple[float, float]:
-    """What stands alone and what multiplies a texture."""
+    """The value that replaces a factor and its texture, and the factor that multiplies the texture."""
     return (0.0, factor) if other is None else (other, 0.0)

@@ -14,8 +14,8 @@ from viewsphere.model.mistakes import one_of
 
 @dataclass(frozen=True)
 class Options:
-    """antialias: samples in an edge pixel, 1 or 4; shadow_resolution: width of the shadow maps in texels, 0 for what suits
-    the pictures; ambient_occlusion: off, fast or fine.
+    """antialias: samples in an edge pixel, 1 or 4; shadow_resolution: width of the shadow maps in texels, 0 to derive it from
+    the pictures' size; ambient_occlusion: off, fast or fine.
     """
 
     antialias: int = 4
@@ -28,8 +28,8 @@ class Options:
 
 
 def parse_options(given: Mapping[str, JsonValue]) -> Options:
-    """Checked options. Raises RecipeError, which begins with the recipe's field, for an unknown name (with the nearest) or a
-    value out of range.
+    """The options, checked. Raises RecipeError, whose message begins with the recipe's field, for an unknown name (with the
+    nearest) or a value out of range.
     """
     known = [f.name for f in fields(Options)]
     for name in given:
@@ -45,7 +45,7 @@ def parse_options(given: Mapping[str, JsonValue]) -> Options:
     if isinstance(resolution, bool) or not isinstance(resolution, int) or not (resolution == 0 or 64 <= resolution <= 8192):
         raise RecipeError(f"engine.shadow_resolution: expected an integer in 64..8192, found {resolution!r}")
     occlusion = given.get("ambient_occlusion", default.ambient_occlusion)
-    if occlusion is False:  # YAML's off
+    if occlusion is False:  # YAML reads off as False
         occlusion = "off"
     if occlusion not in ("off", "fast", "fine"):
         raise RecipeError(f"engine.ambient_occlusion: expected off, fast or fine, found {occlusion!r}")

@@ -27,10 +27,10 @@ _AROUND = np.array([[-1, -1, -1, 0, 0, 1, 1, 1], [-1, 0, 1, -1, 1, -1, 0, 1]], n
 class Baked:
     """All that a picture is painted from; lengths are in `unit`s from `origin`.
 
-    floor (12,): texture repeats per length of the ground, its texture coordinates at the origin, its material, 1 if it only
-    scatters, 2 if it is a shadow catcher, its colour; the middle of all there is, and one over half its size. kind (T + 1,)
-    uint8: of each triangle, see `kernels_paint`; owner (T,) int32: equal where neighbouring triangles look alike; see_through
-    (T + 1,). blended: `with_blended_colors`.
+    floor (12,): the ground's texture repeats per length, its texture coordinates at the origin, its material, 1 if the ground
+    only scatters or 2 if it is a shadow catcher, its colour; the middle of all things, and one over half their size. kind
+    (T + 1,) uint8: of each triangle, see `kernels_paint`; owner (T,) int32: equal where neighbouring triangles look alike;
+    see_through (T + 1,). blended: `with_blended_colors`.
     """
 
     geometry: Geometry
@@ -49,9 +49,9 @@ class Baked:
 
 
 def paint(baked: Baked, camera: Camera, visibility: Visibility, antialias: bool, has_sky: bool, radiance: Float32) -> None:
-    """Fill `radiance` (H * W, 4) float32: scene-linear, premultiplied; alpha is the share that is covered.
+    """Fill `radiance` (H * W, 4) float32: scene-linear, premultiplied; alpha is the covered share of the pixel.
 
-    Edge pixels are the mean of four samples. Where nothing is, the sky if `has_sky`, else 0.
+    Edge pixels are the mean of four samples. Uncovered pixels show the sky if `has_sky`, else 0.
     """
     view = view_of(baked, camera)
     triangle, depth = visibility.triangle.reshape(-1), visibility.inverse_depth.reshape(-1)
@@ -69,8 +69,8 @@ def paint(baked: Baked, camera: Camera, visibility: Visibility, antialias: bool,
 def _smooth(
     baked: Baked, camera: Camera, visibility: Visibility, samples: Samples, behind: Marks, has_sky: bool, radiance: Float32
 ) -> None:
-    """Edge pixels: the mean of their samples. Only those that look like no pixel's centre around are shaded, and those of
-    pixels marked in `behind`.
+    """Set edge pixels to the mean of their samples. Samples are shaded only if they look like no centre of a pixel around, or
+    lie in pixels marked in `behind`.
     """
     shown, centres = (samples.triangle, samples.inverse_depth), (visibility.triangle, visibility.inverse_depth)
     normals = baked.geometry.triangle_normals
@@ -88,15 +88,15 @@ def _smooth(
     colors = np.empty((len(at), 4), np.float32)
     _shade(baked, camera, view, visibility, own.triangle, own.inverse_depth, colors, own)
     if has_sky:
-        colors[~is_own, 3] = 1  # the sky need not look there
+        colors[~is_own, 3] = 1  # the sky need not be looked up for these
         sky_behind(view, baked.surrounding, colors)
     glints, means = kernels_paint.average_samples(samples.pixels, like, colors, radiance)
     brighten_lines(samples.pixels[glints], means, camera.width, radiance)
 
 
 def brighten_lines(pixels: Int32, means: Float32, width: int, radiance: Float32) -> None:
-    """Give pixels (G,) whose glints are dimmed so much of their true light (G, 3) that they are as bright as two pixels around:
-    a bright line is as bright as it is.
+    """Brighten pixels (G,) whose glints were dimmed towards their true means (G, 3), until they are as bright as the second
+    brightest pixel around: so a bright line keeps its brightness.
     """
     y, x = np.divmod(pixels, np.int32(width))
     rows, columns = _AROUND[0] + y, _AROUND[1] + x
@@ -124,13 +124,13 @@ def _shade(
     radiance: Float32,
     samples: Samples | None = None,
 ) -> list[Layer]:
-    """Fill `radiance` (S, 4) with what the samples show; what is behind see-through surfaces first. Returns the layers."""
+    """Fill `radiance` (S, 4) with what the samples show, surfaces behind see-through ones first. Returns the layers."""
     solid, ground = np.empty((2, len(triangle)), np.int32)
     materials = baked.surfaces.material, np.zeros(len(baked.surfaces.looks) + 1, np.uint64)
     solids, grounds = kernels_paint.sorted_samples(triangle, baked.kind, *materials, radiance, solid, ground)
     _shade_some(baked, view, solid[:solids], False, triangle, depth, radiance)
     _shade_some(baked, view, ground[:grounds], True, triangle, depth, radiance)
-    # Also where no see-through surface is in front: a decal may lie on what is.
+    # Layers are listed also where a solid surface is in front: a decal may lie on that surface.
     pixels = None if samples is None else samples.pixels
     stack = layers(baked.blended, camera, triangle, depth, baked.see_through, pixels, visibility.corners)
     for layer in stack:

@@ -33,11 +33,11 @@ class Surfaces(NamedTuple):
 class Textures(NamedTuple):
     """All mip levels of all textures in one array, as bundles: textures that a material looks up together.
 
-    texels (N,) uint16: linear light and data, 65,535 is 1; components of normals, 32,768 is 0 and 65,535 is 1; behind the last,
-    room for reading three planes at once. levels
-    (X, 16, 3) int32: first word, width and height of each level. modes (X, 14) int32: number of levels, wrap along u and v,
-    nearest, uv set, number of planes of four channels, up to six planes' kinds, whether it has normals and the coat's normals.
-    transforms (X, 6): rows of the 2 x 3 matrix on (u, v, 1).
+    texels (N,) uint16: for linear light and data 65,535 means 1; for components of normals 32,768 means 0 and 65,535 means 1;
+    behind the last texel there is room for reading three planes at once. levels (X, 16, 3) int32: first word, width and height
+    of each level. modes (X, 14) int32: number of levels, wrap along u and v, nearest, uv set, number of planes of four
+    channels, kinds of up to six planes, whether the bundle has normals and the coat's normals. transforms (X, 6): rows of the 2
+    x 3 matrix on (u, v, 1).
     """
 
     texels: NDArray[np.uint16]
@@ -50,7 +50,7 @@ class View(NamedTuple):
     """One picture's rays: direction = rotation.T @ ray.
 
     eye (3,); rotation (3, 3) world to camera; lens (2, 3): ray = lens @ (column, row, 1) in samples;
-    rays (S, 3), empty for a pinhole; columns: samples in a row; pixel: a pixel's size at distance 1; scale: of depths;
+    rays (S, 3), empty for a pinhole; columns: samples in a row; pixel: a pixel's size at distance 1; scale: factor of depths;
     places (S, 2): column and row of samples that do not lie on a grid, else empty.
     """
 

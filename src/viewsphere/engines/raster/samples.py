@@ -18,18 +18,18 @@ from viewsphere.truth.geometry import Geometry
 from viewsphere.truth.visibility import RayTable, Visibility, homogeneous, index_rays, lens_table
 
 OFFSETS = ((0.375, 0.125), (0.875, 0.375), (0.625, 0.875), (0.125, 0.625))
-"""Places of the four samples in a pixel: a rotated grid, whose every row and column of quarters holds one."""
+"""Places of the four samples in a pixel: a rotated grid, in which each row and each column of quarters holds one sample."""
 
 MOST_LAYERS = 8
 POINTS_AT_ONCE = 1 << 20
-"""How many points are sorted by depth in one pass (100 MB)."""
+"""How many points are sorted by depth in one pass (100 MB of lists)."""
 
 _CENTER = np.full((2, 4), 0.5)
 _ROTATED = np.array(OFFSETS).T.copy()
 _CENTER_REACH, _ROTATED_REACH = (0.5, 0.5), (0.125, 0.875)
 _NO_PIXELS = np.zeros(0, np.int32)
 NOWHERE = np.zeros(0, np.uint8)
-"""Marks where no pixel is marked."""
+"""Marks of a picture in which no pixel is marked."""
 
 Int32 = NDArray[np.int32]
 Float32 = NDArray[np.float32]
@@ -55,7 +55,7 @@ class Samples:
 
 @dataclass(frozen=True, eq=False)
 class Layer:
-    """One surface each of some points: slot (n,) int32, triangle (n,) int32, inverse_depth (n,) float32."""
+    """One surface at each of some points: slot (n,) int32, triangle (n,) int32, inverse_depth (n,) float32."""
 
     slot: Int32
     triangle: Int32
@@ -67,12 +67,13 @@ def edge_samples(
 ) -> Samples | None:
     """The pixels whose samples do not all show the surface at the centre, with their samples; None if there are none.
 
-    `visibility` is truth's buffer for this camera; owner (T,): equal where neighbouring triangles look alike. Looked at are the
-    pixels that differ from a neighbour and, with a pinhole, those in which something comes between the centres: nearer (thin
-    wires), or as far (thin lines on a surface, `kernels_lines`). Those marked in behind (H * W,), if that is not empty, are
-    among them whatever their samples show. With a distorted lens each sample shows exactly what truth's rasteriser would see
-    there; with a pinhole nearly all do: a triangle that no centre around sees and that has no corner in such a pixel is left
-    out (`kernels_edges`), and what is behind it, or at the centre, is shown instead.
+    `visibility` is truth's buffer for this camera; owner (T,): equal where neighbouring triangles look alike. Candidates are
+    the pixels that differ from a neighbour and, with a pinhole, the pixels in which a surface passes between the centres: a
+    nearer one (thin wires), or one as far (thin lines on a surface, `kernels_lines`). Pixels marked in behind (H * W,), if
+    `behind` is not empty, are returned whatever their samples show. With a distorted lens each sample shows exactly what
+    truth's rasteriser would see there; with a pinhole nearly all samples do: a triangle that no centre around sees and that has
+    no corner in such a pixel is left out (`kernels_edges`), and the surface behind it, or the one at the centre, is shown
+    instead.
     """
     look = visibility.triangle, visibility.inverse_depth, owner, geometry.triangle_normals
     marks = _differs_from_neighbour(*look)
@@ -92,19 +93,20 @@ def edge_samples(
 
 
 def differs_behind(visibility: Visibility, stack: Sequence[Layer], owner: Int32, normals: Float32, radiance: Float32) -> Marks:
-    """The pixels that look like a neighbour in front, but not behind what is seen through: (H * W,), empty if nothing is.
+    """Pixels that look like a neighbour in front, but not behind a see-through surface: marks (H * W,), empty if none is
+    see-through.
 
-    `stack` is what `layers` gives for the pixels' centres, radiance (H * W, 4) their colours: where these are the same, nothing
-    shows of the difference.
+    `stack` is what `layers` gives for the pixels' centres, radiance (H * W, 4) their colours: where two pixels have equal
+    colours, nothing shows of a difference behind.
     """
     if not stack:
         return NOWHERE
     marks = np.zeros(visibility.triangle.size, np.uint8)
     shown = visibility.triangle, visibility.inverse_depth
-    behind, depth = shown[0].flatten(), shown[1].flatten()  # without a solid surface, what is seen through
+    behind, depth = shown[0].flatten(), shown[1].flatten()  # where there is no solid surface, the see-through one
     for i, layer in enumerate(stack):
         if i > 0:
-            behind[:] = -1  # where a see-through surface ends, there is none
+            behind[:] = -1  # beyond the end of a see-through surface this layer is empty
         behind[layer.slot], depth[layer.slot] = layer.triangle, layer.inverse_depth
         kernels_chosen.compare_behind(layer.slot, behind, depth, *shown, owner, normals, radiance, marks)
     return marks
@@ -119,16 +121,16 @@ def layers(
     pixels: Int32 | None = None,
     corners: NDArray[np.float64] | None = None,
 ) -> list[Layer]:
-    """What is seen at the points that see through something: the solid surfaces behind, then see-through ones, back to front.
+    """Surfaces at the points that see through something: the solid surfaces behind, then the see-through ones, back to front.
 
-    The points, with what each shows (N,), are all pixels' centres in order, or the four samples of each of `pixels`; a slot is
-    a point's index. see_through (T + 1,): the last entry, for triangle -1, is False; `corners` is `Visibility.corners`, if
-    known. The first layer holds the nearest solid surfaces (nothing where there is none), the second the farthest see-through
-    one of every such point, the third the next of those that have two, up to 8; farther ones are left out. Empty where nothing
-    is see-through.
+    The points, with the triangle that each shows (N,), are all pixels' centres in order, or the four samples of each of
+    `pixels`; a slot is a point's index. see_through (T + 1,): the last entry, for triangle -1, is False; `corners` is
+    `Visibility.corners`, if known. The first layer holds the nearest solid surfaces (nothing where there is none), the second
+    the farthest see-through surface of every such point, the third the next of points that have two, up to 8; farther ones are
+    left out. Empty where nothing is see-through.
 
-    A see-through surface that lies on a solid one (1/z the same within 1e-5) is in front of it, and of two that lie on one
-    another the later triangle is in front: decals are on top.
+    A see-through surface that lies on a solid one (1/z equal within 1e-5) is in front of it, and of two see-through surfaces
+    that lie on one another the later triangle is in front: decals are on top.
     """
     clear = np.flatnonzero(see_through)
     if len(clear) == 0:
@@ -164,7 +166,7 @@ def layers(
 
 
 def _touched(points: _Points, geometry: Geometry, q: NDArray[np.float64], see_through: Bool) -> NDArray[np.intp]:
-    """Pixels of a distorted lens at whose points there is something to see through."""
+    """Pixels of a distorted lens at whose points a see-through surface may be in front."""
     points.draw(geometry, q, see_through, np.flatnonzero(see_through))
     return points.pixels[:-1][points.counts.any(axis=1)].astype(np.intp)
 
@@ -177,7 +179,7 @@ def _pile(
     clear: NDArray[np.int64],
     shown: tuple[Int32, Float32],
 ) -> None:
-    """Draw what is see-through before the solid surfaces that the points show, then the solid ones behind the others."""
+    """Draw see-through surfaces before the solid ones that the points show, then the solid surfaces behind see-through ones."""
     is_solid = ~see_through[shown[0]] & (shown[0] >= 0)
     points.seen[:] = np.where(is_solid, shown[0], -1)
     points.nearest[:] = np.where(is_solid, shown[1], 0)
@@ -218,7 +220,7 @@ def _joined(parts: Sequence[Layer]) -> Layer:
 
 @dataclass(frozen=True, eq=False)
 class _Points:
-    """Chosen pixels and what is drawn at their points, as `kernels_samples` describes it."""
+    """Chosen pixels and the surfaces drawn at their points, as `kernels_samples` describes them."""
 
     camera: Camera
     grid: Int32
@@ -232,7 +234,7 @@ class _Points:
 
     @classmethod
     def of(cls, camera: Camera, marks: NDArray[np.uint8], count: int, capacity: int) -> _Points:
-        """Of the marked pixels, `count` points each, which list up to `capacity` see-through surfaces."""
+        """The marked pixels, with `count` points each, and room for up to `capacity` see-through surfaces a point."""
         grid, pixels = kernels_chosen.numbered(marks)
         n = len(pixels) - 1
         return cls(
@@ -265,7 +267,7 @@ class _Points:
 
 
 def _differs_from_neighbour(triangle: Int32, depth: Float32, owner: Int32, normals: Float32) -> NDArray[np.uint8]:
-    """Pixels that look different from the one beside, above or below: uint8, one after another, padded to whole words of 8."""
+    """Pixels that look different from the one beside, above or below: uint8, in order, padded to whole words of 8 bytes."""
     height, width = triangle.shape
     beside, above = np.empty((2, height * width + 8), np.uint8)
     room, owners = np.zeros((8, width + 16), np.float32), np.zeros((4, width + 16), np.int32)
@@ -283,14 +285,14 @@ def _differs_from_neighbour(triangle: Int32, depth: Float32, owner: Int32, norma
 def _pinhole_edges(
     geometry: Geometry, visibility: Visibility, marks: Marks, q: NDArray[np.float64], owner: Int32, behind: Marks
 ) -> tuple[Int32, Float32, Int32, Float32]:
-    """pixels, position, triangle and inverse depth of `Samples`."""
+    """The arrays pixels, position, triangle and inverse_depth of `Samples`, for a pinhole."""
     shown, (height, width) = (visibility.triangle, visibility.inverse_depth), visibility.triangle.shape
     wanted, chosen = np.zeros((2, len(geometry.triangles)), np.uint8)
-    are_wanted, are_chosen = wanted.view(np.bool_), chosen.view(np.bool_)  # which numpy finds faster
+    are_wanted, are_chosen = wanted.view(np.bool_), chosen.view(np.bool_)  # numpy searches booleans faster
     kernels_lines.on_others(q, geometry.triangles, geometry.triangle_cutout, owner, *shown, np.empty(len(q), np.int32), chosen)
     kernels_lines.mark(np.flatnonzero(are_chosen), q, geometry.triangles, owner, _ROTATED, *shown, marks, wanted)
     marked = np.flatnonzero(marks != 0)
-    most = len(marked) + height * width // 8  # with those found later
+    most = len(marked) + height * width // 8  # room for pixels that are found while drawing
     pixels = np.empty(most, np.int32)
     pixels[: len(marked)] = marked
     starts = np.searchsorted(marked, width * np.arange(height + 1)).astype(np.int32)
@@ -308,12 +310,12 @@ def _pinhole_edges(
 
 
 def _room(width: int) -> tuple[NDArray[np.uint32], Float32]:
-    """Where `kernels_edges.draw` keeps the pixels of a triangle, and 1/z at the samples of one."""
+    """Scratch of `kernels_edges.draw`: pixels of a triangle, and 1/z at the samples of one pixel."""
     return np.empty(max(width, kernels_edges.NARROW**2) + 1, np.uint32), np.empty(4, np.float32)
 
 
 def _differing(count: int, *known: NDArray[Any]) -> tuple[Int32, Float32, Int32, Float32]:
-    """Of `count` pixels those whose samples do not all look like the centre, as `kernels_edges.finish` finds them."""
+    """Among `count` pixels those whose samples do not all look like the centre, as `kernels_edges.finish` returns them."""
     pixels, position = np.empty(count, np.int32), np.empty((4 * count, 2), np.float32)
     triangle, inverse = np.empty(4 * count, np.int32), np.empty(4 * count, np.float32)
     n = kernels_edges.finish(count, *known, pixels, position, triangle, inverse)

@@ -1,4 +1,4 @@
-"""Blurs that are the same all over the picture: a Gaussian, and a camera that moves while it looks."""
+"""Blurs that are the same all over the picture: a Gaussian, and a camera that moves during the exposure."""
 
 from __future__ import annotations
 
@@ -12,25 +12,25 @@ from viewsphere.imaging.spread import gaussian, spread, spread_both_ways
 Float32 = NDArray[np.float32]
 
 SIGMA = 1 / 50
-"""Of the Gaussian at strength 1, in widths."""
+"""Sigma of the Gaussian at strength 1, in widths of the picture."""
 
 STREAK = 1 / 12
-"""Length at strength 1, in widths."""
+"""Length of the streak at strength 1, in widths of the picture."""
 
 
 def blur(picture: Float32, strength: float) -> Float32:
-    """The picture under a Gaussian; it is a blur of the light and keeps its sum."""
+    """The picture under a Gaussian: light is blurred, and its sum is kept."""
     sigma = strength * SIGMA * picture.shape[1]
     return spread_both_ways(picture, gaussian(sigma)) if strength > 0 else picture
 
 
 def motion_blur(picture: Float32, strength: float, angle_deg: float) -> Float32:
-    """The mean of the picture along a straight streak, counter-clockwise from the right."""
+    """The mean of the picture along a straight streak; its angle is counter-clockwise from the right."""
     return spread(picture, streak(strength * STREAK * picture.shape[1], angle_deg)) if strength > 0 else picture
 
 
 def streak(length: float, angle_deg: float) -> Float32:
-    """Weights of a segment of this length in pixels about the middle, each the share of it that a bilinear pixel takes."""
+    """Weights of a centred segment of this length in pixels: each is the share of the segment that a bilinear pixel takes."""
     steps = max(1, math.ceil(8 * length))
     along = ((np.arange(steps) + 0.5) / steps - 0.5) * length
     x, y = along * math.cos(math.radians(angle_deg)), -along * math.sin(math.radians(angle_deg))

@@ -13,7 +13,7 @@ from viewsphere.assets.srgb import linear
 Float32 = NDArray[np.float32]
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
-"""Shares of linear sRGB."""
+"""Shares of linear sRGB's red, green and blue in the luminance."""
 
 
 def jitter(picture: Float32, brightness: float, contrast: float, saturation: float, hue: float) -> Float32:
@@ -45,7 +45,8 @@ def tone_table(brightness: float, contrast: float) -> Float32:
 def chroma_matrix(saturation: float, hue: float) -> NDArray[np.float64]:
     """Linear sRGB to linear sRGB, (3, 3): rows sum to 1, luminance stays.
 
-    Around grey a colour has two components in the plane of equal luminance; they are turned in an orthonormal basis of it.
+    Around grey a colour has two components in the plane of equal luminance; they are turned in an orthonormal basis of that
+    plane.
     """
     grey = np.outer(np.ones(3), LUMINANCE)
     first = np.cross(LUMINANCE, np.ones(3))
@@ -60,6 +61,6 @@ def chroma_matrix(saturation: float, hue: float) -> NDArray[np.float64]:
 
 @cache
 def _curve() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Coded values and their light, closer together where it is dark."""
+    """Coded values and their light at the same nodes, which are denser where it is dark."""
     codes = np.arange(4097) / 4096
     return codes, linear(codes)

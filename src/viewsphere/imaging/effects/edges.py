@@ -1,4 +1,4 @@
-"""Lines along the targets' borders and creases, as computer graphics of the kind once drew over its pictures."""
+"""Lines along the targets' borders and creases, as early computer graphics drew them over pictures."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from viewsphere.imaging.spread import gaussian, spread_both_ways
 Float32 = NDArray[np.float32]
 
 CREASE = (0.25, 0.75)
-"""Change of slope from one pixel to the next at which a line begins to show, and is all there."""
+"""Change of slope from one pixel to the next at which a line begins to show, and at which it shows in full."""
 
 WIDTH = 1 / 300
-"""Of the lines, in widths of the picture."""
+"""Width of the lines, in widths of the picture."""
 
 
 def edge_highlight(picture: Float32, strength: float, seen: Seen) -> Float32:
@@ -31,7 +31,7 @@ def edge_highlight(picture: Float32, strength: float, seen: Seen) -> Float32:
 def lines(seen: Seen) -> Float32:
     """How much of a line each pixel shows, (H, W) float32 in [0, 1].
 
-    The inverse depth of a plane is linear in the picture, so its second difference is 0 but at creases and steps.
+    The inverse depth of a plane is linear in the picture, so its second difference is not 0 only at creases and steps.
     """
     bent = crease(seen.inverse_depth, seen.intrinsics.fx)
     low, high = CREASE
@@ -43,7 +43,7 @@ def lines(seen: Seen) -> Float32:
 
 
 def crease(inverse_depth: Float32, focal: float) -> Float32:
-    """How much the surface's slope changes from a pixel to the next, about the tangent of the angle; (H, W), 0 where empty."""
+    """Change of the surface's slope from a pixel to the next, about the tangent of the angle; (H, W), 0 where empty."""
     q = np.pad(inverse_depth, 1, mode="edge")
     middle = q[1:-1, 1:-1]
     across = np.abs(q[1:-1, :-2] - 2 * middle + q[1:-1, 2:])
@@ -53,7 +53,7 @@ def crease(inverse_depth: Float32, focal: float) -> Float32:
 
 
 def _beside(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Pixels with one of these to their left, right, top or bottom."""
+    """Pixels that have a pixel of the mask to their left, right, top or bottom."""
     out = np.zeros_like(mask)
     out[1:] |= mask[:-1]
     out[:-1] |= mask[1:]

@@ -16,21 +16,21 @@ FAR = 1 / 40
 """Radius, in widths, of the disc that a point at infinity becomes at strength 1."""
 
 NEAREST = 2.0
-"""Nearer than a third of the focus the discs grow no more: so many times `FAR`."""
+"""Nearer than a third of the focus distance discs grow no more: they are at most so many times `FAR`."""
 
 TAPS = 24
-"""Pixels of a disc's radius that are visited; in large pictures every second, third ... stands for those around it."""
+"""Pixels of a disc's radius that are visited: for larger discs every second (third, ...) pixel stands for those around it."""
 
 STEP = 1.0
-"""Pixels of radius by which neighbours of one surface differ at most."""
+"""Pixels by which the disc's radius differs at most between neighbours of one surface."""
 
 
 def depth_of_field(picture: Float32, strength: float, focus: float, inverse_depth: Float32) -> Float32:
     """The picture through a thin lens whose sharp plane is `focus` metres away; inverse depth (H, W), 0 is infinitely far.
 
-    Every pixel is spread over its disc. What lies behind a sharp or less blurred pixel does not spread over it; what lies in
-    front of the focus spreads over everything, and what is hidden behind its soft border is made up from beside it. Pixels at
-    a step show both its sides: they get their own side's colour before, and are softened over three pixels after.
+    Every pixel is spread over its disc. A pixel behind a sharp or less blurred one does not spread over that one; a pixel in
+    front of the focus spreads over everything, and what its soft border would reveal is filled in from beside. Pixels at a
+    depth step show both sides: before, they get the colour of their own side, and after, they are softened over three pixels.
     """
     largest = strength * FAR * picture.shape[1]
     if largest < 1e-3:
@@ -58,8 +58,8 @@ def depth_of_field(picture: Float32, strength: float, focus: float, inverse_dept
 def circle_radius(inverse_depth: Float32, focus: float, largest: float) -> Float32:
     """Radius in pixels of the circle of confusion, above 0 in front of the focus, below 0 behind it; float32.
 
-    A thin lens of aperture A, its sensor v pixels behind it, shows a point at z as a disc of diameter A v |1/z - 1/focus|, all
-    of which is proportional to |focus / z - 1|: `largest` is what it is at infinity.
+    A thin lens of aperture A, its sensor v pixels behind it, shows a point at z as a disc of diameter A v |1/z - 1/focus|,
+    which is proportional to |focus / z - 1|: `largest` is the radius at infinity.
     """
     relative = inverse_depth * np.float32(focus) - np.float32(1)
     return np.minimum(relative, np.float32(NEAREST)) * np.float32(largest)
@@ -76,14 +76,14 @@ def disc_area(radius: Float32, stride: int = 1) -> Float32:
 
 
 def _thinned(picture: Float32, radius: Float32, stride: int) -> Float32:
-    """The picture, where its discs are larger than the stride, as means of what each pixel that is visited stands for."""
+    """The picture with a mean over the pixels that each visited pixel stands for, wherever discs are larger than the stride."""
     share = np.clip(radius * np.float32(1 / stride) - np.float32(0.5), 0, 1)[..., None]
     means = spread_both_ways(picture, box((stride - 1) / 2))
     return (picture + (means - picture) * share).astype(np.float32)
 
 
 def _steps(signed: Float32) -> Mask:
-    """Pixels beside one of another surface."""
+    """Pixels beside a pixel of another surface."""
     out = np.zeros(signed.shape, np.bool_)
     across, down = np.abs(np.diff(signed, axis=1)) > STEP, np.abs(np.diff(signed, axis=0)) > STEP
     out[:, 1:] |= across
@@ -94,7 +94,7 @@ def _steps(signed: Float32) -> Mask:
 
 
 def _one_sided(picture: Float32, signed: Float32, step: Mask) -> Float32:
-    """The picture with each of these pixels a mean of those within two that are like it and not at a step themselves."""
+    """The picture with each pixel at a step replaced by the mean of pixels within two that are alike and not at a step."""
     y, x = np.nonzero(step)
     total, colors = np.zeros(len(y), np.float32), np.zeros((len(y), picture.shape[2]), np.float32)
     for down, across in np.ndindex(5, 5):

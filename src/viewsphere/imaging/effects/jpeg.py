@@ -1,4 +1,4 @@
-"""JPEG: what the camera's computer, and the web, leave of a picture."""
+"""JPEG compression, as in a camera or on the web."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 BEST, WORST = 95, 5
-"""Qualities just above strength 0, and at 1."""
+"""JPEG's qualities just above strength 0, and at strength 1."""
 
 
 def jpeg(pixels: NDArray[np.uint8], strength: float) -> NDArray[np.uint8]:

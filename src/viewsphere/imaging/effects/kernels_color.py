@@ -13,7 +13,7 @@ U = nb.uintp
 
 @njit(fastmath=FAST)
 def recolor(picture, table, matrix, out):
-    """Each of three channels through the table (if it is not empty), then the matrix; (N, 3), or (N, 4) premultiplied."""
+    """Put three channels through the table (if it is not empty), then through the matrix; (N, 3), or (N, 4) premultiplied."""
     top = f4(table.shape[0] - 1)
     for i in range(picture.shape[0]):
         a = picture[i, 3] if picture.shape[1] == 4 else f4(1)

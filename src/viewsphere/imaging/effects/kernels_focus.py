@@ -1,6 +1,6 @@
 """Pixels spread over discs of their own size, in depth order.
 
-Planes and scratch are one flat array each, lines are always `LINE` pixels: so the compiler can work on eight at once.
+Planes and scratch are one flat array each, and lines always have `LINE` pixels: so the compiler can work on eight at once.
 """
 
 from __future__ import annotations
@@ -15,16 +15,16 @@ from viewsphere.kernels.jit import inner, njit
 
 f4 = nb.float32
 U = nb.uintp
-LINE = 64  # fewer would be unrolled one by one
+LINE = 64  # pixels in a line; loops over fewer would be unrolled instead of vectorised
 LINES = 16
 RADIUS, NEAR = 1, 2
 BEHIND, FRONT = 0, 1
-MADE_UP = f4(0.05)  # weight of what is drawn on behind something near: it counts where little else spreads
+MADE_UP = f4(0.05)  # weight of colours filled in behind something near: it counts where little else spreads
 
 
 @inner(fastmath=FAST)
 def _reaches(radius, near, margin, slack, y0, x0, rows):
-    """The largest disc that touches some lines of pixels, and the largest in front of the focus; -1 where none does."""
+    """The largest disc that reaches some lines of pixels, and the largest in front of the focus; -1 where none does."""
     largest, nearest = f4(-1), f4(-1)
     for y in range(y0, y0 + rows + 2 * margin):
         down = max(y0 + margin - y, y - (y0 + rows - 1 + margin))
@@ -39,7 +39,7 @@ def _reaches(radius, near, margin, slack, y0, x0, rows):
 
 @inner(fastmath=FAST)
 def _gather(p, plane, width, at, channels, reach, stride, layer, b):
-    """Sums of weighted colours, and after them of weights, over all discs that reach the line of pixels from `at`.
+    """Sums of weighted colours, and then of weights, over all discs that reach the line of pixels that begins at `at`.
 
     Scratch b: a line of weights, then `channels + 1` lines of sums for each layer.
     """
@@ -73,7 +73,7 @@ def _gather(p, plane, width, at, channels, reach, stride, layer, b):
 
 @inner(fastmath=FAST)
 def _mix(b, channels, has_near, y, x0, out):
-    """What is in front of the focus over the rest; where there is no rest, it alone."""
+    """Lay the layer in front of the focus over the other layer; where that one is empty, the front layer stands alone."""
     back, front = LINE, LINE * (channels + 2)
     for i in range(min(LINE, out.shape[1] - x0)):
         rest, over = b[back + LINE * channels + i], f4(0)

@@ -1,4 +1,4 @@
-"""What a sensor adds: the chance of single photo-electrons, and its own electronics."""
+"""A sensor's noise: the chance of single photo-electrons, and that of its electronics."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ from numpy.typing import NDArray
 Float32 = NDArray[np.float32]
 
 ELECTRONS = 50.0
-"""Of white at strength 1."""
+"""Photo-electrons that make white at strength 1."""
 
 READ = 0.03
-"""Sigma at strength 1, in whites."""
+"""Sigma of the read noise at strength 1, white being 1."""
 
 
 def noise(picture: Float32, shot: float, read: float, seed: int) -> Float32:
     """The light counted and read out, each channel of each pixel by itself, clipped to [0, 1].
 
-    Light v is Poisson(v n) / n with n = ELECTRONS / shot^2, then a Gaussian is added. Premultiplied colours get the noise of
-    what they show, in their share; alpha stays. The same seed makes the same noise.
+    Light v becomes Poisson(v n) / n with n = ELECTRONS / shot^2, then a Gaussian is added. Premultiplied colours get the noise
+    of the unpremultiplied colour times alpha; alpha stays. The same seed makes the same noise.
     """
     if shot == 0 and read == 0:
         return picture

@@ -1,1 +1,1 @@
-"""What a car is built from: hull, greenhouse, wheels, lights and fittings."""
+"""The parts of a car: hull, greenhouse, wheels, lights and fittings."""

@@ -10,7 +10,7 @@ from viewsphere.zoo.shapes.paint import Color, lamp, linear, metal
 
 @dataclass(frozen=True)
 class Coats:
-    """Paint, the roof's paint, lower cladding, rims, and what all cars share."""
+    """Materials: paint, the roof's paint, lower cladding, rims, and those that all cars share."""
 
     paint: Material
     roof: Material

@@ -149,8 +149,8 @@ class Hull:
 def follow(hull: Hull, inner: Outline, corner: float, overlap: float = 0.0) -> Float:
     """A point on an inner outline for each of the hull's stations, (stations, 2).
 
-    Beside the inner outline's flank (parameters corner to 4 - corner) at the same y, ahead and behind spread around its
-    ends; overlap metres further inwards.
+    Stations beside the inner outline's flank (parameters corner to 4 - corner) keep their y; stations ahead and behind are
+    spread around its ends. All points are moved `overlap` metres further inwards.
     """
     u = hull.stations
     y = hull.outline.point(u)[:, 1]

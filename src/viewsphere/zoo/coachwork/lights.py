@@ -23,7 +23,7 @@ def _pair(part: str, material: Material, solid: Solid) -> list[Piece]:
 
 
 def _shrunk(corners: Float, left: float, right: float, low: float, high: float) -> Float:
-    """The part of a quad between these fractions."""
+    """The part of a quad between these fractions of its width and height, (4, 2)."""
     return in_quad(corners, np.array([[left, low], [right, low], [right, high], [left, high]]))
 
 
@@ -52,7 +52,7 @@ def headlights(shape: Shape, style: Lamps, coats: Coats) -> list[Piece]:
 
 
 def taillights(shape: Shape, style: Lamps, coats: Coats) -> list[Piece]:
-    """Lamps on the rear corners; upright on vans, pickups and block-shaped ones, else lying."""
+    """Lamps on the rear corners; upright on vans, pickups and boxy bodies, else lying."""
     hull = shape.bed if shape.body == "pickup" else shape.hull
     upright = shape.body in ("van", "pickup") or style in ("block", "round")
     half, surface = shape.width / 2, hull.surface
@@ -106,7 +106,7 @@ def _square(shape: Shape, z: float, size: float) -> Float:
 
 
 def _slats(surface: Surface, quad: Float, rows: int, upright: bool) -> list[Solid]:
-    """Bars across a grille, and along it for a mesh."""
+    """Bars across a grille; for a mesh also bars along it."""
     solids: list[Solid] = []
     for share in (np.arange(rows) + 0.5) / rows:
         line = in_quad(quad, np.stack([np.linspace(0.04, 0.96, 15), np.full(15, share)], axis=1))

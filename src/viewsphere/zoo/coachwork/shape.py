@@ -77,7 +77,7 @@ class Shape:
 
     @cached_property
     def arches(self) -> tuple[Arch, Arch]:
-        """Front and rear."""
+        """Front and rear wheel opening."""
         r = self.wheel.radius
         p = self.proportions
         front, rear = (Arch(self.y(a), r, r * 1.13 + 0.012) for a in (p.front_axle, p.rear_axle))

@@ -15,8 +15,8 @@ SEGMENTS = 32
 class Wheel:
     """A wheel's measures in metres and its rim's design.
 
-    radius and width: the tyre's; rim: the rim's radius as a fraction of it; spokes: how many; spoke_width: at the hub, as
-    a fraction of their pitch; flare: 0.5 for straight spokes, more widens them towards the rim; twist: how far spokes
+    radius and width: the tyre's; rim: the rim's radius as a fraction of the tyre's; spokes: how many; spoke_width: at the hub,
+    as a fraction of the spokes' pitch; flare: 0.5 for straight spokes, more widens them towards the rim; twist: how far spokes
     lean, radians; paired: each spoke is two.
     """
 
@@ -68,7 +68,7 @@ def _on_axle(solid: Solid) -> Solid:
 
 
 def _angles(w: Wheel) -> Float:
-    """Where spokes start, radians."""
+    """Angles at which spokes start, radians."""
     angles = np.arange(w.spokes) * 2 * np.pi / w.spokes
     spread = 0.24 * 2 * np.pi / w.spokes
     return np.concatenate([angles - spread, angles + spread]) if w.paired else angles

@@ -1,1 +1,1 @@
-"""What bicycles are built from. The frame's plane is x = 0, the bottom bracket at y = 0, the ground at z = 0 while building."""
+"""The parts of bicycles. While building, the frame's plane is x = 0, the bottom bracket at y = 0, the ground at z = 0."""

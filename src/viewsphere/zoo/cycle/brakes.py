@@ -18,9 +18,9 @@ Brake = Literal["caliper", "v", "disc", "hub"]
 
 
 def rim_brake(kind: Brake, w: Wheel, axle: Float, toward: Float, behind: float, name: str, coats: Coats) -> list[Piece]:
-    """A brake on the rim where the wheel meets the blades or stays that run `toward` this direction from the axle.
+    """A rim brake where the wheel meets the blades or stays that run in the direction `toward` from the axle.
 
-    behind: how far the arms stand off those, metres along the world's y.
+    behind: how far the brake's arms stand off these blades or stays, metres along the world's y.
     """
     if kind not in ("caliper", "v"):
         return []
@@ -131,7 +131,7 @@ def cables(
 ) -> list[Piece]:
     """Part cable: from both sides of the bar into the frame, and to where the front brake's cable ends.
 
-    entry, front: place and direction of arrival; the bar is turned by `angle` radians, `front` given for straight ahead.
+    entry, front: place and direction of arrival; the bar is turned by `angle` radians, but `front` is given for straight ahead.
     """
     centre = clamp(at, c)
     if c.bar == "drop":

@@ -11,12 +11,12 @@ from viewsphere.zoo.shapes.rods import across, circle, copies, plate, turns, was
 from viewsphere.zoo.shapes.solids import Float, Solid, join, loft, moved
 
 PITCH = 0.0127
-"""Half an inch: ISO 9633."""
+"""A chain's pitch, metres: half an inch (ISO 9633)."""
 
 
 @dataclass(frozen=True)
 class Pulley:
-    """A wheel that the chain runs over: centre (y, z) and pitch radius in metres; turn +1 where y goes over to z."""
+    """A wheel that the chain runs over: centre (y, z) and pitch radius, metres; turn: +1 from +y to +z, -1 the other way."""
 
     y: float
     z: float
@@ -57,7 +57,7 @@ def _path(pulleys: Sequence[Pulley]) -> Float:
 
 
 def phase_on(centres: Float, pulley: Pulley) -> float:
-    """The angle at which a roller sits, near the middle of where the chain lies on the pulley, radians from y to z."""
+    """The angle of a roller near the middle of the pulley's arc that the chain covers, radians from y to z."""
     offset = centres - (pulley.y, pulley.z)
     near = np.flatnonzero(np.abs(np.linalg.norm(offset, axis=1) - pulley.radius) < 5e-4)
     middle = offset[near[len(near) // 2]] if len(near) else np.array((1.0, 0.0))

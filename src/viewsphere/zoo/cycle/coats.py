@@ -10,7 +10,7 @@ from viewsphere.zoo.shapes.paint import Color, Finish, coated, lamp, linear, met
 
 @dataclass(frozen=True)
 class Colors:
-    """Colours sRGB 0..1; parts: cranks, stem, seat post and hubs; sidewall, grip: tyres' and grips'."""
+    """Colours sRGB 0..1; parts: of cranks, stem, seat post and hubs; sidewall, grip: of the tyres and of the grips."""
 
     frame: Color = (0.7, 0.08, 0.1)
     accent: Color = (0.95, 0.95, 0.93)
@@ -27,7 +27,7 @@ class Colors:
 
 @dataclass(frozen=True)
 class Coats:
-    """What the colours become, and what all bicycles share."""
+    """The materials of these colours, and those that all bicycles share."""
 
     frame: Material
     accent: Material
@@ -55,7 +55,7 @@ class Coats:
 
 
 def coats(c: Colors, canvas: Color) -> Coats:
-    """All materials of a bicycle of these colours; canvas is its bags'."""
+    """All materials of a bicycle of these colours; canvas is the colour of its bags."""
     frame = coated("frame_paint", c.frame, c.finish)
     return Coats(
         frame=frame,

@@ -42,12 +42,12 @@ def clamp(at: Layout, c: Cockpit) -> Float:
 
 
 def _stem_root(at: Layout, c: Cockpit) -> Float:
-    """Where the stem leaves the steering axis."""
+    """The point where the stem leaves the steering axis."""
     return at.head[1] + (0.012 + c.height + (0.0 if c.quill else 0.02)) * at.steering
 
 
 def bar_path(c: Cockpit) -> Float:
-    """The left half of the handlebar from its middle, (N, 3) relative to it."""
+    """The left half of the handlebar as a path from the bar's middle, (N, 3) relative to that point."""
     w = c.width / 2
     if c.bar == "drop":
         knots = [(0, 0, 0), (0.5 * w, 0, 0), (w - 0.035, -0.002, 0), (w - 0.008, -0.022, 0), (w, -0.055, -0.001)]
@@ -103,7 +103,7 @@ def cockpit_pieces(at: Layout, c: Cockpit, coats: Coats) -> list[Piece]:
 
 
 def _sides(name: str, material: Material, solid: Solid) -> list[Piece]:
-    """The left one and its image."""
+    """The left part and its mirror image."""
     return [Piece(f"{name}_left", material, solid), Piece(f"{name}_right", material, mirrored(solid))]
 
 

@@ -26,9 +26,10 @@ class Bicycle:
     """Parameters of a bicycle; lengths in metres, angles in degrees, colours sRGB 0..1.
 
     steering: positive turns the front wheel to the rider's left; crank: length; crank_angle: of the right crank, 0 forward,
-    90 up; crank_arms: of the spider; brake: caliper and v on the rim, disc (the wheel's rotor), hub (nothing to see);
-    guards: mudguards in the frame's colour, in extra or none; panniers: bags on the carrier; bottles: on the down tube, then
-    on the seat tube; lights: in front and, without a carrier, on the rear mudguard or the seat post; dynamo: in the front hub.
+    90 up; crank_arms: of the spider; brake: caliper and v on the rim, disc (the wheel's rotor), hub (invisible);
+    guards: mudguards in the frame's colour, in the colour `extra`, or none; panniers: bags on the carrier; bottles: on the down
+    tube, then on the seat tube; lights: in front and, without a carrier, on the rear mudguard or the seat post; dynamo: in the
+    front hub.
     """
 
     style: Style = "road"

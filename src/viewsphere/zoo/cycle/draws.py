@@ -1,4 +1,4 @@
-"""Random bicycles: what is ridden, by style and kind."""
+"""Random bicycles as they are found on roads, by style and kind."""
 
 from __future__ import annotations
 
@@ -74,13 +74,13 @@ def _between(rng: np.random.Generator, low: float, high: float) -> float:
 
 
 def _shade(rng: np.random.Generator, color: Color) -> Color:
-    """The colour a little lighter or darker and off its hue."""
+    """The colour a little lighter or darker, its hue changed a little."""
     r, g, b = np.clip(np.array(color) * rng.uniform(0.85, 1.08) + rng.normal(0, 0.012, 3), 0.03, 0.96)
     return (float(r), float(g), float(b))
 
 
 def _colors(rng: np.random.Generator, dark_parts: float, dark_rims: float, other_fork: float) -> Colors:
-    """Paint with its accent, and the share of bicycles whose parts, rims and forks are black."""
+    """Paint with its accent; the numbers are probabilities of black parts, of black rims, and of a fork in another colour."""
     paint, accent = _one(rng, _PAINTS)
     frame = _shade(rng, paint)
     fork = _one(rng, (_BLACK, accent, _SILVER)) if _coin(rng, other_fork) else frame
@@ -97,7 +97,7 @@ def _colors(rng: np.random.Generator, dark_parts: float, dark_rims: float, other
 
 
 def _frame_size(rng: np.random.Generator, g: Geometry, tall: float) -> Geometry:
-    """The geometry for a rider of a size of 0 (short) to 1."""
+    """The geometry for a rider of size `tall`, from 0 (short) to 1."""
     return replace(
         g,
         wheelbase=g.wheelbase + 0.045 * (tall - 0.5) + _between(rng, -0.01, 0.01),
@@ -358,7 +358,7 @@ def _town_wheel(rng: np.random.Generator, disc: bool, black: bool) -> Wheel:
 
 
 def _town_geometry(rng: np.random.Generator, w: Wheel, beam: bool) -> Geometry:
-    """Upright; small wheels make it shorter."""
+    """An upright geometry; shorter with small wheels."""
     small = w.bead < 0.3
     base = Geometry(1.1 - 0.03 * small, 0.455, 0.03 if small else 0.065, 69, 70.5, w.radius + 0.056, 0.058, 0.21, 0.46, 0.665)
     return _frame_size(rng, replace(base, tube=1.45 if beam else _between(rng, 1.0, 1.25)), float(rng.uniform()))

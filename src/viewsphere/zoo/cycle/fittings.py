@@ -13,11 +13,11 @@ from viewsphere.zoo.shapes.rods import aimed, between, rod, shifted, swept
 from viewsphere.zoo.shapes.solids import Float, Solid, both_sides, join, lathe, moved, rounded_box
 
 GAP = 0.016
-"""Between tyre and mudguard, metres."""
+"""Gap between tyre and mudguard, metres."""
 
 
 def _arc(axle: Float, radius: float, start: float, stop: float) -> Float:
-    """Points around the axle; 0 degrees points to the front, 90 up, 180 to the rear."""
+    """Points of an arc around the axle, its angles in degrees: 0 points to the front, 90 up, 180 to the rear."""
     a = np.radians(np.linspace(start, stop, 31))
     return axle + radius * np.stack([0 * a, -np.cos(a), np.sin(a)], axis=1)
 

@@ -22,10 +22,10 @@ SIDES = 16
 
 @dataclass(frozen=True)
 class Frame:
-    """shape: diamond, or for stepping through: swan (two bowed tubes), wave (one deep beam), mixte (two straight tubes).
+    """shape: diamond, or a step-through: swan (two bowed tubes), wave (one deep beam), mixte (two straight tubes).
 
-    decor: letters are fields on the sides of the down tube, two_tone half of the tubes in the accent colour; shock: a swing
-    arm with a spring; bridge: a cross tube between the seat stays, for a brake.
+    decor: `letters` are fields on the sides of the down tube, `two_tone` paints half of the tubes in the accent colour; shock:
+    a swing arm with a spring; bridge: a cross tube between the seat stays, for a brake.
     """
 
     shape: Shape = "diamond"
@@ -36,7 +36,7 @@ class Frame:
 
 @dataclass(frozen=True)
 class Room:
-    """What the wheels need, metres: half the width between the rear dropouts' middles, and half that of tyre and mudguard."""
+    """Half widths that the wheels need, metres: between the rear dropouts' middles, and of tyre and mudguard."""
 
     half: float = 0.066
     clearance: float = 0.019
@@ -70,7 +70,7 @@ def frame_pieces(at: Layout, f: Frame, w: Wheel, room: Room, coats: Coats) -> li
 
 
 def _main_tubes(at: Layout, f: Frame, room: Room, coats: Coats) -> list[Piece]:
-    """What joins the head tube to the rest."""
+    """The tubes that join the head tube to the rest of the frame."""
     k = at.g.tube
     low, high = at.head
     up = at.steering
@@ -105,7 +105,7 @@ def _main_tubes(at: Layout, f: Frame, room: Room, coats: Coats) -> list[Piece]:
 
 
 def _bow(a: Float, b: Float, sag: float, at: Layout) -> Float:
-    """A curve from the head tube down and back to the seat tube: a cubic Bezier that leaves both square-on."""
+    """A curve from the head tube down and back to the seat tube: a cubic Bezier, perpendicular to both tubes at its ends."""
     reach = float(np.linalg.norm(b - a))
     first = a - sag * reach * unit(at.ahead + 0.75 * at.steering)
     second = b - 0.42 * reach * unit(np.array((0.0, 1.0, 0.02)))

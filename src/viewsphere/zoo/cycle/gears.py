@@ -20,9 +20,9 @@ Guard = Literal["none", "ring", "half", "case"]
 
 @dataclass(frozen=True)
 class Gears:
-    """rings: teeth of the chainrings, the chain's first; cogs: teeth of the cassette from the smallest; on: index of the
-    cog in use; one cog means no derailleur. line: the chain's distance from the middle, metres; cage: between the
-    derailleur's pulleys, metres; guard: what keeps trousers off the chain.
+    """rings: teeth of the chainrings, the one in use first; cogs: teeth of the cassette from the smallest; on: index of the
+    cog in use; one cog means no derailleur. line: the chain's distance from the middle, metres; cage: distance between the
+    derailleur's pulleys, metres; guard: the guard that keeps trousers off the chain.
     """
 
     rings: tuple[int, ...] = (50, 34)
@@ -39,7 +39,7 @@ class Gears:
 
 
 STEP = 0.0039
-"""Between neighbouring cogs, metres."""
+"""Distance between neighbouring cogs, metres."""
 JOCKEY = 11
 """Teeth of a derailleur's pulleys."""
 
@@ -54,7 +54,7 @@ def _jockeys(at: Layout, g: Gears) -> tuple[Pulley, Pulley]:
 
 
 def _pulleys(at: Layout, g: Gears) -> list[Pulley]:
-    """What the chain runs over, in its order: chainring, lower pulley, upper pulley, cog."""
+    """The pulleys in the order in which the chain runs over them: chainring, lower pulley, upper pulley, cog."""
     front = Pulley(at.bracket[1], at.bracket[2], pitch_radius(g.rings[0]))
     cog = Pulley(at.rear_axle[1], at.rear_axle[2], pitch_radius(g.cogs[g.on]))
     if not g.derailleur:
@@ -147,7 +147,7 @@ def _bar(template: Solid, a: Float, b: Float, span: float) -> Solid:
 
 
 def _stadium(ends: Float, first: float, second: float) -> Float:
-    """A counter-clockwise outline around two points (2, 2) with these radii."""
+    """A counter-clockwise outline (N, 2) around two points (2, 2) at these distances from them."""
     axis = np.arctan2(*(ends[1] - ends[0])[::-1])
     turn = np.linspace(-np.pi / 2, np.pi / 2, 7)
     far = ends[1] + second * np.stack([np.cos(axis + turn), np.sin(axis + turn)], axis=1)
@@ -204,7 +204,7 @@ def _guard(at: Layout, g: Gears, coats: Coats) -> list[Piece]:
 
 
 def _belt(front: Pulley, rear: Pulley, full: bool) -> Float:
-    """The outline (N, 2) of a belt around both: all of it, or most of the upper run with the front's arc."""
+    """The outline (N, 2) of a belt around both pulleys: all of it, or most of the upper run with the front pulley's arc."""
     y, z = rear.y - front.y, rear.z - front.z
     tilt, bend = np.arctan2(z, y), np.arcsin((front.radius - rear.radius) / np.hypot(y, z))
     start = tilt + np.pi / 2 - bend

@@ -91,7 +91,7 @@ class Layout:
         return self.bracket + height * self.seat
 
     def steered(self, solid: Solid, angle: float) -> Solid:
-        """Turned about the steering axis, radians; positive turns the front wheel to the rider's left (+X)."""
+        """The solid turned about the steering axis, radians; positive turns the front wheel to the rider's left (+X)."""
         return Solid(self.steered_points(solid.vertices, angle), solid.triangles)
 
     def steered_points(self, points: Float, angle: float) -> Float:

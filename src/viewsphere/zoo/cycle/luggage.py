@@ -1,4 +1,4 @@
-"""What bicycles carry: bottles, a carrier, baskets and bags."""
+"""Luggage of bicycles: bottles, a carrier, baskets and bags."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def bottle_pieces(at: Layout, on_seat_tube: bool, coats: Coats) -> list[Piece]:
 
 
 def carrier_height(at: Layout, w: Wheel) -> float:
-    """Where the carrier's platform lies above the ground, metres."""
+    """Height of the carrier's platform above the ground, metres."""
     return at.rear_axle[2] + w.radius + 0.05
 
 
@@ -180,7 +180,7 @@ def _ccw(outline: Float) -> bool:
 
 
 def basket_pieces(at: Layout, c: Cockpit, kind: Basket, w: Wheel, coats: Coats) -> list[Piece]:
-    """A basket in front of the bar; it turns with it."""
+    """A basket in front of the bar; the basket turns with the bar."""
     top = shifted(clamp(at, c), y=-0.062)
     low = at.front_axle[2] + w.radius + 0.05
     height = float(np.clip(top[2] - low, 0.17, 0.24))
@@ -230,7 +230,7 @@ def _wire_basket(size: Float, height: float) -> Solid:
 
 
 def _wicker_basket(size: Float, height: float) -> Solid:
-    """Woven rows: each weaves in and out, the next the other way round; a plaited rim and a floor."""
+    """Woven rows: each row weaves in and out, opposite to the row below; a plaited rim and a floor."""
     count = int(height / 0.0125)
     rows: list[Solid] = []
     for k in range(count):

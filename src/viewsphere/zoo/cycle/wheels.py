@@ -39,12 +39,12 @@ class Wheel:
 
     @property
     def radius(self) -> float:
-        """To the tyre's tread."""
+        """Radius of the tyre's tread, metres."""
         return self.bead + 0.98 * self.tyre
 
     @property
     def inner(self) -> float:
-        """To the rim's inside, where spokes end."""
+        """Radius of the rim's inside, where spokes end, metres."""
         return self.bead - self.rim_depth
 
 
@@ -60,7 +60,7 @@ class Hub:
 
 
 def on_axle(solid: Solid) -> Solid:
-    """From z up to the axle along x; z becomes x."""
+    """The solid turned from standing on z up to lying on the axle along x: z becomes x."""
     return turned(solid, 1, np.pi / 2)
 
 

@@ -1,1 +1,1 @@
-"""What chairs are built from: members, slabs and cushions, materials, and one module for each style."""
+"""The parts of chairs: members, slabs and cushions, materials, and one module for each style."""

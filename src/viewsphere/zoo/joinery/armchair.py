@@ -35,8 +35,9 @@ Feet = Literal["tapered", "block", "bun", "metal"]
 class Armchair:
     """Parameters of an armchair; lengths in metres.
 
-    body: straight, rolled or sloping arms, a wing chair, a tub whose back runs on into its arms, or a wooden frame; arm: its
-    thickness; arm_height: its top; lean: run of the back to the rear per metre; buttons: columns of tufts in the back.
+    body: straight, rolled or sloping arms, a wing chair, a tub whose back runs on into its arms, or a wooden frame; arm: an
+    arm's thickness; arm_height: height of its top; lean: run of the back to the rear per metre; buttons: columns of tufts in
+    the back.
     """
 
     width: float = 0.8
@@ -160,7 +161,7 @@ def _rolled(p: Armchair, low: float, front: float, rear: float) -> tuple[Solid, 
     foot = np.array([(p.inner - 0.01, low), (wall, low), (wall, (low + cz) / 2)])
     xz = np.vstack([foot, roll, [(p.inner - 0.01, (low + cz) / 2)]])[::-1]
     y = np.array([front, front, front + 0.006, front + 0.02, *np.linspace(front + 0.08, rear, 6), rear])
-    heart = np.array([wall - 0.012, cz - 0.06])  # from where all of the outline can be seen
+    heart = np.array([wall - 0.012, cz - 0.06])  # a point from which all of the outline can be seen
     size = np.array([0, 0.93, 0.975, 1, *np.ones(6), 0])[:, None, None]
     plan = heart + (xz - heart) * size
     rings = np.dstack([plan[..., 0], np.broadcast_to(y[:, None], plan.shape[:2]), plan[..., 1]])
@@ -202,7 +203,7 @@ def _back(p: Armchair) -> list[Piece]:
 
 
 def _tufted(outline: Float, face: Height, columns: int, span: float) -> tuple[Height, list[tuple[float, float]]]:
-    """The face drawn in at staggered buttons."""
+    """The face drawn in at staggered buttons, and the buttons' places."""
     x = float(outline[:, 0].max())
     step = 2 * x / (columns + 0.6)
     rows = np.arange(0.24, span - 0.06, 0.85 * step)

@@ -15,7 +15,7 @@ Cloth = Literal["fabric", "leather", "velvet"]
 
 @dataclass(frozen=True)
 class Cover:
-    """What a seat is covered with."""
+    """The material that covers a seat."""
 
     color: Color = (0.3, 0.36, 0.42)
     cloth: Cloth = "fabric"
@@ -121,7 +121,7 @@ RUBBER = Material("rubber", linear((0.09, 0.09, 0.095)), roughness=0.9)
 
 
 def drawn_color(colors: tuple[Color, ...], rng: np.random.Generator, hue: float = 0.012) -> Color:
-    """One of these, a little off: lighter or darker, and by about `hue` in each channel."""
+    """One of these colours, a little off: lighter or darker, and by about `hue` in each channel."""
     base = np.array(colors[int(rng.integers(len(colors)))])
     r, g, b = np.clip(base * rng.uniform(0.88, 1.1) + rng.normal(0, hue, 3), 0.03, 0.95)
     return float(r), float(g), float(b)

@@ -29,7 +29,7 @@ _TURNED_TOP = ((0.5, 0.017), (0.7, 0.021), (0.74, 0.015), (0.77, 0.021), (0.8, 0
 class Dining:
     """Parameters of a wooden dining chair; lengths in metres.
 
-    width: of the seat at its front; taper: the seat's width at its rear as a fraction of it; rungs: slats or rungs in the
+    width: of the seat at its front; taper: the seat's width at its rear as a fraction of `width`; rungs: slats or rungs in the
     back; rake: how far the top of the back lies behind its foot; hollow: how far the middle of the rails bows to the rear;
     arch: rise of the crest rail in its middle; cover: of a padded seat or back.
     """
@@ -63,7 +63,7 @@ class Dining:
 
     @property
     def under(self) -> float:
-        """Height of the legs' and aprons' top."""
+        """Height of the top of legs and aprons."""
         return self.seat_height - {"wood": 0.022, "padded": 0.05, "rush": -0.004}[self.seat]
 
     def post(self, z: ArrayLike) -> Float:
@@ -110,7 +110,7 @@ def _legs(p: Dining, wood: tuple[Material, ...]) -> list[Piece]:
 
 
 def _aprons(p: Dining, wood: tuple[Material, ...]) -> list[Piece]:
-    """The rails under the seat; a woven seat is its own."""
+    """The rails under the seat; a woven seat has its own."""
     if p.seat == "rush":
         return []
     (xf, yf), (xr, yr) = p.front, p.rear
@@ -177,7 +177,7 @@ def _stretchers(p: Dining, wood: tuple[Material, ...]) -> list[Piece]:
     low, high = 0.13, 0.2
 
     def rail(a: ArrayLike, b: ArrayLike) -> list[Piece]:
-        """Turned on turned legs, else sawn."""
+        """A rail between two points: turned where the legs are turned, else sawn."""
         if p.legs == "turned":
             return [
                 Piece("stretcher", wood[0], spindle(a, b, [(0, 0.008), (0.3, 0.011), (0.5, 0.015), (0.7, 0.011), (1, 0.008)]))
@@ -194,7 +194,7 @@ def _stretchers(p: Dining, wood: tuple[Material, ...]) -> list[Piece]:
 
 
 def _back(p: Dining, wood: tuple[Material, ...]) -> list[Piece]:
-    """What fills the space between the posts."""
+    """The slats, rungs or boards between the posts."""
     if p.back == "padded":
         return _padded(p, wood)
     if p.back == "ladder":

@@ -39,7 +39,7 @@ class Folding:
     """Parameters of a folding chair; lengths in metres.
 
     slats: boards in the seat of a slatted chair; back_slats: in its back; padded: cushions on a steel chair, else sheet
-    plastic; metal: colour of the tubes, None is chrome; shell: colour of sheet seats.
+    plastic; metal: colour of the tubes, None for chrome; shell: colour of sheet seats.
     """
 
     kind: Kind = "steel"
@@ -57,13 +57,13 @@ class Folding:
 
     @property
     def long_leg(self) -> Float:
-        """(y, z) of the legs that lead from the front feet up into the back."""
+        """(y, z) of the legs that run from the front feet up into the back."""
         y = self.depth / 2
         return np.array([(-y + 0.01, 0.0), (0.2 * y, self.seat_height + 0.03), (0.72 * y, self.height)])
 
     @property
     def short_leg(self) -> Float:
-        """(y, z) of the legs that lead from the rear feet to the front of the seat."""
+        """(y, z) of the legs that run from the rear feet to the front of the seat."""
         y = self.depth / 2
         return np.array([(y - 0.01, 0.0), (-0.56 * y, self.seat_height - 0.043)])
 
@@ -214,12 +214,12 @@ def _slatted(p: Folding) -> list[Piece]:
 
 
 def _extended(leg: Float, share: float) -> Float:
-    """The leg led on beyond its foot by this share of its first stretch."""
+    """The leg extended beyond its foot by this share of its first stretch."""
     return np.vstack([leg[0] - share * (leg[1] - leg[0]), leg[1:]])
 
 
 def _sawn(solid: Solid) -> Solid:
-    """What reaches below the floor is pressed flat onto it."""
+    """The solid with everything below the floor pressed flat onto it."""
     return Solid(np.maximum(solid.vertices, (-np.inf, -np.inf, 0.0)), solid.triangles)
 
 

@@ -48,7 +48,7 @@ class Office:
 
     @property
     def span(self) -> float:
-        """From the lower edge of the back to the upper."""
+        """Distance from the lower edge of the back to its upper edge, metres."""
         return self.height - self.seat_height - 0.03
 
     @property

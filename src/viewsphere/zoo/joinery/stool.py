@@ -36,7 +36,7 @@ class Stool:
     """Parameters of a stool; lengths in metres.
 
     height: of the seat; seat_width: its diameter or side; splay: run of the legs per metre of height; back: height of a low
-    back above the seat, 0 for none; padded: upholstered; metal: colour of the steel, None is chrome.
+    back above the seat, 0 for none; padded: upholstered; metal: colour of the steel, None for chrome.
     """
 
     height: float = 0.74
@@ -64,7 +64,7 @@ class Stool:
 
     @property
     def steel(self) -> Material:
-        """What the metal is coated with."""
+        """The coating of the metal."""
         return BRASS if self.brass else CHROME if self.metal is None else lacquered(self.metal)
 
 

@@ -94,13 +94,13 @@ def _undercarriage(p: Windsor, wood: tuple[Material, ...]) -> list[Piece]:
 
 
 def _sticks(p: Windsor, wood: tuple[Material, ...]) -> list[Piece]:
-    """Spindles that fan out of the seat's rear edge, and what holds their tops."""
+    """Spindles that fan out of the seat's rear edge, and the comb or bow that holds their tops."""
     foot, head = p.seat_height - 0.02, p.height - p.seat_height
     side = np.linspace(-1, 1, p.spindles + 2)
     base = np.column_stack([0.36 * p.width * side, 0.5 * p.depth - 0.035 - 0.05 * side**2, np.full(len(side), foot)])
 
     def back(x: Float, z: Float) -> Float:
-        """y of the back."""
+        """y of the back's surface at x and z."""
         return 0.5 * p.depth - 0.035 - 0.28 * x**2 / p.width + p.rake * (z - foot) / head
 
     if p.back == "comb":

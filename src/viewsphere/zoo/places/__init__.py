@@ -1,7 +1,7 @@
 """Places that ship with the tool: layouts of the zoo's families around a free spot where targets stand.
 
 A place is one module of this package, named as its file: `NAME(...)` lays out a Place from parameters and `NAME_random(rng)`
-draws them. Frame: metres, +Z up, the floor at z = 0, the origin on a free stretch of it.
+draws the parameters. Frame: metres, +Z up, the floor at z = 0, the origin on a free stretch of the floor.
 """
 
 from __future__ import annotations
@@ -30,8 +30,8 @@ class Piece:
 
 @dataclass(frozen=True)
 class Place:
-    """A layout; nothing in it was built yet. `free`: lowest x and y, highest x and y of the floor that is left to targets, if
-    it ends anywhere.
+    """A layout, of which nothing is built yet. `free`: lowest x and y, highest x and y of the floor that is left to targets;
+    None where this floor has no end.
     """
 
     pieces: tuple[Piece, ...]

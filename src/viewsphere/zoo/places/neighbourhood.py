@@ -16,19 +16,19 @@ from viewsphere.zoo.townscape.plan import HALF_LENGTH, ROAD, STEP
 from viewsphere.zoo.townscape.plots import Plot, allotted
 
 VERGE, PAVEMENT, GARDEN = 4.2, 5.95, 6.36
-"""x of the verge's middle, where lamp posts stand, of benches on the pavement, of the gardens' edge, metres."""
+"""x of the middle of the verge, where lamp posts stand; of benches on the pavement; of the gardens' edge; metres."""
 
 FAR = 65.0
-"""Plots beyond this y are too far off for shrubs, bins and trees behind the house, metres."""
+"""Distance along the street, metres, beyond which plots have no shrubs, bins and trees behind the house."""
 
 
 @dataclass(frozen=True)
 class Neighbourhood:
-    """Parameters of a neighbourhood; metres. `seed` draws all that the others leave open.
+    """Parameters of a neighbourhood; metres. `seed` draws all that the other parameters leave open.
 
     houses: designs with the garage on the right, without one, with it on the left; trees: designs; lamp_spacing: between lamp
     posts of one side; lamp: y of the right one nearest to the origin, mirrored on the left; greenery: share of plots with a
-    tree before the house; bounded: share with a hedge or fence before it; clear: no tree reaches nearer to the origin.
+    tree before the house; bounded: share with a hedge or fence before it; clear: distance from the origin that trees keep.
     """
 
     seed: int = 0
@@ -72,7 +72,7 @@ def neighbourhood(parameters: Neighbourhood | None = None) -> Place:
 
 
 def neighbourhood_random(rng: np.random.Generator) -> Place:
-    """A neighbourhood with everything drawn."""
+    """A neighbourhood with all parameters drawn."""
     return neighbourhood(
         Neighbourhood(
             seed=int(rng.integers(1 << 31)),
@@ -96,7 +96,7 @@ def _named(stands: Sequence[_Stand]) -> tuple[Piece, ...]:
 
 
 def _designs(rng: np.random.Generator, family: str, count: int, wanted: Callable[[Any], bool] = lambda p: True) -> list[int]:
-    """Seeds of this many members of a family whose parameters are wanted."""
+    """Seeds of `count` members of a family whose parameters `wanted` accepts."""
     draw = plugins.family(family).draw
     seeds: list[int] = []
     while len(seeds) < count:
@@ -129,7 +129,7 @@ def _paved(plots: Sequence[Plot], design: np.random.Generator) -> list[_Stand]:
 
 
 def _beside(y: float, crossings: Iterable[float], gap: float = 2.5) -> float:
-    """The y nearest to this one that is not before a driveway."""
+    """The y nearest to `y` that is not before a driveway."""
     tries = y + np.array([s * 0.25 * k for k in range(40) for s in (1, -1)])
     free = (np.abs(tries[:, None] - np.array([*crossings])) > gap).all(axis=1)
     return float(tries[free][0])
@@ -167,7 +167,7 @@ def _boundaries(p: Neighbourhood, plots: Sequence[Plot], rng: np.random.Generato
 
 
 def _trees(p: Neighbourhood, plots: Sequence[Plot], rng: np.random.Generator) -> list[_Stand]:
-    """Trees on front lawns, and taller ones behind the houses where one sees between them."""
+    """Trees on front lawns, and taller trees behind the houses, in the gaps between them."""
     radius = {s: tree.draw(np.random.default_rng(s)).crown / 2 for s in _designs(rng, "tree", p.trees, lambda t: t.height < 9)}
     seeds = [*radius]
     stands: list[_Stand] = []

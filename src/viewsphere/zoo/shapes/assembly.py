@@ -12,7 +12,7 @@ from viewsphere.assets.mesh import Material, Mesh
 from viewsphere.zoo.shapes.solids import Float, Solid, join
 
 WELD = 1e-5
-"""Vertices nearer than this are one, metres."""
+"""Vertices nearer to each other than this are merged, metres."""
 
 
 @dataclass(frozen=True, eq=False)

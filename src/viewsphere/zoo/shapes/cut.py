@@ -9,7 +9,7 @@ from viewsphere.zoo.shapes.solids import Float, Solid
 
 Index = NDArray[np.int64]
 SNAP = 1e-4
-"""Vertices nearer to the level than this lie on it: no slivers."""
+"""Vertices nearer to the level than this count as lying on it, so that no slivers arise."""
 
 
 def cut(solid: Solid, level: Float) -> tuple[Solid, Solid]:
@@ -33,13 +33,13 @@ def cut(solid: Solid, level: Float) -> tuple[Solid, Solid]:
 
 
 def _crossing(vertices: Float, d: Float, a: Index, b: Index) -> Float:
-    """Where the level is 0 between vertices a and b; the same bits from either side."""
+    """The points where the level is 0 between vertices a and b; the same bits from either side."""
     i, j = np.minimum(a, b), np.maximum(a, b)
     share = d[i] / (d[i] - d[j])
     return vertices[i] + (vertices[j] - vertices[i]) * share[:, None]
 
 
 def _compact(vertices: Float, triangles: Index) -> Solid:
-    """Only the vertices in use."""
+    """The solid with only the vertices that its triangles use."""
     used, index = np.unique(triangles, return_inverse=True)
     return Solid(vertices[used], index.reshape(-1, 3))

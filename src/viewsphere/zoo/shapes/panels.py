@@ -1,4 +1,4 @@
-"""Things that lie on a curved surface: rounded panels, frames around openings, ribbons along a line.
+"""Shapes that follow a curved surface: rounded panels, frames around openings, ribbons along a line.
 
 A surface is a function of two arrays (u, v) of one shape (...) to points (..., 3); outside is d/du x d/dv.
 """

@@ -1,4 +1,4 @@
-"""Bars, bent tubes, flat plates and many copies of one solid: what frames and machines are made of."""
+"""Bars, bent tubes, flat plates and many copies of one solid, for frames and machines."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def between(a: ArrayLike, b: ArrayLike, share: float) -> Float:
 
 
 def shifted(point: ArrayLike, x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Float:
-    """The point, or points (..., 3), moved by so much, metres."""
+    """The point, or points (..., 3), moved by (x, y, z), metres."""
     return np.asarray(point, np.float64) + np.array((x, y, z))
 
 
@@ -103,7 +103,7 @@ def washer(inner: ArrayLike, outer: ArrayLike, thickness: float) -> Solid:
 
 
 def across(solid: Solid) -> Solid:
-    """A flat thing about z = 0 put upright into x = 0: its x becomes y, its y becomes z, its z becomes x."""
+    """A flat solid about z = 0 put upright into x = 0: its x becomes y, its y becomes z, its z becomes x."""
     return Solid(solid.vertices[:, (2, 0, 1)], solid.triangles)
 
 

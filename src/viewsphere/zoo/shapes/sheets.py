@@ -1,4 +1,4 @@
-"""Curved sheets and mouldings: what is bent, sawn or extruded."""
+"""Curved sheets and mouldings: bent, sawn or extruded solids."""
 
 from __future__ import annotations
 
@@ -25,9 +25,10 @@ def sheet(points: Float, thickness: float) -> Solid:
 
 
 def moulding(path: ArrayLike, profile: ArrayLike, side: ArrayLike) -> Solid:
-    """A (K, 2) profile, counter-clockwise, led along a (N, 3) path.
+    """A (K, 2) profile, counter-clockwise, swept along a (N, 3) path.
 
-    Its first coordinate points towards `side`, (3,) or (N, 3), made square to the path, its second towards side x path.
+    The profile's first coordinate points towards `side`, (3,) or (N, 3), made perpendicular to the path; its second points
+    towards side x path.
     """
     line = np.asarray(path, np.float64)
     ring = np.asarray(profile, np.float64)[::-1]

@@ -46,12 +46,12 @@ def both_sides(solid: Solid) -> Solid:
 
 
 def moved(solid: Solid, by: ArrayLike) -> Solid:
-    """Translated, metres."""
+    """The solid translated, metres."""
     return Solid(solid.vertices + np.asarray(by, np.float64), solid.triangles)
 
 
 def turned(solid: Solid, axis: int, angle: float) -> Solid:
-    """Rotated about a coordinate axis (0 x, 1 y, 2 z) through the origin, right-handed, radians."""
+    """The solid rotated about a coordinate axis (0 x, 1 y, 2 z) through the origin, right-handed, radians."""
     c, s = np.cos(angle), np.sin(angle)
     i, j = (axis + 1) % 3, (axis + 2) % 3
     rotation = np.eye(3)
@@ -111,7 +111,7 @@ def frames_along(path: Float) -> tuple[Float, Float]:
 
 
 def tube(path: ArrayLike, radius: ArrayLike, sides: int = 10) -> Solid:
-    """A closed tube along a (N, 3) path; radius is one or one a point, metres."""
+    """A closed tube along a (N, 3) path; radius in metres, one for all points or one for each."""
     line = np.asarray(path, np.float64)
     u, v = frames_along(line)
     r = np.broadcast_to(np.asarray(radius, np.float64), len(line))[:, None, None]

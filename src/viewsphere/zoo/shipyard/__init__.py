@@ -1,1 +1,1 @@
-"""What a boat is built from: lines, shell, deck, fittings, engines, spars and sails."""
+"""The parts of a boat: lines, shell, deck, fittings, engines, spars and sails."""

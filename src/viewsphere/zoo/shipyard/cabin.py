@@ -21,9 +21,9 @@ Span = tuple[float, float]
 class Trunk:
     """A house on deck from t = start to stop, metres.
 
-    width: half of it at most; margin: side deck; height: of front and rear above the deck's middle; lean: how far the
-    sides fall inwards, fraction of the width; rake: how far the front's top stands behind its foot, the rear's before
-    its; square: exponent of the plan; camber: rise of the roof.
+    width: half of the trunk's greatest; margin: width of the side deck; height: of front and rear above the deck's middle;
+    lean: how far the sides fall inwards, fraction of the width; rake: how far the front's top stands behind its foot, and the
+    rear's top before its foot; square: exponent of the plan; camber: rise of the roof.
     """
 
     deck: Deck
@@ -53,7 +53,7 @@ class Trunk:
         return np.stack([foot * (1 - self.lean * h), y, low + h * (top - low)], axis=-1)
 
     def columns(self) -> Float:
-        """The wall's u."""
+        """Values of u at the wall's columns."""
         return np.concatenate([np.linspace(0, 0.3, 14), np.linspace(0.3, 0.7, 16)[1:-1], np.linspace(0.7, 1, 14)])
 
     def walls(self) -> Solid:

@@ -14,7 +14,7 @@ MAHOGANY: Color = (0.42, 0.17, 0.08)
 
 @dataclass(frozen=True)
 class Coats:
-    """Topsides, bottom, stripes, deck, wood and what all boats share."""
+    """Materials: topsides, bottom, stripes, deck, wood, and those that all boats share."""
 
     hull: Material
     bottom: Material

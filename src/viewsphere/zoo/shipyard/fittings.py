@@ -1,4 +1,4 @@
-"""What is screwed on: cleats, railings, wheels, seats, lights, fenders, a flag."""
+"""Fittings: cleats, railings, wheels, seats, lights, fenders, a flag."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from viewsphere.zoo.shipyard.coats import Coats
 from viewsphere.zoo.shipyard.shell import Deck, pair
 
 Flag = tuple[Color, Color, Color]
-"""Stripes from the lowest to the highest."""
+"""Stripes of a flag, from the lowest to the highest."""
 
 
 def cleat(size: float = 0.2) -> Solid:

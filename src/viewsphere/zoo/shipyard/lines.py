@@ -21,7 +21,7 @@ Triple = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class Round:
-    """Round bilges. Each of bow, middle and stern: the two inner points (x, h), (x, h) of a cubic Bezier from keel
+    """Round bilges. Each of bow, middle and stern: the two inner control points (x, h), (x, h) of a cubic Bezier from keel
     (0, 0) to sheer (1, 1), in half breadths and heights."""
 
     fore: Quad = (0.22, 0.2, 0.62, 0.55)
@@ -37,7 +37,8 @@ class Round:
 
 @dataclass(frozen=True)
 class Chine:
-    """V bottom and sides that meet in a chine (v = 0.5). Each: the chine's (x, h), and how hollow the side is above it."""
+    """V bottom and sides that meet in a chine (v = 0.5). Each of bow, middle and stern: the chine's (x, h), and how hollow the
+    side above it is."""
 
     fore: Triple = (0.3, 0.5, 0.75)
     middle: Triple = (0.87, 0.36, 0.3)
@@ -53,7 +54,7 @@ class Chine:
 
 
 def _blend(t: Float, fore: float, middle: float, aft: float) -> Float:
-    """From bow through the middle to the stern."""
+    """The number blended from bow through the middle to the stern."""
     return curve(t, [(0, fore), (0.45, middle), (1, aft)])
 
 
@@ -61,7 +62,7 @@ def _blend(t: Float, fore: float, middle: float, aft: float) -> Float:
 class Lines:
     """Metres. sheer, keel: z over t; stem, stern: how far the profile stands back from the ends of the length, over the
     height from keel 0 to sheer 1, in lengths; widest: t of the greatest beam; entry, quarter: exponents (p, q) of
-    (1 - s^p)^q from there to the bow and to the stern, where `tuck` of the beam is left."""
+    (1 - s^p)^q from the greatest beam to the bow and to the stern, where the share `tuck` of the beam is left."""
 
     length: float
     beam: float
@@ -98,7 +99,7 @@ class Lines:
         return n / np.maximum(np.linalg.norm(n, axis=-1, keepdims=True), 1e-12)
 
     def raised(self, t: ArrayLike, v: ArrayLike, offset: ArrayLike) -> Float:
-        """Points this far outside the left skin, or inside if negative, never beyond the middle."""
+        """Points this far outside the left skin, or inside it if negative, never beyond the ship's middle."""
         points = self.point(t, v) + self.normal(t, v) * np.asarray(offset, np.float64)[..., None]
         points[..., 0] = np.maximum(points[..., 0], 0.0)
         return points
@@ -124,7 +125,7 @@ class Lines:
         return t, v, self.point(t, v)
 
     def waterline(self, z: float) -> Float:
-        """The left skin at a height: (T, 4) of x, y, t, v, from bow to stern; the keel or sheer where it does not reach."""
+        """The left skin at a height: (T, 4) of x, y, t, v, from bow to stern; keel or sheer where the skin does not reach z."""
         t, v, points = self._table
         k = np.clip((points[..., 2] < z).sum(axis=1), 1, v.size - 1)
         row = np.arange(t.size)
@@ -139,12 +140,12 @@ class Lines:
         return np.interp(at, line[:, 1], line[:, 2]), np.interp(at, line[:, 1], line[:, 3])
 
     def half_at(self, y: ArrayLike, z: float) -> Float:
-        """Half breadths of the skin at these y and this z."""
+        """Half breadths of the hull at these y and this z."""
         line = self.waterline(z)
         return np.interp(np.asarray(y, np.float64), line[:, 1], line[:, 0])
 
     def within(self, points: Float, z: float, gap: float) -> Float:
-        """The points of the left side, brought down or up to z and, where that lies outside the hull, `gap` inside it."""
+        """The points of the left side moved to the height z, and, where this leaves the hull, to `gap` inside the hull."""
         line = self.waterline(z)
         inside = line[line[:, 0] > gap, :2]
         y = np.clip(points[..., 1], inside[0, 1] + gap, inside[-1, 1] - gap)
@@ -153,6 +154,6 @@ class Lines:
 
 
 def stations(count: int, dense: float = 0.6) -> Float:
-    """Values from 0 to 1 that lie closer at the ends; dense from 0 (even) to below 1."""
+    """Values from 0 to 1 that lie closer together at the ends; `dense` from 0 (even) to below 1."""
     s = np.linspace(0, 1, count)
     return s - dense * np.sin(2 * np.pi * s) / (2 * np.pi)

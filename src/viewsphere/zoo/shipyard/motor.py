@@ -29,10 +29,11 @@ Drive = Literal["outboard", "stern_drive"]
 class MotorBoat:
     """Parameters of a motor boat; lengths in metres, colours sRGB 0..1.
 
-    length, beam: of the hull; freeboard: sheer above the water amidships; spring: how much the bow is higher, fraction;
+    length, beam: of the hull; freeboard: sheer above the water amidships; spring: how much higher the bow is, fraction;
     flare: how hollow the bow's sides are; stem_rake: overhang of the bow, lengths; cockpit: where the well begins (t);
-    screen: height of the windscreen; bow_seats: a second well ahead of it; cuddy: a low cabin there; top: canopy over
-    console or cockpit; house: where the wheelhouse begins (t), with its height, the rake of its front and windows on a side.
+    screen: height of the windscreen; bow_seats: a second well ahead of the cockpit; cuddy: a low cabin in its stead; top:
+    canopy over console or cockpit; house: where the wheelhouse begins (t), with its height, the rake of its front and windows
+    on a side.
     """
 
     style: Style = "runabout"
@@ -242,7 +243,7 @@ def _gauges(c: Coats, at: tuple[float, float, float]) -> list[Piece]:
 
 
 def _seat_width(deck: Deck, well: Opening, back: float, ahead: float) -> float:
-    """Width of a bench across a well's rear, `back` (t) ahead of its end, clear of the hull `ahead` metres from there."""
+    """Width of a bench across a well's rear, `back` (t) ahead of the well's end, clear of the hull `ahead` metres on."""
     end = float(deck.lines.sheer_line(well.stop)[1])
     inside = float(well.half(deck.lines, np.array(well.stop - back)))
     return 2 * min(inside, float(deck.lines.half_at(end - ahead, well.floor))) - 0.12

@@ -34,7 +34,7 @@ def propeller(radius: float, at: ArrayLike) -> Solid:
 
 
 def outboard(c: Coats, at: ArrayLike, leg: float, size: float) -> list[Piece]:
-    """An outboard clamped at `at` (on the transom's face); leg: from there down to the cavitation plate, metres."""
+    """An outboard clamped at `at` (on the transom's face); leg: distance from `at` down to the cavitation plate, metres."""
     s, low = size, -leg
     cowl = stacked(
         [

@@ -47,7 +47,7 @@ class Rig:
 
     @property
     def radius(self) -> float:
-        """Of the mast."""
+        """Radius of the mast."""
         return (0.0098 if self.wooden else 0.0078) * self.length + 0.008
 
     def mast_at(self, z: float) -> Float:
@@ -117,7 +117,7 @@ def rigged(rig: Rig, look: Cut, jib_look: Cut, c: Coats) -> list[Piece]:
 
 
 def _spars(rig: Rig, c: Coats) -> list[Piece]:
-    """Mast, boom, and gaff and bowsprit where they belong."""
+    """Mast and boom, for a gaff rig also gaff and bowsprit."""
     spar = c.wood if rig.wooden else c.alloy
     r = rig.radius
     z = rig.foot[2] + np.array([-0.05, 0.0, 0.5, 0.8, 0.95, 1.0]) * (rig.head - rig.foot[2])

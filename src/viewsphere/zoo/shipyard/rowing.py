@@ -26,8 +26,8 @@ SKIN = 0.018
 class RowingBoat:
     """Parameters of a rowing boat; lengths in metres, angles in degrees, colours sRGB 0..1.
 
-    length, beam: of the shell; depth: from the keel to the sheer amidships; spring: how far bow and stern rise above
-    that, fractions of the depth; planks: strakes of a clinker hull, 0 for a smooth one; thwarts: benches to sit on;
+    length, beam: of the shell; depth: from the keel to the sheer amidships; spring: how much higher than that bow and stern
+    rise, fractions of the depth; planks: strakes of a clinker hull, 0 for a smooth one; thwarts: benches to sit on;
     oars: pairs; sweep: how far the oars trail aft of square, None when they lie in the boat.
     """
 
@@ -120,7 +120,7 @@ def _shell(p: RowingBoat, lines: Lines, c: Coats, paint: Paint) -> list[Piece]:
 
 
 def _planking(p: RowingBoat, lines: Lines, t: Float) -> Float:
-    """The outside; clinker planks stand off at their lower edges."""
+    """The outer skin; clinker planks stand off at their lower edges."""
     if not p.planks:
         return lines.point(t, np.linspace(0, 1, 22))
     v, off = [0.0], [0.0]

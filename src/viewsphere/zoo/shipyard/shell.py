@@ -1,4 +1,4 @@
-"""Skin, transom, deck with its wells, and what runs along the sheer."""
+"""Skin, transom, deck with its wells, and rails along the sheer."""
 
 from __future__ import annotations
 

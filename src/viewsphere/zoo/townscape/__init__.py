@@ -1,1 +1,1 @@
-"""What streets, houses, trees and street furniture are built from."""
+"""The parts of streets, houses, trees and street furniture."""

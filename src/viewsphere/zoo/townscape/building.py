@@ -1,4 +1,4 @@
-"""A house put together: blocks of four facades under a roof, and what is fastened to them."""
+"""A house put together: blocks of four facades under a roof, and the fittings on them."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ GARAGE = 3.4
 """Width of a garage's block, metres."""
 
 WING = 1.3
-"""How far a wing stands forward."""
+"""How far a wing stands before the front, metres."""
 
 STOREY = 2.75
 FLOOR = 0.18
-"""Height of the ground floor above the ground."""
+"""Height of the ground floor above the ground, metres."""
 
 SEAM = FLOOR + STOREY + 0.5
-"""Where the upper storey's wall begins when it is another one."""
+"""Height at which the upper storey's wall begins where it differs from the wall below, metres."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ def layout(p: House) -> Layout:
 
 
 def images(p: House, rng: np.random.Generator) -> list[Image]:
-    """Wall, upper wall, roof."""
+    """Textures of wall, upper wall and roof."""
     roof = textures.plaster(rng, "gravel", (0.5, 0.49, 0.47), 0.2) if p.roof == "flat" else _tiles(p, rng)
     return [_wall_image(p.wall, p.wall_color, rng), _wall_image(p.upper or "plaster", p.upper_color, rng), roof]
 
@@ -197,7 +197,7 @@ def _block(
 
 
 def _two_tone(wall: Solid, f: Fabric) -> list[Piece]:
-    """The wall in two materials, parted between the storeys."""
+    """The wall in two materials, divided between the storeys."""
     above = wall.vertices[wall.triangles][:, :, 2].mean(axis=1) > SEAM
     return [
         Piece("wall", f.wall, Solid(wall.vertices, wall.triangles[~above])),

@@ -31,7 +31,7 @@ HILL = Material("hill", roughness=1.0)
 WOOD = Material("wood", roughness=1.0)
 
 AIR = srgb.linear((0.66, 0.74, 0.82))
-"""What distance fades into, linear."""
+"""The colour into which distant things fade, linear."""
 
 
 @dataclass(frozen=True)
@@ -90,7 +90,7 @@ def _scattered(relief: Relief, rng: np.random.Generator, near: float, far: float
 
 
 def _away(points: Float) -> Float:
-    """Distance (N,) from the street's rectangle."""
+    """Distance (N,) of points from the street's rectangle, metres."""
     return np.hypot(np.maximum(np.abs(points[:, 0]) - HALF_WIDTH, 0), np.maximum(np.abs(points[:, 1]) - HALF_LENGTH, 0))
 
 
@@ -123,7 +123,9 @@ def _crown(relief: Relief, x: float, y: float, size: float, rng: np.random.Gener
 
 
 def around(points: Float) -> Float:
-    """Metres along the horizon as seen from the origin, and down (N, 2): leaves on woods, which nobody sees from behind."""
+    """uv (N, 2) of points: metres along the horizon seen from the origin, and down; for leaves on woods, never seen from
+    behind.
+    """
     reach = np.hypot(points[:, 0], points[:, 1])
     return np.stack([reach * np.arctan2(points[:, 1], points[:, 0]), -points[:, 2]], axis=1)
 
@@ -160,7 +162,7 @@ _ROOFS = ((0.5, 0.26, 0.2), (0.33, 0.33, 0.35), (0.42, 0.3, 0.24))
 
 
 def images(rng: np.random.Generator) -> list[Image]:
-    """Grass, asphalt, leaves."""
+    """Textures of grass, asphalt and leaves."""
     return [turf(), textures.asphalt(rng, (0.4, 0.39, 0.38), 256), textures.leafage(rng, (0.3, 0.39, 0.17))]
 
 

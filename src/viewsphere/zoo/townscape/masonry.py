@@ -31,7 +31,7 @@ class Opening:
 
 @dataclass(frozen=True)
 class Joinery:
-    """What windows and doors are made of; shutters None for none."""
+    """Materials of windows and doors; shutters None for none."""
 
     frame: Material
     glass: Material
@@ -79,7 +79,7 @@ def _reveal(a: float, b: float, low: float, high: float) -> Float:
 
 
 def filled(opening: Opening, j: Joinery, rng: np.random.Generator) -> list[Piece]:
-    """What stands in an opening: window, door or garage door."""
+    """The contents of an opening: window, door or garage door."""
     pieces = {"window": _window, "door": _door, "garage": _garage}[opening.kind](opening, j, rng)
     return [Piece(p.part, p.material, moved(p.solid, (opening.x, 0, opening.z))) for p in pieces]
 

@@ -22,13 +22,13 @@ SETTS = textured("setts", 5, 1.2, 0.9)
 PATCH = Material("patched_asphalt", (0.62, 0.62, 0.62, 1.0), base_color_texture=ASPHALT.base_color_texture, roughness=0.95)
 
 GUTTER = 2.95
-"""Inner edge of the gutter."""
+"""x of the inner edge of the gutter, metres."""
 
 CROSSING = 1.6
-"""Half the width of a dropped kerb."""
+"""Half the width of a dropped kerb, metres."""
 
 TURF: Color = (0.375, 0.455, 0.195)
-"""Grass, sRGB: the same in all streets and in the country."""
+"""Colour of grass, sRGB: the same in all streets and in the country."""
 
 
 def turf() -> Image:
@@ -67,14 +67,14 @@ def tints(rng: np.random.Generator, wear: float) -> dict[str, Tint]:
 
 
 def meadow(rng: np.random.Generator, points: Float) -> Float:
-    """Factors (N, 3) of the grass' colour: it is not equally green everywhere."""
+    """Factors (N, 3) of the grass' colour, since grass is not equally green everywhere."""
     light, dry = waves(rng, points[:, :2], 9.0), waves(rng, points[:, :2], 16.0)
     shade = 0.9 + 0.09 * light
     return np.stack([shade, shade - 0.02, shade - 0.06 - 0.05 * dry], axis=1)
 
 
 def _drop(y: Float, crossings: tuple[float, ...]) -> Float:
-    """How far the kerb is dropped, 0 to 1."""
+    """How far the kerb is dropped at these y, 0 to 1."""
     off = np.abs(y[:, None] - np.asarray(crossings)).min(axis=1, initial=np.inf)
     return np.clip((CROSSING + 0.5 - off) / 0.5, 0, 1)
 
@@ -97,7 +97,7 @@ def _strip(side: int, x: Float, y: Float, z: Float) -> Solid:
 
 
 def sections(crossings: tuple[tuple[float, ...], tuple[float, ...]]) -> list[Piece]:
-    """Road, gutters, kerbs, verges with the driveways' crossings, pavements and lawns; and what closes them below."""
+    """Road, gutters, kerbs, verges with the driveways' crossings, pavements and lawns; and the faces that close them below."""
     y = np.linspace(-HALF_LENGTH, HALF_LENGTH, 101)
     pieces = [Piece("road", ASPHALT, _strip(1, np.linspace(-GUTTER, GUTTER, 13), y, np.zeros(1)))]
     for side, at in zip((1, -1), crossings, strict=True):

@@ -17,12 +17,12 @@ if TYPE_CHECKING:
     from viewsphere.zoo.house import House
 
 SETBACK = 15.2
-"""x of the nearest wall, metres."""
+"""x of the houses' nearest wall, metres."""
 
 
 @dataclass(frozen=True)
 class Plot:
-    """One house's plot: its middle along the street, and where on it things are, metres; seed draws the house."""
+    """One house's plot: its middle along the street, where house, driveway and door are, metres; seed draws the house."""
 
     side: int
     y: float
@@ -35,12 +35,12 @@ class Plot:
 
     @property
     def turn(self) -> float:
-        """What turns a piece's front (-Y) to the road, degrees."""
+        """Turn about z that faces a piece's front (-Y) to the road, degrees."""
         return 270.0 if self.side > 0 else 90.0
 
     @property
     def ends(self) -> tuple[float, float]:
-        """y where it borders on its neighbours."""
+        """y of the plot's borders with its neighbours."""
         return self.y - PLOT / 2, self.y + PLOT / 2
 
 
@@ -51,7 +51,7 @@ def allotted(
     pool: dict[int, House],
     rng: np.random.Generator,
 ) -> list[Plot]:
-    """A plot for each middle: a house (a seed of `pool`) that is not the one next door, its garage, if any, at the driveway."""
+    """A plot for each middle: a house (a seed of `pool`) other than next door's; a garage, if any, is at the driveway."""
     plots: list[Plot] = []
     for y, driveway in zip(middles, driveways, strict=True):
         near = -side if driveway > y else side

@@ -1,4 +1,4 @@
-"""What lies on a road: painted lines, manhole covers, drains, patches. All thin slabs, at least 3 mm apart in height."""
+"""Things on a road: painted lines, manhole covers, drains, patches. All thin slabs, at least 3 mm apart in height."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from viewsphere.zoo.townscape.surfaces import cuboid
 
 PAINT_TOP, PATCH_TOP, IRON_TOP = 0.004, 0.003, 0.006
 EDGE = 2.72
-"""Middle of the edge lines."""
+"""x of the middle of the edge lines, metres."""
 
 IRON = metal("cast_iron", (0.27, 0.26, 0.25), 0.6)
 

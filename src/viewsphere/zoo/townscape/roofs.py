@@ -1,4 +1,4 @@
-"""Roofs over a rectangle about the origin, width along x, depth along y, eaves at z = 0; what stands on them."""
+"""Roofs over a rectangle about the origin, width along x, depth along y, eaves at z = 0; and chimneys."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ THICK = 0.16
 
 
 def gable(width: float, depth: float, slope: float, eaves: float, tiles: Material, trim: Material) -> list[Piece]:
-    """Ridge along x; slope: rise over run; eaves: how far it reaches beyond the walls in y, half of that and 0.1 m in x."""
+    """Ridge along x; slope: rise over run; eaves: how far the roof exceeds the walls in y; in x by half of that and 0.1 m."""
     run, rise = depth / 2 + eaves, slope * depth / 2
     foot = -slope * eaves
     half = width / 2 + 0.5 * eaves + 0.1

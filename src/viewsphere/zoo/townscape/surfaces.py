@@ -1,4 +1,4 @@
-"""What turns assembled triangles into textured, weathered surfaces: uv in metres and vertex colours."""
+"""From assembled triangles to textured, weathered surfaces: uv in metres and vertex colours."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from viewsphere.zoo.shapes.assembly import Piece, assemble
 from viewsphere.zoo.shapes.solids import Float, Solid
 
 LEVEL = 0.985
-"""Surfaces whose normal's z is beyond this take their uv from above."""
+"""z of the unit normal beyond which a surface takes its uv from above."""
 
 Tint = Callable[[Float], Float]
-"""From points (N, 3) to the factors (N,) or (N, 3) of the base colour, linear, 0..1."""
+"""Maps points (N, 3) to factors (N,) or (N, 3) of the base colour, linear, 0..1."""
 
 
 def finished(
@@ -42,7 +42,7 @@ def planar_uv(mesh: Mesh) -> np.ndarray[tuple[int, ...], np.dtype[np.float32]]:
 
 
 def mapped(mesh: Mesh, material: str, uv: Tint) -> Mesh:
-    """The mesh with other uv0 on one material: from points (N, 3) to metres (N, 2)."""
+    """The mesh with another uv0 on one material; `uv` maps points (N, 3) to metres (N, 2)."""
     index = [m.name for m in mesh.materials].index(material)
     own = np.unique(mesh.triangles[mesh.triangle_material == index])
     uv0 = planar_uv(mesh) if mesh.uv0 is None else mesh.uv0.copy()
@@ -79,7 +79,7 @@ def cuboid(low: ArrayLike, high: ArrayLike) -> Solid:
 
 
 def prism(profile: ArrayLike, low: float, high: float, axis: int = 2) -> Solid:
-    """A convex (N, 2) profile, counter-clockwise in the plane of the two axes after `axis` (1: z, x), drawn along it."""
+    """A convex (N, 2) profile, counter-clockwise in the plane of the two axes after `axis` (1: z, x), extruded along `axis`."""
     ring = np.asarray(profile, np.float64)
     n, i = len(ring), np.arange(len(ring))
     points = np.empty((2 * n, 3))

@@ -1,6 +1,6 @@
 """Tileable pictures of building materials, drawn by numpy: (N, N, 4) uint8 sRGB, row 0 on top, opaque.
 
-Every function takes the generator that its grain is drawn from and returns one tile; `textured` says how many metres it covers.
+Every function takes the generator that its grain is drawn from and returns one tile; `textured` sets a tile's size in metres.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ Float = NDArray[np.float64]
 
 
 def textured(name: str, image: int, metres: float, roughness: float = 0.9, tint: float = 1.0) -> Material:
-    """A material that repeats one image every so many metres, given uv in metres."""
+    """A material that repeats one image every `metres`, given uv in metres."""
     texture = Texture(image, scale=(1 / metres, 1 / metres))
     return Material(name, (tint, tint, tint, 1.0), base_color_texture=texture, roughness=roughness)
 
