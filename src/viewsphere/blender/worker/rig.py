@@ -25,7 +25,8 @@ RINGS, SIDES = 12, 48
 def make_rig(scene, poses):
     """Target, sphere and the scene's camera, and a marker for each of the poses.
 
-    Returns the camera's largest error over all poses: in metres, directions being compared at the distance of the target.
+    Returns the camera's largest error over all poses: in the scene's units, directions being compared at the distance of the
+    target.
     """
     scene.frame_start, scene.frame_end = 1, len(poses)
     camera = scene.camera

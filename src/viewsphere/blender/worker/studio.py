@@ -9,7 +9,8 @@ import numpy as np
 
 DARKEST = 0.6
 """Largest share of the light that shadows remove: Workbench darkens faces turned away from the sun as much, though the sun
-gives them nothing."""
+gives them nothing.
+"""
 
 TURNED = 0.05
 """Cosine of the angle between the sun and a surface's normal below which Workbench treats the surface as shadowed."""
