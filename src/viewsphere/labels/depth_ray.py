@@ -13,13 +13,13 @@ from viewsphere.labels._sight import Sight
 from viewsphere.model.sample import Sample
 
 TOLERANCE = 1e-6
-"""Share of the distance: both channels are rounded to float32."""
+"""Tolerance of the proof as a share of the distance: both channels are rounded to float32."""
 
 
 def compute(sight: Sight) -> NDArray[np.float32]:
     """Distance from the camera's centre to the seen point, (H, W) metres, infinite where nothing is seen.
 
-    It is the length of the pixel's ray times 1/s of `truth.visibility`: never negative, behind a fisheye neither.
+    The distance is the length of the pixel's ray divided by `truth.visibility`'s s: never negative, not even behind a fisheye.
     """
     length = np.linalg.norm(pixel_rays(sight.camera.intrinsics), axis=-1)
     out = np.full(length.shape, np.inf, np.float32)
@@ -29,7 +29,7 @@ def compute(sight: Sight) -> NDArray[np.float32]:
 
 
 def prove(sample: Sample, models: Models) -> Iterator[str]:
-    """It is depth times the length of the ray that goes 1 m along the camera's z axis."""
+    """The distance is depth times the length of the pixel's ray whose z is 1."""
     distance, depth = channel_of(sample, "depth_ray"), channel_of(sample, "depth")
     if distance is None:
         return
