@@ -50,11 +50,11 @@ PARTS_OF_COLOUR = (
 EMBREE = "Embree, one ray a pixel"
 STAGES = ("truth: raster", "truth: channels", "colour", "annotations", "files")
 Rival = tuple[str, Callable[[Camera], Any]]
-"""A name for the table, and what draws a frame."""
+"""A name for the table, and the function that draws a frame."""
 
 
 class Clock:
-    """CPU milliseconds of this process, all threads, by stage."""
+    """Collects the CPU milliseconds of this process, all threads, by stage."""
 
     def __init__(self) -> None:
         self.times: dict[str, list[float]] = {}
@@ -142,7 +142,7 @@ def timed(times: dict[str, float]) -> Iterator[None]:
 
 
 def measure(frames: int, antialias: int, folder: Path) -> tuple[Clock, int]:
-    """The reference frame stage by stage; also how many triangles it has."""
+    """Times of the reference frame, stage by stage, and the number of its triangles."""
     clock = Clock()
     stages = Stages()
     shot = next(plan(reference_recipe(frames, antialias, folder), shot_frames=frames).shots(stages.box))
@@ -166,7 +166,7 @@ def measure(frames: int, antialias: int, folder: Path) -> tuple[Clock, int]:
 
 
 def baked(engine: Engine, shot: Shot, mesh: Mesh) -> Stage:
-    """The stage with all that its first picture needs."""
+    """The shot's stage, with its first geometry built."""
     stage = engine.stage(shot, lambda spec: mesh)
     stage.at(0)
     return stage
@@ -182,20 +182,20 @@ def installed_rivals(geometry: Geometry) -> list[Rival]:
 
 
 def rival_shot(clock: Clock, name: str, draw: Callable[[Camera], Any], cameras: Sequence[Camera]) -> None:
-    """The same frames by a rival, right after ours: what slows the machine for seconds slows both."""
-    draw(cameras[0])  # its scene comes back into the caches, as ours has
+    """Time the same frames by a rival, right after ours: a load that slows the machine for seconds then slows both."""
+    draw(cameras[0])  # brings the rival's scene into the caches, where ours is
     for camera in cameras:
         clock(name, lambda camera=camera: draw(camera))
 
 
 def drawn(stage: Stage, instant: int, camera: Camera) -> tuple[Geometry, Visibility]:
-    """What there is at an instant, and what of it a camera sees."""
+    """The geometry of an instant, and the visibility for a camera."""
     geometry = stage.at(instant)
     return geometry, rasterize(geometry, camera)
 
 
 def one_frame(clock: Clock, shot: Shot, instant: int, stage: Stage, mesh: Mesh) -> Sample:
-    """One frame stage by stage, but for its files."""
+    """Time one frame stage by stage, without writing its files."""
     boxes = [box_vertices(*mesh.bounds)]
     now, camera = shot.instants[instant], shot.camera(instant)
     geometry, visibility = clock("truth: raster", lambda: drawn(stage, instant, camera))
@@ -207,7 +207,7 @@ def one_frame(clock: Clock, shot: Shot, instant: int, stage: Stage, mesh: Mesh) 
 
 
 def one_shot(clock: Clock, shot: Shot, instants: Sequence[int], stage: Stage, mesh: Mesh, store: Store) -> None:
-    """As many frames as a run has in a shot, stage by stage. Each has its share of what a shot writes beside them."""
+    """Time the frames of a shot as large as a run's, stage by stage; the shot's own files count in equal shares."""
     inside: list[float] = []
     files: list[float] = []
 
@@ -231,8 +231,8 @@ def one_shot(clock: Clock, shot: Shot, instants: Sequence[int], stage: Stage, me
 
 
 def rates(folder: Path, frames: int, turns: int = 3) -> dict[int, float]:
-    """Frames a second on the wall clock of one and of two warm workers: what thrice as many frames take longer, the least of
-    several turns each.
+    """Frames a second on the wall clock with one and with two warm workers: from the extra time that three times as many
+    frames take, each time being the least of several turns.
     """
     seconds: dict[tuple[int, int], float] = {}
     for turn in range(turns):
@@ -261,7 +261,7 @@ def main() -> None:
     options.add_argument("--endurance", type=int, metavar="FRAMES", help="tell the memory of one Blender over so many frames")
     options.add_argument("--json", type=Path, help="write the figures here too")
     args = options.parse_args()
-    keep_freed_memory()  # as workers do
+    keep_freed_memory()  # workers set the same
     print(f"{processor()}, {os.cpu_count()} cores, Python {platform.python_version()}")
     if args.scaling:
         from bench_scaling import scaling

@@ -1,9 +1,10 @@
 """Render a scene that `bench_cycles.py` described as BlenderProc would: PYTHON bench_blenderproc.py FOLDER.
 
-Run by a Python that has `bpy`. BlenderProc's documented settings (https://dlr-rm.github.io/BlenderProc/, `DefaultConfig`), but
-for the number of samples: at most three bounces, of them none glossy, adaptive sampling down to a noise of 0.01, no light tree,
-persistent data, all cores, Intel's denoiser as a compositor node with albedo and normals at the node's own settings, object
-indices from a pass of the same render; one process, poses as keyframes, an animation. Pictures are PNG, indices EXR.
+To be run by a Python that has `bpy`. The settings are BlenderProc's documented ones (https://dlr-rm.github.io/BlenderProc/,
+`DefaultConfig`), but for the number of samples: at most three bounces, of them none glossy, adaptive sampling down to a noise
+of 0.01, no light tree, persistent data, all cores, Intel's denoiser as a compositor node with albedo and normals at the node's
+own settings, object indices from a pass of the same render; one process, poses as keyframes, an animation. Pictures are PNG,
+indices EXR.
 
 Reads FOLDER/told.json; writes FOLDER/cpu.json: CPU seconds of this process, all threads, after each frame.
 """

@@ -1,8 +1,8 @@
 """The Cycles engine beside the same Blender driven as BlenderProc drives it: CPU seconds a frame, over all threads.
 
 The reference car (bench_scene.py) on a ground, and over a picture; 640x480, equal samples, both denoised, the same camera, sun
-and sky. Ours is the whole frame with its labels, in this process and in Blender's; theirs is Blender's alone, with object
-indices (bench_blenderproc.py). What is done once a scene is told apart.
+and sky. Our figures are those of whole frames with labels, in this process and in Blender's; BlenderProc's are those of
+Blender alone, with object indices (bench_blenderproc.py). Work done once a scene is reported separately.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from viewsphere.truth.visibility import rasterize
 HERE = Path(__file__).parent
 EQUAL = {"samples": 16, "bounces": 3}
 DIFFUSE = {"glossy_bounces": 0, "transmission_bounces": 0, "volume_bounces": 0}
-"""As BlenderProc's: light that was reflected does not go on. Ours lets it, unless told."""
+"""BlenderProc's setting: paths end after a glossy reflection or transmission. Our default lets them go on."""
 ENGINES: dict[str, dict[str, Any]] = {
     "equal": {"name": "cycles", **EQUAL},
     "equal, its bounces": {"name": "cycles", **EQUAL, "settings": DIFFUSE},
@@ -44,7 +44,7 @@ ENGINES: dict[str, dict[str, Any]] = {
 LABELS = ["depth", "instances", "normals"]
 Size = tuple[int, int]
 PER_SHOT = 25
-"""Frames of a shot where memory is measured."""
+"""Frames of each shot in the measurement of memory."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ class Costs:
 
 
 def recipe_of(folder: Path, engine: dict[str, Any], has_ground: bool, frames: int, size: Size = (640, 480)) -> Recipe:
-    """The car from all around."""
+    """A recipe of the car, seen from all around."""
     photo = {} if has_ground else {"background": {"image": str(folder / "photo.png")}}
     return Recipe(
         name="bench",
@@ -76,7 +76,7 @@ def recipe_of(folder: Path, engine: dict[str, Any], has_ground: bool, frames: in
 
 
 def write_scene(folder: Path) -> None:
-    """The car, and a picture to stand before."""
+    """Write the car, and a background picture."""
     write_reference(folder)
     save(folder / "photo.png", np.random.default_rng(0).integers(0, 255, (480, 640, 3), dtype=np.uint8))
 
@@ -88,12 +88,12 @@ def cpu_of(pid: int) -> float:
 
 
 def ours(shot: Shot, stages: Stages, pictures: Path | None = None) -> Costs:
-    """A shot's frames by the engine that it names."""
+    """Costs of a shot's frames, rendered by the engine that the shot names."""
     mesh = stages.model(shot.things[0].model)
     engine: Engine = plugins.load("engines", shot.engine)
 
     def spent() -> float:
-        """Here and in Blender."""
+        """CPU seconds so far, in this process and in Blender."""
         there = cpu_of(stage.keeper.process_for(stage.arrangement(0)).pid) if isinstance(stage, CyclesStage) else 0.0
         return time.process_time() + there
 
@@ -126,7 +126,7 @@ def save(path: Path, picture: Any) -> None:
 
 
 def told(shot: Shot, stages: Stages, folder: Path, threads: int) -> dict[str, Any]:
-    """What the other program needs: the same model, lights and cameras."""
+    """The scene for bench_blenderproc.py: the same model, lights and cameras."""
     thing, scene = shot.things[0], shot.scene
     mesh = stages.model(thing.model)
     cameras = [shot.camera(instant) for instant in range(len(shot.instants))]
@@ -185,7 +185,7 @@ def compare(frames: int, threads: int, folder: Path) -> dict[str, dict[str, Cost
 
 
 def table(found: dict[str, dict[str, Costs]]) -> list[str]:
-    """A line an engine and scene."""
+    """Lines of a table, one for each engine and scene."""
     lines = [
         "| scene | engine | CPU s a frame | of BlenderProc's | labels, ms | first frame |",
         "|---|---|---:|---:|---:|---:|",
@@ -201,7 +201,7 @@ def table(found: dict[str, dict[str, Costs]]) -> list[str]:
 
 
 def memory(frames: int, folder: Path) -> list[float]:
-    """Megabytes that one Blender holds after each frame of many, of two shots in turn."""
+    """Megabytes that one Blender holds after each of many frames, of two shots in turn."""
     engine = {"name": "cycles", "quality": "draft", "samples": 1, "denoise": "off", "replace_after": 0}
     stages = Stages()
     found: list[float] = []
@@ -223,7 +223,7 @@ def cycles(frames: int, threads: int) -> None:
 
 
 def endurance(frames: int) -> None:
-    """Print what Blender holds over many frames."""
+    """Print Blender's memory over many frames."""
     with tempfile.TemporaryDirectory() as name:
         write_scene(Path(name))
         held = memory(frames, Path(name))

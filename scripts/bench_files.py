@@ -2,7 +2,8 @@
 
     .venv/bin/python scripts/bench_files.py
 
-Noise (standard deviation 6 of 255) makes the second column of the pictures. Best of twenty, three views, 640 x 480.
+The second column of pictures is of the frames with added noise (standard deviation 6 of 255). Best of twenty, three views, 640
+x 480.
 """
 
 from __future__ import annotations
@@ -78,7 +79,7 @@ def by_numpy(array: Any) -> bytes:
 
 
 def main() -> None:
-    keep_freed_memory()  # as workers do
+    keep_freed_memory()  # workers set the same
     made, rng = frames(), np.random.default_rng(0)
     plain = [frame["rgb"] for frame in made]
     noisy = [np.clip(a + rng.normal(0, NOISE, a.shape), 0, 255).astype(np.uint8) for a in plain]

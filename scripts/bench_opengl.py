@@ -1,4 +1,4 @@
-"""A rival for the benchmark: OpenGL draws truth's labels, read back to memory. Without a GPU, that is Mesa's llvmpipe."""
+"""A rival for the benchmark: OpenGL draws truth's labels, read back to memory; without a GPU by Mesa's llvmpipe."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from viewsphere.model.camera import Camera
 from viewsphere.truth.geometry import Geometry
 
 NEAR = 0.1
-"""Metres from the camera before which nothing is drawn; there is no far plane."""
+"""Distance of the near plane, metres; there is no far plane."""
 
 VERTEX = """
 #version 330
@@ -45,12 +45,12 @@ void main() {
 
 
 class NoOpenGL(Exception):
-    """There is no OpenGL 3.3 here that draws without a window."""
+    """This machine has no OpenGL 3.3 that draws without a window."""
 
 
 def opengl(geometry: Geometry) -> tuple[str, Callable[[Camera], tuple[Any, Any]]]:
-    """The driver's name, and what draws a frame: (H, W, 2) float32, instance and triangle + 1 (exact to 2 ** 24), and
-    (H, W, 4) float32, normal and z-depth in metres; 0 where nothing is. The triangles stay with OpenGL.
+    """The driver's name, and the function that draws a frame: (H, W, 2) float32, instance and triangle + 1 (exact to 2 ** 24),
+    and (H, W, 4) float32, normal and z-depth in metres; 0 where nothing is seen. The triangles stay in OpenGL's memory.
     """
     import moderngl
 
@@ -84,18 +84,18 @@ def opengl(geometry: Geometry) -> tuple[str, Callable[[Camera], tuple[Any, Any]]
 
 
 def _context(moderngl: Any) -> Any:
-    """Without a window, drawing the nearest surface."""
+    """An OpenGL context without a window, with depth testing."""
     options = {"backend": "egl"} if sys.platform.startswith("linux") else {}
     try:
         context = moderngl.create_context(standalone=True, require=330, **options)
-    except Exception as error:  # as the libraries that it loads raise
+    except Exception as error:  # the libraries that moderngl loads raise errors of many kinds
         raise NoOpenGL(str(error)) from error
     context.enable_only(moderngl.DEPTH_TEST)
-    context.front_face = "cw"  # rows run downwards
+    context.front_face = "cw"  # the picture is drawn upside down, which reverses windings
     return context
 
 
 def clip_from_world(camera: Camera) -> Any:
-    """(4, 4): OpenGL's clip coordinates, w the z-depth, the picture's top row first in memory."""
+    """Matrix (4, 4) to OpenGL's clip coordinates: w is the z-depth, and the picture's top row comes first in memory."""
     x, y, w = camera.P
     return np.stack((2 * x / camera.width - w, 2 * y / camera.height - w, w - [0, 0, 0, 2 * NEAR], w))

@@ -35,7 +35,7 @@ TURNS = 3
 
 
 def rows_of(triangles: int) -> int:
-    """Rows of a ball of about so many triangles: it has four times their square."""
+    """Rows of a ball of about so many triangles: a ball of n rows has 4 n^2."""
     return max(round(np.sqrt(triangles / 4)), 3)
 
 
@@ -72,9 +72,9 @@ def ball(triangles: int, materials: int = 1, size: int = 1024) -> Mesh:
 
 
 def frame_cost(mesh: Mesh, side: tuple[int, int] = (640, 480), copies: int = 1) -> dict[str, float]:
-    """CPU milliseconds: the stage once, then truth and colour a frame; pixels not of objects are ground and sky.
+    """CPU milliseconds by name: the stage once, truth and colour a frame; pixels without objects show ground and sky.
 
-    A mesh that was staged before is staged faster: what of it is kept for the next shot is not made again.
+    Give a new mesh each time: a mesh that was staged before is staged faster, as parts of its stage are cached.
     """
     spec = ModelSpec(key="ball", source="ball", category="ball", category_id=1)
     across = int(np.ceil(np.sqrt(copies)))
@@ -109,7 +109,7 @@ def frame_cost(mesh: Mesh, side: tuple[int, int] = (640, 480), copies: int = 1) 
 
 
 def series() -> Iterator[tuple[str, list[tuple[float, Callable[[], dict[str, float]]]]]]:
-    """What grows: its values, and what measures the cost at each, of a new mesh every time."""
+    """For each series its name, and pairs of a value and a function that measures the cost there with a new mesh."""
     exact = [4 * rows_of(n) ** 2 for n in TRIANGLES]
     yield "triangles", [(n, lambda n=n: frame_cost(ball(n))) for n in exact]
     yield "pixels", [(n * n, lambda n=n: frame_cost(ball(75_000), (n, n))) for n in SIDES]
@@ -118,7 +118,7 @@ def series() -> Iterator[tuple[str, list[tuple[float, Callable[[], dict[str, flo
 
 
 def least(run: Callable[[], dict[str, float]]) -> dict[str, float]:
-    """The least of several turns: other work on the machine only adds."""
+    """The least costs of several turns: other work on the machine can only add to them."""
     turns = []
     for _ in range(TURNS):
         turns.append(run())

@@ -1,6 +1,6 @@
 """The benchmark's reference scene: a zoo car cut to about 75,000 triangles, a set of 1,024 x 1,024 textures, a sky with a sun.
 
-Everything is computed, so that the figures can be measured anywhere. Texture set: base colour, occlusion + roughness +
+The whole scene is computed, so that the figures can be measured anywhere. The texture set: base colour, occlusion + roughness +
 metallic in one image, and normals; on every material, mapped from the sides of a box, 0.5 m a tile.
 """
 

@@ -1,6 +1,7 @@
-"""Beside Blender's Cycles: five scenes with equal lights, rendered by both, shown side by side with FLIP and SSIM.
+"""Compares the raster engine with Blender's Cycles: five scenes with equal lights, rendered by both, shown side by side with
+FLIP and SSIM.
 
-Cycles is that of the Python that viewsphere finds (VIEWSPHERE_BLENDER_PYTHON, or the extra `blender`). Both pictures go
+Cycles runs in the Python that viewsphere finds (VIEWSPHERE_BLENDER_PYTHON, or the extra `blender`). Both pictures go
 through viewsphere's own view transform. FLIP: Andersson et al., *FLIP: A Difference Evaluator for Alternating Images* (2020),
 0 is equal, from the package `flip-evaluator`; SSIM: Wang et al. 2004, 1 is equal, from `scikit-image`.
 """
@@ -133,7 +134,7 @@ def shot_of(case: Case) -> tuple[Shot, dict[str, Mesh]]:
 
 
 def describe(case: Case, folder: Path) -> None:
-    """Write the scene as Cycles is to render it."""
+    """Write the scene for compare_cycles.py."""
     shot, meshes = shot_of(case)
     camera = shot.camera(0)
     models: list[dict[str, Any]] = []
@@ -156,7 +157,7 @@ def describe(case: Case, folder: Path) -> None:
 
 
 def picture(case: Case) -> np.ndarray[Any, Any]:
-    """viewsphere's."""
+    """viewsphere's picture of a case, (H, W, 3)."""
     shot, meshes = shot_of(case)
     engine: Engine = plugins.load("engines", "raster")
     stage = engine.stage(shot, lambda spec: meshes[spec.key])

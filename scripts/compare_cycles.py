@@ -1,7 +1,8 @@
 """Render scenes that `compare.py` described with Blender's Cycles: PYTHON compare_cycles.py FOLDER SAMPLES.
 
-Run by a Python that has `bpy`. Reads FOLDER/<name>.json and its GLB files; writes FOLDER/<name>_cycles.exr, scene-linear. Units
-of light: a sun's strength is irradiance; a point or spot lamp of P watts gives P / 4 pi at one metre, an area lamp P / pi.
+To be run by a Python that has `bpy`. Reads FOLDER/<name>.json and its GLB files; writes FOLDER/<name>_cycles.exr, scene-linear.
+Units of light: a sun's strength is irradiance; a point or spot lamp of P watts gives P / 4 pi at one metre, an area lamp P /
+pi.
 """
 
 import json

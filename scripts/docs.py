@@ -51,7 +51,7 @@ def row(parameter: inspect.Parameter) -> tuple[str, str]:
 
 
 def choices(kind: Any) -> str:
-    """The values of an enumeration, wherever it hides in a type."""
+    """The values of the enumeration in a type, such as an optional or a list; empty for a type without one."""
     if inspect.isclass(kind) and issubclass(kind, Enum):
         return f" One of {', '.join(member.value for member in kind)}."
     return "".join(choices(inner) for inner in get_args(kind))
@@ -97,7 +97,7 @@ def recipe_page() -> str:
 
 
 def fields_table(entries: dict[str, Any], named: list[str]) -> str:
-    """Fields of one entry, or of several: `point=PointEntry, spot=SpotEntry`; one that not all have says whose it is."""
+    """Fields of one entry, or of several: `point=PointEntry, spot=SpotEntry`; a field of only some entries names them."""
     kinds = {name: entries[entry or name] for name, _, entry in (one.partition("=") for one in named)}
     rows: dict[tuple[str, str, str], list[str]] = {}
     for kind, entry in kinds.items():
@@ -111,7 +111,7 @@ def fields_table(entries: dict[str, Any], named: list[str]) -> str:
 
 
 def value(default: Any) -> str:
-    """A default as a recipe would have it; empty for none."""
+    """A default as a recipe would write it; empty without a default."""
     if isinstance(default, list):
         return f"[{', '.join(map(value, default))}]"
     if isinstance(default, str):

@@ -1,10 +1,10 @@
-"""Compares labels of another revision with this one's, value by value, as `viewsphere.open` reads them.
+"""Compares the labels of another revision with this one's, value by value, as read by `viewsphere.open`.
 
     scripts/labels REVISION [--but FIELD ...] [--share 0.001]    # status 1 where anything else differs
 
 Both revisions render the five paper recipes (two models and a part of the poses each), a street with company and, where Blender
-is set up, an animated file, with all channels. Of each field that differs a line says in how many values (of channels: pixels)
-and by how much at most.
+is set up, an animated file, with all channels. For each field that differs, a line gives the number of differing values (of
+channels: pixels) and the largest difference.
 """
 
 from __future__ import annotations
@@ -126,13 +126,13 @@ def recipes(folder: Path) -> Iterator[tuple[str, Path, dict[str, Any]]]:
         yield path.stem, path, PAPER
     slider(folder)
     for name, recipe in (("street", STREET), ("animated", ANIMATED)):
-        path = folder / f"{name}.json"  # which is YAML, too
+        path = folder / f"{name}.json"  # JSON is YAML, too
         path.write_text(json.dumps(recipe))
         yield name, path, {}
 
 
 def environment(out: Path) -> dict[str, str]:
-    """Each revision has its own cache."""
+    """Environment variables for a revision's process: each revision has its own cache."""
     return {**os.environ, "VIEWSPHERE_CACHE": str(out.parent / f"cache-{out.name.partition('-')[0]}")}
 
 
@@ -145,14 +145,14 @@ def render(python: Path, source: Path, changes: dict[str, Any], out: Path) -> No
 
 @contextmanager
 def read(python: Path, out: Path) -> Iterator[Iterator[dict[str, Any]]]:
-    """What `values` says of each sample, by this Python's viewsphere."""
+    """Iterates the result of `values`, run by this Python's viewsphere, while the context lasts."""
     with subprocess.Popen([python, __file__, "--read", out], env=environment(out), stdout=subprocess.PIPE) as process:
         assert process.stdout is not None
         yield iter(partial(pickle.load, process.stdout), None)
 
 
 def values(out: Path) -> Iterator[dict[str, Any]]:
-    """Of each sample of a data set, by name: every value that is read, plain or an array."""
+    """For each sample of a data set all its values by name: plain ones and arrays."""
     for sample in vs.open(out):
         camera, pose = sample.camera, sample.pose.model_dump(mode="json")
         said: dict[str, Any] = {
@@ -172,7 +172,7 @@ def values(out: Path) -> Iterator[dict[str, Any]]:
 
 
 def plain(value: Any) -> Any:
-    """The value without classes, which differ between revisions."""
+    """The value as plain data, without classes: these differ between revisions."""
     return dataclasses.asdict(value) if dataclasses.is_dataclass(value) else value  # type: ignore[arg-type]
 
 
@@ -185,7 +185,7 @@ class Tally:
     largest: float = 0.0
 
     def add(self, old: Any, new: Any) -> None:
-        """Count a value; of a picture its pixels."""
+        """Count one value, or all pixels of a picture."""
         if not (isinstance(old, np.ndarray) and isinstance(new, np.ndarray) and old.shape == new.shape):
             self.count += 1
             self.differing += type(old) is not type(new) or old != new
@@ -200,13 +200,13 @@ class Tally:
 
 
 def field_of(name: str) -> str:
-    """`object 3 box2d` is counted as `object box2d`."""
+    """The field that a value is counted for: `object box2d` for `object 3 box2d`."""
     words = name.split(" ", 2)
     return f"object {words[2]}" if words[0] == "object" and len(words) == 3 else name
 
 
 def tallies(old: Iterator[dict[str, Any]], new: Iterator[dict[str, Any]]) -> dict[str, Tally]:
-    """Of every field."""
+    """The tally of every field over all samples."""
     found: defaultdict[str, Tally] = defaultdict(Tally)
     for before, after in zip_longest(old, new, fillvalue={}):
         for name in before.keys() | after.keys():
@@ -215,7 +215,7 @@ def tallies(old: Iterator[dict[str, Any]], new: Iterator[dict[str, Any]]) -> dic
 
 
 def compare(folder: Path, old: Path, share: float) -> set[str]:
-    """The fields that differ in any recipe, channels in more than this share of their pixels; all are told on the way."""
+    """The fields that differ in any recipe, channels in more than this share of their pixels; every difference is printed."""
     found: set[str] = set()
     for name, path, changes in recipes(folder):
         if name == "animated" and not has_blender():

@@ -4,7 +4,7 @@
 
 Digests of truth over random scenes (`tests/truth/truth_digest.py`) have to be equal everywhere; then the tests of truth and of
 kernels run on the oldest release without the quicker compiler. Releases that are not installed come into `.venv/numba`. The
-table tells the CPU seconds that compiling took, and those of drawing the scenes.
+table gives the CPU seconds of compiling, and those of drawing the scenes.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ def installed(release: str) -> Path | None:
 
 
 def environment(cache: Path, release: str, stock: bool) -> dict[str, str]:
-    """For a process with this numba, whose kernels are kept in a folder of its own."""
+    """Environment variables for a process with this numba, which keeps compiled kernels in a separate folder."""
     folder = installed(release)
     path = {} if folder is None else {"PYTHONPATH": str(folder)}
     place = cache / f"{release} {'stock' if stock else 'quicker'}"
@@ -50,7 +50,7 @@ def environment(cache: Path, release: str, stock: bool) -> dict[str, str]:
 
 
 def measured(cache: Path, build: tuple[str, bool]) -> dict[str, Any]:
-    """What `truth_digest.py` says on this release, without the quicker compiler where that is True."""
+    """The output of `truth_digest.py` for a build: a release, and whether it runs without the quicker compiler."""
     command = [sys.executable, str(DIGESTS)]
     said = json.loads(subprocess.run(command, env=environment(cache, *build), check=True, capture_output=True).stdout)
     if not said["numba"].startswith(f"{build[0]}.") or said["stock"] != build[1]:
@@ -59,7 +59,7 @@ def measured(cache: Path, build: tuple[str, bool]) -> dict[str, Any]:
 
 
 def table(found: Iterable[dict[str, Any]]) -> list[str]:
-    """A line a build."""
+    """Lines of a table, one for each build."""
     lines = ["| numba | compiler | compiling, CPU s | drawing, CPU s | visibility | samples |", "|---|---|---:|---:|---|---|"]
     for said in found:
         name, compiling = "stock" if said["stock"] else "quicker", said["first"] - said["again"]

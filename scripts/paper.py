@@ -47,7 +47,7 @@ Picture = Any  # (H, W, 3) uint8
 
 @dataclass(frozen=True)
 class Pick:
-    """A frame of a recipe: number of its model, and the pose nearest to this one."""
+    """A frame of a recipe: its model's number, and a viewpoint; the recipe's nearest viewpoint is taken."""
 
     model: int
     azimuth: float
@@ -60,7 +60,7 @@ def recipe(name: str, changes: dict[str, Any] | None = None) -> Recipe:
 
 
 def frames(made_of: Recipe, picks: Sequence[Pick]) -> list[Sample]:
-    """The frames of a recipe that are asked for, rendered in memory."""
+    """The picked frames of a recipe, rendered in memory."""
     planned, stages = prepare(made_of), Stages()
     views = [planned.pose_list[i] for i in range(planned.poses)]
     table = np.array([(v.azimuth_deg, v.elevation_deg, v.distance) for v in views])
@@ -82,7 +82,7 @@ def save(name: str, picture: Picture) -> None:
 
 
 def grid(tiles: Sequence[Picture], columns: int, width: int = WIDTH) -> Picture:
-    """Tiles of one shape, made smaller to fill a page's width."""
+    """A grid of tiles of one shape, shrunk to a page's width."""
     each = (width - (columns - 1) * GAP) // columns
     height = round(each * tiles[0].shape[0] / tiles[0].shape[1])
     rows = -(-len(tiles) // columns)
@@ -149,11 +149,11 @@ def hairdryer() -> None:
                         Pick(4, 60, 10, 2), Pick(5, 160, 10, 2), Pick(0, 100, 30, 3), Pick(3, 20, 10, 4)])  # fmt: skip
 
 
-# Fig. 1: all that there is of one car
+# Fig. 1: everything known of one car
 
 
 def fig1() -> None:
-    """As in the paper: model and picture on the left, 3D box and sizes in the middle, depth, 2D box and mask on the right."""
+    """As in the paper: on the left model and picture, in the middle 3D box and sizes, on the right depth, 2D box and mask."""
     pick = Pick(4, 35, 20, 5)
     (sample,) = frames(recipe("car"), [pick])
     channels = ["rgb", "triangles", "normals_geometric"]
@@ -192,7 +192,7 @@ def box3d_picture(sample: Sample, o: ObjectAnnotation, size: int) -> Picture:
     centre = o.box3d_camera.mean(axis=0)
     for name, face in FACES.items():
         middle = o.box3d_camera[list(face)].mean(axis=0)
-        if middle @ (middle - centre) < 0:  # it looks at the camera
+        if middle @ (middle - centre) < 0:  # the triangle faces the camera
             pen.polygon([points[i] for i in face], fill=(*FACE_COLORS[name], 70))
             x, y = np.mean([points[i] for i in face], axis=0)
             pen.text((x, y), name, fill=(255, 255, 255), font=large, anchor="mm", stroke_width=2, stroke_fill=INK)
@@ -206,14 +206,14 @@ def box3d_picture(sample: Sample, o: ObjectAnnotation, size: int) -> Picture:
 
 
 def colored(values: Any) -> Picture:
-    """0 to 1 as colours, dark to light."""
+    """Values in 0..1 as colours, dark to light."""
     at = np.clip(values, 0, 1) * (len(VIRIDIS) - 1)
     channels = [np.interp(at, range(len(VIRIDIS)), [c[i] for c in VIRIDIS]) for i in range(3)]
     return np.stack(channels, axis=-1).round().astype(np.uint8)
 
 
 def depth_picture(sample: Sample, size: int) -> Picture:
-    """Near is light; below it, the scale."""
+    """Depth as a picture, near being light, with a scale below."""
     depth = np.asarray(sample.depth)
     near, far = np.floor(depth.min() * 2) / 2, np.ceil(np.percentile(depth[np.isfinite(depth)], 90) * 2) / 2
     picture = colored(1 - (depth - near) / (far - near))
@@ -257,7 +257,7 @@ def mask_picture(sample: Sample, o: ObjectAnnotation, size: int) -> Picture:
 
 
 def facts(sample: Sample, o: ObjectAnnotation, size: int) -> Picture:
-    """The numbers: sizes, pose, matrices."""
+    """A picture of the labels in numbers: sizes, pose, matrices."""
     assert o.real_size is not None
     rows = [("category", f"{o.category} ({o.supercategory}), model {o.key}")]
     rows += [("real size", "width {:.2f}, height {:.2f}, length {:.2f} m".format(*o.real_size))]
@@ -289,7 +289,7 @@ def facts(sample: Sample, o: ObjectAnnotation, size: int) -> Picture:
     return np.asarray(image)
 
 
-# Fig. 2: place models, choose poses, run
+# Fig. 2: place models, choose viewpoints, run
 
 
 def fig2() -> None:
@@ -307,7 +307,7 @@ def fig2() -> None:
 
 
 def part_picture(sample: Sample) -> Picture:
-    """Every part in a colour of its own."""
+    """The picture of the label `parts`, every part in its own colour."""
     parts = np.asarray(sample.parts)
     colors = np.random.default_rng(5).integers(60, 250, (int(parts.max()) + 1, 3)).astype(np.uint8)
     colors[0] = 30
@@ -317,7 +317,7 @@ def part_picture(sample: Sample) -> Picture:
 def pose_sphere(made_of: Recipe, size: int) -> Picture:
     """All cameras of a recipe as dots around its first model, seen from outside."""
     planned, stages = prepare(made_of), Stages()
-    spec = planned.model_specs[17].model_copy(update={"scale": 3.6})  # twice its length, to be seen among the cameras
+    spec = planned.model_specs[17].model_copy(update={"scale": 3.6})  # twice the car's length, to be visible among the cameras
     lens = Intrinsics(width=2 * size, height=2 * size, fx=3.0 * size, fy=3.0 * size, cx=size, cy=1.24 * size)
     pose = Viewpoint(index=0, azimuth_deg=30, elevation_deg=17, distance=24.5)
     x, y, z = stages.box(spec).mean(axis=0).tolist()
@@ -373,7 +373,7 @@ def fig3() -> None:
     save("paper_fig3.jpg", grid(tiles, 3, 3 * size[0] + 2 * GAP))
 
 
-# Places, company, planes
+# Places, distractors (company), billboards (planes)
 
 STREET = {
     "models[0].scale": "as_is",
@@ -385,7 +385,7 @@ STREET = {
 
 
 def street() -> None:
-    """Cars on the road of a neighbourhood, behind whatever stands there; below, what is labelled."""
+    """Cars on the road of a neighbourhood, partly hidden by its objects; below, the labels."""
     place = {"source": "zoo:neighbourhood"}
     samples = []
     for pick, scene in (
@@ -399,7 +399,7 @@ def street() -> None:
 
 
 def labelled(sample: Sample) -> Picture:
-    """Masks and boxes of the models, everything else that is labelled tinted; what is seen of the first."""
+    """Masks and boxes of the models, other labelled objects tinted; the title gives the models' visibility."""
     first = [o for o in sample.objects if o.category == sample.objects[0].category]
     grey = np.repeat(np.asarray(Image.fromarray(sample.rgb).convert("L"))[..., None], 3, axis=2)
     others = [o for o in sample.objects if o.category != first[0].category and o.area]
@@ -415,7 +415,7 @@ def labelled(sample: Sample) -> Picture:
 
 
 def chairs() -> None:
-    """Two or three chairs in one picture, and before planes with pictures."""
+    """Two or three chairs in one picture, and chairs before billboards."""
     plane = {"image": str(IMAGES / "zoo_neighbourhood.png"), "height": 1.3, "at": [0.1, 1.0, 10]}
     samples = []
     for pick, changes in (

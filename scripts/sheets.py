@@ -69,7 +69,7 @@ def scenes(size: float) -> tuple[Scene, ...]:
 
 
 def extra_scenes(hdri: Path | None, photo: Path | None) -> Iterator[Scene]:
-    """In the light of a picture; over a photograph."""
+    """Scenes in the light of an environment picture, and over a photograph, if given."""
     if hdri:
         yield Scene(sun=None, sky=Environment(file=str(hdri.resolve())), ground=CONCRETE)
     if photo:
@@ -78,7 +78,7 @@ def extra_scenes(hdri: Path | None, photo: Path | None) -> Iterator[Scene]:
 
 
 def models(files: Sequence[Path], families: Sequence[str]) -> Iterator[tuple[str, Mesh]]:
-    """Name and mesh; what cannot be loaded is said and left out."""
+    """Name and mesh of each model; models that cannot be loaded are reported and left out."""
     for family in families:
         yield family, build(family, np.random.default_rng(5))
     for file in files:
@@ -90,7 +90,7 @@ def models(files: Sequence[Path], families: Sequence[str]) -> Iterator[tuple[str
 
 
 def tile(mesh: Mesh, scene: Scene, azimuth_deg: float = 35, elevation_deg: float = 20) -> Image.Image:
-    """The model in this light, all of it in the picture."""
+    """A picture of the whole model in this light."""
     size = float(np.linalg.norm(np.ptp(mesh.bounds, axis=0)))
     pose = Viewpoint(index=0, azimuth_deg=azimuth_deg, elevation_deg=elevation_deg, distance=2.2 * size)
     x, y, z = mesh.bounds.mean(axis=0).tolist()

@@ -1,4 +1,4 @@
-"""What the alpha of a base-colour texture is for, where the file's format has no word for it."""
+"""Finds the alpha mode of base-colour textures whose file format cannot state it."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ SOLID = 250
 """Texels with at least this alpha are taken as opaque."""
 
 SLIGHT_SHARE = 0.001
-"""A material that shows at most this share of texels that are not solid is opaque: specks, not a shape."""
+"""A material of whose visible texels at most this share is not solid is opaque: specks are no shape."""
 
 BINARY_SHARE = 0.02
-"""A material that shows at most this share of texels neither clear nor solid is a cut-out (MASK)."""
+"""A material of whose visible texels at most this share is neither clear nor solid is a cut-out (MASK)."""
 
 
 def with_alpha_modes(pieces: Sequence[Piece], materials: Sequence[Material], images: Sequence[Image]) -> list[Material]:
-    """The materials, those opaque so far with the alpha mode that the texels their triangles show ask for.
+    """The materials; opaque ones get the alpha mode that suits the texels visible on their triangles.
 
-    What an atlas holds between its islands is not shown and does not count, nor do texels on the rim of an
-    island, where its edge and the picture's seldom agree to the texel, unless all lie there. A texture that
-    is clear all over is an exporter's slip.
+    Texels between the islands of an atlas are not visible and do not count. Texels on the rim of an island do not count
+    either, unless all lie there: the edges of island and picture seldom agree to the texel. A texture that is clear all over
+    counts as opaque: an exporter's mistake.
     """
     return [
         material if material.alpha_mode != "OPAQUE" else replace(material, alpha_mode=_mode(index, material, pieces, images))
@@ -56,8 +56,8 @@ def shown_texels(texture: Texture, uv: Float, shape: tuple[int, ...]) -> NDArray
     """Texels (H, W) of a picture of this shape that triangles with corners `uv` (T, 3, 2) show: those whose
     centre lies in a triangle, and each triangle's own centre.
 
-    Of a triangle wider than the picture, or beyond the edge of a clamped one, its whole box counts. The
-    texture's offset and scale apply; it must not be turned or mirrored.
+    Of a triangle wider than the picture, or beyond the edge of a clamped picture, the whole bounding box counts. The
+    texture's offset and scale apply; the texture must not be rotated or mirrored.
     """
     from viewsphere.assets.kernels_coverage import add_triangles
 
@@ -82,7 +82,7 @@ def shown_texels(texture: Texture, uv: Float, shape: tuple[int, ...]) -> NDArray
 
 
 def _without_rim(texels: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """The texels whose four neighbours are among them, or all when there are none."""
+    """The texels whose four neighbours are also in the set; all texels if no such texel exists."""
     inner = texels.copy()
     for axis in (0, 1):
         inner &= np.roll(texels, 1, axis) & np.roll(texels, -1, axis)

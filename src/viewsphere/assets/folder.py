@@ -1,4 +1,4 @@
-"""The one way a reader opens files: none leaves the model's folder unasked, and each is remembered."""
+"""The only way in which readers open files: none outside of the model's folder unless allowed, and each is recorded."""
 
 from __future__ import annotations
 
@@ -22,23 +22,22 @@ from viewsphere.assets.mesh import Image
 from viewsphere.errors import ModelError
 
 SHARPEST = 4096
-"""Longest side, in texels, of what is kept of a texture: five of 8,192 would take a worker more than a gigabyte."""
+"""Longest side, in texels, that textures are reduced to: five of 8,192 would take a worker more than a gigabyte."""
 
 IMAGE_FORMATS = ("PNG", "JPEG", "WEBP", "BMP", "GIF", "TIFF", "TGA", "DDS", "PPM")
 
 
 class UnreadableError(Exception):
-    """A file that the model names and that cannot be used; the message says why."""
+    """A file named by the model cannot be used; the message says why."""
 
 
 @dataclass(eq=False)
 class ModelFolder:
     """The folder of one model file while it is read.
 
-    `inside` is what of the file is meant (`inside.split_source`); `shown` are objects of it that count though renders do not
-    show them; `files` are all files read or looked for, the model itself
-    first; `warnings` what had to be left out, each naming the model's file; `images` the textures decoded so far, in order of
-    first use.
+    `inside` is the part of the file that is read (`inside.split_source`); `shown` are objects of the file that count though
+    renders do not show them; `files` are all files read or looked for, the model itself first; `warnings` say what had to be
+    left out, each with the model's file name; `images` are the textures decoded so far, in order of first use.
     """
 
     model: Path
@@ -53,22 +52,22 @@ class ModelFolder:
     _indices: dict[str, int | None] = field(default_factory=dict[str, "int | None"])
 
     def copy(self) -> ModelFolder:
-        """One that goes on from here, without images."""
+        """A copy with the files and warnings so far, but without images; both can go on independently."""
         return replace(self, files=[*self.files], warnings=[*self.warnings], images=[], _said={*self._said}, _indices={})
 
     def warn(self, message: str) -> None:
-        """Add a warning, once, with the model's name before it."""
+        """Add a warning that begins with the model's file name, unless the same one was added before."""
         line = f"{self.model.name}: {message}"
         if line not in self._said:
             self._said.add(line)
             self.warnings.append(line)
 
     def error(self, message: str) -> ModelError:
-        """The error that says this of the model's file."""
+        """A ModelError with this message, which begins with the model's path."""
         return ModelError(f"{self.model}: {message}")
 
     def check(self, limit: str, found: int, what: str) -> None:
-        """Raise ModelError when there are more of something than the limit of this name allows."""
+        """Raise ModelError when `found`, the number of `what`, exceeds the value of the named `limit`."""
         most: int = getattr(limits, limit)
         if found > most:
             raise self.error(f"expected at most {most:,} {what} (limit {limit}), found {found:,}; simplify the model")
@@ -93,9 +92,8 @@ class ModelFolder:
     def read(self, reference: str, what: str = "file") -> bytes:
         """Bytes of a file that the model names, or of a data: URI.
 
-        Raises UnreadableError when there is none, or when it lies outside the model's folder and the folder
-        is confined. A path that leads nowhere (or outside) but whose last part lies beside the model is read
-        from there, with a warning.
+        Raises UnreadableError when the file is missing, or lies outside the model's folder while the folder is confined. If a
+        path leads nowhere (or outside) but a file of the same name lies beside the model, that file is read, with a warning.
         """
         if reference.startswith("data:"):
             return _data_uri(reference)
@@ -132,7 +130,7 @@ class ModelFolder:
         )
 
     def _existing(self, path: Path) -> Path | None:
-        """This file, or the one beside it whose name differs in case only; both are remembered."""
+        """The file, or else one beside it whose name differs only in case; None if neither exists. Both are recorded."""
         try:
             self.remember(path)
             if path.is_file():
@@ -158,7 +156,7 @@ class ModelFolder:
         """Index in `images` of the texture `key` (a path or data: URI, or any name when `data` holds its
         bytes).
 
-        None, with a warning, when it cannot be used: the material's factors stand alone then.
+        None, with a warning, when the picture cannot be used: the material then has its factors without the texture.
         """
         if key not in self._indices:
             index = None
@@ -182,14 +180,14 @@ class ModelFolder:
         return small
 
     def derived(self, key: str, make: Callable[[], Image]) -> int:
-        """Index in `images` of an image made from others, made once for each key."""
+        """Index in `images` of an image computed from others by `make`, which is called once for each key."""
         index = self._indices.get(key)
         if index is None:
             index = self._indices[key] = self.add_image(make())
         return index
 
     def add_image(self, image: Image) -> int:
-        """Keep an image; its index."""
+        """Append an image to `images`; returns its index."""
         self.images.append(image)
         self.check("MAX_TEXTURES", len(self.images), "textures")
         pixels = sum(known.pixels[..., 0].size for known in self.images)
@@ -200,7 +198,7 @@ class ModelFolder:
 def decode_image(data: bytes, where: str, *, upright: bool = False) -> NDArray[np.uint8]:
     """Decode a texture to (H, W, 4) uint8; 16-bit channels keep their upper byte.
 
-    With `upright` a photograph is turned as its camera says (EXIF orientation), which no texture is. Raises
+    With `upright` a photograph is rotated by its EXIF orientation, which does not apply to textures. Raises
     UnreadableError, beginning with `where`: no image, a damaged one, or one beyond `limits`.
     """
     from PIL import Image as Pillow

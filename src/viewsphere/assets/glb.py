@@ -129,7 +129,7 @@ class _Writer:
             "metallicFactor": m.metallic,
             "roughnessFactor": m.roughness,
         }
-        # glTF bounds emissiveFactor by 1; what is brighter goes to the extension.
+        # glTF limits emissiveFactor to 1; the excess goes to the extension KHR_materials_emissive_strength.
         strength = max(1.0, *m.emissive)
         entry: Object = {
             "name": m.name,

@@ -1,4 +1,4 @@
-"""What is inside of a .blend file: paths as Blender writes them, `street.blend/Collection/Cars`."""
+"""Paths to a part of a .blend file, as Blender writes them: `street.blend/Collection/Cars`."""
 
 from __future__ import annotations
 
@@ -11,9 +11,10 @@ KINDS = ("Object", "Collection")
 
 
 def split_source(path: Path) -> tuple[Path, tuple[str, ...]]:
-    """The file, and what of it is meant: nothing for all of it, else `("Object", name)` or `("Collection", name)`.
+    """The file, and the part of it that the path names: () for the whole file, else `("Object", name)` or `("Collection",
+    name)`.
 
-    Raises ModelError for a path into a .blend file that is neither.
+    Raises ModelError for a path into a .blend file that names neither an object nor a collection.
     """
     for file in path.parents:
         if file.suffix.lower() == BLEND and not file.is_dir():

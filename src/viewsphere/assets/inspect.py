@@ -1,4 +1,4 @@
-"""What is in a model file, and what it becomes."""
+"""Reports a model file's contents, and the model after normalisation."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from viewsphere.model.model_spec import Axis, ModelSpec, Size
 
 @dataclass(frozen=True)
 class ModelReport:
-    """A model after normalisation, and how it was read.
+    """A model after normalisation, and facts about its file.
 
     `size` (width, height, length) and `bounds` (lowest and highest corner) are metres in object axes;
     `raw_size` is the file's own, along its own x, y and z. `parts` are names and triangle counts; `materials`

@@ -19,8 +19,8 @@ _ID = re.compile(rb"\b(?:object)?id\s*=\s*[\"']([^\"']+)[\"']")
 
 
 def count_instances(references: Mapping[str, Sequence[str]], root: str) -> tuple[int | None, int]:
-    """Number of objects that `root` stands for, itself included, when every reference is followed, and how many of
-    them lie within one another at most.
+    """Number of objects that `root` expands to, itself included, when every reference is followed, and the depth of the
+    deepest nesting.
 
     The number is None when an object is part of itself, and at most `ENOUGH`.
     """
@@ -79,7 +79,7 @@ def dae_references(data: bytes) -> dict[str, list[str]]:
 
 
 def threemf_references(archive: zipfile.ZipFile) -> dict[str, list[str]]:
-    """For each object of a 3MF file the objects it is made of; what is built is `""`."""
+    """For each object of a 3MF file its component objects; the build, which lists the printed objects, is `""`."""
     references: dict[str, list[str]] = {"": []}
     for entry in archive.namelist():
         if not entry.lower().endswith(".model"):

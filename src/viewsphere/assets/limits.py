@@ -1,6 +1,6 @@
-"""How much a model file or a picture may ask for: no file makes the reader run out of memory or time.
+"""Limits for model files and pictures, so that no file makes the reader run out of memory or time.
 
-An error that a limit causes gives its name, its value and what was found.
+The error message for an exceeded limit gives the limit's name and value, and the value found.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ MAX_READ_BYTES = 4 << 30
 """Address space of the process that reads one file; `$VIEWSPHERE_MAX_READ_BYTES` overrides it."""
 
 MAX_FILE_BYTES = 4 << 30
-MAX_FILES = 10_000  # that one model names: textures, buffers, material libraries
+MAX_FILES = 10_000  # named by one model: textures, buffers, material libraries
 MAX_TRIANGLES = 20_000_000
-MAX_BLENDER_TRIANGLES = 10_000_000  # that Blender may make of a file
+MAX_BLENDER_TRIANGLES = 10_000_000  # that Blender may evaluate from one file
 MAX_VERTICES = 3 * MAX_TRIANGLES
 MAX_PICTURE_PIXELS = 100_000_000
 """Pixels of any one picture: a texture, the ground's, a plane's, a background's, a sky's; 400 MB once it is RGBA."""
@@ -35,11 +35,11 @@ MAX_SIZE = 1e5
 
 
 FROM_OUTSIDE = ("SIGKILL", "SIGTERM", "SIGINT", "SIGHUP", "SIGQUIT")
-"""Signals by which others end a process: nothing that a file does makes a reader send them."""
+"""Signals that come from other processes or the system: no damaged file makes a reader end by one of them."""
 
 
 def too_slow(seconds: float) -> str:
-    """Of a reader that took longer than it may."""
+    """The message for a reader that exceeded its time limit."""
     return (
         f"expected to be read within {seconds:g} s (limit MAX_READ_SECONDS), stopped then; simplify the model, or "
         "set VIEWSPHERE_MAX_READ_SECONDS higher"
@@ -47,7 +47,7 @@ def too_slow(seconds: float) -> str:
 
 
 def ended(reader: str, how: str, memory: int) -> str:
-    """Of a reader that ended without an answer: who it was, and the signal that ended it or whatever else is known."""
+    """The message for a reader process that ended without an answer; `how`: the signal that ended it, or its exit status."""
     if how in FROM_OUTSIDE:
         return (
             f"{reader} ended unexpectedly: it was killed ({how}), perhaps because memory ran out; the file may be whole: "
@@ -58,7 +58,7 @@ def ended(reader: str, how: str, memory: int) -> str:
 
 
 def from_environment(name: str) -> float:
-    """The limit of this name, or what `$VIEWSPHERE_<name>` says instead; UserError when that is no positive number."""
+    """The value of `$VIEWSPHERE_<name>`, else of the named limit; UserError when the variable is no positive number."""
     text = os.environ.get(f"VIEWSPHERE_{name}", "")
     try:
         value = float(text or globals()[name])

@@ -15,7 +15,7 @@ from viewsphere.errors import ModelError
 
 SUFFIXES = ("3mf", "dae", "glb", "gltf", "obj", "off", "ply", "stl")
 BLENDER_SUFFIXES = ("abc", "blend", "fbx", "usd", "usda", "usdc", "usdz")
-"""What only Blender reads."""
+"""Suffixes of formats that only Blender reads."""
 ANIMATED_SUFFIXES = (*BLENDER_SUFFIXES, "glb", "gltf")
 PICTURE_SUFFIXES = ("bmp", "jpeg", "jpg", "png", "tif", "tiff", "webp")
 
@@ -38,11 +38,12 @@ KNOWN = {
 """Model formats that are not read, by suffix."""
 
 IN_BLENDER = {"x3d", "wrl"}
-"""Those of them that Blender opens with an extension."""
+"""Formats of `KNOWN` that Blender opens with an extension."""
 
 
 def load_model(path: Path, *, confined: bool = True, shown: tuple[str, ...] = ()) -> tuple[Mesh, FileFacts]:
-    """Read a model file, in this process: its triangles in its own axes and unit, and what it says of these.
+    """Read a model file, in this process: its triangles in the file's own axes and unit, and what the file says of axes and
+    unit.
 
     | suffix    | up            | front        | unit                  | source                              |
     |-----------|---------------|--------------|-----------------------|-------------------------------------|
@@ -73,7 +74,7 @@ def load_model(path: Path, *, confined: bool = True, shown: tuple[str, ...] = ()
 def load_frames(
     path: Path, frames: Sequence[int], *, confined: bool = True, shown: tuple[str, ...] = (), clip: str | None = None
 ) -> Iterator[tuple[Mesh, FileFacts]]:
-    """A model file as it is at its first frame, then as at each of these, which ascend, by Blender, which opens it once.
+    """A model file's meshes at its first frame, then at each of the ascending `frames`; Blender opens the file once.
 
     `clip` names the animation that is played, where the file has several.
 
@@ -88,7 +89,7 @@ def load_frames(
 
 
 def check_animated(path: Path) -> str:
-    """The suffix of a file whose kind may hold an animation that is read; ModelError for another."""
+    """The suffix of a file whose format may hold a readable animation; ModelError for other formats."""
     suffix = check_source(path)
     if suffix in ANIMATED_SUFFIXES:
         return suffix
@@ -128,7 +129,7 @@ def _read(folder: ModelFolder, suffix: str) -> tuple[Mesh, FileFacts]:
 
 
 def _read_gltf(folder: ModelFolder) -> tuple[Mesh, FileFacts]:
-    """A glTF file; by Blender where it is compressed in a way that only Blender reads, and there is one."""
+    """A glTF file's mesh; read by Blender, where one is installed, if the file's compression needs Blender."""
     from viewsphere.assets.gltf import read_gltf
     from viewsphere.assets.gltf.document import ForBlenderError
 

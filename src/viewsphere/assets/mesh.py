@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 Wrap = Literal["repeat", "clamp", "mirror"]
 WRAPS: tuple[Wrap, ...] = get_args(Wrap)
-"""Wrap modes in the order of the numbers by which kernels know them."""
+"""Wrap modes; kernels refer to a mode by its index here."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,10 +60,10 @@ class Material:
     base_color_texture: Texture | None = None
     metallic: float = 0.0
     roughness: float = 0.8
-    metallic_roughness_texture: Texture | None = None  # G roughness, B metallic
+    metallic_roughness_texture: Texture | None = None  # green: roughness, blue: metallic
     normal_texture: Texture | None = None
     normal_scale: float = 1.0
-    occlusion_texture: Texture | None = None  # R
+    occlusion_texture: Texture | None = None  # red
     occlusion_strength: float = 1.0
     emissive: tuple[float, float, float] = (0.0, 0.0, 0.0)
     emissive_texture: Texture | None = None

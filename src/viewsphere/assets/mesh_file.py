@@ -32,7 +32,7 @@ def write_mesh(path: Path, mesh: Mesh, facts: FileFacts) -> None:
 
 
 def read_mesh(path: Path, source: Path) -> tuple[Mesh, FileFacts]:
-    """What `write_mesh` wrote of the model `source`, bit for bit; raises whatever numpy or json do for a damaged file."""
+    """The mesh of the model `source` as `write_mesh` stored it, bit for bit; a damaged file raises numpy's or json's errors."""
     with np.load(path, allow_pickle=False) as stored:
         header: dict[str, Any] = json.loads(stored["header"].tobytes())
         arrays = {name: stored[name] for name in ARRAYS if name in stored}

@@ -21,7 +21,7 @@ OPTION_ARGUMENTS = {"-mm": 2, **dict.fromkeys(SCALAR_OPTIONS, 1)}
 VECTOR_OPTIONS = ("-o", "-s", "-t")
 
 HEIGHT = 0.01
-"""Of a height map from black to white, in widths of its picture."""
+"""Rise of a height map from black to white for `-bm 1`, in widths of its picture."""
 
 Pixels = NDArray[np.uint8]
 
@@ -132,7 +132,7 @@ class _Builder:
         return float((2.0 / (max(self.number("ns", 0.0), 0.0) + 2.0)) ** 0.25)
 
     def specular(self) -> float:
-        """Ks of 0.5 is taken as a dielectric's 4 %: it is what exporters of PBR materials write."""
+        """A Ks of 0.5 counts as a dielectric's 4 %, because exporters of PBR materials write 0.5."""
         if "ks" not in self.block or "pr" in self.block or "pm" in self.block:
             return 1.0
         return min(1.0, 2.0 * max(self.color("ks", (0.5, 0.5, 0.5))))
@@ -179,7 +179,7 @@ class _Builder:
         return source.texture(color)
 
     def metallic_roughness(self, rough_map: _Map | None, metal_map: _Map | None) -> Texture | None:
-        """Roughness in green and metallic in blue of one new image."""
+        """A new texture with roughness in its green and metallic in its blue channel."""
         rough, metal = self.image(rough_map), self.image(metal_map)
         source = rough_map if rough is not None else metal_map
         if source is None or (rough is None and metal is None):
@@ -206,7 +206,7 @@ class _Builder:
         return Image(f"{self.name} roughness and metallic", pixels)
 
     def bump(self, source: _Map | None) -> Texture | None:
-        """A bump map, heights turned into normals; none where all heights are one."""
+        """The normal map of a bump statement, heights turned into normals; None for a height map of a single height."""
         image = self.image(source)
         if source is None or image is None:
             return None

@@ -1,5 +1,5 @@
-"""Materials from expressions of Blender's nodes (`viewsphere.blender.worker.nodes`): constants stay factors, a picture alone
-stays as it is, and what is worked out of pictures becomes a new one.
+"""Materials from expressions of Blender's nodes (`viewsphere.blender.worker.nodes`): constants become factors, a picture used
+unchanged stays the texture, and an expression over pictures is baked into a new picture.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ Told = Mapping[str, Any]
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)
 FINE = 65_535
-"""Steps of linear light for which sRGB is worked out."""
+"""Steps of linear light in the table of sRGB values."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class Picture:
 
 @dataclass(eq=False)
 class Painter:
-    """Makes materials. `pictures` are those that expressions number, None where none of them does; warnings go to `folder`."""
+    """Makes materials. Expressions refer to `pictures` by index, None for a picture that none uses; warnings go to `folder`."""
 
     folder: ModelFolder
     pictures: Sequence[Picture | None]
@@ -51,7 +51,7 @@ class Painter:
 
 @dataclass(eq=False)
 class _Work:
-    """One material."""
+    """Makes one material from its expressions `told`."""
 
     painter: Painter
     told: Told
@@ -99,7 +99,7 @@ class _Work:
         return Material(base_color=(red, green, blue, 1.0), base_color_texture=self._baked("colour", color, alpha))
 
     def _plain_base(self, color: Any, alpha: Any) -> Texture | None:
-        """The colour's picture, where it is one as it stands, and its alpha is what hides."""
+        """The texture of the colour's picture, if colour and alpha are that picture unchanged, so that nothing is baked."""
         if not self._is_picture(color, srgb=True):
             return None
         clear = self._pixels(color)[..., 3].min() < 255
@@ -145,7 +145,7 @@ class _Work:
         }
 
     def _occlusion(self) -> dict[str, Any]:
-        """The texture, where a picture says how much light from all around arrives, and how far it counts."""
+        """The occlusion texture and its strength, where a picture gives the share of ambient light that arrives."""
         shade, strength = _faded(self.told["occlusion"])
         if not isinstance(self._usable(shade), dict):
             return {}
@@ -184,12 +184,12 @@ class _Work:
     # Textures.
 
     def _usable(self, told: Any) -> Any:
-        """The expression, or its value where it has no pictures that can be used."""
+        """The expression, or its constant value if it contains no usable picture."""
         leaves = [leaf for leaf in images_of(told) if self._index(leaf) is not None]
         return told if leaves else _plain(self.value(told))
 
     def _index(self, leaf: Told) -> int | None:
-        """The folder's image of a leaf; None where it or its texture coordinates are missing."""
+        """Index of a leaf's picture in the folder's images; None where the picture or its texture coordinates are missing."""
         has_uv = self.uvs[0] is not None and self._texcoord(leaf) is not None
         return self.painter.pictures[leaf["image"]].index if has_uv else None
 
@@ -211,11 +211,11 @@ class _Work:
         return self.painter.folder.images[index].pixels
 
     def _texture(self, leaf: Told, image: int | None = None) -> Texture:
-        """The texture that looks up `image`, by default the leaf's own, as the leaf does."""
+        """A texture with the leaf's coordinates and transform, of the image with index `image`, by default the leaf's own."""
         index, texcoord = self._index(leaf), self._texcoord(leaf)
         assert index is not None and texcoord is not None
         turn, (u, v), (x, y) = leaf["rotation"], leaf["scale"], leaf["offset"]
-        # Blender's v points up: 1 - v is turned the other way round another point.
+        # Blender's v points up, glTF's down: in 1 - v the rotation has the other sense and another centre.
         offset = float(x - v * np.sin(turn)), float(1 - y - v * np.cos(turn))
         return Texture(
             index if image is None else image,
@@ -229,7 +229,7 @@ class _Work:
         )
 
     def _baked(self, what: str, color: Any, alpha: Any, *, is_color: bool = True) -> Texture:
-        """A texture of what expressions come to: sRGB where it is colour."""
+        """A texture with the values of two expressions, colour and alpha; with `is_color` encoded as sRGB."""
         leaves = [leaf for told in (color, alpha) for leaf in images_of(told) if self._index(leaf) is not None]
         if any(_place(leaf) != _place(leaves[0]) for leaf in leaves):
             self.painter.folder.warn(
@@ -251,7 +251,7 @@ class _Work:
     # Values.
 
     def value(self, told: Any, size: tuple[int, int] | None = None) -> Float:
-        """What an expression comes to, linear: () or (3,), or (H, W) or (H, W, 3) where it has pictures."""
+        """The linear value of an expression: () or (3,); (H, W) or (H, W, 3) where it contains pictures."""
         if not isinstance(told, dict):
             return np.asarray(told, np.float32)
         told = cast("Told", told)
@@ -295,7 +295,7 @@ def _place(leaf: Told) -> Any:
 
 
 def _product(told: Any) -> tuple[Float, Any]:
-    """The constants of a product, (3,), and what else is in it."""
+    """The product of the constant factors, (3,), and the expression of the other factors."""
     constant, rest = np.ones(3, np.float32), cast("list[Any]", [])
     for factor in _factors(told):
         if isinstance(factor, dict):
@@ -308,7 +308,7 @@ def _product(told: Any) -> tuple[Float, Any]:
 
 
 def _factors(told: Any) -> list[Any]:
-    """What a product is of, products within it taken apart."""
+    """The factors of a product, with those of products within it."""
     if isinstance(told, dict) and cast("Told", told)["do"] == "multiply":
         return [factor for of in cast("Told", told)["of"] for factor in _factors(of)]
     return [told]
@@ -326,7 +326,7 @@ def _is_paint(told: Any) -> bool:
 
 
 def _without_paint(told: Any) -> Any:
-    """The expression with 1 for vertex colours: the mesh has them."""
+    """The expression with 1 for vertex colours: the mesh brings them."""
     if not isinstance(told, dict):
         return told
     told = cast("Told", told)
@@ -336,14 +336,14 @@ def _without_paint(told: Any) -> Any:
 
 
 def _channel(told: Any) -> tuple[int | None, Any]:
-    """A channel's number and what it is of."""
+    """The number of the channel that an expression takes, and the expression that it is taken of."""
     if isinstance(told, dict) and cast("Told", told)["do"] == "channel":
         return cast("Told", told)["which"], cast("Told", told)["of"][0]
     return None, told if isinstance(told, dict) else None
 
 
 def _faded(told: Any) -> tuple[Any, float]:
-    """An expression that is mixed with white, as glTF's importer does, without that, and its share; else itself and 1."""
+    """An expression without the mix with white that Blender's glTF importer adds, and its share; else itself and 1."""
     mixed = _inside(told, "grey")
     if isinstance(mixed, dict) and cast("Told", mixed)["do"] == "mix" and cast("Told", mixed)["how"] == "MIX":
         share, white, shade = cast("Told", mixed)["of"]
@@ -354,7 +354,7 @@ def _faded(told: Any) -> tuple[Any, float]:
 
 
 def _inside(told: Any, do: str) -> Any:
-    """What is in an expression of this kind; another one itself."""
+    """The operand of an expression of the kind `do`; any other expression itself."""
     return cast("Told", told)["of"][0] if isinstance(told, dict) and cast("Told", told)["do"] == do else told
 
 
@@ -380,11 +380,11 @@ def _srgb_bytes(light: Float) -> NDArray[np.uint8]:
     return table[np.rint(light * FINE).astype(np.uint16)]
 
 
-# The work of each kind of expression, on arrays whose last axis is the colours' where there are any.
+# One function for each kind of expression, on arrays whose last axis is the colour's if any operand is a colour.
 
 
 def _aligned(*values: Float) -> list[Float]:
-    """Values that broadcast: where one is a colour, numbers get an axis for it."""
+    """Values that broadcast against each other: if one is a colour, plain numbers get a colour axis."""
     is_color = [_is_color(v) for v in values]
     return [v[..., None] if any(is_color) and not c and v.ndim else v for v, c in zip(values, is_color, strict=True)]
 
@@ -469,7 +469,7 @@ def _contrast(_: Told, color: Float, bright: Float, contrast: Float) -> Float:
 
 
 def _hue(_: Told, color: Float, hue: Float, saturation: Float, value: Float, share: Float) -> Float:
-    """Blender's Hue/Saturation/Value: hue 0.5 leaves it as it is; constants of pictures are taken by their mean."""
+    """Blender's Hue/Saturation/Value: a hue of 0.5 changes nothing; settings given by pictures count by their mean."""
     turned = _from_hsv(_to_hsv(color) + np.array([float(hue.mean()) - 0.5, 0, 0], np.float32), saturation, value)
     return _mix({"how": "MIX"}, share, color, turned)
 

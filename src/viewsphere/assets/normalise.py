@@ -18,7 +18,7 @@ PROPORTION_TOLERANCE = 0.1
 def normalise(mesh: Mesh, facts: FileFacts, spec: ModelSpec, first: tuple[Mesh, FileFacts] | None = None) -> Mesh:
     """The mesh in object axes and metres: turned, scaled and centred as the model's settings say.
 
-    Axes: `spec.up` becomes +Z and `spec.forward` -Y, by an exact permutation and change of signs; unset ones
+    Axes: `spec.up` becomes +Z and `spec.forward` -Y, by an exact permutation and change of signs; unset axes
     are the file's. Scale: `as_is` keeps the file's unit (or `spec.unit` metres); `real_size` scales uniformly
     until the length (along Y) is the real one's: the model keeps its proportions, and a warning says when
     they differ from the real ones by more than 10 %; a number is the length in metres. Centring: `box` puts
@@ -26,8 +26,8 @@ def normalise(mesh: Mesh, facts: FileFacts, spec: ModelSpec, first: tuple[Mesh, 
     in x and y and its lowest point at z = 0; `as_is` keeps the file's own origin.
 
     Computed in float64, stored as float32; triangles come sorted by part and material, otherwise in the
-    file's order. `first`, what the file has at its first frame, is scaled and centred in the place of the mesh: what moves then
-    moves. Raises ModelError for parallel axes and for a result smaller or larger than `limits` allows.
+    file's order. `first`, the mesh and facts of an animation's first frame, sets scale and centre for all frames, so that
+    motion is kept. Raises ModelError for parallel axes and for a result smaller or larger than `limits` allows.
     """
     turn = rotation(spec.up or facts.up, spec.forward or facts.forward, str(facts.path))
     still, origin = (mesh, facts.origin) if first is None else (first[0], first[1].origin)
@@ -48,7 +48,7 @@ def normalise(mesh: Mesh, facts: FileFacts, spec: ModelSpec, first: tuple[Mesh, 
 
 
 def _placing(mesh: Mesh, turn: Float, facts: FileFacts, spec: ModelSpec) -> tuple[float, Float, tuple[str, ...]]:
-    """Metres in one unit of the file, what lands on the origin (3,) in turned metres, and warnings."""
+    """Metres in one unit of the file, the point (3,) that becomes the origin (metres, turned axes), and warnings."""
     low, high = np.sort(mesh.bounds @ turn.T, axis=0)
     factor, warnings = _factor(high - low, facts, spec)
     low, high = low * factor, high * factor

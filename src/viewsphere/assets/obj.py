@@ -1,4 +1,4 @@
-"""Wavefront OBJ: our own reader, because parts, several materials and smoothing groups matter here.
+"""Wavefront OBJ: our own reader, to keep parts, several materials and smoothing groups.
 
 http://www.martinreddy.net/gfx/3d/OBJ.spec; vertex colours as `v x y z r g b` (sRGB) by common use.
 """
@@ -26,9 +26,9 @@ NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
 def read_obj(folder: ModelFolder) -> tuple[Mesh, FileFacts]:
     """The file as one mesh: up +Y, front +Z, unit 1 (OBJ has no rule for either).
 
-    Parts are the objects (`o`) if there are several, else the groups (`g`). Without normals, smoothing groups
-    decide if the file has any, else creases. Curves, surfaces, lines and points are left out. Raises
-    ModelError.
+    Parts are the objects (`o`) if there are several, else the groups (`g`). If normals are missing, edges are
+    smoothed by the file's smoothing groups, or without groups by their angle. Curves, surfaces, lines and points are left out.
+    Raises ModelError.
     """
     source = _Source()
     source.read(statements(decode(folder.read_model())))
@@ -47,7 +47,7 @@ def read_obj(folder: ModelFolder) -> tuple[Mesh, FileFacts]:
 
 @dataclass(eq=False)
 class _Source:
-    """The file's statements, sorted by kind; faces hold indices into `materials`, `objects` and `groups`."""
+    """The file's statements by kind; faces hold indices into `materials`, `objects` and `groups`."""
 
     v: list[str] = field(default_factory=list[str])
     vt: list[str] = field(default_factory=list[str])
@@ -100,7 +100,7 @@ class _Source:
         self.face_smoothing.append(state["s"])
 
     def _absolute(self, token: str) -> str:
-        """A corner with relative indices (-1 is the last element so far) in absolute ones."""
+        """A face's corner with its relative indices (-1 is the last element so far) made absolute."""
         totals = (len(self.v), len(self.vt), len(self.vn))
         return "/".join(
             str(total + 1 + int(index)) if index.startswith("-") and index[1:].isdecimal() else index
@@ -147,19 +147,19 @@ def _whole(folder: ModelFolder, source: _Source) -> tuple[Piece, Int]:
 
 
 def _taken(values: Float, at: Int) -> Float | None:
-    """Rows at these indices, zero where the index is -1, None when all are."""
+    """Rows of the values at these indices, zero where the index is -1; None if all indices are -1."""
     if not len(values) or (at < 0).all():
         return None
     return np.where(at[:, None] < 0, 0.0, values[at])
 
 
 def _flipped(uv: Float | None) -> Float | None:
-    """OBJ's v runs upwards, glTF's downwards."""
+    """Texture coordinates with v flipped: OBJ's v runs upwards, glTF's downwards."""
     return None if uv is None else np.column_stack([uv[:, 0], 1.0 - uv[:, 1]])
 
 
 def _corner_indices(folder: ModelFolder, tokens: list[str], totals: tuple[int, int, int]) -> Int:
-    """Position, uv and normal index of each distinct corner, (N, 3), from 0; -1 where it has none."""
+    """Position, uv and normal index of each distinct corner, (N, 3), from 0; -1 where a corner has none."""
     indices = np.full((len(tokens), 3), -1, np.int64)
     for row, token in enumerate(tokens):
         for column, text in enumerate(token.split("/")[:3]):
@@ -188,7 +188,7 @@ def _vertices(lines: list[str]) -> tuple[Float, Float | None]:
 
 
 def _rows(lines: list[str], width: int) -> Float:
-    """Numbers of each line, (N, at most `width`) and NaN for what a line leaves out."""
+    """Numbers of each line, (N, at most `width`), NaN for numbers that a line lacks."""
     rows = [line.split()[:width] for line in lines]
     most = max(map(len, rows), default=0)
     if all(len(row) == most for row in rows):
@@ -206,7 +206,7 @@ def _rows(lines: list[str], width: int) -> Float:
 
 
 def _padded(values: Float, width: int, empty: float) -> Float:
-    """The first `width` columns, those that are missing filled."""
+    """The first `width` columns; missing columns are filled with `empty`."""
     missing = max(width - values.shape[1], 0)
     return np.pad(values[:, :width], ((0, 0), (0, missing)), constant_values=empty)
 

@@ -15,7 +15,7 @@ def read_picture(folder: ModelFolder) -> tuple[Mesh, FileFacts]:
     as the picture's proportions ask.
 
     A picture of more than `SHARPEST` texels a side is reduced by a whole factor. Its back shows the picture mirrored. A
-    photograph is turned as its camera says. Texels that are clear cut holes (MASK) or, if many are in between, blend
+    photograph is turned as its camera says. Clear texels cut holes (MASK) or, if many texels are partly clear, blend
     (BLEND), as `alpha.with_alpha_modes` finds. Raises ModelError when the file is no picture or beyond `limits`.
     """
     data = folder.read_model()

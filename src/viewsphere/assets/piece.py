@@ -1,4 +1,4 @@
-"""Pieces: what a reader finds in a file, and how they become one checked Mesh."""
+"""Pieces: the triangles that a reader finds in a file, and joining them into one checked Mesh."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ TEXTURE_FIELDS = tuple(name for name in Material.__dataclass_fields__ if name.en
 """Names of Material's texture fields, in order."""
 
 GREATEST = 1e30
-"""Coordinates beyond are taken as infinite: their squares would be in float32."""
+"""Larger coordinates count as infinite, because their squares are infinite in float32."""
 
 FAR = 1e3
 """A model this many times its own size away from the file's origin is stored around its own centre."""
@@ -89,8 +89,8 @@ def assemble(
     """Join pieces into one mesh, parts in order of first appearance, unused parts, materials and images left
     out.
 
-    Triangles with NaN or infinite corners and those without area are dropped with a warning; a normal that is no direction
-    becomes the mean of its faces', with a warning too. Raises ModelError when no triangle is left or there are too
+    Triangles with NaN or infinite corners and those without area are dropped with a warning; a zero or NaN normal
+    becomes the mean of its faces' normals, with a warning too. Raises ModelError when no triangle is left or there are too
     many.
     """
     pieces, materials = _without_lost_textures(folder, pieces, materials)
@@ -142,7 +142,7 @@ def assemble(
 def _without_lost_textures(
     folder: ModelFolder, pieces: Sequence[Piece], materials: Sequence[Material]
 ) -> tuple[list[Piece], list[Material]]:
-    """The pieces with materials of which they have the texture coordinates; else the factors stand alone, with a warning."""
+    """The pieces, and materials without textures whose coordinates a piece lacks; a warning names each lost texture."""
     kept, all_materials = list(pieces), list(materials)
     known: dict[tuple[int, tuple[str, ...]], int] = {}
     for i, piece in enumerate(pieces):
@@ -222,14 +222,14 @@ def _normals(
 
 
 def _is_direction(vectors: NDArray[np.floating]) -> NDArray[np.bool_]:
-    """Which of the vectors (N, 3) are long enough to have one; NaN has none."""
+    """Which of the vectors (N, 3) are long enough to be directions, (N,) bool; False for NaN."""
     return np.linalg.norm(vectors, axis=1) > 1e-12
 
 
 def unit_normals(
     vertices: NDArray[np.float32], triangles: NDArray[np.int32], given: NDArray[np.float32] | None
 ) -> NDArray[np.float32]:
-    """Unit normals (V, 3): the given ones, and the area-weighted mean of the faces where they are zero."""
+    """Unit normals (V, 3): the given ones; where these are zero or missing the area-weighted mean of the faces, or else +Z."""
     normals = np.zeros((len(vertices), 3)) if given is None else given.astype(np.float64)
     lengths = np.linalg.norm(normals, axis=1)
     missing = ~_is_direction(normals)
@@ -248,7 +248,7 @@ def unit_normals(
 
 
 def face_normals(positions: Float, triangles: NDArray[np.integer]) -> Float:
-    """Normals (T, 3) whose length is twice the triangle's area, counter-clockwise side."""
+    """Normals (T, 3) on the counter-clockwise side, their length twice the triangle's area."""
     a, b, c = (positions[triangles[:, i]] for i in range(3))
     return np.cross(b - a, c - a)
 

@@ -8,7 +8,7 @@ from viewsphere.assets.piece import Float, Int
 from viewsphere.assets.transform import unit
 
 MAX_EARS = 2_048
-"""Polygons with more corners are cut as a fan whatever their shape: cutting ears takes quadratic time."""
+"""Polygons with more corners are cut as a fan, even concave ones: cutting ears takes quadratic time."""
 
 
 def triangulate(positions: Float, corners: Int, counts: Int) -> tuple[Int, Int]:
@@ -57,7 +57,7 @@ def _lean(points: Float, triangles: Int, owner: Int, first: Int) -> tuple[Float,
 
 
 def _flattened(points: Float, normal: Float) -> Float | None:
-    """The polygon's points (n, 2) in its own plane, counter-clockwise; None without area."""
+    """The polygon's points (n, 2) in its own plane, counter-clockwise; None if the polygon has no area."""
     # Neither @ nor the norm of one vector: BLAS, which rounds by processor, does both.
     (z,) = unit(normal[None])
     if not z.any() or not np.isfinite(z).all() or not np.isfinite(points).all():

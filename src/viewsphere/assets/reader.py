@@ -1,8 +1,8 @@
 """The program that reads one model file, so that a crash costs a message: `python -m viewsphere.assets.reader JOB`.
 
 JOB is JSON: the model's specification, the folder for the result, the limits and the process that asked. The folder
-receives `mesh.npz` and `outcome.json`: the files that the model named, or the error. Its standard input is a pipe that
-nobody writes to; its end means that whoever asked is gone.
+receives `mesh.npz` and `outcome.json`: the files that the model named, or the error. Standard input is a pipe that
+nobody writes to; its end of file means that the process that asked is gone.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ MESH, OUTCOME = "mesh.npz", "outcome.json"
 
 @dataclass(frozen=True)
 class Job:
-    """What to read (a ModelSpec's fields), where the result goes, seconds, bytes, the asking process's id, and whether Blender
-    is what reads it. `frames`, which ascend, are read instead of the one of the specification.
+    """A job: the model (a ModelSpec's fields), the folder for the result, limits in seconds and bytes, the asking process's id,
+    and whether Blender reads the file. Ascending `frames`, if given, are read instead of the specification's frame.
     """
 
     spec: dict[str, Any]
@@ -41,12 +41,12 @@ class Job:
     frames: tuple[int, ...] = ()
 
     def to_json(self) -> str:
-        """One line of text."""
+        """The job as one line of JSON."""
         return json.dumps(asdict(self))
 
 
 def main() -> None:
-    """Read what the first argument says, write the result, end."""
+    """Do the job of the first argument, and end this process."""
     told = json.loads(sys.argv[1])
     job = Job(**told | {"frames": tuple(told["frames"])})
     _end_with(job.parent)
@@ -54,13 +54,12 @@ def main() -> None:
     outcome = read(job)
     (Path(job.folder) / OUTCOME).write_text(json.dumps(outcome), encoding="utf-8")
     sys.stderr.flush()
-    os._exit(0)  # at once: a library's own clearing up may crash too
+    os._exit(0)  # at once: a library's cleanup at exit may crash, too
 
 
 def read(job: Job) -> dict[str, Any]:
-    """Read and normalise the model into the job's folder: the files it named, or the error, as `outcome.json` has them.
-
-    Whatever goes wrong in a reader becomes one line that names the model.
+    """Read and normalise the model into the job's folder; returns the files that the model named, or the error, for
+    `outcome.json`. Any exception in a reader becomes one line that names the model.
     """
     from viewsphere.model.model_spec import ModelSpec
 
@@ -82,7 +81,7 @@ def read(job: Job) -> dict[str, Any]:
 
 
 def _read_model(spec: ModelSpec, job: Job) -> Sequence[Path]:
-    """Write the mesh, or one for each frame; the files that the model named."""
+    """Write the mesh, or one for each frame; returns the files that the model named."""
     from viewsphere.assets.load import load_frames, load_model
     from viewsphere.assets.mesh_file import write_mesh
     from viewsphere.assets.normalise import normalise
@@ -102,13 +101,13 @@ def _read_model(spec: ModelSpec, job: Job) -> Sequence[Path]:
 
 
 def mesh_name(number: int) -> str:
-    """File of a job's frame of this number."""
+    """File name for the mesh of a job's frame, by the frame's position in the job."""
     return MESH if number == 0 else f"mesh{number}.npz"
 
 
 def _end_with(parent: int) -> None:
-    """Die when the process that asked does."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # whoever asked decides
+    """End this process when the process that asked ends."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the process that asked decides
     if sys.platform == "linux":
         import ctypes
 
@@ -127,7 +126,7 @@ def _watch() -> None:
 
 
 def _limit(job: Job) -> None:
-    """Bound memory and the size of files, and processor time should nobody be left to stop this process."""
+    """Limit memory and the size of files, and processor time in case no other process is left to stop this one."""
     if sys.platform == "win32":
         return
     import resource
@@ -138,7 +137,7 @@ def _limit(job: Job) -> None:
     seconds = int(2 * job.seconds * cores) + 1
     wanted = {memory: job.memory, "RLIMIT_FSIZE": job.memory, "RLIMIT_CPU": seconds, "RLIMIT_CORE": 0}
     for name, most in wanted.items():
-        with suppress(ValueError, OSError, AttributeError):  # what a platform lacks, or has set lower
+        with suppress(ValueError, OSError, AttributeError):  # a limit that the platform lacks, or has set lower
             kind = getattr(resource, name)
             hard = resource.getrlimit(kind)[1]
             resource.setrlimit(kind, (most if hard == resource.RLIM_INFINITY else min(most, hard), hard))

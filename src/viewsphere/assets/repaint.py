@@ -11,7 +11,7 @@ from viewsphere.model.thing import Repaint
 
 
 def repainted(material: Material, repaints: Sequence[Repaint]) -> tuple[Material, Repaint | None]:
-    """The material with its new tint, and the last of the repaints whose pattern its name matches."""
+    """The material with its new tint, and the last repaint whose pattern matches the material's name, None if none does."""
     found = next((r for r in reversed(repaints) if fnmatchcase(material.name, r.material)), None)
     if found is None or found.tint is None:
         return material, found

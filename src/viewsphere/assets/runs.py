@@ -1,4 +1,4 @@
-"""Runs: consecutive triangles of one part and one material, what exporters write as one primitive."""
+"""Runs: consecutive triangles of one part and one material, which exporters write as one primitive."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Run:
 
 
 def runs(mesh: Mesh) -> Iterator[Run]:
-    """The mesh's triangles, in order, cut wherever part or material change."""
+    """Runs of the mesh's triangles, in order; a new run begins where part or material changes."""
     change = np.diff(mesh.triangle_part) | np.diff(mesh.triangle_material)
     starts = [0, *(np.flatnonzero(change) + 1).tolist(), len(mesh.triangles)]
     for start, stop in pairwise(starts):

@@ -1,4 +1,4 @@
-"""What there is in a .blend file that is a scene: asked from Blender once, without reading meshes."""
+"""The contents of a .blend scene: Blender lists them once, without handing over meshes."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ from viewsphere.geometry.rotation import Float, matrix_from_quaternion, rigid
 
 @dataclass(frozen=True)
 class SceneObject:
-    """An object of a file: its kind as Blender names it, its `parent`, the names of all collections that it is in, its custom
-    properties, the names of its parts that a render would show at any frame that is asked for, and where it stands at the
-    first: `place` and `turn`, (x, y, z) metres and a quaternion (w, x, y, z), in the file's world.
+    """An object of a file: its kind in Blender's terms, its `parent`, the names of all collections around it, its custom
+    properties, the names of its parts that a render would show at any requested frame, and its pose at the first frame:
+    `place` (x, y, z) in metres and `turn`, a quaternion (w, x, y, z), in the file's world.
     """
 
     name: str
@@ -36,14 +36,14 @@ class SceneObject:
 
     @property
     def file_from_object(self) -> Float:
-        """Rigid, (4, 4), metres."""
+        """Pose of the object at the first frame: rigid, (4, 4), metres, in the file's world."""
         return rigid(matrix_from_quaternion(self.turn), np.array(self.place))
 
 
 @dataclass(frozen=True)
 class SceneFile:
-    """The objects of a file, by name; metres in one of its units; whether it has light; what to tell the user; and the names
-    of the objects that show anything at its `first` frame and at each that was asked for.
+    """The objects of a file; `unit`: metres in one of its units; whether it has light; warnings for the user; and, in
+    `showing`, the names of the objects that are visible at the file's `first` frame and at each requested one.
     """
 
     path: Path
@@ -60,7 +60,7 @@ class SceneFile:
         return {one.name: one for one in self.objects}
 
     def ancestors(self, one: SceneObject) -> tuple[SceneObject, ...]:
-        """Its parent, that one's parent and so on."""
+        """An object's parent, its parent's parent, and so on."""
         found: list[SceneObject] = []
         while (parent := self.by_name.get(one.parent or "")) is not None and len(found) < len(self.objects):
             one = parent
@@ -70,11 +70,11 @@ class SceneFile:
 
 @lru_cache(maxsize=64)
 def scene_file(path: Path, confined: bool = True, shown: tuple[str, ...] = (), frames: tuple[int, ...] = ()) -> SceneFile:
-    """What the file holds at its first frame and at these; `shown` are patterns of objects that count although renders do not
-    show them.
+    """The file's contents at its first frame and at `frames`; `shown` are patterns of objects that count although renders do
+    not show them.
 
-    Confined, nothing outside of its folder is read. Raises ModelError in one line for a file that Blender cannot open,
-    MissingExtraError without a Blender.
+    With `confined`, nothing outside of the file's folder is read. Raises ModelError in one line for a file that Blender cannot
+    open, MissingExtraError without a Blender.
     """
     told = _asked(path, confined, "contents", frames=frames, shown=shown, most=limits.MAX_BLENDER_TRIANGLES)
     objects = tuple(_object(one, told["unit"]) for one in told["objects"])
@@ -85,7 +85,7 @@ def scene_file(path: Path, confined: bool = True, shown: tuple[str, ...] = (), f
 
 @lru_cache(maxsize=64)
 def places(path: Path, confined: bool, names: tuple[str, ...], frames: tuple[int, ...]) -> Mapping[int, Mapping[str, Float]]:
-    """Where objects stand at each of the frames, which ascend: rigid, (4, 4), metres. Raises as `scene_file` does."""
+    """Poses of the named objects at each of the ascending frames: rigid, (4, 4), metres. Raises as `scene_file` does."""
     told = _asked(path, confined, "places", names=names, frames=frames)
     unit = told["unit"]
     stands = [[_standing(place, turn, unit) for place, turn in at] for at in told["places"]]

@@ -17,7 +17,7 @@ MAX_VALENCE = 64
 
 
 def flat(piece: Piece) -> Piece:
-    """The piece with every triangle on its own, each corner with its face's normal."""
+    """The piece with unshared vertices, each corner having its face's normal."""
     faces = face_normals(piece.positions, piece.triangles)
     return replace(split(piece), normals=np.repeat(unit(faces), 3, axis=0))
 
@@ -25,10 +25,10 @@ def flat(piece: Piece) -> Piece:
 def creased(piece: Piece, groups: NDArray[np.int64] | None = None) -> Piece:
     """The piece with normals that are smooth across edges and sharp at creases.
 
-    A corner's normal is the mean, weighted by their angles there, of the faces around its point whose
-    direction differs from its own face's by less than `CREASE_DEG`; with `groups` (T,), one smoothing group a
-    triangle, of those of the same group instead, and group 0 is flat. Beyond `MAX_VALENCE` faces around a
-    point only near ones (in file order) count.
+    A corner's normal is the mean, weighted by the angles at the corner's point, of the normals of the faces around this point
+    that differ from the corner's own face by less than `CREASE_DEG`. With `groups` (T,), one smoothing group a triangle, the
+    faces of the same group count instead, and group 0 is flat. Of more than `MAX_VALENCE` faces around a point only those
+    near in the file's order count.
     """
     faces = face_normals(piece.positions, piece.triangles)
     directions = unit(faces)
@@ -69,7 +69,7 @@ def _angles(positions: Float, triangles: Int) -> Float:
 def angle_of(sine: Float, cosine: Float) -> Float:
     """arctan2(sine, cosine) for sines of at least 0, to 1e-11 rad, and 0 where the angle is unknown.
 
-    By halving the angle four times and the power series, since numpy's own rounds by processor.
+    Computed by halving the angle four times and a power series, since numpy's arctan2 rounds differently on each processor.
     """
     for _ in range(4):
         cosine = cosine + np.sqrt(sine * sine + cosine * cosine)
@@ -82,7 +82,7 @@ def angle_of(sine: Float, cosine: Float) -> Float:
 
 
 def split(piece: Piece) -> Piece:
-    """The piece with every triangle on its own."""
+    """The piece with unshared vertices: three for every triangle."""
     corners = piece.triangles.reshape(-1)
     return replace(pick(piece, corners), triangles=np.arange(len(corners)).reshape(-1, 3))
 

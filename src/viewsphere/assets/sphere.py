@@ -1,4 +1,4 @@
-"""The head of a picture of the whole sphere, OpenEXR or Radiance HDR: what can be told of it without its pixels.
+"""The head of an environment picture (whole sphere), OpenEXR or Radiance HDR: its properties, read without its pixels.
 
 Radiance's picture format, Ward 1991: https://radsite.lbl.gov/radiance/refer/filefmts.pdf.
 """
@@ -35,8 +35,8 @@ class ExrHead:
 
 @dataclass(frozen=True)
 class HdrHead:
-    """The text of a Radiance file before its pixels, line feeds alone; how its rows and columns run, such as -Y and +X, and
-    how many there are.
+    """The text of a Radiance file before its pixels, line feeds alone; the directions of its rows and columns, such as -Y and
+    +X, and their numbers.
     """
 
     text: bytes
@@ -47,15 +47,15 @@ class HdrHead:
 
     @property
     def is_upright(self) -> bool:
-        """Whether its rows are rows of the picture."""
+        """Whether the file's scan lines are rows of the picture, not columns."""
         return self.first[1:] == b"Y"
 
 
 def read_head(path: Path) -> ExrHead | HdrHead | None:
-    """What a file says of itself, None if it is of neither kind; its first bytes say which, not its name.
+    """The head of a file; its first bytes, not its name, tell the format. None for any other format.
 
-    Raises UnreadableError, in words that name the file: it cannot be opened, is damaged, lacks colours, has more pixels than
-    `limits` allows, or is not twice as wide as high.
+    Raises UnreadableError, whose message names the file, if the file cannot be opened, is damaged, lacks colours, has more
+    pixels than `limits` allows, or is not twice as wide as high.
     """
     try:
         with path.open("rb") as file:
@@ -68,7 +68,7 @@ def read_head(path: Path) -> ExrHead | HdrHead | None:
 
 
 def check_shape(path: Path, width: int, height: int) -> None:
-    """Raise UnreadableError for too many pixels, or for another shape than that of a whole sphere."""
+    """Raise UnreadableError for too many pixels, or if the width is not twice the height."""
     most = limits.MAX_PICTURE_PIXELS
     if width * height > most:
         found = f"{width} x {height}: save it with 4096 x 2048"
@@ -83,7 +83,7 @@ def check_shape(path: Path, width: int, height: int) -> None:
 
 @contextlib.contextmanager
 def silenced() -> Generator[None]:
-    """Keep what OpenEXR prints by itself, beside what it raises, off the terminal."""
+    """Keep OpenEXR's own messages, which it prints in addition to raising errors, off the terminal."""
     with contextlib.ExitStack() as stack:
         with contextlib.suppress(OSError, ValueError):  # a process may have no standard error
             kept = os.dup(2)
@@ -113,7 +113,7 @@ def _exr(path: Path) -> ExrHead:
             width, height = (int(high[k]) - int(low[k]) + 1 for k in (0, 1))
     except (UnreadableError, MemoryError):
         raise
-    except Exception:  # OpenEXR raises whatever its parser does
+    except Exception:  # OpenEXR's parser raises errors of many kinds
         raise _unreadable(path, "found one whose head cannot be read: damaged or cut off; get or export it again") from None
     check_shape(path, width, height)
     return ExrHead(*found, width, height)

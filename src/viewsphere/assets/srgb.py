@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 STEPS = 8
-"""Enough for all digits of roots of numbers between 0.001 and 1000."""
+"""Newton steps that give all digits of roots of numbers between 0.001 and 1000."""
 
 
 def linear(srgb: ArrayLike) -> NDArray[np.float64]:
@@ -28,7 +28,7 @@ def encoded(light: ArrayLike) -> NDArray[np.float64]:
 
 
 def _root(values: NDArray[np.float64], degree: Literal[3, 5]) -> NDArray[np.float64]:
-    """Third or fifth root of values about 1, by Newton's method: numpy's powers round by processor."""
+    """Third or fifth root of values about 1, by Newton's method: numpy's powers round differently on each processor."""
     root = np.sqrt(np.sqrt(values))
     for _ in range(STEPS):
         square = root * root

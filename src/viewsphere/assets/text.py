@@ -28,7 +28,7 @@ def decode(data: bytes) -> str:
 
 
 def _guess(data: bytes) -> str:
-    """Encoding of the lines that are not ASCII."""
+    """A guess at the encoding, made from the lines that are not ASCII."""
     from charset_normalizer import from_bytes
 
     foreign = b"\n".join(line for line in data[: 1 << 24].splitlines() if not line.isascii())[:SAMPLE_BYTES]
@@ -37,6 +37,6 @@ def _guess(data: bytes) -> str:
 
 
 def statements(text: str) -> list[str]:
-    """Lines of an OBJ or MTL file: continued ones joined, tabs as blanks, no blanks around them."""
+    """Statements of an OBJ or MTL file: continued lines joined, tabs replaced by blanks, surrounding blanks removed."""
     plain = text.replace("\r\n", "\n").replace("\r", "\n").replace("\\\n", " ").replace("\t", " ")
     return [line.strip() for line in plain.split("\n")]

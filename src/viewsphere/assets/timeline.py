@@ -1,4 +1,4 @@
-"""When a file's animation begins and ends: asked from Blender, once for a file and all that it names."""
+"""A file's timeline, asked from Blender; answers are cached until the file, or a file that it names, changes."""
 
 from __future__ import annotations
 
@@ -28,20 +28,20 @@ class Timeline:
     clips: tuple[str, ...] = ()
 
     def seconds(self, frame: int) -> float:
-        """From the first frame to this one."""
+        """Seconds from the first frame to this one."""
         return (frame - self.first) / self.fps
 
 
 @dataclass(eq=False)
 class Blenders:
-    """Answers about files; files of one folder are opened by one Blender, one after another. A context manager."""
+    """Answers requests about files by running Blenders, one for all files of a folder. A context manager, which ends them."""
 
     _stack: ExitStack
     _running: dict[tuple[Path, bool], BlenderProcess]
 
     @staticmethod
     def none_yet() -> Blenders:
-        """None is started before it is needed."""
+        """No Blender runs yet: each is started when it is first needed."""
         return Blenders(ExitStack(), {})
 
     def __enter__(self) -> Blenders:
@@ -51,7 +51,7 @@ class Blenders:
         self._stack.close()
 
     def told(self, path: Path, confined: bool, do: str, about: Mapping[str, Any]) -> dict[str, Any]:
-        """The answer to a request about a file, which may be known; ModelError in one line when there is none."""
+        """The answer to a request about a file, cached or from Blender; ModelError in one line when Blender has no answer."""
         file = split_source(path)[0]
         check_animated(file)
 
@@ -64,7 +64,7 @@ class Blenders:
         return kept(file, f"{do} {confined} {sorted(about.items())}", ask)
 
     def timeline(self, path: Path, confined: bool, clip: str | None = None) -> Timeline:
-        """When the file begins and ends, playing the animation of this name, by default the first."""
+        """The file's timeline while the animation `clip` plays, by default the first one."""
         told = self.told(path, confined, "timeline", {"clip": clip})
         return Timeline(told["first"], told["last"], told["fps"], told["moves"], tuple(told["clips"]))
 
@@ -77,7 +77,7 @@ class Blenders:
         try:
             answer = asked(folder, process, do, **about)
         except ModelError:
-            self._running.pop(place).close()  # it may have died
+            self._running.pop(place).close()  # a Blender that failed to answer may have died
             raise
         remember_layers(folder, process.log, begun)
         return answer

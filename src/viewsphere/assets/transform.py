@@ -11,7 +11,7 @@ from viewsphere.geometry.rotation import transform
 
 
 def moved(piece: Piece, matrix: Float) -> Piece:
-    """The piece under an affine matrix (4, 4); a mirrored one is wound the other way round."""
+    """The piece under an affine matrix (4, 4); the winding of a mirrored piece is reversed to keep its fronts."""
     linear = matrix[:3, :3]
     mirrored = bool(np.linalg.det(linear) < 0)
     # The cofactor matrix is det times the inverse transpose and exists for flattening matrices too.
@@ -23,6 +23,6 @@ def moved(piece: Piece, matrix: Float) -> Piece:
 
 
 def unit(vectors: Float) -> Float:
-    """Vectors (N, 3) of length one; those without direction are zero."""
+    """Vectors (N, 3) of length one; vectors without a direction become zero."""
     lengths = np.linalg.norm(vectors, axis=1, keepdims=True)
     return np.where(lengths > 0, vectors / np.where(lengths > 0, lengths, 1.0), 0.0)

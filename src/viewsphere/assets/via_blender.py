@@ -1,4 +1,4 @@
-"""FBX, USD, Alembic and .blend files, and frames of animated glTF: Blender opens and evaluates them, in a process of its own.
+"""FBX, USD, Alembic and .blend files, and frames of animated glTF: Blender opens and evaluates them, in its own process.
 
 Blender reads only the model's folder unless the model says `confined: false`, writes nowhere, runs no scripts and reaches no
 network. Textures are read here, like any other model's.
@@ -48,16 +48,16 @@ GLTF_FROM_BLENDER = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0
 def read_via_blender(folder: ModelFolder) -> tuple[Mesh, FileFacts]:
     """The file as it would be rendered at its first frame, in Blender's axes (up +Z, front -Y) and metres.
 
-    Of a .blend file, what `folder.inside` names: an object with its children, a collection, or all of it. One part an
-    object, those that another one instances by both names. Raises ModelError in one line.
+    Of a .blend file, the part that `folder.inside` names: an object with its children, a collection, or the whole file. Each
+    object is one part; a part instanced by another object is named by both objects. Raises ModelError in one line.
     """
     return next(_read(folder, [None]))
 
 
 def read_frames(folder: ModelFolder, frames: Sequence[int]) -> Iterator[tuple[Mesh, FileFacts]]:
-    """The file as it would be rendered at its first frame, then at each of these, which ascend; opened once.
+    """The file as it would be rendered at its first frame, then at each of the ascending `frames`; opened once.
 
-    As `read_via_blender`, but for glTF, which keeps its own axes (up +Y, front +Z).
+    Axes are those of `read_via_blender`, but glTF files keep their own (up +Y, front +Z).
     """
     kind = folder.model.suffix[1:].lower()
     for mesh, facts in _read(folder, [None, *frames], GLTF_FROM_BLENDER if kind in ("glb", "gltf") else None):
@@ -67,7 +67,7 @@ def read_frames(folder: ModelFolder, frames: Sequence[int]) -> Iterator[tuple[Me
 def _read(
     folder: ModelFolder, frames: Sequence[int | None], turn: NDArray[np.float64] | None = None
 ) -> Iterator[tuple[Mesh, FileFacts]]:
-    """The file at each of the frames, turned."""
+    """The file's mesh at each of the frames, rotated to the expected axes."""
     kind = folder.model.suffix[1:].lower()
     _check_beginning(folder, kind, read_named(folder))
     with started(folder) as process:
@@ -92,12 +92,12 @@ def _read(
 
 
 def read_named(folder: ModelFolder) -> bytes:
-    """The model file's bytes, as `read_model` gives them; buffers that a glTF file names are remembered: Blender does not tell
-    of them.
+    """The model file's bytes, as `read_model` gives them; buffers that a glTF file names are recorded here, because
+    Blender does not report them.
     """
     data = folder.read_model()
     if folder.model.suffix.lower() == ".gltf":
-        with suppress(ValueError, TypeError, AttributeError):  # what is no glTF file, Blender refuses
+        with suppress(ValueError, TypeError, AttributeError):  # Blender reports a file that is no glTF
             for buffer in json.loads(data)["buffers"]:
                 uri = str(buffer.get("uri", "data:"))
                 if not uri.startswith("data:"):
@@ -106,14 +106,15 @@ def read_named(folder: ModelFolder) -> bytes:
 
 
 def _check_beginning(folder: ModelFolder, kind: str, data: bytes) -> None:
-    """Refuse Alembic files that are none or cut off, at which Blender says nothing or crashes (Ogawa's header: the place of its
-    root group, which is written last)."""
+    """Refuse truncated files and other files named .abc, on which Blender crashes or reports nothing: Ogawa's header holds the
+    position of the root group, which is written last.
+    """
     if kind == "abc" and not (data.startswith(b"Ogawa") and int.from_bytes(data[8:16], "little") < len(data)):
         raise folder.error("expected an Alembic file (Ogawa), found another kind or a part of one: truncated or damaged")
 
 
 def started(folder: ModelFolder) -> BlenderProcess:
-    """A Blender that reads what the folder may; ModelError when there is none."""
+    """A started Blender that may read the same files as the folder; ModelError when no Blender is installed."""
     try:
         python = find_blender()
     except MissingExtraError:
@@ -129,7 +130,7 @@ def started(folder: ModelFolder) -> BlenderProcess:
 
 
 def asked(folder: ModelFolder, process: BlenderProcess, do: str, /, **told: Any) -> dict[str, Any]:
-    """What Blender answers to a request about the file; ModelError when it cannot."""
+    """Blender's answer to a request about the file; ModelError when the answer is an error, or Blender dies."""
     root = str(folder.model.parent.resolve()) if folder.confined else None
     seconds = limits.from_environment("MAX_READ_SECONDS")
     kind = folder.model.suffix[1:].lower()
@@ -143,7 +144,7 @@ def asked(folder: ModelFolder, process: BlenderProcess, do: str, /, **told: Any)
 
 
 def why_no_answer(died: BlenderDied, seconds: float) -> str:
-    """Of a Blender that had this long to answer about a file, and ended instead."""
+    """The message for a Blender that ended, after so many seconds, instead of answering about a file."""
     said = str(died).partition("; its log")[0]
     if died.signal == "SIGXCPU" or said.startswith("Blender hung"):
         return limits.too_slow(seconds)
@@ -152,7 +153,7 @@ def why_no_answer(died: BlenderDied, seconds: float) -> str:
 
 
 def _check_layers(folder: ModelFolder, log: Path) -> None:
-    """Remember the layers of a USD file, by what its library says of them; warn of those that were not read."""
+    """Record the layers of a USD file, as its library logs them; warn about layers that could not be read."""
     opened, missing = _layers(log)
     for name in sorted({*opened, *missing}):
         path = _layers_file(name)
@@ -166,13 +167,13 @@ def _check_layers(folder: ModelFolder, log: Path) -> None:
 
 
 def remember_layers(folder: ModelFolder, log: Path, begun: int) -> None:
-    """Remember the layers of a USD file, missing ones too, by what was said of them after so many bytes of the log."""
+    """Record the layers of a USD file, missing ones too, from the log behind its first `begun` bytes."""
     for name in sorted(set().union(*_layers(log, begun))):
         _remember(folder, _layers_file(name))
 
 
 def _layers(log: Path, begun: int = 0) -> tuple[set[str], set[str]]:
-    """The layers of USD files that were looked for, and those that could not be opened."""
+    """The layers of USD files that the log says were looked for, and the ones that could not be opened."""
     with log.open("rb") as file:
         file.seek(begun)
         said = file.read().decode("utf-8", "replace")
@@ -180,7 +181,7 @@ def _layers(log: Path, begun: int = 0) -> tuple[set[str], set[str]]:
 
 
 def _layers_file(name: str) -> Path:
-    """The file of a layer, which may be an archive."""
+    """The file of a layer; for a layer inside an archive the archive."""
     return Path(name.partition("[")[0])
 
 
@@ -244,7 +245,7 @@ def _piece(told: Mapping[str, Any], material: int) -> Piece:
 
 
 def _picture(folder: ModelFolder, told: Mapping[str, Any], number: int) -> Picture:
-    """The picture in the folder's images: read from its file, from the bytes that the model holds, or as Blender decoded it."""
+    """The picture in the folder's images: read from its file, from bytes packed in the model, or as decoded by Blender."""
     name = told["name"]
     if "pixels" in told:
         index = folder.derived(f"#{number}", lambda: Image(name, reduced(np.load(told["pixels"]), SHARPEST)))
@@ -261,7 +262,7 @@ def _picture(folder: ModelFolder, told: Mapping[str, Any], number: int) -> Pictu
 
 
 def _with_modes(pieces: Sequence[Piece], materials: Sequence[Material], images: Sequence[Image]) -> list[Material]:
-    """The materials with the alpha modes that their textures ask for; where a texture is turned, its alpha blends."""
+    """The materials with alpha modes that suit their textures' alpha (`alpha`); a rotated texture's alpha always blends."""
     found = with_alpha_modes(pieces, materials, images)
     for i, material in enumerate(materials):
         texture = material.base_color_texture

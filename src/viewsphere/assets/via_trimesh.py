@@ -1,4 +1,4 @@
-"""PLY, STL, OFF, DAE and 3MF: trimesh parses them (https://trimesh.org), this module keeps what it found.
+"""PLY, STL, OFF, DAE and 3MF: parsed by trimesh (https://trimesh.org), turned into pieces here.
 
 trimesh's parsers are called directly: its Trimesh class would merge and reorder vertices.
 """
@@ -42,7 +42,7 @@ Rgba = tuple[float, float, float, float]
 
 
 def read_via_trimesh(folder: ModelFolder) -> tuple[Mesh, FileFacts]:
-    """The file as one mesh with its scene's transforms applied; parts are its geometries.
+    """The file as one mesh with the scene's transforms applied; each geometry of the file is a part.
 
     Vertex and face colours are taken as sRGB. Without normals, edges are smooth up to a crease.
     """
@@ -57,7 +57,7 @@ def read_via_trimesh(folder: ModelFolder) -> tuple[Mesh, FileFacts]:
 
 
 class _Resolver:
-    """What trimesh asks for files that a model names."""
+    """The resolver through which trimesh's parsers read the files that a model names."""
 
     def __init__(self, folder: ModelFolder) -> None:
         self.folder = folder
@@ -91,7 +91,7 @@ def _check_promises(folder: ModelFolder, kind: str, data: bytes) -> None:
             _check_archive(folder, data)
     except (ModelError, MemoryError):
         raise
-    except Exception as error:  # zipfile and lxml raise whatever a damaged file leads them to
+    except Exception as error:  # zipfile and lxml raise errors of many kinds for damaged files
         raise _unreadable(folder, kind, error) from None
 
 
@@ -130,7 +130,7 @@ def _parse(folder: ModelFolder, kind: str, data: bytes) -> dict[str, Any]:
             loaded = mesh_loaders[kind](io.BytesIO(data), file_type=kind, resolver=_Resolver(folder))
     except (ModelError, MemoryError):
         raise
-    except Exception as error:  # each parser raises whatever its code stumbles over
+    except Exception as error:  # trimesh's parsers raise errors of many kinds for damaged files
         raise _unreadable(folder, kind, error) from None
     return cast("dict[str, Any]", loaded)
 
@@ -141,7 +141,7 @@ class _Builder:
     materials: list[Material]
 
     def scene(self, loaded: Mapping[str, Any]) -> list[Piece]:
-        """All geometries where the scene's graph puts them; each once at the origin without a graph."""
+        """All geometries where the scene's graph puts them; without a graph each once at the origin."""
         geometry: dict[str, Any] = loaded["geometry"]
         graph: list[dict[str, Any]] = loaded.get("graph") or [
             {"frame_to": name, "geometry": name, "matrix": np.eye(4)} for name in geometry
@@ -188,7 +188,7 @@ class _Builder:
         return [moved(piece if piece.normals is not None else creased(piece), matrix)]
 
     def _material(self, source: Any) -> int:
-        """Index of the material that keeps what trimesh's has."""
+        """Index of the material made from trimesh's material."""
         image = getattr(source, "baseColorTexture", None) or getattr(source, "image", None)
         texture = self._texture(image)
         color = _unit_color(getattr(source, "baseColorFactor", None), (1.0, 1.0, 1.0, 1.0))
@@ -220,7 +220,7 @@ class _Builder:
 
 
 def _unit_color(color: Any, default: Rgba) -> Rgba:
-    """A colour in [0, 1] from trimesh's, which are floats or bytes."""
+    """A colour in [0, 1] from trimesh's colours, which are floats or bytes."""
     if color is None:
         return default
     values = np.asarray(color)
@@ -257,7 +257,7 @@ def _vertex_colors(values: Any, count: int) -> Float | None:
 
 
 def _with_face_colors(piece: Piece, colors: NDArray[Any]) -> Piece:
-    """The piece with every triangle on its own, coloured by its face."""
+    """The piece with unshared vertices, each coloured by its face."""
     alone = split(piece)
     return replace(alone, colors=_vertex_colors(np.repeat(colors, 3, axis=0), len(alone.positions)))
 

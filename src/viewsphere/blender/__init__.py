@@ -1,1 +1,1 @@
-"""Blender as a program of its own: which interpreter has it, starting it, speaking to it."""
+"""Blender as a program of its own: finding its interpreter, starting it, sending it requests."""

@@ -25,7 +25,7 @@ Listener = Callable[[str], None]
 
 
 def home() -> Path:
-    """Where the environment lies, made or not: in the user's data folder."""
+    """The environment's folder, inside the user's data folder; the environment itself may not be made yet."""
     return Path(platformdirs.user_data_dir("viewsphere")) / "blender"
 
 
@@ -37,8 +37,8 @@ def interpreter_of(environment: Path) -> Path:
 def make_environment(listener: Listener) -> Path:
     """Make the environment, or make it anew, and return its interpreter.
 
-    It is made aside and renamed when it is whole. `listener` gets a line for each step, and pip's own. Raises UserError
-    when there is no Python 3.11, or pip cannot install what is needed.
+    The environment is built under another name and renamed when complete. `listener` gets a line for each step, and pip's
+    lines. Raises UserError when there is no Python 3.11, or pip cannot install what is needed.
     """
     place = home()
     base = _python311()
@@ -81,7 +81,7 @@ def _version(python: str) -> str:
 
 
 def _run(command: list[str | Path], listener: Listener) -> None:
-    """Run a command and pass on what it says; UserError with its last word if it fails."""
+    """Run a command and pass its output on, line by line; if the command fails, UserError with the last line."""
     said = ""
     own = {name: value for name, value in os.environ.items() if not name.startswith("PYTHON")}
     with subprocess.Popen(
@@ -100,7 +100,7 @@ def _run(command: list[str | Path], listener: Listener) -> None:
 
 
 def _sweep(place: Path) -> None:
-    """Remove what was left half made by a process that was killed."""
+    """Remove environments that killed processes left half made."""
     for left in place.glob(f"{ASIDE}*"):
         with suppress(OSError):
             if left.stat().st_mtime < time.time() - STALE_S:

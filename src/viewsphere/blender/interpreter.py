@@ -55,7 +55,7 @@ PACKAGES = {
 
 @dataclass(frozen=True)
 class Device:
-    """What Cycles can compute on: CPU, CUDA, OPTIX, HIP, METAL or ONEAPI, and its name."""
+    """A device that Cycles can compute on: its kind (CPU, CUDA, OPTIX, HIP, METAL or ONEAPI) and its name."""
 
     kind: str
     name: str
@@ -63,7 +63,7 @@ class Device:
 
 @dataclass(frozen=True)
 class Library:
-    """A system library that is not there, and the Debian or Ubuntu package that has it, where that is known."""
+    """A missing system library, and the Debian or Ubuntu package that brings it, where the package is known."""
 
     name: str
     package: str | None
@@ -71,7 +71,7 @@ class Library:
 
 @dataclass(frozen=True)
 class Graphics:
-    """What EEVEE and Workbench draw with, where that is known; or why they cannot."""
+    """The OpenGL driver that EEVEE and Workbench draw with, where the driver is known; or why they cannot draw."""
 
     driver: str | None = None
     problem: str | None = None
@@ -79,7 +79,7 @@ class Graphics:
 
 @dataclass(frozen=True)
 class Blender:
-    """The Blender of an interpreter: its version, devices and graphics, or what is wrong with it."""
+    """The Blender of one Python interpreter: version, devices and graphics, or the problem that keeps it from working."""
 
     python: Path
     version: str | None = None
@@ -96,11 +96,11 @@ class Blender:
 
 
 def find_blender(python: str | None = None) -> Path:
-    """The interpreter that has bpy.
+    """The Python interpreter whose Blender (the module bpy) is used.
 
     The first of: `python` (a file, an environment's folder or a name on the PATH), $VIEWSPHERE_BLENDER_PYTHON, this
-    interpreter if it has bpy, the environment that `viewsphere doctor --setup-blender` makes. Whether its Blender works is
-    not looked at. Raises UserError for a named one that is not there, MissingExtraError when there is none.
+    interpreter if it has bpy, the environment that `viewsphere doctor --setup-blender` makes. Whether its Blender
+    works is not tried. Raises UserError for a named interpreter that is missing, MissingExtraError when none is found.
     """
     for given, place in ((python, "engine.python"), (os.environ.get(VARIABLE), f"${VARIABLE}")):
         if given:
@@ -114,7 +114,7 @@ def find_blender(python: str | None = None) -> Path:
 
 
 def probe(python: Path) -> Blender:
-    """Start this interpreter's Blender, ask what it is and have it draw a little; takes some seconds, two minutes at most."""
+    """Start this interpreter's Blender, ask for its version and devices, and try to draw; takes two minutes at most."""
     with tempfile.TemporaryDirectory(prefix="viewsphere-probe-") as folder:
         try:
             with BlenderProcess(python, Path(folder) / "log") as process:
@@ -127,7 +127,7 @@ def probe(python: Path) -> Blender:
 
 
 def _graphics(process: BlenderProcess) -> Graphics:
-    """Workbench's first picture tells: EEVEE draws by the same means, but compiles its shaders first."""
+    """Whether OpenGL drawing works, tried with Workbench: EEVEE draws the same way, but compiles its shaders first."""
     try:
         return Graphics(process.ask("draw", DRAW_S, renderer="workbench")["driver"])
     except (BlenderError, BlenderDied) as error:
@@ -155,7 +155,7 @@ def _program(given: str, place: str) -> Path:
 
 
 def _broken(python: Path, error: str) -> Blender:
-    """What is wrong: no bpy at all, libraries that the system lacks, or something else."""
+    """A Blender that did not start, and why: no bpy at all, missing system libraries, or another error."""
     if "No module named 'bpy'" in error:
         return Blender(python, problem=f"it has no bpy: {INSTALL}")
     missing = missing_libraries(error + "\n" + _ldd(_module(python)))
@@ -165,7 +165,7 @@ def _broken(python: Path, error: str) -> Blender:
 
 
 def _module(python: Path) -> str | None:
-    """Where its bpy lies, found without importing it."""
+    """Path of the interpreter's bpy, found without importing bpy."""
     code = "import importlib.util as u; s = u.find_spec('bpy'); print(s.origin if s else '')"
     with suppress(OSError, subprocess.SubprocessError):
         run = subprocess.run([python, "-P", "-c", code], capture_output=True, text=True, timeout=ASK_S)
@@ -174,7 +174,7 @@ def _module(python: Path) -> str | None:
 
 
 def _ldd(module: str | None) -> str:
-    """What Linux says of a shared object's libraries."""
+    """What Linux's `ldd` prints about a shared object's libraries."""
     ldd = shutil.which("ldd")
     if module is None or ldd is None or not sys.platform.startswith("linux"):
         return ""

@@ -1,9 +1,9 @@
-"""One Blender: a program that is started, asked and ended.
+"""One Blender process: starting it, sending it requests, ending it.
 
-It runs `worker/` in the interpreter that has bpy, with factory settings, and none of this process's Python or of the
-user's Blender: neither add-ons nor scripts. Requests and answers are JSON, a line each, over its standard input and output;
-arrays lie in files of a folder that both know. What Blender says besides goes to a log. When this process ends, however it
-does, Blender's input ends, and so do Blender and the folder.
+The Blender process runs `worker/` in the interpreter that has bpy, with factory settings, and with nothing of this process's
+Python or of the user's Blender: neither add-ons nor scripts. Requests and answers are JSON, a line each, over the process's
+standard input and output; arrays lie in files of a folder that both sides know. Blender's other output goes to a log. When
+this process ends, in whatever way, Blender's standard input closes: Blender then removes the folder and ends, too.
 """
 
 from __future__ import annotations
@@ -36,11 +36,11 @@ runpy.run_module("worker", run_name="__main__", alter_sys=True)
 
 ANSWER_S = 120.0
 GRACE_S = 3.0
-"""An idle Blender ends within a few milliseconds of being told."""
+"""Seconds that Blender has to end by itself once its input is closed; an idle Blender takes a few milliseconds."""
 
 MEMORY = Path("/dev/shm")
 LEAST_MEMORY = 2 << 30
-"""Bytes that must be free there: containers often have 64 MB."""
+"""Bytes that must be free in `MEMORY` to be used: containers often have 64 MB."""
 
 ASIDE = "viewsphere-blender-"
 STALE_S = 86_400.0
@@ -51,13 +51,13 @@ SHELLS_SIGNALS = 128
 
 
 class BlenderProcess:
-    """A Blender of one's own, started at once; for one thread at a time.
+    """A Blender process, started at once and owned by this object; only one thread at a time may use it.
 
-    `python` is an interpreter that has bpy (`find_blender`). What Blender says is added to the file `log`, by default one
-    that lasts as long as the process. Arrays and other files for Blender lie in `folder`, which lasts as long. One that is
-    given folders as `readable` reads only what lies there, where the system can see to that (Linux 5.13 and later), and
-    ends with the thread that starts it; its `folder` is where this process keeps temporary files. It works with this many
-    `threads`, 0 for one a core.
+    `python` is an interpreter that has bpy (`find_blender`). Blender's output is appended to the file `log`, by default
+    one that is deleted with the process. Arrays and other files for Blender lie in `folder`, which is deleted with it, too.
+    With `readable`, Blender reads only what lies in these folders, where the system can enforce it (Linux 5.13 and later), and
+    ends with the thread that starts it; its `folder` then lies among this process's temporary files. Blender works with this
+    many `threads`, 0 for one a core.
     """
 
     def __init__(self, python: Path, log: Path | None = None, readable: Sequence[Path] | None = None, threads: int = 0) -> None:
@@ -90,25 +90,25 @@ class BlenderProcess:
 
     @property
     def pid(self) -> int:
-        """Its number in the system."""
+        """The process id of Blender."""
         return self._process.pid
 
     def close(self) -> None:
-        """End it, and remove its folder. It ends by itself when it is forgotten, or when this process ends."""
+        """End Blender and remove its folder, which garbage collection of this object and the end of this process do as well."""
         self._end()
 
     def put(self, array: NDArray[Any]) -> str:
-        """Write an array for the next request to name; once that is answered, the file is gone."""
+        """Write an array to a file that the next request can name, and return its path; that request's answer deletes it."""
         file = self.folder / f"{len(self._put)}.npy"
         np.save(file, array, allow_pickle=False)
         self._put.append(file)
         return str(file)
 
     def ask(self, do: str, timeout_s: float = ANSWER_S, **told: Any) -> Any:
-        """What Blender answers to a request: plain data.
+        """Blender's answer to a request, as plain JSON data.
 
-        Raises BlenderError when it answers that it cannot (a note has the worker's trace), BlenderDied when it has ended
-        or does not answer in time, in which case it is ended.
+        Raises BlenderError when the answer is an error (a note has the worker's trace), BlenderDied when Blender has ended, or
+        does not answer in time: Blender is killed then.
         """
         request = json.dumps({"do": do, **told}).encode() + b"\n"
         begun = time.monotonic()
@@ -118,7 +118,7 @@ class BlenderProcess:
         try:
             answer = self._exchange(request)
         except BaseException:
-            _kill(self._process)  # an answer that comes later would be taken for another request's
+            _kill(self._process)  # a late answer would be taken for the next request's
             raise
         finally:
             timer.cancel()
@@ -132,7 +132,7 @@ class BlenderProcess:
         return answer["ok"]
 
     def _exchange(self, request: bytes) -> dict[str, Any] | None:
-        """The answer to a request; None when there will be none."""
+        """The answer to a request; None when Blender has ended without one."""
         requests, answers = self._process.stdin, self._process.stdout
         assert requests is not None and answers is not None
         try:
@@ -141,18 +141,18 @@ class BlenderProcess:
             while line := answers.readline():
                 if line.startswith((b'{"ok"', b'{"error"')) and line.endswith(b"\n"):
                     return json.loads(line)
-        except (OSError, ValueError):  # it has ended, or was closed
+        except (OSError, ValueError):  # Blender has ended, or was closed
             return None
         return None
 
     def _forget(self) -> None:
-        """Remove the arrays that were put: they have been read."""
+        """Remove the files of `put`: the request that named them has been answered."""
         for file in self._put:
             file.unlink(missing_ok=True)
         self._put.clear()
 
     def _died(self, do: str, seconds: float, timeout_s: float) -> BlenderDied:
-        """How it ended, in one line."""
+        """The error that says, in one line, how Blender ended."""
         try:
             status = self._process.wait(GRACE_S)
         except subprocess.TimeoutExpired:
@@ -168,7 +168,7 @@ class BlenderProcess:
         return BlenderDied(f"Blender died ({how}) after {seconds:.1f} s of `{do}`; its log ends with: {said}", by)
 
     def _last_lines(self) -> list[str]:
-        """The end of what this Blender said."""
+        """The last lines that this Blender wrote to its log."""
         with suppress(OSError), self.log.open("rb") as file:
             size = file.seek(0, os.SEEK_END)
             file.seek(max(self._log_start, size - TAIL_BYTES))
@@ -178,7 +178,7 @@ class BlenderProcess:
 
 
 def _end(process: subprocess.Popen[bytes], folder: Path, owner: int) -> None:
-    """Let it end, or end it; a forked copy of its owner does nothing."""
+    """Let Blender end by itself, else kill it, and remove its folder; a forked copy of the owning process does nothing."""
     if os.getpid() != owner:
         return
     assert process.stdin is not None and process.stdout is not None
@@ -194,7 +194,7 @@ def _end(process: subprocess.Popen[bytes], folder: Path, owner: int) -> None:
 
 
 def _kill(process: subprocess.Popen[bytes]) -> None:
-    """End it, and what it runs in where the interpreter is a script that starts one: they would hold the pipes open."""
+    """Kill Blender with its whole process group: where the interpreter is a script, its children would keep the pipes open."""
     if os.name != "posix":
         process.kill()
     elif process.returncode is None:
@@ -203,7 +203,7 @@ def _kill(process: subprocess.Popen[bytes]) -> None:
 
 
 def _signal(status: int) -> str | None:
-    """The signal that ended a process, or what a script started that tells its own end by it (128 and more)."""
+    """Name of the signal that ended a process with this exit status, or that a shell script reports (128 and more)."""
     number = -status if status < 0 else status - SHELLS_SIGNALS
     with suppress(ValueError):
         return signal.Signals(number).name
@@ -211,7 +211,7 @@ def _signal(status: int) -> str | None:
 
 
 def _environment(python: Path, folder: Path) -> dict[str, str]:
-    """This process's environment without what would lead Blender to files of the user's, or of another Python's."""
+    """This process's environment without variables that would lead Blender to the user's files or to another Python's."""
     foreign = ("BLENDER_",) if python == Path(sys.executable) else ("BLENDER_", "PYTHON", "__PYVENV_LAUNCHER__")
     kept = {name: value for name, value in os.environ.items() if not name.startswith(foreign)}
     own = {name: str(folder) for name in ("TMPDIR", "TEMP", "TMP")}
@@ -219,7 +219,7 @@ def _environment(python: Path, folder: Path) -> dict[str, str]:
 
 
 def _private_folder() -> Path:
-    """A new folder that others cannot read, in memory where there is enough."""
+    """A new folder that other users cannot read, in `MEMORY` where enough of it is free, else among the temporary files."""
     place = Path(tempfile.gettempdir())
     with suppress(OSError):
         if os.access(MEMORY, os.W_OK) and shutil.disk_usage(MEMORY).free >= LEAST_MEMORY:
@@ -229,7 +229,7 @@ def _private_folder() -> Path:
 
 
 def _sweep(place: Path) -> None:
-    """Remove what was left behind where both processes were killed at once."""
+    """Remove old folders that stayed because this process and its Blender were killed at the same time."""
     for left in place.glob(f"{ASIDE}*"):
         with suppress(OSError):
             if left.stat().st_mtime < time.time() - STALE_S:

@@ -1,6 +1,6 @@
 """The command line: recipes in, data sets out.
 
-Workers import the main program anew: commands are imported when there is one to run.
+Worker processes import the main program again: so commands are imported only when one of them is run.
 """
 
 from __future__ import annotations

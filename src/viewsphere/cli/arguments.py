@@ -41,7 +41,7 @@ def load_recipe(file: Path, changes: Sequence[str] | None = None) -> Recipe:
 
 
 def split(formats: str | None) -> tuple[str, ...] | None:
-    """Names with commas between them, None for None."""
+    """The names in a comma-separated list; None for None."""
     return None if formats is None else tuple(f.strip() for f in formats.split(",") if f.strip())
 
 

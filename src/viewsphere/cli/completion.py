@@ -1,4 +1,4 @@
-"""What the Tab key offers; nothing heavy is imported for it."""
+"""Completions for the Tab key; nothing heavy is imported, so that they appear at once."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ BASH = "complete_bash"
 
 
 def models(incomplete: str) -> list[str]:
-    """Zoo families, beside the files here; none where it can be no family: then the shell completes files."""
+    """Zoo families and files of this folder; nothing where the word can be no family: then the shell completes files."""
     if not ZOO.startswith(incomplete[: len(ZOO)]):
         return []
     here = () if incomplete.startswith(ZOO) else Path().glob(f"{incomplete}[!.]*")
@@ -26,18 +26,18 @@ def models(incomplete: str) -> list[str]:
 
 
 def formats(incomplete: str) -> list[str]:
-    """Names of formats, behind those that are given and a comma."""
+    """The comma-separated formats typed so far, each time followed by one more format."""
     given, comma, _ = incomplete.rpartition(",")
     return [given + comma + name for name in plugins.names("formats") if name not in given.split(",")]
 
 
 def axes() -> list[str]:
-    """Signed axes."""
+    """Axes with signs, such as +x."""
     return [sign + axis for axis in "xyz" for sign in "+-"]
 
 
 def changes(incomplete: str) -> list[str]:
-    """Fields that the recipe to start from shows, and the engines for `engine=`."""
+    """The fields in the template of `viewsphere new`; after `engine=` the engines."""
     if incomplete.startswith("engine="):
         return [f"engine={name}" for name in plugins.names("engines")]
     return [f"{field}=" for field in _fields()]
@@ -56,7 +56,7 @@ def _fields() -> Iterable[str]:
 
 
 def in_bash(run: Callable[[], object], environ: MutableMapping[str, str]) -> None:
-    """Answer bash, which takes `zoo:car` and `engine=raster` for three words: it gets what stands behind the last of them."""
+    """Complete in bash, which splits `zoo:car` and `engine=raster` into three words: completions are for the last one alone."""
     words, at = environ["COMP_WORDS"].split("\n"), int(environ["COMP_CWORD"])
     whole: list[str] = []
     place = 0

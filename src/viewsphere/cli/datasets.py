@@ -125,7 +125,7 @@ def report(
 
 
 def _proof(dataset: Dataset, frames: int) -> Proof:
-    """What `check` finds, for a report."""
+    """The findings of `check` on this many frames, for a report."""
     from viewsphere.check import check as prove
     from viewsphere.report import Proof
 

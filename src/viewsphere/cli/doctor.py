@@ -1,4 +1,4 @@
-"""What works on this machine."""
+"""The command `doctor`: tells what works on this machine."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def doctor(
 
 
 def examine() -> dict[str, Any]:
-    """What was found, as plain data."""
+    """The findings about this machine, as plain data."""
     return {
         "viewsphere": version("viewsphere"),
         "python": {"version": platform.python_version(), "executable": sys.executable},
@@ -52,7 +52,7 @@ def examine() -> dict[str, Any]:
 
 
 def _set_up_blender() -> None:
-    """Make the environment, unless there is one that works."""
+    """Make the Python environment with Blender, unless a working Blender exists."""
     from viewsphere.blender.environment import home, interpreter_of, make_environment
     from viewsphere.blender.interpreter import probe
 
@@ -70,7 +70,7 @@ def _processor() -> dict[str, Any]:
 
 
 def _kernels() -> dict[str, Any]:
-    """Where compiled kernels are kept; whether that can be written, and has some."""
+    """The folder of compiled kernels, whether it is writable, and whether it holds any."""
     from viewsphere.kernels.kernel_cache import kernel_folder
 
     folder = kernel_folder()
@@ -80,7 +80,7 @@ def _kernels() -> dict[str, Any]:
 
 
 def _extras() -> dict[str, list[str]]:
-    """Packages of each extra that this installation knows, without Blender: that may lie in another interpreter."""
+    """Packages of each extra of this installation, except Blender's, which may lie in another interpreter."""
     found: dict[str, list[str]] = {}
     for requirement in requires("viewsphere") or ():
         extra = re.search(r"""extra == ['"]([\w-]+)['"]""", requirement)
@@ -104,7 +104,7 @@ def _version(package: str) -> str | None:
 
 
 def _blender() -> dict[str, Any]:
-    """The interpreter that has Blender, and what it says; `problem` is None where all is well."""
+    """The interpreter that has Blender, and that Blender's version, devices and graphics; `problem` is None if all works."""
     from viewsphere.blender.interpreter import find_blender, probe
 
     try:
@@ -125,7 +125,7 @@ def _blender() -> dict[str, Any]:
 
 
 def _lines(found: dict[str, Any]) -> Iterator[tuple[str, str]]:
-    """The same in words: a name and what was found."""
+    """The findings in words: pairs of a name and a text."""
     python, processor, kernels, blender = (found[name] for name in ("python", "processor", "kernels", "blender"))
     yield "viewsphere", found["viewsphere"]
     yield "Python", f"{python['version']}, {python['executable']}"

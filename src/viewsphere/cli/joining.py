@@ -1,4 +1,4 @@
-"""Commands that make a data set of others."""
+"""Commands that make a data set of other data sets."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What to write when a command is given nothing, with what lies in this folder."""
+"""Suggests what to type when a command lacks its arguments, with files that lie in this folder."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ MODELS = tuple(f"{folder}[!.]*.{suffix}" for folder in ("", "[!.]*/") for suffix
 
 
 class Command(TyperCommand):
-    """A command that says what to write next when it is given nothing and needs something."""
+    """A command that suggests what to type when it needs arguments and got none."""
 
     def parse_args(self, ctx: typer.Context, args: list[str]) -> list[str]:  # pyright: ignore[reportIncompatibleMethodOverride]
-        """The arguments, as typer takes them; raises UserError when there are none and some are needed."""
+        """Parse the arguments by typer; raises UserError with a suggestion if arguments are required and none is given."""
         if not args and not ctx.resilient_parsing and any(p.required for p in self.params):
             raise UserError(for_command(ctx.info_name or ""))
         return super().parse_args(ctx, args)  # pyright: ignore[reportArgumentType]
 
 
 def for_command(name: str) -> str:
-    """What a command expects, and an example with what is found here."""
+    """A message of the arguments that a command expects, with an example made of files found here."""
     data = _near("*/store/plan.json", "store/plan.json")
     folder = data[0].parent.parent if data else Path("cars-ds")
     found = f"found {folder} here" if data else "no data set yet? `viewsphere render` makes one"
@@ -49,7 +49,7 @@ def for_command(name: str) -> str:
 
 
 def for_render(given: Path | None, output: Path | None) -> str:
-    """The same for `render`, which may lack its recipe, its folder or both."""
+    """The message for `render`, which may lack its recipe, its output folder or both."""
     if given is None:
         first = _recipe_here()
         found = "found nothing" if output is None else "found no recipe"
@@ -61,7 +61,7 @@ def for_render(given: Path | None, output: Path | None) -> str:
 
 
 def _recipe() -> Path:
-    """A recipe that lies here, or the one that `viewsphere new cars` would write."""
+    """A recipe found here, or the path of the one that `viewsphere new cars` would write."""
     return next(iter(_near(*RECIPES)), Path("cars/recipe.yaml"))
 
 

@@ -1,4 +1,4 @@
-"""What the user sees: progress, summaries, complaints; and the files commands leave beside data sets."""
+"""Output for the user: progress, summaries, errors; and files that commands write besides data sets."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ MOST_FINDINGS = 20
 
 
 def complain(error: ViewsphereError, status: int) -> None:
-    """Print an error, a line each problem, and leave with this status."""
+    """Print an error, one line for each problem, and exit with this status."""
     for line in str(error).splitlines():
         typer.echo(f"viewsphere: {line}", err=True)
     sys.exit(status)
@@ -47,7 +47,7 @@ def write_picture(file: Path, picture: Any) -> None:
 
 
 def print_json(value: object) -> None:
-    """Print for scripts."""
+    """Print a value as JSON, for scripts."""
     import json
 
     typer.echo(json.dumps(value, indent=2))
@@ -62,13 +62,13 @@ def print_plan(planned: Plan) -> None:
 
 
 def print_estimate(cost: Estimate) -> None:
-    """Print what a whole data set will take."""
+    """Print the estimated time and size of a whole data set."""
     crew = f"{cost.workers} worker{'s' if cost.workers > 1 else ''}"
     typer.echo(f"about {_duration(cost.seconds)} with {crew}, {_size(cost.bytes)} on disk")
 
 
 def _duration(seconds: float) -> str:
-    """Two units at most: 40 s, 12 min, 6 h 20 min, 3 d 4 h."""
+    """A duration in at most two units: 40 s, 12 min, 6 h 20 min, 3 d 4 h."""
     if seconds < 90:
         return f"{math.ceil(seconds)} s"
     minutes = round(seconds / 60)
@@ -80,7 +80,7 @@ def _duration(seconds: float) -> str:
 
 
 def _size(count: float) -> str:
-    """In decimal units, as disks are sold: 45 GB, 1.3 GB, 320 MB."""
+    """A size in bytes, in decimal units, as on disks: 45 GB, 1.3 GB, 320 MB."""
     unit, name = (1e9, "GB") if count >= 1e9 else (1e6, "MB")
     return f"{count / unit:.1f} {name}" if 1e9 <= count < 1e10 else f"{math.ceil(count / unit)} {name}"
 
@@ -102,7 +102,7 @@ def print_report(report: Report, repaired: Sequence[str] = ()) -> None:
 
 
 def _print_warnings(warnings: Mapping[str, Sequence[str]]) -> None:
-    """Of models by their keys; what is said of several models, such as all that are taken of one file, is said once."""
+    """Print warnings, by the models' keys; a warning shared by several models, as by all parts of a file, is printed once."""
     models: dict[str, list[str]] = {}
     for key, said in warnings.items():
         for warning in said:
@@ -115,7 +115,7 @@ def _print_warnings(warnings: Mapping[str, Sequence[str]]) -> None:
 
 
 def print_summary(summary: Summary, as_json: bool) -> None:
-    """Print what a run left."""
+    """Print the summary of a run."""
     if as_json:
         print_json({**summary.__dict__, "root": str(summary.root)})
         return
@@ -130,7 +130,7 @@ def print_summary(summary: Summary, as_json: bool) -> None:
 
 
 class ProgressBar:
-    """A line a phase: what is done, frames a second, time left."""
+    """A line for each phase: work done, frames a second, time left."""
 
     def __init__(self, quiet: bool) -> None:
         self.kept = "nothing was finished yet"

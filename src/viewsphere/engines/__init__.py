@@ -1,4 +1,4 @@
-"""Painters of pictures: what an engine must offer."""
+"""Engines paint the pictures of shots; these are the protocols that an engine implements."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ class Stage(Protocol):
     def color(self, instant: int, sensor: int, visibility: Visibility, transparent: bool) -> NDArray[np.uint8]:
         """The picture of a sensor at an instant, (H, W, 3) uint8 sRGB; `visibility` is truth's buffer of `at(instant)`.
 
-        With `transparent`, (H, W, 4) with straight alpha and no background: black where nothing is seen. Over any plain
-        background it gives the picture with that background.
+        With `transparent`, (H, W, 4) with straight alpha and no background: black where nothing is seen. Laid over
+        a plain background, this picture equals the one painted with that background.
         """
         ...
 
     def of(self, shot: Shot) -> Self:
-        """The same for another shot, one of an equal `stage_key`: nothing that stands still is built again."""
+        """A stage for another shot of an equal `stage_key`, which reuses everything built for things that stand still."""
         ...
 
 

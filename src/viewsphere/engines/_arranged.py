@@ -30,7 +30,7 @@ class Arranged:
 
     @property
     def meshes(self) -> list[Mesh]:
-        """What the geometry was built from."""
+        """The meshes that the geometry was built from."""
         return present(self.things, self.whole)
 
     @property
@@ -50,9 +50,9 @@ class Arranged:
 
 @dataclass(frozen=True, eq=False)
 class Arrangements:
-    """A shot's things at each of its instants; what stands still is loaded and placed once.
+    """A shot's things at each of its instants; things that stand still are loaded and placed once.
 
-    The triangles of a few instants are there at once: see `truth.moving.Ring`.
+    The triangles of the last few instants are kept: see `truth.moving.Ring`.
     """
 
     shot: Shot
@@ -63,23 +63,23 @@ class Arrangements:
 
     @classmethod
     def build(cls, shot: Shot, load: Callable[[ModelSpec], Mesh]) -> Arrangements:
-        """Of a shot, with all its models loaded; `load` gives a model's normalised mesh."""
+        """The arrangements of a shot, with all its models loaded; `load` gives a model's normalised mesh."""
         ring = Ring(shot.scene.ground is not None, shot.label_alpha)
         return cls(shot, load, tuple(placed_meshes(shot.things, load)), None, ring).of(shot)
 
     def of(self, shot: Shot) -> Arrangements:
-        """The same for another shot, one of an equal `stage_key`."""
+        """The arrangements of another shot of an equal `stage_key`, which share the loaded meshes."""
         own = replace(self, shot=shot)
         return replace(own, floor=shot_floor(shot, lambda instant: own._meshes(shot.things_at(instant))))
 
     def at(self, instant: int) -> Arranged:
-        """As they stand at an instant, counted from 0 in the shot."""
+        """The things as they stand at an instant, counted from 0 in the shot."""
         things = self.shot.things_at(instant)
         meshes = self._meshes(things)
         moving = tuple(i for i, thing in enumerate(self.shot.things) if not thing.motion.is_still)
         return Arranged(things, meshes, self.ring.at(things, meshes, self.floor), moving, bool(self.shot.sequence))
 
     def _meshes(self, things: tuple[Thing, ...]) -> tuple[Mesh, ...]:
-        """Of these things: what stands still is the shot's own."""
+        """Meshes of these things; a model that does not change with time keeps the mesh loaded for the shot."""
         held = zip(self.shot.things, things, self.meshes, strict=True)
         return tuple(mesh if now.model is own.model else self.load(now.model) for own, now, mesh in held)

@@ -17,7 +17,7 @@ OPENS_SCENES = True
 """Workbench renders .blend files that are the scene."""
 
 CATCHES_SHADOWS = False
-"""There is no ground of which only the shadows are seen."""
+"""Workbench has no shadow catcher."""
 
 
 def check(options: Mapping[str, JsonValue]) -> None:

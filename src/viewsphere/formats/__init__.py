@@ -1,4 +1,4 @@
-"""Ways to write a data set: what a format must offer."""
+"""Formats that a data set can be exported to; these are the protocols that a format implements."""
 
 from __future__ import annotations
 
@@ -13,25 +13,25 @@ if TYPE_CHECKING:
     from viewsphere.store import Dataset
 
 Remark = tuple[int | None, str]
-"""What is wrong with an export, and with which frame of the plan; None: with the export as a whole."""
+"""A fault of an export: the number of its frame in the plan (None: of the whole export), and what is wrong."""
 
 
 class Format(Protocol):
     """A module that writes a data set in one format: `writer`.
 
-    What it may have besides: `CHANNELS`, names of channels: a run that does not keep them is refused before it begins;
-    `check()`, which raises a UserError where the format cannot be written; `verify(dataset, folder, sampled)` of `Verified`, by
-    which `viewsphere check` proves an export; `read(path, *, keep_going) -> ForeignDataset` (`viewsphere.store.foreign`), by
-    which data sets of the format are imported.
+    A format may also have: `CHANNELS`, names of channels: a run that does not keep them is refused before it begins;
+    `check()`, which raises a UserError where the format cannot be written; `verify(dataset, folder, sampled)` of `Verified`,
+    with which `viewsphere check` proves an export; `read(path, *, keep_going) -> ForeignDataset` (`viewsphere.store.foreign`),
+    with which data sets of the format are imported.
     """
 
     def writer(
         self, dataset: Dataset, folder: Path, note: Callable[[str], None]
     ) -> AbstractContextManager[Callable[[Sample], None]]:
-        """Ready to write into this empty folder; images by `dataset.link`.
+        """A context manager that writes an export into this empty folder; stored pictures are put there by `dataset.link`.
 
-        The context gives a function that is called with the finished samples, one after another in frame order, and keeps
-        none of them. It ends when there are no more. `note` takes lines for the user.
+        Entering the context gives a function that is called with the finished samples, one after another in frame order, and
+        keeps none of them. Leaving the context finishes the export. `note` takes lines for the user.
         """
         ...
 

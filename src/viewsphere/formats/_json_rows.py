@@ -1,4 +1,4 @@
-"""JSON files of any size, row by row; which values are rows is the format's to say."""
+"""Reads JSON files of any size row by row; the format says which values are rows."""
 
 from __future__ import annotations
 
@@ -9,21 +9,22 @@ from typing import IO, Any
 
 BLOCK = 1 << 16
 LONGEST = 1 << 24
-"""Characters that are read at once at least, and that a row has at most."""
+"""Fewest characters read at once (`BLOCK`), and most characters of a row (`LONGEST`)."""
 
 LONGEST_NUMBER = 32
-"""Characters behind a number that may belong to it, too."""
+"""Characters that must be known behind a number to be sure that the number has ended."""
 
 Where = tuple[str, ...]
-"""Keys from the top of a file to a value in it; that of a list's item is its `id`, or else its place."""
+"""Keys from the top of a file to a value in it; the key of a list's item is the item's `id`, or else its index."""
 
 Row = tuple[Where, Any]
 
 
 def rows(file: Path, opened: Collection[Where]) -> Iterator[Row]:
-    """The values of a JSON file; in the place of those that are `opened` (whose keys are these; "*" is any) their items.
+    """The values of a JSON file and their keys; objects and lists whose keys are in `opened` ("*" is any key) are replaced by
+    their items.
 
-    Raises ValueError for what is no JSON, OSError where the file cannot be read.
+    Raises ValueError for a file that is no JSON, OSError where the file cannot be read.
     """
     with file.open(encoding="utf-8", newline="") as text:
         reader = _Reader(text)
@@ -43,7 +44,7 @@ def _below(where: Where, reader: _Reader, opened: Collection[Where], *, numbered
 
 
 def _items(where: Where, reader: _Reader, opened: Collection[Where], *, named: bool) -> Iterator[Row]:
-    """Those of an object (`named`) or of a list."""
+    """The items of an object (`named`) or of a list."""
     reader.take("{" if named else "[")
     place = 0
     while reader.peek() != ("}" if named else "]"):
@@ -59,7 +60,7 @@ def _items(where: Where, reader: _Reader, opened: Collection[Where], *, named: b
 
 
 class _Reader:
-    """What is not read yet of a text; no more is held than the next value needs."""
+    """Reads values from the unread rest of a text; no more of the text is held than the next value needs."""
 
     def __init__(self, text: IO[str]) -> None:
         self._text = text
@@ -67,7 +68,7 @@ class _Reader:
         self._decoder = json.JSONDecoder()
 
     def peek(self) -> str:
-        """The next character that is no white space; raises ValueError where there is none."""
+        """The next character that is no white space; raises ValueError at the end of the text."""
         while True:
             while self._at < len(self._buffer) and self._buffer[self._at] in " \t\n\r":
                 self._at += 1
@@ -105,7 +106,7 @@ class _Reader:
         raise ValueError(f"character {self._gone + self._at:,}: expected the file's end, found {found!r}")
 
     def _more(self) -> bool:
-        """Read on, behind a long value more; False at the file's end."""
+        """Read another block, larger within a long value; False at the file's end."""
         block = self._text.read(max(BLOCK, len(self._buffer) - self._at))
         if block:
             self._gone += self._at

@@ -1,7 +1,7 @@
-"""Labels: everything that is said of a picture and computed from truth's triangles; one file a label, which states `LABEL`.
+"""Labels: everything computed about a picture from truth's triangles; each label is one file, which defines `LABEL`.
 
-`ChannelLabel`s are arrays of pixels, which a recipe's `channels` ask for; `ObjectLabel`s are fields of objects, which always
-are computed. Third parties add one by an entry point of the group `viewsphere.labels` that names such a module.
+`ChannelLabel`s are arrays of pixels, computed if a recipe's `channels` name them; `ObjectLabel`s are fields of objects, and
+always computed. Third parties add a label by an entry point of the group `viewsphere.labels` that names such a module.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ __all__ = [
 
 @cache
 def labels() -> dict[str, Label]:
-    """All labels by name, the channels that recipes keep by default first, then by the alphabet."""
+    """All labels by name, first the channels that recipes keep by default, then the others in alphabetical order."""
     names = sorted(plugins.names("labels"), key=lambda name: (name not in DEFAULT_CHANNELS, name))
     found: dict[str, Label] = {name: plugins.load("labels", name).LABEL for name in names}
     for name, label in found.items():
@@ -77,20 +77,20 @@ def object_labels() -> tuple[ObjectLabel, ...]:
 
 @cache
 def channels() -> dict[str, Channel]:
-    """All that a recipe's `channels` may name, passes first."""
+    """All channels that a recipe's `channels` may name: first the passes, then the labels of pixels."""
     return PASSES | {name: label.channel for name, label in channel_labels().items()}
 
 
 def drawings() -> tuple[Drawing, ...]:
-    """How labels are shown, in the order of the labels' names."""
+    """The drawings of all labels that have one, in the order of the labels' names."""
     return tuple(label.drawing for _, label in sorted(labels().items()) if label.drawing)
 
 
 def observe(geometry: Geometry, camera: Camera, visibility: Visibility, names: Iterable[str]) -> dict[str, NDArray[Any]]:
     """The named labels of pixels, each (H, W) or (H, W, components) as its file says.
 
-    `visibility` is `rasterize(geometry, camera)`. `instances` are those that the visibility keeps, so not to be written to.
-    Raises ValueError for other names.
+    `visibility` is `rasterize(geometry, camera)`. The array of `instances` is shared with the visibility and must not be
+    written to. Raises ValueError for names that are no labels of pixels.
     """
     known, sight, names = channel_labels(), Sight(geometry, camera, visibility), tuple(names)
     unknown = [name for name in names if name not in known]
@@ -109,12 +109,13 @@ def annotate(
     models: Sequence[str],
     real_sizes: Sequence[Size | None] | None = None,
 ) -> tuple[ObjectAnnotation, ...]:
-    """Annotations of all objects (things of an id) that are there at an instant (counted from 0 in the shot), seen or not, in
-    the order of their ids.
+    """Annotations of all objects (things with an id) present at an instant (counted from 0 in the shot), visible or not, in the
+    order of their ids.
 
     `boxes[i]` is the 3D box (8, 3) of object i + 1's model in the object's axes, `models[i]` the path of that model in the data
-    set and `real_sizes[i]` its true size (by default the one its spec gives in numbers); `geometry` is the shot's stage and
-    `visibility` what this camera sees of it. An object that covers no pixel has an empty mask, no `box2d` and visibility 0.
+    set and `real_sizes[i]` its true size (by default the one its spec gives in numbers); `geometry` is the stage's at
+    this instant, and `visibility` is `rasterize(geometry, camera)`. An object that covers no pixel has an empty mask, no
+    `box2d` and visibility 0.
     """
     objects = shot.objects
     if not len(objects) == len(boxes) == len(models) == geometry.object_count:

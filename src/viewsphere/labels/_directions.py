@@ -1,4 +1,4 @@
-"""What holds of all directions that are kept: the two kinds of normals."""
+"""The proof shared by both labels of normals: the values must be unit vectors."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ TOLERANCE = 1e-5
 
 
 def unit_proof(name: str) -> Callable[[Sample, Models], Iterator[str]]:
-    """The proof that a channel of directions holds unit vectors, or 0 where there is none."""
+    """The proof that a channel of directions holds unit vectors, or 0 where nothing is seen."""
 
     def prove(sample: Sample, models: Models) -> Iterator[str]:
         array = channel_of(sample, name)

@@ -1,4 +1,4 @@
-"""What a label is: one file in `viewsphere.labels` states one as `LABEL`."""
+"""The classes of labels; each file of `viewsphere.labels` defines one label as `LABEL`."""
 
 from __future__ import annotations
 
@@ -27,17 +27,17 @@ Models = Mapping[str, ModelFacts]
 """Models of a data set by their keys."""
 
 Proof = Callable[[Sample, Models], Iterator[str]]
-"""Yields a message for whatever of a stored sample contradicts the rest of it."""
+"""Yields a message for each value of a stored sample that contradicts the rest of the sample."""
 
 
 def trusted(sample: Sample, models: Models) -> Iterator[str]:
-    """The proof of a label that nothing else in a sample says anything of: only computing it again proves it."""
+    """The proof of a label about which nothing else in a sample says anything: only computing the label again proves it."""
     yield from ()
 
 
 @dataclass(frozen=True)
 class Needs:
-    """What a label is computed from besides its own instant and sensor: offsets of instants (-1 is the one before), and names
+    """The inputs of a label besides its own instant and sensor: offsets of instants (-1 is the one before), and names
     of other sensors.
     """
 
@@ -52,14 +52,14 @@ class Needs:
 
     @property
     def is_some(self) -> bool:
-        """Whether it needs anything else."""
+        """Whether the label needs other instants or sensors."""
         return bool(self.instants or self.sensors)
 
 
 @dataclass(frozen=True)
 class Drawing:
-    """How `preview` shows a label, by what name: pixels of the picture changed, lines drawn over it at a scale, or another
-    picture (of the sample's size) beside it.
+    """How `preview` shows a label, and under which name: pixels of the picture changed, lines drawn over it at a scale, or
+    another picture (of the sample's size) beside it.
     """
 
     name: str
@@ -70,7 +70,7 @@ class Drawing:
 
 @dataclass(frozen=True, kw_only=True)
 class Label:
-    """What all labels state: the name of their file, what they mean, and their frame of reference.
+    """The properties of all labels: `name` (that of their file), `meaning`, and `axes`, their frame of reference.
 
     `prove` compares a stored sample with itself, which is quick; besides, `check` computes every label again.
     """
@@ -85,7 +85,7 @@ class Label:
 
 @dataclass(frozen=True, kw_only=True)
 class ChannelLabel(Label):
-    """A label of pixels, kept as a file of its own: (height, width) or (height, width, components); `empty` where nothing is
+    """A label of pixels, stored as a separate file: (height, width) or (height, width, components); `empty` where nothing is
     seen. `encoding` is the default kind of file: png16 for ids, tiff for whatever has to be exact.
     """
 
@@ -98,14 +98,14 @@ class ChannelLabel(Label):
 
     @property
     def channel(self) -> Channel:
-        """What files are written by."""
+        """The channel that describes the label's file."""
         return Channel(self.name, self.dtype, self.components, self.unit, self.empty, self.encoding, self.meaning)
 
 
 @dataclass(frozen=True)
 class Field:
     """One field of an object: a number, a text or a plain dataclass of these (`shape` is empty), a tuple of numbers, or an
-    array. `optional`: None says that there is none.
+    array. `optional`: None says that the object has no such value.
     """
 
     name: str
@@ -118,7 +118,7 @@ class Field:
     optional: bool = False
 
     def plain(self, value: Any) -> Any:
-        """The value as JSON has it; NaN becomes null."""
+        """The value as plain JSON data; NaN becomes null."""
         if hasattr(value, "__dataclass_fields__"):
             return {name: _without_nan(part) for name, part in value.__dict__.items()}
         if isinstance(value, np.ndarray):
@@ -159,7 +159,7 @@ def _plainly(one: Any, other: Any) -> bool:
 
 
 def nothing(annotation: ObjectAnnotation) -> None:
-    """What is kept of a label that follows from the shot and its models."""
+    """The `keep` of labels that follow from the shot and its models: nothing is stored."""
     return
 
 
@@ -167,9 +167,9 @@ def nothing(annotation: ObjectAnnotation) -> None:
 class ObjectLabel(Label):
     """A label of objects: one field or several that are computed together.
 
-    `compute(sight, i)` gives the fields of the object of id i + 1. `keep` gives, as JSON, what of them does not follow from the
-    shot and its models, None where nothing is left; `restore(kept, placement, annotation)` makes all fields of that again,
-    equal to the last bit: other labels' fields are there as attributes of the annotation.
+    `compute(sight, i)` gives the fields of the object of id i + 1. `keep` gives, as JSON, the part of them that does not follow
+    from the shot and its models, None if everything follows. `restore(kept, placement, annotation)` computes all fields from
+    this part again, equal to the last bit; other labels' fields are available as attributes of the annotation.
     """
 
     fields: tuple[Field, ...]
@@ -188,7 +188,7 @@ class ObjectLabel(Label):
         axes: str = "",
         drawing: Drawing | None = None,
     ) -> ObjectLabel:
-        """A label that follows from where an object and the camera are and from the model: nothing of it is kept."""
+        """A label computed from the poses of object and camera and from the model alone: nothing of it is stored."""
         return ObjectLabel(
             name=name,
             meaning=meaning,
@@ -207,7 +207,7 @@ def rendered(sample: Sample) -> list[ObjectAnnotation]:
 
 
 def channel_of(sample: Sample, name: str) -> Array | None:
-    """A channel, None if it is not there or cannot be read, which another proof says."""
+    """A channel, None if it is missing or cannot be read, which another proof reports."""
     try:
         array = sample.channels[name]
     except (KeyError, ViewsphereError):

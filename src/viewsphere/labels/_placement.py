@@ -1,4 +1,4 @@
-"""Where an object is in a picture, as its shot and its model say: what labels share that need no pixel."""
+"""An object's pose in a picture, from its shot and its model: the input of labels that need no pixels."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Float = NDArray[np.float64]
 
 
 class ModelFacts(Protocol):
-    """What is known of a normalised model: its OBJ file (relative to the data set's root), its box (8, 3) in its own axes, its
+    """Facts about a normalised model: its OBJ file (relative to the data set's root), its box (8, 3) in its own axes, its
     true size if known (metres), and its category.
     """
 
@@ -40,7 +40,7 @@ class ModelFacts(Protocol):
 @dataclass(frozen=True, eq=False)
 class Placement:
     """One object in one picture: its model and pose (world from object), the camera, and the angular resolution of pose
-    categories. `known` gives what is known of its model, and is asked when that is needed.
+    categories. `known` loads the facts about its model, and is called when they are first needed.
     """
 
     spec: ModelSpec
@@ -51,7 +51,7 @@ class Placement:
 
     @cached_property
     def facts(self) -> ModelFacts:
-        """What is known of the model."""
+        """The facts about the model."""
         return self.known()
 
     @property
@@ -61,17 +61,17 @@ class Placement:
 
     @cached_property
     def world_from_object(self) -> Float:
-        """(4, 4)."""
+        """Object axes to world axes, (4, 4), rigid, metres."""
         return np.array(self.pose, np.float64)
 
     @cached_property
     def camera_from_world(self) -> Float:
-        """(4, 4)."""
+        """World axes to camera axes (OpenCV), (4, 4), rigid, metres."""
         return rigid(self.camera.R, self.camera.t)
 
     @cached_property
     def camera_from_object(self) -> Float:
-        """(4, 4)."""
+        """Object axes to camera axes (OpenCV), (4, 4), rigid, metres."""
         return compose(self.camera_from_world, self.world_from_object)
 
     @cached_property
@@ -84,8 +84,8 @@ def view_of(camera_from_object: Float, center: Float) -> View:
     """Orbit angles, distance and tilt of the camera around the point `center` (3,) of the object's own axes.
 
     Azimuth is in [0, 360). Tilt is in [-180, 180]: the camera's roll once it is turned, by the shortest
-    way, to look at the point; so for a camera that looks at it anyway these are the numbers of its pose.
-    Straight above or below, where azimuth and tilt are one, tilt is 0.
+    way, to look at the point; so for a camera that looks at the point, the angles equal its viewpoint's.
+    Straight above or below, where azimuth and tilt are the same rotation, tilt is 0.
     """
     rows: list[list[float]] = camera_from_object[:3].tolist()
     columns = [[row[k] for row in rows] for k in range(3)]
@@ -111,7 +111,7 @@ def view_of(camera_from_object: Float, center: Float) -> View:
 
 
 def _degrees(angle: float) -> float:
-    """Degrees to 1e-9, so that a full turn less the last digit is 0 and not 360."""
+    """Radians in degrees, rounded to 1e-9, so that a full turn less a rounding error becomes 0 and not 360."""
     return round(math.degrees(angle), 9) + 0.0
 
 

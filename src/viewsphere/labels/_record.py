@@ -1,4 +1,4 @@
-"""Objects as plain JSON and back, exactly: whole, or only what does not follow from their shot and models."""
+"""Objects as plain JSON and back, exactly: whole, or short, without everything that follows from their shot and models."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _OWN = frozenset(f.name for f in fields(ObjectAnnotation))
 
 
 def annotation_of(object_id: int, values: Iterable[Mapping[str, Any]], source: Mapping[str, Any] | None = None) -> Any:
-    """The annotation with these fields; those that `ObjectAnnotation` does not name go to `more`."""
+    """The annotation with these fields; fields that `ObjectAnnotation` lacks go to `more`."""
     own: dict[str, Any] = {}
     for some in values:
         own.update(some)
@@ -26,7 +26,7 @@ def annotation_of(object_id: int, values: Iterable[Mapping[str, Any]], source: M
 
 
 def whole_record(o: ObjectAnnotation, labels: Sequence[ObjectLabel]) -> dict[str, Any]:
-    """All that is said of an object, as `json.dumps(..., allow_nan=False)` takes it."""
+    """All fields of an object, as `json.dumps(..., allow_nan=False)` takes it."""
     known = {**o.more, **{name: getattr(o, name) for name in _OWN}}
     record = {"id": o.id, **{f.name: f.plain(known[f.name]) for f in _fields(labels) if f.name in known}}
     return record if o.source is None else {**record, "source": dict(o.source)}
@@ -43,7 +43,7 @@ def _fields(labels: Sequence[ObjectLabel]) -> Iterable[Field]:
 
 
 def short_record(o: ObjectAnnotation, labels: Sequence[ObjectLabel]) -> dict[str, Any]:
-    """What labels keep of a rendered object, by their names."""
+    """The parts of a rendered object that labels keep, by the labels' names."""
     kept = {label.name: label.keep(o) for label in labels}
     return {"id": o.id, **{name: value for name, value in kept.items() if value is not None}}
 
@@ -51,8 +51,8 @@ def short_record(o: ObjectAnnotation, labels: Sequence[ObjectLabel]) -> dict[str
 def from_short_record(
     record: Mapping[str, Any], placement: Placement, makers: Mapping[str, ObjectLabel], where: str
 ) -> ObjectAnnotation:
-    """The object that a short record was made of; a field is made again when it is first asked for. `makers` are labels by
-    their fields, `where` names the record.
+    """The object that a short record was made of; a field is restored when it is first asked for. `makers` are the
+    labels by the names of their fields; `where` names the record in messages.
     """
     made = object.__new__(_Restored)
     made.__dict__.update(id=record["id"], source=None, _record=record, _placement=placement, _makers=makers, _where=where)
@@ -60,7 +60,7 @@ def from_short_record(
 
 
 class _Restored(ObjectAnnotation):
-    """An object whose fields are made when they are asked for."""
+    """An object whose fields are restored when they are first asked for."""
 
     def __getattr__(self, name: str) -> Any:
         own = self.__dict__

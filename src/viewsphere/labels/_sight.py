@@ -1,4 +1,4 @@
-"""What one camera sees of a geometry: what the labels of a picture share, computed when first asked for."""
+"""A camera's view of a geometry, with values shared by the labels of a picture, computed when first asked for."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ from viewsphere.truth.visibility import Instances, Visibility, homogeneous, lens
 
 @dataclass(frozen=True, eq=False)
 class Sight:
-    """A camera's view of a geometry: `visibility` is `rasterize(geometry, camera)`. `placements` are those of the objects 1, 2,
-    ..., None for one that is not there; labels of pixels need none.
+    """A camera's view of a geometry: `visibility` is `rasterize(geometry, camera)`. `placements` belong to the objects 1, 2,
+    ...; an absent object's is None; labels of pixels need no placements.
     """
 
     geometry: Geometry
@@ -32,11 +32,11 @@ class Sight:
 
     @cached_property
     def rays(self) -> NDArray[np.float64]:
-        """A distorted lens' ray of each pixel (H, W, 3); (0, 0, 3) for a pinhole."""
+        """The ray of each pixel of a distorted lens (H, W, 3), in camera axes; (0, 0, 3) for a pinhole, which needs none."""
         rays = lens_rays(self.camera)
         if rays is None:
             rays = np.empty((0, 0, 3))
-            rays.setflags(write=False)  # as a lens' are: the kernels are compiled once for both
+            rays.setflags(write=False)  # read-only like a lens's rays, so that kernels are compiled once for both
         return rays
 
     @cached_property
@@ -46,17 +46,17 @@ class Sight:
 
     @cached_property
     def camera_from_ray(self) -> NDArray[np.float64]:
-        """Camera axes of a pixel's ray: K^-1 for a pinhole, whose rays are pixels."""
+        """Matrix (3, 3) from rays to camera axes: K^-1 for a pinhole, whose rays are pixels (x, y, 1); else the identity."""
         return inverse_camera_matrix(self.camera.intrinsics) if self.camera.distortion is None else np.eye(3)
 
     @property
     def instances(self) -> Instances:
-        """Which object each pixel shows, and what pixels each one has."""
+        """The object that each pixel shows, and area and box of each object's visible pixels."""
         return self.visibility.instances(self.geometry)
 
     @cached_property
     def projected(self) -> tuple[tuple[Bounds | None, bool], ...]:
-        """Of each object, the 2D box of its projected triangles, and whether the lens shows all of them."""
+        """For each object the 2D box of its projected triangles, and whether the lens shows all of them."""
         g, count = self.geometry, self.geometry.object_count
         parts, points = pairwise(g.triangle_start[: count + 1]), pairwise(g.vertex_start[: count + 1])
         return tuple(
@@ -65,19 +65,19 @@ class Sight:
         )
 
     def placement(self, i: int) -> Placement:
-        """Where the object of id i + 1 is; raises ValueError where it is not there."""
+        """Placement of the object of id i + 1; raises ValueError for an absent object."""
         found = self.placements[i]
         if found is None:
             raise ValueError(f"object {i + 1}: expected one that is there")
         return found
 
     def empty(self, dtype: type[np.generic], components: int = 1) -> NDArray[Any]:
-        """Room for a channel of this picture."""
+        """An uninitialised array for a channel of this picture, (H, W) or (H, W, components)."""
         shape = self.visibility.triangle.shape
         return np.empty(shape if components == 1 else (*shape, components), dtype)
 
     def per_triangle(self, table: NDArray[np.int32], empty: int) -> NDArray[np.int32]:
-        """An int32 channel: the number that a table has for the triangle seen, `empty` where nothing is."""
+        """An int32 channel: the table's number for the triangle seen, `empty` where nothing is seen."""
         from viewsphere.truth import kernels_channels as kernels
 
         out = self.empty(np.int32)

@@ -23,13 +23,13 @@ def compute(sight: Sight, i: int) -> Mapping[str, Any]:
 
 
 def restore(kept: None, placement: Placement, o: ObjectAnnotation) -> Mapping[str, Any]:
-    """The box of the mask that is kept."""
+    """The box of the object's mask, which is kept."""
     tight = rle_box(o.rle.height, o.rle.width, o.rle.counts)
     return {"box2d": tight and tuple(map(float, tight))}
 
 
 def prove(sample: Sample, models: Models) -> Iterator[str]:
-    """The box is the mask's."""
+    """The box is tight around the mask."""
     for o in rendered(sample):
         tight = mask_box(o.mask)
         if o.box2d != tight:

@@ -15,7 +15,7 @@ from viewsphere.model.sample import ObjectAnnotation, Sample
 
 
 def compute(sight: Sight, i: int) -> Mapping[str, Any]:
-    """Both boxes; where the lens shows only a part of the model, its visible pixels count too."""
+    """Both boxes, clipped and unclipped; where the lens shows only a part of the model, the box includes its visible pixels."""
     bounds, whole = sight.projected[i]
     projected = _clipped(bounds, sight.camera)
     if not whole and sight.instances.area[i + 1]:
@@ -30,14 +30,14 @@ def _clipped(bounds: Bounds | None, camera: Camera) -> Bounds | None:
 
 
 def keep(o: ObjectAnnotation) -> Any:
-    """The unclipped box, from which the other follows; the other, named, where there is none."""
+    """The unclipped box, from which the clipped one follows; without an unclipped box {"cut": the clipped one}."""
     if o.box2d_unclipped is not None:
         return list(o.box2d_unclipped)
     return None if o.box2d_projected is None else {"cut": list(o.box2d_projected)}
 
 
 def restore(kept: Any, placement: Placement, o: ObjectAnnotation) -> Mapping[str, Any]:
-    """Both boxes, of what is kept."""
+    """Both boxes, from the one that is kept."""
     if isinstance(kept, dict):
         return {"box2d_projected": tuple(kept["cut"]), "box2d_unclipped": None}
     bounds = None if kept is None else (kept[0], kept[1], kept[2], kept[3])
@@ -45,7 +45,7 @@ def restore(kept: Any, placement: Placement, o: ObjectAnnotation) -> Mapping[str
 
 
 def prove(sample: Sample, models: Models) -> Iterator[str]:
-    """The projected box holds the visible pixels, is the clipped one, and lies in the box of the projected 3D box."""
+    """The projected box holds the visible pixels and is the unclipped box clipped, which lies in the projected 3D box."""
     for o in rendered(sample):
         tight, around, unclipped = mask_box(o.mask), o.box2d_projected, o.box2d_unclipped
         if tight and (around is None or not _within(tight, around, 1.0)):

@@ -12,7 +12,7 @@ from viewsphere.labels._sight import Sight
 from viewsphere.model.sample import Sample
 
 TOLERANCE = 1e-5
-"""Share of an object's size by which float32 may leave its box."""
+"""Share of an object's size by which float32 coordinates may lie outside of its box."""
 
 
 def compute(sight: Sight) -> NDArray[np.float32]:
@@ -26,7 +26,7 @@ def compute(sight: Sight) -> NDArray[np.float32]:
 
 
 def prove(sample: Sample, models: Models) -> Iterator[str]:
-    """Points lie in their objects' boxes; the background has none."""
+    """Points lie in their objects' boxes; the background has no coordinates."""
     points, instances = channel_of(sample, "coordinates"), channel_of(sample, "instances")
     if points is None or instances is None:
         return

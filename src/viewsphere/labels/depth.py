@@ -13,7 +13,7 @@ from viewsphere.model.sample import Sample
 
 
 def compute(sight: Sight) -> NDArray[np.float32]:
-    """z of the seen point, (H, W) metres, infinite where nothing is seen; behind a fisheye it is negative."""
+    """z of the seen point, (H, W) metres, infinite where nothing is seen; negative behind the image plane of a fisheye."""
     from viewsphere.truth import kernels_channels as kernels
 
     out = sight.empty(np.float32)
@@ -33,7 +33,7 @@ def prove(sample: Sample, models: Models) -> Iterator[str]:
 
 
 def picture(depth: NDArray[np.float32]) -> Picture:
-    """Near is light, far is dark, nothing is black; (H, W, 3) uint8."""
+    """Depth as a picture (H, W, 3) uint8: near is light, far is dark, and pixels without depth are black."""
     seen = np.isfinite(depth)
     grey = np.zeros(depth.shape, np.float64)
     if seen.any():

@@ -11,7 +11,7 @@ from viewsphere.model.sample import Sample
 
 
 def prove(sample: Sample, models: Models) -> Iterator[str]:
-    """The map holds ids of objects that are there."""
+    """The map holds only ids of objects of the sample."""
     instances = channel_of(sample, "instances")
     if instances is None or not instances.size:
         return

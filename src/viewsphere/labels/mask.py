@@ -24,7 +24,7 @@ def compute(sight: Sight, i: int) -> Mapping[str, Any]:
 
 
 def restore(counts: str, placement: Placement, o: ObjectAnnotation) -> Mapping[str, Any]:
-    """The fields, of the code that is kept."""
+    """The fields, from the run-length code that is kept."""
     height, width = placement.camera.height, placement.camera.width
     return {"rle": Rle(height, width, counts), "area": rle_area(height, width, counts)}
 
@@ -42,7 +42,7 @@ def prove(sample: Sample, models: Models) -> Iterator[str]:
         if instances is not None and not np.array_equal(mask, instances == o.id):
             yield f"object {o.id}: run lengths differ from the instance map at {(mask != (instances == o.id)).sum()} pixels"
         if o.source is not None and not mask.any():
-            continue  # it came with a box alone
+            continue  # an imported object may have a box alone
         if o.area != mask.sum():
             yield f"object {o.id}: expected area {mask.sum()}, found {o.area}"
         polygons: Any = mask_polygons(mask)

@@ -11,12 +11,12 @@ from viewsphere.model.sample import Sample
 
 
 def of(placement: Placement) -> Mapping[str, Any]:
-    """The model's names."""
+    """The model's key and file."""
     return {"key": placement.spec.key, "model": placement.facts.obj, "track": placement.spec.track}
 
 
 def prove(sample: Sample, models: Models) -> Iterator[str]:
-    """Models are those of the data set."""
+    """The object's model is one of the data set's."""
     for o in rendered(sample):
         facts = models.get(o.key)
         if facts is None:

@@ -11,7 +11,7 @@ from viewsphere.model.sample import Sample
 
 
 def prove(sample: Sample, models: Models) -> Iterator[str]:
-    """Objects have parts, the background has none."""
+    """Objects have parts, the background has no part."""
     parts, instances = channel_of(sample, "parts"), channel_of(sample, "instances")
     if parts is not None and instances is not None and ((parts > 0) != (instances > 0)).any():
         yield f"expected a part where an object is seen, none elsewhere; found {((parts > 0) != (instances > 0)).sum()} others"

@@ -16,7 +16,7 @@ TOLERANCE = 1e-9
 
 
 def of(placement: Placement) -> Mapping[str, Any]:
-    """The pose in the world and before the camera."""
+    """The pose in world axes and in camera axes."""
     in_camera = placement.camera_from_object
     return {
         "world_from_object": placement.world_from_object,
@@ -26,7 +26,7 @@ def of(placement: Placement) -> Mapping[str, Any]:
 
 
 def prove(sample: Sample, models: Models) -> Iterator[str]:
-    """The pose before the camera is that in the world, seen by the camera, and the quaternion is its rotation."""
+    """The pose in camera axes is the pose in world axes seen by the camera, and the quaternion is its rotation."""
     if sample.known_camera is None:
         return
     camera_from_world = rigid(sample.camera.R, sample.camera.t)

@@ -18,7 +18,7 @@ def of(placement: Placement) -> Mapping[str, Any]:
 
 
 def prove(sample: Sample, models: Models) -> Iterator[str]:
-    """From 60 degrees up and down it is top and bottom, and above and below where the elevation says so."""
+    """The category is top or bottom from 60 degrees up or down, and else says above or below as the elevation does."""
     for o in rendered(sample):
         elevation, name = round(o.view.elevation_deg, 6), o.pose_category
         ends = {"top": elevation >= 60, "bottom": elevation <= -60}

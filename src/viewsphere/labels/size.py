@@ -11,11 +11,11 @@ from viewsphere.labels._placement import Placement
 from viewsphere.model.sample import Sample
 
 TOLERANCE = 1e-9
-"""Share of the size."""
+"""Tolerance of the proof as a share of the size."""
 
 
 def of(placement: Placement) -> Mapping[str, Any]:
-    """The box's extents, and the true ones."""
+    """The 3D box's extents, and the model's true size."""
     return {"size": box_size(placement.box), "real_size": placement.facts.real_size}
 
 

@@ -23,7 +23,7 @@ def compute(sight: Sight) -> NDArray[np.int32]:
 
 
 def prove(sample: Sample, models: Models) -> Iterator[str]:
-    """Objects have triangles, the background has none."""
+    """Objects have triangles, the background has no triangle."""
     triangles, instances = channel_of(sample, "triangles"), channel_of(sample, "instances")
     if triangles is not None and instances is not None and ((triangles >= 0) != (instances > 0)).any():
         wrong = ((triangles >= 0) != (instances > 0)).sum()

@@ -21,9 +21,9 @@ EVERYWHERE = (-math.inf, -math.inf, math.inf, math.inf)
 def compute(sight: Sight, i: int) -> Mapping[str, Any]:
     """Both shares of one object.
 
-    Visibility is its visible pixels over all pixels it would cover alone, on a canvas of three times the image's width and
-    height (BOP's visib_fract, https://github.com/thodan/bop_toolkit/blob/master/docs/bop_datasets_format.md); truncation is
-    the share of those outside the image. An object that covers no pixel has visibility 0.
+    Visibility is the object's visible pixels over all pixels that it would cover alone, on a canvas of three times the image's
+    width and height (BOP's visib_fract, https://github.com/thodan/bop_toolkit/blob/master/docs/bop_datasets_format.md);
+    truncation is the share of the latter outside the image. An object that covers no pixel has visibility 0.
     """
     visible, truncated = _shares(sight, i, int(sight.instances.area[i + 1]))
     return {"visibility": visible, "truncation": truncated}
@@ -34,7 +34,7 @@ def _shares(sight: Sight, i: int, area: int) -> tuple[float, float]:
     if own is None:
         if not area:
             return 0.0, 1.0
-        own = EVERYWHERE  # all that is seen of it is nearer than boxes begin
+        own = EVERYWHERE  # the object is visible, but all nearer than the distance at which projected boxes begin
     width, height = sight.camera.width, sight.camera.height
     image = (0.0, 0.0, float(width), float(height))
     if whole and not overlap(own, image):
@@ -51,8 +51,8 @@ def _shares(sight: Sight, i: int, area: int) -> tuple[float, float]:
 
 
 def _is_unobstructed(sight: Sight, i: int) -> bool:
-    """Whether nothing can hide any of the object: no other's box meets its own, no scenery is there, and no ground is in the
-    way.
+    """Whether nothing can hide any part of the object: its 2D box meets no other object's box, there is no scenery, and the
+    ground cannot lie before it.
     """
     geometry = sight.geometry
     if geometry.has_scenery:
@@ -65,7 +65,7 @@ def _is_unobstructed(sight: Sight, i: int) -> bool:
 
 
 def _pixels_alone(sight: Sight, i: int, own: Bounds) -> tuple[int, int]:
-    """Pixels the object would cover alone on the large canvas, and how many of them lie in the image."""
+    """Number of pixels that the object alone would cover on the large canvas, and how many of these lie in the image."""
     width, height = sight.camera.width, sight.camera.height
     x0, y0, x1, y1 = own
     left, top = math.floor(max(x0, -width)), math.floor(max(y0, -height))
@@ -78,7 +78,7 @@ def _pixels_alone(sight: Sight, i: int, own: Bounds) -> tuple[int, int]:
 
 
 def prove(sample: Sample, models: Models) -> Iterator[str]:
-    """Shares lie in [0, 1]; what has pixels is visible, and nothing else is."""
+    """Both shares lie in [0, 1], and visibility is above 0 exactly for objects with visible pixels."""
     for o in rendered(sample):
         shares, seen = (o.visibility, o.truncation), int(o.mask.sum())
         if not all(0 <= share <= 1 for share in shares) or (o.visibility > 0) != (seen > 0):

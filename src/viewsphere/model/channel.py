@@ -1,4 +1,4 @@
-"""Channels: the arrays of pixels that a sample has. What one is, and the passes; labels are in `viewsphere.labels`."""
+"""Channels, the arrays of pixels of a sample: their class, and the passes; labels are in `viewsphere.labels`."""
 
 from __future__ import annotations
 
@@ -42,16 +42,16 @@ PASSES: dict[str, Channel] = {
         Channel("rgba", np.uint8, 4, "sRGB", 0, "png", "colour picture without its background; straight alpha"),
     )
 }
-"""Channels that an engine paints; all others are labels. Of the passes that are kept, the first is a sample's picture."""
+"""Channels that an engine paints; all others are labels. The first pass that a data set keeps is its samples' picture."""
 
 DEFAULT_CHANNELS = ("rgb", "depth", "instances", "normals")
 
 
 def picture_of(kept: Container[str]) -> str | None:
-    """The channel to show where one picture is wanted, None if there is none."""
+    """The channel that serves as a sample's picture, None if no pass is kept."""
     return next((name for name in PASSES if name in kept), None)
 
 
 def missing(needed: Iterable[str], kept: Container[str]) -> tuple[str, ...]:
-    """Those of the needed channels that are not kept; a picture without background does for one that has it."""
+    """The needed channels that are not kept; `rgba`, the picture without background, replaces `rgb`."""
     return tuple(name for name in needed if name not in kept and not (name == "rgb" and picture_of(kept)))

@@ -1,4 +1,4 @@
-"""How the channels of a data set are written: a recipe's `files`."""
+"""The kinds of file that a data set's channels are written as: a recipe's `files`."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ SUFFIXES: dict[Encoding, str] = {
 """File name endings, with their dots."""
 
 LOSSY = ("jpeg", "webp", "jxl")
-"""Encodings that take a quality; all but JPEG are lossless without one."""
+"""Encodings that take a quality; without a quality all but JPEG are lossless."""
 
 STEP = 0.001
 
@@ -60,11 +60,11 @@ class Files(Frozen):
 
     @property
     def step(self) -> float:
-        """Metres in a step of a png16 depth."""
+        """Metres in one step of a 16-bit PNG of depth."""
         return self.depth_unit or STEP
 
     def encoding(self, channel: Channel) -> Encoding:
-        """How this channel is written."""
+        """The encoding that this channel is written in."""
         match channel.name, channel.encoding:
             case "rgb", _:
                 return self.rgb

@@ -17,7 +17,7 @@ EXPLAINED = "explained"
 
 
 class Place(NamedTuple):
-    """Where a value stands: a file and a line, counted from 1; or the option that sets it, and 0."""
+    """Where a value is written: a file and a line, counted from 1; or the option that sets the value, and 0."""
 
     file: str
     line: int
@@ -28,15 +28,15 @@ class Place(NamedTuple):
 
 @dataclass(frozen=True)
 class Marks:
-    """Where the values of a recipe's file stand, and those it took from elsewhere. It is no part of what they say: all marks
-    are equal.
+    """The places of a recipe's values in its file and in the files that it extends. All marks compare equal: places are no part
+    of a recipe's meaning.
     """
 
     file: str = field(default="", compare=False)
     places: Mapping[Path, Place] = field(default_factory=dict[Path, Place], compare=False)
 
     def place(self, path: Path) -> Place:
-        """Place of the value, else of the innermost value around it that was written."""
+        """Place of the value at `path`, or, if the value was not written, of the innermost written value around it."""
         while path and path not in self.places:
             path = path[:-1]
         return self.places.get(path, Place(self.file, 1))
@@ -51,7 +51,7 @@ class Marks:
 
 
 def nearest(name: object, known: Iterable[str]) -> str:
-    """`; did you mean 'x'?` with the known name most like this one, or that it begins; empty if none is like it."""
+    """`; did you mean 'x'?` with the known name most similar to `name`, or beginning with it; empty if none is similar."""
     by_lower, lower = {k.lower(): k for k in known}, str(name).lower()
     begun = [k for k in by_lower if len(lower) > 2 and k.startswith(lower)]
     close = get_close_matches(lower, by_lower, 1, 0.6) or begun[:1]
@@ -74,7 +74,7 @@ def shown(value: object) -> str:
 
 
 def explained(error: ValidationError, fields: Sequence[str], steps: Path = ()) -> ValidationError:
-    """The same mistakes in their final words; `fields` are those of the model that found them, `steps` lead to it."""
+    """The same mistakes in their final words; `fields`: the model's field names; `steps`: the path to the model."""
     errors = error.errors(include_url=False)
     details = [
         InitErrorDetails(
@@ -90,7 +90,7 @@ def explained(error: ValidationError, fields: Sequence[str], steps: Path = ()) -
 
 @contextmanager
 def at(*steps: str | int) -> Generator[None]:
-    """Say of a mistake in one part of a value, a ValueError, where that part stands."""
+    """Turn a ValueError about one part of a value into a ValidationError that has the part's place."""
     try:
         yield
     except ValidationError as error:
@@ -101,7 +101,7 @@ def at(*steps: str | int) -> Generator[None]:
 
 
 def _follows(error: ErrorDetails, errors: Sequence[ErrorDetails]) -> bool:
-    """Whether a list is only found too short because its items, mistakes themselves, were not counted."""
+    """Whether an error `too_short` only follows from others: invalid items of a list are not counted."""
     depth = len(error["loc"])
     inside = (e for e in errors if len(e["loc"]) > depth and e["loc"][:depth] == error["loc"])
     return error["type"] == "too_short" and any(inside)
@@ -119,13 +119,13 @@ def report(error: ValidationError, data: object, marks: Marks | None = None) -> 
 
 
 def dotted(path: Path) -> str:
-    """`models[0].category`; `recipe` for the whole."""
+    """A path as text, `models[0].category`; `recipe` for the empty path."""
     text = "".join(f"[{p}]" if isinstance(p, int) else f".{p}" for p in path)
     return text.removeprefix(".") or "recipe"
 
 
 def _below(error: ErrorDetails) -> Path:
-    """The rest of the path to what is wrong, where the location ends above it: a missing field, a union's `kind`."""
+    """The end of the path to the wrong field, where pydantic's location stops above it: a missing field, a union's `kind`."""
     match error["type"]:
         case "explained":
             return error.get("ctx", {})["below"]
@@ -138,7 +138,7 @@ def _below(error: ErrorDetails) -> Path:
 
 
 def _path_in(data: Any, location: Path) -> Path:
-    """The part of a location that stands in the data: without the names of union members and absent fields."""
+    """The part of a location that exists in the data: without the names of union members and of absent fields."""
     path: list[str | int] = []
     for part in location:
         if isinstance(part, int):

@@ -7,10 +7,10 @@ from typing import Annotated
 from pydantic import BeforeValidator, Field
 
 LARGEST = 1e9
-"""Of any number in a recipe: metres, degrees, pixels; beyond it what is meant is out of every picture."""
+"""Largest absolute value of any number in a recipe (metres, degrees, pixels): anything beyond lies outside of every picture."""
 
 FARTHEST = 1e5
-"""Metres that anything of a scene may be away from its middle, as large as models may be: single precision ends soon after."""
+"""Largest distance, in metres, of anything from a scene's middle, equal to the largest model: float32 is too coarse beyond."""
 
 
 def whole(value: object) -> object:

@@ -9,7 +9,7 @@ from viewsphere.model.frozen import Frozen
 from viewsphere.model.scene import IDENTITY, Matrix4
 
 CAMERA = "camera"
-"""Name of a rig's only sensor, unless it has another."""
+"""Default name of a rig's only sensor."""
 
 
 class Sensor(Frozen):

@@ -1,4 +1,4 @@
-"""A sample: one frame's pictures and everything that is known of its objects."""
+"""A sample: one sensor's picture at one instant, and the labels of its objects."""
 
 from __future__ import annotations
 
@@ -49,21 +49,21 @@ class ObjectAnnotation:
 
     Boxes are half-open pixel corners (x0, y0, x1, y1). `box2d` is tight around the visible pixels, None if
     there are none; `box2d_projected` is the box of the projected model clipped to the image, None where
-    they do not meet; `box2d_unclipped` the same unclipped, None where the model reaches behind the camera
-    (or out of a distorted lens' field). The 3D box is tight and object-aligned: (8, 3) in the object's, the
+    they do not meet; `box2d_unclipped` is the same box unclipped, None where the model reaches behind the
+    camera (or out of a distorted lens' field of view). The 3D box is tight and object-aligned: (8, 3) in the object's, the
     world's and the camera's axes (metres) and (8, 2) in pixels, NaN where the lens does not show the
     vertex, as behind the camera; vertex order and faces as in `viewsphere.geometry.box`. `visibility` is
     visible pixels over all the pixels the object alone would cover, those outside the image included (BOP's
-    visib_fract, on a canvas of three times the image's width and height); `truncation` is the share of the
-    latter outside the image.
+    visib_fract, on a canvas of three times the image's width and height); `truncation` is the share of all
+    these pixels that lies outside the image.
 
-    Of an animated model, `key` and all that is said of the model are those of the frame's moment; `track` is the key of the
-    model that stays itself, else empty.
+    For an animated model, `key` and all facts about the model are those of the frame's moment, and `track` is the key of the
+    animated model, which is equal at all moments; otherwise `track` is empty.
 
-    An object of an imported data set has `source`, its annotation there; what that does not say is NaN, and its
-    key and model may be empty. Where it says no mask, the mask is empty, but `box2d` and `area` are the source's.
+    An imported object has `source`, its annotation in the imported data set; values that the annotation lacks are NaN, and
+    key and model may be empty. If it lacks a mask, the mask is empty, but `box2d` and `area` are the annotation's.
 
-    `more` are fields of labels that others than viewsphere bring; they are attributes, too.
+    `more` holds the fields of labels that other packages bring; these fields are attributes, too.
     """
 
     id: int
@@ -92,7 +92,7 @@ class ObjectAnnotation:
     visibility: float
     truncation: float
     source: Mapping[str, Any] | None = None
-    # Factories leave no attribute on the class, so that `__getattr__` of a subclass is asked for these, too.
+    # Default factories, unlike defaults, leave no attribute on the class, so that `__getattr__` of a subclass gets these, too.
     track: str = field(default_factory=str)
     more: Mapping[str, Any] = field(default_factory=dict[str, Any])
 
@@ -128,7 +128,7 @@ class ObjectAnnotation:
 @dataclass(frozen=True, eq=False)
 class Sample:
     """One sensor's picture at one instant: camera, pose, objects and channels. `channels` maps names to arrays (loaded
-    when asked). Pictures that were imported may have no known camera and pose; `image_size` is theirs.
+    when asked). Imported pictures may have no known camera and pose; these have an `image_size`.
     """
 
     index: int
@@ -138,16 +138,16 @@ class Sample:
     objects: tuple[ObjectAnnotation, ...]
     channels: Mapping[str, NDArray[Any]]
     files: Mapping[str, str]  # channel -> path relative to the data set's root; empty in memory
-    image_size: tuple[int, int] | None = None  # (width, height) where there is no camera to say it
-    source: Mapping[str, Any] | None = None  # what the imported data set says of the picture
-    sequence: str = ""  # of still pictures none
+    image_size: tuple[int, int] | None = None  # (width, height) in pixels, if the camera is not known
+    source: Mapping[str, Any] | None = None  # the imported data set's entry of the picture
+    sequence: str = ""  # empty for still pictures
     sensor: str = CAMERA
-    instant: int = 0  # counted from 0 in the sequence; of still pictures in the data set
+    instant: int = 0  # counted from 0 in the sequence, or, for still pictures, in the data set
     time: float = 0.0  # seconds from the sequence's first instant
 
     @property
     def camera(self) -> Camera:
-        """Raises StoreError for an imported picture of which nobody knows the camera."""
+        """The camera; raises StoreError for an imported picture without a known camera."""
         if self.known_camera is None:
             raise StoreError(
                 f"frame {self.index}: expected a camera, found an imported picture: nobody knows where it was taken"
@@ -156,32 +156,32 @@ class Sample:
 
     @property
     def pose(self) -> Viewpoint:
-        """Raises StoreError for an imported picture of which nobody knows the pose."""
+        """The camera's viewpoint; raises StoreError for an imported picture without a known pose."""
         if self.known_pose is None:
             raise StoreError(f"frame {self.index}: expected a pose, found an imported picture: nobody knows where it was taken")
         return self.known_pose
 
     @property
     def width(self) -> int:
-        """Pixels."""
+        """Width of the picture in pixels."""
         return self.image_size[0] if self.known_camera is None and self.image_size else self.camera.width
 
     @property
     def height(self) -> int:
-        """Pixels."""
+        """Height of the picture in pixels."""
         return self.image_size[1] if self.known_camera is None and self.image_size else self.camera.height
 
     @property
     def picture(self) -> NDArray[np.uint8]:
         """The colours, (H, W, 3), or (H, W, 4) where only the picture without its background is kept.
 
-        Raises AttributeError where neither is.
+        Raises AttributeError where neither picture is kept.
         """
         return getattr(self, picture_of(self.channels) or "rgb")
 
     @property
     def picture_file(self) -> str | None:
-        """The file of `picture`, None if there is none."""
+        """Path of the file of `picture`, relative to the data set's root; None without a picture."""
         return self.files.get(picture_of(self.files) or "")
 
     def __getattr__(self, name: str) -> NDArray[Any]:

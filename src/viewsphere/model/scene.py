@@ -139,7 +139,7 @@ class Ground(Frozen):
 
     @property
     def is_labelled(self) -> bool:
-        """Whether it is there for labels."""
+        """Whether labels see the ground."""
         return self.labels or not self.catcher
 
 
@@ -220,7 +220,7 @@ class Finish(Frozen):
     effects: Effects = Effects()
 
     def with_background(self, transparent: bool) -> Finish:
-        """The same with its background, or with none at all."""
+        """The same finish, with its background, or transparent behind the scene."""
         background = self.background.model_copy(update={"transparent": transparent})
         return self.model_copy(update={"background": background})
 

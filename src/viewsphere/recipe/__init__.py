@@ -1,1 +1,1 @@
-"""What a user writes: fields, distributions, files, mistakes."""
+"""Recipes as users write them: their fields, distributions and files, and messages about mistakes."""

@@ -1,4 +1,4 @@
-"""A .blend file that is the scene around the targets of a recipe: what of it is labelled, and what of it is shown."""
+"""A .blend file that is the scene around the targets of a recipe: which of its objects are labelled, and which are shown."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ class BlendEntry(Frozen):
 
     @property
     def is_drawn_per_frame(self) -> bool:
-        """Whether what is shown of it differs from frame to frame."""
+        """Whether the shown objects of the file can differ from frame to frame."""
         return any(entry.draw == "per_frame" for entry in self.variants.values())
 
 

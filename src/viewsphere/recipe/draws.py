@@ -1,8 +1,8 @@
 """Distributions: what may stand for any number, vector, colour or word of a recipe's scene, and for some entries as a whole.
 
-`Drawn[T]` is a field of type T that also takes a distribution over T. Every end, mean and choice of one is read as T is, so
-its short forms, limits and mistakes are those of T; T is convex, hence whatever is drawn between valid values is valid.
-`drawn` puts draws in their place.
+`Drawn[T]` is a field of type T that also takes a distribution over T. Each bound, mean and choice of a distribution is read
+like a T, with T's short forms, limits and error messages. Valid values of T form a convex set, so that anything drawn between
+valid values is valid. `drawn` replaces distributions by draws.
 """
 
 from __future__ import annotations
@@ -40,11 +40,11 @@ KINDS = ("uniform", "log_uniform", "normal", "choice")
 DEEPEST = 16
 
 NEARLY_ALWAYS = 3.0
-"""Standard deviations from a normal distribution's mean that hold all but one draw of four hundred."""
+"""Standard deviations around a normal distribution's mean within which 399 of 400 draws lie."""
 
 Steps = tuple[str, ...]
 RngOf = Callable[[Steps], "Generator"]
-"""A generator for the path of a value: every distribution has its own, so that none depends on what else is drawn."""
+"""A generator for the path of a value: every distribution has its own generator, so that no draw depends on another."""
 
 Of = Literal["number", "whole number", "vector", "word", "entry"]
 T = TypeVar("T")
@@ -107,7 +107,7 @@ class Distribution(_AsWritten):
 
     @property
     def kind(self) -> str:
-        """Which of the four it is."""
+        """Which of the four kinds this distribution is."""
         return next(name for name in KINDS if getattr(self, name) is not None)
 
     def draw(self, rng_of: RngOf, path: Steps) -> Any:
@@ -132,7 +132,7 @@ def _pick(rng: Generator, count: int, weights: tuple[float, ...] | None) -> int:
 
 
 def _each(draw: Callable[..., float], *args: Any) -> Any:
-    """Numbers as they are, vectors component by component; a number beside vectors counts for each component."""
+    """Draw once for numbers, and for vectors once a component; a number beside vectors counts for each component."""
     size = next((len(arg) for arg in args if isinstance(arg, tuple)), None)
     if size is None:
         return draw(*args)
@@ -148,14 +148,14 @@ def _log_uniform(rng: Generator, low: float, high: float) -> float:
 
 
 def _portable(value: float) -> float:
-    """The value to twelve digits: the last ones of a power or a logarithm differ between processors."""
+    """The value to twelve digits: the last digits of powers and logarithms differ between processors."""
     return float(f"{value:.12g}")
 
 
 def _normal(
     rng: Generator, limits: tuple[float, float], mean: float, deviation: float, low: float | None, high: float | None
 ) -> float:
-    """A truncated normal by inversion: one uniform number, whatever the limits."""
+    """A draw of a truncated normal distribution by inversion, which takes one uniform number for any limits."""
     low, high = max(limits[0], limits[0] if low is None else low), min(limits[1], limits[1] if high is None else high)
     u, value = float(rng.random()), mean
     if deviation > 0:
@@ -176,7 +176,7 @@ class _Reader(NamedTuple):
     depth: int = 0
 
     def read(self, value: Any) -> Any:
-        """The value, valid; raises ValueError or ValidationError."""
+        """The validated value or distribution; raises ValueError or ValidationError."""
         if isinstance(value, Distribution):
             value = value.model_dump()
         if self.of == "number" and isinstance(value, (list, tuple)):
@@ -225,7 +225,7 @@ class _Reader(NamedTuple):
         return raw.model_copy(update=values)
 
     def _deviation(self, value: Any) -> Any:
-        """One number, also for vectors, or one for each component."""
+        """A standard deviation: one number, also for vectors, or one number for each component."""
         if self.of == "number" or not isinstance(value, (list, tuple)):
             return _DEVIATION.validate_python(value)
         parts: list[Any] = []
@@ -236,12 +236,12 @@ class _Reader(NamedTuple):
 
 
 def _means_choice(value: Mapping[Any, Any]) -> bool:
-    """Whether a mapping is a choice of entries, the word perhaps misspelt, rather than an entry."""
+    """Whether a mapping is a choice of entries, perhaps with a misspelt `choice`, rather than an entry."""
     return "choice" in value or any(nearest(key, ("choice",)) for key in value)
 
 
 def _ordered(low: Any, high: Any) -> bool:
-    """Whether no component of `low` is above that of `high`; those that are drawn do not count."""
+    """Whether no component of `low` is above that of `high`; components that are distributions do not count."""
     if isinstance(low, tuple) and isinstance(high, tuple):
         return all(_ordered(a, b) for a, b in zip(cast(tuple[Any, ...], low), cast(tuple[Any, ...], high), strict=False))
     return not isinstance(low, (int, float)) or not isinstance(high, (int, float)) or low <= high
@@ -257,7 +257,7 @@ def _check_ends(kind: str, low: Any, high: Any) -> None:
 
 
 def _lowest(value: Any) -> float:
-    """The least number that can come of a value."""
+    """The least number that can be drawn from a value."""
     if isinstance(value, Distribution):
         if value.normal is not None:
             low = value._limits[0]  # pyright: ignore[reportPrivateUsage]
@@ -267,7 +267,7 @@ def _lowest(value: Any) -> float:
 
 
 def span(value: Any) -> tuple[float, float]:
-    """Least and greatest number that may come of a value, vectors as a whole; of a normal distribution nearly always."""
+    """Least and greatest number drawn from a value, over all components; for normal distributions nearly always."""
     if isinstance(value, Distribution):
         if value.normal is None:
             return span(getattr(value, value.kind))
@@ -314,7 +314,7 @@ _WRAPPERS = {"function-before", "function-after", "function-wrap", "nullable", "
 
 
 def _of(schema: Any) -> tuple[Of, tuple[float, float]]:
-    """What a field holds, and the lowest and highest number in it."""
+    """The kind of value that a field holds, and the lowest and highest number allowed."""
     while schema["type"] in _WRAPPERS:
         schema = schema["schema"]
     match schema["type"]:
@@ -333,7 +333,7 @@ def _of(schema: Any) -> tuple[Of, tuple[float, float]]:
 
 
 Drawn = Annotated[T, OrDrawn()]
-"""A T, or a distribution over T: what a recipe holds. What is drawn from it, and so what a scene is made of, is a T."""
+"""A field of a recipe that is a T or a distribution over T. A draw, as scenes are made of, is a T."""
 
 _DEVIATION: TypeAdapter[Any] = TypeAdapter(Drawn[Annotated[float, Field(strict=True, ge=0, allow_inf_nan=False)]])
 
@@ -359,7 +359,7 @@ def is_random(value: object) -> bool:
 
 
 def alternatives(value: Any) -> Iterator[Any]:
-    """All that a word or an entry may be: the value itself, or what its choices may be."""
+    """All values that a word or an entry may take: the value itself, or the values of each of its choices."""
     if isinstance(value, Distribution) and value.choice is not None:
         for option in value.choice:
             yield from alternatives(option)

@@ -1,7 +1,7 @@
-"""Entries: what a recipe says of a part of the scene, derived from the class of that part.
+"""Entries, the classes of a recipe's parts of the scene, derived from the scene's own classes.
 
-A field is written once, in the scene's class: the entry has its limits, its default and its description from there, and takes
-distributions over its values. The body of an entry holds only what differs.
+A field is written once, in the scene's class: the entry takes its limits, default and description from there, and allows
+distributions over its values. The body of an entry holds only the fields that differ.
 """
 
 from __future__ import annotations
@@ -36,9 +36,9 @@ def entry_of(part: type[Part], *, without: Names = (), fixed: Names = (), option
 
     without: fields that recipes do not have.
     fixed: fields that are not drawn, because planning has to know them.
-    optional: fields that are None where nothing is said, as the entry has other ways to say it; they stand before its own.
+    optional: fields that are None unless given, because the entry has other ways to express them; they precede its own fields.
 
-    To a type checker an entry is what becomes of it once it is drawn, as it is with `Drawn`.
+    To a type checker an entry is the class of the part that is drawn from it, as with `Drawn`.
     """
 
     class Derived(Entry):
@@ -54,7 +54,7 @@ def entry_of(part: type[Part], *, without: Names = (), fixed: Names = (), option
 def concrete(entry: Frozen, **others: Any) -> Any:
     """The part of a scene that a drawn entry means; `others` are fields that follow from more than the entry.
 
-    What is None has the default of the scene's class.
+    Fields that are None get the defaults of the scene's class.
     """
     part = cast("Entry", entry).part
     said = {name: getattr(entry, name, None) for name in part.model_fields} | others
@@ -62,17 +62,17 @@ def concrete(entry: Frozen, **others: Any) -> Any:
 
 
 def pictures_of(part: type[Frozen]) -> tuple[str, ...]:
-    """Names of the fields of a scene's class that hold the path of a picture."""
+    """Names of the fields in a class of the scene that hold the path of a picture."""
     return tuple(name for name, field in part.model_fields.items() if _has(_kind(field), PICTURE))
 
 
 def words_of(part: type[Frozen], name: str) -> list[str]:
-    """The words that a field of a scene's class may be."""
+    """The words allowed for a field in a class of the scene."""
     return list(get_args(part.model_fields[name].annotation))
 
 
 def is_drawn_color(value: Any) -> bool:
-    """Whether a value that may be more than a colour is one that is drawn: as a whole, or component by component."""
+    """Whether a value is a colour with distributions: one over whole colours, or a list with one for a component."""
     if isinstance(value, Mapping):
         return not value.keys().isdisjoint(KINDS)
     parts = cast(tuple[Any, ...], value) if isinstance(value, (list, tuple)) else ()
@@ -97,11 +97,11 @@ _READERS: dict[Any, tuple[Any, ...]] = {
     LINEAR: (BeforeValidator(_linear), OrShort(COLOR_FORMS[0])),
     SRGB: (BeforeValidator(_srgb), OrShort(COLOR_FORMS[0])),
 }
-"""How values of a kind are read in a recipe, beyond what the scene asks of them."""
+"""For a type or mark, additional validators of a recipe's values: strictness and short forms."""
 
 
 def _derive(entry: type[Entry], without: Names, fixed: Names, optional: Names) -> None:
-    """Give an entry's class, before pydantic collects its fields, those of its part that it lacks."""
+    """Add the fields of its part that an entry's class lacks, before pydantic collects the class's fields."""
     known = {name for base in entry.__mro__ for name in vars(base).get("__annotations__", {})}
     forms: dict[str, Any] = {}
     for name, field in entry.part.model_fields.items():
@@ -115,12 +115,12 @@ def _derive(entry: type[Entry], without: Names, fixed: Names, optional: Names) -
 
 
 def _kind(field: FieldInfo) -> Any:
-    """The whole type of a field, its limits and marks too."""
+    """The type of a field, with its limits and marks."""
     return cast(Any, Annotated)[field.annotation, *field.metadata] if field.metadata else field.annotation
 
 
 def _form(kind: Any, *limits: Any) -> Any:
-    """A type whose values, and those in them, may be distributions."""
+    """The type, changed so that its values, and the values within them, may be distributions."""
     origin, args = get_origin(kind), get_args(kind)
     if origin is Annotated:
         return _form(args[0], *args[1:], *limits)
@@ -133,14 +133,14 @@ def _form(kind: Any, *limits: Any) -> Any:
 
 
 def _read(kind: Any, *limits: Any) -> Any:
-    """A type within its limits, read as recipes are."""
+    """The type with its limits and the validators of `_READERS`."""
     marks = [kind, *(limit for limit in limits if isinstance(limit, str))]
     readers = [reader for mark in marks for reader in _READERS.get(mark, ())]
     return cast(Any, Annotated)[kind, *limits, *readers] if limits or readers else kind
 
 
 def _field(field: FieldInfo, optional: bool) -> Any:
-    """Default and description of an entry's field."""
+    """An entry's field with the default and description of the scene's field."""
     short = ", a name or '#rrggbb'" if _has(_kind(field), LINEAR, SRGB) else ""
     text = f"{field.description}{short}"
     if not optional:
@@ -151,6 +151,6 @@ def _field(field: FieldInfo, optional: bool) -> Any:
 
 
 def _has(kind: Any, *marks: str) -> bool:
-    """Whether a type, or one in it, has one of the marks."""
+    """Whether a type, or a type within it, has one of the marks."""
     args = get_args(kind)
     return any(mark in args for mark in marks) or any(_has(arg, *marks) for arg in args)

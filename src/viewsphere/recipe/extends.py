@@ -1,4 +1,4 @@
-"""Recipes made of others: `extends: base.yaml`, and fields set from outside (`--set`)."""
+"""Recipes built on other recipes by `extends: base.yaml`, and fields set from outside (`--set`)."""
 
 from __future__ import annotations
 
@@ -35,27 +35,29 @@ PATHS: tuple[tuple[str, ...], ...] = (
     ("scene", "planes", "*", "image"),
     ("scene", "planes", "*", "images"),
 )
-"""Fields that hold a path, which is relative to the file it is written in."""
+"""Fields that hold a path; a path is relative to the file in which it is written."""
 
 WORDS = {"file", "daylight"}
-"""What stands in these fields besides paths and the zoo's names."""
+"""Values of these fields that are neither paths nor names of the zoo."""
 
 _STEP = re.compile(r"(?:^|\.)([A-Za-z_][\w-]*)|\[(\d+)\]")
 
 
 @dataclass(frozen=True)
 class _Layer:
-    """Plain data, and where every value of it stands."""
+    """Plain data, and the place of every value in it."""
 
     data: dict[str, Any]
     places: dict[Steps, Place]
 
 
 def assemble(path: Path, changes: Mapping[str, Any] | None = None) -> tuple[dict[str, Any], Marks]:
-    """The data of a recipe file upon those it extends, with `changes` (`viewpoints.elevation` -> value), and its places.
+    """The data of a recipe file, merged over the files that it extends, with `changes` (`viewpoints.elevation` -> value), and
+    the places of all values.
 
-    A mapping is merged field by field, but one of another `kind` takes the other's place, as everything else does; null takes
-    a field away. Raises RecipeError as `read` does, and for files that extend one another in a circle.
+    A mapping is merged field by field into the one that it extends, unless their `kind` differs; it then replaces the other
+    mapping, as all other values do. null removes a field. Raises RecipeError as `read` does, and for files that extend one
+    another in a circle.
     """
     layer = _extended(path, ())
     for name, value in (changes or {}).items():
@@ -116,7 +118,7 @@ def _merge(under: dict[str, Any], over: dict[str, Any], steps: Steps, forget: Ca
 
 def _of_other_kind(old: Any, new: Any) -> bool:
     if not {*KINDS}.isdisjoint({*old, *new}):
-        return True  # a distribution
+        return True  # distributions are replaced whole, not merged
     return "kind" in new and new["kind"] != old.get("kind", "grid")
 
 
@@ -126,7 +128,7 @@ def _forget(places: dict[Steps, Place], steps: Steps) -> None:
 
 
 def _set(layer: _Layer, name: str, value: Any) -> _Layer:
-    """The layer with one field of another value."""
+    """The layer with one field set to another value."""
     where = f"--set {name}"
     steps = _steps(name, where)
     places = dict(layer.places)
@@ -170,7 +172,7 @@ def _replaced(data: Any, steps: Steps, value: Any, where: str) -> Any:
 
 
 def _rebased(data: Any, pattern: tuple[str, ...], folder: str) -> Any:
-    """The data with the relative paths that a pattern leads to starting from another folder."""
+    """The data in which relative paths, in fields that match the pattern, are prefixed by a folder."""
     if isinstance(data, dict) and isinstance(data.get("choice"), list):
         return {**data, "choice": [_rebased(option, pattern, folder) for option in data["choice"]]}
     if not pattern:

@@ -18,7 +18,7 @@ from viewsphere.model.mistakes import Path as Steps
 
 LARGEST_FILE = 10_000_000
 MOST_VALUES = 200_000
-"""Aliases can make a file of a few lines mean billions of values."""
+"""Most values of a recipe: by YAML's aliases a file of a few lines can stand for billions of values."""
 
 _INT = re.compile(r"[-+]?[0-9]+\Z")
 _FLOAT = re.compile(r"(?:[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?|[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN))\Z")
@@ -26,7 +26,7 @@ _TAG = "tag:yaml.org,2002:"
 
 
 def _use_yaml_12(rules: type[yaml.SafeLoader] | type[yaml.SafeDumper]) -> None:
-    """YAML 1.2's core rules: `no` and `12:30` are text, `1e3` is a number, there are no dates and no merge keys."""
+    """Set YAML 1.2's core rules: `no` and `12:30` are text, `1e3` is a number, there are no dates and no merge keys."""
     rules.yaml_implicit_resolvers = {}
     rules.add_implicit_resolver(f"{_TAG}null", re.compile(r"(?:~|null|Null|NULL|)\Z"), ["~", "n", "N", ""])
     rules.add_implicit_resolver(f"{_TAG}bool", re.compile(r"(?:true|True|TRUE|false|False|FALSE)\Z"), list("tTfF"))
@@ -35,11 +35,11 @@ def _use_yaml_12(rules: type[yaml.SafeLoader] | type[yaml.SafeDumper]) -> None:
 
 
 class _Loader(yaml.SafeLoader):
-    """Reads by the rules of YAML 1.2."""
+    """A loader that follows the rules of YAML 1.2."""
 
 
 class _Dumper(yaml.SafeDumper):
-    """Writes so that `_Loader` reads the same."""
+    """A dumper whose text `_Loader` reads back equal."""
 
     def ignore_aliases(self, data: Any) -> bool:
         return True
@@ -183,7 +183,7 @@ def dump(data: dict[str, Any]) -> str:
 
 
 def schema(channels: Sequence[str] = ()) -> dict[str, Any]:
-    """JSON schema (draft 2020-12) of recipe files, with a description of every field; `channels`, if any, are all there are."""
+    """JSON schema (draft 2020-12) of recipe files, with a description of every field; `channels`: all valid ones, if given."""
     from viewsphere.recipe.recipe import Recipe
 
     whole = Recipe.model_json_schema()
@@ -205,5 +205,5 @@ def schema(channels: Sequence[str] = ()) -> dict[str, Any]:
 
 
 def template() -> str:
-    """The commented recipe that `viewsphere new` writes; it renders as it is."""
+    """The commented recipe that `viewsphere new` writes; it can be rendered unchanged."""
     return files("viewsphere.model").joinpath("template.yaml").read_text("utf-8")

@@ -85,7 +85,7 @@ class EffectsEntry(entry_of(Effects, without=("seed",)), PerFrame):
 
     @property
     def is_noisy(self) -> bool:
-        """Whether there may be noise, which is another in every frame."""
+        """Whether the effects may include noise, which differs in every frame."""
         return any(isinstance(value, Distribution) or value > 0 for value in (self.shot_noise, self.read_noise))
 
 

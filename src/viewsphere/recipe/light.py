@@ -47,7 +47,7 @@ def _day(value: str) -> str:
 
 
 def _hours(value: Any) -> Any:
-    """Hours of the day in UTC, below 0 or above 24 where that is another day; numbers as they are."""
+    """The hours of a time of day in UTC, below 0 or above 24 if UTC has another date; numbers are returned unchanged."""
     if not isinstance(value, str):
         return value
     found = _TIME.match(value)
@@ -123,7 +123,7 @@ class HdriSky(entry_of(Environment, without=("kind", "file"))):
 
 
 SKIES = tuple(dict.fromkeys([*GradientEntry.model_fields, *DaylightSky.model_fields, *HdriSky.model_fields]))
-"""Fields of skies of all kinds."""
+"""The fields of all kinds of sky."""
 
 
 def _sky(value: Any) -> Any:
@@ -196,7 +196,7 @@ class _Aimed(entry_of(AimedLight), _Placed):
 
 
 def _standing(at: At) -> Any:
-    """Where `at` is, None if that is drawn."""
+    """The point (x, y, z) that `at` means, metres; None if `at` contains distributions."""
     if is_random(at):
         return None
     direction = orbit_center(math.radians(at.azimuth_deg), math.radians(at.elevation_deg), at.distance)

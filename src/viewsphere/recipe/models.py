@@ -137,7 +137,7 @@ class ModelEntry(Frozen):
 
     @property
     def families(self) -> tuple[str, ...]:
-        """The zoo families of this entry; empty if it is one of files."""
+        """The zoo families of this entry; empty for an entry of files."""
         return tuple(s.removeprefix(ZOO) for s in self.source if s.startswith(ZOO))
 
     @model_validator(mode="after")

@@ -39,7 +39,7 @@ from viewsphere.recipe.values import OrShort, shape_of
 from viewsphere.recipe.viewpoints import Viewpoints
 
 BEFORE_RENDERING = {"name", "formats", "max_frames", "shot_frames"}
-"""Fields that change neither a picture nor a label."""
+"""Fields of a recipe that change neither a picture nor a label."""
 
 Share = Annotated[
     Annotated[Number, Field(ge=0, le=1), Tag("number")] | Annotated[tuple[str, ...], Tag("list")],
@@ -211,14 +211,14 @@ class Recipe(Frozen):
         return hashlib.sha256(text.encode()).hexdigest()
 
     def to_yaml(self) -> str:
-        """The recipe as the text of a file, without what equals the defaults; paths stay as they were written."""
+        """The recipe as the text of a file, without fields that equal their defaults; paths are kept as they were written."""
         from viewsphere.recipe.file import dump
 
         return dump(self.model_dump(mode="json", exclude_defaults=True))
 
 
 def _plain(value: Any) -> Any:
-    """NumPy's numbers and arrays and paths as plain data; everything else as it is."""
+    """NumPy's numbers and arrays, and paths, as plain data; all other values unchanged."""
     if isinstance(value, Mapping):
         return {k: _plain(v) for k, v in value.items()}
     if isinstance(value, (list, tuple)):

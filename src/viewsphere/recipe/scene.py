@@ -31,7 +31,7 @@ from viewsphere.recipe.values import OrShort, pair
 
 LARGEST_IMAGE = 16384
 OF_FILE = ("place", "sun", "sky", "ground")
-"""What a .blend file brings with it."""
+"""Fields that a recipe with a .blend scene must not have: the file brings them."""
 LENSES = ("fov_deg", "focal_px", "focal_mm", "K", "of_viewpoints")
 
 Row = tuple[Number, Number, Number]
@@ -196,12 +196,12 @@ class SceneEntry(Frozen):
 
     @property
     def backgrounds(self) -> tuple[BackgroundEntry, ...]:
-        """All that the background may be."""
+        """All values that the background may take."""
         return tuple(alternatives(self.background))
 
     @property
     def automatic_ground(self) -> Literal["on", "off", "catcher"]:
-        """What `ground: auto` means."""
+        """The ground that `ground: auto` stands for in this scene."""
         if self.blend is not None:
             return "off"
         if any(entry.environment for entry in self.backgrounds):
@@ -217,12 +217,12 @@ class SceneEntry(Frozen):
 
     @property
     def is_composed(self) -> bool:
-        """Whether there is more than one model and the ground: then world z = 0 is the floor that all stand on."""
+        """Whether the scene holds more than a model and the ground: then everything stands on world z = 0."""
         return bool(self.place or self.blend or self.company or self.planes)
 
     @property
     def is_moved_each_frame(self) -> bool:
-        """Whether what stands around is drawn for every frame."""
+        """Whether the surroundings (place, distractors, billboards, variants) are drawn anew for every frame."""
         drawn = (self.place, self.company, *self.planes)
         if self.blend is not None and self.blend.is_drawn_per_frame:
             return True
@@ -230,7 +230,7 @@ class SceneEntry(Frozen):
 
     @property
     def is_new_each_frame(self) -> bool:
-        """Whether anything that a shot's frames share is drawn for every frame."""
+        """Whether anything that frames of one shot must share is drawn anew for every frame."""
         lit = (self.sun, self.sky, self.lights, self.ground, self.materials)
         return self.is_moved_each_frame or (self.draw == "per_frame" and (is_random(lit) or self._has_sky_folder))
 
@@ -241,7 +241,7 @@ class SceneEntry(Frozen):
 
     @property
     def has_fixed_scenery(self) -> bool:
-        """Whether there is a place or planes, the same for all models."""
+        """Whether the scene has scenery (a place, billboards, a .blend file) that is the same for all models."""
         variants = () if self.blend is None else self.blend.variants.values()
         drawn = [entry for entry in (self.place, *self.planes, *variants) if entry is not None]
         return bool(drawn or self.blend) and all(entry.draw == "fixed" for entry in drawn)

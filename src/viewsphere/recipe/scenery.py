@@ -1,4 +1,4 @@
-"""What stands around the targets of a recipe: a place, company, flat planes with pictures."""
+"""The surroundings of a recipe's targets: a place, distractors (`company`), and billboards (`planes`)."""
 
 from __future__ import annotations
 
@@ -101,17 +101,17 @@ class CompanyEntry(Frozen):
 
     @property
     def number(self) -> int:
-        """How many there are."""
+        """Number of distractors."""
         return self.count or len(self.layout)
 
     @property
     def placer(self) -> str:
-        """Name of the placer."""
+        """Name of the placer that places the distractors."""
         return self.layout if isinstance(self.layout, str) else "listed"
 
     @property
     def spots(self) -> tuple[Spot, ...]:
-        """Where each stands, as far as the recipe says."""
+        """The listed spots of the distractors; empty where a placer chooses them."""
         return () if isinstance(self.layout, str) else self.layout
 
 

@@ -1,4 +1,4 @@
-"""What the targets of a recipe stand on, and changes to their materials."""
+"""The ground that a recipe's targets stand on, and changes to their materials."""
 
 from __future__ import annotations
 

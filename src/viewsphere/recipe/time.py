@@ -30,7 +30,7 @@ class FrameRange(Frozen):
         return self
 
     def of(self, first: int, last: int) -> tuple[int, ...]:
-        """The frames, of a file that begins and ends with these."""
+        """The frames of this range in a file whose first and last frame are `first` and `last`."""
         begin, end = first if self.first is None else self.first, last if self.last is None else self.last
         return tuple(range(begin, end + 1, self.step))
 
@@ -65,7 +65,7 @@ STEPS = (
 
 
 def chosen_frames(frames: Frames, first: int, last: int) -> tuple[int, ...]:
-    """The frames that are meant of a file that begins and ends with these; empty for a range beyond it."""
+    """The chosen frames of a file whose first and last frame are `first` and `last`; empty for a range beyond the file."""
     if isinstance(frames, tuple):
         return frames
     return (FrameRange() if frames == "all" else frames).of(first, last)

@@ -36,7 +36,7 @@ class OrShort:
 
 
 def pair(value: object) -> object:
-    """A number twice, for a field of two; lists as they are."""
+    """A single number as two equal ones, for a field of two numbers; lists unchanged."""
     if isinstance(value, (int, float)) and not isinstance(value, bool):
         return value, value
     if not isinstance(value, (list, tuple)):
@@ -51,7 +51,7 @@ def _ordered(value: tuple[float, float]) -> tuple[float, float]:
 
 
 def shape_of(value: object) -> str:
-    """`mapping`, `list`, `text` or `number`: which member of a union a value can only mean."""
+    """The shape of a value, `mapping`, `list`, `text` or `number`, by which a union finds the member that it can only mean."""
     if isinstance(value, (Mapping, Frozen)):
         return "mapping"
     if isinstance(value, (list, tuple)):
@@ -79,7 +79,7 @@ class Range(Frozen):
 
     @property
     def count(self) -> int:
-        """How many values; a last step that falls short of `stop` by rounding only still counts."""
+        """Number of values; a last step that misses `stop` only by rounding still counts."""
         return math.floor((self.stop - self.start) / self.step + 1e-9) + 1
 
     def value(self, index: int) -> float:
@@ -109,7 +109,7 @@ Interval = Annotated[
 def parse_color(value: object, also: str = "", words: Sequence[str] = ()) -> tuple[float, float, float]:
     """An sRGB colour, three numbers of 0..1, from its name, `#rgb`, `#rrggbb` or [r, g, b].
 
-    Raises ValueError, which names what `also` would have been right, and the nearest of colours and `words`.
+    Raises ValueError, which says what else (`also`) is allowed, and names the nearest of the colours and `words`.
     """
     expected = f"expected {also}a colour name, '#rrggbb' or [r, g, b] of 0..1"
     if isinstance(value, str):
@@ -150,7 +150,7 @@ SrgbColor = Annotated[tuple[float, float, float], BeforeValidator(parse_color), 
 
 
 def switch(value: object) -> bool | None:
-    """True or False for on and off (as YAML 1.1 or 1.2 reads them), None for anything else."""
+    """True or False for on and off (as read by YAML 1.1 or 1.2), None for any other value."""
     if isinstance(value, bool):
         return value
     return {"on": True, "off": False}.get(value.lower()) if isinstance(value, str) else None

@@ -16,7 +16,7 @@ from viewsphere.recipe.values import Interval, Point, Range, Values, shape_of
 AZIMUTH = "0: the camera faces the model's front; 90: it stands on the model's left, +X"
 ELEVATION = "above the horizon, -90 to 90"
 FARTHEST = 1e6
-"""Metres: ten times the largest model there may be."""
+"""Largest distance of a camera from its target, metres: ten times the largest model allowed."""
 
 DISTANCE = "from the target to the camera, metres"
 TILT = "roll of the camera about its axis, clockwise seen from behind"
@@ -245,7 +245,7 @@ class PoseList(_Aimed):
 
     @property
     def of_cameras(self) -> dict[str, object]:
-        """What only cameras of 3D files have, as far as it is given."""
+        """The given fields that are allowed only for cameras of 3D files."""
         names = ("camera", "frames", "clip", "at", "size")
         return {name: value for name in names if (value := getattr(self, name)) is not None}
 

@@ -1,11 +1,11 @@
 """The store: finished shots on disk, each written aside and renamed when whole, and the data set they make up.
 
-    OUT/store/plan.json                        what was asked for
+    OUT/store/plan.json                        the plan: what a recipe asked for
     OUT/store/models/<key>/                    the normalised model (OBJ, GLB) and model.json
     OUT/store/shots/<hh>/<shot>/frames.json    records of the shot's frames
-    OUT/store/shots/<hh>/<shot>/shot.json      the scene that they show (what is no object: scenery.json)
+    OUT/store/shots/<hh>/<shot>/shot.json      the scene that they show (scenery.json: its things that are no objects)
     OUT/store/shots/<hh>/<shot>/<channel>/<sample>.png|.tiff|...
-    OUT/store/writing/                         what is not whole yet
+    OUT/store/writing/                         folders that are not whole yet
 
 `hh` are the first two hexadecimal digits of the shot key's SHA-256, so that no folder grows large. Workers never share
 a file.

@@ -1,4 +1,4 @@
-"""Channels as files: which kind is the recipe's choice, and every file says itself what it is."""
+"""Channels as files: the recipe chooses the kind of file, and every file's first bytes say which kind it is."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ MOST_COLORS = 256
 def encode(channel: Channel, array: NDArray[Any], files: Files | None = None) -> bytes:
     """The bytes of a channel's file of the kind that `files` choose.
 
-    Raises ValueError for an array that is not as the channel's row says, StoreError for ids above 65535, MissingExtraError
-    where a codec is not installed. Ids above 255 do not fit a palette: such a frame's masks are 16-bit.
+    Raises ValueError for an array of another shape or dtype than the channel's, StoreError for ids above 65535,
+    MissingExtraError where a codec is not installed. Ids above 255 do not fit a palette: such a frame's map is a 16-bit PNG.
     """
     from viewsphere.codecs import exr, npz, pictures, png_tiff
 
@@ -50,13 +50,13 @@ def encode(channel: Channel, array: NDArray[Any], files: Files | None = None) ->
 
 
 def _steps(depth: NDArray[np.float32], unit: float) -> NDArray[np.uint16]:
-    """Depth in whole steps: 0 where nothing is seen (or it lies behind the camera), else 1 to 65535, which holds all beyond."""
+    """Depth in whole steps, 1 to 65535, which stands for all larger depths, too; 0 where nothing is in front."""
     steps = np.clip(np.rint(depth.astype(np.float64) / unit), 1, MOST_STEPS)
     return np.where(np.isfinite(depth) & (depth > 0), steps, 0).astype(np.uint16)
 
 
 def depth_step(file: Path) -> float:
-    """Metres by which neighbouring numbers of a depth file differ; 0 where it is exact. Errors as for `decode`."""
+    """Metres by which neighbouring numbers of a depth file differ; 0 where the file is exact. Errors as for `decode`."""
     from viewsphere.codecs import png_tiff
 
     try:
@@ -78,7 +78,7 @@ def check_codecs(channels: Container[str], files: Files) -> None:
 def _masks(channel: Channel, array: NDArray[np.int32], indexed: bool) -> bytes:
     from viewsphere.codecs import png_tiff
 
-    most = int(array.view(np.uint32).max(initial=0))  # what is negative counts as large
+    most = int(array.view(np.uint32).max(initial=0))  # negative ids count as large ones
     if most > MOST_STEPS:
         raise StoreError(f"channel {channel.name}: expected ids in 0..65535, found {array.min()}..{array.max()}")
     if indexed and most < MOST_COLORS:
@@ -87,7 +87,10 @@ def _masks(channel: Channel, array: NDArray[np.int32], indexed: bool) -> bytes:
 
 
 def palette() -> NDArray[np.uint8]:
-    """The 256 distinct colours (256, 3) of PASCAL VOC, 0 black: bits of the id, the lowest three to the colours' highest."""
+    """The 256 distinct colours (256, 3) of PASCAL VOC, id 0 being black.
+
+    The lowest three bits of an id become the highest bits of red, green and blue, the next three bits the next highest ones.
+    """
     ids = np.arange(MOST_COLORS)
     bits = ids[:, None] >> np.arange(8) & 1
     colors = [sum(bits[:, 3 * k + c] << (7 - k) for k in range(3) if 3 * k + c < 8) for c in range(3)]
@@ -121,7 +124,7 @@ def decode(channel: Channel, file: Path, written: Callable[[bytes], None] | None
 
 
 def _decoded(channel: Channel, data: bytes) -> NDArray[Any]:
-    """The array in a file's bytes, whose first ones say what it is."""
+    """The array in a file's bytes, whose first ones say which kind of file it is."""
     from viewsphere.codecs import exr, npz, pictures, png_tiff
 
     if channel.name in {"rgb", "rgba"}:
@@ -155,5 +158,5 @@ def _metres(data: bytes) -> NDArray[np.float32]:
 
 
 def _is_own_png(data: bytes, components: int) -> bool:
-    """Whether this is a PNG of 8-bit RGB or RGBA, as this package writes them (PNG specification, 11.2.1)."""
+    """Whether the bytes are a PNG of 8-bit RGB or RGBA, as this package writes pictures (PNG specification, 11.2.1)."""
     return data[:8] == b"\x89PNG\r\n\x1a\n" and data[24:26] == (b"\x08\x06" if components == 4 else b"\x08\x02")

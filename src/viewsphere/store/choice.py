@@ -12,7 +12,7 @@ from viewsphere.errors import UserError
 @dataclass(frozen=True)
 class Choice:
     """Frames of models whose keys match one of the patterns, and whose numbers lie in one of the ranges [first, stop);
-    all of them where there is none.
+    without patterns all models, without ranges all numbers.
     """
 
     models: tuple[str, ...] = ()
@@ -20,15 +20,15 @@ class Choice:
 
     @property
     def is_some(self) -> bool:
-        """Whether anything is left out."""
+        """Whether the choice leaves anything out."""
         return bool(self.models or self.frames)
 
     def has_model(self, key: str) -> bool:
-        """Whether frames of this model are meant."""
+        """Whether the choice includes frames of this model."""
         return not self.models or any(fnmatchcase(key, pattern) for pattern in self.models)
 
     def places(self, first: int, count: int) -> Sequence[int]:
-        """Which of the frames first, first + 1, ... are meant, counted from 0."""
+        """Which of the frames first, first + 1, ..., first + count - 1 the choice includes, counted from 0."""
         if not self.frames:
             return range(count)
         return [i for i in range(count) if any(low <= first + i < stop for low, stop in self.frames)]

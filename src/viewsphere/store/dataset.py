@@ -31,7 +31,7 @@ class Dataset(Sequence[Sample]):
     """The finished frames of a data set, in frame order; what `viewsphere.open` gives.
 
     `len`, indexing and iteration give samples whose channels are read when asked for. `link` and `path` serve exporters. With
-    a choice, only the frames that it means are there.
+    a choice, only the chosen frames are there.
     """
 
     def __init__(self, root: str | os.PathLike[str], choice: Choice | None = None) -> None:
@@ -75,7 +75,7 @@ class Dataset(Sequence[Sample]):
 
     @cached_property
     def models(self) -> tuple[ModelInfo, ...]:
-        """The finished models, in the plan's order; of a choice, those that its frames have."""
+        """The finished models, in the plan's order; with a choice only the models of the chosen frames."""
         keys = self.plan.models
         if self.choice.is_some:
             seen = {o.key for sample in self for o in sample.objects}
@@ -85,7 +85,7 @@ class Dataset(Sequence[Sample]):
 
     @cached_property
     def _shots(self) -> tuple[list[tuple[str, Sequence[int]]], list[int]]:
-        """Keys of the finished shots in frame order, with the places of their frames, and the number of frames before each."""
+        """Key and chosen places of each finished shot, in frame order; and the number of frames before each shot."""
         shots: list[tuple[str, Sequence[int]]] = []
         starts, total = [0], 0
         found = (self.plan.find(key) for key in self.store.finished())
@@ -122,7 +122,7 @@ class Dataset(Sequence[Sample]):
             yield from self.samples_of(key, places)
 
     def shots(self) -> Iterator[tuple[str, Sequence[int]]]:
-        """Key of every finished shot, in frame order, and which of its frames are meant, counted from 0."""
+        """Key of every finished shot, in frame order, and which of its frames are chosen, counted from 0."""
         yield from self._shots[0]
 
     def samples_of(self, key: str, places: Sequence[int]) -> Iterator[Sample]:
@@ -132,8 +132,9 @@ class Dataset(Sequence[Sample]):
             yield self._sample(records, place)
 
     def _places(self, row: Row) -> Sequence[int]:
-        """Which of a finished shot's frames the choice means, by the model's key, or by that of its moment where it moves.
-        Where the plan does not know the model, as of data sets made elsewhere, a frame is of all models that it shows.
+        """Which of a finished shot's frames are chosen, by the model's key, or by the key of its moment if the model is
+        animated. Where the plan does not know a frame's model, as in imported data sets, the frame belongs to all models that
+        it shows.
         """
         places = self.choice.places(row.first, row.count)
         if not self.choice.models or not places:
@@ -147,14 +148,14 @@ class Dataset(Sequence[Sample]):
         return [place for place, sample in shown if any(self._is_chosen(o, model) for o in sample.objects)]
 
     def _is_chosen(self, shown: ObjectAnnotation, model: str | None) -> bool:
-        """Whether an object makes its frame one of those that are meant: where the frame's model is known, only that does."""
+        """Whether an object makes its frame a chosen one: if the frame's model is known, only an object of this model can."""
         if model is None:
             return self.choice.has_model(shown.key) or self.choice.has_model(shown.track)
         return shown.track == model and self.choice.has_model(shown.key)
 
     @cached_property
     def _chosen(self) -> tuple[str, ...]:
-        """Keys of the models that the choice names, moments of models that move among them."""
+        """Keys of all models that the choice names; each moment of an animated model has its own key."""
         return tuple(key for key in self.plan.models if self.choice.has_model(key))
 
     def _read_records(self, key: str) -> _Records:
@@ -204,7 +205,7 @@ class Dataset(Sequence[Sample]):
 
     @cached_property
     def _kinds(self) -> tuple[Files, ...]:
-        """How each part wrote its files."""
+        """The kinds of files that each part has written."""
         return tuple(Files.model_validate(part.recipe.get("files", {})) for part in self.plan.parts)
 
     def path(self, relative: str) -> Path:
@@ -231,8 +232,8 @@ class Dataset(Sequence[Sample]):
 
 @dataclass(frozen=True, eq=False)
 class _Records:
-    """What a shot's frames.json says, and what makes samples of it where that is not all: the shot, and how its channels' files
-    are called (channel, what comes before a sample's number, what after it).
+    """A shot's frames.json, and, for short records, what else their samples need: the shot, and the names of its channels'
+    files (channel, and the path before and after a sample's number).
     """
 
     file: Path

@@ -17,7 +17,7 @@ from viewsphere.model.sample import Box, ObjectAnnotation, Rle, Sample, View
 from viewsphere.store.records import Category, ModelInfo
 
 MOST_SHOWN = 10
-"""Problems that are named when all are refused."""
+"""Number of problems that an error names."""
 
 
 @dataclass(frozen=True)
@@ -38,9 +38,9 @@ class ForeignModel:
 
 @dataclass(frozen=True)
 class ForeignDataset:
-    """What a format's `read` gives: all there is to know at once, and the frames one by one, in order.
+    """The result of a format's `read`: facts about the whole data set, and its frames one by one, in order.
 
-    Frames are numbered from 0 and `frames` can be called again. `left_out` says what was broken, and is not there.
+    Frames are numbered from 0, and `frames` can be called again. `left_out` names the broken entries that were left out.
     """
 
     name: str
@@ -49,7 +49,7 @@ class ForeignDataset:
     splits: tuple[str, ...]
     channels: tuple[str, ...]
     count: int
-    poses: int  # their indices are below this
+    poses: int  # indices of poses are below this number
     max_objects: int
     frames: Callable[[], Iterator[ForeignFrame]]
     models: tuple[ForeignModel, ...] = ()
@@ -72,7 +72,7 @@ def foreign_object(
     box: Box | None,
     **known: Any,
 ) -> ObjectAnnotation:
-    """An object of which only `mask` (H, W), or only `box`, is known, besides what `known` says; the rest is NaN.
+    """An object of which only `mask` (H, W), or only `box`, is known, and the fields in `known`; all others are NaN.
 
     `size` is the image's (width, height), `source` the annotation as it stood in the other data set.
     """

@@ -1,4 +1,4 @@
-"""Files of one data set in another: hard links where the file system has them."""
+"""Puts files of one data set into another: by hard links where the file system has them."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from viewsphere.store.sample_records import whole_sample
 
 
 def link_file(source: Path, destination: Path) -> str:
-    """Put a file at `destination`, which must not exist: as a `hard link`, else a `reflink`, else a `copy`; gives which."""
+    """Put a file at `destination`, which must not exist: as a `hard link`, else a `reflink`, else a `copy`; returns which."""
     with suppress(OSError):
         os.link(source, destination)
         return "hard link"
@@ -35,7 +35,7 @@ def link_file(source: Path, destination: Path) -> str:
 
 
 def link_model(store: Store, info: ModelInfo, files: Iterable[Path]) -> None:
-    """Write a model of these files, two of which are the OBJ and GLB of `info`, unless there is one of its key."""
+    """Write a model of these files, among them the OBJ and GLB of `info`, unless the store has a model of its key."""
     if store.model_info(info.key) is not None:
         return
     prefix = store.model_folder(info.key).relative_to(store.root).as_posix()
@@ -50,7 +50,7 @@ def link_model(store: Store, info: ModelInfo, files: Iterable[Path]) -> None:
 def link_shot(store: Store, key: str, frames: Iterable[ForeignFrame], known: Iterable[Path] = ()) -> int:
     """Write a shot whose channels are files that exist already; gives the number of its frames.
 
-    `known` are files that say more of it, as `Store.known_of` has them.
+    `known` are further files of the shot, as listed by `Store.known_of`.
     """
     target = store.shot_folder(key)
     prefix = target.relative_to(store.root).as_posix()

@@ -1,4 +1,4 @@
-"""What the store says of itself: the plan it was made for, its parts, categories and models."""
+"""Records of the store as a whole: its plan, the plan's parts, its categories and models."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ class ModelInfo:
 
 @dataclass(frozen=True)
 class Part:
-    """What one recipe (or one source of a merge) brought: the samples [first, first + frames).
+    """The samples [first, first + frames) that one recipe, or one source of a merge, has added to the data set.
 
     `blocks` say what each of its samples shows, in order: the subjects of its sampler (models, or scenes) and the numbers of
     their poses.
@@ -93,7 +93,7 @@ class Part:
 
     @property
     def is_product(self) -> bool:
-        """Whether its samples are known models at known poses."""
+        """Whether the part's samples show known models at known poses."""
         return self.sampler == PRODUCT and bool(self.blocks)
 
     @property
@@ -114,10 +114,10 @@ class Part:
 
 @dataclass(frozen=True)
 class PlanRecord:
-    """What `plan.json` says: all a reader needs to know of the plan.
+    """The content of `plan.json`: all that readers of the data set need to know of the plan.
 
-    `parts`: what was rendered or brought in one after another; a recipe that was just rendered has one. Version, digest, name
-    and recipe are the last part's, all other fields are of all parts together.
+    `parts` were rendered or imported one after another; a data set rendered once has one. Version, digest, name and recipe are
+    the last part's; all other fields hold for all parts together.
     """
 
     version: str
@@ -142,16 +142,17 @@ class PlanRecord:
         return self.parts[self.part_of(frame)].max_objects if self.parts else self.max_objects
 
     def annotation_id(self, frame: int, object_id: int) -> int:
-        """Number of an object's annotation, unique and from 1: parts that come later change none."""
+        """Number of an object's annotation, unique and counted from 1: later parts do not change it."""
         number, first = self.part_of(frame), 0
         if self.parts:
             first = self.parts[number].first
         return self._annotations[number] + (frame - first) * self.most_objects(frame) + object_id
 
     def folder_of(self, frame: int, size: int) -> int | None:
-        """Number of the folder for a frame where none may hold more than `size` objects; None: it needs no folder.
+        """Number of a frame's sub-folder, where no folder may hold more than `size` objects; None if the frame needs no
+        sub-folder.
 
-        Parts that come later change none: what was laid flat stays so.
+        Later parts do not change it: files once laid without sub-folders stay so.
         """
         spans = [(p.first, p.frames, p.max_objects) for p in self.parts] or [(0, self.frames, self.max_objects)]
         number, begun, fit = 0, 0, 1  # begun: where the part begins, in frames of which `fit` go into a folder
@@ -167,20 +168,20 @@ class PlanRecord:
         return next((i for i in reversed(range(len(self.parts))) if self.parts[i].digest == digest), None)
 
     def channels_of(self, part: int) -> tuple[str, ...]:
-        """Channels of a part's frames, those that later parts added included."""
+        """Channels of a part's frames, with the ones added by later parts."""
         added = (channels for later in self.parts for number, channels in later.supplies if number == part)
         return tuple(dict.fromkeys(chain(self.parts[part].channels, *added)))
 
     @cached_property
     def indices(self) -> tuple[Index, ...]:
-        """The shots of each part, but for those with channels of others' frames."""
+        """The index of each part's own shots, without shots that add channels to an earlier part's frames."""
         return tuple(Index(p.blocks, p.first, p.shot_frames, number) for number, p in enumerate(self.parts))
 
     @cached_property
     def supplements(self) -> tuple[tuple[Index, tuple[str, ...]], ...]:
-        """The shots with channels that a part added to frames of an earlier one, and these channels.
+        """Indices of the shots that add channels to an earlier part's frames, each with these channels.
 
-        No other shot's key holds a plus.
+        Only keys of such shots contain a plus.
         """
         return tuple(
             (Index(self.parts[number].blocks, self.parts[number].first, part.shot_frames, later, f"+{later}"), channels)
@@ -190,11 +191,11 @@ class PlanRecord:
 
     @property
     def rows(self) -> Iterator[Row]:
-        """All shots, but for those with channels that were added later, in the order of their samples."""
+        """Rows of all shots in the order of their samples, without shots that add channels later."""
         return chain.from_iterable(self.indices)
 
     def rows_of(self, part: int) -> Iterator[Row]:
-        """All shots that a part renders: its own, then those with channels of older frames."""
+        """Rows of all shots that a part renders: its own shots, then those that add channels to older frames."""
         added = (index for index, _ in self.supplements if index.part == part)
         return chain(self.indices[part], chain.from_iterable(added))
 
@@ -204,7 +205,7 @@ class PlanRecord:
         return next((row for row in (index.find(key) for index in every) if row is not None), None)
 
     def row_at(self, sample: int) -> Row:
-        """The row that holds a sample; raises IndexError for one that none holds."""
+        """The row that holds a sample; raises IndexError for a sample beyond all rows."""
         return self.indices[self.part_of(sample)].at(sample)
 
     @cached_property
@@ -213,7 +214,7 @@ class PlanRecord:
 
     @cached_property
     def _annotations(self) -> list[int]:
-        """Annotation numbers that the parts before each one take."""
+        """For each part the number of annotation ids taken by the parts before it."""
         counts = (part.frames * part.max_objects for part in self.parts)
         return list(accumulate(counts, initial=0))
 
@@ -229,7 +230,7 @@ class PlanRecord:
 
     @staticmethod
     def from_json(text: str) -> PlanRecord:
-        """Read plan.json's text; raises KeyError, TypeError or ValueError for anything else."""
+        """The record in plan.json's text; raises KeyError, TypeError or ValueError for any other text."""
         found = json.loads(text)["store"]
         if found != STORE_VERSION:
             raise ValueError(f"a store of version {found}, where this viewsphere reads {STORE_VERSION}: render the recipe anew")

@@ -1,7 +1,7 @@
-"""A sample as plain JSON and back, exactly: what the store keeps of it besides its channels.
+"""Samples, without their channels, as plain JSON and back, exactly.
 
-What was rendered is kept beside its shot: of its objects there stands only what does not follow from the shot and the models.
-What came from elsewhere is kept whole.
+A rendered sample is kept beside its shot by a short record, which holds only those values of the objects that do not follow
+from the shot and the models. An imported sample is kept by a whole record.
 """
 
 from __future__ import annotations
@@ -31,17 +31,17 @@ from viewsphere.model.shot import Shot
 
 Channels = Mapping[str, NDArray[Any]]
 Facts = Callable[[str], ModelFacts]
-"""What is known of a model, by its key."""
+"""Gives the facts about a model by its key."""
 
 
 def short_sample(sample: Sample) -> dict[str, Any]:
-    """A sample of a shot that is kept, too, as `json.dumps(..., allow_nan=False)` takes it."""
+    """The short record of a sample whose shot is stored, too, as `json.dumps(..., allow_nan=False)` takes it."""
     labels = object_labels()
     return {"index": sample.index, "objects": [short_record(o, labels) for o in sample.objects]}
 
 
 def whole_sample(sample: Sample) -> dict[str, Any]:
-    """A sample with all that is known of it, but for its channels' pixels; NaN becomes null."""
+    """The whole record of a sample, with everything but its channels' pixels; NaN becomes null."""
     camera, pose, labels = sample.known_camera, sample.known_pose, object_labels()
     return {
         "index": sample.index,
@@ -91,7 +91,7 @@ def from_whole_sample(record: Mapping[str, Any], channels: Channels, files: Mapp
 
 @dataclass(frozen=True, eq=False)
 class ShotRecords:
-    """Makes a shot's samples again of their short records; `facts` says what is known of its models, `where` names the file."""
+    """Restores a shot's samples from short records; `facts` describes its models, `where` names the file in messages."""
 
     shot: Shot
     facts: Facts

@@ -18,7 +18,7 @@ def read_gltf(folder: ModelFolder) -> tuple[Mesh, FileFacts]:
 
     Skins stand in their bind pose with the scene's joints, morph targets at their default weights, instances
     are repeated. One part a node, named by the node or its mesh. Raises ModelError for a file that breaks the
-    specification where it matters, or that requires an extension not read here.
+    specification in a way that affects the mesh, or requires an extension that this reader lacks.
     """
     document = Document.read(folder)
     pieces = read_pieces(document)

@@ -54,11 +54,11 @@ HARMLESS_EXTENSIONS = {
 
 DRACO = "KHR_draco_mesh_compression"
 BLENDER_EXTENSIONS = {DRACO}
-"""Extensions that are not read here and that Blender reads."""
+"""Extensions that this reader lacks and Blender has."""
 
 
 class ForBlenderError(ModelError):
-    """A file that is not read here and that Blender may read."""
+    """This reader cannot read the file, but Blender may."""
 
 
 @dataclass(eq=False)

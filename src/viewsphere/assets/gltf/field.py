@@ -31,7 +31,7 @@ class Field:
         return cast("dict[str, Any]", self.value)
 
     def get(self, key: str) -> Field:
-        """A member; a missing one is an empty object."""
+        """A member of this object; if it is missing, an empty object."""
         return Field(self.mapping().get(key, {}), f"{self.where}.{key}")
 
     def extension(self, name: str) -> Field | None:
@@ -40,14 +40,14 @@ class Field:
         return extensions.get(name) if name in extensions else None
 
     def items(self, key: str) -> list[Field]:
-        """Members of an array; a missing one is empty."""
+        """Items of a member that is an array; none if the member is missing."""
         value = self.mapping().get(key, [])
         if not isinstance(value, list):
             raise Field(value, f"{self.where}.{key}").fail("an array")
         return [Field(v, f"{self.where}.{key}[{i}]") for i, v in enumerate(cast("list[Any]", value))]
 
     def at(self, key: str, index: int) -> Field:
-        """One member of an array of the file's root; ModelError when there is no such index."""
+        """One item of an array in the file's root; ModelError when the index is out of range."""
         value = self.mapping().get(key, [])
         if not isinstance(value, list):
             raise Field(value, f"{self.where}.{key}").fail("an array")

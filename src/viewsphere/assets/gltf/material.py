@@ -19,7 +19,7 @@ DIELECTRIC = 0.04  # reflectance at normal incidence of ior 1.5
 
 
 def read_materials(document: Document, used: Collection[int]) -> list[Material]:
-    """All materials in file order (those not used are left plain), then one for primitives that name none.
+    """All materials in file order (unused ones as plain `Material()`), then the default for primitives without a material.
 
     Primitives without material are plain white plastic rather than the specification's mirror-like metal.
     """
@@ -93,7 +93,7 @@ class _Reader:
         return found
 
     def _specular_glossiness(self, entry: Field, material: Material) -> Material:
-        """KHR_materials_pbrSpecularGlossiness as metallic-roughness; its second texture is not kept."""
+        """KHR_materials_pbrSpecularGlossiness as metallic-roughness; the specular-glossiness texture is dropped."""
         old = entry.extension("KHR_materials_pbrSpecularGlossiness")
         if old is None:
             return material

@@ -22,7 +22,7 @@ def read_pieces(document: Document) -> list[Piece]:
     worlds = _world_matrices(document)
     pieces: list[Piece] = []
     parts: dict[str, int] = {}
-    meshes: dict[int, list[Piece]] = {}  # unmorphed and unskinned, for instances
+    meshes: dict[int, list[Piece]] = {}  # read once without morphing or skinning, for instances
     total = 0
     for index, world in worlds.items():
         node = document.root.at("nodes", index)

@@ -1,8 +1,8 @@
 """The loop: one JSON object a line in, one a line out.
 
-Blender writes to file descriptor 1 as it pleases, so answers go out by a copy of it that is made before bpy is imported,
-and 1 leads where 2 does: to the log. A thread of its own reads the requests: when the other side has gone, however it
-ended, it sees the end of file at once and ends this process, even in the midst of a render.
+Blender itself prints to file descriptor 1, so answers go out through a copy of that descriptor, made before bpy is imported,
+and descriptor 1 is redirected to the log, as 2 is. A separate thread reads the requests: when the other process has ended, in
+whatever way, this thread meets the end of file at once and ends this process, even in the midst of a render.
 """
 
 from __future__ import annotations
@@ -29,21 +29,21 @@ ONLINE = ("socket.connect", "socket.getaddrinfo", "socket.gethostbyname", "socke
 
 
 def main(folder: Path, readable: list[str] | None = None, threads: int = 0) -> None:
-    """Answer requests until there are no more; `folder` is where their arrays lie, and does not outlive the other side.
+    """Answer requests until the input ends; `folder`, where the requests' arrays lie, is removed then.
 
     With `readable`, files are read only from these folders and from the system's, and written only to `folder`, where the
-    system can see to that. Blender works with this many `threads`, 0 for one a core.
+    system can enforce it. Blender works with this many `threads`, 0 for one a core.
     """
     if readable is not None:
         _bind(folder, readable)
     if threads:
         os.environ["LP_NUM_THREADS"] = str(threads)  # of Mesa's software OpenGL
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches all processes of a terminal; the other side decides
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches all processes of a terminal; the process that asks decides
     answers = _own_output()
     faulthandler.enable()
     requests: SimpleQueue[bytes] = SimpleQueue()
     threading.Thread(target=_read, args=(requests, folder), daemon=True).start()
-    with suppress(Exception), few_cores(threads):  # whoever asks first is told what is wrong
+    with suppress(Exception), few_cores(threads):  # the first request is answered with the error
         start_blender()
     while True:
         said = answer(requests.get())
@@ -55,7 +55,7 @@ def main(folder: Path, readable: list[str] | None = None, threads: int = 0) -> N
 
 
 def _bind(folder: Path, readable: list[str]) -> None:
-    """Bounds that hold for all that comes later."""
+    """Restrict which files this process, and so Blender, may read and write from now on."""
     from .confine import confine, die_with_parent
 
     os.environ["TF_DEBUG"] = "SDF_LAYER"  # USD says in the log which files it opens
@@ -95,7 +95,7 @@ def _stay_offline(event: str, _: tuple[Any, ...]) -> None:
 
 
 def _own_output() -> BinaryIO:
-    """The way to the other side; whatever else is written there goes to the log from now on."""
+    """A stream for answers, a copy of standard output; all else printed to standard output goes to the log from now on."""
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
     sys.stdout.reconfigure(line_buffering=True)
@@ -109,7 +109,7 @@ def _read(requests: SimpleQueue[bytes], folder: Path) -> None:
 
 
 def _leave(folder: Path) -> None:
-    """End at once, whatever is being rendered, and leave nothing behind; Blender 4.5 hangs in its own way out."""
+    """Remove the folder and end at once, even in the midst of a render: Blender 4.5 can hang in its regular exit."""
     shutil.rmtree(folder, ignore_errors=True)
     sys.stdout.flush()
     os._exit(0)
@@ -124,7 +124,7 @@ def _hello(_: dict[str, Any]) -> dict[str, Any]:
 
 
 def _devices() -> list[dict[str, str]]:
-    """Each of the kinds of devices that this Blender knows and this machine has."""
+    """All devices of this machine that this Blender can compute on, as dicts with kind and name."""
     import _cycles
 
     found: list[dict[str, str]] = []
@@ -135,7 +135,7 @@ def _devices() -> list[dict[str, str]]:
 
 
 def _memory(_: dict[str, Any]) -> dict[str, float | None]:
-    """Resident memory in megabytes, as it is now; on macOS the most there was, on Windows unknown."""
+    """Resident memory of this process in megabytes: now on Linux, the peak on macOS, None on Windows."""
     statm = Path("/proc/self/statm")
     if statm.exists():
         return {"rss_mb": int(statm.read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6}

@@ -1,4 +1,4 @@
-"""What of an open file needs add-ons or scripts, none of which are there."""
+"""Finds parts of an open file that need add-ons or scripts, none of which the worker loads."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def _driven():
 
 
 def _of_python(owner):
-    """Its drivers for which Python would have to run: expressions beyond Blender's own arithmetic."""
+    """The owner's drivers that would need Python: expressions beyond Blender's own arithmetic."""
     drivers = owner.animation_data.drivers
     return [one for one in drivers if one.driver.type == "SCRIPTED" and not one.driver.is_simple_expression]
 

@@ -17,8 +17,9 @@ def read_cameras(told):
     """The motion and the lens of the file's `camera` (None: the scene's, or the only one) at the `frames` (None: the first) of
     its animation `clip`.
 
-    A motion is `rotation` (3, 3), world from camera in OpenCV's axes, and `center` in metres, both relative to the place and
-    turn that the object `at`, if any, has at the first frame. A lens is for a picture of `size`, by default the scene's.
+    A motion is `rotation` (3, 3), world from camera in OpenCV's axes, and `center` in metres, both relative to the position
+    and rotation that the object `at`, if any, has at the first frame. The lens is for a picture of `size` (width, height), by
+    default the scene's.
     """
     unit, warnings = open_file(told["file"], told["kind"], told["root"], cameras=True, clip=told["clip"])
     scene = bpy.context.scene
@@ -61,7 +62,7 @@ def _object(scene, name):
 
 
 def _rigid(shown):
-    """World from object, without scale."""
+    """The world-from-object matrix without its scale: a rigid motion."""
     place, turn, _ = shown.matrix_world.decompose()
     return Matrix.LocRotScale(place, turn, None)
 

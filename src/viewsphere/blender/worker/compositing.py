@@ -16,7 +16,7 @@ def tree_of(scene):
 
 
 def fault(scene):
-    """A warning where a compositor gives no picture, so that the picture is what Cycles gives."""
+    """A warning where the compositor has no output, so that Cycles' uncomposited picture is used; else None."""
     tree = tree_of(scene)
     if tree is None or not len(tree.nodes) or is_used(scene):
         return []
@@ -34,7 +34,7 @@ def _is_output(node):
 
 
 def stop_writing():
-    """Nothing but pictures that are asked for is written: no file outputs, in no compositor and no group."""
+    """Switch off all File Output nodes, in compositors and in node groups, so that only requested pictures are written."""
     trees = [*bpy.data.node_groups, *(tree for s in bpy.data.scenes if (tree := getattr(s, "node_tree", None)) is not None)]
     for tree in trees:
         for node in tree.nodes:
@@ -43,7 +43,7 @@ def stop_writing():
 
 
 def set_up(scene):
-    """Pictures leave as scene-linear floating point numbers; the compositor is exact, on the processor."""
+    """Have pictures written as scene-linear floating point numbers, composited at full precision on the processor."""
     render, image = scene.render, scene.render.image_settings
     if hasattr(image, "media_type"):  # Blender 5.0 and later
         image.media_type = "IMAGE"
@@ -71,7 +71,7 @@ def read_picture(file):
 
 
 def with_alpha(composed, rendered):
-    """A composed picture whose compositor dropped the alpha has the rendered one's: else nothing would be seen behind it."""
+    """The composed picture, with the rendered alpha where the compositor dropped its own: else no background would show."""
     if composed.shape == rendered.shape and (composed[..., 3] == 1).all():
         composed[..., 3] = rendered[..., 3]
     return composed

@@ -1,7 +1,7 @@
-"""What this process may read and write from now on: Linux's Landlock, where the kernel has it (5.13 and later).
+"""Restricts the files that this process may read and write: by Linux's Landlock, where the kernel has it (5.13 and later).
 
-https://docs.kernel.org/userspace-api/landlock.html. A thread's bounds are those of the threads and processes that it starts
-later, and cannot be widened: so this comes before Blender, which starts threads as it is imported.
+https://docs.kernel.org/userspace-api/landlock.html. A thread's restrictions pass on to the threads and
+processes that it starts later, and cannot be loosened: so they are set before bpy is imported, which starts threads.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from contextlib import suppress
 from pathlib import Path
 
 CREATE_RULESET, ADD_RULE, RESTRICT_SELF = 444, 445, 446
-"""System calls, of the same numbers on every architecture."""
+"""Numbers of Landlock's system calls, the same on every architecture."""
 SET_NO_NEW_PRIVS = 38  # prctl(2)
 
 EXECUTE, WRITE_FILE, READ_FILE, READ_DIR = 1 << 0, 1 << 1, 1 << 2, 1 << 3
@@ -35,9 +35,9 @@ class _Beneath(ctypes.Structure):
 
 
 def confine(readable: list[str], writable: list[str]) -> bool:
-    """Let this process read only these folders, its own programs and the system's, and write only the others.
+    """Let this process read only the `readable` folders, its Python and the system's folders, and write only to `writable`.
 
-    False, and no bounds, where the kernel cannot do it.
+    Returns False, with nothing restricted, where the kernel has no Landlock.
     """
     if not sys.platform.startswith("linux"):
         return False
@@ -60,7 +60,7 @@ def confine(readable: list[str], writable: list[str]) -> bool:
 
 
 def _allow(libc, ruleset: int, place: str, access: int) -> None:
-    with suppress(OSError):  # what is not there needs no rule
+    with suppress(OSError):  # a path that does not exist needs no rule
         parent = os.open(place, os.O_PATH | os.O_CLOEXEC)
         if not Path(place).is_dir():
             access &= ~ONLY_FOR_FOLDERS
@@ -69,7 +69,7 @@ def _allow(libc, ruleset: int, place: str, access: int) -> None:
 
 
 def _programs() -> set[str]:
-    """Where this interpreter and what it imports lie."""
+    """Folders of this interpreter and of the modules that it imports."""
     places = {
         sys.prefix,
         sys.base_prefix,
@@ -82,7 +82,7 @@ def _programs() -> set[str]:
 
 
 def die_with_parent() -> None:
-    """End when the thread that started this process does, even in the midst of something that lets no other thread run."""
+    """Have the kernel kill this process when the thread that started it ends, even while Blender lets no other thread run."""
     if sys.platform.startswith("linux"):
         set_death_signal, kill = 1, 9  # prctl(2), signal(7)
         ctypes.CDLL(None).prctl(set_death_signal, kill, 0, 0, 0)

@@ -1,4 +1,4 @@
-"""What there is in a .blend file that a recipe may name: objects, what they show, whether it is lit."""
+"""Lists what a recipe may name in a .blend file: its objects, what each of them shows, and whether the scene is lit."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ PICTURES = ("FILE", "SEQUENCE", "TILED", "MOVIE")
 
 
 def contents(told):
-    """What `viewsphere.assets.scene_file` asks for: `file`, its `root`, the `frames` that are asked for besides the first,
-    which ascend, patterns of objects that are `shown` although the file hides them, and the `most` triangles.
+    """Answer the request of `viewsphere.assets.scene_file`, which names `file`, its `root`, ascending `frames` besides the
+    first, patterns of objects that are `shown` although the file hides them, and the `most` triangles allowed.
     """
     unit, warnings = open_file(told["file"], "blend", told["root"])
     scene = bpy.context.scene
@@ -47,12 +47,12 @@ def contents(told):
 
 
 def places(told):
-    """Where the objects of these `names` stand at each of the `frames`, which ascend: place and turn, in the file's units."""
+    """Position and rotation of the objects of these `names` at each of the ascending `frames`, in the file's units."""
     unit, _ = open_file(told["file"], "blend", told["root"])
     scene, after, found = bpy.context.scene, None, []
     objects = [bpy.data.objects[name] for name in told["names"]]
     for one in objects:
-        one.hide_viewport = False  # else it is not evaluated
+        one.hide_viewport = False  # Blender evaluates no object that is hidden in viewports
     for frame in told["frames"]:
         go_to(scene, frame, after)
         graph, after = bpy.context.evaluated_depsgraph_get(), frame
@@ -66,7 +66,7 @@ def _standing(matrix):
 
 
 class _Seeing:
-    """What a render would show of each object: names of its parts, where it stands first, and which show at each `frame`."""
+    """Collects what a render would show: each object's part names, its first pose, and which objects show at each `frame`."""
 
     def __init__(self):
         self.parts, self.matrices, self.lamps, self._left_out = {}, {}, 0, {}
@@ -88,7 +88,7 @@ class _Seeing:
                 showing.add(owner.name)
 
     def warnings(self):
-        """What is rendered although no label knows of it."""
+        """Warnings about rendered things that have no triangles, and so no labels."""
         return [
             f"{what} is rendered, but no label knows of it: {listed(names)}; convert it to a mesh"
             for what, names in self._left_out.items()
@@ -96,7 +96,7 @@ class _Seeing:
 
 
 def _has_area(item, matrix):
-    """Whether there is a triangle with an area, as it stands there."""
+    """Whether the item, placed by this matrix, has a triangle whose area is not zero."""
     mesh = item.to_mesh() if item.type == "META" else item.data
     try:
         if mesh is None or not len(mesh.loop_triangles):
@@ -134,7 +134,7 @@ def _object(one, seeing):
 
 
 def _collections(one):
-    """Names of the collections that it is in, or that it instances, and of those that these are in."""
+    """Names of the collections that hold the object or that it instances, and of all collections around these."""
     found = {collection.name for collection in one.users_collection}
     if one.instance_collection is not None:
         found.add(one.instance_collection.name)

@@ -1,4 +1,4 @@
-"""What Blender evaluated, object by object, as arrays of triangles."""
+"""Blender's evaluated objects as arrays of triangles."""
 
 from __future__ import annotations
 
@@ -20,21 +20,22 @@ OWN_SLASH = "\u2215"
 
 
 class Gathering:
-    """Takes the triangles of what is rendered.
+    """Collects the triangles of all objects that a render would show.
 
     `pieces` are triangles of one material, with files of arrays: positions, triangles, normals, uv0, uv1 and colors, the last
-    three None where there are none; `uvs` names the two layers. `placed` says which pieces stand where, as what part.
+    three None where there are none; `uvs` names the two layers. `placed` lists where each piece stands (a matrix) and which
+    part it belongs to.
     """
 
     def __init__(self, folder, pictures, wanted, most):
         self.pieces, self.placed, self.materials, self.warnings = [], [], [], []
         self._folder, self._pictures, self._wanted, self._most = folder, pictures, wanted, most
         self._count = 0
-        self._meshes = {}  # of those that stand more than once: numbers of their pieces and of their triangles
-        self._known = {}  # numbers of materials
+        self._meshes = {}  # of meshes that are placed more than once: numbers of their pieces, and their triangle counts
+        self._known = {}  # numbers of materials by their addresses
 
     def take(self, depsgraph):
-        """All that a render of this would show, in the order of names."""
+        """Collect all objects that a render of this depsgraph would show, in the order of their names."""
         for material in bpy.data.materials:
             self._known[material.as_pointer()] = len(self.materials)
             self.materials.append(Reader(self._pictures).read(material))
@@ -57,7 +58,7 @@ class Gathering:
         self._sort()
 
     def _sort(self):
-        """Order what stands by its part, and pieces by their first use."""
+        """Sort the placed pieces by their part, and number pieces by their first use."""
         self.placed.sort(key=lambda placed: placed["part"])
         order = dict.fromkeys(number for placed in self.placed for number in placed["pieces"])
         rank = {number: k for k, number in enumerate(order)}
@@ -127,7 +128,7 @@ class Gathering:
         return vertices.reshape(-1, 3), corners, normals.reshape(-1, 3)
 
     def _piece(self, mesh, arrays, loops, number):
-        """Write the triangles with these corners; a vertex for all that are alike."""
+        """Write the triangles with these corners as a piece's files; equal corners share a vertex."""
         vertices, corners, normals = arrays
         material = self.materials[number] if number is not None else None
         uvs = _layers(mesh, material)
@@ -150,22 +151,22 @@ class Gathering:
 
 
 def taken(instance, item):
-    """Whether its triangles are part of what the camera may see."""
+    """Whether the camera can see this instance's triangles: it is shown, has faces, and is no shadow catcher or holdout."""
     if not instance.show_self or item.type not in SOLID:
         return False
     return item.visible_camera and not item.is_shadow_catcher and not item.is_holdout
 
 
 def part_of(item, owner):
-    """Name of the part that an object is, or that it is where another one instances it; their own slashes are written so that
-    they are not taken for that of the instance (`viewsphere.assets.parts.own_part` does the same).
+    """Name of an object's part: the object's name, or `owner/object` where `owner` instances it. A slash within a name is
+    replaced, so that the slash between the two names is unique (`viewsphere.assets.parts.own_part` does the same).
     """
     own = [one.name.replace("/", OWN_SLASH) for one in (owner, item)]
     return own[1] if item.original == owner.original else "/".join(own)
 
 
 def _layers(mesh, material):
-    """Names of the two layers of texture coordinates: the one that is used by default, and another that the material names."""
+    """Names of the two layers of texture coordinates: the default one, and another that the material names."""
     main = next((layer.name for layer in mesh.uv_layers if layer.active_render), None)
     named = (_uses(material, "uv") - {"", main}) & set(mesh.uv_layers.keys())
     return [main, min(named, default=None)]
@@ -180,7 +181,7 @@ def _uses(told, key):
 
 
 def _colors(mesh, material, corners, loops):
-    """Linear colours (N, 4) of corners, where the material asks for them or there is no material; else None."""
+    """Linear vertex colours (N, 4) of corners, where the material uses them or there is no material; else None."""
     attributes = mesh.color_attributes
     if material is None:
         names = [attributes[attributes.render_color_index].name] if len(attributes) else []
@@ -211,7 +212,7 @@ def _corner_values(data, name, width, mesh):
 
 
 def _welded(rows):
-    """Of equal rows (N, K) float32 the first, and for each row the number of its first: by a hash, which is checked."""
+    """Indices of the distinct rows of (N, K) float32, and for each row the number of its distinct row: by a verified hash."""
     bits = np.ascontiguousarray(rows).view(np.uint32).astype(np.uint64)
     mixed = np.zeros(len(bits), np.uint64)
     for column in bits.T:

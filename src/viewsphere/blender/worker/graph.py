@@ -21,11 +21,11 @@ class Graph:
         return node
 
     def math(self, operation, *values):
-        """A number."""
+        """The result of a Math node, a number."""
         return self.node("ShaderNodeMath", enumerate(values), operation=operation).outputs[0]
 
     def vector(self, operation, *values):
-        """Three numbers."""
+        """The result of a Vector Math node, three numbers."""
         return self.node("ShaderNodeVectorMath", enumerate(values), operation=operation).outputs[0]
 
     def dot(self, a, b):
@@ -33,7 +33,7 @@ class Graph:
         return self.node("ShaderNodeVectorMath", enumerate((a, b)), operation="DOT_PRODUCT").outputs["Value"]
 
     def product(self, *values):
-        """The product of numbers; constants are worked out here."""
+        """The product of numbers; constants are multiplied here, without nodes."""
         constant, sockets = 1.0, []
         for value in values:
             if isinstance(value, bpy.types.NodeSocket):
@@ -48,7 +48,7 @@ class Graph:
         return result
 
     def colors(self, *values):
-        """The product of colours; constants are worked out here."""
+        """The product of colours; constants are multiplied here, without nodes."""
         constant, sockets = (1.0, 1.0, 1.0), []
         for value in values:
             if isinstance(value, bpy.types.NodeSocket):
@@ -75,14 +75,14 @@ class Graph:
         return self.math("SUBTRACT", 1.0, value) if isinstance(value, bpy.types.NodeSocket) else 1.0 - value
 
     def mix(self, share, first, second):
-        """Two closures; None is nothing, which neither reflects nor hides."""
+        """A mix of two closures (shaders); None stands for a closure that neither reflects nor hides anything."""
         if not isinstance(share, bpy.types.NodeSocket) and share in (0, 1):
             return second if share else first
         inputs = {0: share} | {k: closure for k, closure in ((1, first), (2, second)) if closure is not None}
         return self.node("ShaderNodeMixShader", inputs).outputs[0]
 
     def add(self, first, second):
-        """Two closures; None is nothing."""
+        """The sum of two closures (shaders); None stands for no closure."""
         if first is None or second is None:
             return first or second
         return self.node("ShaderNodeAddShader", {0: first, 1: second}).outputs[0]

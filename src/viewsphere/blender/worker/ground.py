@@ -13,11 +13,11 @@ SKY = "viewsphere sky"
 
 
 def fade(material, middle, fading, sky):
-    """Let the camera see the sky instead of the ground as far as it has faded; light and mirrors meet all of it.
+    """Let the camera see the sky instead of the ground where the ground has faded; light and mirrors meet the whole ground.
 
-    Transparency would be drawn by lot: a holdout, or the sky's light where the film is not transparent, has no noise. `fading`:
-    metres behind the `middle` at which it begins and ends, and sines of the angle between the view and the ground at which
-    flat views do. `sky`: picture and turn of what is seen.
+    A transparent shader would be sampled at random, with noise; a holdout, or emission of the sky's light where the film is not
+    transparent, has none. `fading`: metres behind the `middle` at which fading begins and ends, and sines of the angle between
+    view and ground at which it begins and ends for flat views. `sky`: the visible sky's picture, and its turn in degrees.
     """
     graph = Graph(material.node_tree)
     output = next(node for node in material.node_tree.nodes if node.type == "OUTPUT_MATERIAL").inputs["Surface"]
@@ -30,7 +30,7 @@ def fade(material, middle, fading, sky):
 
 
 def show_sky(is_shown):
-    """Whether what has faded is the sky, or nothing."""
+    """Choose what shows where the ground has faded: the sky, or nothing (transparency)."""
     for material in bpy.data.materials:
         node = material.node_tree.nodes.get(SKY) if material.node_tree is not None else None
         if node is not None and node.outputs[0].default_value != is_shown:
@@ -38,7 +38,7 @@ def show_sky(is_shown):
 
 
 def _gone(graph, middle, fading):
-    """The share that has faded; few nodes, as each sample of the ground works them out."""
+    """The share of the ground that has faded; by few nodes, because they are evaluated for each sample of the ground."""
     place = graph.node(
         "ShaderNodeVectorTransform", {0: tuple(middle)}, vector_type="POINT", convert_from="WORLD", convert_to="CAMERA"
     )
@@ -61,11 +61,11 @@ def _seen(graph, image, turn_deg):
 
 
 def _between(graph, value, low, high):
-    """0 at low, 1 at high, and no less and no more beyond."""
+    """0 up to `low`, 1 from `high` on, linear between them."""
     return graph.node("ShaderNodeMapRange", {"Value": value, "From Min": low, "From Max": high}, clamp=True).outputs["Result"]
 
 
 def _smooth(graph, value, low, high):
-    """The same by 3 x^2 - 2 x^3."""
+    """0 up to `low`, 1 from `high` on, smooth (3 x^2 - 2 x^3) between them."""
     inputs = {"Value": value, "From Min": low, "From Max": high}
     return graph.node("ShaderNodeMapRange", inputs, interpolation_type="SMOOTHSTEP").outputs["Result"]

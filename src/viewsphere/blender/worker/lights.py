@@ -1,4 +1,4 @@
-"""Lamps and the world's picture.
+"""Lamps, and the world's environment picture.
 
 viewsphere's irradiance E gives a white Lambert surface the radiance E / pi. Cycles: a sun's strength is irradiance; a lamp of P
 watts gives P / (4 pi) at one metre, a rectangle P / pi.
@@ -15,14 +15,14 @@ from mathutils import Matrix, Vector
 KINDS = {"sun": "SUN", "point": "POINT", "spot": "SPOT", "area": "AREA"}
 
 EVEN = 0.05
-"""By how much of its mean the light within a cell of the map differs at most, by which light from the sky is sampled."""
+"""Largest relative deviation of the light within one cell of the map that Cycles samples the sky's light by."""
 
 FEWEST = 32
-"""Columns of that map."""
+"""Fewest columns of the map that Cycles samples the sky's light by."""
 
 
 def add_light(scene, told):
-    """A lamp that is not seen itself. Its strength is that of its brightest colour, so that colours stay within 1."""
+    """Add a lamp that the camera does not see. Its strength is its brightest colour channel, so that colours stay within 1."""
     kind = told["kind"]
     data = bpy.data.lights.new(kind, KINDS[kind])
     color = told["irradiance"]
@@ -47,15 +47,15 @@ def add_light(scene, told):
 
 
 def _facing(position, direction):
-    """A lamp looks along its -Z; a rectangle's width lies level."""
+    """The matrix of a lamp that shines along its -Z in this direction, an area lamp's width being level."""
     direction = Vector(direction) if any(direction) else Vector((0, 0, -1))
     return Matrix.Translation(position) @ direction.to_track_quat("-Z", "Y").to_matrix().to_4x4()
 
 
 def add_world(scene, told):
-    """Two pictures of the whole sphere: what lights, and what the camera sees (often the same).
+    """Set the environment picture that lights the scene and the one that the camera sees (often the same one).
 
-    The latter and its turn are returned.
+    Returns the picture that the camera sees, and its turn in degrees.
     """
     world = bpy.data.worlds.new("world")
     scene.world = world
@@ -66,7 +66,7 @@ def add_world(scene, told):
     output = tree.nodes.new("ShaderNodeOutputWorld")
     pixels = np.load(told["picture"])
     place, image = _turned(tree, told["turn_deg"]), _picture(pixels)
-    # A finer map, as Cycles would take, knows no more; each sample of light looks it up, and a small one stays at hand.
+    # The finer map that Cycles would take holds no more; each light sample looks the map up, and a small one stays in cache.
     world.cycles.sampling_method, world.cycles.sample_map_resolution = "MANUAL", _columns(pixels)
     lighting, seen = _background(tree, place, image), image
     if told["seen"] == told["picture"]:
@@ -82,7 +82,7 @@ def add_world(scene, told):
 
 
 def _turned(tree, turn_deg):
-    """Directions in the picture's axes: the picture turns counter-clockwise from above."""
+    """World directions in the axes of a picture that is turned counter-clockwise, seen from above."""
     place, turn = tree.nodes.new("ShaderNodeTexCoord"), tree.nodes.new("ShaderNodeMapping")
     turn.inputs["Rotation"].default_value = (0, 0, -math.radians(turn_deg))
     tree.links.new(place.outputs["Generated"], turn.inputs["Vector"])

@@ -1,15 +1,16 @@
-"""glTF 2.0 materials as Cycles' nodes: the fields of `viewsphere.assets.mesh.Material`, understood as the raster engine does.
+"""glTF 2.0 materials as Cycles' nodes: the fields of `viewsphere.assets.mesh.Material`, with the meaning that the raster engine
+gives them.
 
-A Principled BSDF does most of it: both know metals and dielectrics, roughness squared, Fresnel between the reflectance at
-normal incidence and 1, a clear coat of ior 1.5. Beside it:
+A Principled BSDF covers most fields: glTF and Cycles share metals and dielectrics, roughness squared, Fresnel between the
+reflectance at normal incidence and 1, a clear coat of ior 1.5. Beside it:
 
 - Occlusion textures are left out: light that does not reach a crevice does not reach it here.
-- A BLEND material's reflections and emission do not become transparent with it (glass is often made by alpha), except where
-  it is all but clear. A material that transmits is never cut out, as labels have it.
-- What transmits is thin and refracts nothing: it lets through what is straight behind it, tinted by its base colour, and
-  scatters the square of its roughness of it; light passes likewise, so its shadows are as light as it is clear. A picture's
-  alpha has no colours: where the background is laid behind later, it shows through by the least of the tints, and what the
-  others let through more is light of the surroundings.
+- Reflections and emission of a BLEND material stay when its alpha falls (glass is often made by alpha), except where the
+  material is almost clear. A material that transmits is never cut out: labels count it as solid, too.
+- Transmitting surfaces are thin and refract nothing: the light from straight behind passes, tinted by the base colour, and
+  the square of the roughness is the share of it that is scattered. Shadow rays pass in the same way, so clear glass casts
+  light shadows. A picture's alpha has no colours: where a background is laid behind a finished picture, the background
+  shows by the smallest of the three tints, and the surplus of the other two is filled with light of the surroundings.
 - Unlit colours are seen as they are, from the camera and in mirrors; they light nothing and cast shadows.
 - All surfaces have two sides.
 """
@@ -26,21 +27,21 @@ from .meshes import COLORS
 from .textures import Textures
 
 UNEXPOSED = 1 / 0.7
-"""Radiance that is shown as white: one over `viewsphere.imaging.view.EXPOSURE`."""
+"""Radiance of an unlit white surface, which the view shows as white: one over `viewsphere.imaging.view.EXPOSURE`."""
 
 TOTAL = 0.99
-"""Reflectance of dielectrics at most, as in Cycles."""
+"""Largest reflectance of dielectrics at normal incidence, as in Cycles."""
 
 GREY = 0.02
-"""Colours that differ by less between red, green and blue tint nothing."""
+"""Colours whose red, green and blue differ by less count as grey."""
 
 SHARP = 0.1
-"""Roughness up to which thin glass is taken as clear: it would scatter a hundredth."""
+"""Roughness up to which thin glass is taken as clear: it would scatter a hundredth of the light."""
 
 
 @dataclass(frozen=True)
 class _Look:
-    """What a material is made of: numbers, colours of three, or sockets. A normal of None is the surface's own."""
+    """Properties of a material: numbers, colours (three numbers) or nodes' outputs. A normal of None is the surface's own."""
 
     color: Any
     alpha: Any
@@ -53,7 +54,7 @@ class _Look:
     coat: Any
     coat_roughness: Any
     coat_normal: Any
-    transmission: Any  # of light that is not mirrored
+    transmission: Any  # share of the light that is not mirrored
 
 
 def build_material(told, images, has_uv, has_colors, is_traced=True):
@@ -86,24 +87,24 @@ def fill_material(material, told, images, has_uv, has_colors, is_traced=True):
 
 
 def build_plain(told, images, has_uv):
-    """What Workbench shows of a material: a picture as it is, without one the factor of its base colour."""
+    """A material for Workbench, which shows the base colour's picture unchanged, or without one the base colour factor."""
     material = bpy.data.materials.new(told["name"] or "material")
     material.diffuse_color = [min(max(c, 0.0), 1.0) for c in told["base_color"]]
     material.metallic, material.roughness = told["metallic"], told["roughness"]
     if material.node_tree is None:  # before Blender 5
         material.use_nodes = True
-    material.node_tree.nodes.clear()  # any texture's node would pass for the base colour's
+    material.node_tree.nodes.clear()  # Workbench takes any texture node for the base colour
     Textures(Graph(material.node_tree), images, tuple(has_uv)).color(told["base_color_texture"])
     return material
 
 
 def _nothing(graph, tint=(1.0, 1.0, 1.0)):
-    """What lets light pass straight on."""
+    """A closure through which all light passes straight on, tinted."""
     return graph.node("ShaderNodeBsdfTransparent", {"Color": tint}).outputs[0]
 
 
 def _veiled(graph, alpha, surface):
-    """The surface as far as it is opaque."""
+    """The surface mixed with transparency by its alpha."""
     return surface if alpha == 1 else graph.mix(alpha, _nothing(graph), surface)
 
 
@@ -115,7 +116,7 @@ def _base(graph, textures, told, has_colors):
     color = graph.colors(tuple(max(c, 0.0) for c in factor), *_given(textures.color(texture), colors and colors["Color"]))
     if mode == "OPAQUE" or (mode == "MASK" and told["transmission"] > 0 and not told["unlit"]):
         return color, 1.0
-    # Labels see the nearest texel, and a cut-out must end where they do.
+    # Labels cut out by the nearest texel, and the picture's cut-out must end where the labels' does.
     texels = textures.alpha(texture, nearest=mode == "MASK")
     alpha = graph.product(opacity, *_given(texels, colors and colors["Alpha"]))
     if mode == "BLEND":
@@ -179,7 +180,7 @@ def _without_metal(graph, share, metallic):
 
 
 def _reflectance(told):
-    """Of a dielectric at normal incidence; an ior of 0 means total reflection (KHR_materials_ior)."""
+    """Reflectance of a dielectric at normal incidence; an ior of 0 means total reflection (KHR_materials_ior)."""
     return min(((told["ior"] - 1) / (told["ior"] + 1)) ** 2 if told["ior"] > 0 else 1.0, TOTAL)
 
 
@@ -203,7 +204,7 @@ def _tint(graph, textures, told, metallic):
     if metallic == 0:
         return tint
     node = graph.node("ShaderNodeMix", data_type="RGBA")
-    # Sockets of one name for every type: by place.
+    # The node has sockets of equal names, one for each data type: addressed by number.
     graph.give(node.inputs[0], metallic)
     graph.give(node.inputs[6], tint)
     graph.give(node.inputs[7], (1.0, 1.0, 1.0))
@@ -211,14 +212,14 @@ def _tint(graph, textures, told, metallic):
 
 
 def _unlit(graph, color):
-    """Light for whoever looks, none for what scatters it."""
+    """Emission that only camera and mirror rays see: it lights no surface."""
     path = graph.node("ShaderNodeLightPath").outputs
     seen = graph.complement(path["Is Diffuse Ray"])
     return graph.node("ShaderNodeEmission", {"Color": color, "Strength": graph.product(UNEXPOSED, seen)}).outputs[0]
 
 
 def _lit(graph, told, look, is_traced):
-    """The surface with what shows through it."""
+    """The whole surface: reflection, emission, and the light that passes through it."""
     has_glass, is_blended = look.transmission != 0, told["alpha_mode"] == "BLEND" and look.alpha != 1
     shine = None
     if has_glass or is_blended:
@@ -231,9 +232,9 @@ def _lit(graph, told, look, is_traced):
 
 
 def _more_shine(graph, alpha):
-    """The share of its mirrored light that a blended surface shows beyond its opacity.
+    """The share of its mirrored light that a blended surface adds beyond its opacity.
 
-    Only to the camera: between surfaces, more light would leave than comes.
+    Only camera rays see the addition: between surfaces, more light would leave than arrives.
     """
     shown = graph.math("MINIMUM", graph.product(8.0, alpha), 1.0)
     camera = graph.node("ShaderNodeLightPath").outputs["Is Camera Ray"]
@@ -241,7 +242,7 @@ def _more_shine(graph, alpha):
 
 
 def _principled(graph, told, look, color):
-    """The opaque surface; with a colour of 0 where it is no metal, only what it mirrors and emits."""
+    """The opaque surface; with a black base colour a dielectric only mirrors and emits."""
     reflectance = _reflectance(told)
     inputs = {
         "Base Color": color,
@@ -263,7 +264,7 @@ def _principled(graph, told, look, color):
 
 
 def _through(graph, told, look, is_traced):
-    """What is behind thin glass: what its surface does not mirror, in its colour."""
+    """Light from behind thin glass: the share that the surface does not mirror, tinted by its colour."""
     reflectance = min(_reflectance(told) * told["specular"], TOTAL)
     left = graph.complement(_fresnel(graph, _ior(reflectance), look.normal)) if reflectance > 0 else 1.0
     if look.coat != 0:
@@ -277,13 +278,13 @@ def _through(graph, told, look, is_traced):
 
 
 def _clear(graph, color, left, tint):
-    """What is straight behind, times `tint`, which is this share `left` of the colour."""
+    """Light from straight behind, times `tint`, which is the glass's colour times the share `left` that is not mirrored."""
     excess = _above_least(graph, color)
     if not isinstance(excess, bpy.types.NodeSocket) and max(excess) < GREY:
         return _nothing(graph, tint)
     camera = graph.node("ShaderNodeLightPath").outputs["Is Camera Ray"]
     excess = graph.shades(excess, graph.product(left, camera))
-    # Without a difference in ior it goes straight on, but Cycles does not count it as transparent.
+    # A refraction of ior 1 lets light go straight on, but does not count as transparent in the picture's alpha.
     straight = graph.node("ShaderNodeBsdfRefraction", {"Color": excess, "Roughness": 0.0, "IOR": 1.0}).outputs[0]
     return graph.add(_nothing(graph, graph.vector("SUBTRACT", tint, excess)), straight)
 
@@ -298,7 +299,7 @@ def _above_least(graph, color):
 
 
 def _fresnel(graph, ior, normal):
-    """What a thin sheet mirrors, from either side: the node would take its back for the inside of a solid."""
+    """Fresnel reflectance of a thin sheet, equal from both sides: Cycles' node alone takes the back for a solid's inside."""
     back = graph.node("ShaderNodeNewGeometry").outputs["Backfacing"]
     turned = graph.math("POWER", ior, graph.math("MULTIPLY_ADD", back, -2.0, 1.0))
     inputs = {"IOR": turned} | ({"Normal": normal} if normal is not None else {})

@@ -1,7 +1,7 @@
 """Meshes and their pictures from arrays; triangles stay in the arrays' order.
 
-glTF's v points down, Blender's up: v is turned here, once, and pictures get their last row first. Names of the layers: `uv0`,
-`uv1`, `colors`.
+glTF's v points down, Blender's up: v is flipped here and nowhere else, and Blender stores a picture's last row first. Layer
+names: `uv0`, `uv1`, `colors`.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ COLORS = "colors"
 
 @dataclass(frozen=True)
 class Images:
-    """The pictures of a mesh as Blender has them, made when first asked for: each file at most once as colour, once as data."""
+    """A mesh's pictures as Blender images, made when first asked for: each file at most once as colour and once as data."""
 
     told: list
     made: dict
 
     def get(self, index, is_color):
-        """The picture as sRGB colours or as plain numbers; colours under an alpha of 0 stay as they are."""
+        """The picture as sRGB colours or as plain numbers; colours under an alpha of 0 are kept."""
         told = self.told[index]
         key = told["pixels"], is_color
         if key not in self.made:
@@ -32,7 +32,7 @@ class Images:
 
 
 def build_images(told, made=None):
-    """The pictures that `told` lists, for `materials.build_material`; meshes that are given one dict `made` share them."""
+    """The pictures that `told` lists, for `materials.build_material`; meshes built with the same dict `made` share images."""
     return Images(told, {} if made is None else made)
 
 
@@ -48,7 +48,7 @@ def _image(told, is_color):
 
 
 def build_mesh(name, told, materials):
-    """A mesh of the contract with these materials, triangle i being polygon i, with normals as they are told."""
+    """A Blender mesh of the arrays in `told`, with these materials; triangle i is polygon i, and normals are kept exactly."""
     vertices = np.nan_to_num(np.load(told["vertices"]))
     triangles, normals = _wound(vertices, np.load(told["triangles"]), np.load(told["normals"]))
     mesh = bpy.data.meshes.new(name)
@@ -64,7 +64,7 @@ def build_mesh(name, told, materials):
     mesh.polygons.foreach_set("material_index", np.load(told["triangle_material"]))
     _add_layers(mesh, told, triangles)
     mesh.update(calc_edges=True)
-    # Free normals, of Blender 4.5 and later: neither rounded nor bent by edges.
+    # This attribute (Blender 4.5 and later) keeps normals exactly: Blender neither rounds them nor changes them at edges.
     mesh.attributes.new("custom_normal", "FLOAT_VECTOR", "POINT").data.foreach_set("vector", _flat(normals))
     return mesh
 
@@ -82,10 +82,10 @@ def _add_layers(mesh, told, triangles):
 
 
 def _wound(vertices, triangles, normals):
-    """The triangles, with corners in the order that makes their fronts those of the normals, and unit normals.
+    """The triangles, wound so that each front faces the side of its normals, and unit normals.
 
-    Cycles would shade a front whose normals look to the back as if light came through it. A vertex without a normal gets the
-    mean of its triangles.
+    Cycles would shade a front whose normals point to its back as if light came through the surface. A vertex without a normal
+    gets the mean normal of its triangles.
     """
     normals = np.nan_to_num(normals, posinf=0.0, neginf=0.0)
     a, b, c = (vertices[triangles[:, k]] for k in range(3))

@@ -1,7 +1,7 @@
 """Node trees of materials as plain expressions, which `viewsphere.assets.nodes` works out.
 
-An expression is a number, a list of three or four (linear colours), or a dict `{"do": name, ...}` of other expressions. What
-a tree says that no expression can goes by name to `lost`.
+An expression is a number, a list of three or four (linear colours), or a dict `{"do": name, ...}` of other expressions. Parts
+of a tree that no expression can say are listed by name in `lost`.
 """
 
 from __future__ import annotations
@@ -9,10 +9,10 @@ from __future__ import annotations
 from contextlib import contextmanager
 
 STEPS = 256
-"""Of curves and colour ramps."""
+"""Steps of the tables that stand for curves and colour ramps."""
 
 MOST = 1000
-"""Nodes that are followed in one material, counted as often as they are used."""
+"""Most nodes followed in one material, a node counted each time that it is used."""
 
 PLAIN = {
     "color": [0.8, 0.8, 0.8],
@@ -28,15 +28,15 @@ PLAIN = {
     "coat_roughness": 0.0,
     "normal": None,
 }
-"""A surface as expressions; `normal` is None, or what a normal map's colours and strength are."""
+"""A surface as expressions; `normal` is None, or a normal map's colours and strength."""
 
 GLTF_NODES = ("gltf material output", "gltf settings")
-"""Beginnings of the names of groups, in lower case, by which Blender's glTF importer and exporter keep what no shader has:
-https://docs.blender.org/manual/en/latest/addons/import_export/scene_gltf2.html, "Baked Ambient Occlusion".
+"""Beginnings of the names of groups, in lower case, in which Blender's glTF importer and exporter keep properties that no
+shader has: https://docs.blender.org/manual/en/latest/addons/import_export/scene_gltf2.html, "Baked Ambient Occlusion".
 """
 
 UNSEEN = {"alpha": 0.0}
-"""A surface that is not there: nothing but its alpha counts."""
+"""An invisible surface: only its alpha counts."""
 
 BLENDS = ("MIX", "MULTIPLY", "ADD", "SUBTRACT", "SCREEN", "DARKEN", "LIGHTEN", "DIFFERENCE", "DIVIDE", "OVERLAY")
 MATHS = (
@@ -60,7 +60,7 @@ class Reader:
     def __init__(self, images):
         self.images = images
         self.lost = []
-        self._groups = []  # the group nodes within which a node lies, the innermost last
+        self._groups = []  # the group nodes around the node being read, the innermost last
         self._count = 0
 
     def read(self, material):
@@ -78,7 +78,7 @@ class Reader:
         return {"name": material.name, **(PLAIN | look), "occlusion": self._occlusion(tree), "lost": self.lost}
 
     def _occlusion(self, tree):
-        """The share of the light from all around that arrives, as glTF knows it; None where nothing says it."""
+        """glTF's ambient occlusion, the share of the ambient light that arrives; None where the tree has none."""
         for node in tree.nodes if tree else ():
             group = node.node_tree if node.bl_idname == "ShaderNodeGroup" else None
             if group is not None and group.name.lower().startswith(GLTF_NODES):
@@ -150,7 +150,7 @@ class Reader:
         with self._feeding(node.inputs[0]) as found:
             by_angle = found is not None and getattr(found[0], "bl_idname", "") in BY_ANGLE
         if by_angle and first is not UNSEEN and second is not UNSEEN:
-            return first | {"roughness": second["roughness"], "specular": 1.0}  # the older way to say plastic
+            return first | {"roughness": second["roughness"], "specular": 1.0}  # an older way to build plastic
         return _mixed(self._number(node.inputs[0]), first, second)
 
     def _sum_of_two(self, node):
@@ -190,7 +190,7 @@ class Reader:
 
     @contextmanager
     def _feeding(self, socket):
-        """What `_source` finds, within the groups in which it lies."""
+        """The node and output of `_source`, with `_groups` set, while the context lasts, to the groups around that node."""
         groups = list(self._groups)
         try:
             yield self._source(socket)
@@ -198,8 +198,8 @@ class Reader:
             self._groups = groups
 
     def _source(self, socket):
-        """The node and output that feed a socket, through reroutes and groups; None where nothing does; no node, and the
-        group's own input, where that has a value.
+        """The node and output that feed a socket, through reroutes and groups; None where the socket is not linked; (None,
+        input) where the link leads to a group's input socket with a value of its own.
         """
         while socket.is_linked and socket.links[0].is_valid and not socket.links[0].is_muted:
             output = socket.links[0].from_socket
@@ -229,7 +229,7 @@ class Reader:
         return None
 
     def _worked(self, node, output):
-        """What a node gives at an output."""
+        """The expression of a node's output."""
         self._count += 1
         if self._count > MOST:
             self._lose(f"a tree of more than {MOST:,} nodes")
@@ -237,7 +237,7 @@ class Reader:
         return VALUES.get(node.bl_idname, Reader._unknown)(self, node, output)
 
     def _unknown(self, node, output):
-        """A middling value, or what goes into a node that is left out."""
+        """The expression for a node that is not supported: the first linked input of the output's type, else a middle value."""
         self._lose(f"the node {node.bl_label or node.bl_idname}")
         linked = [s for s in node.inputs if s.is_linked and s.type == output.type and s.type in ("RGBA", "VALUE")]
         if linked:
@@ -254,12 +254,12 @@ class Reader:
         told |= self._place(node.inputs["Vector"])
         if output.name == "Alpha":
             return told | {"alpha": True}
-        # Without its alpha a picture's clear texels are black, unless it says that its alpha is something else.
+        # Where the alpha is not linked, clear texels show black, unless the picture's alpha is an independent channel.
         is_black = not node.outputs["Alpha"].is_linked and node.image.alpha_mode in ("STRAIGHT", "PREMUL")
         return told | {"black": is_black}
 
     def _place(self, socket):
-        """Which texture coordinates, and how they are moved: first scaled, then turned, then shifted, v upwards."""
+        """The name of the texture coordinates and their transform: first scaled, then rotated, then shifted, v upwards."""
         place = {"uv": "", "scale": [1.0, 1.0], "rotation": 0.0, "offset": [0.0, 0.0]}
         found = self._source(socket)
         if found is not None and found[0] is not None and found[0].bl_idname == "ShaderNodeMapping":
@@ -446,7 +446,7 @@ def _multiplied(*values):
 
 
 def _mixed(share, first, second):
-    """Two surfaces, field by field; of one that is not there only its alpha counts."""
+    """Two surfaces mixed field by field; of an invisible one (`UNSEEN`) only the alpha counts."""
     whole = [field for field in PLAIN if field not in ("alpha", "normal")]
     if first is UNSEEN or second is UNSEEN:
         mixed = dict(second if first is UNSEEN else first)

@@ -1,4 +1,4 @@
-"""Opening and importing files, and what of a .blend file is wanted."""
+"""Opens and imports files, and selects the wanted objects of a .blend file."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ NAMES_SAID = 8
 
 
 def open_file(file, kind, root, cameras=False, clip=None):
-    """Make the file the scene, at its first frame, which becomes the scene's; metres in one of its units, and warnings.
+    """Open the file as the scene, at the file's first frame. Returns the metres in one unit of the file, and warnings.
 
-    Of a USD file, its cameras are imported where they are asked for. `clip` names the animation that is played.
+    A USD file's cameras are imported if `cameras` is true. `clip` names the animation that is played.
     """
     try:
         if kind == "blend":
@@ -55,7 +55,7 @@ def _newer(kind):
 
 
 def _libraries(root):
-    """Warnings about files that this one links: those outside of `root` are put out of use, others may be missing."""
+    """Warnings about files that this one links: files outside of `root` are disabled, others may be missing."""
     said = []
     for library in list(bpy.data.libraries):
         path = Path(bpy.path.abspath(library.filepath, library=library.parent)).resolve()
@@ -73,7 +73,7 @@ def is_within(path, root):
 
 
 def choose(scene, inside):
-    """The objects that are wanted, made part of the scene, by name and library; None for all that are rendered."""
+    """Link the wanted objects into the scene; returns their addresses, None where all rendered objects are wanted."""
     if not inside:
         return None
     kind, name = inside
@@ -83,7 +83,7 @@ def choose(scene, inside):
         raise ValueError(f"expected {_article(kind)} of the name {name!r}, found {_named(there, name)}")
     objects = [found, *found.children_recursive] if kind == "Object" else list(_rendered(found))
     if kind == "Object":
-        found.hide_render = False  # who asks for it by name wants it
+        found.hide_render = False  # an object asked for by name counts even where it is hidden
     linked = set(scene.collection.objects)
     for one in objects:
         if one not in linked:
@@ -92,7 +92,7 @@ def choose(scene, inside):
 
 
 def _rendered(collection):
-    """Its objects and those of the collections in it, without those that renders do not show."""
+    """Objects of a collection and of the collections in it, but for collections that renders do not show."""
     yield from dict.fromkeys(collection.objects)
     for child in collection.children:
         if not child.hide_render:

@@ -1,4 +1,4 @@
-"""Pictures of materials: the files that they are, or their bytes or pixels where they are not files that others read."""
+"""Pictures of materials: by their files, or by their bytes or pixels where no file exists that viewsphere can read."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ FIRST_TILE = "1001"
 
 
 class Pictures:
-    """The pictures that materials use; `told` lists them.
+    """The pictures that materials use, listed in `told`.
 
-    Each has a `name`, is_srgb, and one of `path`, `data` (a file that holds the bytes of a packed picture), `pixels` (an
-    array (H, W, 4) uint8, the first row on top), or none of them where it cannot be read.
+    Each entry has a `name`, is_srgb, and one of `path`, `data` (a file that holds the bytes of a packed picture), `pixels` (an
+    array (H, W, 4) uint8, the first row on top), or none of these where the picture cannot be read.
     """
 
     def __init__(self, folder, root):
@@ -29,7 +29,7 @@ class Pictures:
         self._known = {}
 
     def index(self, image, lose):
-        """Its number."""
+        """The picture's index in `told`; a new picture is added. `lose` is called with the name of what cannot be kept."""
         key = image.as_pointer()
         if key not in self._known:
             self._known[key] = len(self.told)
@@ -63,7 +63,7 @@ class Pictures:
         return str(file)
 
     def _decoded(self, image):
-        """Its pixels as Blender reads them."""
+        """An image's pixels as Blender decodes them."""
         width, height = image.size
         if not width or not height:
             return {}

@@ -1,23 +1,23 @@
-"""When a file begins and ends, whether anything moves in it, and how to get to a frame."""
+"""A file's animation: its first and last frame, whether anything moves, and going to a frame."""
 
 from __future__ import annotations
 
 import bpy
 
 SIMULATED = {"CLOTH", "SOFT_BODY", "FLUID", "DYNAMIC_PAINT", "PARTICLE_SYSTEM", "COLLISION"}
-"""Modifiers whose result follows from the frames before."""
+"""Modifiers whose result depends on earlier frames (simulations)."""
 
 PLAYED = SIMULATED | {"BUILD", "EXPLODE", "MESH_CACHE", "MESH_SEQUENCE_CACHE", "OCEAN", "WAVE"}
-"""Modifiers that change with time by themselves."""
+"""Modifiers that change with time without any keys."""
 
 TIME_NODES = {"GeometryNodeInputSceneTime", "GeometryNodeSimulationInput"}
 
 
 def play(clip):
-    """Let everything move as the animation of this name says; None: as the file does, where importers play the first one.
+    """Let every object play the animation `clip`; None: the animation that the file plays, the first one in imported files.
 
-    FBX files call it a take, glTF an animation; importers make it an action, with the name of what it moves before it. What
-    the first one does not move plays the first that moves it.
+    FBX files call an animation a take; importers turn each into an action, named `<moved object>|<animation>`. An object that
+    the first animation does not move plays the first one that does.
     """
     chosen = [action for action in bpy.data.actions if clip in (action.name, action.name.rpartition("|")[2])]
     if clip is not None and not chosen:
@@ -41,12 +41,12 @@ def clips():
 
 
 def set_span(scene, kind):
-    """Make the frames from which to which something moves the scene's own; those of a .blend file stay."""
+    """Set the scene's first and last frame to those of its animation; a .blend file keeps its own."""
     if kind == "blend":
         return
     played = {one.animation_data.action for one in _animated() if one.animation_data} - {None}
     ranges = [action.frame_range for action in played or bpy.data.actions]
-    if bpy.data.cache_files:  # importers have set the scene's frames to theirs
+    if bpy.data.cache_files:  # Alembic and USD importers have set the scene's frames
         ranges.append((scene.frame_start, scene.frame_end))
     if ranges:
         scene.frame_start = round(min(first for first, _ in ranges))
@@ -67,7 +67,7 @@ def timeline(scene):
 
 
 def go_to(scene, frame, after=None):
-    """Make it this frame; simulations are played up to it, from the first frame or from the one `after` which it comes."""
+    """Go to a frame; simulations are played up to it, from the first frame on, or from the last shown frame, `after`."""
     if is_simulated(scene):
         for between in range(scene.frame_start if after is None else after + 1, frame):
             scene.frame_set(between)
@@ -75,7 +75,7 @@ def go_to(scene, frame, after=None):
 
 
 def is_simulated(scene):
-    """Whether a frame follows from the frames before."""
+    """Whether the scene has simulations, so that a frame depends on earlier ones."""
     world = scene.rigidbody_world
     return bool(
         (world is not None and world.enabled and world.collection is not None)
@@ -105,6 +105,6 @@ def _has_node(kinds):
 
 
 def _animated():
-    """All that drivers and actions are most often of."""
+    """The data-blocks that usually carry drivers and actions."""
     names = "objects", "meshes", "shape_keys", "armatures", "cameras", "lights", "curves", "materials"
     return (one for name in names for one in getattr(bpy.data, name))

@@ -1,7 +1,7 @@
-"""A model file that Blender opens or imports, as plain arrays and expressions: what `viewsphere.assets.via_blender` asks for.
+"""Reads model files through Blender into plain arrays and expressions, for `viewsphere.assets.via_blender`.
 
-The file is evaluated as a frame of it would be rendered: by a render engine that paints nothing and takes what it is given.
-So modifiers, particles and visibility are those of renders, not of the window.
+A frame is evaluated by rendering it with a render engine that paints nothing and only collects the evaluated objects: so
+modifiers, particles and visibility have their settings for renders, not those for the viewport.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ from .weight import check_weight
 def read(told):
     """Open `told["file"]`, of a `told["kind"]`, and write its arrays at a frame to `told["folder"]`.
 
-    `inside` names what of a .blend file is wanted, as Blender writes it: `["Object", name]`, `["Collection", name]` or
-    nothing; `shown` names objects that count although renders do not show them. `root` is the folder that what the file
-    names has to lie in, None for anywhere; `most` the number of triangles.
-    `frame` None is the first; `after` is the frame of the last answer where the file is open since then, else None.
+    `inside` selects a part of a .blend file: `["Object", name]` or `["Collection", name]`, or nothing for the whole file;
+    `shown` names objects that count although renders do not show them. Files that the model names must lie below `root`,
+    None for anywhere; `most` is the largest number of triangles allowed. `frame` None is the first one; `after` is the frame
+    of the previous answer if the file is still open, else None.
     Raises ValueError in one line for what cannot be read.
     """
     if told.get("after") is None:
@@ -85,14 +85,14 @@ def evaluate(scene, gathering):
 
 
 def read_timeline(told):
-    """When the file begins and ends; it is opened, but not evaluated."""
+    """The file's first and last frame, rate and animations; the file is opened, but not evaluated."""
     _, warnings = open_file(told["file"], told["kind"], told["root"], clip=told["clip"])
     files = [str(Path(file).resolve()) for file in bpy.utils.blend_paths(absolute=True)]
     return {**timeline(bpy.context.scene), "warnings": warnings, "files": files}
 
 
 def prepare(scene):
-    """A picture of a few pixels by a camera of our own, and nothing that happens after rendering."""
+    """Set up a render of a few pixels by a camera of our own, without compositing or sequencing."""
     render = scene.render
     render.resolution_x = render.resolution_y = 8
     render.resolution_percentage = 100

@@ -1,4 +1,4 @@
-"""Blender's renderers: how each of them works, and whether those that draw through OpenGL can do so here."""
+"""Settings of Blender's renderers, and a test whether OpenGL, which EEVEE and Workbench need, works here."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ import bpy
 from . import compositing
 
 ENOUGH = 8
-"""Samples from which on normals help the denoiser."""
+"""Samples per pixel from which on the normals pass helps the denoiser."""
 
 FAINT = 1e-3
-"""Light of a lamp below which EEVEE leaves it out; without a limit it would leave out all of it."""
+"""Light below which EEVEE ignores a lamp; a threshold of 0 would make EEVEE ignore all lamps."""
 
 TRIED = 8
-"""Pixels a side of the picture by which drawing is tried."""
+"""Width and height, in pixels, of the test picture."""
 
 
 def set_up(scene, settings):
-    """How a renderer works: what is unchanged stays in memory, and there are no more threads than it may have."""
+    """Configure the renderer: unchanged data stay in memory between renders, and the number of threads is limited."""
     render = scene.render
     render.use_persistent_data = True
     render.threads_mode = "FIXED" if settings["threads"] else "AUTO"
@@ -33,12 +33,12 @@ def set_up(scene, settings):
 
 
 def is_drawn(scene):
-    """Whether its renderer draws through OpenGL, and gives its pictures by files alone."""
+    """Whether the scene's renderer draws through OpenGL, and so gives pictures only by way of files."""
     return scene.render.engine != "CYCLES"
 
 
 def try_drawing(told):
-    """Draw next to nothing; how long that took, and with which driver. Where it cannot be done Blender may not survive it."""
+    """Draw a tiny picture; returns the seconds taken and the driver's name. Where OpenGL does not work, Blender may crash."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     scene = bpy.context.scene
     _choose(scene.render, told["renderer"])
@@ -51,7 +51,7 @@ def try_drawing(told):
 
 
 def _driver():
-    with suppress(Exception):  # before the first picture, and in some versions always, it is a secret
+    with suppress(Exception):  # not known before the first picture, in some versions never
         import gpu
 
         return gpu.platform.renderer_get()
@@ -68,7 +68,7 @@ def _choose(render, name):
 
 
 def _set_up_cycles(scene, settings):
-    """One process a core, no adaptive sampling unless asked for."""
+    """Cycles' settings; adaptive sampling is off unless asked for."""
     cycles = scene.cycles
     cycles.samples = settings["samples"]
     cycles.use_adaptive_sampling = False
@@ -82,7 +82,7 @@ def _set_up_cycles(scene, settings):
 
 
 def _denoise(cycles, how, samples):
-    """Open Image Denoise; normals that are themselves noise, of a few samples, would tell it to keep the noise."""
+    """Switch on Open Image Denoise; with few samples without the normals pass, whose noise the denoiser would preserve."""
     cycles.use_denoising = how != "off"
     if how != "off":
         cycles.denoiser = "OPENIMAGEDENOISE"
@@ -93,13 +93,13 @@ def _denoise(cycles, how, samples):
 
 
 def _choose_device(cycles, name):
-    """The processor, or all graphics cards that Cycles reaches this way; raises ValueError if there is none."""
+    """Compute on the processor, or on all devices of the kind `name` (CUDA, HIP, ...); raises ValueError if there is none."""
     cycles.device = "CPU" if name == "CPU" else "GPU"
     if name == "CPU":
         return
     preferences = bpy.context.preferences.addons["cycles"].preferences
     chosen = []
-    with suppress(TypeError):  # a kind that this build does not know
+    with suppress(TypeError):  # a kind of device that this build does not know
         preferences.compute_device_type = name
         preferences.refresh_devices()
         chosen = [device for device in preferences.devices if device.type == name]
@@ -110,7 +110,7 @@ def _choose_device(cycles, name):
 
 
 def _set_up_eevee(scene, settings):
-    """Light of lamps without end, as it is elsewhere; mirrors and near shade as far as the picture shows what makes them."""
+    """EEVEE's settings: lamps light at any distance, as in the other renderers; reflections use screen space."""
     compositing.set_up(scene)
     eevee = scene.eevee
     eevee.taa_render_samples = settings["samples"]
@@ -121,7 +121,7 @@ def _set_up_eevee(scene, settings):
 
 
 def _set_up_workbench(scene, settings):
-    """Colours and textures in the light of a studio."""
+    """Workbench's settings: textures in the light of the studio (`studio`)."""
     compositing.set_up(scene)
     display = scene.display
     display.render_aa = "OFF" if settings["samples"] == 1 else str(settings["samples"])
@@ -136,10 +136,10 @@ _TITLES = {"cycles": "Cycles", "eevee": "EEVEE", "workbench": "Workbench"}
 
 
 def _set(renderer, owners, name, value):
-    """A setting by its name in Python; raises ValueError for one that the renderer does not have, or does not take."""
+    """Set a renderer's property by its Python name; raises ValueError for an unknown name or a refused value."""
     expected = f"engine.settings.{name}: expected a setting of {_TITLES[renderer]} and a value it takes, found {value!r}"
     owner = next((one for one in owners if name in one.bl_rna.properties), None)
-    if owner is None:  # Blender 4.5 would take it
+    if owner is None:  # Blender 4.5 would accept any name
         raise ValueError(expected)
     try:
         setattr(owner, name, value)

@@ -1,7 +1,7 @@
-"""A picture of the staged scene: the camera to the pixel, pixels without a file of Blender's own.
+"""Renders the staged scene with an exact camera, and hands the pixels over as arrays.
 
-In a Blender without windows 'Render Result' has no pixels; Cycles' own result does while its engine runs. What the other
-renderers draw comes by a file, which lies in memory.
+In a Blender without windows the image 'Render Result' has no pixels; Cycles' result has them while its engine runs, and is
+read then. The pictures of the other renderers are read from a file.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from mathutils import Matrix
 from . import compositing, ground, renderers
 
 SENSOR = 36.0
-"""Millimetres; any will do."""
+"""Width of the camera's sensor in millimetres; any value will do, as the focal length is given in proportion."""
 
 DRAWN_OFF = {
     "5": (0.009, -0.127),
@@ -26,21 +26,21 @@ DRAWN_OFF = {
     "16": (0.040, -0.035),
     "32": (0.031, -0.094),
 }
-"""Pixels, to the right and down, by which Workbench's pictures are off with so many samples, as measured: it moves its samples
-until one of them lies in the middle.
+"""Pixels, to the right and down, by which Workbench's pictures are displaced, by number of samples, as measured: Workbench
+shifts its sample pattern until one sample lies in the middle.
 """
 
 OTHERS_HIGHER = 0.1
-"""Pixels by which all samples but one lie higher in Blender 4.5, as measured; where pixels are not square, hardly."""
+"""Pixels by which all samples but one lie higher in Blender 4.5, as measured with square pixels; with others hardly any."""
 
 PASSES = {"index": ("use_pass_object_index", ("Object Index", "IndexOB")), "depth": ("use_pass_z", ("Depth",))}
-"""What may be asked for besides the colours: the layer's property, the pass's names in Blender 5 and before."""
+"""The passes besides the colours: the view layer's property, and the pass's names in Blender 5 and before."""
 
 
 def render(told):
     """Write (H, W, 4) float32 to `out`: scene-linear, premultiplied, the first row on top; empty outside of the border.
 
-    Each of the `passes` goes beside it, (H, W, 1): for `picture.npy`, `picture.index.npy`.
+    Each of the `passes` is written beside it, (H, W, 1): beside `picture.npy`, for one, `picture.index.npy`.
     """
     scene = bpy.context.scene
     view = told["camera"]
@@ -50,7 +50,7 @@ def render(told):
     _set_border(scene, told["border"], view)
     wanted, has_more = _switched(bpy.context.view_layer, told)
     if is_changed or has_more or renderers.is_drawn(scene):
-        scene.update_tag()  # else persistent data hides what has changed; it works out meshes' tangents anew
+        scene.update_tag()  # else persistent data hides the change; updates meshes' tangents, too
     begun, cpu = time.monotonic(), time.process_time()
     file = Path(told["out"]).with_suffix(".exr")
     found = (
@@ -62,7 +62,7 @@ def render(told):
 
 
 def _switched(layer, told):
-    """Switch on the passes that are asked for; the file for each name that one may have, and whether any was off."""
+    """Switch on the requested passes; returns the output file for each possible name of a pass, and whether any was off."""
     wanted, has_more = {"Combined": told["out"]}, False
     for name, (switch, names) in PASSES.items():
         if name in told["passes"]:
@@ -72,7 +72,7 @@ def _switched(layer, told):
 
 
 def _switch(owner, name, value):
-    """Set a property; whether it was another."""
+    """Set a property; returns whether its value has changed."""
     is_changed = getattr(owner, name) != value
     if is_changed:
         setattr(owner, name, value)
@@ -80,7 +80,7 @@ def _switch(owner, name, value):
 
 
 def _straightened(scene, view):
-    """The view from which the renderer's picture lies where that of this view should."""
+    """The view (camera) with its principal point moved so that the renderer's displaced picture lands in the right place."""
     samples = scene.display.render_aa if scene.render.engine == "BLENDER_WORKBENCH" else ""
     across, down = DRAWN_OFF.get(samples, (0.0, 0.0))
     is_square = abs(view["fx"] / view["fy"] - 1) < 1e-3
@@ -90,7 +90,7 @@ def _straightened(scene, view):
 
 
 def place_camera(scene, view):
-    """A pinhole with these intrinsics: the sensor's shift is the principal point, pixels that are not square fx / fy."""
+    """Make the camera a pinhole of these intrinsics: the principal point by the sensor's shift, fx / fy by the pixel aspect."""
     width, height, fx, fy = view["width"], view["height"], view["fx"], view["fy"]
     render = scene.render
     render.resolution_x, render.resolution_y = width, height
@@ -109,7 +109,7 @@ def place_camera(scene, view):
 def _set_border(scene, border, view):
     scene.render.use_border = scene.render.use_crop_to_border = border is not None
     if border is not None:
-        # Blender truncates: a thousandth of a pixel more does not change the grid and keeps the whole numbers whole.
+        # Blender truncates the border to pixels: a thousandth of a pixel more keeps rounding from dropping a row.
         left, top, right, bottom = (v + 1e-3 for v in border)
         scene.render.border_min_x, scene.render.border_max_x = left / view["width"], right / view["width"]
         low, high = view["height"] - bottom + 2e-3, view["height"] - top + 2e-3
@@ -117,8 +117,8 @@ def _set_border(scene, border, view):
 
 
 def _rendered(names, composed):
-    """Cycles' passes of one render, (H, W, C) float32 each, the first row on top; the colours from the file that the
-    compositor writes, if it is used.
+    """Cycles' passes of one render by name, (H, W, C) float32 each, the first row on top; if the compositor is used, the
+    colours come from the file `composed`, which the compositor writes.
     """
     found = {}
     original = cycles.CyclesRender.render
@@ -153,7 +153,7 @@ def _rendered(names, composed):
 def _drawn(scene, file):
     """The colours of one picture, (H, W, 4) float32, the first row on top.
 
-    Where the compositor drops their alpha the picture is drawn again without it.
+    Where the compositor drops the alpha, the picture is drawn again without the compositor to get it.
     """
     drawn = _written(scene, file)
     if scene.render.film_transparent and compositing.is_used(scene) and (drawn[..., 3] == 1).all():
@@ -166,7 +166,7 @@ def _drawn(scene, file):
 
 
 def _written(scene, file):
-    """A picture by way of a file."""
+    """A rendered picture, read back from the file that Blender writes."""
     scene.render.filepath = str(file)
     bpy.ops.render.render(write_still=True)
     pixels = compositing.read_picture(file)
@@ -175,7 +175,7 @@ def _written(scene, file):
 
 
 def _whole(pixels, border, view):
-    """The part within the border, in its place in a whole picture."""
+    """The rendered part within the border, put in its place in a whole picture that is empty elsewhere."""
     if border is None:
         return pixels
     left, top, right, bottom = border

@@ -1,8 +1,8 @@
 """The camera on the viewing sphere: a frame of the timeline for every pose.
 
-An empty, `target`, stands where the camera looks; its child, `viewing sphere`, which no render shows, is as large as the camera
-is far away, turned by 90 degrees less the elevation about X and by the azimuth about Z; on it the camera, which the tilt
-rolls. Whoever turns or scales the sphere moves the camera. Keys are constant: nothing is between two poses.
+An empty, `target`, stands where the camera looks. Its child `viewing sphere`, which no render shows, has the camera's distance
+as its radius, and is rotated by 90 degrees less the elevation about X and by the azimuth about Z. The sphere's child is the
+camera, rolled by the tilt: rotating or scaling the sphere moves the camera. Keys are constant: poses are not interpolated.
 """
 
 from __future__ import annotations
@@ -16,16 +16,17 @@ from mathutils import Matrix
 from .rendering import place_camera
 
 STILL = 1e-9
-"""What changes by less is not keyed: metres, radians, millimetres or shares of the picture."""
+"""Properties that change by less are not keyed: metres, radians, millimetres or shares of the picture."""
 
 RINGS, SIDES = 12, 48
-"""Circles of the sphere, and edges of each."""
+"""Circles of the displayed sphere, and edges of each circle."""
 
 
 def make_rig(scene, poses):
     """Target, sphere and the scene's camera, and a marker for each of the poses.
 
-    Gives how far the camera is off where it should be, at most: in metres, or by as much at the distance of its target.
+    Returns the camera's largest error over all poses: in the scene's units, directions being compared at the distance of the
+    target.
     """
     scene.frame_start, scene.frame_end = 1, len(poses)
     camera = scene.camera
@@ -51,7 +52,7 @@ def make_rig(scene, poses):
 
 
 def key(owner, path, values):
-    """Set a property of a data-block to the first of its values; where they change, one key a frame, constant."""
+    """Set a data-block's property to the first of the values; if they change, add a constant key for each frame."""
     rows = np.array(values, float).reshape(len(values), -1)
     is_array = np.ndim(values[0]) > 0
     holder, _, name = path.rpartition(".")
@@ -94,8 +95,8 @@ def _off(scene, number, pose):
 
 
 def _ball():
-    """Circles of equal elevation and of equal azimuth, of radius 1, as edges; its poles lie on Y, above and below where no
-    tilt is.
+    """Circles of equal elevation and of equal azimuth, of radius 1, as edges; its poles lie on Y, which points up
+    in the picture of a camera without tilt.
     """
     angles = [2 * math.pi * i / SIDES for i in range(SIDES)]
     circles = []

@@ -1,4 +1,4 @@
-"""The staged scene as a .blend file for people to open: whoever renders one of its frames sees that frame's picture."""
+"""Saves the staged scene as a .blend file for people to open: rendering a frame of this file gives that frame's picture."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ CURVES = {"standard": "Standard", "raw": "Standard", "filmic": "Filmic", "agx": 
 """Blender's view transform for each of viewsphere's."""
 
 LOOKS = {"Filmic": "Very High Contrast"}
-"""Those that bring a transform nearest to viewsphere's; with one, no picture is shown as it is."""
+"""Blender's look that brings a transform nearest to viewsphere's; with a look, no background can be shown unchanged."""
 
 SHOWN_AS = {"Standard": "sRGB", "Filmic": "Filmic sRGB", "AgX": "AgX Base sRGB"}
-"""Colour spaces of pictures that these transforms show as they are."""
+"""For each view transform the colour space that a background's file must be given to be shown unchanged."""
 
 MODELS, SCENERY, LIGHTS, RIG = "models", "scenery", "lights", "rig"
 
 
 def save(told):
-    """Write what is staged to the file `told["file"]`, with the poses' cameras on a rig; gives by how much these are off."""
+    """Write the staged scene to `told["file"]`, with the poses' cameras on a rig; returns the cameras' largest error."""
     scene = bpy.context.scene
     scene.name = told["name"]
     if told["is_users"]:
@@ -41,7 +41,7 @@ def save(told):
 
 
 def _hold_still():
-    """What a file animates stays as it is at the moment that is shown: the timeline is the poses'."""
+    """Switch off a user's animation, which keeps its values of the staged moment: frames of the timeline are poses now."""
     for kind in (p.identifier for p in bpy.data.bl_rna.properties if p.type == "COLLECTION"):
         for one in getattr(bpy.data, kind):
             for animated in (one, getattr(one, "node_tree", None)):
@@ -53,11 +53,11 @@ def _hold_still():
 
 
 def _describe(scene, told):
-    """What viewsphere knows of the frames and the objects, as custom properties, and a text."""
+    """Store what viewsphere knows of the frames and objects as custom properties, and as a text."""
     for name, value in told["properties"].items():
         scene[name] = value
     for one in scene.objects:
-        if "id" not in one:  # a user's file has it
+        if "id" not in one:  # an object may have an `id` from the user
             one.pass_index = told["members"].get(one.name, 0)
         for name, value in told["objects"].get(str(one.pass_index), {}).items():
             one[name] = value
@@ -65,7 +65,7 @@ def _describe(scene, told):
 
 
 def _show(scene, told):
-    """What is seen behind, and how light becomes a picture."""
+    """Set up the visible background and the view transform."""
     scene.render.film_transparent = told["is_open"]
     ground.show_sky(not told["is_open"])
     shown, transform = scene.view_settings, CURVES[told["transform"]]
@@ -80,7 +80,7 @@ def _show(scene, told):
 
 
 def _lay_behind(scene, told, space):
-    """Compositor nodes that lay the picture over a background, which is shown as it is whatever the exposure."""
+    """Compositor nodes that lay the picture over a background, which exposure and view transform leave unchanged."""
     tree, out = _compositor(scene)
     behind, render = tree.nodes.new("CompositorNodeImage"), tree.nodes.new("CompositorNodeRLayers")
     dim, over = tree.nodes.new("CompositorNodeExposure"), tree.nodes.new("CompositorNodeAlphaOver")
@@ -92,7 +92,7 @@ def _lay_behind(scene, told, space):
         behind.frame_start, behind.frame_duration, behind.frame_offset = 1, len(told["poses"]), 0
         behind.use_auto_refresh = True
     key(tree, f'nodes["{dim.name}"].inputs[1].default_value', [-stops for stops in told["exposures"]])
-    # Blender 5 names these sockets; before, both were called Image, behind the factor.
+    # Blender 5 has names for these two sockets; before, both were called Image and came after the factor.
     below, above = ("Background", "Foreground") if "Background" in over.inputs else (1, 2)
     for source, socket in (
         (behind.outputs["Image"], dim.inputs["Image"]),
@@ -107,7 +107,7 @@ def _lay_behind(scene, told, space):
 
 
 def _compositor(scene):
-    """The scene's compositor, empty, and the node of its result."""
+    """The scene's compositor tree, emptied, and its output node."""
     if hasattr(scene, "compositing_node_group"):  # Blender 5
         tree = bpy.data.node_groups.new("picture", "CompositorNodeTree")
         tree.interface.new_socket("Image", in_out="OUTPUT", socket_type="NodeSocketColor")
@@ -119,7 +119,7 @@ def _compositor(scene):
 
 
 def _sort(scene):
-    """Collections of models, scenery, lights and the rig."""
+    """Sort the objects into collections of models, scenery, lights and the rig."""
     for name in (MODELS, SCENERY, LIGHTS, RIG):
         scene.collection.children.link(bpy.data.collections.new(name))
     for one in list(scene.collection.objects):
@@ -136,7 +136,7 @@ def _collection_of(one):
 
 
 def _set_output(render, is_transparent):
-    """Pictures beside the file, computed with all the cores there are."""
+    """Set rendered pictures to be saved beside the .blend file, and computed on all cores."""
     if hasattr(render.image_settings, "media_type"):  # Blender 5
         render.image_settings.media_type = "IMAGE"
     render.image_settings.file_format, render.image_settings.color_mode = "PNG", "RGBA" if is_transparent else "RGB"
@@ -146,7 +146,7 @@ def _set_output(render, is_transparent):
 
 
 def _pack_one(one, is_packed):
-    """What cannot be read, because it is not there, stays out."""
+    """Pack a picture or a font into the file, unless its own file is missing."""
     with suppress(RuntimeError):
         if not is_packed:
             one.pack()
@@ -155,7 +155,7 @@ def _pack_one(one, is_packed):
 
 
 def _pack(sequence):
-    """All pictures lie in the file, but those of our sequence, which lie beside it; no path leads out of there."""
+    """Pack all pictures into the file, except the backgrounds' sequence beside it; no path leads to any other folder."""
     for image in bpy.data.images:
         if image.source == "SEQUENCE" and sequence:
             image.filepath = f"//{sequence}/{Path(image.filepath).name}"
@@ -166,5 +166,5 @@ def _pack(sequence):
     for screen in bpy.data.screens:
         for space in (space for area in screen.areas for space in area.spaces):
             if space.type == "FILE_BROWSER" and space.params is not None:
-                space.params.directory = b"/" * 1000  # what is shorter leaves the end of what was there
+                space.params.directory = b"/" * 1000  # a shorter path would leave the end of the old one
                 space.params.directory = b"//"

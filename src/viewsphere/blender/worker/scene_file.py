@@ -1,4 +1,4 @@
-"""A user's own file as the scene: its world, lights, meshes and compositor as they are."""
+"""Opens a user's .blend file as the scene; its world, lights, meshes and compositor are kept."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .playing import go_to
 
 
 def open_scene(told):
-    """Open the file that is told, with what is to be shown and hidden; the scene."""
+    """Open the file that `told` names, with its objects shown and hidden as requested; returns the scene."""
     open_file(told["file"], "blend", told["root"])
     scene = bpy.context.scene
     reveal(scene, told["shown"])
@@ -27,23 +27,23 @@ def open_scene(told):
 
 
 def reveal(scene, names):
-    """Let renders show the objects of these names; one that is hidden at the first frame is shown with all that is parented to
-    it.
+    """Let renders show the objects of these names; an object hidden at the first frame is shown with all its children,
+    grandchildren and so on.
     """
     there = set(scene.collection.objects)
     for one in (bpy.data.objects[name] for name in names if name in bpy.data.objects):
         for member in (one, *(one.children_recursive if one.hide_render else ())):
             _fix(member, "hide_render", False)
             _fix(member, "hide_viewport", False)
-            if member not in there:  # its own collections may be hidden
+            if member not in there:  # the object's own collections may be hidden
                 scene.collection.objects.link(member)
                 there.add(member)
 
 
 def _fix(one, name, value):
-    """Set what a driver or an animation of the file would set otherwise; a driver has the last word.
+    """Set a property for good, against drivers and animations of the file: by a driver, which overrides animations.
 
-    What a library has can be given no driver, but its curves can be silenced.
+    Objects from a library cannot be given drivers, but their animation curves can be muted.
     """
     if one.animation_data is not None and one.library is None:
         one.driver_remove(name)
@@ -56,7 +56,7 @@ def _fix(one, name, value):
 
 
 def _curves(animation):
-    """All drivers and curves by which something moves."""
+    """All drivers and animation curves of an object's animation data."""
     yield from animation.drivers
     strips = (strip for track in animation.nla_tracks for strip in track.strips)
     for played in (animation, *strips):
@@ -67,7 +67,7 @@ def _curves(animation):
 
 
 def _only_color(scene):
-    """Leave out what would not fit the labels: they are of one moment, one view and the triangles that modifiers make."""
+    """Switch off effects that would not fit the labels, which show one moment, one view and the triangles of modifiers."""
     render = scene.render
     render.use_motion_blur = render.use_multiview = render.use_freestyle = render.use_sequencer = render.use_stamp = False
     render.use_border = render.use_crop_to_border = False

@@ -9,11 +9,11 @@ from . import ground, lights, materials, meshes, renderers, studio
 from .scene_file import open_scene
 
 NUMBER = "number"
-"""Property of a model's mesh: its place among those that are told."""
+"""Custom property of a model's mesh: the mesh's index in the request."""
 
 
 def stage(told):
-    """Replace whatever there is by the scene that is told; the camera comes with each render."""
+    """Replace the open scene by the one in `told`, which has no camera: each render brings its own."""
     if told["file"]:
         scene = open_scene(told["file"])
     else:
@@ -21,7 +21,7 @@ def stage(told):
         scene = bpy.context.scene
         scene.view_layers[0].use_pass_z = False
     renderer = told["settings"]["renderer"]
-    made = {}  # copies of a model that are painted otherwise share its textures
+    made = {}  # copies of a model with other materials share its textures
     kinds = [_mesh(mesh["name"], mesh, made, renderer) for mesh in told["meshes"]]
     for number, kind in enumerate(kinds):
         kind[NUMBER] = number
@@ -42,7 +42,7 @@ def stage(told):
 
 
 def paint(told):
-    """Fill the materials of models anew; their pictures are coarser, or finer, than they were. All else stays."""
+    """Rebuild the materials of some models, whose pictures have become coarser or finer; the scene is otherwise kept."""
     numbered = {mesh[NUMBER]: mesh for mesh in bpy.data.meshes if NUMBER in mesh}
     made = {}
     before = set(bpy.data.images)
@@ -56,7 +56,7 @@ def paint(told):
 
 
 def _lay_ground(scene, told, sky, known, renderer):
-    """The ground: it fades into the sky far behind the scene, or shows nothing but the shadows on it."""
+    """Add the ground, which fades into the sky far behind the scene, or, as a shadow catcher, shows only shadows."""
     floor = _place(scene, _mesh("ground", told["mesh"], known, renderer), Matrix.Identity(4), 0)
     floor.is_shadow_catcher = told["catcher"]
     if not told["catcher"] and renderer != "workbench":

@@ -1,4 +1,4 @@
-"""Workbench's light: the sun, and the sky and what is below as two hemispheres. It knows of no other."""
+"""Workbench's studio light, which can imitate only the sun and two hemispheres: the sky and the light from below."""
 
 from __future__ import annotations
 
@@ -8,15 +8,17 @@ import bpy
 import numpy as np
 
 DARKEST = 0.6
-"""What shadows take at most: faces turned away from the sun, which have nothing of it, lose as much."""
+"""Largest share of the light that shadows remove: Workbench darkens faces turned away from the sun as much, though the sun
+gives them nothing.
+"""
 
 TURNED = 0.05
-"""Cosine between the sun and what it shines on below which Workbench takes that for shadow."""
+"""Cosine of the angle between the sun and a surface's normal below which Workbench treats the surface as shadowed."""
 
 
 def light(display, lights, hemispheres):
-    """Light the display's studio by the sun among the `lights`, and by what a white matt surface receives from above and from
-    below, `hemispheres` (2, 3); None leaves Blender's own studio as it is.
+    """Light the display's studio by the sun among the `lights`, and by `hemispheres` (2, 3), the radiance of a white matt
+    surface that faces up, and of one that faces down; None leaves Blender's own studio as it is.
     """
     if hemispheres is None:
         return
@@ -30,7 +32,7 @@ def light(display, lights, hemispheres):
     system.light_ambient = least.tolist()
     for lamp in system.solid_lights:
         lamp.use, lamp.specular_color = False, (0, 0, 0)
-    # A wholly smooth one gives (1 + cosine) / 4 of its colour.
+    # A studio lamp of smoothness 1 gives (1 + cosine) / 4 of its colour.
     for lamp, way, more in zip(system.solid_lights, (1.0, -1.0), (above - least, below - least), strict=False):
         _shine(lamp, (0.0, 0.0, way), 2 * more, 1.0)
     _shine(system.solid_lights[2], toward, direct, 0.0)

@@ -15,7 +15,7 @@ _EXTENSIONS = {"repeat": "REPEAT", "clamp": "EXTEND", "mirror": "MIRROR"}
 
 @dataclass(frozen=True)
 class Textures:
-    """The textures of one material; each look-up is made once, however many channels are used."""
+    """The textures of one material; each texture is looked up by one node, however many of its channels are used."""
 
     graph: Graph
     images: Images
@@ -23,15 +23,15 @@ class Textures:
     _nodes: dict = field(default_factory=dict)
 
     def color(self, told):
-        """Colour, linear, or None without a texture; one whose coordinates the mesh lacks is none."""
+        """A texture's linear colour; None without a texture, or if the mesh lacks its coordinates."""
         return self._output(told, "Color", True)
 
     def alpha(self, told, nearest):
-        """Opacity of a colour's texture, of the nearest texel if asked to, or None."""
+        """Alpha of a colour texture, of the nearest texel with `nearest`, or None."""
         return self._output(told and {**told, "nearest": nearest or told["nearest"]}, "Alpha", True)
 
     def channel(self, told, name):
-        """Channel Red, Green, Blue or Alpha of what is no colour, or None."""
+        """Channel Red, Green, Blue or Alpha of a data texture, or None."""
         if name == "Alpha" or not self._is_usable(told):
             return self._output(told, name, False)
         key = _key(told), "channels"
@@ -41,9 +41,9 @@ class Textures:
         return self._nodes[key].outputs[name]
 
     def normal(self, told, scale):
-        """The normal that a map makes of the surface's, or None.
+        """The surface's normal changed by a normal map, or None.
 
-        Blender's x runs along the mesh's u, its y up in the picture as glTF's; both must be turned as the texture is.
+        Tangent space: Blender's x runs along the mesh's u, y up in the picture, as in glTF; a rotated texture rotates both.
         """
         color = self._output(told, "Color", False)
         if color is None or scale == 0:
@@ -85,22 +85,22 @@ class Textures:
         )
 
     def _transformed(self, told, place):
-        """KHR_texture_transform where v points up: the same scale and rotation, and the origin moved to the other corner."""
+        """KHR_texture_transform where v points up: the same scale and rotation, but about the picture's other corner."""
         (_, b), (_, d) = _matrix(told)
         x, y = told["offset"]
         inputs = {
             "Vector": place,
-            "Location": (x + b, 1 - y - d, 0.0),  # the texture's place of u = 0 and v = 1, Blender's origin
+            "Location": (x + b, 1 - y - d, 0.0),  # where glTF's transform takes u = 0, v = 1, Blender's origin
             "Rotation": (0.0, 0.0, told["rotation"]),
             "Scale": (*told["scale"], 1.0),
         }
         return self.graph.node("ShaderNodeMapping", inputs, vector_type="POINT").outputs[0]
 
     def _wrapped(self, place, wraps, size):
-        """Wrap each axis that has one of `wraps`; the picture's own wrapping does the rest.
+        """Wrap the axes whose entry of `wraps` is not None by nodes; the image node's own mode wraps the other axis.
 
-        Half a texel inside of the edge a look-up does not see the opposite one; mirrored or clamped, it sees the same texel on
-        both sides of the edge.
+        Coordinates stay half a texel inside of the edge, where a look-up does not blend with the opposite edge; mirrored or
+        clamped look-ups beyond would see that same texel anyway.
         """
         split = self.graph.node("ShaderNodeSeparateXYZ", {0: place}).outputs
         axes = [self._wrapped_axis(split[k], wraps[k], 0.5 / size[k]) for k in range(2)]
@@ -126,7 +126,7 @@ def _matrix(told):
 
 
 def _turn(told):
-    """Two rows: what a normal map's x and y give along the mesh's u, and up in its picture, taken as square to each other."""
+    """Rows (2, 2) that take a normal map's x and y to the mesh's u and to up in the picture, as orthogonal directions."""
     (a, b), (c, d) = _matrix(told)
     turning = a * d - b * c
     if turning == 0:

@@ -1,4 +1,4 @@
-"""How many triangles modifiers will make, as far as that can be told before they do."""
+"""Estimates how many triangles modifiers will make, before Blender evaluates them."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def check_weight(scene, wanted, most):
 
 
 def expected_triangles(item, render):
-    """Triangles of an object, and the modifier that makes the most of them; those whose work is not known count as none."""
+    """Triangles of an object, and the modifier that makes the most of them; modifiers of unknown effect count as none."""
     faces, loops = len(item.data.polygons), len(item.data.loops)
     cause, most = "", 1.0
     for modifier in item.modifiers:
@@ -38,7 +38,7 @@ def expected_triangles(item, render):
 
 
 def _factor(modifier, render, corners):
-    """Faces for one face of so many corners."""
+    """The number of faces that a modifier makes of one face with so many corners."""
     if modifier.type in ("SUBSURF", "MULTIRES"):
         levels = modifier.render_levels
         if render.use_simplify:

@@ -1,4 +1,4 @@
-"""What Blender's renderers have in common: `cycles`, `eevee` and `workbench` are this package's work but for their names."""
+"""The engines `cycles`, `eevee` and `workbench`, but for their names and flags: they differ only in Blender's renderer."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from viewsphere.model.shot import Shot
 
 PROGRAMS = (Path(__file__).parent, Path(__file__).parents[2] / "blender" / "worker")
-"""Sources that the pictures of all these renderers depend on."""
+"""Source folders that the pictures of all these renderers depend on."""
 
 
 def check(options: Mapping[str, JsonValue], renderer: str) -> None:
@@ -29,7 +29,7 @@ def check(options: Mapping[str, JsonValue], renderer: str) -> None:
 
 
 def stage(shot: Shot, load: Callable[[ModelSpec], Mesh]) -> CyclesStage:
-    """Build the shot's scene in Blender, and its geometry here; the shot's engine says which renderer paints it.
+    """Build the shot's scene in Blender, and its geometry in this process; the shot's engine names the renderer.
 
     Raises UserError for an unknown engine option or one out of range, or where Blender cannot be used.
     """
@@ -46,7 +46,7 @@ def save(shot: Shot, samples: Sequence[Sample], load: Callable[[ModelSpec], Mesh
 
 
 def shows_sky(shot: Shot, finish: Finish) -> bool:
-    """Whether a picture of a shot has the sky where nothing else is; `save` wants frames that agree in this."""
+    """Whether a picture of a shot has the sky where nothing else is; `save` needs frames that agree in this."""
     from viewsphere.engines._blender import saving
 
     return saving.shows_sky(shot, finish)

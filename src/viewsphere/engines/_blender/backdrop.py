@@ -16,7 +16,7 @@ from viewsphere.truth.geometry import Geometry
 from viewsphere.truth.visibility import Visibility
 
 EDGE = 1
-"""Pixels beyond what truth sees in which a smoothed outline still shows it."""
+"""Pixels by which an object's smoothed outline reaches beyond the pixels whose rays hit the object."""
 
 Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
@@ -24,8 +24,8 @@ Float32 = NDArray[np.float32]
 
 @dataclass(frozen=True, eq=False)
 class Backdrop:
-    """What is behind a shot. middle (3,) and unit: centre and half the extent of what is placed, world metres; ground: the
-    first of the ground's triangles.
+    """The backdrop of a shot. middle (3,) and unit: centre and half the extent of all placed things, world metres; ground:
+    index of the ground's first triangle.
     """
 
     sky: SkyPictures
@@ -35,14 +35,14 @@ class Backdrop:
 
     @classmethod
     def of(cls, shot: Shot, geometry: Geometry) -> Backdrop:
-        """A shot's. Raises RecipeError for a picture that cannot be read."""
+        """The backdrop of a shot. Raises RecipeError for a picture that cannot be read."""
         scene = shot.scene
         sky = sky_pictures(scene.sky, scene.sun, scene.lights, scene.ground is not None)
         middle, unit = extent(geometry, any(p.scenery for p in shot.things))
         return cls(sky, middle, unit, int(geometry.triangle_start[-1]))
 
     def behind(self, picture: Float32, camera: Camera, visibility: Visibility, is_open: bool) -> Float32:
-        """The picture (H, W, 4), premultiplied, with a ground that fades into the sky, or into nothing where it is open."""
+        """The picture (H, W, 4), premultiplied, with a ground that fades into the sky, or into nothing if `is_open`."""
         rays = np.nan_to_num(pixel_rays(camera.intrinsics)) @ camera.R
         length = np.linalg.norm(rays, axis=2)
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -58,8 +58,8 @@ class Backdrop:
         return out
 
     def _left(self, away: Float, rise: Float, camera: Camera, triangle: NDArray[np.int32]) -> Float32:
-        """The share (H, W) that has not faded, by distance and the view's rise: all of what stands on the ground, nothing of
-        what is beyond its end.
+        """The share (H, W) of each pixel that has not faded, by distance `away` and the ray's `rise` (sine of its elevation): 1
+        on everything that stands on the ground, 0 beyond the ground's end.
         """
         behind = np.where(np.isfinite(away), away, 0) - np.linalg.norm(self.middle - camera.center)
         near = np.clip(1 - (behind / self.unit - BEGIN) / OVER, 0, 1)
@@ -84,7 +84,7 @@ class Backdrop:
 
 
 def _widened(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """With the pixels that are at most `EDGE` from one of the mask's."""
+    """The mask (H, W), and all pixels at most `EDGE` columns and rows away from its pixels."""
     height, width = mask.shape
     padded = np.pad(mask, EDGE)
     near = np.zeros_like(mask)

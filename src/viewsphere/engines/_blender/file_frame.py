@@ -1,4 +1,4 @@
-"""From the shot's world to that of a .blend file that is the scene: another origin, turned, in the file's unit."""
+"""From the shot's world to the world of a .blend scene, which has its own origin, rotation and unit."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class FileFrame:
 
     @classmethod
     def of(cls, blend: BlendScene | None) -> FileFrame:
-        """The file's; without one the world's own."""
+        """The frame of the .blend file; without a file the identity."""
         if blend is None:
             return cls(np.eye(4), 1.0)
         world_from_file = np.array(blend.world_from_file)
@@ -35,25 +35,25 @@ class FileFrame:
 
     @property
     def is_same(self) -> bool:
-        """Whether nothing changes."""
+        """Whether the file's world is the shot's world, in metres."""
         return self.unit == 1.0 and bool((self.file_from_world == np.eye(4)).all())
 
     def placed(self, world_from_object: ArrayLike) -> list[list[float]]:
-        """The file's matrix of an object whose mesh is in metres."""
+        """Object-to-file matrix (4, 4), as nested lists, of an object whose mesh is in metres."""
         matrix = compose(self.file_from_world, world_from_object)
         matrix[:3] /= self.unit
         return matrix.tolist()
 
     def point(self, point: ArrayLike) -> list[float]:
-        """A place, in the file's units."""
+        """A point (3,) of the world in the file's axes and units."""
         return (transform(self.file_from_world, point) / self.unit).tolist()
 
     def direction(self, direction: ArrayLike) -> list[float]:
-        """A direction."""
+        """A direction (3,) of the world in the file's axes."""
         return transform(self.file_from_world[:3, :3], direction).tolist()
 
     def light(self, told: Told) -> Told:
-        """A light: what it gives falls off with the square of the distance, which is counted in the file's units."""
+        """A light in the file's axes and units; its power is scaled, as light falls off with the squared distance in units."""
         if self.is_same:
             return told
         if told["kind"] == "sun":
@@ -67,7 +67,7 @@ class FileFrame:
         return {**told, **changed}
 
     def camera(self, told: Told) -> Told:
-        """A camera: the rows of `R` are its axes."""
+        """A camera in the file's axes and units; the rows of `R` are the camera's axes."""
         if self.is_same:
             return told
         axes = [self.direction(axis) for axis in told["R"]]

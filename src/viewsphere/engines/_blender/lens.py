@@ -1,6 +1,7 @@
-"""Lenses that Blender's camera does not have: pinhole pictures that cover the lens's rays, sampled along these.
+"""Lenses that Blender's camera does not have: pinhole pictures are rendered that cover the lens's rays, and are sampled along
+them.
 
-Labels are truth's in any case: it casts the same rays.
+Labels are not affected: truth casts the lens's rays itself.
 """
 
 from __future__ import annotations
@@ -20,13 +21,13 @@ Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
 
 FINER = 1.5
-"""Pixels of a covering picture in one of the lens's, along a line."""
+"""Pixels of a covering picture in one pixel of the lens's picture, along a line."""
 
 STEEPEST = 1.5
-"""Tangent of the angle from the axis up to which one picture will do."""
+"""Tangent of the largest angle from the optical axis that a single covering picture may reach."""
 
 MARGIN = 2
-"""Pixels around the outermost rays."""
+"""Margin of a covering picture around the outermost rays, in pixels."""
 
 FACES: tuple[tuple[tuple[int, int, int], ...], ...] = (
     ((1, 0, 0), (0, 1, 0), (0, 0, 1)),
@@ -36,14 +37,15 @@ FACES: tuple[tuple[tuple[int, int, int], ...], ...] = (
     ((1, 0, 0), (0, 0, 1), (0, -1, 0)),
     ((-1, 0, 0), (0, 1, 0), (0, 0, -1)),
 )
-"""Rows: axes of a view ahead, to the right, left, down, up and behind, in the camera's."""
+"""Six matrices whose rows are the axes of a view ahead, right, left, down, up and behind, in camera axes."""
 
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """A pinhole picture: `camera`, and which of the lens's pixels look through it, where.
+    """A covering pinhole picture: its `camera`, and where the rays of the lens's pixels meet it.
 
-    pixels (N,) indices of the lens's pixels; x, y (N,): where their rays meet the picture; None where its pixels are these.
+    pixels (N,): indices of the lens's pixels that this picture serves; x, y (N,): where their rays meet the picture, in its
+    pixels. All three are None where the covering picture is the lens's picture, pixel by pixel.
     """
 
     camera: Camera
@@ -53,7 +55,7 @@ class View:
 
 
 def views_of(camera: Camera) -> tuple[View, ...]:
-    """The pictures that a camera's own is made from: itself for a pinhole without skew, one that is somewhat wider for a lens
+    """The covering pictures of a camera: the camera's own for a pinhole without skew, one that is somewhat wider for a lens
     that bends rays a little, else up to six sides of a cube.
     """
     if camera.distortion is None and camera.intrinsics.skew == 0:
@@ -74,7 +76,7 @@ def views_of(camera: Camera) -> tuple[View, ...]:
 
 
 def _view(camera: Camera, face: Float, pixels: NDArray[np.int64], rays: Float) -> View:
-    """The smallest picture through which these rays, in the view's axes, pass."""
+    """The smallest covering picture, with the axes `face`, through which these rays pass."""
     focal = FINER * max(camera.intrinsics.fx, camera.intrinsics.fy)
     x, y = focal * rays[:, 0] / rays[:, 2], focal * rays[:, 1] / rays[:, 2]
     left, top = math.floor(x.min()) - MARGIN, math.floor(y.min()) - MARGIN

@@ -18,9 +18,9 @@ Device = Literal["cpu", "cuda", "optix", "hip", "metal", "oneapi"]
 
 @dataclass(frozen=True)
 class Common:
-    """What every renderer takes.
+    """Options of every renderer.
 
-    samples: of a pixel; threads of one Blender, 0 for all cores; python: the interpreter that has bpy, None to look for it;
+    samples: per pixel; threads: of one Blender, 0 for all cores; python: the interpreter that has bpy, None to look for it;
     replace_after: shots after which Blender is started anew, 0 for never; settings: the renderer's own, by their names in
     Python.
     """
@@ -36,13 +36,13 @@ class Common:
 
     @property
     def draws(self) -> bool:
-        """Whether it needs OpenGL."""
+        """Whether the renderer draws through OpenGL."""
         return self.renderer != "cycles"
 
 
 @dataclass(frozen=True)
 class Options(Common):
-    """Of Cycles. denoise: off, fast or best (Open Image Denoise); bounces: of light; device: what computes."""
+    """Options of Cycles. denoise: off, fast or best (Open Image Denoise); bounces: of light; device: the kind that computes."""
 
     renderer = "cycles"
     title = "Cycles"
@@ -54,7 +54,7 @@ class Options(Common):
 
 @dataclass(frozen=True)
 class Eevee(Common):
-    """Of EEVEE. raytracing: whether what the picture shows is mirrored, and keeps light from its neighbours."""
+    """Options of EEVEE. raytracing: whether visible surfaces are reflected in others, and shade their neighbours."""
 
     renderer = "eevee"
     title = "EEVEE"
@@ -65,7 +65,7 @@ class Eevee(Common):
 
 @dataclass(frozen=True)
 class Workbench(Common):
-    """Of Workbench."""
+    """Options of Workbench."""
 
     renderer = "workbench"
     title = "Workbench"
@@ -81,7 +81,7 @@ PRESETS = {
     "good": Options(),
     "final": Options(samples=256, denoise="best", bounces=8),
 }
-"""What `quality` stands for; other options change it."""
+"""Cycles' options for each `quality`, from which other given options depart."""
 
 EEVEE_PRESETS = {"draft": Eevee(samples=4, raytracing=False), "good": Eevee(), "final": Eevee(samples=64)}
 WORKBENCH_PRESETS = {"draft": Workbench(samples=5), "good": Workbench(), "final": Workbench(samples=32)}
@@ -121,7 +121,7 @@ def _parsed(given: Mapping[str, JsonValue], presets: Mapping[str, _Own]) -> _Own
 
 def _checked(name: str, value: JsonValue, default: Common) -> JsonValue:
     if name in _CHOICES:
-        value = "off" if value is False else value  # YAML's off
+        value = "off" if value is False else value  # YAML reads a bare `off` as false
         if value not in _CHOICES[name]:
             raise RecipeError(f"engine.{name}: expected {_listed(_CHOICES[name])}, found {value!r}")
     elif name == "samples" and isinstance(default, Workbench):

@@ -24,15 +24,19 @@ from viewsphere.surroundings.sun import sun_light
 from viewsphere.truth.geometry import Geometry
 
 Put = Callable[[NDArray[Any]], str]
-"""Keeps an array where the worker can read it, and gives its path."""
+"""Writes an array to a file that the worker can read, and returns the file's path."""
 
 Told = dict[str, Any]
 
 BEGIN, OVER = 4.0, 26.0
-"""Behind the middle of what is placed, in half its extents: where the ground begins to fade into the sky, and how far on."""
+"""Distances behind the middle of all placed things, in halves of their extent: where the ground begins to fade into the sky,
+and how much farther it has faded altogether.
+"""
 
 FLAT, FLATTER = 0.09, 1 / 12
-"""Sine of the angle between the view and the ground below which it fades, however near, and by how much less it is gone."""
+"""Sine of the angle between view and ground below which the ground fades at any distance, and the decrease of this sine over
+which it fades altogether.
+"""
 
 ARRAYS = ("vertices", "triangles", "normals", "triangle_material", "uv0", "uv1", "colors")
 
@@ -46,7 +50,7 @@ def told_scene(
     put: Put,
     levels: Sequence[Levels] | None = None,
 ) -> Told:
-    """The worker's `stage` request; `levels`: how coarse each kind's pictures are, None for as they are.
+    """The worker's `stage` request; `levels`: halvings of each kind's pictures, None for unchanged pictures.
 
     Raises UserError for a picture of sky or ground that cannot be read.
     """
@@ -80,8 +84,8 @@ def told_scene(
 
 
 def kinds_of(things: Sequence[Thing], meshes: Sequence[Mesh], scene: Scene) -> tuple[Kind, ...]:
-    """The models that are put into the scene, each with its changes to materials; without what is not there, or what a .blend
-    scene brings.
+    """The models that are put into the scene, each with its changes to materials; without absent things, and without things
+    that a .blend scene contains already.
     """
     found: dict[tuple[int, tuple[Repaint, ...]], tuple[Mesh, list[Thing]]] = {}
     for thing, mesh in zip(things, meshes, strict=True):
@@ -136,7 +140,7 @@ def _told_images(images: Sequence[Image], put: Put) -> list[Told]:
 
 
 def _told_material(material: Material, repaints: Sequence[Repaint]) -> Told:
-    """Metallic and roughness of a repaint stand for the factor and its texture."""
+    """A material with its repaints; a repaint's metallic or roughness replaces both the factor and its texture."""
     tinted, repaint = repainted(material, repaints)
     told = asdict(tinted)
     told["fixed_metallic"] = None if repaint is None else repaint.metallic
@@ -145,7 +149,7 @@ def _told_material(material: Material, repaints: Sequence[Repaint]) -> Told:
 
 
 def _told_ground(ground: Ground, geometry: Geometry, has_scenery: bool, put: Put) -> Told:
-    """Truth's own ground, with the texture coordinates that raster's has, and as far as that is seen."""
+    """The ground with truth's own triangles, the texture coordinates of the raster engine, and the range of its fading."""
     vertices = geometry.vertices[geometry.vertex_start[-1] :]
     triangles = geometry.triangles[geometry.triangle_start[-1] :] - geometry.vertex_start[-1]
     material, images = ground_material(ground)
@@ -168,8 +172,8 @@ def _told_ground(ground: Ground, geometry: Geometry, has_scenery: bool, put: Put
 
 
 def extent(geometry: Geometry, has_scenery: bool) -> tuple[NDArray[np.float64], float]:
-    """Centre (3,) and half the diagonal of all that is placed; with scenery the world's origin and the next power of two, so
-    that they stay when the targets change.
+    """Centre (3,) and half the diagonal of all placed things, world metres; with scenery the origin and the next power of two,
+    so that both stay the same when the targets change.
     """
     if not geometry.triangle_start[-1]:
         return np.zeros(3), 1.0
@@ -185,7 +189,7 @@ def middle_of(geometry: Geometry, count: int) -> NDArray[np.float64]:
 
 
 def _told_lights(scene: Scene, middle: NDArray[np.float64]) -> list[Told]:
-    """The sun as it arrives, and the lamps; hemispheres are part of the world."""
+    """The sun, as the sky lets it through, and the lamps; hemisphere lights are part of the world's picture."""
     told: list[Told] = []
     sun = sun_light(scene.sky, scene.sun) if scene.blend is None or not scene.blend.is_lit else None
     if sun is not None:
@@ -211,7 +215,7 @@ def _told_world(pictures: SkyPictures, put: Put) -> Told:
 
 
 def _hemispheres(scene: Scene, pictures: SkyPictures) -> list[list[float]]:
-    """Radiance of a white matt surface that looks up, and of one that looks down, (2, 3), without the sun's own light."""
+    """Radiance (2, 3) of a white matt surface that faces up, and of one that faces down, without the sun's own light."""
     height = len(pictures.lighting)
     zenith = (np.arange(height) + 0.5) / height * math.pi
     weight = np.cos(zenith) * np.sin(zenith) * (2 * math.pi / height)

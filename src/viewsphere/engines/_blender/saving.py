@@ -1,4 +1,4 @@
-"""A shot as a .blend file to open in Blender: what the worker's `save` is told (`viewsphere.blender.worker.saving`)."""
+"""A shot as a .blend file to open in Blender: the request to the worker's `save` (`viewsphere.blender.worker.saving`)."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ from viewsphere.model.scene import Finish
 from viewsphere.model.shot import Shot
 
 NEAREST, FARTHEST = 1e-3, 1e5
-"""What the camera sees, in distances to its target: with more, surfaces would flicker in Blender's windows."""
+"""The camera's clipping range, in distances to its target: with a larger one surfaces would flicker in Blender's windows."""
 
 SAME = 1e-6
-"""Targets that differ by less, in distances of the camera, are one."""
+"""Targets that differ by less, in camera distances, count as the same target."""
 
 MOST_OFF = 1e-4
-"""Camera's error that nobody sees, in distances."""
+"""Largest error of the camera that needs no note, in distances to its target: nobody would see it."""
 
 TEXT = """\
 {name}, which viewsphere made from the data set {data}.
@@ -51,10 +51,10 @@ The pass index of an object is its number in the data set's instance maps; its c
 def save(shot: Shot, samples: Sequence[Sample], load: Callable[[ModelSpec], Mesh], file: Path, data: str) -> tuple[str, ...]:
     """Write a shot's scene, with the cameras of these samples, which are those of its frames, in order.
 
-    The pictures have one size and shape of pixels, and all or none of them show the sky. A shot of another engine is told as
-    this one would render it. Backgrounds that change lie beside the file, in a folder of its name. `data` is the data set's
-    name. Gives what could not be carried over, a line each. Raises UserError where Blender cannot be used, ModelError where it
-    dies twice.
+    The pictures have one size and shape of pixels, and all or none of them show the sky. A shot of another engine is
+    written as Cycles would render it. Backgrounds that change lie beside the file, in a folder of its name. `data` is the data
+    set's name. Returns a line for everything that the file could not keep. Raises UserError where Blender cannot be used,
+    ModelError where Blender dies twice.
     """
     kept = shot.engine_options if shot.engine == "cycles" else {"python": shot.engine_options.get("python")}
     own = shot.model_copy(update={"engine": "cycles", "engine_options": {**kept, "device": "cpu"}})
@@ -83,7 +83,7 @@ def shows_sky(shot: Shot, finish: Finish) -> bool:
 
 
 def _ask(stage: Arrangement, told: dict[str, Any], finishes: Sequence[Finish], camera: Camera, file: Path) -> float:
-    """Have it written; gives by how much its camera is off at most."""
+    """Ask Blender to write the file; returns the largest error of its cameras, in the file's units."""
     process = stage.keeper.process_for(stage)
     background, sequence = None, ""
     if told["is_open"] and not told["transparent"] and not told["is_users"]:
@@ -104,7 +104,7 @@ def _ask(stage: Arrangement, told: dict[str, Any], finishes: Sequence[Finish], c
 
 
 def _told(shot: Shot, samples: Sequence[Sample], finishes: Sequence[Finish], name: str, data: str) -> dict[str, Any]:
-    """All of the worker's request that is not a picture."""
+    """The worker's request, without the background pictures."""
     views = [finish.view for finish in finishes]
     temperatures = {view.temperature_k for view in views} - {NEUTRAL_K}
     return {
@@ -124,7 +124,7 @@ def _told(shot: Shot, samples: Sequence[Sample], finishes: Sequence[Finish], nam
 
 
 def _told_poses(samples: Sequence[Sample], frame: FileFrame) -> list[dict[str, Any]]:
-    """The rig at every sample, whatever its camera's pose was called: it looks at a point of its axis."""
+    """The rig's pose at every sample, as an orbit around a point on the camera's axis, also for 6 DoF poses."""
     poses: list[dict[str, Any]] = []
     nearest, farthest = (f(sample.pose.distance for sample in samples) for f in (min, max))
     still = np.full(3, np.inf)
@@ -161,7 +161,7 @@ def _told_objects(samples: Sequence[Sample]) -> dict[str, dict[str, Any]]:
 
 
 def _lacking(samples: Sequence[Sample], finishes: Sequence[Finish], off: float) -> Iterator[str]:
-    """What Blender's camera, which is `off` by this share of its distance, and its pictures have not."""
+    """Lines about lens and picture properties that the .blend file lacks; `off` is the camera's error in distances."""
     if off > MOST_OFF:
         yield f"the camera is off by up to {off:.1g} of its distance: Blender's numbers are single, the origin far"
     if any(sample.camera.distortion is not None or sample.camera.intrinsics.skew for sample in samples):

@@ -1,4 +1,4 @@
-"""The stage of Blender's renderers: truth's geometry here, the same triangles in a Blender that paints them."""
+"""The stage of Blender's renderers: truth's geometry in this process, and the same triangles in a Blender that paints."""
 
 from __future__ import annotations
 
@@ -34,39 +34,39 @@ from viewsphere.truth.geometry import Geometry
 from viewsphere.truth.visibility import Visibility, homogeneous
 
 STAGE_SECONDS = 600.0
-"""A scene that Blender has not built by then hangs."""
+"""Seconds after which a Blender that has not built its scene counts as hanging."""
 
 FRAME_SECONDS = 3600.0
 
 FIRST_SECONDS = 900.0
-"""A renderer that has not drawn its first, tiny picture by then hangs: it compiles its shaders first, which without a graphics
-card takes from seconds to minutes.
+"""Seconds after which a renderer that has not drawn its first, tiny picture counts as hanging: it compiles its shaders first,
+which without a graphics card takes from seconds to minutes.
 """
 
 NEAREST, FARTHEST = 1e-3, 1e7
-"""Metres in which a camera that follows rays sees."""
+"""Clipping range of cameras that trace rays (Cycles), metres."""
 
 SPARE = 4.0
-"""How much nearer than what is seen at the centres of pixels a camera that draws sees, and how much farther."""
+"""Factor by which the clipping range of cameras that draw exceeds the depths seen at the centres of pixels, at both ends."""
 
 AROUND = 2
-"""Pixels to which Blender's filter spreads what is seen."""
+"""Pixels by which Blender's pixel filter spreads a surface."""
 
 Float32 = NDArray[np.float32]
 
 Clip = tuple[float, float]
-"""Metres to the nearest and the farthest that a camera sees."""
+"""Clipping range of a camera: least and greatest depth, metres."""
 
 AllLevels = tuple[Levels, ...]
-"""Of each kind of model."""
+"""Halvings of the pictures of each kind of model."""
 
 Bounds = tuple[Path, ...] | None
-"""The folders that Blender may read, where it opens a file of a user's; None where it opens none."""
+"""The folders that Blender may read if it opens a user's .blend file; None (no restriction) if it opens none."""
 
 
 @dataclass(eq=False)
 class Keeper:
-    """The one Blender of this process: it has one shot's scene at a time, and is replaced when it has served long enough."""
+    """Keeps this process's only Blender, which holds one shot's scene at a time and is replaced after some number of shots."""
 
     python: Path
     process: BlenderProcess | None = None
@@ -77,7 +77,7 @@ class Keeper:
     _served: int = 0
 
     def process_for(self, stage: Arrangement, levels: AllLevels | None = None) -> BlenderProcess:
-        """A Blender that has this stage's scene, its pictures as coarse as `levels` says; None: as they are, or were."""
+        """A Blender that holds this stage's scene, with pictures halved by `levels`; None keeps the pictures as they are."""
         if self.process is not None and self._stage is stage:
             if levels is not None and levels != self._levels:
                 self._stage = None
@@ -98,7 +98,7 @@ class Keeper:
         return self.process
 
     def _try_drawing(self, process: BlenderProcess, options: AnyOptions) -> None:
-        """See, once, that this renderer draws here at all: Blender does not survive it everywhere."""
+        """Test, once a renderer, that it can draw on this machine: without working OpenGL Blender crashes."""
         self._stage = None
         try:
             process.ask("draw", FIRST_SECONDS, renderer=options.renderer)
@@ -109,7 +109,7 @@ class Keeper:
         self._drawing.add(options.renderer)
 
     def drop(self) -> None:
-        """End it; the next picture starts another."""
+        """End Blender; the next picture starts a new one."""
         if self.process is not None:
             self.process.close()
         self.process, self._stage, self._served = None, None, 0
@@ -127,13 +127,13 @@ def _started(python: Path, bounds: Bounds, threads: int) -> BlenderProcess:
 
 @cache
 def keeper_of(python: Path) -> Keeper:
-    """The keeper of this process's Blender in this interpreter, the same one every time."""
+    """The keeper of this process's Blender for a Python interpreter; the same object at every call."""
     return Keeper(python)
 
 
 @dataclass(frozen=True, eq=False)
 class CyclesStage:
-    """A shot's scene for Blender."""
+    """A shot's stage, painted by one of Blender's renderers."""
 
     arrangements: Arrangements
     options: AnyOptions
@@ -142,11 +142,11 @@ class CyclesStage:
 
     @property
     def shot(self) -> Shot:
-        """What is painted."""
+        """The shot that this stage paints."""
         return self.arrangements.shot
 
     def of(self, shot: Shot) -> CyclesStage:
-        """The same for another shot, one of an equal `stage_key`."""
+        """A stage for another shot of an equal `stage_key`, which shares the loaded meshes."""
         return replace(self, arrangements=self.arrangements.of(shot))
 
     def at(self, instant: int) -> Geometry:
@@ -154,7 +154,7 @@ class CyclesStage:
         return self.arrangements.at(instant).geometry
 
     def arrangement(self, instant: int) -> Arrangement:
-        """All things as they stand at an instant; the last one is kept."""
+        """All things as they stand at an instant; the last answer is kept."""
         now = self.arrangements.at(instant)
         if now.geometry not in self._arranged:
             self._arranged.clear()
@@ -180,7 +180,7 @@ class CyclesStage:
 
 @dataclass(frozen=True, eq=False)
 class Arrangement:
-    """Things of a shot as they stand at some instant: what Blender has of a scene."""
+    """A shot's things as they stand at an instant, as a scene that Blender builds and keeps."""
 
     shot: Shot
     things: Sequence[Thing]
@@ -191,18 +191,18 @@ class Arrangement:
 
     @property
     def bounds(self) -> Bounds:
-        """What Blender may read for it."""
+        """The folders that Blender may read to build this scene."""
         blend = self.shot.scene.blend
         if blend is None:
             return None
         return (Path(blend.file).resolve().parent,) if blend.confined else (Path("/"),)
 
     def radiance(self, camera: Camera, is_open: bool, visibility: Visibility) -> Float32:
-        """Scene-linear, premultiplied, (H, W, 4) float32; where `is_open` nothing is behind the scene."""
+        """Scene-linear, premultiplied, (H, W, 4) float32; with `is_open` the background is left empty."""
         return self._drawn(camera, is_open, visibility) if self.options.draws else self._radiance(camera, is_open)
 
     def _drawn(self, camera: Camera, is_open: bool, visibility: Visibility) -> Float32:
-        """What a renderer that draws gives, which tells depths apart that are not too far from one another."""
+        """The picture of a renderer that draws: with a tight clipping range, as the depth buffer has a limited precision."""
         clip = clip_of(visibility, self.geometry, camera)
         if self.backdrop is None:
             return self._radiance(camera, is_open, clip)
@@ -211,13 +211,13 @@ class Arrangement:
 
     @cached_property
     def backdrop(self) -> Backdrop | None:
-        """The ground's end and the sky, where the renderer has none."""
+        """The sky and the ground's fading, for Workbench, which has neither; None otherwise."""
         if self.options.renderer != "workbench" or self.shot.scene.blend is not None:
             return None
         return Backdrop.of(self.shot, self.geometry)
 
     def _radiance(self, camera: Camera, is_open: bool, clip: Clip = (NEAREST, FARTHEST)) -> Float32:
-        """Scene-linear, premultiplied, (H, W, 4) float32."""
+        """Scene-linear, premultiplied, (H, W, 4) float32; a Blender that dies is started again, once."""
         died: BlenderDied | None = None
         for _ in range(2):
             try:
@@ -249,21 +249,21 @@ class Arrangement:
         return kinds_of(self.things, self.meshes, self.shot.scene)
 
     def _levels(self, cameras: Sequence[Camera]) -> AllLevels | None:
-        """How coarse pictures may be; None for as they are: OpenGL has mip levels, and what a user's own scene has in it, and
-        does with its picture, may magnify.
+        """Halvings of the models' pictures for these cameras. None (no halving) with OpenGL, which has mip levels, and in a
+        user's .blend scene, whose mirrors, lenses or compositor may magnify a picture.
         """
         if self.options.draws or self.shot.scene.blend is not None:
             return None
         return tuple(kind.levels(cameras) for kind in self.kinds)
 
     def paint(self, process: BlenderProcess, levels: AllLevels, before: AllLevels | None) -> None:
-        """Make the materials anew of the models whose pictures are to be finer or coarser."""
+        """Rebuild the materials of the models whose pictures become finer or coarser."""
         changed = [i for i, level in enumerate(levels) if before is None or level != before[i]]
         looks = told_looks([self.kinds[i] for i in changed], process.put, [levels[i] for i in changed])
         process.ask("paint", STAGE_SECONDS, looks=[{"mesh": i, **look} for i, look in zip(changed, looks, strict=True)])
 
     def tell(self, process: BlenderProcess, levels: AllLevels | None = None) -> None:
-        """Build the scene in this Blender. Raises UserError for what its renderer does not know or have."""
+        """Build the scene in this Blender. Raises UserError for settings or devices that the renderer lacks."""
         shot = self.shot
         told = told_scene(self.things, self.meshes, self.geometry, shot.scene, self.options, process.put, levels)
         try:
@@ -273,7 +273,7 @@ class Arrangement:
 
 
 def clip_of(visibility: Visibility, geometry: Geometry, camera: Camera) -> Clip:
-    """Metres between which there is all that is seen; the ground as far as its corners, where Blender's ends."""
+    """Clipping range, metres, of all visible surfaces; of the ground up to its corners, where Blender's ground ends."""
     known = visibility.inverse_depth[visibility.inverse_depth > 0]
     if not len(known):
         return NEAREST, 1 / NEAREST
@@ -285,7 +285,7 @@ def clip_of(visibility: Visibility, geometry: Geometry, camera: Camera) -> Clip:
 
 
 def told_camera(camera: Camera, clip: Clip = (NEAREST, FARTHEST)) -> dict[str, Any]:
-    """A pinhole without skew as the worker's `render` wants it."""
+    """A pinhole camera without skew as the worker's `render` takes it."""
     return {
         **{name: getattr(camera.intrinsics, name) for name in ("width", "height", "fx", "fy", "cx", "cy")},
         "R": camera.R.tolist(),

@@ -1,11 +1,11 @@
-"""Pictures of models no finer than a frame can show.
+"""Reduces models' pictures to the resolution that a frame can show.
 
-Cycles reads texels without mip levels. Where many of them lie in a pixel each look-up waits for memory, a tenth of a frame's
-time in all, and shows one texel's noise instead of the mean. So a picture is halved, as whole means of 2 x 2 texels, as often
-as `FINEST` texels still lie in each pixel, along a line, wherever on the model and however it is turned.
+Cycles has no mip levels. Where many texels fall into one pixel, each look-up waits for memory (a tenth of a frame's time in
+all) and returns the noise of one texel instead of the mean. So a picture is halved, by means of 2 x 2 texels, as often as at
+least `FINEST` texels still lie in each pixel, along a line, at any place of the model and any rotation.
 
-How often depends on the frame's own camera and on nothing else, so that a frame is the same whatever was rendered before.
-What cuts out stays as it is: labels see each texel.
+The number of halvings depends on the frame's own camera alone, so that a frame does not depend on those rendered before.
+Textures that cut out are never halved: labels see each texel.
 """
 
 from __future__ import annotations
@@ -27,26 +27,28 @@ from viewsphere.model.camera import Camera
 from viewsphere.model.thing import Repaint, Thing
 
 FINEST = 2.0
-"""Texels of a halved picture in a pixel, along a line, at least."""
+"""Fewest texels of a halved picture in a pixel, along a line."""
 
 UNSEEN = 1.0
-"""Pixels that all triangles together cover, at most, on which there may be fewer: slivers, and those without an extent in the
-picture.
+"""Pixels that triangles with fewer than `FINEST` texels may cover in all: slivers, and triangles that the texture's coordinates
+map to a line or a point.
 """
 
 BUMPED = 0.25
-"""How much of the spread of directions that are no longer told apart adds to the fourth power of roughness: measured against
-Cycles' own pictures of full normal maps. All of it would be right for lobes of Gauss's form, and too bright for these.
+"""Share of the spread of averaged normals that is added to the fourth power of roughness: measured against Cycles' pictures
+with full normal maps. A share of 1 would be right for Gaussian lobes, and is too bright for Cycles' GGX lobes.
 """
 
 ROUGHER = 4.0
-"""The fourth power of roughness, at most, that this adds to one: bumps of what is smoother are mirrors, and seen."""
+"""Largest ratio of the added fourth power of roughness to the material's own: normal maps of smoother materials are kept, as
+each of their bumps mirrors visibly.
+"""
 
 MOST = 8
-"""Halvings."""
+"""Most halvings of a picture."""
 
 BAND = 1 << MOST
-"""Rows that are halved at once."""
+"""Rows of a picture that are averaged at once, to limit memory."""
 
 Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
@@ -54,7 +56,7 @@ Content = Literal["color", "data", "normal"]
 _Read = Callable[[NDArray[np.uint8]], Float32]
 Key = tuple[int, int, str] | tuple[int, int, int, float, float]
 Levels = tuple[tuple[int, ...], ...]
-"""Halvings of each of `CONTENTS`, for each material."""
+"""Halvings of each texture of `CONTENTS`, for each material."""
 
 CONTENTS: Mapping[str, Content] = {
     "base_color_texture": "color",
@@ -73,7 +75,7 @@ CONTENTS: Mapping[str, Content] = {
 
 @dataclass(frozen=True, eq=False)
 class Density:
-    """How finely a picture lies on a surface. texels (T,): of each triangle, along a metre of the way on which there are
+    """How finely a picture covers a surface. texels (T,): texels per metre of each triangle, along the direction with the
     fewest, ascending; area (T,): square metres of the triangles up to this one.
     """
 
@@ -82,7 +84,7 @@ class Density:
 
     @classmethod
     def of(cls, mesh: Mesh, chosen: NDArray[np.bool_], texture: Texture, size: tuple[int, int]) -> Density:
-        """On the chosen triangles (T,); size: of the picture, width and height. What is clamped has no extent."""
+        """The density on the chosen triangles (T,); size: the picture's width and height. Clamped parts have no extent."""
         uv = mesh.uv1 if texture.texcoord else mesh.uv0
         assert uv is not None
         triangles = mesh.triangles[chosen]
@@ -98,7 +100,7 @@ class Density:
         return cls(texels[order], np.cumsum(area[order]))
 
     def halvings(self, pixels: float) -> int:
-        """How often the picture may be halved where a metre is seen as so many pixels."""
+        """How often the picture may be halved where a metre covers so many pixels."""
         if not len(self.texels) or not math.isfinite(pixels):
             return 0
         first = int(np.searchsorted(self.area * pixels**2, UNSEEN, side="right"))
@@ -112,7 +114,7 @@ def _edges(corners: Float) -> Float:
 
 
 def _fewest(edges: Float, across: Float) -> Float:
-    """The smaller singular value (T,) of what takes a triangle's edges (T, 2, 3) to those in the picture (T, 2, 2)."""
+    """The smaller singular value (T,) of the linear map from triangles' edges (T, 2, 3) to those in the picture (T, 2, 2)."""
     (e, f), (p, q) = np.moveaxis(edges, 1, 0), np.moveaxis(across, 1, 0)
     ee, ef, ff = (e * e).sum(axis=1), (e * f).sum(axis=1), (f * f).sum(axis=1)
 
@@ -128,7 +130,7 @@ def _fewest(edges: Float, across: Float) -> Float:
 
 @dataclass(frozen=True, eq=False)
 class Kind:
-    """A model with its changed materials, and where it stands."""
+    """A model with one set of repainted materials, and all things that use it."""
 
     mesh: Mesh
     repaints: tuple[Repaint, ...]
@@ -140,19 +142,19 @@ class Kind:
 
     @cached_property
     def balls(self) -> tuple[Float, float]:
-        """Centres (N, 3) of balls around it where it stands, and their radius."""
+        """Centres (N, 3) of balls around the model wherever it stands, and their radius, world metres."""
         low, high = self.mesh.bounds
         middles = [transform(thing.world_from_object, (low + high) / 2) for thing in self.things]
         return np.array(middles), float(np.linalg.norm(high - low)) / 2
 
     def levels(self, cameras: Sequence[Camera]) -> Levels:
-        """Halvings for a frame that is made of these pinholes' pictures."""
+        """Halvings for a frame that is made of these pinhole cameras' pictures."""
         pixels = max(map(self._pixels, cameras))
         return tuple(self._material_levels(index, pixels) for index in range(len(self.mesh.materials)))
 
     def _pixels(self, camera: Camera) -> float:
-        """Pixels of a pinhole's picture in a metre of the model, at most, however it is turned; inf where one is about the
-        camera.
+        """Most pixels of a pinhole's picture on a metre of the model, at any rotation; inf where the camera lies in the ball
+        around a model.
         """
         middles, radius = self.balls
         nearest = float(np.linalg.norm(middles - camera.center, axis=1).min()) - radius
@@ -171,7 +173,7 @@ class Kind:
             or texture.wrap_s != texture.wrap_t
             or (self.mesh.uv1 if texture.texcoord else self.mesh.uv0) is None
         ):
-            return 0  # where the wraps differ, nodes of the material know the picture's size
+            return 0  # with different wraps the material's nodes depend on the picture's size
         if name == "base_color_texture" and self._cuts(material, texture):
             return 0
         if CONTENTS[name] == "normal" and (name != "normal_texture" or not self._can_roughen(material)):
@@ -185,11 +187,11 @@ class Kind:
         return level if CONTENTS[name] != "normal" or level == 0 or self._is_matt(index, level) else 0
 
     def _cuts(self, material: Material, texture: Texture) -> bool:
-        """Whether the picture's alpha counts."""
+        """Whether the texture's alpha makes parts of the material transparent."""
         return material.alpha_mode != "OPAQUE" and bool((self.mesh.images[texture.image].pixels[..., 3] < 255).any())
 
     def _can_roughen(self, material: Material) -> bool:
-        """Whether bumps that are halved away can become roughness: both pictures lie on one another."""
+        """Whether averaged bumps can be turned into roughness: both textures must cover each other texel by texel."""
         bumps, rough = material.normal_texture, material.metallic_roughness_texture
         if bumps is None or rough is None or bumps != replace(rough, image=bumps.image):
             return False
@@ -198,14 +200,14 @@ class Kind:
         return len(sizes) == 1 and (repaint is None or repaint.roughness is None)
 
     def _is_matt(self, index: int, level: int) -> bool:
-        """Whether a material has enough roughness for its bumps to be added to."""
+        """Whether a material is rough enough that its averaged bumps may be added to the roughness (`ROUGHER`)."""
         if (index, level) not in self._matt:
             own, bumps = self._fourths(self.mesh.materials[index], level)
             self._matt[index, level] = float(bumps.mean()) <= ROUGHER * float(own.mean())
         return self._matt[index, level]
 
     def _fourths(self, material: Material, level: int) -> tuple[Float, Float]:
-        """The fourth power (H, W) of roughness, and what the bumps add to it."""
+        """The fourth power (H, W) of roughness, and the addition (H, W) for the averaged bumps."""
         rough, bumps = material.metallic_roughness_texture, material.normal_texture
         assert rough is not None and bumps is not None
         own = np.clip(self._means_of(rough.image, level, "own") * material.roughness, 0, 1) ** 4
@@ -257,7 +259,7 @@ class Kind:
         return self._made[key]
 
     def _means_of(self, image: int, level: int, what: Literal["own", "spread"]) -> Float:
-        """A picture's roughness (H, W), or how far its directions are spread."""
+        """Means of a picture's roughness (H, W), or the spread of its normals (H, W)."""
         if (image, level, what) not in self._read:
             pixels = self.mesh.images[image].pixels
             own = spread_of(pixels, level) if what == "spread" else _means(pixels[..., 1], level, _plain)[..., 0]
@@ -279,7 +281,7 @@ def halved(pixels: NDArray[np.uint8], level: int, content: Content) -> NDArray[n
 
 
 def spread_of(pixels: NDArray[np.uint8], level: int) -> Float:
-    """How much the directions (H, W) in squares of 2^level texels of a normal map differ, as the raster engine has it: twice
+    """The spread (H, W) of directions in squares of 2^level texels of a normal map, defined as in the raster engine: twice
     the inverse of their concentration as a von Mises-Fisher lobe (Toksvig 2005, Banerjee et al. 2005).
     """
     squared = np.minimum((_means(pixels[..., :3], level, _directions).astype(np.float64) ** 2).sum(axis=-1), 1)
@@ -308,7 +310,7 @@ def _light(pixels: NDArray[np.uint8]) -> Float32:
 
 
 def _directions(pixels: NDArray[np.uint8]) -> Float32:
-    """Unit vectors of a normal map; what has no direction, as between an atlas's islands, is level."""
+    """Unit vectors of a normal map; texels without a direction, as between an atlas's islands, get the unbent normal."""
     v = pixels.astype(np.float32) * np.float32(2 / 255) - np.float32(1)
     v[..., 2] = np.maximum(v[..., 2], 0)
     length = np.sqrt((v * v).sum(axis=-1, keepdims=True))

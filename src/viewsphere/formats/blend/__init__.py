@@ -38,7 +38,7 @@ from viewsphere.store import Dataset
 from viewsphere.zoo import build
 
 ENGINE = "cycles"
-"""The engine that has a Blender."""
+"""The engine that builds and saves the scenes."""
 
 
 def check() -> None:
@@ -48,11 +48,11 @@ def check() -> None:
 
 @contextmanager
 def writer(dataset: Dataset, folder: Path, note: Callable[[str], None]) -> Generator[Callable[[Sample], None]]:
-    """Write the frames that have a camera; notes say what could not be carried over.
+    """Write the frames that have a camera; notes name everything that Blender's files cannot hold.
 
-    Blender wants all frames of a scene at once: of each only its place is kept until all were seen, then those of one scene
-    after another are read again. Raises UserError where Blender cannot be used or no frame can be written, ModelError for
-    scenery that cannot be read any more.
+    Blender needs all frames of a scene at once: first only each frame's place is noted, and after the last frame the samples
+    of one scene after another are read again. Raises UserError where Blender cannot be used or no frame can be written,
+    ModelError for scenery that cannot be read any more.
     """
     groups: dict[object, _Group] = {}
     places = ((key, place) for key, places in dataset.shots() for place in places)
@@ -70,7 +70,7 @@ def writer(dataset: Dataset, folder: Path, note: Callable[[str], None]) -> Gener
 
 
 def _left_out(dataset: Dataset, groups: Collection[_Group]) -> Iterator[str]:
-    """What is said of frames that are not written, or not as they were."""
+    """Notes about frames that are not written, or not as they were rendered."""
     total = len(dataset)
     written = sum(len(places) for group in groups for places in group.places.values())
     needs = "cameras, models and where they stand"
@@ -84,7 +84,7 @@ def _left_out(dataset: Dataset, groups: Collection[_Group]) -> Iterator[str]:
 
 
 def _save(dataset: Dataset, folder: Path, groups: Collection[_Group]) -> Iterator[str]:
-    """Write a file for each group; gives what Blender's files cannot hold."""
+    """Write a file for each group; yields notes about everything that Blender's files cannot hold."""
     counts = Counter(group.model for group in groups)
     for group in groups:
         shots, instants, samples = zip(*_views(dataset, group), strict=True)
@@ -96,14 +96,14 @@ def _save(dataset: Dataset, folder: Path, groups: Collection[_Group]) -> Iterato
 
 @dataclass(eq=False)
 class _Group:
-    """A model's frames of one scene: of which shots, and their places there."""
+    """Frames that share a file: the model's key, and for each shot the frames' places in it."""
 
     model: str
     places: dict[str, list[int]] = field(default_factory=dict[str, list[int]])
 
 
 def _views(dataset: Dataset, group: _Group) -> Iterator[tuple[Shot, Instant, Sample]]:
-    """A group's frames; what their shots say of single frames does not count."""
+    """Shot, instant and sample of each frame of a group."""
     for key, places in group.places.items():
         known = dataset.store.shot(key)
         for place, sample in zip(places, dataset.samples_of(key, places), strict=True):
@@ -112,13 +112,13 @@ def _views(dataset: Dataset, group: _Group) -> Iterator[tuple[Shot, Instant, Sam
 
 
 def _stored(dataset: Dataset, key: str) -> tuple[Shot | None, bytes]:
-    """A shot, where it is known, and what is equal for shots of one scene."""
+    """A shot (None if it is not known), and a digest that is equal for shots of one scene."""
     shot = dataset.store.shot(key)
     return shot, _alike(shot) if shot else b""
 
 
 def _scene(known: Shot | None, alike: bytes, key: str, place: int, sample: Sample) -> object:
-    """Equal for frames that can share a file."""
+    """A value that is equal for frames that can share a file."""
     shot = known or _lit_anyhow(key, sample)
     return alike or _alike(shot), *_seen(shot, place if known else 0, sample)
 
@@ -129,7 +129,7 @@ def _alike(shot: Shot) -> bytes:
 
 
 def _seen(shot: Shot, instant: int, sample: Sample) -> tuple[object, ...]:
-    """Besides the scene, equal for frames that can share a file."""
+    """The properties of a frame, besides the scene, that frames of one file share."""
     shows_sky = plugins.load("engines", ENGINE).shows_sky(shot, shot.finish(instant))
     lens = sample.camera.intrinsics
     models = tuple(o.key for o in sample.objects)
@@ -137,7 +137,7 @@ def _seen(shot: Shot, instant: int, sample: Sample) -> tuple[object, ...]:
 
 
 def _lit_anyhow(key: str, sample: Sample) -> Shot:
-    """A shot of which only its objects and cameras are known, in the default light."""
+    """A shot in the default light, for an imported frame of which only objects and camera are known."""
     return Shot(
         key=key,
         things=tuple(Thing(id=o.id, model=_spec(o.key, ""), motion=Motion.still(_matrix(o))) for o in sample.objects),
@@ -149,7 +149,7 @@ def _lit_anyhow(key: str, sample: Sample) -> Shot:
 
 
 def _as_taken(sample: Sample) -> Instant:
-    """The instant of a sample whose camera is known."""
+    """An instant made from an imported sample's camera and pose."""
     camera = sample.camera
     a, b, c, d = ((x, y, z, w) for x, y, z, w in rigid(camera.R.T, camera.center).tolist())
     x, y, z = (camera.center + sample.pose.distance * camera.R[2]).tolist()
@@ -162,13 +162,13 @@ def _matrix(o: ObjectAnnotation) -> Matrix4:
 
 
 def _spec(key: str, source: str) -> ModelSpec:
-    """A model file as it is: in metres, where it stands in it."""
+    """The specification of a normalised model file: in metres, with its own origin."""
     return ModelSpec(key=key, source=source, category="model", category_id=1, centring="as_is")
 
 
 @dataclass(frozen=True, eq=False)
 class _Models:
-    """Normalised meshes: of objects, by `keys` of the data set, what it keeps of them; of scenery, what its source gives."""
+    """Loads normalised meshes: of objects from the data set, by its `keys` of their models; of scenery from its source."""
 
     dataset: Dataset
     keys: Mapping[ModelSpec, str]

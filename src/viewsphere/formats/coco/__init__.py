@@ -6,7 +6,7 @@
 
 Large data sets have numbered sub-folders. Image and annotation ids count from 1 and come from the plan:
 they do not depend on what is finished. Segmentations are polygons that pycocotools rasterises to the
-identical mask. Imported annotations stay as they were, but for their ids.
+identical mask. Imported annotations are kept unchanged, except for their ids.
 """
 
 from __future__ import annotations

@@ -35,8 +35,8 @@ _FIRST_FREE_ID = 91
 
 
 def category_ids(dataset: Dataset) -> dict[int, int]:
-    """COCO id of each category of the data set. With imported pictures in it, the ids they came with, and free ones for the
-    others; else COCO's own for its 80 names, however spelled, and free ones above 90.
+    """COCO id of each category of the data set. If the data set has imported pictures, their categories keep their
+    ids and the others get free ones; else COCO's 80 names, in any spelling, have COCO's ids and others free ones above 90.
     """
     if any(part.frames and not part.settings for part in dataset.plan.parts):
         return {category.id: category.id for category in dataset.categories}

@@ -18,7 +18,7 @@ from viewsphere.store import Dataset
 FOLDER_SIZE = 10_000
 
 Masks = Mapping[int, NDArray[np.bool_]]
-"""Visible pixels (H, W) of a sample's objects by their ids, but for objects that are not seen."""
+"""Masks (H, W) of the visible pixels of a sample's visible objects, by the objects' ids."""
 
 
 def seen(sample: Sample) -> Masks:
@@ -27,7 +27,7 @@ def seen(sample: Sample) -> Masks:
 
 
 def files(dataset: Dataset, sample: Sample, masks: Masks) -> Iterator[Expected]:
-    """Picture and masks, by their paths from the export's folder; of a frame without a picture none."""
+    """The files of a sample: picture and masks, with their paths from the export's folder; none without a picture."""
     if sample.picture_file is None:
         return
     yield sample.index, f"{sample.split}/{_image_file(dataset, sample)}", sample.picture_file
@@ -37,7 +37,7 @@ def files(dataset: Dataset, sample: Sample, masks: Masks) -> Iterator[Expected]:
 
 
 def annotations_of(dataset: Dataset, sample: Sample, ids: Mapping[int, int], masks: Masks) -> Iterator[dict[str, Any]]:
-    """Of the objects that are seen, or were imported with a box; `ids`: COCO's of the data set's categories."""
+    """COCO's annotations of all visible objects, and of imported ones that have a box; `ids`: COCO's category ids by ours."""
     for o in sample.objects:
         if o.source is not None and (o.area or o.box2d is not None):
             yield _foreign_annotation(dataset, sample, o, ids)
@@ -63,7 +63,7 @@ def _stem(dataset: Dataset, sample: Sample) -> str:
 
 
 def image(dataset: Dataset, sample: Sample) -> dict[str, Any]:
-    """COCO's image of a sample, with the paper's keys; one that was imported as it came, but for id and file."""
+    """COCO's image entry of a sample, with the paper's keys; of an imported one its own entry with new id and file name."""
     if sample.known_camera is None:
         source = dict(sample.source or {})
         named = {"imported_file_name": source["file_name"]} if "file_name" in source else {}
@@ -93,7 +93,7 @@ def image(dataset: Dataset, sample: Sample) -> dict[str, Any]:
 
 
 def _foreign_annotation(dataset: Dataset, sample: Sample, o: ObjectAnnotation, ids: Mapping[int, int]) -> dict[str, Any]:
-    """An imported object's annotation as it was, but for its ids, and without the file of a mask that did not come with it."""
+    """An imported object's own annotation with this export's ids; its mask file, which is not in the store, is not named."""
     source = {k: v for k, v in (o.source or {}).items() if k != "path_mask"}
     own = {
         "id": dataset.plan.annotation_id(sample.index, o.id),
@@ -136,5 +136,5 @@ def _annotation(
 
 
 def _corner_and_size(box: Box | None) -> list[float] | None:
-    """COCO's [x, y, width, height] of (x0, y0, x1, y1)."""
+    """COCO's [x, y, width, height] of a box (x0, y0, x1, y1)."""
     return None if box is None else [box[0], box[1], box[2] - box[0], box[3] - box[1]]

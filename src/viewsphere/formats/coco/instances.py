@@ -17,13 +17,13 @@ from viewsphere.store import Dataset
 
 
 def file_name(split: str) -> str:
-    """Of a split's file."""
+    """File name of a split's instances."""
     return f"instances_{split}.json"
 
 
 @contextmanager
 def instances(dataset: Dataset, folder: Path) -> Generator[Callable[[Sample, Masks], None]]:
-    """Write the files of all splits into this folder: gives a function that appends a frame to its split's."""
+    """Write the files of all splits into this folder: gives a function that appends a frame to its split's file."""
     folder.mkdir(exist_ok=True)
     ids = category_ids(dataset)
     head = json_bytes(_head(dataset, ids))[:-1]
@@ -38,7 +38,7 @@ def instances(dataset: Dataset, folder: Path) -> Generator[Callable[[Sample, Mas
 
 @contextmanager
 def _instances(file: Path, head: bytes) -> Generator[Callable[[dict[str, Any], Iterator[dict[str, Any]]], None]]:
-    """One file: annotations wait in a file of their own until its images are complete."""
+    """Write one file: annotations wait in a temporary file until the images, which come first, are complete."""
     with file.open("wb") as images, TemporaryFile(dir=file.parent) as waiting:
         images.write(head + b',"images":[')
         separators = {images: b"\n", waiting: b"\n"}

@@ -23,20 +23,20 @@ from viewsphere.store.foreign import ForeignDataset, ForeignFrame, foreign_objec
 
 LARGEST_ID = 2**63
 LARGEST_CATEGORY = 2**31
-"""Ids are below these; COCO's own crowds have annotation ids of twelve digits."""
+"""Ids must be below these limits; COCO's own crowds have annotation ids of twelve digits."""
 
 LARGEST_NUMBER = 2**53
 MOST_IMAGES_BESIDE = 10
-"""How many image sizes away a polygon's corner may lie."""
+"""Largest distance of a polygon's corner from the image, in image sizes."""
 
 
 def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
     """All images and annotations of a folder with instances files, or of one such file.
 
-    Every file is a split, named as the file without `instances_`. Images are looked for where COCO and its relatives keep
-    them: in `<split>/`, `images/<split>/`, `images/` and beside. Ids of categories stay what they are. Raises StoreError
-    with every mistake: dangling and repeated ids, missing images, boxes and segmentations that are none; with `keep_going`
-    what is broken is left out and told.
+    Every file becomes a split, named like the file without `instances_`. Images are looked for where COCO and its relatives
+    keep them: in `<split>/`, `images/<split>/`, `images/` and beside. Ids of categories are kept. Raises StoreError with every
+    mistake: dangling and repeated ids, missing images, invalid boxes and segmentations; with `keep_going` broken entries are
+    left out and reported.
     """
     files = _instances_files(path)
     root = path if path.is_dir() else path.parent
@@ -66,7 +66,7 @@ def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
 
 
 def _digest(files: Sequence[Path], left_out: Sequence[str]) -> str:
-    """Of the files, and of what of them is not used."""
+    """SHA-256 of the files' contents, and of the messages about entries that were left out."""
     digest = hashlib.sha256()
     for file in files:
         digest.update(f"{file.name}\0{hashlib.sha256(file.read_bytes()).hexdigest()}".encode())
@@ -77,7 +77,7 @@ def _digest(files: Sequence[Path], left_out: Sequence[str]) -> str:
 
 @dataclass(frozen=True)
 class _Split:
-    """One instances file, what can be used of it, and what cannot."""
+    """One instances file: its valid entries, and the problems of the others."""
 
     split: str
     file: Path
@@ -139,7 +139,7 @@ def _is_id(value: object, largest: int = LARGEST_ID) -> bool:
 def _with_ids(
     values: Sequence[Any], what: str, file: Path, problems: list[str], largest: int = LARGEST_ID
 ) -> Iterator[dict[str, Any]]:
-    """Those that are mappings with an id of their own."""
+    """The entries that are mappings with a valid and unique id; the problems of the others are appended."""
     seen: set[int] = set()
     for i, value in enumerate(values):
         number = value.get("id") if isinstance(value, dict) else None
@@ -158,7 +158,7 @@ def _image_file(image: dict[str, Any], root: Path, split: str, beside: Path) -> 
         return None
     for folder in (root / split, root / "images" / split, root / "images", root, beside):
         place = folder / name
-        with suppress(OSError):  # no file system has a name that long
+        with suppress(OSError):  # the name may be too long for the file system
             if place.is_file():
                 return place
     return None
@@ -204,7 +204,7 @@ def _annotation_problem(
     if outline and size:
         try:
             _mask(outline, size)
-        except Exception as error:  # the reader of run lengths and polygons is C code with errors of its own
+        except Exception as error:  # pycocotools' C code raises errors of many kinds
             return f"expected a segmentation of COCO; found {outline!r:.60} ({error})"
     return None
 
@@ -217,9 +217,9 @@ def _are_numbers(value: Any, count: int | None) -> bool:
 
 
 def _mask(outline: Any, size: tuple[int, int]) -> NDArray[np.bool_] | None:
-    """Mask (H, W) of polygons or run lengths, as pycocotools makes it; None where there is none.
+    """Mask (H, W) of polygons or run lengths, as decoded by pycocotools; None without an outline.
 
-    Raises ValueError for what pycocotools, which trusts its input, would run wild on.
+    Raises ValueError for outlines on which pycocotools, which does not check its input, could crash.
     """
     from pycocotools import mask as coco
 
@@ -246,7 +246,7 @@ def _mask(outline: Any, size: tuple[int, int]) -> NDArray[np.bool_] | None:
 
 
 def _clashes(parts: Sequence[_Split]) -> Iterator[str]:
-    """Categories of one id that differ from file to file."""
+    """Problems: categories of one id that differ from file to file."""
     first: dict[int, tuple[Category, Path]] = {}
     for part in parts:
         for category in part.categories.values():
@@ -281,7 +281,7 @@ def _sample(part: _Split, image: dict[str, Any], index: int) -> Sample:
 
 
 def _corners(source: dict[str, Any]) -> Box | None:
-    """The box that is given, else that around the polygons; None if neither is."""
+    """The annotation's box, else the box around its polygons; None if it has neither."""
     if box := source.get("bbox"):
         return box[0], box[1], box[0] + box[2], box[1] + box[3]
     outline = source.get("segmentation")

@@ -1,11 +1,11 @@
-"""The layout and JSON of Ruiz et al. 2019's own tool, key for key, its faults mended; docs/formats.md lists
-them.
+"""The layout and JSON of Ruiz et al. 2019's own tool, key for key, without its faults, which docs/formats.md
+lists.
 
     dataset1.json
     MODELS/<key>/<key>.obj, .glb, ...
     Pose-<index>/RGB|MASK|DEPTH/<object>-<pose>.png|.tiff
 
-Pictures that were imported without a camera are left out: the layout is one of poses.
+Pictures imported without a camera are left out: the layout sorts everything by pose.
 
 An object's name is its model's key; where a pose has several frames, or a frame several objects, the
 frame's and the object's numbers follow it.

@@ -16,12 +16,12 @@ FOLDER_SIZE = 10_000
 
 
 def is_of_a_pose(sample: Sample) -> bool:
-    """Whether the layout, which is one of poses, has a place for a sample."""
+    """Whether a sample has a known camera and pose, which the layout needs: it sorts everything by pose."""
     return sample.known_camera is not None and sample.known_pose is not None
 
 
 def files(dataset: Dataset, sample: Sample) -> Iterator[Expected]:
-    """Picture, depth and masks, by their paths from the export's folder."""
+    """The files of a sample: picture, depth and masks, with their paths from the export's folder."""
     folder = _pose_folder(dataset, sample)
     names = _shared_files(dataset, sample)
     for channel, kind in ((picture_of(names), "RGB"), ("depth", "DEPTH")):
@@ -32,14 +32,14 @@ def files(dataset: Dataset, sample: Sample) -> Iterator[Expected]:
 
 
 def rendered(dataset: Dataset, sample: Sample) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Name and entry of every object."""
+    """Name and JSON entry of every object."""
     files = _shared_files(dataset, sample)
     for o in sample.objects:
         yield _object_name(dataset, sample, o), _rendered(sample, o, f"{_stem(dataset, sample, o)}.png", files)
 
 
 def _shared_files(dataset: Dataset, sample: Sample) -> dict[str, str]:
-    """Names of a frame's files by channel: all objects share those of the first one."""
+    """Names of a frame's files by channel; all objects share these files, which are named after the first object."""
     if not sample.objects:
         return {}
     stem = _stem(dataset, sample, sample.objects[0])
@@ -51,7 +51,7 @@ def _stem(dataset: Dataset, sample: Sample, o: ObjectAnnotation) -> str:
 
 
 def _object_name(dataset: Dataset, sample: Sample, o: ObjectAnnotation) -> str:
-    """An object's name in its pose: its model's key, with numbers where that is not unique."""
+    """An object's name in its pose: its model's key, with numbers where the key is not unique."""
     plan = dataset.plan
     is_product = all(part.is_product or not part.is_sampled for part in plan.parts)
     one_a_pose = is_product and dataset.max_objects == 1 and plan.frames <= len(plan.models) * plan.poses
@@ -65,14 +65,14 @@ def _pose_folder(dataset: Dataset, sample: Sample) -> str:
 
 
 def _group(dataset: Dataset, sample: Sample) -> str:
-    """Sub-folder of a pose's folders, where they would hold too many files."""
+    """Sub-folder in a pose's folders, empty unless they would hold too many files."""
     plan = dataset.plan
     number, count = (n * dataset.max_objects // max(plan.poses, 1) for n in (sample.index, plan.frames))
     return f"{number // FOLDER_SIZE:04d}/" if count > FOLDER_SIZE else ""
 
 
 def pose(dataset: Dataset, sample: Sample) -> dict[str, Any]:
-    """The keys of a sample's pose, but for what was rendered of it."""
+    """The JSON keys of a sample's pose, but for the list of rendered objects."""
     viewpoint = sample.pose
     return {
         "distance": viewpoint.distance,

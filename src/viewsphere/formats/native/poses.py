@@ -1,4 +1,4 @@
-"""The file `dataset1.json`: what was rendered, by poses, of frames that come in another order."""
+"""Writes `dataset1.json`, which is sorted by pose, from frames that come in another order."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from viewsphere.store import Dataset
 FILE_NAME = "dataset1.json"
 
 Place = tuple[int, int, int, int]
-"""Where an object's entry waits: pose, position of the pose's keys, position of the entry, its end."""
+"""An object's entry in the waiting file: pose, position of the pose's keys, position of the entry, and its end."""
 
 
 @contextmanager
 def poses(dataset: Dataset, folder: Path) -> Generator[Callable[[Sample], None]]:
     """Write the file into this folder: gives a function that appends a frame.
 
-    Entries wait in a file of their own, and their places in a table that the database keeps on disk once it is long.
+    Entries wait in a temporary file, and their positions in an SQLite table, which moves to disk once it is long.
     """
     with TemporaryFile(dir=folder) as waiting, closing(sqlite3.connect("")) as table:
         table.execute("PRAGMA journal_mode = OFF")

@@ -1,4 +1,4 @@
-"""A data set in the layout of Ruiz et al. 2019, of their tool or of this one."""
+"""Reads data sets in the layout of Ruiz et al. 2019, made by their tool or by viewsphere."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ RIGHT_ANGLES = 1e-3
 LONGEST_NAME = 150
 LARGEST_POSE = 10_000_000
 MISTAKES = (LookupError, TypeError, ValueError, AttributeError, OSError)
-"""What reading a JSON that is not as it should be raises."""
+"""Errors raised by reading JSON of another structure than expected."""
 
 
 def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
@@ -36,7 +36,7 @@ def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
     their 3D boxes in pixels.
 
     A frame without a split is in `train`, an object's category is its vehicle's. Raises StoreError with every entry that
-    lacks a vehicle, a picture or a mask, or has no camera; with `keep_going` these are left out and told.
+    lacks a vehicle, a picture or a mask, or has no camera; with `keep_going` these entries are left out and reported.
     """
     file = path / "dataset1.json" if path.is_dir() else path
     vehicles, poses, digest = _load(file)
@@ -65,7 +65,7 @@ def read(path: Path, *, keep_going: bool = False) -> ForeignDataset:
 
 @dataclass(frozen=True)
 class _Frame:
-    """What one picture of the data set shows; every object is (model key, category, mask file, entry)."""
+    """One picture of the data set and its objects; every object is (model key, category, mask file, entry)."""
 
     split: str
     pose: Viewpoint
@@ -78,7 +78,7 @@ class _Frame:
 def _load(file: Path) -> tuple[dict[str, Any], dict[str, Any], str]:
     try:
         text = file.read_bytes()
-        data = json.loads(text, parse_constant=lambda _: None)  # NaN is what is not known
+        data = json.loads(text, parse_constant=lambda _: None)  # NaN stands for unknown values
     except (OSError, ValueError, RecursionError) as error:
         raise StoreError(f"{file}: expected the native format's JSON; found: {error}") from None
     if not isinstance(data, dict) or not all(isinstance(data.get(k), dict) for k in ("vehicles", "poses")):
@@ -91,7 +91,7 @@ def _load(file: Path) -> tuple[dict[str, Any], dict[str, Any], str]:
 
 
 def _is_name(text: str) -> bool:
-    """Whether this names one folder, and leads nowhere else."""
+    """Whether a text is the name of one folder, without separators or `..`."""
     return bool(text.strip(". ")) and not set(text) & set("/\\\0") and len(text.encode()) <= LONGEST_NAME
 
 
@@ -142,7 +142,7 @@ def _model(key: str, file: Path, vehicle: dict[str, Any], category: Category) ->
 
 
 def _frames(root: Path, vehicles: dict[str, Any], poses: dict[str, Any], problems: list[str]) -> Iterator[_Frame]:
-    """Objects that share a picture make a frame; the rest of a broken one is left out with it."""
+    """The frames: objects that share a picture. A frame with any broken entry is left out."""
     for number, pose in poses.items():
         pictures: dict[str, list[tuple[str, dict[str, Any]]]] = {}
         try:
@@ -210,7 +210,7 @@ def _picture(root: Path, file: Path, camera: Camera) -> Path:
 
 
 def _is_depth(file: Path, camera: Camera) -> bool:
-    """Whether this is depth as this package keeps it: metres along z, of whatever kind of file."""
+    """Whether a file holds depth as viewsphere keeps it: metres along z, in any of its encodings."""
     try:
         array = decode(channels()["depth"], file)
     except UserError:
@@ -244,7 +244,7 @@ def _samples(frames: tuple[_Frame, ...], categories: Mapping[str, Category]) -> 
 
 
 def _object(number: int, category: Category, key: str, mask: NDArray[np.bool_], entry: dict[str, Any]) -> ObjectAnnotation:
-    """An object, and what COCO would say of it."""
+    """An object; its `source` holds its entry in COCO's terms."""
     pixels, visibility, truncation = _known(entry)
     tight = mask_box(mask) or (0, 0, 0, 0)
     source = {
@@ -274,7 +274,7 @@ def _object(number: int, category: Category, key: str, mask: NDArray[np.bool_], 
 
 
 def _known(entry: dict[str, Any]) -> tuple[NDArray[np.float64], float | None, float | None]:
-    """3D box in pixels (8, 2), visibility and truncation, as far as they are given; raises for what is none."""
+    """3D box in pixels (8, 2), visibility and truncation, each if given; raises for malformed values."""
     shares = entry.get("visibility"), entry.get("truncation")
     visibility, truncation = (None if share is None else float(share) for share in shares)
     return _vertices(entry.get("bbox_3D_pxs"), 2), visibility, truncation

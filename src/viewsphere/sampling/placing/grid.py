@@ -1,4 +1,4 @@
-"""In the cells of a grid around the first, the nearest cells first, all facing -Y."""
+"""In the cells of a grid around what stands there before or around the origin, the nearest first, all facing -Y."""
 
 from __future__ import annotations
 
@@ -9,21 +9,25 @@ from itertools import product
 from viewsphere.model.camera import Camera
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Matrix4
-from viewsphere.sampling.placing import Draws, Room, Shape, checked, standing
+from viewsphere.sampling.placing import Draws, Room, Shape, checked, footprint, standing
 
 
 def place(
     cast: Sequence[ModelSpec], room: Room, shapes: Sequence[Shape], views: Sequence[Camera], rng: Draws
 ) -> Sequence[Matrix4]:
-    """Poses with the middle of each box in the middle of a cell, the room's gap between cells.
+    """Poses with the middle of each box in the middle of a cell, the room's gap between cells; what stands there before has the
+    first cell.
 
     All cells are as wide and as long as the largest boxes. Raises RecipeError where the grid leaves the free floor.
     """
-    wide, long = (max(float(shape.box[4, k] - shape.box[2, k]) for shape in shapes) + room.gap for k in (0, 1))
-    middles = [((shape.box[2, :2] + shape.box[4, :2]) / 2).tolist() for shape in shapes]
-    poses = [standing(shapes[0].box)]
-    for (column, line), shape, (x, y) in zip(_cells(len(cast))[1:], shapes[1:], middles[1:], strict=True):
-        poses.append(standing(shape.box, middles[0][0] + column * wide - x, middles[0][1] + line * long - y))
+    whole = [*room.prints, *(footprint(shape.box, standing(shape.box)) for shape in shapes)]
+    wide, long = (2 * max(float(own.half[k]) for own in whole) + room.gap for k in (0, 1))
+    cells = _cells(len(whole))[len(room.taken) :]
+    middle = whole[0].center if room.taken else whole[0].center * 0
+    poses: list[Matrix4] = []
+    for (column, line), shape, own in zip(cells, shapes, whole[len(room.taken) :], strict=True):
+        x, y = middle - own.center + (column * wide, line * long)
+        poses.append(standing(shape.box, float(x), float(y)))
     return checked(cast, room, shapes, poses)
 
 
