@@ -29,7 +29,7 @@ MESH, OUTCOME = "mesh.npz", "outcome.json"
 @dataclass(frozen=True)
 class Job:
     """What to read (a ModelSpec's fields), where the result goes, seconds, bytes, the asking process's id, and whether Blender
-    is what reads it. `frames`, which ascend, are read instead of the one of the specification.
+    is what reads it. `frames` of its animation, which ascend, are read; none: the file as it stands.
     """
 
     spec: dict[str, Any]

@@ -12,7 +12,10 @@ from viewsphere.model.sample import Sample
 
 def of(placement: Placement) -> Mapping[str, Any]:
     """The model's names."""
-    return {"key": placement.spec.key, "model": placement.facts.obj, "track": placement.spec.track}
+    spec, step = placement.spec, placement.step
+    if step is None:
+        return {"key": spec.key, "model": placement.facts.obj, "track": ""}
+    return {"key": spec.key_at(step.frame), "model": placement.facts.obj, "track": spec.key}
 
 
 def prove(sample: Sample, models: Models) -> Iterator[str]:
