@@ -39,6 +39,7 @@ class Models:
         cannot be used, StoreError for one that changed since its frames were made.
         """
         known, wanted = self.store.model_info(spec.key), _with_rest(spec, steps)
+        self._check_key(spec)
         if known is not None and trusted and spec.source.startswith("zoo:"):
             return
         if wanted:
@@ -64,6 +65,16 @@ class Models:
             self._write_deforming(spec, wanted, self.store.aside(self.store.model_folder(spec.key), again=True))
         else:
             self._write(spec, again=True)
+
+    def _check_key(self, spec: ModelSpec) -> None:
+        """Raises StoreError where the key is that of a time step of a model that the store holds."""
+        track, _, frame = spec.key.rpartition("-f")
+        info = self.store.model_info(track) if track and frame.isdecimal() else None
+        if info is not None and any(step.key == spec.key for step in info.steps):
+            raise StoreError(
+                f"{self.store.root}: expected another name for {spec.key!r}, which is a time step of its model {track!r}: "
+                "give the recipe's entry a name"
+            )
 
     def _write(self, spec: ModelSpec, again: bool = False) -> None:
         """Export a model that stays as it is."""
