@@ -15,7 +15,7 @@ SMALL = Intrinsics(width=8, height=8, fx=8, fy=8, cx=4, cy=4)
 AHEAD = Viewpoint(index=0, azimuth_deg=0, elevation_deg=0, distance=1)
 
 
-def unit_box(_):
+def unit_box(_, step=None):
     """The box of any model."""
     return box_vertices((-0.5,) * 3, (0.5,) * 3)
 

@@ -25,7 +25,7 @@ PATCH = """
 import sys
 if "-m" in sys.orig_argv and "viewsphere.assets.reader" in sys.orig_argv:
     import viewsphere.assets.load as load
-    def read(folder, suffix):
+    def read(folder, suffix, node):
 {body}
     load._read = read
 """

@@ -18,6 +18,7 @@ from viewsphere.check import check
 from viewsphere.errors import ModelError, RecipeError
 from viewsphere.geometry.camera import project
 from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.thing import TimeStep
 from viewsphere.run.importing import import_dataset
 from viewsphere.run.stages import Stages
 from viewsphere.store import Choice
@@ -37,8 +38,12 @@ def files(blender, tmp_path_factory):
     return folder
 
 
-def spec_of(path, frame, **fields):
-    return ModelSpec(key="a", source=str(path), category="thing", category_id=1, frame=frame, **fields)
+def spec_of(path, **fields):
+    return ModelSpec(key="a", source=str(path), category="thing", category_id=1, rest=1, **fields)
+
+
+def at(frame):
+    return TimeStep(frame=frame)
 
 
 def recipe(files, name="jump.blend", frames=FRAMES, viewpoints=None, **fields):
@@ -67,25 +72,25 @@ def assert_holds(folder):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_format_moves_from_where_it_stands_at_the_first_frame(files, kind):
-    specs = [spec_of(files / f"jump.{kind}", frame, centring="floor", clip=KINDS[kind]) for frame in FRAMES]
-    read_ahead(specs)
-    for spec, x, z in zip(specs, (0, 1, 2), (0, 1, 0), strict=True):
-        mesh, facts = load(spec)
-        reach = (np.cos((spec.frame - 1) / 24) + np.sin((spec.frame - 1) / 24)) / 2  # of a square that turns
+    spec = spec_of(files / f"jump.{kind}", centring="floor", clip=KINDS[kind])
+    read_ahead(spec, FRAMES)
+    for frame, x, z in zip(FRAMES, (0, 1, 2), (0, 1, 0), strict=True):
+        mesh, facts = load(spec, step=at(frame))
+        reach = (np.cos((frame - 1) / 24) + np.sin((frame - 1) / 24)) / 2  # of a square that turns
         np.testing.assert_allclose(mesh.bounds, [[x - reach, -reach, z], [x + reach, reach, z + 1]], atol=2e-3)
         assert len(mesh.triangles) == 12
         assert facts.up == ("+y" if kind == "glb" else "+z")
-    assert load(specs[0])[1].unit == 1
+    assert load(spec)[1].unit == 1
+    np.testing.assert_array_equal(load(spec)[0].vertices, load(spec, step=at(1))[0].vertices)
 
 
 def test_frames_are_read_at_once_and_each_is_the_same_alone(files, tmp_path, monkeypatch):
-    specs = [spec_of(files / "bend.blend", frame) for frame in FRAMES]
-    alone = load_normalised(specs[1], folder=tmp_path / "other")
-    read_ahead(specs, tmp_path / "own")
-    monkeypatch.setattr(cache, "read_frames_apart", None)
+    spec = spec_of(files / "bend.blend")
+    alone = load_normalised(spec, folder=tmp_path / "other", step=at(13))
+    read_ahead(spec, FRAMES, tmp_path / "own")
     monkeypatch.setattr(cache, "read_apart", None)
-    read_ahead(specs, tmp_path / "own")
-    together = [load_normalised(spec, folder=tmp_path / "own") for spec in specs]
+    read_ahead(spec, FRAMES, tmp_path / "own")
+    together = [load_normalised(spec, folder=tmp_path / "own", step=at(frame)) for frame in FRAMES]
     np.testing.assert_array_equal(together[1].vertices, alone.vertices)
     np.testing.assert_array_equal(together[1].normals, alone.normals)
     # An armature lifts the upper half and a shape key widens all, both by 1 m; the box of the first frame is centred.
@@ -94,22 +99,22 @@ def test_frames_are_read_at_once_and_each_is_the_same_alone(files, tmp_path, mon
 
 
 def test_simulations_are_played_up_to_the_frame(files):
-    fallen = load_normalised(spec_of(files / "fall.blend", 13, centring="floor"))
+    fallen = load_normalised(spec_of(files / "fall.blend", centring="floor"), step=at(13))
     seconds = 12 / 24
     assert fallen.bounds[0, 2] == pytest.approx(-9.81 / 2 * seconds**2, rel=0.15)
 
 
 def test_a_file_of_several_animations_is_warned_of(files):
-    mesh, _ = load(spec_of(files / "jump.fbx", 13))
+    mesh, _ = load(spec_of(files / "jump.fbx"), step=at(13))
     assert "choose one by clip: 'cubeAction', 'eyeAction'" in mesh.warnings[-1]
     with pytest.raises(ModelError, match=r"expected an animation 'walk', found 'cubeAction', 'eyeAction'"):
-        load(spec_of(files / "jump.fbx", 13, clip="walk"))
+        load(spec_of(files / "jump.fbx", clip="walk"), step=at(13))
 
 
 def test_files_that_cannot_move_are_refused(tmp_path):
     (tmp_path / "a.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
     with pytest.raises(ModelError, match=r"expected a file that can move \(abc, blend, fbx, .*found obj"):
-        load(spec_of(tmp_path / "a.obj", 2))
+        load(spec_of(tmp_path / "a.obj"), step=at(2))
 
 
 # What files name.
@@ -239,8 +244,8 @@ def test_a_changed_buffer_is_read_anew(files, blender, tmp_path):
     )
     path = tmp_path / "models" / "jump.gltf"
     subprocess.run([blender, "-c", export, files / "jump.blend", path], check=True, capture_output=True)
-    spec, buffer = spec_of(path, 13), path.with_suffix(".bin")
-    before, data = load(spec)[0].bounds, np.frombuffer(buffer.read_bytes(), np.float32).copy()
+    spec, buffer = spec_of(path), path.with_suffix(".bin")
+    before, data = load(spec, step=at(13))[0].bounds, np.frombuffer(buffer.read_bytes(), np.float32).copy()
     assert timeline(path).last == 25
     accessors = json.loads(path.read_text())
     times = accessors["bufferViews"][accessors["accessors"][accessors["animations"][0]["samplers"][0]["input"]]["bufferView"]]
@@ -248,7 +253,7 @@ def test_a_changed_buffer_is_read_anew(files, blender, tmp_path):
     data[first : first + times["byteLength"] // 4] *= 2
     buffer.write_bytes(data.tobytes())
     assert timeline(path).last > 25
-    assert abs(load(spec)[0].bounds - before).max() > 0.1
+    assert abs(load(spec, step=at(13))[0].bounds - before).max() > 0.1
 
 
 # Recipes.
@@ -352,7 +357,7 @@ def test_cameras_see_what_blender_sees(files, kind):
     assert planned.frames == planned.shot_count == 3
     for shot in (planned.shot(i, stages.box) for i in range(3)):
         camera = camera_of(lens, shot.instants[0].viewpoint, (0, 0, 0))
-        vertices = stages.model(shot.things[0].model).vertices.astype(float)
+        vertices = stages.model(shot.things[0].model, shot.things[0].step).vertices.astype(float)
         pixels, _ = project(lens, vertices @ camera.R.T + camera.t)
         expected = np.array(seen[str(shot.instants[0].viewpoint.time.frame)])
         gaps = np.linalg.norm(pixels[:, None] - expected, axis=2)

@@ -94,12 +94,13 @@ def test_labelled_objects_move(made):
     )
     assert met_by_cycles(recipe) == {0, 1, 11, 12}
     stages = Stages()
-    cars = [p for shot in plan(recipe).shots(stages.box) for p in shot.objects if p.model.category == "car"]
+    shots = list(plan(recipe).shots(stages.box))
+    cars = [p for shot in shots for p in shot.objects if p.model.category == "car"]
     places = np.array([p.world_from_object for p in cars])
     assert np.allclose(places[:, :3, 3], [[-2, 2, 0], [0, 2, 0], [2, 2, 0]], atol=1e-5)
     assert np.allclose(np.degrees(np.arctan2(places[:, 1, 0], places[:, 0, 0])), [0, 45, 90], atol=1e-4)
     for car in cars:
-        assert np.allclose(np.ptp(stages.box(car.model), axis=0), [1, 2, 1.3], atol=1e-5)
+        assert np.allclose(np.ptp(stages.box(car.model, car.step), axis=0), [1, 2, 1.3], atol=1e-5)
         assert car.id == cars[0].id
 
 
@@ -119,7 +120,8 @@ def test_what_appears_and_vanishes_is_labelled_while_it_is_there(made, name):
         assert [p.id for p in shot.objects] == [1, 2, 3, 4]
         names = {name for p in shot.objects if p.model.parts for name in p.model.parts.only}
         assert names == {"Oak", f"plane{plane}", "Late" if late else "Early"}
-        assert {p.model.track for p in shot.objects if p.model.parts} <= {spec.key for spec in planned.kept_specs}
+        assert {p.model.key for p in shot.objects if p.model.parts} <= {spec.key for spec in planned.kept_specs}
+        assert all(p.key == f"{p.model.key}-f{p.step.frame:04d}" for p in shot.objects if p.model.parts)
 
 
 def met_by_cycles(recipe):

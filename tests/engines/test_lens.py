@@ -85,7 +85,7 @@ def stage():
         scene=Scene(sun=None, finish=Finish(background=Background(color=(0, 0, 0)), view=View(transform="raw"))),
         engine_options={"antialias": 1, "ambient_occlusion": "off"},
     )
-    return raster.stage(shot, lambda spec: meshes[int(spec.key)]), meshes
+    return raster.stage(shot, lambda spec, step=None: meshes[int(spec.key)]), meshes
 
 
 def camera(name: str, rng) -> Camera:

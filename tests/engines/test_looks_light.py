@@ -30,7 +30,7 @@ def picture(
     lens = Intrinsics(width=width, height=height, fx=focal, fy=focal, cx=width / 2, cy=height / 2)
     pose = Viewpoint(index=0, azimuth_deg=30, elevation_deg=elevation_deg, distance=distance)
     shot = still_shot([Thing(id=1, model=SPEC)], lens, [pose], scene=scene)
-    return painted(raster.stage(shot, lambda spec: mesh), shot.camera(0)).astype(float)
+    return painted(raster.stage(shot, lambda spec, step=None: mesh), shot.camera(0)).astype(float)
 
 
 @pytest.mark.parametrize("turbidity", [1.8, 2.5, 3, 5, 8, 10])

@@ -54,7 +54,7 @@ def camera(width, height, focal, azimuth=0.0, elevation=0.0, distance=1.0, targe
 def stage_of(meshes: list[Mesh], scene: Scene, **options):
     things = [Thing(id=i + 1, model=SPEC.model_copy(update={"key": f"m{i}"})) for i in range(len(meshes))]
     shot = still_shot(things, scene=scene, engine_options=options)
-    return raster.stage(shot, lambda spec: meshes[int(spec.key[1:])])
+    return raster.stage(shot, lambda spec, step=None: meshes[int(spec.key[1:])])
 
 
 def picture(mesh: Mesh, scene: Scene, view: Camera, **options) -> np.ndarray:

@@ -42,7 +42,7 @@ def stage_of(target, scenery, scene=SCENE, **options):
             for i, (_, move) in enumerate(scenery)
         ),
     )
-    return raster.stage(still_shot(things, scene=scene, engine_options=options), lambda spec: meshes[spec.key])
+    return raster.stage(still_shot(things, scene=scene, engine_options=options), lambda spec, step=None: meshes[spec.key])
 
 
 def from_above(stage, x, y, scale, size=160):

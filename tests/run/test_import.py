@@ -244,7 +244,7 @@ def test_imported_categories_of_one_name_stay_two_when_others_are_added(tmp_path
     planned = plan(small_recipe(models=[models[0], {**models[1], "supercategory": "vehicle", "name": "a"}]))
     portion = extend(planned, Dataset(tmp_path / "out").plan)
     assert [(c.id, c.name) for c in portion.record.categories] == [(3, "car"), (17, "car"), (18, "box")]
-    assert [spec.category_id for spec in portion.model_specs] == [18, 3]
+    assert [spec.category_id for spec, _ in portion.models] == [18, 3]
 
 
 def test_what_is_no_data_set_says_so(tmp_path):

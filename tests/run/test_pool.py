@@ -108,7 +108,7 @@ def test_what_a_worker_cannot_do_ends_the_run_with_its_traceback(tmp_path):
 CHAIR = ModelSpec(key="chair", source="zoo:chair", category="chair", category_id=1, seed=1)
 
 
-LOOK_AT_CHAIR = ModelTask("same model", (CHAIR,))
+LOOK_AT_CHAIR = ModelTask("same model", CHAIR)
 
 
 def test_workers_stay_for_the_next_list_and_one_that_died_meanwhile_is_replaced(tmp_path):

@@ -61,12 +61,12 @@ def test_a_rule_that_labels_nothing_that_is_seen_is_told():
 
 def test_what_shows_nothing_at_the_first_frame_is_the_model_of_a_later_one():
     made = scenery(*SIGNS[:2], labels=[{"name": "*", "category": "sign"}])
-    made = replace(made, frames=(1, 5))
+    made = replace(made, seconds={1: 0.0, 5: 0.5})
     showing = {1: frozenset({"sign1"}), 5: frozenset({"sign2"})}
     made.__dict__["file"] = SceneFile(Path("a.blend"), SIGNS[:2], 1.0, True, (), 1, showing)
     made.__dict__["_stands"] = {frame: {"sign1": np.eye(4), "sign2": np.eye(4)} for frame in (1, 5)}
     one, other = made.models(lambda category, labels: 1)
-    assert (one.frame, other.frame) == (None, 5)
+    assert (one.rest, other.rest) == (1, 5)
     assert [[made.shows(spec, frame) for frame in (1, 5)] for spec in (one, other)] == [[True, False], [False, True]]
 
 

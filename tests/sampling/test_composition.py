@@ -16,7 +16,7 @@ from viewsphere.sampling.plan import check_images, plan
 from viewsphere.zoo.places import Piece, Place, standing
 
 
-def box_of(spec):
+def box_of(spec, step=None):
     """A box by the key alone: no mesh is needed."""
     size = 1 + sum(spec.key.encode()) % 7 / 10
     return box_vertices((-size / 2, -size, -size / 3), (size / 2, size, size / 3))

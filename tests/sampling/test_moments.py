@@ -39,9 +39,13 @@ def recipe(*models, **fields):
     return Recipe(models=models or [walker()], **{"viewpoints": viewpoints, "formats": [], **fields})
 
 
-def box_of(spec):
+def frame_of(spec, step):
+    return step.frame if step else spec.rest or 1
+
+
+def box_of(spec, step=None):
     """A box that is as high as the frame says."""
-    return box_vertices((-0.5, -0.5, 0.0), (0.5, 0.5, 1.0 + (spec.frame or 1) / 100))
+    return box_vertices((-0.5, -0.5, 0.0), (0.5, 0.5, 1.0 + frame_of(spec, step) / 100))
 
 
 def error(*models, **fields):
@@ -55,9 +59,11 @@ def test_every_pose_at_every_time_step():
     assert (planned.models, planned.time_steps, planned.frames) == (1, 4, 12)
     shots = list(planned.shots(box_of))
     assert [f.index for s in shots for f in s.instants] == list(range(12))
-    assert [(s.things[0].model.frame, s.things[0].model.key) for s in shots] == [
-        (frame, f"walk-f{frame:04d}") for frame in (1, 13, 25, 37)
+    assert {s.things[0].model for s in shots} == {planned.model_specs[0]}
+    assert [(s.things[0].step.frame, s.things[0].step.seconds, s.things[0].key) for s in shots] == [
+        (frame, (frame - 1) / 24, f"walk-f{frame:04d}") for frame in (1, 13, 25, 37)
     ]
+    assert len({s.stage_key for s in shots}) == 1
     assert [[f.viewpoint.azimuth_deg for f in s.instants] for s in shots] == [[0, 90, 180]] * 4
     assert [s.instants[0].viewpoint.time.seconds for s in shots] == [0, 0.5, 1, 1.5]
     assert len({f.viewpoint.index for s in shots for f in s.instants}) == 12
@@ -65,7 +71,8 @@ def test_every_pose_at_every_time_step():
     middle = tuple(box_of(planned.model_specs[0]).mean(axis=0).tolist())
     assert {f.viewpoint.target for s in shots for f in s.instants} == {middle}
     assert [row.key for row in planned.rows] == [s.key for s in shots]
-    assert [spec.key for spec in planned.kept_specs] == ["walk", *(s.things[0].model.key for s in shots)]
+    assert [spec.key for spec in planned.kept_specs] == ["walk"]
+    assert [step.frame for step in planned.steps_of(planned.kept_specs[0])] == [1, 13, 25, 37]
 
 
 def test_a_camera_that_moves_takes_a_pose_a_time_step():
@@ -96,20 +103,20 @@ def test_all_time_steps_of_a_model_share_a_split_a_scene_and_a_camera():
     for by in ("model", "pose"):
         splits = {"train": 0.5, "val": 0.5, "by": by}
         planned = plan(recipe(walker(), {"source": "run.fbx", "category": "x", "frames": "all"}, scene=scene, splits=splits))
-        frames = [(s.things[0].model.track, f) for s in planned.shots(box_of) for f in s.instants]
+        frames = [(s.things[0].model.key, f) for s in planned.shots(box_of) for f in s.instants]
         groups = {}
         for number, (track, frame) in enumerate(frames):
             groups.setdefault((track, number % 3), set()).add((frame.split, frame.viewpoint.azimuth_deg))
         assert all(len(found) == 1 for found in groups.values())
         assert sum(planned.split_counts.values()) == planned.frames == 3 * (4 + 24)
-    suns = {(s.things[0].model.track, s.scene.sun.azimuth_deg) for s in planned.shots(box_of)}
+    suns = {(s.things[0].model.key, s.scene.sun.azimuth_deg) for s in planned.shots(box_of)}
     assert len(suns) == 2
 
 
 def test_company_is_at_its_own_time_step_of_the_same_number():
     models = walker(), {"source": "run.fbx", "category": "person", "frames": [1, 24]}
     planned = plan(recipe(*models, scene={"company": {"count": 1}}, splits={"train": 1}))
-    pairs = [tuple(p.model.key for p in s.things) for s in planned.shots(box_of)]
+    pairs = [tuple(p.key for p in s.things) for s in planned.shots(box_of)]
     assert pairs[:4] == [
         ("walk-f0001", "run-f0001"),
         ("walk-f0013", "run-f0024"),
@@ -120,8 +127,8 @@ def test_company_is_at_its_own_time_step_of_the_same_number():
 
 
 def test_the_ground_is_where_the_lowest_moment_touches_it():
-    def sinking(spec):
-        return box_of(spec) - [0, 0, (spec.frame or 1) / 50]
+    def sinking(spec, step=None):
+        return box_of(spec, step) - [0, 0, frame_of(spec, step) / 50]
 
     assert {s.scene.floor for s in plan(recipe()).shots(sinking)} == {-37 / 50}
     assert {s.scene.floor for s in plan(recipe(scene={"ground": "off"})).shots(sinking)} == {None}
@@ -150,8 +157,8 @@ def test_time_steps_are_added_to_those_there_are():
 
 
 def test_a_camera_inside_at_any_time_step_is_found():
-    def growing(spec):
-        return box_vertices((-0.5, -0.5, 0.0), (0.5, 0.5 if spec.frame < 30 else 9.0, 1.0))
+    def growing(spec, step=None):
+        return box_vertices((-0.5, -0.5, 0.0), (0.5, 0.5 if frame_of(spec, step) < 30 else 9.0, 1.0))
 
     planned = plan(recipe(viewpoints={"azimuth": [0, 180], "distance": 5, "elevation": 0}))
     problem = Distances(planned, growing).problem(planned.subjects[0])

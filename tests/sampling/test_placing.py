@@ -248,7 +248,7 @@ def test_the_placer_in_the_docs_is_one_file(installed):
     (code,) = (block for block in blocks if "def place(" in block)
     installed("circle", code)
     assert plugins.names("placers").count("circle") == 1
-    things = plan(recipe("circle", gap=0.5)).shot(0, lambda spec: box(0.4, 0.6)).things
+    things = plan(recipe("circle", gap=0.5)).shot(0, lambda spec, step=None: box(0.4, 0.6)).things
     poses = [np.array(thing.world_from_object) for thing in things]
     middle, ring = poses[0][:2, 3], np.array([pose[:2, 3] for pose in poses[1:]])
     radius = np.linalg.norm(ring - middle, axis=1)
@@ -274,7 +274,7 @@ def place(cast, room, shapes, views, rng):
     )
     boxes = {}
 
-    def box_of(spec):
+    def box_of(spec, step=None):
         if spec.key not in boxes:
             boxes[spec.key] = box_vertices(*load_normalised(spec, build_zoo_model).bounds)
         return boxes[spec.key]

@@ -68,7 +68,7 @@ def finishes(scene, folder=Path(), **fields):
     }
 
 
-def box_of(spec):
+def box_of(spec, step=None):
     return box_vertices((-1.0, -2.0, -0.5), (1.0, 2.0, 1.5))
 
 

@@ -25,7 +25,7 @@ import platformdirs
 
 from viewsphere.assets import limits
 from viewsphere.assets.inside import split_source
-from viewsphere.assets.isolated import read_apart, read_frames_apart
+from viewsphere.assets.isolated import read_apart
 from viewsphere.assets.load import check_source
 from viewsphere.assets.mesh import Mesh
 from viewsphere.assets.mesh_file import read_mesh
@@ -34,8 +34,9 @@ from viewsphere.assets.parts import taken
 from viewsphere.assets.piece import FileFacts, extents
 from viewsphere.errors import ModelError
 from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.thing import TimeStep
 
-SETTINGS = ("up", "forward", "unit", "centring", "scale", "real_size", "confined", "frame", "clip", "shown")
+SETTINGS = ("up", "forward", "unit", "centring", "scale", "real_size", "confined", "clip", "shown")
 ZOO = "zoo:"
 ASIDE = "reading-"
 BATCH = 32
@@ -44,24 +45,34 @@ BATCH = 32
 STALE_SECONDS = 86_400.0
 
 
-def load_normalised(spec: ModelSpec, build: Callable[[ModelSpec], Mesh] | None = None, folder: Path | None = None) -> Mesh:
+def load_normalised(
+    spec: ModelSpec,
+    build: Callable[[ModelSpec], Mesh] | None = None,
+    folder: Path | None = None,
+    step: TimeStep | None = None,
+) -> Mesh:
     """The model in object axes and metres: the mesh that `load` gives."""
-    return load(spec, build, folder)[0]
+    return load(spec, build, folder, step)[0]
 
 
 def load(
-    spec: ModelSpec, build: Callable[[ModelSpec], Mesh] | None = None, folder: Path | None = None
+    spec: ModelSpec,
+    build: Callable[[ModelSpec], Mesh] | None = None,
+    folder: Path | None = None,
+    step: TimeStep | None = None,
 ) -> tuple[Mesh, FileFacts]:
-    """The model in object axes and metres, and what its file says of itself; from the cache when it holds them.
+    """The model in object axes and metres at a time step (None: as it rests), and what its file says of itself; from the cache
+    when it holds them.
 
     `build` makes the mesh of a source that begins with `zoo:` (in object axes, metres); such meshes are
     normalised too but neither cached nor made in another process. `folder` is the cache's, by default
     `cache_folder()`. A damaged entry is built again; a cache that cannot be written is no error. Read back, every
     array is equal bit for bit. Raises ModelError as the readers do and when reading takes too long or too much.
     """
+    frame = frame_of(spec, step)
     if spec.parts is not None:
-        whole, facts = load(spec.whole, build, folder)
-        return taken(whole, spec), facts
+        whole, facts = load(spec.whole, build, folder, None if frame is None else TimeStep(frame=frame))
+        return taken(whole, spec, step), facts
     if spec.source.startswith(ZOO):
         raw, facts = load_zoo(spec, build)
         return normalise(raw, facts, spec), facts
@@ -69,37 +80,43 @@ def load(
     folder = folder or cache_folder()
     check_source(path)
     try:
-        first = _first_digest(path, inside, spec)
+        first = _first_digest(path, inside, spec, frame)
     except OSError:
         first = None  # the reader says what is wrong with the file
     stored = None if first is None else _stored(folder, first, path)
     if stored is not None:
         return stored
     with _aside(folder) as place:
-        file, named = read_apart(spec, place)
+        (file,), named = read_apart(spec, () if frame is None else (frame,), place)
         mesh, facts = read_mesh(file, path)
         if first is not None:
             _store(folder, first, path, named, file)
     return mesh, facts
 
 
-def read_ahead(specs: Sequence[ModelSpec], folder: Path | None = None) -> None:
-    """Put what the cache lacks of these moments of one model, alike but for key and frame, into it: the file is opened once.
+def frame_of(spec: ModelSpec, step: TimeStep | None) -> int | None:
+    """The frame of its file at which a model is meant at a time step (None: as it rests); None for a file as it stands."""
+    return spec.rest if step is None else step.frame
+
+
+def read_ahead(spec: ModelSpec, frames: Iterable[int], folder: Path | None = None) -> None:
+    """Put what the cache lacks of an animated model at these frames into it: the file is opened once for many.
 
     Raises ModelError as `load` does; a cache that cannot be written is no error.
     """
     folder = folder or cache_folder()
-    path, inside = split_source(Path(specs[0].source))
+    spec = spec if spec.parts is None else spec.whole
+    path, inside = split_source(Path(spec.source))
     lacking: dict[int, str] = {}
     with suppress(OSError):
-        for spec in specs:
-            first = _first_digest(path, inside, spec)
-            if spec.frame is not None and not _is_stored(folder, first, path):
-                lacking[spec.frame] = first
-    for frames in _batches(sorted(lacking)):
+        for frame in frames:
+            first = _first_digest(path, inside, spec, frame)
+            if not _is_stored(folder, first, path):
+                lacking[frame] = first
+    for batch in _batches(sorted(lacking)):
         with _aside(folder) as place:
-            files, named = read_frames_apart(specs[0], frames, place)
-            for frame, file in zip(frames, files, strict=True):
+            files, named = read_apart(spec, batch, place)
+            for frame, file in zip(batch, files, strict=True):
                 _store(folder, lacking[frame], path, named, file)
 
 
@@ -166,11 +183,11 @@ def cache_folder() -> Path:
     return Path(os.environ.get("VIEWSPHERE_CACHE") or platformdirs.user_cache_dir("viewsphere")) / "models"
 
 
-def _first_digest(path: Path, inside: tuple[str, ...], spec: ModelSpec) -> str:
+def _first_digest(path: Path, inside: tuple[str, ...], spec: ModelSpec, frame: int | None) -> str:
     if not path.is_file() or path.stat().st_size > limits.MAX_FILE_BYTES:
         raise FileNotFoundError(path)
     digest = hashlib.sha256(_readers_digest().encode())
-    digest.update(spec.model_dump_json(include=set(SETTINGS)).encode())
+    digest.update(f"{frame} {spec.model_dump_json(include=set(SETTINGS))}".encode())
     digest.update(path.suffix.lower().encode() + path.name.encode() + b"\0".join(text.encode() for text in inside))
     with path.open("rb") as file:
         digest.update(hashlib.file_digest(file, "sha256").digest())

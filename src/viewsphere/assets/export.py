@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.assets.glb import glb_bytes
+from viewsphere.assets.deforming import DeformingMesh
+from viewsphere.assets.glb import deforming_glb_bytes, glb_bytes
 from viewsphere.assets.mesh import Material, Mesh, Texture
 from viewsphere.assets.runs import runs
 from viewsphere.assets.srgb import encoded
 from viewsphere.codecs.png_tiff import encode_png
+from viewsphere.model.model_spec import step_key
 
 
 def export_glb(mesh: Mesh, path: Path) -> Path:
@@ -28,8 +30,28 @@ def export_glb(mesh: Mesh, path: Path) -> Path:
     return path
 
 
-def export_obj(mesh: Mesh, folder: Path, name: str) -> Path:
-    """Write `<name>.obj`, `<name>.mtl` and its textures to the folder; returns the OBJ's path.
+def export_deforming(model: DeformingMesh, folder: Path, name: str, seconds: Mapping[int, float]) -> None:
+    """Write `<name>.glb` with all time steps of a model, and an OBJ of each, `<name>-f0013.obj`, which share `<name>.mtl` and
+    its textures as long as materials stay the same. By frame, `seconds` say when the GLB's animation shows each; without it the
+    first is shown.
+
+    In the GLB, a time step is a node of the OBJ's name. Each has vertices of its own, exact to the last bit; all else is shared
+    where it is equal. Otherwise as `export_glb` and `export_obj`.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    names = {frame: step_key(name, frame) for frame in model.meshes}
+    (folder / f"{name}.glb").write_bytes(deforming_glb_bytes(model, names, seconds))
+    library, last = name, None
+    for frame, mesh in model.meshes.items():
+        if last is not None and (mesh.materials is not last.materials or mesh.images is not last.images):
+            library = names[frame]
+        export_obj(mesh, folder, names[frame], library)
+        last = mesh
+
+
+def export_obj(mesh: Mesh, folder: Path, name: str, library: str = "") -> Path:
+    """Write `<name>.obj`, `<name>.mtl` and its textures to the folder; returns the OBJ's path. With the name of a material
+    `library`, which meshes of equal materials and images share, that is written in place of `<name>.mtl`, once.
 
     In object axes (Z up, front -Y, metres), with digits that read back as the same float32. The faces are
     `mesh.triangles` in order, a group (`g`) a part. MTL keeps base colour, opacity, metallic, roughness,
@@ -38,10 +60,13 @@ def export_obj(mesh: Mesh, folder: Path, name: str) -> Path:
     """
     folder.mkdir(parents=True, exist_ok=True)
     names = _plain_names(material.name or "material" for material in mesh.materials)
-    (folder / f"{name}.mtl").write_text(_mtl(mesh, folder, name, names), encoding="utf-8", newline="\n")
+    is_written = bool(library) and (folder / f"{library}.mtl").exists()
+    library = library or name
+    if not is_written:
+        (folder / f"{library}.mtl").write_text(_mtl(mesh, folder, library, names), encoding="utf-8", newline="\n")
     path = folder / f"{name}.obj"
     with path.open("w", encoding="utf-8", newline="\n") as file:
-        file.write(f"# Z up, front -Y, metres\nmtllib {name}.mtl\n")
+        file.write(f"# Z up, front -Y, metres\nmtllib {library}.mtl\n")
         file.writelines(_obj_runs(mesh, names))
     return path
 

@@ -22,33 +22,35 @@ FROM_GLTF = np.array([0, 2, 1]), np.array([1, -1, 1], np.float32)
 """Which of glTF's axes are the object's, and their signs."""
 
 
-def read_exported(file: Path, parts: Sequence[str], *, whole: bool = False) -> Mesh:
-    """The mesh of a GLB file that this package wrote, in object axes; every number is equal to the last bit.
+def read_exported(file: Path, parts: Sequence[str], node: str | None = None, *, whole: bool = False) -> Mesh:
+    """The mesh of a GLB file that this package wrote, in object axes; every number is equal to the last bit. Of a model that
+    deforms, `node` names the time step.
 
     `parts` names all parts of the model, those without triangles too. Materials that cannot be seen through are left plain, and
     images that only they use are left out, unless the `whole` mesh is asked for. Raises ModelError for a file that cannot be
-    read, or that has other parts.
+    read, or that has other parts, or no such node.
     """
     document = Document.read(ModelFolder(file))
-    primitives = list(_primitives(document, parts))
+    step = None if node is None else _step(document, node)
+    primitives = list(_primitives(document, _meshes(document, step), parts))
     vertices = [_accessor(document, p, "POSITION", 3) for _, p in primitives]
     triangles = [document.accessor(p.integer("indices"), (1,)).reshape(-1, 3).astype(np.int64) for _, p in primitives]
     firsts = np.cumsum([0, *(len(own) for own in vertices)])
     counts = [len(own) for own in triangles]
     materials = document.root.items("materials")
-    seen_through = {i for i, entry in enumerate(materials) if entry.text("alphaMode", "OPAQUE") != "OPAQUE"}
+    first, count = (0, len(materials)) if step is None else map(int, step.get("extras").numbers("materials", 2, ()))
+    seen_through = {i for i in range(first, first + count) if whole or materials[i].text("alphaMode", "OPAQUE") != "OPAQUE"}
     if whole:
         _read_images(document)
-        seen_through = set(range(len(materials)))
     axes, signs = FROM_GLTF
     try:
         return Mesh(
             vertices=_joined(vertices, 3)[:, axes] * signs,
             triangles=np.concatenate([own + first for own, first in zip(triangles, firsts, strict=False)]).astype(np.int32),
             normals=_joined([_accessor(document, p, "NORMAL", 3) for _, p in primitives], 3)[:, axes] * signs,
-            triangle_material=np.repeat([p.integer("material") for _, p in primitives], counts).astype(np.int32),
+            triangle_material=np.repeat([p.integer("material") - first for _, p in primitives], counts).astype(np.int32),
             triangle_part=np.repeat([part for part, _ in primitives], counts).astype(np.int32),
-            materials=tuple(read_materials(document, seen_through)[:-1]),
+            materials=tuple(read_materials(document, seen_through)[:-1][first : first + count]),
             parts=tuple(parts),
             uv0=_optional(document, primitives, "TEXCOORD_0", 2),
             uv1=_optional(document, primitives, "TEXCOORD_1", 2),
@@ -66,10 +68,26 @@ def _read_images(document: Document) -> None:
         document.folder.image(f"#{i}", entry.text("name"), bytes(data))
 
 
-def _primitives(document: Document, parts: Sequence[str]) -> Iterator[Part]:
+def _step(document: Document, name: str) -> Field:
+    """The node that is called so and stands for a time step."""
+    for node in document.root.items("nodes"):
+        if node.text("name") == name and "extras" in node:
+            return node
+    raise document.folder.error(f"expected a node {name!r}, found none")
+
+
+def _meshes(document: Document, step: Field | None) -> Sequence[Field]:
+    """The parts, or those of one time step."""
+    if step is None:
+        return document.root.items("meshes")
+    nodes = (document.root.at("nodes", int(child.value)) for child in step.items("children"))
+    return [document.root.at("meshes", node.integer("mesh")) for node in nodes]
+
+
+def _primitives(document: Document, meshes: Sequence[Field], parts: Sequence[str]) -> Iterator[Part]:
     """All primitives in order; meshes are the parts that have triangles."""
     part = -1
-    for mesh in document.root.items("meshes"):
+    for mesh in meshes:
         name = mesh.text("name")
         if name not in parts[part + 1 :]:
             raise document.folder.error(f"expected the parts {', '.join(parts)} in order, found {name!r}")

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import hashlib
 import io
 import json
 import struct
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -12,7 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.assets.mesh import Material, Mesh, Texture
+from viewsphere.assets.deforming import DeformingMesh
+from viewsphere.assets.mesh import Image, Material, Mesh, Texture
 from viewsphere.assets.runs import Run, runs
 from viewsphere.codecs.png_tiff import encode_png
 
@@ -26,11 +29,29 @@ Object = dict[str, Any]
 
 def glb_bytes(mesh: Mesh) -> bytes:
     """GLB of a mesh in object axes: one node and mesh a part, one primitive a run, in order."""
-    writer = _Writer(mesh)
-    for run in runs(mesh):
-        writer.add_run(run)
-    writer.add_materials()
-    return writer.packed()
+    writer = _Writer()
+    writer.add_mesh(mesh)
+    return writer.packed([{"name": part["name"], "mesh": i} for i, part in enumerate(writer.meshes)])
+
+
+def deforming_glb_bytes(model: DeformingMesh, names: Mapping[int, str], seconds: Mapping[int, float]) -> bytes:
+    """GLB of a model that deforms: a node for each time step, called as `names` say by frame, with a child for each part.
+
+    An animation scales one of them after another from 0 to 1, each at its `seconds`; at rest the first is shown. What has a
+    scale of 0 is not drawn (glTF 2.0, section 3.5.3). `extras` say which materials are the time step's.
+    """
+    writer = _Writer({})
+    steps, parts = list[Object](), list[Object]()
+    for frame, mesh in model.meshes.items():
+        first = len(writer.meshes)
+        materials = writer.add_mesh(mesh)
+        own = range(first, len(writer.meshes))
+        children = [len(model.meshes) + i for i in own]
+        hidden: Object = {"scale": [0.0, 0.0, 0.0]} if steps else {}
+        steps.append({"name": names[frame], "children": children, **hidden, "extras": {"materials": materials}})
+        parts += [{"name": writer.meshes[i]["name"], "mesh": i} for i in own]
+    writer.animate([seconds[frame] for frame in model.meshes])
+    return writer.packed(steps + parts, len(steps))
 
 
 def material_names(file: Path) -> tuple[str, ...]:
@@ -43,7 +64,9 @@ def material_names(file: Path) -> tuple[str, ...]:
 
 @dataclass(eq=False)
 class _Writer:
-    mesh: Mesh
+    """`known`: accessors by their content, where equal ones are shared."""
+
+    known: dict[object, int] | None = None
     binary: io.BytesIO = field(default_factory=io.BytesIO)
     views: list[Object] = field(default_factory=list[Object])
     accessors: list[Object] = field(default_factory=list[Object])
@@ -52,10 +75,31 @@ class _Writer:
     samplers: list[Object] = field(default_factory=list[Object])
     textures: list[Object] = field(default_factory=list[Object])
     extensions: set[str] = field(default_factory=set[str])
-    last_part: int = -1
+    animations: list[Object] = field(default_factory=list[Object])
+    images: list[Image] = field(default_factory=list[Image])
+    last: Mesh | None = None
+    first_image: int = 0
+    first_material: int = 0
 
-    def add_run(self, run: Run) -> None:
-        mesh, at = self.mesh, run.vertices
+    def add_mesh(self, mesh: Mesh) -> list[int]:
+        """Add a mesh a part; gives the first and the number of its materials."""
+        last = self.last
+        if last is None or mesh.images is not last.images:
+            self.first_image = len(self.images)
+            self.images += mesh.images
+        if last is None or mesh.materials is not last.materials or mesh.images is not last.images:
+            self.first_material = len(self.materials)
+            self.materials += [self.material(material) for material in mesh.materials]
+        self.last, part = mesh, -1
+        for run in runs(mesh):
+            if run.part != part:
+                part = run.part
+                self.meshes.append({"name": mesh.parts[part], "primitives": []})
+            self.add_run(mesh, run)
+        return [self.first_material, len(mesh.materials)]
+
+    def add_run(self, mesh: Mesh, run: Run) -> None:
+        at = run.vertices
         turned = np.array([0, 2, 1])
         signs = np.array([1, 1, -1], np.float32)
         attributes = {
@@ -70,12 +114,26 @@ class _Writer:
             if array is not None:
                 attributes[name] = self.accessor(array[at], kind)
         indices = self.accessor(run.triangles.astype(np.uint32).reshape(-1, 1), "SCALAR")
-        if run.part != self.last_part:
-            self.meshes.append({"name": mesh.parts[run.part], "primitives": []})
-            self.last_part = run.part
-        self.meshes[-1]["primitives"].append(
-            {"attributes": attributes, "indices": indices, "material": run.material, "mode": 4}
-        )
+        material = self.first_material + run.material
+        self.meshes[-1]["primitives"].append({"attributes": attributes, "indices": indices, "material": material, "mode": 4})
+
+    def animate(self, seconds: Sequence[float]) -> None:
+        """Show the first nodes one after another, as many as there are seconds."""
+        if len(seconds) < 2:
+            return
+        samplers, channels = list[Object](), list[Object]()
+        for i in range(len(seconds)):
+            begin = max(i - 1, 0)
+            times = np.array(seconds[begin : i + 2], np.float32)
+            shown = np.repeat(np.arange(begin, begin + len(times)) == i, 3).reshape(-1, 3).astype(np.float32)
+            entry = {"input": self.keys(times.reshape(-1, 1), "SCALAR"), "output": self.keys(shown, "VEC3")}
+            samplers.append({**entry, "interpolation": "STEP"})
+            channels.append({"sampler": i, "target": {"node": i, "path": "scale"}})
+        self.animations.append({"name": "time steps", "samplers": samplers, "channels": channels})
+
+    def keys(self, rows: NDArray[np.float32], kind: str) -> int:
+        """An accessor of an animation's key frames."""
+        return self.accessor(rows, kind, bounded=kind == "SCALAR", target=None)
 
     def view(self, data: bytes, target: int | None = None) -> int:
         self.binary.write(b"\0" * (-self.binary.tell() % 4))
@@ -86,11 +144,15 @@ class _Writer:
         self.views.append(entry)
         return len(self.views) - 1
 
-    def accessor(self, rows: NDArray[Any], kind: str, bounded: bool = False) -> int:
+    def accessor(self, rows: NDArray[Any], kind: str, bounded: bool = False, target: int | None = ARRAY_BUFFER) -> int:
+        """Put an array into the file; `target` says what reads it, if it is no index."""
         is_float = rows.dtype == np.float32
         data = np.ascontiguousarray(rows, "<f4" if is_float else "<u4")
+        content = kind, bounded, is_float, target, hashlib.sha256(data.tobytes()).digest()
+        if self.known is not None and content in self.known:
+            return self.known[content]
         entry: Object = {
-            "bufferView": self.view(data.tobytes(), ARRAY_BUFFER if is_float else ELEMENT_ARRAY_BUFFER),
+            "bufferView": self.view(data.tobytes(), target if is_float else ELEMENT_ARRAY_BUFFER),
             "componentType": FLOAT if is_float else UINT32,
             "count": len(rows),
             "type": kind,
@@ -98,6 +160,8 @@ class _Writer:
         if bounded:
             entry["min"], entry["max"] = data.min(axis=0).tolist(), data.max(axis=0).tolist()
         self.accessors.append(entry)
+        if self.known is not None:
+            self.known[content] = len(self.accessors) - 1
         return len(self.accessors) - 1
 
     def texture(self, texture: Texture, **more: float) -> Object:
@@ -108,7 +172,7 @@ class _Writer:
             "wrapS": WRAP_CODES[texture.wrap_s],
             "wrapT": WRAP_CODES[texture.wrap_t],
         }
-        entry: Object = {"sampler": _index(self.samplers, sampler), "source": texture.image}
+        entry: Object = {"sampler": _index(self.samplers, sampler), "source": self.first_image + texture.image}
         info: Object = {"index": _index(self.textures, entry), "texCoord": texture.texcoord, **more}
         transform: Object = {
             "offset": list(texture.offset),
@@ -119,9 +183,6 @@ class _Writer:
             info["extensions"] = {"KHR_texture_transform": transform}
             self.extensions.add("KHR_texture_transform")
         return info
-
-    def add_materials(self) -> None:
-        self.materials = [self.material(material) for material in self.mesh.materials]
 
     def material(self, m: Material) -> Object:
         pbr: Object = {
@@ -198,10 +259,10 @@ class _Writer:
                 found[key] = self.texture(texture)
         return found
 
-    def packed(self) -> bytes:
-        """The whole file."""
+    def packed(self, nodes: Sequence[Object], roots: int | None = None) -> bytes:
+        """The whole file, with these nodes: the first so many (None: all) are the scene's."""
         images: list[Object] = []
-        for image in self.mesh.images:
+        for image in self.images:
             images.append(
                 {
                     "name": image.name,
@@ -209,19 +270,18 @@ class _Writer:
                     "bufferView": self.view(encode_png(image.pixels)),
                 }
             )
-        count = len(self.meshes)
         root: Object = {
             "asset": {"version": "2.0", "generator": "viewsphere"},
             "scene": 0,
-            "scenes": [{"nodes": list(range(count))}],
-            "nodes": [{"name": mesh["name"], "mesh": i} for i, mesh in enumerate(self.meshes)],
+            "scenes": [{"nodes": list(range(len(nodes) if roots is None else roots))}],
+            "nodes": nodes,
             "meshes": self.meshes,
             "materials": self.materials,
             "accessors": self.accessors,
             "bufferViews": self.views,
             "buffers": [{"byteLength": self.binary.tell()}],
         }
-        optional = {"images": images, "samplers": self.samplers, "textures": self.textures}
+        optional = {"images": images, "samplers": self.samplers, "textures": self.textures, "animations": self.animations}
         root |= {name: value for name, value in optional.items() if value}
         if self.extensions:
             root["extensionsUsed"] = sorted(self.extensions)

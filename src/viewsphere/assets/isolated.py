@@ -26,18 +26,13 @@ SINGLE_THREADED = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREA
 """Threads reserve address space, which is limited, and readers have no use for them."""
 
 
-def read_apart(spec: ModelSpec, folder: Path) -> tuple[Path, list[Path]]:
-    """Read and normalise a model file in a short-lived process that writes only below `folder`.
+def read_apart(spec: ModelSpec, frames: Sequence[int], folder: Path) -> tuple[list[Path], list[Path]]:
+    """Read and normalise a model file in a short-lived process that writes only below `folder`: as it is at frames of its
+    animation, which ascend, or for no frames as it stands.
 
-    Gives the file that `mesh_file.read_mesh` reads, and the files that the model named. Raises ModelError in one line:
-    what the reader says of the file, or how its process came to its end (killed for time or memory, crashed).
+    Gives the files that `mesh_file.read_mesh` reads, one a frame, and the files that the model named. Raises ModelError in one
+    line: what the reader says of the file, or how its process came to its end (killed for time or memory, crashed).
     """
-    meshes, files = read_frames_apart(spec, () if spec.frame is None else (spec.frame,), folder)
-    return meshes[0], files
-
-
-def read_frames_apart(spec: ModelSpec, frames: Sequence[int], folder: Path) -> tuple[list[Path], list[Path]]:
-    """The same for frames of an animated file, which ascend: a mesh for each; for no frames, one of the file as it stands."""
     memory = int(limits.from_environment("MAX_READ_BYTES"))
     seconds = limits.from_environment("MAX_READ_SECONDS") * (1 + len(frames))
     by_blender = bool(frames) or check_source(Path(spec.source)) in BLENDER_SUFFIXES

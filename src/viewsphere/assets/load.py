@@ -41,9 +41,10 @@ IN_BLENDER = {"x3d", "wrl"}
 """Formats of `KNOWN` that Blender opens with an extension."""
 
 
-def load_model(path: Path, *, confined: bool = True, shown: tuple[str, ...] = ()) -> tuple[Mesh, FileFacts]:
-    """Read a model file, in this process: its triangles in the file's own axes and unit, and what the file says of axes and
-    unit.
+def load_model(
+    path: Path, *, confined: bool = True, shown: tuple[str, ...] = (), node: str | None = None
+) -> tuple[Mesh, FileFacts]:
+    """Read a model file, in this process: its triangles in its own axes and unit, and what it says of these.
 
     | suffix    | up            | front        | unit                  | source                              |
     |-----------|---------------|--------------|-----------------------|-------------------------------------|
@@ -60,15 +61,15 @@ def load_model(path: Path, *, confined: bool = True, shown: tuple[str, ...] = ()
     COLLADA: Y_UP has its front at +z, Z_UP at -y, X_UP at +z. Others are FBX, USD, Alembic and .blend (`via_blender`), of
     which `file.blend/Object/NAME` and `file.blend/Collection/NAME` are parts. With `confined`, files that the model names
     (textures, buffers, material libraries) are read only from its own folder and below; `shown` are objects of a .blend file
-    that are read although renders do not show them. Raises ModelError in
-    one line that names the file: missing, empty, truncated, not a model, no triangles, or more of them than
+    that are read although renders do not show them; `node` names one of a glTF file below which is what is read. Raises
+    ModelError in one line that names the file: missing, empty, truncated, not a model, no triangles, or more of them than
     `limits` allows.
     """
     suffix = check_source(path)
     file, inside = split_source(path)
     # NaN and infinity are found and reported once the whole file is read.
     with np.errstate(all="ignore"):
-        return _read(ModelFolder(file, confined, inside, shown), suffix)
+        return _read(ModelFolder(file, confined, inside, shown), suffix, node)
 
 
 def load_frames(
@@ -108,9 +109,9 @@ def check_source(path: Path) -> str:
     raise ModelError(f"{path}: expected a model file with suffix {expected}, found {path.suffix or 'none'!r}")
 
 
-def _read(folder: ModelFolder, suffix: str) -> tuple[Mesh, FileFacts]:
+def _read(folder: ModelFolder, suffix: str, node: str | None) -> tuple[Mesh, FileFacts]:
     if suffix in {"glb", "gltf"}:
-        return _read_gltf(folder)
+        return _read_gltf(folder, node)
     if suffix in BLENDER_SUFFIXES:
         from viewsphere.assets.via_blender import read_via_blender
 
@@ -128,13 +129,13 @@ def _read(folder: ModelFolder, suffix: str) -> tuple[Mesh, FileFacts]:
     return read_via_trimesh(folder)
 
 
-def _read_gltf(folder: ModelFolder) -> tuple[Mesh, FileFacts]:
-    """A glTF file's mesh; read by Blender, where one is installed, if the file's compression needs Blender."""
+def _read_gltf(folder: ModelFolder, node: str | None) -> tuple[Mesh, FileFacts]:
+    """A glTF file; by Blender where it is compressed in a way that only Blender reads, and there is one."""
     from viewsphere.assets.gltf import read_gltf
     from viewsphere.assets.gltf.document import ForBlenderError
 
     try:
-        return read_gltf(folder)
+        return read_gltf(folder, node)
     except ForBlenderError as error:
         from viewsphere.assets.via_blender import read_via_blender
 

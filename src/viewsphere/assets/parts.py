@@ -13,6 +13,7 @@ from viewsphere.assets.piece import used_images
 from viewsphere.errors import ModelError
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.model_spec import ModelSpec, Parts
+from viewsphere.model.thing import TimeStep
 
 VERTEX = ("uv0", "uv1", "colors")
 
@@ -20,8 +21,8 @@ OWN_SLASH = "\u2215"
 """Stands for a slash in an object's name, as Blender's worker writes it in names of parts."""
 
 
-def taken(mesh: Mesh, spec: ModelSpec) -> Mesh:
-    """What `spec.parts` says of a whole model's mesh, with the materials and images that it uses.
+def taken(mesh: Mesh, spec: ModelSpec, step: TimeStep | None = None) -> Mesh:
+    """What `spec.parts` says of a whole model's mesh at a time step, with the materials and images that it uses.
 
     Raises ModelError where that is nothing.
     """
@@ -34,7 +35,8 @@ def taken(mesh: Mesh, spec: ModelSpec) -> Mesh:
     parts, part = np.unique(mesh.triangle_part[chosen], return_inverse=True)
     materials, material = np.unique(mesh.triangle_material[chosen], return_inverse=True)
     kept, images = used_images([mesh.materials[i] for i in materials], mesh.images)
-    vertices, normals = _turned(mesh.vertices[used], mesh.normals[used], spec.parts)
+    axes = np.array((step and step.file_from_axes) or spec.parts.file_from_axes)
+    vertices, normals = _turned(mesh.vertices[used], mesh.normals[used], axes)
     rest = {name: None if values is None else values[used] for name in VERTEX for values in [getattr(mesh, name)]}
     return replace(
         mesh,
@@ -69,10 +71,9 @@ def _is_of(part: str, objects: frozenset[str]) -> bool:
 
 
 def _turned(
-    vertices: NDArray[np.float32], normals: NDArray[np.float32], parts: Parts
+    vertices: NDArray[np.float32], normals: NDArray[np.float32], axes: NDArray[np.float64]
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """In the parts' axes."""
-    axes = np.array(parts.file_from_axes)
+    """In the parts' axes (file from axes)."""
     if (axes == np.eye(4)).all():
         return vertices, normals
     turn = axes[:3, :3].T

@@ -28,8 +28,8 @@ MESH, OUTCOME = "mesh.npz", "outcome.json"
 
 @dataclass(frozen=True)
 class Job:
-    """A job: the model (a ModelSpec's fields), the folder for the result, limits in seconds and bytes, the asking process's id,
-    and whether Blender reads the file. Ascending `frames`, if given, are read instead of the specification's frame.
+    """What to read (a ModelSpec's fields), where the result goes, seconds, bytes, the asking process's id, and whether Blender
+    is what reads it. `frames` of its animation, which ascend, are read; none: the file as it stands.
     """
 
     spec: dict[str, Any]

@@ -18,7 +18,7 @@ from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.model.scene import Matrix4
 from viewsphere.model.shot import Shot
-from viewsphere.model.thing import Motion, Thing
+from viewsphere.model.thing import Motion, Thing, TimeStep
 from viewsphere.store import Dataset, ModelInfo, depth_step
 from viewsphere.store.channel_files import MOST_STEPS
 from viewsphere.truth.geometry import Geometry, build_geometry, present
@@ -82,7 +82,8 @@ class Again:
         if o is None:
             return None
         info = self._models[o.key]
-        return Placement(_spec(o, info), _matrix(o.world_from_object), sample.camera, shot.category_deg, lambda: info)
+        pose = _matrix(o.world_from_object)
+        return Placement(_spec(info), pose, sample.camera, shot.category_deg, lambda: info, _step(info))
 
     def _built(self, sample: Sample, shot: Shot, key: str) -> Geometry | None:
         """The geometry that a sample shows; None where scenery is not what it was."""
@@ -92,8 +93,8 @@ class Again:
         ground = shot.scene.ground is not None and shot.scene.ground.is_labelled
         now = objects, around.things, ground, shot.label_alpha, shot.scene.floor
         if self._geometry[0] != now:
-            meshes = [self._mesh(thing.model.key) for thing in objects]
-            scenery = [self._scenery.mesh(around, thing.model) for thing in around.things]
+            meshes = [self._mesh(thing.key) for thing in objects]
+            scenery = [self._scenery.mesh(around, thing) for thing in around.things]
             whole = [mesh for mesh in scenery if mesh is not None]
             things = (*objects, *around.things)
             built = None
@@ -106,23 +107,28 @@ class Again:
         """An object as a sample says that it stands, or not there."""
         if o is None:
             return Thing(id=thing.id, model=thing.model, motion=Motion(poses=(None,)))
-        return Thing(id=o.id, model=_spec(o, self._models[o.key]), motion=Motion.still(_matrix(o.world_from_object)))
+        info = self._models[o.key]
+        return Thing(id=o.id, model=_spec(info), motion=Motion.still(_matrix(o.world_from_object), _step(info)))
 
     def _read(self, key: str) -> Mesh:
         info = self._models[key]
-        return read_exported(self._dataset.path(info.glb), info.parts)
+        return read_exported(self._dataset.path(info.glb), info.parts, info.node)
 
 
-def _spec(o: ObjectAnnotation, info: ModelInfo) -> ModelSpec:
-    """The model as labels know it: what the data set says of it, but for the object's track."""
+def _spec(info: ModelInfo) -> ModelSpec:
+    """The model as labels know it: what the data set says of it."""
     return ModelSpec(
-        key=o.key,
+        key=info.track or info.key,
         source="",
         category=info.category,
         supercategory=info.supercategory,
         category_id=info.category_id,
-        track=o.track,
     )
+
+
+def _step(info: ModelInfo) -> TimeStep | None:
+    """The time step that the key of a model names."""
+    return info.step if info.track else None
 
 
 def _matrix(values: NDArray[np.float64]) -> Matrix4:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator
-from itertools import zip_longest
+from itertools import islice, zip_longest
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -35,24 +36,41 @@ def differing(dataset: Dataset, notes: list[str]) -> Iterator[Finding]:
             notes.append(f"models: the files of {info.key} are not compared, they were exported elsewhere")
             continue
         try:
-            yield from ((info.key, f"model {info.key}: {message}") for message in _problems(dataset, info, categories))
+            yield from ((owner(info), f"model {info.key}: {message}") for message in _problems(dataset, info, categories))
         except Exception as error:
-            yield info.key, f"model {info.key}: {failure('files that can be compared', error)}"
+            yield owner(info), f"model {info.key}: {failure('files that can be compared', error)}"
+
+
+def owner(info: ModelInfo) -> str:
+    """The key of the model that a time step is of; a model's own."""
+    return info.track or info.key
 
 
 def _problems(dataset: Dataset, info: ModelInfo, categories: dict[int, Category]) -> Iterator[str]:
     folder, known = dataset.path(info.obj).parent, categories.get(info.category_id)
-    mesh = read_exported(dataset.path(info.glb), info.parts, whole=True)
+    mesh = read_exported(dataset.path(info.glb), info.parts, info.node, whole=True)
     yield from _facts(info, mesh)
     places = [(dataset.path(file).parent, Path(file).suffix) for file in (info.obj, info.glb)]
-    if places != [(dataset.store.model_folder(info.key), suffix) for suffix in (".obj", ".glb")]:
+    if places != [(dataset.store.model_folder(owner(info)), suffix) for suffix in (".obj", ".glb")]:
         yield f"expected files in its folder, found {info.obj} and {info.glb}"
     if known is None or (known.name, known.supercategory) != (info.category, info.supercategory):
         yield f"expected a category of the plan, found {info.category_id} {info.category!r} ({info.supercategory!r})"
+    library = _library(dataset.path(info.obj), Path(info.glb).stem) if info.step else Path(info.obj).stem
+    if library is None:
+        yield f"{Path(info.obj).name}: expected materials of the model, found others"
+        return
     with TemporaryDirectory() as aside:
-        export_obj(mesh, Path(aside), Path(info.obj).stem)
+        export_obj(mesh, Path(aside), Path(info.obj).stem, library)
         for file in sorted(Path(aside).iterdir()):
             yield from _compared(file, folder / file.name)
+
+
+def _library(obj: Path, name: str) -> str | None:
+    """The file of materials that a time step's OBJ names, without its suffix: the model's or a step's; None for any other."""
+    with obj.open(encoding="utf-8") as file:
+        found = re.fullmatch(r"mtllib (.+)\.mtl\n", next(islice(file, 1, None), ""))
+    known = re.compile(rf"{re.escape(name)}(-f-?\d+)?")
+    return found[1] if found and known.fullmatch(found[1]) else None
 
 
 def _facts(info: ModelInfo, mesh: Mesh) -> Iterator[str]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from importlib.util import find_spec
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,8 +16,8 @@ from viewsphere.check.scenery import Scenery
 from viewsphere.errors import MissingExtraError
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.geometry.rotation import transform
-from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.sample import Sample
+from viewsphere.model.thing import Thing
 from viewsphere.run.tasks import SceneryRecord
 from viewsphere.store import Dataset, depth_step
 from viewsphere.store.channel_files import MOST_STEPS
@@ -54,7 +55,7 @@ class RayCaster:
         if find_spec("embreex") is None:
             raise MissingExtraError("expected embreex, found none: pip install 'viewsphere[check]'")
         self._dataset, self._scenery = dataset, scenery
-        self._files = {info.key: dataset.path(info.glb) for info in dataset.models}
+        self._files = {info.key: (dataset.path(info.glb), info.node) for info in dataset.models}
         self._known: dict[str, _Soup] = {}
         self._around: dict[str, _Soup | None] = {}
         self._key: object = None
@@ -135,7 +136,7 @@ class RayCaster:
             return
         self._middle = np.mean([o.box3d.mean(axis=0) for o in sample.objects], axis=0)
         placed = [(o.id, o.world_from_object, self._exported(o.key)) for o in sample.objects]
-        remade = [(p.world_from_object, self._remade(scenery, p.model)) for p in scenery.things]
+        remade = [(p.world_from_object, self._remade(scenery, p)) for p in scenery.things]
         self._complete = all(soup is not None for _, soup in remade)
         placed += [(0, np.array(world), soup) for world, soup in remade if soup is not None]
         corners = np.concatenate([transform(world, soup.corners) - self._middle for _, world, soup in placed])
@@ -146,15 +147,15 @@ class RayCaster:
         self._key = key
 
     def _exported(self, key: str) -> _Soup:
-        soup = self._known.get(key) or _read(self._files[key])
+        soup = self._known.get(key) or _read(*self._files[key])
         self._known[key] = soup
         return soup
 
-    def _remade(self, record: SceneryRecord, spec: ModelSpec) -> _Soup | None:
+    def _remade(self, record: SceneryRecord, thing: Thing) -> _Soup | None:
         """A piece of scenery, None where it is not what it was."""
-        digest = record.digests[spec.key]
+        digest = record.digests[thing.key]
         if digest not in self._around:
-            mesh = self._scenery.mesh(record, spec)
+            mesh = self._scenery.mesh(record, thing)
             self._around[digest] = mesh and _soup_of(mesh)
         return self._around[digest]
 
@@ -184,15 +185,16 @@ def _cast(scene: Any, origins: Float, directions: Float) -> tuple[Float, NDArray
     return np.where(triangle < 0, np.inf, np.asarray(hit["tfar"], np.float64)), triangle
 
 
-def _read(file: Any) -> _Soup:
-    """An exported GLB in the object's axes."""
+def _read(file: Path, step: str | None) -> _Soup:
+    """An exported GLB in the object's axes; of a model that deforms what is below a time step's node."""
     import trimesh
 
     scene: Any = trimesh.load_scene(file, process=False)
     corners: list[Float] = []
     opaque: list[NDArray[np.bool_]] = []
-    for name in scene.graph.nodes_geometry:
-        matrix, geometry = scene.graph[name]
+    shown = scene.graph.transforms.successors(step or scene.graph.base_frame)
+    for name in filter(shown.__contains__, scene.graph.nodes_geometry):
+        matrix, geometry = scene.graph.get(name, step)
         mesh = scene.geometry[geometry]
         x, y, z = (trimesh.transform_points(mesh.vertices, matrix)).T
         corners.append(np.stack([x, -z, y], axis=-1)[mesh.faces])

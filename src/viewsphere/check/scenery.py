@@ -7,10 +7,11 @@ from functools import lru_cache
 
 from viewsphere.assets.mesh import Mesh
 from viewsphere.errors import ViewsphereError
-from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.shot import Shot
+from viewsphere.model.thing import Thing
+from viewsphere.run.models import mesh_digest
 from viewsphere.run.stages import Stages
-from viewsphere.run.tasks import SceneryRecord, mesh_digest
+from viewsphere.run.tasks import SceneryRecord
 from viewsphere.store import Dataset
 
 NONE = SceneryRecord(things=(), digests={})
@@ -40,17 +41,19 @@ class Scenery:
         text = self.dataset.store.scenery(key)
         return SceneryRecord.model_validate_json(text) if text else NONE
 
-    def mesh(self, record: SceneryRecord, spec: ModelSpec) -> Mesh | None:
-        """A model of a shot's scenery, None where it is not what it was. Merged data sets have several of one key."""
-        digest = record.digests[spec.key]
+    def mesh(self, record: SceneryRecord, thing: Thing) -> Mesh | None:
+        """The model of a shot's scenery as it is shown, None where it is not what it was. Merged data sets have several of one
+        key.
+        """
+        digest = record.digests[thing.key]
         if digest not in self._known:
             self._known[digest] = None
             try:
-                mesh = self._stages.model(spec)
+                mesh = self._stages.model(thing.model, thing.step)
                 if mesh_digest(mesh) == digest:
                     self._known[digest] = mesh
                 else:
-                    self.notes.append(f"background not checked where {spec.key} stands: it is not what it was")
+                    self.notes.append(f"background not checked where {thing.key} stands: it is not what it was")
             except ViewsphereError as error:
-                self.notes.append(f"background not checked where {spec.key} stands: {error}")
+                self.notes.append(f"background not checked where {thing.key} stands: {error}")
         return self._known[digest]

@@ -33,7 +33,7 @@ def contradictions(sample: Sample, shot: Shot, place: int) -> Iterator[str]:
     if [o.id for o in sample.objects] != list(poses):
         yield f"expected the objects {list(poses)} of the shot, found {[o.id for o in sample.objects]}"
         return
-    tracks = {thing.id: thing.model.track for thing in shot.objects}
+    tracks = {thing.id: thing.model.key if thing.motion.step_at(instant) else "" for thing in shot.objects}
     for o in sample.objects:
         if not np.array_equal(o.world_from_object, poses[o.id]):
             yield f"object {o.id}: expected it where the shot has it, found it elsewhere"

@@ -5,14 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Protocol, Self
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Mapping
 
     import numpy as np
     from numpy.typing import NDArray
     from pydantic import JsonValue
 
-    from viewsphere.assets.mesh import Mesh
-    from viewsphere.model.model_spec import ModelSpec
+    from viewsphere.assets.deforming import Load
     from viewsphere.model.shot import Shot
     from viewsphere.truth.geometry import Geometry
     from viewsphere.truth.visibility import Visibility
@@ -47,6 +46,6 @@ class Engine(Protocol):
         """Raise UserError for an option that is not known, or out of range; asked before anything is rendered."""
         ...
 
-    def stage(self, shot: Shot, load: Callable[[ModelSpec], Mesh]) -> Stage:
+    def stage(self, shot: Shot, load: Load) -> Stage:
         """Build what all frames of the shot share; `load` gives a model's normalised mesh."""
         ...

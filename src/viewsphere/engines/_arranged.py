@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
+from viewsphere.assets.deforming import Load, sharing
 from viewsphere.assets.mesh import Mesh
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.shot import Shot
-from viewsphere.model.thing import Thing
+from viewsphere.model.thing import Thing, TimeStep
 from viewsphere.truth.geometry import Geometry, placed_meshes, present
 from viewsphere.truth.moving import Ring, changed, shot_floor
+
+STEPS = 16
+"""Time steps of models whose meshes are kept for the next instants."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +52,22 @@ class Arranged:
 
 
 @dataclass(frozen=True, eq=False)
+class Shown:
+    """Gives models at their time steps; the last `STEPS` are kept, so that what is shown again is the same object."""
+
+    load: Load
+    _held: dict[tuple[ModelSpec, TimeStep], Mesh] = field(default_factory=dict[tuple[ModelSpec, TimeStep], Mesh])
+
+    def mesh(self, spec: ModelSpec, step: TimeStep, resting: Mesh) -> Mesh:
+        """The mesh at a time step, which has in common with the model at rest what is equal."""
+        found = self._held.pop((spec, step), None) or sharing(self.load(spec, step), resting)
+        self._held[spec, step] = found  # the last used comes last
+        if len(self._held) > STEPS:
+            del self._held[next(iter(self._held))]
+        return found
+
+
+@dataclass(frozen=True, eq=False)
 class Arrangements:
     """A shot's things at each of its instants; things that stand still are loaded and placed once.
 
@@ -56,16 +75,17 @@ class Arrangements:
     """
 
     shot: Shot
-    load: Callable[[ModelSpec], Mesh]
-    meshes: tuple[Mesh, ...]
+    shown: Shown
+    meshes: tuple[Mesh, ...]  # at rest
     floor: float | None
     ring: Ring
 
     @classmethod
-    def build(cls, shot: Shot, load: Callable[[ModelSpec], Mesh]) -> Arrangements:
-        """The arrangements of a shot, with all its models loaded; `load` gives a model's normalised mesh."""
+    def build(cls, shot: Shot, load: Load) -> Arrangements:
+        """Of a shot, with all its models loaded; `load` gives a model's normalised mesh."""
         ring = Ring(shot.scene.ground is not None, shot.label_alpha)
-        return cls(shot, load, tuple(placed_meshes(shot.things, load)), None, ring).of(shot)
+        meshes = tuple(placed_meshes(shot.things, load))
+        return cls(shot, Shown(load), meshes, None, ring).of(shot)
 
     def of(self, shot: Shot) -> Arrangements:
         """The arrangements of another shot of an equal `stage_key`, which share the loaded meshes."""
@@ -80,6 +100,6 @@ class Arrangements:
         return Arranged(things, meshes, self.ring.at(things, meshes, self.floor), moving, bool(self.shot.sequence))
 
     def _meshes(self, things: tuple[Thing, ...]) -> tuple[Mesh, ...]:
-        """Meshes of these things; a model that does not change with time keeps the mesh loaded for the shot."""
-        held = zip(self.shot.things, things, self.meshes, strict=True)
-        return tuple(mesh if now.model is own.model else self.load(now.model) for own, now, mesh in held)
+        """Of these things, at the time steps that they show."""
+        held = zip(things, self.meshes, strict=True)
+        return tuple(mesh if now.step is None else self.shown.mesh(now.model, now.step, mesh) for now, mesh in held)

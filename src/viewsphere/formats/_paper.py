@@ -38,10 +38,18 @@ def _vehicle(info: ModelInfo) -> dict[str, Any]:
     return {
         "supercategory": info.supercategory,
         "category": info.category,
-        "model_file": f"./MODELS/{info.key}/{PurePosixPath(info.obj).name}",
+        "model_file": f"./MODELS/{info.track or info.key}/{PurePosixPath(info.obj).name}",
+        **(_deforming(info) if info.step else {}),
         "bbox3D_model": faces(info.box3d_object),
         "real_size": dict(sizes),
     }
+
+
+def _deforming(info: ModelInfo) -> dict[str, Any]:
+    """Of a model that deforms: the file of all its time steps, which lies beside that of this one, and its frame there."""
+    assert info.step is not None
+    track = {"id_track": info.track} if info.track else {}
+    return {"animation": PurePosixPath(info.glb).name, "frame": info.step.frame, "seconds": info.step.seconds, **track}
 
 
 def transformation_matrix(camera: Camera) -> dict[str, list[list[float]]]:

@@ -112,10 +112,9 @@ def annotate(
     """Annotations of all objects (things with an id) present at an instant (counted from 0 in the shot), visible or not, in the
     order of their ids.
 
-    `boxes[i]` is the 3D box (8, 3) of object i + 1's model in the object's axes, `models[i]` the path of that model in the data
-    set and `real_sizes[i]` its true size (by default the one its spec gives in numbers); `geometry` is the stage's at
-    this instant, and `visibility` is `rasterize(geometry, camera)`. An object that covers no pixel has an empty mask, no
-    `box2d` and visibility 0.
+    `boxes[i]` is the 3D box (8, 3) of object i + 1's model then in the object's axes, `models[i]` the path of that model in the
+    data set and `real_sizes[i]` its true size (by default the one its spec gives in numbers); `geometry` is the shot's stage
+    and `visibility` what this camera sees of it. An object that covers no pixel has an empty mask, no `box2d` and visibility 0.
     """
     objects = shot.objects
     if not len(objects) == len(boxes) == len(models) == geometry.object_count:
@@ -129,9 +128,9 @@ def annotate(
         for thing, box, model, size in zip(objects, boxes, models, sizes, strict=True)
     ]
     placed = tuple(
-        None if pose is None else Placement(thing.model, pose, camera, shot.category_deg, lambda known=known: known)
+        None if pose is None else Placement(thing.model, pose, camera, shot.category_deg, lambda known=known: known, step)
         for thing, known in zip(objects, facts, strict=True)
-        for pose in (thing.motion.at(instant),)
+        for pose, step in ((thing.motion.at(instant), thing.motion.step_at(instant)),)
     )
     return annotated(Sight(geometry, camera, visibility, placed))
 

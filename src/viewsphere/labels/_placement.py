@@ -16,6 +16,7 @@ from viewsphere.model.camera import Camera
 from viewsphere.model.model_spec import ModelSpec, Size
 from viewsphere.model.sample import View
 from viewsphere.model.scene import Matrix4
+from viewsphere.model.thing import TimeStep
 
 Float = NDArray[np.float64]
 
@@ -40,7 +41,7 @@ class ModelFacts(Protocol):
 @dataclass(frozen=True, eq=False)
 class Placement:
     """One object in one picture: its model and pose (world from object), the camera, and the angular resolution of pose
-    categories. `known` loads the facts about its model, and is called when they are first needed.
+    categories. `known` gives what is known of its model at the time step that it shows, and is asked when that is needed.
     """
 
     spec: ModelSpec
@@ -48,6 +49,7 @@ class Placement:
     camera: Camera
     category_deg: float
     known: Callable[[], ModelFacts]
+    step: TimeStep | None = None
 
     @cached_property
     def facts(self) -> ModelFacts:

@@ -11,8 +11,11 @@ from viewsphere.model.sample import Sample
 
 
 def of(placement: Placement) -> Mapping[str, Any]:
-    """The model's key and file."""
-    return {"key": placement.spec.key, "model": placement.facts.obj, "track": placement.spec.track}
+    """The model's names."""
+    spec, step = placement.spec, placement.step
+    if step is None:
+        return {"key": spec.key, "model": placement.facts.obj, "track": ""}
+    return {"key": spec.key_at(step.frame), "model": placement.facts.obj, "track": spec.key}
 
 
 def prove(sample: Sample, models: Models) -> Iterator[str]:

@@ -29,8 +29,8 @@ class ModelSpec(Frozen):
     """Which model, and how its file is turned into an object that faces -Y with +Z up, in metres.
 
     `source` is a file's absolute path, or `zoo:<family>` with `seed` naming the draw. None for `up`, `forward` or
-    `unit` means what the file (or its format's specification) says. At a later `frame` a model is turned, scaled and
-    centred as it is at its file's first.
+    `unit` means what the file (or its format's specification) says. An animated model is turned, scaled and centred as it is at
+    its file's first frame; which time step it shows, and when, its thing's motion says.
     """
 
     key: str  # unique and stable in the data set: also the name of its folder
@@ -46,14 +46,22 @@ class ModelSpec(Frozen):
     scale: Literal["as_is", "real_size"] | float = "as_is"  # a number: metres from front to back
     real_size: Size | Literal["file"] | None = None  # "file": the size the file has, before any scaling
     confined: bool = True  # texture and buffer paths may not leave the model's folder
-    frame: int | None = None  # of an animated file, which Blender then reads; None: the first, by which it is also placed
-    clip: str | None = None  # name of the animation that is played, where the file has several; with a frame
-    track: str = ""  # key of the animated model that this is at a moment: what stays itself over time
+    rest: int | None = None  # frame of an animated file, which Blender then reads, where no time step is named
+    clip: str | None = None  # name of the animation that is played, where the file has several
     shown: tuple[str, ...] = ()  # objects of a .blend file that are read although renders do not show them
     parts: Parts | None = None  # what is taken of it, when it is read and normalised
 
+    def key_at(self, frame: int | None) -> str:
+        """The key of the model as it is at a frame of its file; None: its own."""
+        return step_key(self.key, frame)
+
     @property
     def whole(self) -> ModelSpec:
-        """The model that this one is a part of: equal for all parts of one."""
-        unnamed = {"key": "", "category": "", "supercategory": "", "category_id": 0, "track": "", "parts": None}
+        """The model that this one is a part of: equal for all parts of one, whichever frame they rest at."""
+        unnamed = {"key": "", "category": "", "supercategory": "", "category_id": 0, "rest": None, "parts": None}
         return self.model_copy(update=unnamed)
+
+
+def step_key(key: str, frame: int | None) -> str:
+    """The key of the model of this key as it is at a frame of its file; None: its own."""
+    return key if frame is None else f"{key}-f{frame:04d}"

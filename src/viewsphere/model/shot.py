@@ -13,7 +13,7 @@ from viewsphere.model.files import Files
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.instant import Instant
 from viewsphere.model.rig import Rig
-from viewsphere.model.scene import IDENTITY, Finish, Matrix4, Scene
+from viewsphere.model.scene import IDENTITY, Finish, Scene
 from viewsphere.model.thing import Motion, Thing
 
 
@@ -41,10 +41,11 @@ class Shot(Frozen):
     @model_validator(mode="after")
     def _as_many_poses_as_instants(self) -> Shot:
         for thing in self.things:
-            if not thing.motion.is_still and len(thing.motion.poses) != len(self.instants):
+            motion = thing.motion
+            if not motion.lasts(len(self.instants)):
                 raise ValueError(
-                    f"expected one pose of thing {thing.id}, or one an instant ({len(self.instants)}); "
-                    f"found {len(thing.motion.poses)}"
+                    f"expected one pose and one time step of thing {thing.id}, or one an instant ({len(self.instants)}); "
+                    f"found {len(motion.poses)} and {len(motion.steps)}"
                 )
         return self
 
@@ -63,14 +64,13 @@ class Shot(Frozen):
 
     def things_at(self, instant: int) -> tuple[Thing, ...]:
         """All things as they are at an instant, counted from 0 in the shot: standing still there, or not there."""
-        return tuple(
-            thing if thing.motion.is_still else thing.model_copy(update={"motion": Motion(poses=(thing.motion.at(instant),))})
-            for thing in self.things
-        )
+        return tuple(thing.at(instant) for thing in self.things)
 
-    def poses_at(self, instant: int) -> tuple[Matrix4 | None, ...]:
-        """Where all that moves is at an instant, counted from 0 in the shot: equal where the world is."""
-        return tuple(thing.motion.at(instant) for thing in self.things if not thing.motion.is_still)
+    def poses_at(self, instant: int) -> tuple[Motion, ...]:
+        """Where all that moves is, and which time steps are shown, at an instant counted from 0 in the shot: equal where the
+        world is.
+        """
+        return tuple(thing.motion.held(instant) for thing in self.things if not thing.motion.is_still)
 
     def camera(self, instant: int, sensor: int = 0) -> Camera:
         """The camera of a sensor at an instant, both counted from 0 in the shot."""
@@ -87,7 +87,7 @@ class Shot(Frozen):
 
     @property
     def stage_key(self) -> str:
-        """Equal for shots that can share a warm stage: all but their instants, and where what moves is then."""
+        """Equal for shots that can share a warm stage: all but their instants, where what moves is then, and what it shows."""
         things = tuple(
             thing if thing.motion.is_still else thing.model_copy(update={"motion": Motion(poses=(None,))})
             for thing in self.things

@@ -19,26 +19,51 @@ class Repaint(Frozen):
     roughness: Portion | None = Field(default=None, description="instead of what the model says: 0 a mirror, 1 matt")
 
 
+class TimeStep(Frozen):
+    """A time step of an animated model: a frame of its file, and the seconds since that file's first frame.
+
+    `file_from_axes`: where the rigid axes of the parts are then that are taken of the model; None: where `Parts` says.
+    """
+
+    frame: int
+    seconds: float = 0.0
+    file_from_axes: Matrix4 | None = None
+
+
 class Motion(Frozen):
-    """Where a thing is: one rigid pose (world from object) for all instants of a shot, or one an instant, None where the thing
-    is not there.
+    """Where a thing is, and which time step of its file it shows: one rigid pose (world from object) for all instants of a
+    shot, or one an instant, None where the thing is not there; and one time step for all instants, or one an instant, None for
+    a model as it rests.
     """
 
     poses: tuple[Matrix4 | None, ...] = Field(default=(IDENTITY,), min_length=1)
+    steps: tuple[TimeStep | None, ...] = Field(default=(None,), min_length=1)
 
     @property
     def is_still(self) -> bool:
-        """Whether one pose is for all instants."""
-        return len(self.poses) == 1
+        """Whether one pose is for all instants, and no time step is shown."""
+        return len(self.poses) == 1 and self.steps == (None,)
 
     def at(self, instant: int) -> Matrix4 | None:
         """World from object at an instant, counted from 0 in the shot."""
-        return self.poses[0 if self.is_still else instant]
+        return self.poses[0 if len(self.poses) == 1 else instant]
+
+    def step_at(self, instant: int) -> TimeStep | None:
+        """The time step that is shown at an instant, counted from 0 in the shot."""
+        return self.steps[0 if len(self.steps) == 1 else instant]
+
+    def held(self, instant: int) -> Motion:
+        """The motion of what stays as it is at an instant, counted from 0 in the shot."""
+        return self if self.is_still else Motion(poses=(self.at(instant),), steps=(self.step_at(instant),))
+
+    def lasts(self, instants: int) -> bool:
+        """Whether it says where a thing is, and what it shows, at so many instants."""
+        return {len(self.poses), len(self.steps)} <= {1, instants}
 
     @staticmethod
-    def still(world_from_object: Matrix4) -> Motion:
-        """The motion of what stands still."""
-        return Motion(poses=(world_from_object,))
+    def still(world_from_object: Matrix4, step: TimeStep | None = None) -> Motion:
+        """The motion of what stands still, and shows one time step."""
+        return Motion(poses=(world_from_object,), steps=(step,))
 
 
 class Thing(Frozen):
@@ -58,6 +83,24 @@ class Thing(Frozen):
     def is_there(self) -> bool:
         """Whether a still thing is there at all; of a moving one, whether it is at first."""
         return self.motion.poses[0] is not None
+
+    @property
+    def key(self) -> str:
+        """The key of its model, as a still thing shows it, or a moving one at first."""
+        return self.model.key_at(self.step and self.step.frame)
+
+    @property
+    def step(self) -> TimeStep | None:
+        """The time step that a still thing shows, a moving one at first."""
+        return self.motion.steps[0]
+
+    def showing(self, step: TimeStep) -> Thing:
+        """The thing where it stands, at one time step of its model's file."""
+        return self.model_copy(update={"motion": Motion(poses=self.motion.poses, steps=(step,))})
+
+    def at(self, instant: int) -> Thing:
+        """The thing as it is at an instant, counted from 0 in the shot: standing still there, or not there."""
+        return self if self.motion.is_still else self.model_copy(update={"motion": self.motion.held(instant)})
 
     @property
     def world_from_object(self) -> Matrix4:

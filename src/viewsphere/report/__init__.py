@@ -102,7 +102,7 @@ def _models(dataset: Dataset, table: FrameTable, tell: Listener) -> list[dict[st
     found: list[dict[str, Any]] = []
     for done, info in enumerate(chosen, 1):
         try:
-            shape = {"mesh": mesh_data(read_small(dataset.path(info.glb), most)), "problem": None}
+            shape = {"mesh": mesh_data(read_small(dataset.path(info.glb), most, info.node)), "problem": None}
         except ViewsphereError as error:
             shape = {"mesh": None, "problem": str(error)}
         found.append({"key": info.key, **shape, **_cameras(info, table)})

@@ -33,12 +33,14 @@ class SmallMesh:
     edge_colors: NDArray[np.uint8]
 
 
-def read_small(glb: Path, most: int) -> SmallMesh:
-    """A data set's exported model with at most `most` triangles and edges together; raises ModelError as for any model file."""
+def read_small(glb: Path, most: int, node: str | None = None) -> SmallMesh:
+    """A data set's exported model with at most `most` triangles and edges together, of one that deforms what a node shows;
+    ModelError as of any model file.
+    """
     from viewsphere.assets.load import load_model
 
-    mesh = load_model(glb)[0]
-    vertices = mesh.vertices.astype(np.float64)[:, (0, 2, 1)] * (1, -1, 1)  # the file has +y up, its front at +z
+    mesh = load_model(glb, node=node)[0]
+    vertices = mesh.vertices.astype(np.float64)[:, (0, 2, 1)] * (1, -1, 1)  # the file has +y up and the front at +z
     return simplified(vertices, mesh.triangles.astype(np.int64), triangle_colors(mesh), most)
 
 

@@ -17,6 +17,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.thing import TimeStep
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.run.exporting import write
 from viewsphere.run.opening import prepare, to_render
@@ -37,7 +38,9 @@ GOLDEN = 0.6180339887498949
 
 @dataclass(frozen=True)
 class Rates:
-    """Seconds of one process and bytes on disk: for a model, a scene, a frame, the exports of a frame."""
+    """Seconds of one process and bytes on disk: for a model (each time step of one that deforms), a scene, a frame, the exports
+    of a frame.
+    """
 
     model: float
     scene: float
@@ -66,7 +69,7 @@ def estimate(recipe: Recipe, workers: int = 1, clock: Callable[[], float] = time
 
 def extrapolate(planned: Plan, rates: Rates, workers: int) -> Estimate:
     """The cost of a whole plan; no workers count as one, for then the calling process works."""
-    crew, models = max(workers, 1), len(planned.kept_specs)
+    crew, models = max(workers, 1), sum(max(1, len(planned.steps_of(spec))) for spec in planned.kept_specs)
     scenes = len(planned.subjects)
     scenes = planned.frames if planned.recipe.scene.is_new_each_frame else max(scenes, min(crew, planned.shot_count))
     shared = models * rates.model + scenes * rates.scene + planned.frames * rates.frame
@@ -86,7 +89,9 @@ def _measure_in(planned: Plan, store: Store, stopwatch: _Stopwatch) -> Rates:
     store.open_for(portion.record)
     rows = list(_spread(planned))
     specs = {spec.key: spec for row in rows for spec in portion.cast(row)}.values()
-    model = stopwatch.mean([_model_work(store, portion, spec) for spec in specs])
+    shown = [(spec, _shown(planned, spec, rows)) for spec in specs]
+    made = sum(max(1, len(steps)) for _, steps in shown)
+    model = stopwatch.mean([_model_work(store, portion, *one) for one in shown]) * len(shown) / made
     worker = Worker(store.root, portion)  # one that did not make the models: in a run that is seldom the one that renders them
     shots = [planned.shot(row, worker.stages.box) for row in rows]
     load_kernels(shots[0])
@@ -102,11 +107,18 @@ def _measure_in(planned: Plan, store: Store, stopwatch: _Stopwatch) -> Rates:
     model_bytes = disk_bytes([store.folder / "models"])
     outputs = [store.folder / "models", store.folder / "shots", *(store.root / name for name in planned.recipe.formats)]
     frame_bytes = (disk_bytes(outputs) - model_bytes) / frames
-    return Rates(model, scene, frame, export / frames, model_bytes / len(specs), frame_bytes)
+    return Rates(model, scene, frame, export / frames, model_bytes / made, frame_bytes)
 
 
-def _model_work(store: Store, portion: Portion, spec: ModelSpec) -> Callable[[], object]:
-    return lambda: Worker(store.root, portion).make_model(spec)
+def _shown(planned: Plan, spec: ModelSpec, rows: Sequence[Row]) -> tuple[TimeStep, ...]:
+    """The time steps of a model that shots show."""
+    steps, moments = planned.steps_of(spec), (planned.pose_list[row.positions[0][0]].time for row in rows)
+    shown = {moment.frame for moment in moments if moment is not None}
+    return tuple(step for step in steps if step.frame in shown) or steps
+
+
+def _model_work(store: Store, portion: Portion, spec: ModelSpec, steps: Sequence[TimeStep]) -> Callable[[], object]:
+    return lambda: Worker(store.root, portion).models.make(spec, steps)
 
 
 def _export(store: Store, formats: Sequence[str], stopwatch: _Stopwatch) -> float:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections import Counter, defaultdict
+from collections import Counter
 from collections.abc import Container, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import chain
@@ -14,6 +14,7 @@ from viewsphere import plugins
 from viewsphere.errors import ModelError, RecipeError, UserError, ViewsphereError
 from viewsphere.model.channel import missing
 from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.thing import TimeStep
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.run.exporting import export, writable
 from viewsphere.run.opening import commit, prepare, to_append, to_render
@@ -140,7 +141,7 @@ def _render_part(portion: Portion, store: Store, crew: Crew, keep_going: bool, t
 def _prepare_models(portion: Portion, store: Store, crew: Crew, keep_going: bool, tell: Listener) -> dict[str, str]:
     """Normalise and export every model; gives the keys left out, and why."""
     planned = portion.plan
-    jobs = _model_jobs("same model" if portion.number else "model", portion.model_specs)
+    jobs = _model_jobs("same model" if portion.number else "model", portion.models)
     total = len(jobs.all)
     failed: dict[str, ViewsphereError] = {}
     tell(Progress("models", 0, total))
@@ -157,18 +158,14 @@ def _prepare_models(portion: Portion, store: Store, crew: Crew, keep_going: bool
     return {key: str(error) for key, error in failed.items()}
 
 
-def _model_jobs(kind: Kind, specs: Sequence[ModelSpec]) -> Listed:
-    """A job for each model, with its moments."""
-    groups: defaultdict[str, list[ModelSpec]] = defaultdict(list)
-    for spec in specs:
-        groups[spec.track or spec.key].append(spec)
-    return Listed(tuple(Job(key, key, ModelTask(kind, tuple(group))) for key, group in groups.items()))
+def _model_jobs(kind: Kind, models: Iterable[tuple[ModelSpec, tuple[TimeStep, ...]]]) -> Listed:
+    """A job for each model, with its time steps."""
+    return Listed(tuple(Job(spec.key, spec.key, ModelTask(kind, spec, steps)) for spec, steps in models))
 
 
 def _compare_models(portion: Portion, store: Store, crew: Crew) -> None:
     """Raises StoreError where a model is no longer the one that the data set shows."""
-    specs = [spec for spec in portion.model_specs if store.model_info(spec.key) is not None]
-    jobs = _model_jobs("same model", specs)
+    jobs = _model_jobs("same model", (model for model in portion.models if store.model_info(model[0].key) is not None))
     errors = [outcome.error for outcome in crew.run(jobs) if outcome.error]
     if errors:
         raise _joined(errors)
@@ -296,11 +293,10 @@ def _accept(outcome: Outcome, keep_going: bool, skipped: dict[str, str]) -> None
 
 def _note_skipped(portion: Portion, store: Store, skipped: dict[str, str]) -> None:
     """Keep what was left out, of other parts too."""
-    own = {spec.key for spec in portion.model_specs} | set(portion.plan.subjects)
+    own = {spec.key for spec, _ in portion.models} | set(portion.plan.subjects)
     others = {key: why for key, why in store.skipped().items() if key not in own and not _is_of(portion, key)}
     others = others if portion.number else {}
-    moments = {spec.key: skipped[spec.track] for spec in portion.model_specs if spec.track in skipped}
-    store.write_file("skipped.json", json.dumps(others | moments | skipped, indent=1, sort_keys=True))
+    store.write_file("skipped.json", json.dumps(others | skipped, indent=1, sort_keys=True))
 
 
 def _is_of(portion: Portion, key: str) -> bool:

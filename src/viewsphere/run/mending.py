@@ -5,10 +5,12 @@ from __future__ import annotations
 import json
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from viewsphere.errors import StoreError, UserError, ViewsphereError
+from viewsphere.model.thing import TimeStep
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.run.opening import check_whether_same
 from viewsphere.run.pool import Crew, Job, Listed
@@ -44,9 +46,19 @@ class Mender:
         """Make the models of these keys again; gives what could not be done."""
         errors, wanted = _sorted(keys, self._part_of_model)
         for number, found in wanted.items():
-            specs = {spec.key: spec for spec in self._portion(number).model_specs}
-            self._run(number, [Job(key, key, ModelTask("damaged model", (specs[key],))) for key in found], errors)
+            specs = {spec.key: spec for spec, _ in self._portion(number).models}
+            tasks = {key: ModelTask("damaged model", specs[key], self._steps(key)) for key in found}
+            self._run(number, [Job(key, key, task) for key, task in tasks.items()], errors)
         return errors
+
+    def _steps(self, key: str) -> tuple[TimeStep, ...]:
+        """The time steps of a model that all parts asked for whose recipes can be planned."""
+        found: dict[int, TimeStep] = {}
+        for number in range(len(self.record.parts)):
+            with suppress(UserError):
+                models = {spec.key: steps for spec, steps in self._portion(number).models}
+                found |= {step.frame: step for step in models.get(key, ())}
+        return tuple(found.values())
 
     def shots(self, keys: Iterable[str]) -> Errors:
         """Render the shots of these keys again, if their models are what they were; gives what could not be done."""
@@ -66,7 +78,8 @@ class Mender:
         """Those in the shots that are no longer what the data set shows."""
         errors: Errors = {}
         specs = {spec.key: spec for row in rows for spec in self._portion(number).cast(row)}
-        self._run(number, [Job(key, key, ModelTask("same model", (spec,))) for key, spec in specs.items()], errors)
+        steps_of = self._portion(number).plan.steps_of
+        self._run(number, [Job(key, key, ModelTask("same model", spec, steps_of(spec))) for key, spec in specs.items()], errors)
         return errors
 
     def _run(self, number: int, jobs: Sequence[Job], errors: Errors) -> None:
@@ -91,7 +104,7 @@ class Mender:
         problem: UserError = StoreError(f"model {key}: expected a recipe that has it, found none")
         for number in reversed(range(len(self.record.parts))):
             try:
-                if key in {spec.key for spec in self._portion(number).model_specs}:
+                if key in {spec.key for spec, _ in self._portion(number).models}:
                     return number
             except UserError as error:
                 problem = error

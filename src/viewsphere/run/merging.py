@@ -152,7 +152,8 @@ def _reconciled(datasets: Sequence[Dataset]) -> tuple[tuple[Category, ...], tupl
         joined: dict[int, Category] = {}
         for category in dataset.categories:
             joined[category.id] = _joined(categories, category, {c.id for c in joined.values()})
-        model_keys = {info.key: _key_for(contents, info, joined[info.category_id]) for info in dataset.models}
+        own = (info for info in dataset.models if not info.track)
+        model_keys = {info.key: _key_for(contents, info, joined[info.category_id]) for info in own}
         sources.append(_Source(dataset, number, frames, poses, joined, model_keys))
         frames += len(dataset)
         poses += dataset.plan.poses
@@ -175,7 +176,8 @@ def _joined(categories: dict[int, Category], category: Category, others: set[int
 
 def _key_for(contents: dict[str, tuple[object, ...]], info: ModelInfo, category: Category) -> str:
     """The model's key, or one with a number where another model has it; `contents` gets it."""
-    number, key, content = 1, info.key, (info.digest, info.real_size, category.id)
+    steps = tuple((one.key, one.digest, one.real_size) for one in info.steps)
+    number, key, content = 1, info.key, (info.digest, info.real_size, category.id, steps)
     while contents.get(key, content) != content:
         number += 1
         key = f"{info.key}-{number}"
@@ -242,8 +244,9 @@ def _moved(source: _Source, part: Part, block: Block) -> Block:
 
 def _link_models(source: _Source, store: Store) -> None:
     for info in source.dataset.models:
-        moved = replace(info, key=source.model_keys[info.key], **_of(source.categories[info.category_id]))
-        link_model(store, moved, sorted(source.dataset.path(info.obj).parent.iterdir()))
+        if not info.track:
+            key, category = source.model_keys[info.key], _of(source.categories[info.category_id])
+            link_model(store, key, info, sorted(source.dataset.path(info.obj).parent.iterdir()), **category)
 
 
 def _link_frames(source: _Source, targets: Iterator[Row], store: Store, record: PlanRecord, listener: Listener | None) -> None:
@@ -272,10 +275,12 @@ def _renumbered(source: _Source, sample: Sample, index: int) -> ForeignFrame:
 
 
 def _moved_object(source: _Source, o: ObjectAnnotation) -> ObjectAnnotation:
-    key = source.model_keys.get(o.key, o.key)
+    old = o.track or o.key
+    key = source.model_keys.get(old, old)
     folder, _, name = o.model.rpartition("/")
     model = f"{folder.rpartition('/')[0]}/{key}/{name}" if o.model else ""
-    return replace(o, key=key, model=model, **_of(source.categories[o.category_id]))
+    named = {"key": key + o.key.removeprefix(old), "track": key if o.track else ""}
+    return replace(o, **named, model=model, **_of(source.categories[o.category_id]))
 
 
 def _of(category: Category) -> dict[str, Any]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from viewsphere import plugins
-from viewsphere.assets.cache import load_normalised, read_ahead
+from viewsphere.assets.cache import frame_of, load_normalised, read_ahead
 from viewsphere.assets.mesh import Mesh
 from viewsphere.assets.parts import taken
 from viewsphere.errors import ModelError, RecipeError
@@ -17,12 +17,12 @@ from viewsphere.geometry.box import box_size, box_vertices
 from viewsphere.geometry.rotation import transform
 from viewsphere.labels import annotate, observe
 from viewsphere.model.channel import PASSES
-from viewsphere.model.model_spec import ModelSpec, Size
+from viewsphere.model.model_spec import ModelSpec, Size, step_key
 from viewsphere.model.sample import Float, Sample
 from viewsphere.model.shot import Shot
-from viewsphere.model.thing import Thing
+from viewsphere.model.thing import Thing, TimeStep
 from viewsphere.sampling.camera import inside_box
-from viewsphere.store import Store
+from viewsphere.store import ModelInfo, Store
 from viewsphere.truth.enclosure import sky_hidden
 from viewsphere.truth.geometry import without_ground
 from viewsphere.truth.visibility import rasterize, with_ground
@@ -42,9 +42,9 @@ MOST_SKY = 0.8
 """Share of the sky that scenery may hide from a camera that is not inside of it."""
 
 
-def model_files(key: str) -> tuple[str, str]:
-    """Paths of a model's OBJ and GLB in a data set, relative to its root."""
-    return f"store/models/{key}/{key}.obj", f"store/models/{key}/{key}.glb"
+def model_files(key: str, frame: int | None = None) -> tuple[str, str]:
+    """Paths of a model's OBJ, at a frame of its file if it deforms, and GLB in a data set, relative to its root."""
+    return f"store/models/{key}/{step_key(key, frame)}.obj", f"store/models/{key}/{key}.glb"
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,16 +52,19 @@ class StoredBoxes:
     """The boxes (8, 3) of a data set's finished models; raises ModelError for another."""
 
     store: Store
-    _known: dict[str, Float] = field(default_factory=dict[str, Float])
+    _known: dict[str, ModelInfo] = field(default_factory=dict[str, ModelInfo])
 
-    def __call__(self, spec: ModelSpec) -> Float:
-        """The box of this model."""
+    def __call__(self, spec: ModelSpec, step: TimeStep | None = None) -> Float:
+        """The box of this model at a time step."""
         if spec.key not in self._known:
             info = self.store.model_info(spec.key)
             if info is None:
                 raise ModelError(f"model {spec.key}: expected a finished model in {self.store.root}, found none: render again")
-            self._known[spec.key] = info.box3d_object
-        return self._known[spec.key]
+            self._known[spec.key] = info
+        try:
+            return self._known[spec.key].at(step and step.frame).box3d_object
+        except ValueError as error:
+            raise ModelError(f"{self.store.root}: {error}: render again") from None
 
 
 @dataclass(eq=False)
@@ -74,10 +77,10 @@ class Stages:
     _boxes: dict[str, Float] = field(default_factory=dict[str, Float])
     _sizes: dict[str, Size] = field(default_factory=dict[str, Size])
 
-    def model(self, spec: ModelSpec) -> Mesh:
-        """The normalised model; raises ModelError if its file cannot be used."""
-        name = spec.model_dump_json()
-        mesh = self._models.pop(name, None) or self._loaded(spec)
+    def model(self, spec: ModelSpec, step: TimeStep | None = None) -> Mesh:
+        """The normalised model at a time step (None: as it rests); raises ModelError if its file cannot be used."""
+        name = _name(spec, step)
+        mesh = self._models.pop(name, None) or self._loaded(spec, step)
         self._models[name] = mesh  # the last used comes last
         if name not in self._boxes:
             self._boxes[name] = box_vertices(*mesh.bounds)
@@ -86,32 +89,35 @@ class Stages:
             held -= _size(self._models.pop(next(iter(self._models))))
         return mesh
 
-    def _loaded(self, spec: ModelSpec) -> Mesh:
+    def _loaded(self, spec: ModelSpec, step: TimeStep | None) -> Mesh:
         """Many may be parts of one model, which is loaded once."""
-        return load_normalised(spec, build_zoo_model) if spec.parts is None else taken(self.model(spec.whole), spec)
+        if spec.parts is None:
+            return load_normalised(spec, build_zoo_model, step=step)
+        frame = frame_of(spec, step)
+        return taken(self.model(spec.whole, None if frame is None else TimeStep(frame=frame)), spec, step)
 
-    def box(self, spec: ModelSpec) -> Float:
-        """The 3D box (8, 3) of the normalised model in its own axes; raises ModelError if its file cannot be used."""
-        name = spec.model_dump_json()
+    def box(self, spec: ModelSpec, step: TimeStep | None = None) -> Float:
+        """The 3D box (8, 3) of the normalised model at a time step in its own axes; raises ModelError as `model` does."""
+        name = _name(spec, step)
         if name not in self._boxes:
-            self.model(spec)
+            self.model(spec, step)
         return self._boxes[name]
 
-    def real_size(self, spec: ModelSpec) -> Size | None:
+    def real_size(self, spec: ModelSpec, step: TimeStep | None = None) -> Size | None:
         """The model's true (width, height, length) in metres, None if nobody said."""
         if spec.real_size != "file":
             return spec.real_size
-        name = spec.model_dump_json()
+        name = _name(spec, step)
         if name not in self._sizes:
-            self._sizes[name] = box_size(self.box(spec.model_copy(update={"scale": "as_is"})))
+            self._sizes[name] = box_size(self.box(spec.model_copy(update={"scale": "as_is"}), step))
         return self._sizes[name]
 
     def read_ahead(self, planned: Plan, specs: Sequence[ModelSpec]) -> None:
-        """Read all moments of each model of the plan at once, where it moves, instead of one after another."""
+        """Read all time steps of each model of the plan at once, where it moves, instead of one after another."""
         for spec in specs:
-            moments = planned.moments_of(spec)
-            if moments:
-                read_ahead((spec, *moments))
+            frames = {step.frame for step in planned.steps_of(spec)}
+            if frames and spec.rest is not None:
+                read_ahead(spec, frames | {spec.rest})
 
     def check_distances(self, planned: Plan, subject: str) -> None:
         """Raise RecipeError if a pose's camera would stand inside what stands in a subject's frames."""
@@ -147,12 +153,12 @@ class Stages:
         frame's model: under a tree, among hills or in the room where the model stands a camera may well be.
         """
         own = things[0]
-        model = transform(own.world_from_object, self.box(own.model)).mean(axis=0)
+        model = transform(own.world_from_object, self.box(own.model, own.step)).mean(axis=0)
         for thing in things:
-            box = transform(thing.world_from_object, self.box(thing.model))
+            box = transform(thing.world_from_object, self.box(thing.model, thing.step))
             for i in np.flatnonzero(inside_box(box, cameras)):
                 if not thing.scenery or (self._roofs(thing, cameras[i]) and not self._roofs(thing, model)):
-                    what = f"{thing.model.category or 'piece'} {thing.model.key}"
+                    what = f"{thing.model.category or 'piece'} {thing.key}"
                     x, y = np.array(thing.world_from_object)[:2, 3]
                     raise RecipeError(
                         f"viewpoints: expected the camera outside of all that is placed; found it at "
@@ -169,7 +175,7 @@ class Stages:
 
     def _roofs(self, thing: Thing, point: Float) -> bool:
         """Whether scenery hides most of the sky from a point in the world."""
-        mesh = self.model(thing.model)
+        mesh = self.model(thing.model, thing.step)
         inside = transform(np.linalg.inv(np.array(thing.world_from_object)), point)
         return sky_hidden(mesh.vertices.astype(np.float64), mesh.triangles, inside) > MOST_SKY
 
@@ -186,11 +192,22 @@ class Stages:
     def render(self, shot: Shot) -> Iterator[Sample]:
         """The shot's samples in order, channels in memory; raises RecipeError for a camera inside of scenery or a target."""
         stage = self.stage(shot)
-        boxes = [self.box(p.model) for p in shot.objects]
-        sizes = [self.real_size(p.model) for p in shot.objects]
         self._check_shot(shot)
+        shown: tuple[TimeStep | None, ...] | None = None
+        boxes, sizes = list[Float](), list[Size | None]()
         for sample in shot.samples:
+            steps = tuple(thing.motion.step_at(sample[1]) for thing in shot.objects)
+            if steps != shown:
+                both = list(zip(shot.objects, steps, strict=True))
+                boxes = [self.box(thing.model, step) for thing, step in both]
+                sizes = [self.real_size(thing.model, step) for thing, step in both]
+                shown = steps
             yield render_sample(shot, sample, stage, boxes, sizes)
+
+
+def _name(spec: ModelSpec, step: TimeStep | None) -> str:
+    """Equal for equal models."""
+    return spec.model_dump_json() + (step.model_dump_json() if step else "")
 
 
 def _size(mesh: Mesh) -> int:
@@ -204,7 +221,7 @@ def render_sample(
 ) -> Sample:
     """One of `shot.samples`: colour from the engine, every label from truth, for which a shadow catcher may not be there.
 
-    `boxes` and `sizes`: each object's 3D box in its own axes, and its real size if known.
+    `boxes` and `sizes`: each object's 3D box then in its own axes, and its real size if known.
     """
     number, instant, sensor = sample
     now, camera, geometry = shot.instants[instant], shot.camera(instant, sensor), stage.at(instant)
@@ -217,7 +234,8 @@ def render_sample(
     painted = with_ground(geometry, camera, visibility) if pictures and labelled is not geometry else visibility
     for name in pictures:
         observed[name] = stage.color(instant, sensor, painted, name == "rgba")
-    files = [model_files(p.model.key)[0] for p in shot.objects]
+    steps = [thing.motion.step_at(instant) for thing in shot.objects]
+    files = [model_files(p.model.key, step and step.frame)[0] for p, step in zip(shot.objects, steps, strict=True)]
     objects = annotate(shot, instant, camera, labelled, visibility, boxes, files, sizes)
     return Sample(
         index=number,

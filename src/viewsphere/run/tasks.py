@@ -2,37 +2,32 @@
 
 from __future__ import annotations
 
-import hashlib
-from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from viewsphere.assets.cache import read_ahead
-from viewsphere.assets.export import export_glb, export_obj
-from viewsphere.assets.mesh import Mesh
-from viewsphere.errors import StoreError
-from viewsphere.geometry.box import box_size, box_vertices
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.shot import Shot
-from viewsphere.model.thing import Thing
-from viewsphere.run.stages import Stages, StoredBoxes, model_files
+from viewsphere.model.thing import Thing, TimeStep
+from viewsphere.run.models import Models, mesh_digest
+from viewsphere.run.stages import Stages, StoredBoxes
 from viewsphere.run.warm import compile_kernels
 from viewsphere.sampling.extension import Portion
-from viewsphere.store import ModelInfo, Row, Store
+from viewsphere.store import Row, Store
 
 Kind = Literal["model", "same model", "damaged model"]
 
 
 @dataclass(frozen=True)
 class ModelTask:
-    """A model, with its moments behind it; the "same model" has to be what the store holds, if it is there. What is made of a
-    "damaged model" takes its place.
+    """A model, with its time steps if it deforms; the "same model" has to be what the store holds, if it is there. What is made
+    of a "damaged model" takes its place.
     """
 
     kind: Kind
-    specs: tuple[ModelSpec, ...]
+    spec: ModelSpec
+    steps: tuple[TimeStep, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -50,7 +45,7 @@ class KernelTask:
 
 
 class SceneryRecord(Frozen):
-    """What is background in a shot: things of id 0, and the digest of each model's mesh by its key."""
+    """What is background in a shot: things of id 0, and the digest of each model's mesh by its key at the time step shown."""
 
     things: tuple[Thing, ...]
     digests: dict[str, str]
@@ -62,6 +57,7 @@ class Worker:
     def __init__(self, root: Path, portion: Portion) -> None:
         self.store = Store(root)
         self.stages = Stages()
+        self.models = Models(self.store, self.stages)
         self._portion = portion
         self._boxes = StoredBoxes(self.store)
         self._digests: dict[str, str] = {}
@@ -76,11 +72,9 @@ class Worker:
             compile_kernels(task.shot)
             return 0
         if task.kind == "damaged model":
-            for spec in task.specs:
-                mesh = self.stages.model(spec)
-                self._export(spec, mesh, mesh_digest(mesh), again=True)
-            return 0
-        self.make_models(task.specs, trusted=task.kind == "model")
+            self.models.mend(task.spec, task.steps)
+        else:
+            self.models.make(task.spec, task.steps, trusted=task.kind == "model")
         return 0
 
     def make_shot(self, row: Row, again: bool = False) -> int:
@@ -94,80 +88,11 @@ class Worker:
     def _scenery(self, shot: Shot) -> str:
         """What is background in a shot, and digests of its meshes, as `SceneryRecord` reads it; empty if nothing is."""
         things = tuple(p for p in shot.things if p.id == 0)
-        for spec in {p.model.key: p.model for p in things}.values():
-            if spec.key not in self._digests:
-                self._digests[spec.key] = mesh_digest(self.stages.model(spec))
-        digests = {p.model.key: self._digests[p.model.key] for p in things}
+        shown = {
+            thing.model.key_at(step and step.frame): (thing.model, step) for thing in things for step in thing.motion.steps
+        }
+        for key, (spec, step) in shown.items():
+            if key not in self._digests:
+                self._digests[key] = mesh_digest(self.stages.model(spec, step))
+        digests = {key: self._digests[key] for key in shown}
         return SceneryRecord(things=things, digests=digests).model_dump_json() if things else ""
-
-    def make_models(self, specs: Sequence[ModelSpec], trusted: bool = True) -> None:
-        """Make a model, and its moments behind it, as `make_model` does."""
-        if len(specs) > 1 and specs[0].parts is None:
-            read_ahead(specs)
-        for spec in specs:
-            self.make_model(spec, trusted)
-
-    def make_model(self, spec: ModelSpec, trusted: bool = True) -> None:
-        """Normalise a model and export it into the store, or see that the one there is the same.
-
-        `trusted`: the plan's digest and version vouch for models of the zoo that are there. Raises ModelError for a file that
-        cannot be used, StoreError for one that changed since its frames were made.
-        """
-        known = self.store.model_info(spec.key)
-        if known is not None and trusted and spec.source.startswith("zoo:"):
-            return
-        mesh = self.stages.model(spec)
-        digest = mesh_digest(mesh)
-        if known is not None:
-            self._compare(spec, known, digest)
-            return
-        self._export(spec, mesh, digest)
-
-    def _export(self, spec: ModelSpec, mesh: Mesh, digest: str, again: bool = False) -> None:
-        box = box_vertices(*mesh.bounds)
-        obj, glb = model_files(spec.key)
-        info = ModelInfo(
-            key=spec.key,
-            category=spec.category,
-            supercategory=spec.supercategory,
-            category_id=spec.category_id,
-            obj=obj,
-            glb=glb,
-            box3d_object=box,
-            size=box_size(box),
-            real_size=self.stages.real_size(spec),
-            parts=mesh.parts,
-            triangles=len(mesh.triangles),
-            digest=digest,
-            warnings=mesh.warnings,
-        )
-        with self.store.aside(self.store.model_folder(spec.key), again) as folder:
-            export_obj(mesh, folder, spec.key)
-            export_glb(mesh, folder / f"{spec.key}.glb")
-            self.store.write_model_info(folder, info)
-
-    def _compare(self, spec: ModelSpec, known: ModelInfo, digest: str) -> None:
-        if known.digest != digest:
-            raise StoreError(
-                f"{self.store.root}: model {spec.key!r} ({spec.source}) changed since this data set was begun: "
-                "put the old one back, or choose another output folder"
-            )
-        now = {"category": spec.category, "supercategory": spec.supercategory, "real_size": self.stages.real_size(spec)}
-        for name, value in now.items():
-            if getattr(known, name) != value:
-                raise StoreError(
-                    f"{self.store.root}: expected {name} {getattr(known, name)!r} of model {spec.key!r}, as the data set has; "
-                    f"found {value!r}: keep it, or choose another output folder"
-                )
-
-
-def mesh_digest(mesh: Mesh) -> str:
-    """SHA-256 of all that is rendered or labelled of a mesh."""
-    digest = hashlib.sha256()
-    for name in (f.name for f in fields(Mesh) if f.name not in {"images", "warnings"}):
-        value = getattr(mesh, name)
-        digest.update(name.encode())
-        digest.update(value.tobytes() if hasattr(value, "tobytes") else repr(value).encode())
-    for image in mesh.images:
-        digest.update(repr((image.name, image.pixels.shape)).encode() + image.pixels.tobytes())
-    return digest.hexdigest()

@@ -109,7 +109,7 @@ def _outline(value: JsonValue) -> JsonValue:
 def _render(shot: Shot) -> None:
     card = _card()
     engine: Engine = plugins.load("engines", shot.engine)
-    stage = engine.stage(shot, lambda spec: card)
+    stage = engine.stage(shot, lambda spec, step=None, /: card)
     boxes = [box_vertices(*card.bounds)] * len(shot.things)
     for number in shot.samples:
         sample = render_sample(shot, number, stage, boxes, [None] * len(boxes))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from fnmatch import fnmatchcase
 from functools import cached_property, lru_cache
 from pathlib import Path
@@ -18,11 +18,10 @@ from viewsphere.geometry.rotation import Float, compose, transform
 from viewsphere.model.mistakes import nearest
 from viewsphere.model.model_spec import ModelSpec, Parts
 from viewsphere.model.scene import BlendScene, Matrix4
-from viewsphere.model.thing import Motion, Thing
+from viewsphere.model.thing import Motion, Thing, TimeStep
 from viewsphere.recipe.blend import VALUE, BlendEntry, LabelRule, VariantEntry
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.scenery import Labels
-from viewsphere.sampling.moments import at_frame
 from viewsphere.sampling.scenery import Naming, Piece, draw_names, scenery_key
 from viewsphere.sampling.seeds import Names, share
 
@@ -43,18 +42,23 @@ class Labelled:
 
 @dataclass(frozen=True, eq=False)
 class BlendScenery:
-    """The .blend file of a recipe's scene, at the `frames` that are asked for (none: its first). `turn_of` gives the turn of
-    what is shown one after another.
+    """The .blend file of a recipe's scene, at the frames that are asked for (none: its first), each with its `seconds`.
+    `turn_of` gives the turn of what is shown one after another.
     """
 
     recipe: Recipe
     entry: BlendEntry
     turn_of: Turn
-    frames: tuple[int, ...] = ()
+    seconds: Mapping[int, float] = field(default_factory=dict[int, float])
 
     def __getstate__(self) -> dict[str, Any]:
         """What other processes are sent: they ask Blender's cached answers themselves."""
         return {field.name: getattr(self, field.name) for field in fields(self)}
+
+    @property
+    def frames(self) -> tuple[int, ...]:
+        """Those that are asked for, ascending."""
+        return tuple(self.seconds)
 
     @property
     def path(self) -> Path:
@@ -204,22 +208,22 @@ class BlendScenery:
         """What is taken of the file, at one of the frames; a labelled object moves with its axes."""
         if thing.model.parts is None:
             return thing
-        model = self.model_at(thing.model, frame)
-        if not thing.id or model.parts is None:
-            return thing.model_copy(update={"model": model})
-        moved = compose(np.array(self.world_from_file), np.array(model.parts.file_from_axes))
-        return thing.model_copy(update={"model": model, "motion": Motion.still(_rows(moved))})
+        step = self._step(thing.model.parts, frame)
+        if not thing.id:
+            return thing.showing(step)
+        moved = compose(np.array(self.world_from_file), np.array(step.file_from_axes or thing.model.parts.file_from_axes))
+        return thing.model_copy(update={"motion": Motion.still(_rows(moved), step)})
 
-    def model_at(self, spec: ModelSpec, frame: int) -> ModelSpec:
-        """A model that is taken of the file, at one of the frames; anything else as it is."""
+    def steps(self, spec: ModelSpec) -> tuple[TimeStep, ...]:
+        """The frames at which a model is shown that is taken of the file; none for any other."""
         if spec.parts is None:
-            return spec
-        moved = at_frame(spec, frame)
-        if spec.parts.only is None:
-            return moved
-        root = self._root_of[spec.parts.only]
-        stands = self._stands[frame][root.name]
-        return moved.model_copy(update={"parts": spec.parts.model_copy(update={"file_from_axes": _rows(stands)})})
+            return ()
+        return tuple(self._step(spec.parts, frame) for frame in self.frames if self.shows(spec, frame))
+
+    def _step(self, parts: Parts, frame: int) -> TimeStep:
+        """What is shown of the file at one of the frames: a labelled object's axes move with it."""
+        stands = None if parts.only is None else _rows(self._stands[frame][self._root_of[parts.only].name])
+        return TimeStep(frame=frame, seconds=self.seconds[frame], file_from_axes=stands)
 
     @cached_property
     def _root_of(self) -> Mapping[tuple[str, ...], SceneObject]:
@@ -243,8 +247,9 @@ class BlendScenery:
         parts = Parts(only=one.members, file_from_axes=_rows(axes))
         spec = self._spec(one.category, one.root.name, parts, category_id(one.category, labels), "")
         if self.frames and not self.shows(spec, self.file.first):
-            seen = next(frame for frame in self.frames if self.shows(spec, frame))
-            spec = spec.model_copy(update={"frame": seen, "parts": self.model_at(spec, seen).parts})
+            seen = self.steps(spec)[0]
+            parts = parts.model_copy(update={"file_from_axes": seen.file_from_axes})
+            spec = spec.model_copy(update={"rest": seen.frame, "parts": parts})
         return Piece(spec, _rows(compose(np.array(self.world_from_file), axes)), labels)
 
     def _spec(self, category: str, name: str, parts: Parts, category_id: int, rest: str) -> ModelSpec:
@@ -257,6 +262,7 @@ class BlendScenery:
             confined=self.entry.confined,
             shown=self._shown,
             parts=parts,
+            rest=self.file.first if self.frames else None,
         )
 
     def check(self) -> None:

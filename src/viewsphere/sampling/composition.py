@@ -6,7 +6,7 @@ from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property, lru_cache, partial
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ from viewsphere.errors import RecipeError
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Matrix4, Vector
-from viewsphere.model.thing import Motion, Thing
+from viewsphere.model.thing import Motion, Thing, TimeStep
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.scenery import Labels
 from viewsphere.sampling.blend_scene import BlendScenery
@@ -39,8 +39,13 @@ from viewsphere.sampling.viewpoints import Poses
 from viewsphere.store import Category
 from viewsphere.zoo import build_zoo_model
 
-BoxOf = Callable[[ModelSpec], NDArray[np.float64]]
-"""A normalised model's 3D box (8, 3) in its own axes, metres."""
+
+class BoxOf(Protocol):
+    """Gives the 3D box (8, 3) of a normalised model at a time step (None: as it rests) in its own axes, metres."""
+
+    def __call__(self, spec: ModelSpec, step: TimeStep | None = None, /) -> NDArray[np.float64]:
+        """The box, float64."""
+        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -263,13 +268,13 @@ def still(cast: Sequence[ModelSpec], poses: Sequence[Matrix4]) -> tuple[Thing, .
 
 def center(thing: Thing, box_of: BoxOf) -> Vector:
     """What a camera looks at that has no target of its own: the centre of the object's box, world metres."""
-    x, y, z = transform(thing.world_from_object, box_of(thing.model).mean(axis=0)).tolist()
+    x, y, z = transform(thing.world_from_object, box_of(thing.model, thing.step).mean(axis=0)).tolist()
     return x, y, z
 
 
 def center_of_all(things: Sequence[Thing], box_of: BoxOf) -> Vector:
     """The centre of the box around all of them, world metres."""
-    corners = np.concatenate([transform(t.world_from_object, box_of(t.model)) for t in things])
+    corners = np.concatenate([transform(t.world_from_object, box_of(t.model, t.step)) for t in things])
     x, y, z = ((corners.min(axis=0) + corners.max(axis=0)) / 2).tolist()
     return x, y, z
 
@@ -286,8 +291,7 @@ def _blend(recipe: Recipe, subjects: tuple[str, ...], views: Poses) -> BlendScen
         return None
 
     moments = views.moments if isinstance(views, TimedPoses) and entry.frames is not None else ()
-    made = BlendScenery(
-        recipe, entry, Turns(subjects, views), tuple(sorted({moment.frame for moment in moments if moment is not None}))
-    )
+    seconds = {moment.frame: moment.seconds for moment in moments if moment is not None}
+    made = BlendScenery(recipe, entry, Turns(subjects, views), dict(sorted(seconds.items())))
     made.check()
     return made

@@ -47,12 +47,12 @@ class Distances:
             poses = there.poses[::step]
             cameras = self.cameras(there.things, poses, there.target, subject, there.views)
             for thing in there.things:
-                box = transform(thing.world_from_object, self.box_of(thing.model))
+                box = transform(thing.world_from_object, self.box_of(thing.model, thing.step))
                 inside = inside_box(box, cameras)
                 if inside.any():
                     view = there.views[poses[int(np.flatnonzero(inside)[0])]]
                     pose = self.plan.viewpoint(subject, view, there.target)
-                    return RecipeError(f"viewpoints.distance: {distance_problem(pose, box)} (model {thing.model.key})")
+                    return RecipeError(f"viewpoints.distance: {distance_problem(pose, box)} (model {thing.key})")
         return None
 
     def cameras(
@@ -67,7 +67,7 @@ class Distances:
         these things are placed; they look at `target`, by default at the middle of what is placed.
         """
         targets = [thing for thing in things if thing.id and not thing.scenery]
-        corners = np.concatenate([transform(t.world_from_object, self.box_of(t.model)) for t in targets])
+        corners = np.concatenate([transform(t.world_from_object, self.box_of(t.model, t.step)) for t in targets])
         middle = corners.mean(axis=0) if len(targets) == 1 else (corners.min(axis=0) + corners.max(axis=0)) / 2
         middle = middle if target is None else np.array(target)
         subject, views = subject or self.plan.subjects[0], views or self.plan.pose_list

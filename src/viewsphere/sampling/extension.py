@@ -20,6 +20,7 @@ from viewsphere.errors import RecipeError
 from viewsphere.model.instant import Instant
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.shot import Shot
+from viewsphere.model.thing import TimeStep
 from viewsphere.sampling.composition import BoxOf
 from viewsphere.sampling.fitting import check_fit, settings
 from viewsphere.sampling.plan import Plan
@@ -70,9 +71,9 @@ class Portion:
         return text
 
     @cached_property
-    def model_specs(self) -> tuple[ModelSpec, ...]:
-        """All models that the recipe keeps, with the data set's numbers of their categories."""
-        return tuple(self._numbered(spec) for spec in self.plan.kept_specs)
+    def models(self) -> tuple[tuple[ModelSpec, tuple[TimeStep, ...]], ...]:
+        """All models that the recipe keeps, with the data set's numbers of their categories, and their time steps."""
+        return tuple((self._numbered(spec), self.plan.steps_of(spec)) for spec in self.plan.kept_specs)
 
     @property
     def rows(self) -> Iterator[Row]:

@@ -95,7 +95,9 @@ def _shares(splits: Splits) -> str:
 def _check_models(planned: Plan, there: PlanRecord) -> None:
     """File systems that do not tell capitals apart would mix two models up."""
     known = {key.casefold(): key for key in there.models}
-    for spec in planned.kept_specs:
-        other = known.get(spec.key.casefold(), spec.key)
-        if other != spec.key:
-            raise RecipeError(f"models: expected keys that differ in more than capitals; found {spec.key!r} beside {other!r}")
+    for key, spec in planned.kept_keys:
+        other = known.get(key.casefold(), key)
+        if other != key:
+            raise RecipeError(f"models: expected keys that differ in more than capitals; found {key!r} beside {other!r}")
+        if key != spec.key and key in there.models:
+            raise RecipeError(f"models: expected another name for {spec.key!r}; found {key!r}, a model of the data set")

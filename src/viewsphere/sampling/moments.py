@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from bisect import bisect_right
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import accumulate, chain, groupby, pairwise
@@ -16,6 +16,7 @@ from viewsphere.model.camera import Intrinsics
 from viewsphere.model.instant import Moment, Viewpoint
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Vector
+from viewsphere.model.thing import TimeStep
 from viewsphere.recipe.models import ModelEntry
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.time import Frames, Steps, chosen_frames
@@ -24,10 +25,12 @@ from viewsphere.sampling.viewpoints import Poses, View
 
 @dataclass(frozen=True)
 class Step:
-    """A time step: when it is, and the frames of the model's and of the scene's file; None where they do not move."""
+    """A time step of a data set: when it is, what of the model's file it shows, and the frame of the scene's file; None where
+    they do not move.
+    """
 
     moment: Moment
-    model: int | None = None
+    model: TimeStep | None = None
     scene: int | None = None
 
 
@@ -128,7 +131,7 @@ def timed(
         for spec, number in models:
             entry = recipe.models[number]
             own = _model_steps(spec, entry, f"models[{number}]", blenders) if entry.frames is not None else None
-            specs.append(spec if own is None else spec.model_copy(update={"frame": own[0].first, "clip": entry.clip}))
+            specs.append(spec if own is None else spec.model_copy(update={"rest": own[0].first, "clip": entry.clip}))
             timings.append(_timing(recipe, spec, entry, number, own and own[1], scene))
     for timing, (spec, number) in zip(timings, models, strict=True):
         if timing is not None and timing.moving and len(timing.steps) != len(views):
@@ -152,7 +155,7 @@ def _timing(
 ) -> Timing | None:
     """A model's time steps: its own, or the scene's; where both move, the k-th of one go with the k-th of the other."""
     if not scene:
-        steps = tuple(Step(moment, frame) for frame, moment in own or ())
+        steps = tuple(Step(moment, _shown(moment)) for _, moment in own or ())
         return Timing(steps, entry.poses == "moving") if steps else None
     moving = _scene_poses(recipe) == "moving"
     if own is None:
@@ -163,7 +166,11 @@ def _timing(
             f"of {spec.key}"
         )
     pairs = zip(own, scene, strict=True)
-    return Timing(tuple(Step(moment, frame, at) for (frame, _), (at, moment) in pairs), moving)
+    return Timing(tuple(Step(moment, _shown(shown), at) for (_, shown), (at, moment) in pairs), moving)
+
+
+def _shown(moment: Moment) -> TimeStep:
+    return TimeStep(frame=moment.frame, seconds=moment.seconds)
 
 
 def _model_steps(
@@ -206,18 +213,9 @@ def _steps(
     return line, tuple((frame, Moment(frame=frame, seconds=line.seconds(frame))) for frame in chosen)
 
 
-def at_frame(spec: ModelSpec, frame: int | None) -> ModelSpec:
-    """The model at a frame of its file, a model of its own that says whose moment it is; None: as it is."""
-    if frame is None:
-        return spec
-    return spec.model_copy(update={"key": f"{spec.key}-f{frame:04d}", "frame": frame, "track": spec.key})
-
-
-def at_step(timing: Timing | None, spec: ModelSpec, number: int | None) -> ModelSpec:
-    """The model at the time step of this number; the last one where it has fewer, itself where it does not move."""
-    if timing is None or number is None:
-        return spec
-    return at_frame(spec, timing.steps[min(number, len(timing.steps) - 1)].model)
+def at_step(timing: Timing | None, number: int | None) -> TimeStep | None:
+    """What a model shows at the time step of this number: the last one where it has fewer, none where it does not move."""
+    return None if timing is None or number is None else timing.steps[min(number, len(timing.steps) - 1)].model
 
 
 @dataclass(frozen=True, eq=False)
@@ -301,10 +299,9 @@ def _runs_of(timing: Timing | None, views: Poses) -> tuple[Run, ...]:
     return tuple(runs)
 
 
-def check_keys(specs: Sequence[ModelSpec]) -> None:
-    """Raise RecipeError where a time step of one model has the key of another model."""
+def check_keys(keys: Iterable[tuple[str, ModelSpec]]) -> None:
+    """Raise RecipeError where a time step of one model has the key of another model; `keys` are all, with their models."""
     seen: dict[str, ModelSpec] = {}
-    for spec in specs:
-        other = seen.setdefault(spec.key.casefold(), spec)
-        if other is not spec and spec.track != other.track:
-            raise RecipeError(f"models: expected every key once; found {spec.key!r} twice: give an entry another name")
+    for key, spec in keys:
+        if seen.setdefault(key.casefold(), spec).key != spec.key:
+            raise RecipeError(f"models: expected every key once; found {key!r} twice: give an entry another name")

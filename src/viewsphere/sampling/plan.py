@@ -91,17 +91,15 @@ class Plan(Stock):
 
     @property
     def kept_specs(self) -> tuple[ModelSpec, ...]:
-        """All models that the data set keeps: the recipe's, then labelled scenery's, each as it moves behind it."""
-        scenery = () if self.composition is None else self.composition.models
-        if not self.timings:
-            return self.model_specs + scenery
-        own = ((spec, *self.moments_of(spec)) for spec in self.model_specs)
-        moved = ((spec, *self._moments_of_scenery(spec)) for spec in scenery)
-        return tuple(chain.from_iterable((*own, *moved)))
+        """All models that the data set keeps: the recipe's, then labelled scenery's."""
+        return self.model_specs + (() if self.composition is None else self.composition.models)
 
-    def _moments_of_scenery(self, spec: ModelSpec) -> Iterator[ModelSpec]:
-        if self.blend is not None and spec.parts is not None:
-            yield from (self.blend.model_at(spec, frame) for frame in self.blend.frames if self.blend.shows(spec, frame))
+    @property
+    def kept_keys(self) -> Iterator[tuple[str, ModelSpec]]:
+        """The keys of all models that the data set keeps, and of their time steps."""
+        for spec in self.kept_specs:
+            frames = (None, *(step.frame for step in self.steps_of(spec)))
+            yield from ((spec.key_at(frame), spec) for frame in frames)
 
     @property
     def splits(self) -> tuple[str, ...]:
@@ -242,7 +240,7 @@ def plan(recipe: Recipe, shot_frames: int | None = None) -> Plan:
         )
         check_all_frames(recipe, planned.frames, planned.factors)
         if timings:
-            check_keys(planned.kept_specs)
+            check_keys(planned.kept_keys)
         return _composed(planned)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
@@ -26,6 +27,11 @@ class Choice:
     def has_model(self, key: str) -> bool:
         """Whether the choice includes frames of this model."""
         return not self.models or any(fnmatchcase(key, pattern) for pattern in self.models)
+
+    def may_have(self, beginning: str) -> bool:
+        """Whether a pattern may fit keys that begin so."""
+        literal = (re.split(r"[*?[]", pattern, maxsplit=1)[0] for pattern in self.models)
+        return any(text.startswith(beginning) or beginning.startswith(text) for text in literal)
 
     def places(self, first: int, count: int) -> Sequence[int]:
         """Which of the frames first, first + 1, ..., first + count - 1 the choice includes, counted from 0."""

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from viewsphere.errors import StoreError
 from viewsphere.labels import channels
 from viewsphere.model.files import Files
+from viewsphere.model.model_spec import step_key
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.store.channel_files import decode
 from viewsphere.store.choice import Choice
@@ -42,6 +43,7 @@ class Dataset(Sequence[Sample]):
         self.link_kinds: set[str] = set()
         self._records = lru_cache(maxsize=8)(self._read_records)
         self._manifests = lru_cache(maxsize=8)(partial(_manifest_of, self.root))
+        self._info = lru_cache(maxsize=10_000)(self.store.model_info)
         self._facts = lru_cache(maxsize=10_000)(self._model_facts)
 
     def __reduce__(self) -> tuple[type[Dataset], tuple[Path, Choice]]:
@@ -75,13 +77,13 @@ class Dataset(Sequence[Sample]):
 
     @cached_property
     def models(self) -> tuple[ModelInfo, ...]:
-        """The finished models, in the plan's order; with a choice only the models of the chosen frames."""
-        keys = self.plan.models
+        """The finished models in the plan's order, time steps behind their model; of a choice, those that its frames have."""
+        stored = (self.store.model_info(key) for key in self.plan.models)
+        found = tuple(info for model in stored if model is not None for info in (model, *model.steps))
         if self.choice.is_some:
             seen = {o.key for sample in self for o in sample.objects}
-            keys = tuple(key for key in keys if key in seen)
-        found = (self.store.model_info(key) for key in keys)
-        return tuple(m for m in found if m is not None)
+            found = tuple(info for info in found if info.key in seen)
+        return found
 
     @cached_property
     def _shots(self) -> tuple[list[tuple[str, Sequence[int]]], list[int]]:
@@ -142,7 +144,7 @@ class Dataset(Sequence[Sample]):
         model = row.subject if self.plan.parts[row.part].is_product else None
         if model is not None and self.choice.has_model(model):
             return places
-        if model is not None and not any(key.startswith(f"{model}-") for key in self._chosen):
+        if model is not None and not self._has_chosen_step(model):
             return ()
         shown = zip(places, self.samples_of(row.key, places), strict=True)
         return [place for place, sample in shown if any(self._is_chosen(o, model) for o in sample.objects)]
@@ -153,10 +155,12 @@ class Dataset(Sequence[Sample]):
             return self.choice.has_model(shown.key) or self.choice.has_model(shown.track)
         return shown.track == model and self.choice.has_model(shown.key)
 
-    @cached_property
-    def _chosen(self) -> tuple[str, ...]:
-        """Keys of all models that the choice names; each moment of an animated model has its own key."""
-        return tuple(key for key in self.plan.models if self.choice.has_model(key))
+    def _has_chosen_step(self, model: str) -> bool:
+        """Whether the choice names a time step of a model."""
+        if not self.choice.may_have(step_key(model, 0).rstrip("0")):
+            return False
+        info = self._info(model)
+        return info is not None and any(self.choice.has_model(step.key) for step in info.steps)
 
     def _read_records(self, key: str) -> _Records:
         file = self.store.shot_folder(key) / "frames.json"
@@ -173,11 +177,11 @@ class Dataset(Sequence[Sample]):
             return _Records(file, records)
         return _Records(file, records, ShotRecords(shot, self._facts, str(file)), self.store.channel_files(key, shot))
 
-    def _model_facts(self, key: str) -> ModelInfo:
-        info = self.store.model_info(key)
+    def _model_facts(self, key: str, frame: int | None) -> ModelInfo:
+        info = self._info(key)
         if info is None:
             raise ValueError(f"no model {key}")
-        return info
+        return info.at(frame)
 
     def _sample(self, records: _Records, place: int) -> Sample:
         record = records.records[place]
@@ -218,11 +222,13 @@ class Dataset(Sequence[Sample]):
         self.link_kinds.add(link_file(self.root / relative, destination))
 
     def model_files(self) -> Iterator[tuple[str, str]]:
-        """Every finished model's OBJ, GLB, materials and textures: `<key>/<name>`, and the path from the data set's root."""
-        for info in self.models:
-            for file in sorted(self.path(info.obj).parent.iterdir()):
+        """Every finished model's OBJ, GLB, materials and textures: `<key>/<name>`, and the path from the data set's root. A
+        model that deforms comes with all its time steps.
+        """
+        for key, folder in {info.track or info.key: self.path(info.obj).parent for info in self.models}.items():
+            for file in sorted(folder.iterdir()):
                 if file.name not in {"model.json", MANIFEST}:
-                    yield f"{info.key}/{file.name}", file.relative_to(self.root).as_posix()
+                    yield f"{key}/{file.name}", file.relative_to(self.root).as_posix()
 
     def link_models(self, folder: Path) -> None:
         """Put the files of every finished model into `folder`/<key>, as `link` does."""

@@ -14,8 +14,6 @@ from itertools import chain
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from viewsphere.errors import StoreError
 from viewsphere.labels import channels
 from viewsphere.model.files import Files
@@ -27,6 +25,9 @@ from viewsphere.store.index import Row
 from viewsphere.store.manifest import MANIFEST, Manifest, Told, digest, refuse_another, told_of
 from viewsphere.store.records import ModelInfo, PlanRecord
 from viewsphere.store.sample_records import short_sample, whole_sample
+
+OLD_MODEL = "old model~"
+"""Begins the name of a model's folder that another takes the place of."""
 
 
 class Store:
@@ -154,7 +155,11 @@ class Store:
             aside.replace(file)
 
     def _sweep(self) -> None:
-        """Remove what dead writers of this machine left unfinished."""
+        """Remove what dead writers of this machine left unfinished; models that they were about to replace come back."""
+        for left in (self.folder / "writing").glob(f"*~{OLD_MODEL}*"):
+            target = self.model_folder(left.name.partition(f"~{OLD_MODEL}")[2])
+            if not target.exists() and _is_of_dead(left):
+                left.rename(target)
         _remove_of_dead((self.folder / "writing").iterdir())
 
     def shot_folder(self, key: str) -> Path:
@@ -208,7 +213,8 @@ class Store:
 
     def _replace(self, folder: Path, target: Path) -> None:
         """Put a folder in the place of another, which is removed."""
-        old = self.folder / "writing" / f"{_writer()}old~{target.name}"
+        is_model = target.parent == self.folder / "models"
+        old = self.folder / "writing" / f"{_writer()}{OLD_MODEL if is_model else 'old~'}{target.name}"
         shutil.rmtree(old, ignore_errors=True)
         if target.exists():
             target.rename(old)
@@ -217,7 +223,9 @@ class Store:
 
     @contextmanager
     def replacing(self, target: Path) -> Generator[Path]:
-        """A folder to write into that takes the place of `target` when the block ends well."""
+        """A folder to write into that takes the place of `target` when the block ends well. A model's gets a manifest, and is
+        never lost: where a run dies between the two, the next one puts the old folder back.
+        """
         if target == self.folder:
             raise StoreError(f"{target}: expected a format's name, found the store's")
         self._make(self.folder / "writing")
@@ -228,6 +236,8 @@ class Store:
         try:
             with _disk_errors(self.root):
                 yield folder
+                if target.parent == self.folder / "models":
+                    Manifest.of(folder).write(folder)
                 self._replace(folder, target)
         finally:
             shutil.rmtree(folder, ignore_errors=True)
@@ -327,18 +337,13 @@ class Store:
 
     def write_model_info(self, folder: Path, info: ModelInfo) -> None:
         """Write model.json into a model's folder that is being made."""
-        value = {**info.__dict__, "box3d_object": info.box3d_object.tolist()}
-        (folder / "model.json").write_text(json.dumps(value, indent=1), "utf-8")
+        (folder / "model.json").write_text(json.dumps(info.to_plain(), indent=1), "utf-8")
 
     def model_info(self, key: str) -> ModelInfo | None:
         """What is known of a finished model; None if it is not there, StoreError if it cannot be read."""
         file = self.model_folder(key) / "model.json"
         try:
-            value = json.loads(file.read_text("utf-8"))
-            value["box3d_object"] = np.array(value["box3d_object"])
-            for name in ("size", "real_size", "parts", "warnings"):
-                value[name] = None if value[name] is None else tuple(value[name])
-            return ModelInfo(**value)
+            return ModelInfo.from_plain(json.loads(file.read_text("utf-8")))
         except FileNotFoundError:
             return None
         except (OSError, LookupError, TypeError, ValueError) as error:
@@ -356,12 +361,16 @@ def _no_scene(file: Path, error: Exception) -> StoreError:
 
 def _remove_of_dead(paths: Iterable[Path]) -> None:
     """Remove those that were written by processes of this machine that are no more."""
-    for path in paths:
-        host, _, rest = path.name.partition("~")
-        pid = rest.partition("~")[0]
-        if host == socket.gethostname() and pid.isdigit() and not _alive(int(pid)):
-            shutil.rmtree(path, ignore_errors=True)
-            path.unlink(missing_ok=True)
+    for path in filter(_is_of_dead, paths):
+        shutil.rmtree(path, ignore_errors=True)
+        path.unlink(missing_ok=True)
+
+
+def _is_of_dead(path: Path) -> bool:
+    """Whether its name says that a process of this machine wrote it that is no more."""
+    host, _, rest = path.name.partition("~")
+    pid = rest.partition("~")[0]
+    return host == socket.gethostname() and pid.isdigit() and not _alive(int(pid))
 
 
 @contextmanager

@@ -9,6 +9,7 @@ from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from viewsphere.labels import channels
 from viewsphere.store.folder import Store
@@ -34,17 +35,18 @@ def link_file(source: Path, destination: Path) -> str:
         return "copy"
 
 
-def link_model(store: Store, info: ModelInfo, files: Iterable[Path]) -> None:
-    """Write a model of these files, among them the OBJ and GLB of `info`, unless the store has a model of its key."""
-    if store.model_info(info.key) is not None:
+def link_model(store: Store, key: str, info: ModelInfo, files: Iterable[Path], **changed: Any) -> None:
+    """Write a model of these files, those that `info` names among them, unless there is one of this key. `changed` are fields
+    of it that become others.
+    """
+    if store.model_info(key) is not None:
         return
-    prefix = store.model_folder(info.key).relative_to(store.root).as_posix()
-    placed = replace(info, obj=f"{prefix}/{Path(info.obj).name}", glb=f"{prefix}/{Path(info.glb).name}")
-    with store.aside(store.model_folder(info.key)) as folder:
+    prefix = store.model_folder(key).relative_to(store.root).as_posix()
+    with store.aside(store.model_folder(key)) as folder:
         for file in files:
             if file.name not in {"model.json", MANIFEST}:
                 link_file(file.resolve(), folder / file.name)
-        store.write_model_info(folder, placed)
+        store.write_model_info(folder, info.moved(key, prefix, **changed))
 
 
 def link_shot(store: Store, key: str, frames: Iterable[ForeignFrame], known: Iterable[Path] = ()) -> int:

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import json
 from bisect import bisect_right
-from collections.abc import Iterator
-from dataclasses import asdict, dataclass, field, fields
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cached_property
 from itertools import accumulate, chain
+from pathlib import PurePosixPath
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.model.model_spec import Size
+from viewsphere.model.model_spec import Size, step_key
+from viewsphere.model.thing import TimeStep
 from viewsphere.store.index import Block, Index, Row
 from viewsphere.store.manifest import sealed, unsealed
 
@@ -39,7 +41,8 @@ class Category:
 class ModelInfo:
     """A normalised model of the data set; paths are relative to its root.
 
-    `box3d_object` (8, 3) metres in the object's axes; sizes are (width, height, length) in metres.
+    `box3d_object` (8, 3) metres in the object's axes; sizes are (width, height, length) in metres. A model that deforms has the
+    same of each of its `steps`, ascending, whose `track` is its key; its own fields are those of its file's first frame.
     """
 
     key: str
@@ -55,6 +58,49 @@ class ModelInfo:
     triangles: int
     digest: str
     warnings: tuple[str, ...] = ()
+    step: TimeStep | None = None  # that the files show
+    track: str = ""
+    steps: tuple[ModelInfo, ...] = ()
+
+    @property
+    def node(self) -> str | None:
+        """The name of the GLB's node that shows its time step, None where all of it is meant."""
+        return None if self.step is None else PurePosixPath(self.obj).stem
+
+    def at(self, frame: int | None) -> ModelInfo:
+        """What is known of a time step, by the frame of the model's file (None: at rest); raises ValueError for another."""
+        found = self if frame is None else next((one for one in self.steps if one.step and one.step.frame == frame), None)
+        if found is None:
+            raise ValueError(f"model {self.key}: expected time step {frame}, found none")
+        return found
+
+    def moved(self, key: str, prefix: str, **changed: Any) -> ModelInfo:
+        """The same model of another key, whose files lie in the folder `prefix`; `changed` are other fields of it."""
+        obj, glb = (f"{prefix}/{PurePosixPath(file).name}" for file in (self.obj, self.glb))
+        keys = (step_key(key, one.step and one.step.frame) for one in self.steps)
+        steps = (replace(one.moved(own, prefix, **changed), track=key) for one, own in zip(self.steps, keys, strict=True))
+        return replace(self, key=key, obj=obj, glb=glb, steps=tuple(steps), **changed)
+
+    def to_plain(self) -> dict[str, Any]:
+        """The record as JSON has it."""
+        value: dict[str, Any] = {**self.__dict__, "box3d_object": self.box3d_object.tolist()}
+        if self.step is None:
+            del value["step"], value["steps"], value["track"]
+        else:
+            value |= {"step": self.step.model_dump(mode="json"), "steps": [one.to_plain() for one in self.steps]}
+        return value
+
+    @staticmethod
+    def from_plain(value: Mapping[str, Any]) -> ModelInfo:
+        """The record that `to_plain` was asked of; raises LookupError, TypeError or ValueError for anything else."""
+        plain = dict(value)
+        plain["box3d_object"] = np.array(value["box3d_object"])
+        for name in ("size", "real_size", "parts", "warnings"):
+            plain[name] = None if value[name] is None else tuple(value[name])
+        if "step" in value:
+            plain["step"] = TimeStep.model_validate(value["step"])
+            plain["steps"] = tuple(map(ModelInfo.from_plain, value["steps"]))
+        return ModelInfo(**plain)
 
 
 @dataclass(frozen=True)

@@ -30,8 +30,8 @@ from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.model.shot import Shot
 
 Channels = Mapping[str, NDArray[Any]]
-Facts = Callable[[str], ModelFacts]
-"""Gives the facts about a model by its key."""
+Facts = Callable[[str, int | None], ModelFacts]
+"""What is known of a model, by its key, and the frame of its file that it shows, None at rest."""
 
 
 def short_sample(sample: Sample) -> dict[str, Any]:
@@ -126,8 +126,10 @@ class ShotRecords:
     def _objects(self, records: list[dict[str, Any]], instant: int, camera: Camera) -> Iterator[ObjectAnnotation]:
         things = self.shot.objects
         for record in records:
-            spec, pose = things[record["id"] - 1].model, things[record["id"] - 1].motion.at(instant)
+            spec, motion = things[record["id"] - 1].model, things[record["id"] - 1].motion
+            pose, step = motion.at(instant), motion.step_at(instant)
             if pose is None:
                 raise ValueError(f"object {record['id']}: expected one that is there")
-            placement = Placement(spec, pose, camera, self.shot.category_deg, partial(self.facts, spec.key))
+            facts = partial(self.facts, spec.key, step and step.frame)
+            placement = Placement(spec, pose, camera, self.shot.category_deg, facts, step)
             yield from_short_record(record, placement, self._makers, self.where)

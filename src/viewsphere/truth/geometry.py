@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import accumulate, pairwise
@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from viewsphere.assets.deforming import Load
 from viewsphere.assets.mesh import Mesh
-from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.thing import Thing
 from viewsphere.truth.cutouts import ENDLESS, NO_CUTOUTS, Cutouts, mesh_cutouts, stack_cutouts
 
@@ -80,8 +80,8 @@ class Geometry:
         return _extent(self.bounds[:things])
 
 
-def placed_meshes(things: Sequence[Thing], load: Callable[[ModelSpec], Mesh]) -> list[Mesh]:
-    """The model of each thing; each is loaded once."""
+def placed_meshes(things: Sequence[Thing], load: Load) -> list[Mesh]:
+    """The model of each thing as it rests; each is loaded once."""
     loaded = {spec: load(spec) for spec in dict.fromkeys(p.model for p in things)}
     return [loaded[p.model] for p in things]
 

@@ -13,15 +13,16 @@ from viewsphere.assets.mesh import Mesh
 from viewsphere.assets.piece import FileFacts, assemble
 
 
-def read_gltf(folder: ModelFolder) -> tuple[Mesh, FileFacts]:
-    """The file's default scene as one mesh in glTF's axes (up +Y, front +Z, metres), at rest.
+def read_gltf(folder: ModelFolder, node: str | None = None) -> tuple[Mesh, FileFacts]:
+    """The file's default scene as one mesh in glTF's axes (up +Y, front +Z, metres), at rest; or what is below the first node
+    of a name, in that node's axes.
 
     Skins stand in their bind pose with the scene's joints, morph targets at their default weights, instances
     are repeated. One part a node, named by the node or its mesh. Raises ModelError for a file that breaks the
     specification in a way that affects the mesh, or requires an extension that this reader lacks.
     """
     document = Document.read(folder)
-    pieces = read_pieces(document)
+    pieces = read_pieces(document, node)
     materials = read_materials(document, {piece.material for piece in pieces})
     facts = FileFacts(folder.model, folder.model.suffix[1:].lower(), "+y", "+z", 1.0)
     return assemble(folder, pieces, materials, facts)

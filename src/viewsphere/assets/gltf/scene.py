@@ -17,16 +17,19 @@ from viewsphere.geometry.rotation import compose
 TRIANGLES, STRIP, FAN = 4, 5, 6
 
 
-def read_pieces(document: Document) -> list[Piece]:
-    """The triangles of the default scene, node by node, transforms applied."""
-    worlds = _world_matrices(document)
+def read_pieces(document: Document, below: str | None = None) -> list[Piece]:
+    """The triangles of the default scene, or of what is `below` a node of a name, node by node, transforms applied.
+
+    What is scaled to nothing is not drawn (glTF 2.0, section 3.5.3).
+    """
+    worlds = _world_matrices(document, below)
     pieces: list[Piece] = []
     parts: dict[str, int] = {}
     meshes: dict[int, list[Piece]] = {}  # read once without morphing or skinning, for instances
     total = 0
     for index, world in worlds.items():
         node = document.root.at("nodes", index)
-        if "mesh" not in node:
+        if "mesh" not in node or not world[:3, :3].any():
             continue
         mesh = node.integer("mesh")
         entry = document.root.at("meshes", mesh)
@@ -56,11 +59,15 @@ def _unused(name: str, taken: dict[str, int]) -> str:
     return unique
 
 
-def _world_matrices(document: Document) -> dict[int, Float]:
-    """Node-to-world matrices (4, 4) of the default scene, parents first, in file order."""
+def _world_matrices(document: Document, below: str | None) -> dict[int, Float]:
+    """Node-to-world matrices (4, 4) of the default scene, parents first, in file order; or those of what is `below` a node of a
+    name, which is the world then.
+    """
     root = document.root
     nodes = root.items("nodes")
-    if "scenes" in root and root.items("scenes"):
+    if below is not None:
+        starts = _indices(_named(document, below), "children")
+    elif "scenes" in root and root.items("scenes"):
         starts = _indices(root.at("scenes", root.integer("scene", 0)), "nodes")
     else:
         children = {child for node in nodes for child in _indices(node, "children")}
@@ -76,6 +83,14 @@ def _world_matrices(document: Document) -> dict[int, Float]:
         worlds[index] = compose(parent, _local_matrix(node))
         stack.extend((child, worlds[index], depth + 1) for child in reversed(_indices(node, "children")))
     return worlds
+
+
+def _named(document: Document, name: str) -> Field:
+    """The first node of a name."""
+    for node in document.root.items("nodes"):
+        if node.text("name") == name:
+            return node
+    raise document.folder.error(f"expected a node {name!r}, found none")
 
 
 def _indices(entry: Field, key: str) -> list[int]:

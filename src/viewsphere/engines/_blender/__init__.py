@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from pydantic import JsonValue
 
-    from viewsphere.assets.mesh import Mesh
+    from viewsphere.assets.deforming import Load
     from viewsphere.engines._blender.staging import CyclesStage
-    from viewsphere.model.model_spec import ModelSpec
     from viewsphere.model.sample import Sample
     from viewsphere.model.scene import Finish
     from viewsphere.model.shot import Shot
@@ -28,8 +27,8 @@ def check(options: Mapping[str, JsonValue], renderer: str) -> None:
     find_blender(options_of(renderer, options).python)
 
 
-def stage(shot: Shot, load: Callable[[ModelSpec], Mesh]) -> CyclesStage:
-    """Build the shot's scene in Blender, and its geometry in this process; the shot's engine names the renderer.
+def stage(shot: Shot, load: Load) -> CyclesStage:
+    """Build the shot's scene in Blender, and its geometry here; the shot's engine says which renderer paints it.
 
     Raises UserError for an unknown engine option or one out of range, or where Blender cannot be used.
     """
@@ -38,7 +37,7 @@ def stage(shot: Shot, load: Callable[[ModelSpec], Mesh]) -> CyclesStage:
     return build_stage(shot, load)
 
 
-def save(shot: Shot, samples: Sequence[Sample], load: Callable[[ModelSpec], Mesh], file: Path, data: str) -> tuple[str, ...]:
+def save(shot: Shot, samples: Sequence[Sample], load: Load, file: Path, data: str) -> tuple[str, ...]:
     """Write a shot of any engine as a .blend file, with the cameras of its frames' samples; see `saving.save`."""
     from viewsphere.engines._blender import saving
 

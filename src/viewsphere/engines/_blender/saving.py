@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 import shutil
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from viewsphere.assets.mesh import Mesh
+from viewsphere.assets.deforming import Load
 from viewsphere.assets.srgb import encoded
 from viewsphere.codecs.png_tiff import encode_png
 from viewsphere.engines._blender.file_frame import FileFrame
@@ -23,7 +23,6 @@ from viewsphere.imaging.view import EXPOSURE
 from viewsphere.imaging.white import NEUTRAL_K
 from viewsphere.model.camera import Camera
 from viewsphere.model.channel import picture_of
-from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.sample import Sample
 from viewsphere.model.scene import Finish
 from viewsphere.model.shot import Shot
@@ -48,7 +47,7 @@ The pass index of an object is its number in the data set's instance maps; its c
 """
 
 
-def save(shot: Shot, samples: Sequence[Sample], load: Callable[[ModelSpec], Mesh], file: Path, data: str) -> tuple[str, ...]:
+def save(shot: Shot, samples: Sequence[Sample], load: Load, file: Path, data: str) -> tuple[str, ...]:
     """Write a shot's scene, with the cameras of these samples, which are those of its frames, in order.
 
     The pictures have one size and shape of pixels, and all or none of them show the sky. A shot of another engine is

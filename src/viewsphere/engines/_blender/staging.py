@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property, partial
 from pathlib import Path
@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from viewsphere.assets.deforming import Load
 from viewsphere.assets.mesh import Mesh
 from viewsphere.blender.interpreter import GRAPHICS, find_blender
 from viewsphere.blender.process import BlenderProcess
@@ -27,7 +28,6 @@ from viewsphere.imaging.background import display_background
 from viewsphere.imaging.finish import finished
 from viewsphere.imaging.seen import seen_by
 from viewsphere.model.camera import Camera
-from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
 from viewsphere.truth.geometry import Geometry
@@ -309,7 +309,7 @@ def border_of(geometry: Geometry, camera: Camera) -> tuple[int, int, int, int] |
     return left, top, right, min(math.ceil(y.max()) + AROUND, camera.height)
 
 
-def build_stage(shot: Shot, load: Callable[[ModelSpec], Mesh]) -> CyclesStage:
+def build_stage(shot: Shot, load: Load) -> CyclesStage:
     """The stage of a shot; Blender builds the scene when the first picture is asked for.
 
     Raises RecipeError for an option, or a ground, that its renderer does not have.

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from pydantic import JsonValue
 
-    from viewsphere.assets.mesh import Mesh
+    from viewsphere.assets.deforming import Load
     from viewsphere.engines.raster.staging import RasterStage
-    from viewsphere.model.model_spec import ModelSpec
     from viewsphere.model.shot import Shot
 
 
@@ -21,7 +20,7 @@ def check(options: Mapping[str, JsonValue]) -> None:
     parse_options(options)
 
 
-def stage(shot: Shot, load: Callable[[ModelSpec], Mesh]) -> RasterStage:
+def stage(shot: Shot, load: Load) -> RasterStage:
     """Build geometry, textures, shadow map and ambient light, once for all frames of the shot.
 
     Raises UserError for an unknown engine option or one out of range.

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.assets.mesh import Mesh
+from viewsphere.assets.deforming import Load
 from viewsphere.engines._arranged import Arranged, Arrangements
 from viewsphere.engines.raster.baking import Packed, bake, pack, sequence_lengths, still_lengths
 from viewsphere.engines.raster.options import Options, parse_options
@@ -19,7 +18,6 @@ from viewsphere.engines.raster.surface import Lengths
 from viewsphere.imaging.background import display_background
 from viewsphere.imaging.finish import finished
 from viewsphere.imaging.seen import seen_by
-from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.shot import Shot
 from viewsphere.truth.geometry import Geometry
 from viewsphere.truth.visibility import Visibility
@@ -91,7 +89,7 @@ class RasterStage:
         return self._canvases[pixels]
 
 
-def build_stage(shot: Shot, load: Callable[[ModelSpec], Mesh]) -> RasterStage:
+def build_stage(shot: Shot, load: Load) -> RasterStage:
     """The stage of a shot, with all models loaded."""
     options = parse_options(shot.engine_options)
     lenses = [sensor.intrinsics for sensor in shot.rig.sensors]

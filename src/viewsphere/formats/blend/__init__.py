@@ -23,7 +23,9 @@ import numpy as np
 
 from viewsphere import plugins
 from viewsphere.assets.cache import load_normalised
+from viewsphere.assets.load import load_model
 from viewsphere.assets.mesh import Mesh
+from viewsphere.assets.normalise import normalise
 from viewsphere.errors import StoreError, UserError
 from viewsphere.geometry.rotation import rigid
 from viewsphere.model.files import Files
@@ -33,7 +35,7 @@ from viewsphere.model.rig import Rig
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.model.scene import Matrix4, Scene
 from viewsphere.model.shot import Shot
-from viewsphere.model.thing import Motion, Thing
+from viewsphere.model.thing import Motion, Thing, TimeStep
 from viewsphere.store import Dataset
 from viewsphere.zoo import build
 
@@ -90,7 +92,8 @@ def _save(dataset: Dataset, folder: Path, groups: Collection[_Group]) -> Iterato
         shots, instants, samples = zip(*_views(dataset, group), strict=True)
         name = group.model if counts[group.model] == 1 else f"{group.model}-{samples[0].index:06d}"
         own = shots[0].model_copy(update={"instants": instants})
-        load = _Models(dataset, {p.model: o.key for p, o in zip(own.objects, samples[0].objects, strict=False)})
+        shown = zip(own.objects, samples[0].objects, strict=False)
+        load = _Models(dataset, {(thing.model, thing.step): (o.track or o.key, o.key) for thing, o in shown})
         yield from plugins.load("engines", ENGINE).save(own, samples, load, folder / f"{name}.blend", dataset.name)
 
 
@@ -107,8 +110,8 @@ def _views(dataset: Dataset, group: _Group) -> Iterator[tuple[Shot, Instant, Sam
     for key, places in group.places.items():
         known = dataset.store.shot(key)
         for place, sample in zip(places, dataset.samples_of(key, places), strict=True):
-            shot = known or _lit_anyhow(key, sample)
-            yield shot, shot.instants[place if known else 0], sample
+            shot, instant = known or _lit_anyhow(key, sample), place if known else 0
+            yield shot.model_copy(update={"things": shot.things_at(instant)}), shot.instants[instant], sample
 
 
 def _stored(dataset: Dataset, key: str) -> tuple[Shot | None, bytes]:
@@ -119,8 +122,8 @@ def _stored(dataset: Dataset, key: str) -> tuple[Shot | None, bytes]:
 
 def _scene(known: Shot | None, alike: bytes, key: str, place: int, sample: Sample) -> object:
     """A value that is equal for frames that can share a file."""
-    shot = known or _lit_anyhow(key, sample)
-    return alike or _alike(shot), *_seen(shot, place if known else 0, sample)
+    shot, instant = known or _lit_anyhow(key, sample), place if known else 0
+    return alike or _alike(shot), shot.poses_at(instant), *_seen(shot, instant, sample)
 
 
 def _alike(shot: Shot) -> bytes:
@@ -168,19 +171,25 @@ def _spec(key: str, source: str) -> ModelSpec:
 
 @dataclass(frozen=True, eq=False)
 class _Models:
-    """Loads normalised meshes: of objects from the data set, by its `keys` of their models; of scenery from its source."""
+    """Normalised meshes: of objects, by `keys` of the data set (a model's, and that of what is shown of it), what it keeps of
+    them; of scenery, what its source gives.
+    """
 
     dataset: Dataset
-    keys: Mapping[ModelSpec, str]
+    keys: Mapping[tuple[ModelSpec, TimeStep | None], tuple[str, str]]
 
-    def __call__(self, spec: ModelSpec) -> Mesh:
-        key = self.keys.get(spec)
-        if key is None:
-            return load_normalised(spec, _from_zoo)
-        info = self.dataset.store.model_info(key)
+    def __call__(self, spec: ModelSpec, step: TimeStep | None = None, /) -> Mesh:
+        if (spec, step) not in self.keys:
+            return load_normalised(spec, _from_zoo, step=step)
+        key, own = self.keys[spec, step]
+        model = self.dataset.store.model_info(key)
+        info = model and next((one for one in (model, *model.steps) if one.key == own), None)
         if info is None:
-            raise StoreError(f"{self.dataset.root}: expected model {key!r} in the store, found none: render again")
-        return load_normalised(_spec(key, str(self.dataset.path(info.glb).absolute())))
+            raise StoreError(f"{self.dataset.root}: expected model {own!r} in the store, found none: render again")
+        file = self.dataset.path(info.glb).absolute()
+        if info.node is None:
+            return load_normalised(_spec(own, str(file)))
+        return normalise(*load_model(file, node=info.node), _spec(own, str(file)))
 
 
 def _from_zoo(spec: ModelSpec) -> Mesh:

@@ -5,8 +5,9 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+from collections import defaultdict
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any, cast
@@ -21,6 +22,7 @@ from viewsphere.labels import channels
 from viewsphere.model.camera import Camera, Distortion, Intrinsics
 from viewsphere.model.instant import Viewpoint
 from viewsphere.model.sample import ObjectAnnotation, Sample
+from viewsphere.model.thing import TimeStep
 from viewsphere.store import Category, ModelInfo, decode
 from viewsphere.store.foreign import ForeignDataset, ForeignFrame, ForeignModel, foreign_object, refuse_broken
 
@@ -106,7 +108,25 @@ def _categories(vehicles: Mapping[str, Any]) -> dict[str, Category]:
 def _models(
     root: Path, vehicles: dict[str, Any], categories: Mapping[str, Category], problems: list[str]
 ) -> Iterator[ForeignModel]:
-    """The models whose files are there."""
+    """The models whose files are there, each with its time steps if it deforms."""
+    found = list(_vehicles(root, vehicles, categories, problems))
+    steps: defaultdict[str, list[ModelInfo]] = defaultdict(list)
+    for model in found:
+        steps[model.info.track].append(model.info)
+    known = {model.info.key for model in found if not model.info.track}
+    for model in found:
+        info = model.info
+        if not info.track:
+            yield replace(model, info=replace(info, steps=tuple(steps[info.key])))
+        elif info.track not in known:  # what was chosen of a data set may lack the model itself
+            known.add(info.track)
+            yield replace(model, info=replace(info, key=info.track, track="", steps=tuple(steps[info.track])))
+
+
+def _vehicles(
+    root: Path, vehicles: dict[str, Any], categories: Mapping[str, Category], problems: list[str]
+) -> Iterator[ForeignModel]:
+    """The models, and time steps of those that deform, whose files are there."""
     for key, vehicle in vehicles.items():
         file = root / str(vehicle.get("model_file"))
         if not file.is_file() or not file.resolve().is_relative_to(root.resolve()):
@@ -121,7 +141,8 @@ def _model(key: str, file: Path, vehicle: dict[str, Any], category: Category) ->
     box = _vertices(vehicle["bbox3D_model"], 3)
     if np.isnan(box).any():
         raise ValueError("a box that lacks vertices")
-    glb = file.with_suffix(".glb")
+    animation = str(vehicle.get("animation", ""))
+    glb = file.with_name(animation) if _is_name(animation) else file.with_suffix(".glb")
     real = vehicle.get("real_size") or {}
     width, height, length = (real.get(side) for side in ("width", "height", "length"))
     info = ModelInfo(
@@ -137,6 +158,8 @@ def _model(key: str, file: Path, vehicle: dict[str, Any], category: Category) ->
         parts=(),
         triangles=0,
         digest=hashlib.sha256(file.read_bytes()).hexdigest(),
+        step=TimeStep(frame=int(vehicle["frame"]), seconds=float(vehicle.get("seconds", 0))) if animation else None,
+        track=str(vehicle.get("id_track", "")) if animation else "",
     )
     return ForeignModel(info, file.parent)
 

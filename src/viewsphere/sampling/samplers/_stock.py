@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from functools import cached_property
+from itertools import chain
 from typing import Any
 
 from viewsphere.errors import RecipeError
@@ -14,12 +15,12 @@ from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.rig import Rig
 from viewsphere.model.scene import Scene, Vector
 from viewsphere.model.shot import Shot
-from viewsphere.model.thing import Thing
+from viewsphere.model.thing import Thing, TimeStep
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.sampling.blend_scene import BlendScenery
 from viewsphere.sampling.camera import looking
 from viewsphere.sampling.composition import Composition
-from viewsphere.sampling.moments import Schedule, Timing, at_frame, schedules
+from viewsphere.sampling.moments import Schedule, Timing, schedules
 from viewsphere.sampling.pictures import Pictures
 from viewsphere.sampling.scenery import draw_names
 from viewsphere.sampling.scenes import Scenes
@@ -71,10 +72,12 @@ class Stock:
         """Which poses a model is taken from, and when."""
         return self.schedules[self.position[spec.key]]
 
-    def moments_of(self, spec: ModelSpec) -> tuple[ModelSpec, ...]:
-        """A model of the recipe at each frame of its file that is asked for."""
-        timing = self.timings[self.position[spec.key]] if self.timings else None
-        return tuple(at_frame(spec, step.model) for step in (timing.steps if timing else ()) if step.model is not None)
+    def steps_of(self, spec: ModelSpec) -> tuple[TimeStep, ...]:
+        """The time steps of a model's file that the data set keeps, ascending; none where it does not move."""
+        timing = self.timings[self.position[spec.key]] if self.timings and spec.key in self.position else None
+        own = (step.model for step in (timing.steps if timing else ()))
+        blend = () if self.blend is None else self.blend.steps(spec)
+        return tuple(chain((step for step in own if step is not None), blend))
 
     def spec(self, key: str) -> ModelSpec:
         """The model of this key."""

@@ -115,11 +115,11 @@ def _target(stock: Stock, first: Thing, run: Run, target: Vector | None, box_of:
 
 def _floor(stock: Stock, spec: ModelSpec, things: Sequence[Thing], box_of: BoxOf) -> dict[str, float]:
     """How high the ground is at most, in a scene's field: at the lowest that a model comes at its time steps."""
-    moments = stock.moments_of(spec)
-    if not moments or stock.recipe.scene.ground == "off":
+    steps = stock.steps_of(spec)
+    if not steps or stock.recipe.scene.ground == "off":
         return {}
     world = things[0].world_from_object
-    return {"floor": min(float(transform(world, box_of(moment))[:, 2].min()) for moment in moments)}
+    return {"floor": min(float(transform(world, box_of(spec, step))[:, 2].min()) for step in steps)}
 
 
 def _at(stock: Stock, things: Sequence[Thing], run: Run) -> tuple[Thing, ...]:
@@ -131,8 +131,8 @@ def _at(stock: Stock, things: Sequence[Thing], run: Run) -> tuple[Thing, ...]:
     found: list[Thing] = []
     for thing in things:
         number = stock.position.get(thing.model.key)
-        model = at_step(None if number is None else stock.timings[number], thing.model, run.number)
-        moved = thing if model is thing.model else thing.model_copy(update={"model": model})
+        shown = at_step(None if number is None else stock.timings[number], run.number)
+        moved = thing if shown is None else thing.showing(shown)
         if stock.blend is not None and run.step.scene is not None:
             if not stock.blend.shows(moved.model, run.step.scene):
                 continue

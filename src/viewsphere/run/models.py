@@ -1,0 +1,172 @@
+"""Models of a data set: normalised, exported, and compared with those that it holds."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, fields, replace
+from itertools import chain
+from pathlib import Path
+
+from viewsphere.assets.cache import frame_of, read_ahead
+from viewsphere.assets.deforming import DeformingMesh
+from viewsphere.assets.export import export_deforming, export_glb, export_obj
+from viewsphere.assets.mesh import Mesh
+from viewsphere.errors import StoreError
+from viewsphere.geometry.box import box_size, box_vertices
+from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.thing import TimeStep
+from viewsphere.run.stages import Stages, model_files
+from viewsphere.store import ModelInfo, Store
+
+Steps = dict[int, TimeStep]
+"""Time steps by the frames of their model's file, ascending."""
+
+
+@dataclass(frozen=True)
+class Models:
+    """Makes the models of a store."""
+
+    store: Store
+    stages: Stages
+
+    def make(self, spec: ModelSpec, steps: Iterable[TimeStep] = (), trusted: bool = True) -> None:
+        """Normalise a model, at these time steps if it deforms, and export it into the store, or see that the one there is the
+        same; time steps that it lacks are added.
+
+        `trusted`: the plan's digest and version vouch for models of the zoo that are there. Raises ModelError for a file that
+        cannot be used, StoreError for one that changed since its frames were made.
+        """
+        known, wanted = self.store.model_info(spec.key), _with_rest(spec, steps)
+        self._check_key(spec)
+        if known is not None and trusted and spec.source.startswith("zoo:"):
+            return
+        if wanted:
+            read_ahead(spec, wanted)
+        if known is not None:
+            self._compare(spec, known, wanted)
+            held = _steps(known)
+            if wanted.keys() <= held.keys():
+                return
+            wanted = _with_rest(spec, chain(held.values(), wanted.values()))
+            read_ahead(spec, wanted)
+        if wanted:
+            target = self.store.model_folder(spec.key)
+            self._write_deforming(spec, wanted, self.store.aside(target) if known is None else self.store.replacing(target))
+        else:
+            self._write(spec)
+
+    def mend(self, spec: ModelSpec, steps: Iterable[TimeStep]) -> None:
+        """Put a model in the place of one that is damaged; raises StoreError where that was another."""
+        wanted = _with_rest(spec, steps)
+        if wanted:
+            read_ahead(spec, wanted)
+            self._write_deforming(spec, wanted, self.store.aside(self.store.model_folder(spec.key), again=True))
+        else:
+            self._write(spec, again=True)
+
+    def _check_key(self, spec: ModelSpec) -> None:
+        """Raises StoreError where the key is that of a time step of a model that the store holds."""
+        track, _, frame = spec.key.rpartition("-f")
+        info = self.store.model_info(track) if track and frame.isdecimal() else None
+        if info is not None and any(step.key == spec.key for step in info.steps):
+            raise StoreError(
+                f"{self.store.root}: expected another name for {spec.key!r}, which is a time step of its model {track!r}: "
+                "give the recipe's entry a name"
+            )
+
+    def _write(self, spec: ModelSpec, again: bool = False) -> None:
+        """Export a model that stays as it is."""
+        mesh = self.stages.model(spec)
+        with self.store.aside(self.store.model_folder(spec.key), again) as folder:
+            export_obj(mesh, folder, spec.key)
+            export_glb(mesh, folder / f"{spec.key}.glb")
+            self.store.write_model_info(folder, self._info(spec, mesh))
+
+    def _write_deforming(self, spec: ModelSpec, steps: Steps, place: AbstractContextManager[Path]) -> None:
+        """Export a model with all its time steps into a folder."""
+        model = DeformingMesh.of({frame: self.stages.model(spec, step) for frame, step in steps.items()})
+        infos = tuple(replace(self._info(spec, model.meshes[f], step), track=spec.key) for f, step in steps.items())
+        rest = next(info for info in infos if info.step == steps[_rest(spec)])
+        with place as folder:
+            export_deforming(model, folder, spec.key, {frame: step.seconds for frame, step in steps.items()})
+            self.store.write_model_info(folder, replace(rest, key=spec.key, track="", steps=infos))
+
+    def _info(self, spec: ModelSpec, mesh: Mesh, step: TimeStep | None = None) -> ModelInfo:
+        """What there is to know of a model, or of one of its time steps."""
+        frame, box = step and step.frame, box_vertices(*mesh.bounds)
+        obj, glb = model_files(spec.key, frame)
+        return ModelInfo(
+            key=spec.key_at(frame),
+            category=spec.category,
+            supercategory=spec.supercategory,
+            category_id=spec.category_id,
+            obj=obj,
+            glb=glb,
+            box3d_object=box,
+            size=box_size(box),
+            real_size=self.stages.real_size(spec, step),
+            parts=mesh.parts,
+            triangles=len(mesh.triangles),
+            digest=mesh_digest(mesh),
+            warnings=mesh.warnings,
+            step=step,
+        )
+
+    def _compare(self, spec: ModelSpec, known: ModelInfo, wanted: Steps) -> None:
+        """Raises StoreError where the model is not the one that the store holds, at the time steps that it holds of it."""
+        held = _steps(known)
+        if bool(held) != bool(wanted):
+            raise _changed(self.store, spec)
+        for frame in wanted.keys() & held.keys() if wanted else (None,):
+            info, step = known.at(frame), None if frame is None else wanted[frame]
+            if info.digest != mesh_digest(self.stages.model(spec, step)):
+                raise _changed(self.store, spec)
+            now = {
+                "category": spec.category,
+                "supercategory": spec.supercategory,
+                "real_size": self.stages.real_size(spec, step),
+            }
+            for name, value in now.items():
+                if getattr(info, name) != value:
+                    raise StoreError(
+                        f"{self.store.root}: expected {name} {getattr(info, name)!r} of model {info.key!r}, as the data set "
+                        f"has; found {value!r}: keep it, or choose another output folder"
+                    )
+
+
+def _changed(store: Store, spec: ModelSpec) -> StoreError:
+    return StoreError(
+        f"{store.root}: model {spec.key!r} ({spec.source}) changed since this data set was begun: "
+        "put the old one back, or choose another output folder"
+    )
+
+
+def _rest(spec: ModelSpec) -> int:
+    """The frame at which an animated model rests."""
+    frame = frame_of(spec, None)
+    assert frame is not None
+    return frame
+
+
+def _with_rest(spec: ModelSpec, steps: Iterable[TimeStep]) -> Steps:
+    """The time steps with that at which the model rests; none for a model that stays as it is."""
+    found = {step.frame: step for step in steps}
+    return dict(sorted(({_rest(spec): TimeStep(frame=_rest(spec))} | found).items())) if found else {}
+
+
+def _steps(known: ModelInfo) -> Steps:
+    return {info.step.frame: info.step for info in known.steps if info.step}
+
+
+def mesh_digest(mesh: Mesh) -> str:
+    """SHA-256 of all that is rendered or labelled of a mesh."""
+    digest = hashlib.sha256()
+    for name in (f.name for f in fields(Mesh) if f.name not in {"images", "warnings"}):
+        value = getattr(mesh, name)
+        digest.update(name.encode())
+        digest.update(value.tobytes() if hasattr(value, "tobytes") else repr(value).encode())
+    for image in mesh.images:
+        digest.update(repr((image.name, image.pixels.shape)).encode() + image.pixels.tobytes())
+    return digest.hexdigest()
