@@ -54,5 +54,5 @@ def test_recipes_ask_for_it_by_name():
             "splits": {"train": 1},
         }
     )
-    shot = next(plan(recipe).shots(lambda spec: box(0.5, 0.5)))
+    shot = next(plan(recipe).shots(lambda spec, step=None: box(0.5, 0.5)))
     assert sorted(thing.world_from_object[0][3] for thing in shot.things) == pytest.approx([-0.9, -0.9, 0, 0, 0, 0.9])
