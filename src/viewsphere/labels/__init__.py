@@ -24,6 +24,7 @@ from viewsphere.model.channel import DEFAULT_CHANNELS, PASSES, Channel
 from viewsphere.model.model_spec import Size
 from viewsphere.model.sample import ObjectAnnotation
 from viewsphere.model.shot import Shot
+from viewsphere.model.thing import Thing
 from viewsphere.truth.geometry import Geometry
 from viewsphere.truth.visibility import Visibility
 
@@ -124,7 +125,7 @@ def annotate(
         )
     sizes = real_sizes or [None if isinstance(thing.model.real_size, str) else thing.model.real_size for thing in objects]
     facts = [
-        Rendered(model, box, size, thing.model.category, thing.model.category_id)
+        Rendered(model, box, size, thing.model.category, thing.model.category_id, _track(thing, instant))
         for thing, box, model, size in zip(objects, boxes, models, sizes, strict=True)
     ]
     placed = tuple(
@@ -133,6 +134,11 @@ def annotate(
         for pose, step in ((thing.motion.at(instant), thing.motion.step_at(instant)),)
     )
     return annotated(Sight(geometry, camera, visibility, placed))
+
+
+def _track(thing: Thing, instant: int) -> str:
+    """The key of the thing's model where it shows a time step, else empty."""
+    return thing.model.key if thing.motion.step_at(instant) else ""
 
 
 def annotated(sight: Sight) -> tuple[ObjectAnnotation, ...]:
@@ -152,3 +158,4 @@ class Rendered:
     real_size: Size | None
     category: str
     category_id: int
+    track: str

@@ -26,6 +26,8 @@ def prove(sample: Sample, models: Models) -> Iterator[str]:
             yield f"object {o.id}: expected a model of the data set, found {o.key!r}"
         elif facts.obj != o.model:
             yield f"object {o.id}: expected the file {facts.obj} of model {o.key}, found {o.model}"
+        elif facts.track != o.track:
+            yield f"object {o.id}: expected track {facts.track!r} of model {o.key}, found {o.track!r}"
 
 
 LABEL = ObjectLabel.derived(
