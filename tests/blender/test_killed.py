@@ -15,6 +15,7 @@ from viewsphere.assets.timeline import Blenders
 from viewsphere.blender.interpreter import VARIABLE
 from viewsphere.errors import ModelError
 from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.thing import TimeStep
 
 pytestmark = [pytest.mark.timeout(60), pytest.mark.skipif(sys.platform == "win32", reason="signals")]
 
@@ -22,7 +23,7 @@ SAID = "Blender, which reads it, ended unexpectedly: it was killed (SIG{how}), p
 
 READERS = {
     "model": lambda path: load(ModelSpec(key="a", source=str(path), category="thing", category_id=1)),
-    "frame": lambda path: load(ModelSpec(key="a", source=str(path), category="thing", category_id=1, frame=3)),
+    "frame": lambda path: load(ModelSpec(key="a", source=str(path), category="thing", category_id=1), step=TimeStep(frame=3)),
     "timeline": lambda path: Blenders.none_yet().timeline(path, True),
     "scene": scene_file.__wrapped__,
 }

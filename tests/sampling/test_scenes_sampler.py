@@ -28,7 +28,7 @@ from viewsphere.sampling.plan import Plan
 from viewsphere.store import Store
 
 
-def box_of(spec):
+def box_of(spec, step=None):
     """A box of its own for every model."""
     w, n, h = (0.2 + 0.05 * ((sum(spec.key.encode()) + i) % 7) for i in range(3))
     return box_vertices((-w, -n, 0.0), (w, n, h))
