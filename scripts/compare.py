@@ -37,7 +37,7 @@ from viewsphere.model.camera import Intrinsics
 from viewsphere.model.instant import Viewpoint
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.rig import Rig
-from viewsphere.model.scene import AreaLight, Environment, Ground, PointLight, Scene, Sky, SpotLight, Sun, View
+from viewsphere.model.scene import AreaLight, Environment, Ground, PointLight, Scene, Sky, SpotLight, Sun, ViewTransform
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Motion, Thing
 from viewsphere.sampling.camera import looking
@@ -173,7 +173,7 @@ def developed(file: Path) -> np.ndarray[Any, Any]:
         name = next(n for n in channels if n.startswith("RGB"))
         pixels = channels[name].pixels[..., :3].astype(np.float32)
     radiance = np.concatenate([pixels, np.ones_like(pixels[..., :1])], axis=-1)
-    return develop(np.ascontiguousarray(radiance), None, View())
+    return develop(np.ascontiguousarray(radiance), None, ViewTransform())
 
 
 def compare(case: Case, folder: Path, output: Path) -> tuple[float, float]:

@@ -73,7 +73,7 @@ def mesh():
 
 @pytest.fixture
 def sorted_mesh(mesh):
-    from viewsphere.assets.piece import FileFacts
+    from viewsphere.assets.primitive import FileFacts
 
     return normalise(mesh, FileFacts(Path("a.stl"), "stl", "+z", "-y", 1.0), SPEC)
 

@@ -7,7 +7,7 @@ import pytest
 
 from viewsphere.assets.mesh import Mesh
 from viewsphere.assets.normalise import normalise, rotation
-from viewsphere.assets.piece import FileFacts
+from viewsphere.assets.primitive import FileFacts
 from viewsphere.errors import ModelError
 from viewsphere.model.model_spec import ModelSpec
 

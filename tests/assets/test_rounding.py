@@ -14,7 +14,7 @@ import pytest
 from viewsphere.assets import polygon
 from viewsphere.assets.export import export_obj
 from viewsphere.assets.mesh import Image, Material, Mesh, Texture
-from viewsphere.assets.piece import Piece
+from viewsphere.assets.primitive import Primitive
 from viewsphere.assets.smoothing import angle_of, creased
 from viewsphere.assets.srgb import encoded, linear
 
@@ -37,7 +37,7 @@ def bowl():
     x, y = (axis.reshape(-1) / 20.0 for axis in np.mgrid[0:21, 0:21])
     corner = (np.arange(20)[:, None] * 21 + np.arange(20)).reshape(-1, 1)
     triangles = corner + np.array([[0, 21, 22, 0, 22, 1]])
-    return Piece("bowl", 0, np.column_stack([x, y, np.sqrt(3.0 - x * x - y * y)]), triangles.reshape(-1, 3))
+    return Primitive("bowl", 0, np.column_stack([x, y, np.sqrt(3.0 - x * x - y * y)]), triangles.reshape(-1, 3))
 
 
 def digest():
@@ -95,7 +95,7 @@ def test_a_quadrilateral_counts_the_same_however_it_is_cut(cut):
     """At the corner of a dent the normal is the same with either diagonal."""
     points = np.array([[0, 0, 0], [1, 0, 0.1], [1, 1, 0.2], [0, 1, 0.1], [-1, 0, 0.1], [-1, 1, 0.2]])
     other = [[0, 3, 5], [0, 5, 4]]
-    piece = creased(Piece("dent", 0, points, np.array(cut + other)))
+    piece = creased(Primitive("dent", 0, points, np.array(cut + other)))
     at = np.flatnonzero((piece.positions == 0).all(axis=1))
     flat_left, flat_right = np.array([0.1, -0.1, 1]), np.array([-0.1, -0.1, 1])
     mean = flat_left / np.linalg.norm(flat_left) + flat_right / np.linalg.norm(flat_right)

@@ -68,7 +68,7 @@ def rendered(scenes: Mapping[str, Scene], folder: Path) -> dict[str, np.ndarray]
 def _told(scene: Scene, folder: Path, name: str) -> dict:
     view, fields = scene.camera, ("sky", "sun", "samples", "transparent", "sharp")
     return {field: getattr(scene, field) for field in fields} | {
-        "meshes": [_told_mesh(mesh, scene.fixed, folder, f"{name}.{k}") for k, mesh in enumerate(scene.meshes)],
+        "meshes": [_mesh_request(mesh, scene.fixed, folder, f"{name}.{k}") for k, mesh in enumerate(scene.meshes)],
         "camera": {
             "width": view.width,
             "height": view.height,
@@ -80,7 +80,7 @@ def _told(scene: Scene, folder: Path, name: str) -> dict:
     }
 
 
-def _told_mesh(mesh: Mesh, fixed: Mapping[str, float], folder: Path, name: str) -> dict:
+def _mesh_request(mesh: Mesh, fixed: Mapping[str, float], folder: Path, name: str) -> dict:
     def saved(array, what):
         if array is None:
             return None

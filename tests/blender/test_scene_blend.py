@@ -13,7 +13,7 @@ from viewsphere.assets.cache import load_normalised
 from viewsphere.check import check
 from viewsphere.engines import cycles
 from viewsphere.engines._blender.file_frame import FileFrame
-from viewsphere.engines._blender.staging import told_camera
+from viewsphere.engines._blender.staging import camera_request
 from viewsphere.errors import RecipeError
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.run.stages import Stages
@@ -133,7 +133,7 @@ def met_by_cycles(recipe):
         truth = rasterize(stage.geometry, camera).triangle
         process = stage.keeper.process_for(stage)
         out = process.folder / "asked.npy"
-        told = FileFrame.of(shot.scene.blend).camera(told_camera(camera))
+        told = FileFrame.of(shot.scene.blend).camera(camera_request(camera))
         process.ask("render", camera=told, transparent=False, border=None, passes=["index"], out=str(out))
         seen = np.load(out.with_suffix(".index.npy"))[..., 0].astype(int)
         index = {p.id: INDEX.get(p.model.category, p.id) for p in shot.objects}

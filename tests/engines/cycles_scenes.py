@@ -10,7 +10,7 @@ import numpy as np
 from shots import camera_of
 from viewsphere import Recipe, plan
 from viewsphere.engines import cycles
-from viewsphere.engines._blender.staging import Arrangement, told_camera
+from viewsphere.engines._blender.staging import Arrangement, camera_request
 from viewsphere.model.shot import Shot
 from viewsphere.run.stages import Stages
 
@@ -54,7 +54,7 @@ def asked(stage: Arrangement, camera, passes=(), **changed) -> dict[str, np.ndar
     """A picture of the stage as Cycles gives it, and passes."""
     process = stage.keeper.process_for(stage)
     out = str(process.folder / "asked.npy")
-    told = {"camera": told_camera(camera), "transparent": True, "border": None, "passes": list(passes), "out": out}
+    told = {"camera": camera_request(camera), "transparent": True, "border": None, "passes": list(passes), "out": out}
     process.ask("render", **(told | changed))
     found = {name: np.load(out.replace(".npy", f".{name}.npy"))[..., 0] for name in passes}
     return found | {"picture": np.load(out)}

@@ -8,7 +8,7 @@ from called import called
 from viewsphere.assets.mesh import Image, Material, Mesh
 from viewsphere.engines.raster import kernels_block as block
 from viewsphere.engines.raster.kernels_material import material
-from viewsphere.engines.raster.records import View
+from viewsphere.engines.raster.records import PictureRays
 from viewsphere.engines.raster.surface import Lengths, pack_materials, pack_surfaces
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Ground
@@ -50,7 +50,7 @@ def packed(mesh: Mesh, ground: Ground | None = None, repaints=()):
     return pack_surfaces(geometry, (mesh,), materials, metres), materials.textures
 
 
-def view_of(rotation, rays=None) -> View:
+def view_of(rotation, rays=None) -> PictureRays:
     """Only what materials need of a view: its axes."""
     values = {
         "eye": np.zeros(3, np.float32),
@@ -62,7 +62,7 @@ def view_of(rotation, rays=None) -> View:
         "pixel": np.float32(0),
         "scale": np.float32(1),
     }
-    return View(**{name: values[name] for name in View._fields})
+    return PictureRays(**{name: values[name] for name in PictureRays._fields})
 
 
 FRONT = view_of([[1, 0, 0], [0, 0, -1], [0, 1, 0]])  # looks along +Y, x to the right, image down is -Z

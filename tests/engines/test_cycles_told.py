@@ -13,7 +13,7 @@ from viewsphere import plan
 from viewsphere.engines import cycles
 from viewsphere.engines._blender.lens import resampled, views_of
 from viewsphere.engines._blender.options import PRESETS, Options, parse_options
-from viewsphere.engines._blender.requests import told_scene
+from viewsphere.engines._blender.requests import scene_request
 from viewsphere.engines._blender.staging import border_of
 from viewsphere.errors import MissingExtraError, RecipeError, UserError, ViewsphereError
 from viewsphere.geometry.camera import pixel_rays
@@ -77,7 +77,7 @@ def shot_of(**given):
     return next(plan(recipe_of(**given)).shots(stages().box))
 
 
-def told_of(**given):
+def of_request(**given):
     """What Blender is told of a recipe's first shot, and the arrays by the names they were given."""
     shot = shot_of(**given)
     meshes = [stages().model(p.model) for p in shot.things]
@@ -89,11 +89,11 @@ def told_of(**given):
         return f"{len(arrays) - 1}"
 
     options = parse_options(shot.engine_options)
-    return told_scene(shot.things, meshes, geometry, shot.scene, options, put), arrays, geometry
+    return scene_request(shot.things, meshes, geometry, shot.scene, options, put), arrays, geometry
 
 
 def test_what_is_told_is_plain_and_truths_own():
-    told, arrays, geometry = told_of(scene={"ground": {"color": [0.3, 0.3, 0.3], "roughness": 0.6}})
+    told, arrays, geometry = of_request(scene={"ground": {"color": [0.3, 0.3, 0.3], "roughness": 0.6}})
     assert json.loads(json.dumps(told)).keys() == told.keys()
     (thing,), (mesh,) = told["objects"], told["meshes"]
     move = np.array(thing["matrix"])
@@ -107,7 +107,7 @@ def test_what_is_told_is_plain_and_truths_own():
 
 
 def test_copies_share_their_mesh_and_repaints_only_its_arrays():
-    told, arrays, _ = told_of(
+    told, arrays, _ = of_request(
         models=[{"source": "zoo:chair", "category": "chair", "count": 1, "scale": {"length": 0.5}}],
         scene={"ground": False, "place": "zoo:neighbourhood"},
     )
@@ -124,7 +124,7 @@ def id_of(arrays, names):
 def test_an_unreadable_sky_is_a_users_error(tmp_path):
     (tmp_path / "sky.exr").write_bytes(b"none")
     with pytest.raises(ViewsphereError) as caught:
-        told_of(scene={"ground": False, "sky": str(tmp_path / "sky.exr")})
+        of_request(scene={"ground": False, "sky": str(tmp_path / "sky.exr")})
     assert "\n" not in str(caught.value)
 
 

@@ -13,12 +13,12 @@ from viewsphere.assets.mesh import Image, Material, Texture
 from viewsphere.assets.srgb import linear as linear_light
 from viewsphere.engines.raster.samples import differs_behind, edge_samples, layers
 from viewsphere.model.camera import Distortion
-from viewsphere.model.scene import Background, Finish, Scene, View
+from viewsphere.model.scene import Background, Finish, Scene, ViewTransform
 from viewsphere.truth.visibility import rasterize
 
 SIZE, FINE = 48, 8
 GREY = Background(color=(0.6, 0.6, 0.6))
-LIGHT = Scene(sun=None, finish=Finish(background=GREY, view=View(transform="raw")))
+LIGHT = Scene(sun=None, finish=Finish(background=GREY, view=ViewTransform(transform="raw")))
 WALL = unlit(color=(0.7, 0.7, 0.7, 1.0))
 DARK = unlit(color=(0.05, 0.05, 0.05, 1.0))
 FILM = unlit(color=(0.1, 0.2, 0.4, 0.5), alpha_mode="BLEND")

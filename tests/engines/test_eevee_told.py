@@ -16,11 +16,11 @@ from viewsphere.blender.interpreter import VARIABLE
 from viewsphere.engines import eevee, workbench
 from viewsphere.engines._blender.backdrop import Backdrop
 from viewsphere.engines._blender.options import EEVEE_PRESETS, WORKBENCH_PRESETS, Eevee, Workbench, options_of
-from viewsphere.engines._blender.requests import told_scene, told_settings
+from viewsphere.engines._blender.requests import scene_request, settings_request
 from viewsphere.engines._blender.staging import SPARE, clip_of
 from viewsphere.errors import RecipeError
 from viewsphere.imaging.finish import finished
-from viewsphere.sampling.look import engine_look
+from viewsphere.sampling.engine_digest import engine_digest
 from viewsphere.truth.geometry import build_geometry
 from viewsphere.truth.visibility import rasterize
 
@@ -45,7 +45,7 @@ def geometry_of(shot):
 
 def test_they_are_engines_of_their_own():
     assert {"cycles", *NAMES} <= set(plugins.names("engines"))
-    assert len({engine_look(name) for name in ("cycles", *NAMES)}) == 3
+    assert len({engine_digest(name) for name in ("cycles", *NAMES)}) == 3
 
 
 def test_presets_differ_and_other_options_change_them():
@@ -55,7 +55,7 @@ def test_presets_differ_and_other_options_change_them():
         assert presets["draft"].samples < presets["good"].samples < presets["final"].samples
     changed = options_of("eevee", {"quality": "draft", "samples": 9, "raytracing": True, "settings": {"gi_diffuse_bounces": 1}})
     assert changed == Eevee(samples=9, raytracing=True, settings={"gi_diffuse_bounces": 1})
-    assert told_settings(changed) | {"python": None} == {
+    assert settings_request(changed) | {"python": None} == {
         "renderer": "eevee",
         "samples": 9,
         "raytracing": True,
@@ -125,7 +125,7 @@ def test_plan_refuses_a_catcher_by_the_recipe_s_line(tmp_path):
 def test_what_is_told_is_plain_and_light_comes_from_above(scene):
     shot = shot_of({"name": "workbench"}, scene=scene)
     geometry, meshes = geometry_of(shot)
-    told = told_scene(shot.things, meshes, geometry, shot.scene, options_of("workbench", {}), lambda array: "array")
+    told = scene_request(shot.things, meshes, geometry, shot.scene, options_of("workbench", {}), lambda array: "array")
     assert json.loads(json.dumps(told)).keys() == told.keys()
     above, below = np.array(told["hemispheres"])
     assert (above > 0).all() and (below > 0).all()
@@ -136,7 +136,7 @@ def test_the_ground_fades_where_blender_is_told_to():
     """Workbench's, which is faded here, and the others', by Blender's nodes."""
     shot = shot_of({"name": "workbench"}, scene={"ground": "on"})
     geometry, meshes = geometry_of(shot)
-    told = told_scene(shot.things, meshes, geometry, shot.scene, options_of("workbench", {}), lambda array: "array")
+    told = scene_request(shot.things, meshes, geometry, shot.scene, options_of("workbench", {}), lambda array: "array")
     fading, backdrop = told["ground"]["fading"], Backdrop.of(shot, geometry)
     camera = moved_camera(shot, backdrop.middle - shot.instants[0].focus)
     before = np.linalg.norm(backdrop.middle - camera.center)

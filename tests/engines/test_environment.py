@@ -12,7 +12,7 @@ from called import called
 from viewsphere.engines.raster import kernels_block as rows
 from viewsphere.engines.raster.environment import bake_surrounding, sky_behind, sky_lights, without_sun
 from viewsphere.engines.raster.kernels_light import light_around
-from viewsphere.engines.raster.records import View
+from viewsphere.engines.raster.records import PictureRays
 from viewsphere.errors import UserError
 from viewsphere.model.scene import Daylight, Environment, Sky, Sun
 from viewsphere.surroundings.daylight import air, daylight_picture
@@ -240,7 +240,7 @@ def look(width, height, focal, toward=(1.0, 0.0, 0.0)):
     rotation = np.stack([right, np.cross(forward, right), forward]).astype(np.float32)
     lens = np.array([[1 / focal, 0, -width / 2 / focal], [0, 1 / focal, -height / 2 / focal]], np.float32)
     none = np.zeros((0, 3), np.float32)
-    return View(np.zeros(3, np.float32), rotation, lens, none, np.uint32(width), np.float32(1 / focal), np.float32(1))
+    return PictureRays(np.zeros(3, np.float32), rotation, lens, none, np.uint32(width), np.float32(1 / focal), np.float32(1))
 
 
 def background(view, surrounding, width, height):

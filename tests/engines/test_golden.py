@@ -31,7 +31,7 @@ from viewsphere.model.scene import (
     Sky,
     SpotLight,
     Sun,
-    View,
+    ViewTransform,
 )
 from viewsphere.model.thing import Thing
 from viewsphere.run.stages import Stages
@@ -52,7 +52,7 @@ SCENES = {
             sun=Sun(azimuth_deg=200, elevation_deg=25),
             sky=Daylight(turbidity=4, clouds=0.2),
             ground=Ground(color=(0.5, 0.45, 0.4), roughness=0.5),
-            finish=Finish(view=View(transform="agx", exposure=0.3)),
+            finish=Finish(view=ViewTransform(transform="agx", exposure=0.3)),
         ),
     ),
     "chair": (
@@ -68,7 +68,7 @@ SCENES = {
                 PointLight(position=(-1, -1, 0.5), strength=1.5, radius=0.05, color=(0.5, 0.6, 1)),
             ),
             ground=Ground(color=(0.6, 0.58, 0.55)),
-            finish=Finish(view=View(transform="filmic")),
+            finish=Finish(view=ViewTransform(transform="filmic")),
         ),
     ),
     "hair_drier": (

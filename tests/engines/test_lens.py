@@ -18,7 +18,7 @@ from viewsphere.geometry.camera import pixel_rays, project
 from viewsphere.labels import observe
 from viewsphere.model.camera import Camera, Distortion, Intrinsics
 from viewsphere.model.model_spec import ModelSpec
-from viewsphere.model.scene import Background, Finish, Scene, View
+from viewsphere.model.scene import Background, Finish, Scene, ViewTransform
 from viewsphere.model.thing import Motion, Thing
 from viewsphere.truth.visibility import rasterize
 
@@ -82,7 +82,7 @@ def stage():
     shot = still_shot(
         things,
         lens("barrel"),
-        scene=Scene(sun=None, finish=Finish(background=Background(color=(0, 0, 0)), view=View(transform="raw"))),
+        scene=Scene(sun=None, finish=Finish(background=Background(color=(0, 0, 0)), view=ViewTransform(transform="raw"))),
         engine_options={"antialias": 1, "ambient_occlusion": "off"},
     )
     return raster.stage(shot, lambda spec, step=None: meshes[int(spec.key)]), meshes

@@ -33,14 +33,14 @@ from viewsphere.model.scene import (
     Sky,
     SpotLight,
     Sun,
-    View,
+    ViewTransform,
 )
 from viewsphere.model.thing import Thing
 from viewsphere.truth.visibility import rasterize
 
 SPEC = ModelSpec(key="model", source="memory", category="thing", category_id=1)
 DARK = Sky(strength=0.0)
-AS_IT_IS = View(transform="raw", exposure=math.log2(1 / EXPOSURE))
+AS_IT_IS = ViewTransform(transform="raw", exposure=math.log2(1 / EXPOSURE))
 """A radiance of 1 is white."""
 
 
@@ -362,7 +362,7 @@ def test_bytes_are_the_light_through_the_curve_and_colours_come_back():
     uv = np.array([(0, 1), (1, 1), (1, 0), (0, 1), (1, 0), (0, 0)], np.float32)
     texture = Material(unlit=True, base_color_texture=Texture(0))
     shown = replace(card, materials=(texture,), images=(Image("all", pixels),), uv0=uv)
-    finish = Finish(background=Background(color=(0, 0, 0)), view=View(transform="raw"))
+    finish = Finish(background=Background(color=(0, 0, 0)), view=ViewTransform(transform="raw"))
     seen = picture(shown, Scene(finish=finish), camera(16, 16, 10.0))
     assert np.array_equal(seen, pixels[..., :3])
     stage = stage_of([card], Scene())
@@ -385,7 +385,7 @@ def test_transparent_layers_lie_over_one_another_as_they_stand(azimuth, antialia
         materials=tuple(Material(unlit=True, base_color=colors[k], alpha_mode="BLEND") for k in order),
     )
     background = (0.2, 0.5, 0.8)
-    scene = Scene(sun=None, finish=Finish(background=Background(color=background), view=View(transform="raw")))
+    scene = Scene(sun=None, finish=Finish(background=Background(color=background), view=ViewTransform(transform="raw")))
     seen = picture(mesh, scene, camera(20, 20, 60, azimuth, 0, 4, (0, 0.3, 0)), antialias=antialias)
     light = linear(np.array(background))
     for k in (2, 1, 0) if azimuth != 180 else (0, 1, 2):
@@ -405,7 +405,7 @@ def test_a_magnified_blended_texture_fades_from_texel_to_texel(wrap, antialias):
     uv = (mesh.vertices[:, ::2] + 1) / 2
     mesh = replace(mesh, uv0=uv, images=(Image("spot", pixels),))
     background = (0.2, 0.5, 0.8)
-    scene = Scene(sun=None, finish=Finish(background=Background(color=background), view=View(transform="raw")))
+    scene = Scene(sun=None, finish=Finish(background=Background(color=background), view=ViewTransform(transform="raw")))
     view = camera(100, 5, 200, 0, 0, 4, (0, 0, 0))  # 100 pixels are 2 metres
     seen = picture(mesh, scene, view, antialias=antialias)
     texel = (np.arange(100) + 0.5) / 25 - 0.5

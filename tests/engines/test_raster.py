@@ -18,7 +18,7 @@ from viewsphere.geometry.camera import orbit_center, orbit_rotation
 from viewsphere.imaging.view import EXPOSURE, KNEE
 from viewsphere.model.camera import Camera, Distortion, Intrinsics
 from viewsphere.model.model_spec import ModelSpec
-from viewsphere.model.scene import Background, Finish, Ground, Scene, Sky, Sun, View
+from viewsphere.model.scene import Background, Finish, Ground, Scene, Sky, Sun, ViewTransform
 from viewsphere.model.thing import Thing
 from viewsphere.truth.visibility import rasterize
 
@@ -95,7 +95,7 @@ def stage_of(mesh: Mesh, scene: Scene, **options):
     return raster.stage(shot, lambda _: mesh)
 
 
-AS_IT_IS = Finish(background=BLACK, view=View(transform="raw"))
+AS_IT_IS = Finish(background=BLACK, view=ViewTransform(transform="raw"))
 """Unlit colours are shown as they are, also those above the shoulder of the standard view."""
 
 
@@ -215,7 +215,7 @@ def test_exposure_is_in_stops():
     mesh = mesh_of(rectangle((-1, -1, 0), (2, 0, 0), (0, 2, 0)), Material(roughness=1.0, ior=1.0))
     scene = Scene(sun=Sun(elevation_deg=90, strength=0.5, color=(1, 1, 1)), sky=DARK, finish=Finish(background=BLACK))
     view = camera(8, 8, 10.0, elevation=90)
-    finishes = (Finish(background=BLACK, view=View(exposure=e)) for e in (0, 1))
+    finishes = (Finish(background=BLACK, view=ViewTransform(exposure=e)) for e in (0, 1))
     plain, brighter = (picture(mesh, scene.model_copy(update={"finish": f}), view) for f in finishes)
     ratio = linear_light(brighter[0, 0] / 255) / linear_light(plain[0, 0] / 255)
     np.testing.assert_allclose(ratio, 2.0, rtol=0.03)
@@ -385,7 +385,7 @@ def test_distorted_colour_follows_the_labels(lens):
     mesh = mesh_of(card(1.0, 0.6), unlit(color=(1.0, 0.0, 0.0, 1.0)))
     view = camera(64, 64, 50.0, 25, 30, 1.2, distortion=lens)
     stage = stage_of(
-        mesh, Scene(finish=Finish(background=Background(color=(0, 0, 1)), view=View(transform="raw"))), antialias=1
+        mesh, Scene(finish=Finish(background=Background(color=(0, 0, 1)), view=ViewTransform(transform="raw"))), antialias=1
     )
     visible = rasterize(stage.at(0), view)
     seen = painted(stage, view)
@@ -426,7 +426,7 @@ def test_blended_surface_shows_what_is_behind():
     )
     seen = picture(
         both,
-        Scene(finish=Finish(background=Background(color=(0, 0, 1)), view=View(transform="raw"))),
+        Scene(finish=Finish(background=Background(color=(0, 0, 1)), view=ViewTransform(transform="raw"))),
         camera(16, 16, 16.0, distance=2.0),
     )
     assert seen[8, 3].tolist() == as_bytes([0.25, 0.75, 0.0]).tolist()

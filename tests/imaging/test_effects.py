@@ -20,7 +20,7 @@ from viewsphere.imaging.finish import finished
 from viewsphere.imaging.seen import Seen
 from viewsphere.imaging.view import develop, to_bytes
 from viewsphere.model.camera import Intrinsics
-from viewsphere.model.scene import Background, Effects, Finish, Smoother, View
+from viewsphere.model.scene import Background, Effects, Finish, Smoother, ViewTransform
 
 H, W = 96, 160
 LENS = Intrinsics(width=W, height=H, fx=200, fy=200, cx=W / 2, cy=H / 2)
@@ -70,7 +70,7 @@ def test_every_effect_changes_something_stays_in_range_and_repeats(name, channel
     out = finished(light, None, finish, lambda: known)
     assert out.dtype == np.uint8
     assert out.shape == (H, W, channels)
-    assert not np.array_equal(out, develop(light, None, View(), alpha=channels == 4))
+    assert not np.array_equal(out, develop(light, None, ViewTransform(), alpha=channels == 4))
     assert np.array_equal(out, finished(light, None, finish, lambda: known))
     if name != "jpeg":
         picture = apply_effects(noise_picture(channels), finish.effects, known)
@@ -87,7 +87,7 @@ def test_a_plain_finish_asks_for_no_truth():
     def unasked() -> Seen:
         raise AssertionError
 
-    assert np.array_equal(finished(light, None, Finish(), unasked), develop(light, None, View()))
+    assert np.array_equal(finished(light, None, Finish(), unasked), develop(light, None, ViewTransform()))
     with pytest.raises(AssertionError):
         finished(light, None, Finish(smoother=Smoother(kind="box")), unasked)
 

@@ -1,4 +1,4 @@
-"""View transforms, white balance, composites and the sRGB curve."""
+"""ViewTransform transforms, white balance, composites and the sRGB curve."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from viewsphere.assets.srgb import linear
 from viewsphere.imaging.curve import display_linear, srgb_bytes
 from viewsphere.imaging.view import EXPOSURE, KNEE, TRANSFORMS, agx_sigmoid, develop, to_bytes, to_display_linear
 from viewsphere.imaging.white import XYZ_FROM_SRGB, white_balance, white_xyz
-from viewsphere.model.scene import View
+from viewsphere.model.scene import ViewTransform
 
 GREYS = np.concatenate([[0.0], np.geomspace(1e-4, 1e3, 499)])
 
@@ -23,7 +23,7 @@ def opaque(colors) -> np.ndarray:
 def shown(colors, transform="standard", **view) -> np.ndarray:
     """Display-linear colours (N, 3) of exposed light, that is with the base exposure taken out."""
     light = opaque(np.asarray(colors) / EXPOSURE)
-    return to_display_linear(light, None, View(transform=transform, **view))[0]
+    return to_display_linear(light, None, ViewTransform(transform=transform, **view))[0]
 
 
 def test_every_byte_survives_the_curve_there_and_back():
@@ -36,14 +36,14 @@ def test_backgrounds_are_shown_exactly_whatever_the_view():
     pixels = np.random.default_rng(0).integers(0, 256, (48, 37, 3), np.uint8)
     nothing = np.zeros((48, 37, 4), np.float32)
     for transform in TRANSFORMS:
-        view = View(exposure=3, temperature_k=3000, tint=0.5, transform=transform)
+        view = ViewTransform(exposure=3, temperature_k=3000, tint=0.5, transform=transform)
         assert np.array_equal(develop(nothing, display_linear(pixels).reshape(-1, 3), view), pixels)
 
 
 def test_one_colour_stands_for_a_whole_background():
     one = np.array([[0.1, 0.2, 0.9]], np.float32)
     light = np.random.default_rng(1).random((20, 30, 4), np.float32)
-    assert np.array_equal(develop(light, one, View()), develop(light, np.repeat(one, 600, axis=0), View()))
+    assert np.array_equal(develop(light, one, ViewTransform()), develop(light, np.repeat(one, 600, axis=0), ViewTransform()))
 
 
 @pytest.mark.parametrize("transform", TRANSFORMS)
@@ -51,7 +51,7 @@ def test_both_ways_to_bytes_agree(transform):
     rng = np.random.default_rng(2)
     light = rng.random((40, 50, 4), np.float32) * np.float32(2)
     background = rng.random((2000, 3), np.float32)
-    view = View(transform=transform, temperature_k=4500)
+    view = ViewTransform(transform=transform, temperature_k=4500)
     for alpha in (False, True):
         slow = to_bytes(to_display_linear(light, background, view, alpha)).astype(int)
         assert np.abs(slow - develop(light, background, view, alpha)).max() <= 1
@@ -160,7 +160,7 @@ def test_edges_have_no_fringe_on_any_background():
     for object_light in (0.0, KNEE / EXPOSURE):
         light = np.concatenate([coverage[:, None].repeat(3, 1) * object_light, coverage[:, None]], axis=1)[None]
         for behind in (0.0, 1.0):
-            out = to_display_linear(light.astype(np.float32), np.full((1, 3), behind, np.float32), View())[0]
+            out = to_display_linear(light.astype(np.float32), np.full((1, 3), behind, np.float32), ViewTransform())[0]
             expected = behind + (object_light * EXPOSURE - behind) * coverage
             assert np.allclose(out, expected[:, None], atol=1e-6)
 
@@ -169,7 +169,7 @@ def test_transparent_pictures_hold_the_objects_own_colour_at_their_edges():
     coverage = np.array([0, 0.02, 0.5, 1], np.float32)
     color = np.array([0.5, 0.2, 0.1], np.float32)
     light = np.concatenate([coverage[:, None] * color, coverage[:, None]], axis=1)[None]
-    out = develop(light, None, View(), alpha=True)[0]
+    out = develop(light, None, ViewTransform(), alpha=True)[0]
     assert out[:, 3].tolist() == [0, 5, 128, 255]
     assert out[0].tolist() == [0, 0, 0, 0]
     assert (out[1:, :3] == out[3, :3]).all()
@@ -179,5 +179,5 @@ def test_light_that_is_no_number_makes_no_noise():
     light = opaque(np.full((70, 3), 0.5))
     light[0, 3], light[0, 4, 3], light[0, 5, :3] = np.nan, np.nan, np.inf
     for transform in TRANSFORMS:
-        view = View(transform=transform)
+        view = ViewTransform(transform=transform)
         assert np.array_equal(develop(light, None, view)[0, 10:], develop(opaque(np.full((70, 3), 0.5)), None, view)[0, 10:])

@@ -7,8 +7,8 @@ import pytest
 from small import small_recipe, tree_hash
 from viewsphere.errors import RecipeError, StoreError
 from viewsphere.run.generate import generate
+from viewsphere.sampling.engine_digest import engine_digest
 from viewsphere.sampling.fitting import LOOK
-from viewsphere.sampling.look import engine_look
 from viewsphere.store import Store
 from viewsphere.store.manifest import sealed, unsealed
 
@@ -47,7 +47,7 @@ def painted_by(out, look):
 
 
 def test_it_is_of_the_sources():
-    assert len(engine_look("raster")) == 16
+    assert len(engine_digest("raster")) == 16
 
 
 def test_resuming_with_another_engine_is_refused_and_nothing_is_lost(half):
@@ -60,7 +60,7 @@ def test_resuming_with_another_engine_is_refused_and_nothing_is_lost(half):
     assert tree_hash(half) == before
 
 
-@pytest.mark.parametrize("look", [None, engine_look("raster")])
+@pytest.mark.parametrize("look", [None, engine_digest("raster")])
 def test_resuming_with_the_same_goes_on(half, look):
     painted_by(half, look)
     assert generate(small_recipe(**RECIPE), half).rendered == 3

@@ -13,7 +13,7 @@ from viewsphere.model.shot import Shot
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.sampling.distances import Distances
 from viewsphere.sampling.plan import check_images, plan
-from viewsphere.zoo.places import Piece, Place, standing
+from viewsphere.zoo.places import Place, PlacePiece, standing
 
 
 def box_of(spec, step=None):
@@ -43,9 +43,9 @@ def tiny(monkeypatch):
     """A place of three kinds of thing; how many trees, and which house, is drawn."""
 
     def tiny_random(rng):
-        trees = [Piece(f"tree{i}", "tree", i, "tree", standing(8, 3.0 * i)) for i in range(rng.integers(1, 5))]
-        house = Piece("house", "house", int(rng.integers(1 << 20)), "house", standing(-9, 0, 90))
-        return Place((Piece("street", "street", 1, "street", standing(0, 0)), house, *trees), free=(-3, -40, 3, 40))
+        trees = [PlacePiece(f"tree{i}", "tree", i, "tree", standing(8, 3.0 * i)) for i in range(rng.integers(1, 5))]
+        house = PlacePiece("house", "house", int(rng.integers(1 << 20)), "house", standing(-9, 0, 90))
+        return Place((PlacePiece("street", "street", 1, "street", standing(0, 0)), house, *trees), free=(-3, -40, 3, 40))
 
     real = plugins.place
     monkeypatch.setattr(

@@ -25,7 +25,7 @@ from viewsphere.model.scene import (
     Smoother,
     SpotLight,
     Sun,
-    View,
+    ViewTransform,
 )
 from viewsphere.model.shot import Shot
 from viewsphere.recipe.recipe import Recipe
@@ -95,8 +95,8 @@ CONCRETE = [
     ({"background": "transparent"}, {"ground": None, "finish": Finish(background=Background(transparent=True))}),
     ({"background": "white"}, {"ground": None, "finish": Finish(background=Background(color=(1, 1, 1)))}),
     ({"smoother": "box"}, {"finish": Finish(smoother=Smoother(kind="box"))}),
-    ({"view": "agx"}, {"finish": Finish(view=View(transform="agx"))}),
-    ({"view": {"exposure": -1, "tint": 0.2}}, {"finish": Finish(view=View(exposure=-1, tint=0.2))}),
+    ({"view": "agx"}, {"finish": Finish(view=ViewTransform(transform="agx"))}),
+    ({"view": {"exposure": -1, "tint": 0.2}}, {"finish": Finish(view=ViewTransform(exposure=-1, tint=0.2))}),
     ({"effects": {"blur": 0.1, "focus": 4}}, {"finish": Finish(effects=Effects(blur=0.1, focus=4))}),
     (
         {"lights": {"position": [1, 2, 3], "strength": 4, "color": "#ff0000"}},

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from viewsphere.errors import StoreError
-from viewsphere.store.manifest import MANIFEST, Manifest, digest, sealed, told_of, unsealed
+from viewsphere.store.manifest import MANIFEST, Manifest, digest, seal_of, sealed, unsealed
 
 PLAIN = st.dictionaries(
     st.text(max_size=8), st.recursive(st.none() | st.integers() | st.text(max_size=9), st.lists, max_leaves=4)
@@ -45,7 +45,7 @@ def test_an_untouched_folder_has_no_damage(folder):
     assert set(manifest.files) == {"frames.json", "depth/1.tiff", "depth/2.tiff"}
     assert list(manifest.damage(folder)) == []
     data = (folder / "depth/1.tiff").read_bytes()
-    assert told_of(folder / "depth/1.tiff") == (len(data), digest(data)) == manifest.files["depth/1.tiff"]
+    assert seal_of(folder / "depth/1.tiff") == (len(data), digest(data)) == manifest.files["depth/1.tiff"]
     manifest.check("depth/1.tiff", data, folder)
 
 

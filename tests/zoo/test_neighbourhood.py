@@ -11,7 +11,7 @@ import pytest
 from viewsphere import plugins, zoo
 from viewsphere.assets.mesh import Mesh
 from viewsphere.errors import UserError
-from viewsphere.zoo.places import Piece, Place, places, standing
+from viewsphere.zoo.places import Place, PlacePiece, places, standing
 from viewsphere.zoo.places.neighbourhood import Neighbourhood, neighbourhood, neighbourhood_random
 
 SEEDS = range(12)
@@ -22,11 +22,11 @@ def drawn(seed: int) -> Place:
     return neighbourhood_random(np.random.default_rng(seed))
 
 
-def of(place: Place, *families: str) -> list[Piece]:
+def of(place: Place, *families: str) -> list[PlacePiece]:
     return [p for p in place.pieces if p.family in families]
 
 
-def at(piece: Piece) -> np.ndarray:
+def at(piece: PlacePiece) -> np.ndarray:
     return np.array(piece.world_from_piece)[:3, 3]
 
 
@@ -37,7 +37,7 @@ def built() -> tuple[Place, dict[tuple[str, int], Mesh]]:
     return place, {key: zoo.build(key[0], np.random.default_rng(key[1])) for key in sorted(keys)}
 
 
-def in_world(built: tuple[Place, dict[tuple[str, int], Mesh]], *families: str) -> Iterator[tuple[Piece, np.ndarray, Mesh]]:
+def in_world(built: tuple[Place, dict[tuple[str, int], Mesh]], *families: str) -> Iterator[tuple[PlacePiece, np.ndarray, Mesh]]:
     """Pieces with their vertices in the world, (V, 3)."""
     place, meshes = built
     for piece in of(place, *families) if families else place.pieces:

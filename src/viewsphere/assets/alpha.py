@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.assets.mesh import Image, Material, Texture
-from viewsphere.assets.piece import Float, Piece
+from viewsphere.assets.primitive import Float, Primitive
 
 SOLID = 250
 """Texels with at least this alpha are taken as opaque."""
@@ -22,7 +22,7 @@ BINARY_SHARE = 0.02
 """A material of whose visible texels at most this share is neither clear nor solid is a cut-out (MASK)."""
 
 
-def with_alpha_modes(pieces: Sequence[Piece], materials: Sequence[Material], images: Sequence[Image]) -> list[Material]:
+def with_alpha_modes(pieces: Sequence[Primitive], materials: Sequence[Material], images: Sequence[Image]) -> list[Material]:
     """The materials; opaque ones get the alpha mode that suits the texels visible on their triangles.
 
     Texels between the islands of an atlas are not visible and do not count. Texels on the rim of an island do not count
@@ -36,7 +36,7 @@ def with_alpha_modes(pieces: Sequence[Piece], materials: Sequence[Material], ima
 
 
 def _mode(
-    index: int, material: Material, pieces: Sequence[Piece], images: Sequence[Image]
+    index: int, material: Material, pieces: Sequence[Primitive], images: Sequence[Image]
 ) -> Literal["OPAQUE", "MASK", "BLEND"]:
     texture = material.base_color_texture
     if texture is None:

@@ -31,7 +31,7 @@ from viewsphere.assets.mesh import Mesh
 from viewsphere.assets.mesh_file import read_mesh
 from viewsphere.assets.normalise import normalise
 from viewsphere.assets.parts import taken
-from viewsphere.assets.piece import FileFacts, extents
+from viewsphere.assets.primitive import FileFacts, extents
 from viewsphere.errors import ModelError
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.thing import TimeStep

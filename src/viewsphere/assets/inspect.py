@@ -12,7 +12,7 @@ import numpy as np
 from viewsphere.assets.cache import load
 from viewsphere.assets.load import PICTURE_SUFFIXES
 from viewsphere.assets.mesh import Material, Mesh
-from viewsphere.assets.piece import FileFacts
+from viewsphere.assets.primitive import FileFacts
 from viewsphere.model.model_spec import Axis, ModelSpec, Size
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from viewsphere.assets.folder import ModelFolder
 from viewsphere.assets.inside import split_source
 from viewsphere.assets.mesh import Mesh
-from viewsphere.assets.piece import FileFacts
+from viewsphere.assets.primitive import FileFacts
 from viewsphere.errors import ModelError
 
 SUFFIXES = ("3mf", "dae", "glb", "gltf", "obj", "off", "ply", "stl")

@@ -10,7 +10,7 @@ from typing import Any, cast
 import numpy as np
 
 from viewsphere.assets.mesh import Image, Material, Mesh, Texture
-from viewsphere.assets.piece import TEXTURE_FIELDS, FileFacts
+from viewsphere.assets.primitive import TEXTURE_FIELDS, FileFacts
 
 ARRAYS = ("vertices", "triangles", "normals", "triangle_material", "triangle_part", "uv0", "uv1", "colors")
 FACTS = ("format", "up", "forward", "unit", "origin", "size")

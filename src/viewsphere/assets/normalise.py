@@ -8,7 +8,7 @@ import numpy as np
 
 from viewsphere.assets import limits
 from viewsphere.assets.mesh import Mesh
-from viewsphere.assets.piece import FileFacts, Float, face_normals, unit_normals
+from viewsphere.assets.primitive import FileFacts, Float, face_normals, unit_normals
 from viewsphere.errors import ModelError
 from viewsphere.model.model_spec import Axis, ModelSpec, Size
 

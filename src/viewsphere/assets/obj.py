@@ -14,8 +14,8 @@ from viewsphere.assets.alpha import with_alpha_modes
 from viewsphere.assets.folder import ModelFolder, UnreadableError
 from viewsphere.assets.mesh import Material, Mesh
 from viewsphere.assets.mtl import read_materials
-from viewsphere.assets.piece import FileFacts, Float, Int, Piece, assemble, compact
 from viewsphere.assets.polygon import triangulate
+from viewsphere.assets.primitive import FileFacts, Float, Int, Primitive, assemble, compact
 from viewsphere.assets.smoothing import creased
 from viewsphere.assets.srgb import linear
 from viewsphere.assets.text import decode, statements
@@ -121,7 +121,7 @@ class _Source:
         return [whole if whole != "object" else name or whole for name in self.groups]
 
 
-def _whole(folder: ModelFolder, source: _Source) -> tuple[Piece, Int]:
+def _whole(folder: ModelFolder, source: _Source) -> tuple[Primitive, Int]:
     """All triangles as one piece, and the face of each."""
     positions, colors = _vertices(source.v)
     uv = np.nan_to_num(_padded(_rows(source.vt, 2), 2, 0.0))
@@ -131,7 +131,7 @@ def _whole(folder: ModelFolder, source: _Source) -> tuple[Piece, Int]:
     indices = _corner_indices(folder, list(table), (len(positions), len(uv), len(vectors)))
     at, uv_at, normal_at = indices.T
     cut, owner = triangulate(positions[at], corners, np.array(source.counts))
-    whole = Piece(
+    whole = Primitive(
         part="",
         material=0,
         positions=positions[at],
@@ -254,7 +254,7 @@ def _libraries(folder: ModelFolder, line: str) -> list[str]:
     return texts
 
 
-def _pieces(whole: Piece, part: Int, names: list[str], material: Int) -> list[Piece]:
+def _pieces(whole: Primitive, part: Int, names: list[str], material: Int) -> list[Primitive]:
     """The whole cut by part and material, in order of the file's first face of each."""
     key = part * (int(material.max()) + 1) + material
     _, first, run = np.unique(key, return_index=True, return_inverse=True)
@@ -262,7 +262,7 @@ def _pieces(whole: Piece, part: Int, names: list[str], material: Int) -> list[Pi
     rank[np.argsort(first)] = np.arange(len(first))
     run = rank[run.reshape(-1)]
     order = np.argsort(run, kind="stable")
-    pieces: list[Piece] = []
+    pieces: list[Primitive] = []
     for members in np.split(order, np.flatnonzero(np.diff(run[order])) + 1):
         run_piece = replace(whole, triangles=whole.triangles[members], material=int(material[members[0]]))
         pieces.append(compact(replace(run_piece, part=names[int(part[members[0]])])))

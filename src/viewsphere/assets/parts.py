@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.assets.mesh import Mesh
-from viewsphere.assets.piece import used_images
+from viewsphere.assets.primitive import used_images
 from viewsphere.errors import ModelError
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.model_spec import ModelSpec, Parts

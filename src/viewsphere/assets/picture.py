@@ -7,7 +7,7 @@ import numpy as np
 from viewsphere.assets.alpha import with_alpha_modes
 from viewsphere.assets.folder import SHARPEST, ModelFolder, UnreadableError, decode_image, reduced
 from viewsphere.assets.mesh import Image, Material, Mesh, Texture
-from viewsphere.assets.piece import FileFacts, Piece, assemble
+from viewsphere.assets.primitive import FileFacts, Primitive, assemble
 
 
 def read_picture(folder: ModelFolder) -> tuple[Mesh, FileFacts]:
@@ -28,7 +28,7 @@ def read_picture(folder: ModelFolder) -> tuple[Mesh, FileFacts]:
     height, width = pixels.shape[:2]
     half = width / height / 2
     name = folder.model.stem
-    plane = Piece(
+    plane = Primitive(
         part=name,
         material=0,
         positions=np.array([[-half, 0.0, 0.0], [half, 0.0, 0.0], [half, 0.0, 1.0], [-half, 0.0, 1.0]]),

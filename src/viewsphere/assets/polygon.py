@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from viewsphere.assets.piece import Float, Int
+from viewsphere.assets.primitive import Float, Int
 from viewsphere.assets.transform import unit
 
 MAX_EARS = 2_048

@@ -9,20 +9,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.assets.piece import Float, Int, Piece, face_normals, pick
+from viewsphere.assets.primitive import Float, Int, Primitive, face_normals, pick
 from viewsphere.assets.transform import unit
 
 CREASE_DEG = 40.0
 MAX_VALENCE = 64
 
 
-def flat(piece: Piece) -> Piece:
+def flat(piece: Primitive) -> Primitive:
     """The piece with unshared vertices, each corner having its face's normal."""
     faces = face_normals(piece.positions, piece.triangles)
     return replace(split(piece), normals=np.repeat(unit(faces), 3, axis=0))
 
 
-def creased(piece: Piece, groups: NDArray[np.int64] | None = None) -> Piece:
+def creased(piece: Primitive, groups: NDArray[np.int64] | None = None) -> Primitive:
     """The piece with normals that are smooth across edges and sharp at creases.
 
     A corner's normal is the mean, weighted by the angles at the corner's point, of the normals of the faces around this point
@@ -81,13 +81,13 @@ def angle_of(sine: Float, cosine: Float) -> Float:
     return 16.0 * np.nan_to_num(tangent * series)
 
 
-def split(piece: Piece) -> Piece:
+def split(piece: Primitive) -> Primitive:
     """The piece with unshared vertices: three for every triangle."""
     corners = piece.triangles.reshape(-1)
     return replace(pick(piece, corners), triangles=np.arange(len(corners)).reshape(-1, 3))
 
 
-def _welded(piece: Piece, vertex: Int) -> Piece:
+def _welded(piece: Primitive, vertex: Int) -> Primitive:
     """Join corners that came from the same vertex and have the same normal."""
     assert piece.normals is not None
     bits = np.ascontiguousarray(piece.normals.astype(np.float32)).view(np.int32)

@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from viewsphere.assets.piece import Float, Piece
+from viewsphere.assets.primitive import Float, Primitive
 from viewsphere.geometry.rotation import transform
 
 
-def moved(piece: Piece, matrix: Float) -> Piece:
+def moved(piece: Primitive, matrix: Float) -> Primitive:
     """The piece under an affine matrix (4, 4); the winding of a mirrored piece is reversed to keep its fronts."""
     linear = matrix[:3, :3]
     mirrored = bool(np.linalg.det(linear) < 0)

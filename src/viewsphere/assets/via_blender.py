@@ -23,7 +23,7 @@ from viewsphere.assets.alpha import SOLID, with_alpha_modes
 from viewsphere.assets.folder import SHARPEST, ModelFolder, reduced
 from viewsphere.assets.mesh import Image, Material, Mesh
 from viewsphere.assets.nodes import Painter, Picture, images_of
-from viewsphere.assets.piece import FileFacts, Float, Piece, assemble
+from viewsphere.assets.primitive import FileFacts, Float, Primitive, assemble
 from viewsphere.assets.transform import moved
 from viewsphere.blender.interpreter import find_blender
 from viewsphere.blender.process import BlenderProcess
@@ -204,7 +204,7 @@ def _built(
     pictures = [_picture(folder, one, i) if i in shown else None for i, one in enumerate(told["images"])]
     painter = Painter(folder, pictures)
     materials: list[Material] = []
-    local: list[Piece] = []
+    local: list[Primitive] = []
     for one in told["pieces"]:
         material = Material(name="default")
         if one["material"] is not None:
@@ -224,7 +224,7 @@ def _built(
     return assemble(folder, pieces, _with_modes(pieces, materials, folder.images), facts)
 
 
-def _piece(told: Mapping[str, Any], material: int) -> Piece:
+def _piece(told: Mapping[str, Any], material: int) -> Primitive:
     def loaded(name: str) -> Float | None:
         return None if told[name] is None else np.load(told[name]).astype(np.float64)
 
@@ -232,7 +232,7 @@ def _piece(told: Mapping[str, Any], material: int) -> Piece:
         uv = loaded(name)
         return None if uv is None else np.column_stack([uv[:, 0], 1 - uv[:, 1]])
 
-    return Piece(
+    return Primitive(
         part="",
         material=material,
         positions=np.load(told["positions"]).astype(np.float64),
@@ -261,7 +261,7 @@ def _picture(folder: ModelFolder, told: Mapping[str, Any], number: int) -> Pictu
     return Picture(index, told["is_srgb"])
 
 
-def _with_modes(pieces: Sequence[Piece], materials: Sequence[Material], images: Sequence[Image]) -> list[Material]:
+def _with_modes(pieces: Sequence[Primitive], materials: Sequence[Material], images: Sequence[Image]) -> list[Material]:
     """The materials with alpha modes that suit their textures' alpha (`alpha`); a rotated texture's alpha always blends."""
     found = with_alpha_modes(pieces, materials, images)
     for i, material in enumerate(materials):

@@ -20,7 +20,7 @@ from viewsphere.assets.alpha import with_alpha_modes
 from viewsphere.assets.folder import ModelFolder, image_pixels
 from viewsphere.assets.instances import count_instances, dae_references, threemf_references
 from viewsphere.assets.mesh import Image, Material, Mesh, Texture
-from viewsphere.assets.piece import FileFacts, Float, Piece, assemble
+from viewsphere.assets.primitive import FileFacts, Float, Primitive, assemble
 from viewsphere.assets.smoothing import creased, split
 from viewsphere.assets.srgb import linear
 from viewsphere.assets.transform import moved
@@ -140,7 +140,7 @@ class _Builder:
     folder: ModelFolder
     materials: list[Material]
 
-    def scene(self, loaded: Mapping[str, Any]) -> list[Piece]:
+    def scene(self, loaded: Mapping[str, Any]) -> list[Primitive]:
         """All geometries where the scene's graph puts them; without a graph each once at the origin."""
         geometry: dict[str, Any] = loaded["geometry"]
         graph: list[dict[str, Any]] = loaded.get("graph") or [
@@ -155,7 +155,7 @@ class _Builder:
             for piece in self.placed(geometry[edge["geometry"]], str(edge["frame_to"]), np.asarray(edge["matrix"]))
         ]
 
-    def placed(self, geometry: Mapping[str, Any], part: str, matrix: Float) -> list[Piece]:
+    def placed(self, geometry: Mapping[str, Any], part: str, matrix: Float) -> list[Primitive]:
         """One geometry's triangles under an affine matrix."""
         vertices, faces = geometry.get("vertices"), geometry.get("faces")
         if vertices is None or faces is None or not len(faces):
@@ -173,7 +173,7 @@ class _Builder:
         if triangles.min() < 0 or triangles.max() >= len(positions):
             raise self.folder.error(f"a face names vertex {triangles.max()}, expected 0 to {len(positions) - 1}")
         visual = geometry.get("visual")
-        piece = Piece(
+        piece = Primitive(
             part=part,
             material=self._material(getattr(visual, "material", None)),
             positions=positions,
@@ -256,7 +256,7 @@ def _vertex_colors(values: Any, count: int) -> Float | None:
     return np.column_stack([linear(unit[:, :3]), alpha])
 
 
-def _with_face_colors(piece: Piece, colors: NDArray[Any]) -> Piece:
+def _with_face_colors(piece: Primitive, colors: NDArray[Any]) -> Primitive:
     """The piece with unshared vertices, each coloured by its face."""
     alone = split(piece)
     return replace(alone, colors=_vertex_colors(np.repeat(colors, 3, axis=0), len(alone.positions)))

@@ -30,7 +30,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from viewsphere.imaging.curve import srgb_bytes
 from viewsphere.imaging.white import white_balance
-from viewsphere.model.scene import View
+from viewsphere.model.scene import ViewTransform
 
 Float32 = NDArray[np.float32]
 Bytes = NDArray[np.uint8]
@@ -48,7 +48,7 @@ AGX_STOPS = (-10.0, 6.5)
 """The range that AgX shows, in stops from middle grey, 0.18."""
 
 
-def develop(radiance: Float32, background: Float32 | None, view: View, alpha: bool = False) -> Bytes:
+def develop(radiance: Float32, background: Float32 | None, view: ViewTransform, alpha: bool = False) -> Bytes:
     """The picture without smoother and effects, (H, W, 3) uint8 sRGB, in one pass over the pixels.
 
     `radiance` (H, W, 4) float32; `background` display-linear, (H * W, 3) or, one colour everywhere, (1, 3); None is black.
@@ -65,7 +65,7 @@ def develop(radiance: Float32, background: Float32 | None, view: View, alpha: bo
     return out
 
 
-def to_display_linear(radiance: Float32, background: Float32 | None, view: View, alpha: bool = False) -> Float32:
+def to_display_linear(radiance: Float32, background: Float32 | None, view: ViewTransform, alpha: bool = False) -> Float32:
     """As `develop`, before the sRGB curve: (H, W, 3) float32 in [0, 1]; with `alpha` (H, W, 4), premultiplied."""
     from viewsphere.imaging import kernels_view as kernels
 
@@ -84,7 +84,7 @@ def to_bytes(picture: Float32) -> Bytes:
     return out
 
 
-def exposure_matrix(view: View) -> Float32:
+def exposure_matrix(view: ViewTransform) -> Float32:
     """White balance and exposure in one matrix, (3, 3) float32: scene-linear to exposed light."""
     return (white_balance(view.temperature_k, view.tint) * (EXPOSURE * 2.0**view.exposure)).astype(np.float32)
 
@@ -115,7 +115,7 @@ def _agx_tables() -> tuple[Float32, Float32]:
     return sigmoid.astype(np.float32), decoded.astype(np.float32)
 
 
-def _blocks(radiance: Float32, background: Float32 | None, view: View) -> Iterator[tuple[Float32, slice, Float32]]:
+def _blocks(radiance: Float32, background: Float32 | None, view: ViewTransform) -> Iterator[tuple[Float32, slice, Float32]]:
     """Blocks of display-linear light, as `kernels_view` has them, the pixels that each block holds, and their background."""
     from viewsphere.imaging import kernels_view as kernels
 

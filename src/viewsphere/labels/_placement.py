@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from viewsphere.geometry.rotation import compose, rigid
 from viewsphere.model.camera import Camera
 from viewsphere.model.model_spec import ModelSpec, Size
-from viewsphere.model.sample import View
+from viewsphere.model.sample import ObjectView
 from viewsphere.model.scene import Matrix4
 from viewsphere.model.thing import TimeStep
 
@@ -79,12 +79,12 @@ class Placement:
         return compose(self.camera_from_world, self.world_from_object)
 
     @cached_property
-    def view(self) -> View:
+    def view(self) -> ObjectView:
         """The camera as the object sees it, around the centre of its box."""
         return view_of(self.camera_from_object, (self.box[2] + self.box[4]) / 2)
 
 
-def view_of(camera_from_object: Float, center: Float) -> View:
+def view_of(camera_from_object: Float, center: Float) -> ObjectView:
     """Orbit angles, distance and tilt of the camera around the point `center` (3,) of the object's own axes.
 
     Azimuth is in [0, 360). Tilt is in [-180, 180]: the camera's roll once it is turned, by the shortest
@@ -97,7 +97,7 @@ def view_of(camera_from_object: Float, center: Float) -> View:
     seen = [_dot(row, middle) + row[3] for row in rows]
     distance = math.hypot(*seen)
     if distance == 0:
-        return View(0.0, 0.0, 0.0, 0.0)
+        return ObjectView(0.0, 0.0, 0.0, 0.0)
     direction = [value / distance for value in seen]
     x, y, z = (-_dot(column, direction) for column in columns)
     level = math.hypot(x, y)
@@ -111,7 +111,7 @@ def view_of(camera_from_object: Float, center: Float) -> View:
         tilt = math.atan2(_dot(facing, down), _dot(facing, right))
     else:
         azimuth, tilt = math.atan2(facing[1], facing[0]), 0.0
-    return View(_degrees(azimuth) % 360.0, _degrees(elevation), distance, _degrees(tilt))
+    return ObjectView(_degrees(azimuth) % 360.0, _degrees(elevation), distance, _degrees(tilt))
 
 
 def _degrees(angle: float) -> float:

@@ -9,7 +9,7 @@ import numpy as np
 
 from viewsphere.geometry.camera import orbit_center
 from viewsphere.labels._label import Field, Models, ObjectLabel, rendered
-from viewsphere.model.sample import Sample, View
+from viewsphere.model.sample import ObjectView, Sample
 
 TOLERANCE = 1e-6
 
@@ -29,6 +29,6 @@ LABEL = ObjectLabel.derived(
     name="view",
     meaning="the camera's orbit around the centre of its box",
     axes="object",
-    fields=(Field("view", "azimuth, elevation and tilt (degrees) and distance (m)", View),),
+    fields=(Field("view", "azimuth, elevation and tilt (degrees) and distance (m)", ObjectView),),
     prove=prove,
 )

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable, Mapping
+from collections.abc import Container, Iterable
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
-
-Observation = Mapping[str, NDArray[Any]]
-"""Named arrays of one sample, each as its `Channel` says."""
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,7 @@ Box = tuple[float, float, float, float]
 
 
 @dataclass(frozen=True)
-class View:
+class ObjectView:
     """The camera as one object sees it: its orbit around the object's box centre, in the object's own axes.
 
     A camera that does not look at that point counts, for the tilt, as turned to it by the shortest way.
@@ -85,7 +85,7 @@ class ObjectAnnotation:
     world_from_object: Float
     camera_from_object: Float
     quaternion: tuple[float, float, float, float]  # camera_from_object's rotation, (w, x, y, z), w >= 0
-    view: View
+    view: ObjectView
     pose_category: str
     size: Size
     real_size: Size | None

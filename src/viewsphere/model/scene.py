@@ -167,7 +167,7 @@ class Background(Frozen):
     blur: Portion = Field(default=0.0, description="of an image: a Gaussian's sigma, as a share of the frame's width")
 
 
-class View(Frozen):
+class ViewTransform(Frozen):
     """From scene-linear light to display-linear: stops of exposure, the light that shall look white, a view transform."""
 
     exposure: float = Field(default=0.0, ge=-16, le=16, description="stops: 1 is twice as bright")
@@ -216,7 +216,7 @@ class Finish(Frozen):
 
     background: Background = Background()
     smoother: Smoother = Smoother()
-    view: View = View()
+    view: ViewTransform = ViewTransform()
     effects: Effects = Effects()
 
     def with_background(self, transparent: bool) -> Finish:

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, Field, model_validator
 
 from viewsphere.model.frozen import Frozen
-from viewsphere.model.scene import Background, Effects, Picture, Smoother, View
+from viewsphere.model.scene import Background, Effects, Picture, Smoother, ViewTransform
 from viewsphere.recipe.draws import Coordinate, Distribution, Drawn, PointDrawn, is_random
 from viewsphere.recipe.entries import entry_of, is_drawn_color, words_of
 from viewsphere.recipe.scenery import Draw
@@ -76,7 +76,7 @@ class SmootherEntry(entry_of(Smoother), PerFrame):
     """What is done to the border between the targets and their background."""
 
 
-class ViewEntry(entry_of(View), PerFrame):
+class ViewEntry(entry_of(ViewTransform), PerFrame):
     """From light to a picture."""
 
 
@@ -106,4 +106,4 @@ def _of(name: str) -> BeforeValidator:
 
 
 SmootherField = Annotated[SmootherEntry, _of("kind"), OrShort({"enum": words_of(Smoother, "kind")})]
-ViewField = Annotated[ViewEntry, _of("transform"), OrShort({"enum": words_of(View, "transform")})]
+ViewField = Annotated[ViewEntry, _of("transform"), OrShort({"enum": words_of(ViewTransform, "transform")})]

@@ -8,9 +8,9 @@ from importlib.metadata import version
 
 from viewsphere.errors import StoreError
 from viewsphere.recipe.recipe import Recipe
+from viewsphere.sampling.engine_digest import engine_digest
 from viewsphere.sampling.extension import Portion, extend, resumed, whole
 from viewsphere.sampling.fitting import LOOK
-from viewsphere.sampling.look import engine_look
 from viewsphere.sampling.plan import Plan, check_engine, check_images, plan
 from viewsphere.store import Part, PlanRecord, Store, check_codecs
 
@@ -84,7 +84,7 @@ def _resumed(planned: Plan, store: Store, found: PlanRecord, number: int) -> Por
 
 def _check_look(planned: Plan, store: Store, found: PlanRecord, number: int) -> None:
     """Raise StoreError where a part's missing frames would be painted otherwise than those that it has."""
-    then, now = found.parts[number].settings.get(LOOK), engine_look(planned.recipe.engine.name)
+    then, now = found.parts[number].settings.get(LOOK), engine_digest(planned.recipe.engine.name)
     if then in (None, now):
         return
     if _is_begun(store, found, number) and not _is_whole(store, found, number):
@@ -95,7 +95,7 @@ def check_whether_same(store: Store, part: Part) -> None:
     """Raise StoreError where a part's frames would not be rendered as they were: by another version, or painted otherwise."""
     _check_versions(store, (part,))
     engine = part.recipe.get("engine", {}).get("name")
-    if engine and part.settings.get(LOOK) not in (None, engine_look(engine)):
+    if engine and part.settings.get(LOOK) not in (None, engine_digest(engine)):
         raise _painted_otherwise(store, engine)
 
 

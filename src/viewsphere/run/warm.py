@@ -27,7 +27,7 @@ from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
 from viewsphere.run.stages import render_sample
 from viewsphere.sampling.camera import looking
-from viewsphere.sampling.look import engine_look
+from viewsphere.sampling.engine_digest import engine_digest
 from viewsphere.store import encode
 
 if TYPE_CHECKING:
@@ -80,7 +80,7 @@ def _mark(small: Shot) -> Path:
     """The file that is there when this shot's kernels are: named by what they are compiled from and by what it uses."""
     scene = _outline(small.model_dump(mode="json", exclude={"engine_options"}))
     used = json.dumps([scene, small.engine_options], sort_keys=True)
-    engine = engine_look(small.engine)
+    engine = engine_digest(small.engine)
     named = hashlib.sha256("\0".join((sources_digest(PACKAGE), engine, used)).encode()).hexdigest()[:16]
     return kernel_folder() / f"{named}.compiled"
 

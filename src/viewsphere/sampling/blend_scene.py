@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 from functools import cached_property, lru_cache
 from pathlib import Path
@@ -22,8 +22,9 @@ from viewsphere.model.thing import Motion, Thing, TimeStep
 from viewsphere.recipe.blend import VALUE, BlendEntry, LabelRule, VariantEntry
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.scenery import Labels
-from viewsphere.sampling.scenery import Naming, Piece, draw_names, scenery_key
+from viewsphere.sampling.scenery import Naming, SceneryPiece, draw_names, scenery_key
 from viewsphere.sampling.seeds import Names, share
+from viewsphere.sampling.sendable import Sendable
 
 NAMES_SAID = 5
 
@@ -41,7 +42,7 @@ class Labelled:
 
 
 @dataclass(frozen=True, eq=False)
-class BlendScenery:
+class BlendScenery(Sendable):
     """The .blend file of a recipe's scene, at the frames that are asked for (none: its first), each with its `seconds`.
     `turn_of` gives the turn of what is shown one after another.
     """
@@ -50,10 +51,6 @@ class BlendScenery:
     entry: BlendEntry
     turn_of: Turn
     seconds: Mapping[int, float] = field(default_factory=dict[int, float])
-
-    def __getstate__(self) -> dict[str, Any]:
-        """What other processes are sent: they ask Blender's cached answers themselves."""
-        return {field.name: getattr(self, field.name) for field in fields(self)}
 
     @property
     def frames(self) -> tuple[int, ...]:
@@ -174,16 +171,16 @@ class BlendScenery:
         """Rigid: the spot where the targets stand is the world's origin."""
         return _rows(_inverse(np.eye(4) if self.entry.at is None else self.file.by_name[self.entry.at].file_from_object))
 
-    def pieces(self, model: str, pose: str | None, category_id: Naming) -> tuple[Piece, ...]:
+    def pieces(self, model: str, pose: str | None, category_id: Naming) -> tuple[SceneryPiece, ...]:
         """The labelled objects that are shown, then all that is background as one piece."""
         return self._pieces(frozenset(self.hidden(model, pose)), category_id)
 
     @cached_property
-    def _pieces(self) -> Callable[[frozenset[str], Naming], tuple[Piece, ...]]:
+    def _pieces(self) -> Callable[[frozenset[str], Naming], tuple[SceneryPiece, ...]]:
         """By what is hidden; the last are kept, because many shots share one."""
 
         @lru_cache(maxsize=16)
-        def pieces(hidden: frozenset[str], category_id: Naming) -> tuple[Piece, ...]:
+        def pieces(hidden: frozenset[str], category_id: Naming) -> tuple[SceneryPiece, ...]:
             own = [self._piece(one, category_id) for one in self.labelled if not hidden.issuperset(one.members)]
             labelled = {name for one in self.labelled for name in one.members}
             shown = [one.name for one in self.file.objects if one.parts and one.name not in labelled | hidden]
@@ -191,7 +188,7 @@ class BlendScenery:
                 return tuple(own)
             without = tuple(sorted(labelled | {n for n in hidden if self.file.by_name[n].parts}))
             rest = self._spec("", "scenery", Parts(without=without), 0, "/".join(sorted(hidden)))
-            return (*own, Piece(rest, self.world_from_file, "background"))
+            return (*own, SceneryPiece(rest, self.world_from_file, "background"))
 
         return pieces
 
@@ -241,7 +238,7 @@ class BlendScenery:
         """The labelled objects' models, of all variants."""
         return (self._piece(one, category_id).model for one in self.labelled)
 
-    def _piece(self, one: Labelled, category_id: Naming) -> Piece:
+    def _piece(self, one: Labelled, category_id: Naming) -> SceneryPiece:
         labels: Labels = "own"
         axes = one.root.file_from_object
         parts = Parts(only=one.members, file_from_axes=_rows(axes))
@@ -250,7 +247,7 @@ class BlendScenery:
             seen = self.steps(spec)[0]
             parts = parts.model_copy(update={"file_from_axes": seen.file_from_axes})
             spec = spec.model_copy(update={"rest": seen.frame, "parts": parts})
-        return Piece(spec, _rows(compose(np.array(self.world_from_file), axes)), labels)
+        return SceneryPiece(spec, _rows(compose(np.array(self.world_from_file), axes)), labels)
 
     def _spec(self, category: str, name: str, parts: Parts, category_id: int, rest: str) -> ModelSpec:
         return ModelSpec(

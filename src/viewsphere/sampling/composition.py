@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import cached_property, lru_cache, partial
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,10 +22,9 @@ from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.scenery import Labels
 from viewsphere.sampling.blend_scene import BlendScenery
 from viewsphere.sampling.cast import companions
-from viewsphere.sampling.moments import TimedPoses
 from viewsphere.sampling.placing import Draws, Footprint, Placer, Room, Shape, footprint, standing
 from viewsphere.sampling.scenery import (
-    Piece,
+    SceneryPiece,
     draw_names,
     draw_place,
     free_floor,
@@ -35,6 +34,8 @@ from viewsphere.sampling.scenery import (
     plane_spec,
 )
 from viewsphere.sampling.seeds import Names, generator
+from viewsphere.sampling.sendable import Sendable
+from viewsphere.sampling.time_steps import TimedPoses
 from viewsphere.sampling.viewpoints import Poses
 from viewsphere.store import Category
 from viewsphere.zoo import build_zoo_model
@@ -49,7 +50,7 @@ class BoxOf(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class Composition:
+class Composition(Sendable):
     """What a recipe with a place, company or planes puts into its frames; no mesh is touched before `things`.
 
     `subjects`: what the frames are about. `groups` are the models that may meet: those of one split where splits are by model.
@@ -61,10 +62,6 @@ class Composition:
     images: tuple[tuple[str, ...], ...]
     recipe_categories: tuple[Category, ...]
     blend: BlendScenery | None = None
-
-    def __getstate__(self) -> dict[str, Any]:
-        """What other processes are sent: not what was drawn so far."""
-        return {field.name: getattr(self, field.name) for field in fields(self)}
 
     @cached_property
     def categories(self) -> tuple[Category, ...]:
@@ -165,9 +162,9 @@ class Composition:
             for i, p in zip(ids, labelled + rest, strict=True)
         )
 
-    def _pieces(self, subject: str, targets: Sequence[Thing], pose: str | None, box_of: BoxOf) -> list[Piece]:
+    def _pieces(self, subject: str, targets: Sequence[Thing], pose: str | None, box_of: BoxOf) -> list[SceneryPiece]:
         place = self.recipe.scene.place
-        pieces: list[Piece] = []
+        pieces: list[SceneryPiece] = []
         if place is not None:
             pieces += self._place(draw_names(place.draw, subject, pose))
         if self.blend is not None:
@@ -176,13 +173,13 @@ class Composition:
         return pieces + list(plane_pieces(self.recipe, self.images, subject, pose, prints, self._category_id))
 
     @cached_property
-    def _place(self) -> Callable[[Names], tuple[Piece, ...]]:
+    def _place(self) -> Callable[[Names], tuple[SceneryPiece, ...]]:
         """The place's pieces for a draw; the last draws are kept, because many shots share one."""
         entry = self.recipe.scene.place
         assert entry is not None
 
         @lru_cache(maxsize=4)
-        def pieces(names: Names) -> tuple[Piece, ...]:
+        def pieces(names: Names) -> tuple[SceneryPiece, ...]:
             return place_pieces(self.recipe, entry, names, self._category_id)
 
         return pieces

@@ -8,11 +8,10 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from importlib.metadata import version
 from itertools import chain, groupby
-from typing import Any
 
 import numpy as np
 
@@ -34,21 +33,18 @@ from viewsphere.sampling.pose_numbers import (
     kept,
     numbered,
 )
+from viewsphere.sampling.sendable import Sendable
 from viewsphere.store import Block, Category, Part, PlanRecord, Row
 from viewsphere.store.index import Ranges, numbers
 
 
 @dataclass(frozen=True, eq=False)
-class Portion:
+class Portion(Sendable):
     """A part of a data set, and the plan of its recipe, which renders it. `record` is the whole data set's."""
 
     plan: Plan
     record: PlanRecord
     number: int
-
-    def __getstate__(self) -> dict[str, Any]:
-        """What other processes are sent: not what was computed so far."""
-        return {field.name: getattr(self, field.name) for field in fields(self)}
 
     @property
     def part(self) -> Part:

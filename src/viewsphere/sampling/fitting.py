@@ -8,7 +8,7 @@ import json
 from viewsphere.errors import RecipeError
 from viewsphere.model.mistakes import shown
 from viewsphere.recipe.recipe import Splits
-from viewsphere.sampling.look import engine_look
+from viewsphere.sampling.engine_digest import engine_digest
 from viewsphere.sampling.plan import Plan
 from viewsphere.store import Part, PlanRecord
 
@@ -43,7 +43,7 @@ def settings(planned: Plan) -> dict[str, str]:
         options = recipe.scenes.model_dump(mode="json", exclude={"count"})
         value |= {f"scenes.{name}": options[name] for name in options}
     digests = {name: hashlib.sha256(json.dumps(value[name]).encode()).hexdigest()[:16] for name in value}
-    return digests | {LOOK: engine_look(recipe.engine.name)}
+    return digests | {LOOK: engine_digest(recipe.engine.name)}
 
 
 def _check_sampler(planned: Plan, part: Part) -> None:

@@ -27,13 +27,13 @@ from viewsphere.sampling.checks import (
     check_splits,
 )
 from viewsphere.sampling.composition import BoxOf, compose
-from viewsphere.sampling.doubts import hidden_by_exposure, no_light, out_of_view
 from viewsphere.sampling.models import categories, numbered_specs
-from viewsphere.sampling.moments import check_keys, timed
 from viewsphere.sampling.pictures import check_pictures, proportions, scene_pictures
+from viewsphere.sampling.recipe_warnings import hidden_by_exposure, no_light, out_of_view
 from viewsphere.sampling.samplers import Sampler, Stock, lens
 from viewsphere.sampling.scenes import is_night
 from viewsphere.sampling.splits import expected
+from viewsphere.sampling.time_steps import check_keys, timed
 from viewsphere.sampling.viewpoints import poses
 from viewsphere.store import Block, Category, Row
 from viewsphere.store.index import Index, numbers

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from pydantic import TypeAdapter
 
 from viewsphere.recipe.viewpoints import Viewpoints
-from viewsphere.sampling.moments import TimedPoses
+from viewsphere.sampling.time_steps import TimedPoses
 from viewsphere.sampling.viewpoints import ListedPoses, Poses, poses
 from viewsphere.store import Part, PlanRecord
 from viewsphere.store.index import Ranges

@@ -44,7 +44,7 @@ class Naming(Protocol):
 
 
 @dataclass(frozen=True)
-class Piece:
+class SceneryPiece:
     """A model and where it stands; `labels` says whether it is an object of its own."""
 
     model: ModelSpec
@@ -59,7 +59,7 @@ def draw_names(draw: str, model: str, pose: str | None) -> Names:
     return (model,) if draw == "per_model" or pose is None else (model, pose)
 
 
-def place_pieces(recipe: Recipe, entry: PlaceEntry, names: Names, category_id: Naming) -> tuple[Piece, ...]:
+def place_pieces(recipe: Recipe, entry: PlaceEntry, names: Names, category_id: Naming) -> tuple[SceneryPiece, ...]:
     """The place's pieces, turned as the entry says; of a file there is one.
 
     Raises RecipeError for an unknown place and for a file that is not there.
@@ -68,7 +68,7 @@ def place_pieces(recipe: Recipe, entry: PlaceEntry, names: Names, category_id: N
     if not entry.name:
         return (_place_file(recipe, entry, world_from_place, category_id),)
     laid = draw_place(recipe.seed, entry.name, names)
-    pieces: list[Piece] = []
+    pieces: list[SceneryPiece] = []
     for piece in laid.pieces:
         spec = ModelSpec(
             key=scenery_key(piece.family, f"{piece.seed}"),
@@ -78,7 +78,7 @@ def place_pieces(recipe: Recipe, entry: PlaceEntry, names: Names, category_id: N
             category_id=category_id(piece.category, entry.labels),
             centring="as_is",
         )
-        pieces.append(Piece(spec, _composed(world_from_place, piece.world_from_piece), entry.labels))
+        pieces.append(SceneryPiece(spec, _composed(world_from_place, piece.world_from_piece), entry.labels))
     return tuple(pieces)
 
 
@@ -112,7 +112,7 @@ def _composed(a: Matrix4, b: Matrix4) -> Matrix4:
     return rows
 
 
-def _place_file(recipe: Recipe, entry: PlaceEntry, world_from_place: Matrix4, category_id: Naming) -> Piece:
+def _place_file(recipe: Recipe, entry: PlaceEntry, world_from_place: Matrix4, category_id: Naming) -> SceneryPiece:
     path = recipe.folder / Path(entry.source).expanduser()
     try:
         file, inside = split_source(path)
@@ -132,7 +132,7 @@ def _place_file(recipe: Recipe, entry: PlaceEntry, world_from_place: Matrix4, ca
     )
     x, y, z = entry.origin
     moved = ((1.0, 0.0, 0.0, -x), (0.0, 1.0, 0.0, -y), (0.0, 0.0, 1.0, -z), (0.0, 0.0, 0.0, 1.0))
-    return Piece(spec, _composed(world_from_place, moved), entry.labels)
+    return SceneryPiece(spec, _composed(world_from_place, moved), entry.labels)
 
 
 def scenery_key(name: str, rest: str) -> str:
@@ -181,7 +181,7 @@ def plane_pieces(
     pose: str | None,
     targets: Sequence[Footprint],
     category_id: Naming,
-) -> Iterator[Piece]:
+) -> Iterator[SceneryPiece]:
     """The planes of one model, or of one frame, clear of the targets and of one another.
 
     Raises RecipeError where that cannot be.
@@ -199,7 +199,7 @@ def plane_pieces(
             box = box_vertices((-half, 0.0, 0.0), (half, 0.0, entry.height))
             move = _plane_spot(f"scene.planes[{i}]", entry, rng, box, standing_there)
             standing_there.append(footprint(box, move))
-            yield Piece(plane_spec(recipe, entry, path, category_id), move, entry.labels)
+            yield SceneryPiece(plane_spec(recipe, entry, path, category_id), move, entry.labels)
 
 
 def _plane_spot(

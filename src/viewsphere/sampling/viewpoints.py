@@ -31,7 +31,7 @@ from viewsphere.sampling.seeds import generator
 Float = NDArray[np.float64]
 
 
-class View(NamedTuple):
+class Orbit(NamedTuple):
     """Where the camera stands: degrees and metres."""
 
     azimuth: float
@@ -88,7 +88,7 @@ class Poses(Sequence[Viewpoint]):
         return self.name(index)
 
     @abstractmethod
-    def view(self, index: int) -> View:
+    def view(self, index: int) -> Orbit:
         """Where the camera stands."""
 
     def drawn_for(self, name: str) -> Poses:
@@ -146,14 +146,14 @@ class GridPoses(Poses):
         """The pose's values."""
         return "pose " + " ".join(repr(v + 0.0) for v in self.view(index))
 
-    def view(self, index: int) -> View:
+    def view(self, index: int) -> Orbit:
         """The values that this index stands for."""
         _, distances, elevations, azimuths = self._axis_lengths
         index, azimuth = divmod(index, azimuths)
         index, elevation = divmod(index, elevations)
         tilt, distance = divmod(index, distances)
         grid = self.viewpoints
-        return View(
+        return Orbit(
             axis_value(grid.azimuth, azimuth),
             axis_value(grid.elevation, elevation),
             axis_value(grid.distance, distance),
@@ -181,12 +181,12 @@ class JitteredPoses(Poses):
         place, draw = divmod(index, self.viewpoints.count)
         return f"{self._grid.name(place)} draw {draw}"
 
-    def view(self, index: int) -> View:
+    def view(self, index: int) -> Orbit:
         """The grid's pose, moved."""
         around, by = self._grid.view(index // self.viewpoints.count), self.viewpoints.plus_minus
         azimuth, elevation, distance, tilt = generator(self.seed, "jitter", self.name(index)).random(4)
         low, high = max(around.elevation - by.elevation, -90.0), min(around.elevation + by.elevation, 90.0)
-        return View(
+        return Orbit(
             around.azimuth + (2 * azimuth - 1) * by.azimuth,
             low + elevation * (high - low),
             around.distance + (2 * distance - 1) * by.distance,
@@ -213,7 +213,7 @@ class SpherePoses(Poses):
         """The number of the draw."""
         return f"draw {index}"
 
-    def view(self, index: int) -> View:
+    def view(self, index: int) -> Orbit:
         """Azimuth, the sine of the elevation, distance and tilt, each uniform."""
         part = self.viewpoints
         u = generator(self.seed, "sphere", self.name(index)).random(4)
@@ -223,7 +223,7 @@ class SpherePoses(Poses):
         azimuth, distance, tilt = (
             lo + x * (hi - lo) for x, (lo, hi) in ((u[0], part.azimuth), (u[2], part.distance), (u[3], part.tilt))
         )
-        return View(azimuth, elevation, distance, tilt)
+        return Orbit(azimuth, elevation, distance, tilt)
 
 
 @dataclass(frozen=True)
@@ -241,12 +241,12 @@ class NormalPoses(Poses):
         """The number of the draw."""
         return f"draw {index}"
 
-    def view(self, index: int) -> View:
+    def view(self, index: int) -> Orbit:
         """A draw; those beyond a pole, or at no distance, are drawn again."""
         mean, sd = self.viewpoints, self.viewpoints.sd
         rng = generator(self.seed, "normal", self.name(index))
         while True:
-            view = View(
+            view = Orbit(
                 rng.normal(mean.azimuth, sd.azimuth),
                 rng.normal(mean.elevation, sd.elevation),
                 rng.normal(mean.distance, sd.distance),
@@ -293,7 +293,7 @@ class ListedPoses(Poses):
         """The pose's values, and how often they were there before: a camera that rests has equal poses."""
         return self._names[index]
 
-    def view(self, index: int) -> View:
+    def view(self, index: int) -> Orbit:
         """The values of the file, or those of a motion."""
         return self._views[index][0]
 
@@ -302,10 +302,10 @@ class ListedPoses(Poses):
         return self._views[index][1] or super().target(index)
 
     @cached_property
-    def _views(self) -> tuple[tuple[View, Vector | None], ...]:
+    def _views(self) -> tuple[tuple[Orbit, Vector | None], ...]:
         turn = self._turn
         return tuple(
-            self._view_of(turn, entry) if isinstance(entry, Motion) else (View(*entry), None) for entry in self.file.entries
+            self._view_of(turn, entry) if isinstance(entry, Motion) else (Orbit(*entry), None) for entry in self.file.entries
         )
 
     @cached_property
@@ -324,14 +324,14 @@ class ListedPoses(Poses):
         up = self.viewpoints.up or self.file.up
         return axes_rotation(up, self.viewpoints.forward or ("-z" if up[1] == "y" else "-y"), "viewpoints")
 
-    def _view_of(self, turn: Float, motion: Motion) -> tuple[View, Vector]:
+    def _view_of(self, turn: Float, motion: Motion) -> tuple[Orbit, Vector]:
         rotation = transform(turn, motion.R)  # rows: the camera's axes, in our world
         center = self.viewpoints.scale * transform(turn, np.subtract(motion.center, self.viewpoints.origin))
         ahead = -float((rotation[2] * center).sum())
         distance = ahead if ahead > 1e-3 else 1.0
         azimuth, elevation, tilt = (math.degrees(a) for a in orbit_angles(rotation))
         x, y, z = (center + distance * rotation[2]).tolist()
-        return View(azimuth % 360.0, elevation, distance, tilt), (x, y, z)
+        return Orbit(azimuth % 360.0, elevation, distance, tilt), (x, y, z)
 
 
 def poses(viewpoints: Viewpoints, seed: int, folder: Path = Path()) -> Poses:

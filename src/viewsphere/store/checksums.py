@@ -14,7 +14,7 @@ from pathlib import Path
 
 import xxhash
 
-from viewsphere.store.manifest import told_of
+from viewsphere.store.manifest import seal_of
 
 CHECKSUMS = "checksums.xxh128"
 """Name of the file in an export's folder."""
@@ -27,7 +27,7 @@ def write_checksums(folder: Path) -> None:
     seal = xxhash.xxh3_128()
     with (folder / CHECKSUMS).open("wb") as file:
         for path in _files(folder):
-            line = f"{told_of(folder / path)[1]}  {path}\n".encode()
+            line = f"{seal_of(folder / path)[1]}  {path}\n".encode()
             seal.update(line)
             file.write(line)
         file.write(f"# {seal.hexdigest()}\n".encode())
@@ -65,7 +65,7 @@ def _lines(folder: Path) -> Iterator[tuple[str, str]]:
 
 
 def _digest(file: Path) -> str | None:
-    return told_of(file)[1] if file.is_file() else None
+    return seal_of(file)[1] if file.is_file() else None
 
 
 def _files(folder: Path) -> Iterator[str]:

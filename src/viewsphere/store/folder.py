@@ -22,7 +22,7 @@ from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
 from viewsphere.store.channel_files import encode
 from viewsphere.store.index import Row
-from viewsphere.store.manifest import MANIFEST, Manifest, Told, digest, refuse_another, told_of
+from viewsphere.store.manifest import MANIFEST, Manifest, Seal, digest, refuse_another, seal_of
 from viewsphere.store.records import ModelInfo, PlanRecord
 from viewsphere.store.sample_records import short_sample, whole_sample
 
@@ -271,7 +271,7 @@ class Store:
         prefix = target.relative_to(self.root).as_posix()
         records: list[dict[str, Any]] = []
         made: set[str] = set()
-        told: dict[str, Told] = {}
+        told: dict[str, Seal] = {}
         kinds, table = kinds or Files(), channels()
         with self.aside(target, again) as folder:
             for sample in samples:
@@ -297,7 +297,7 @@ class Store:
             if shot is not None:
                 labelled = shot.model_copy(update={"things": shot.objects})  # the others are in scenery.json
                 (folder / "shot.json").write_text(labelled.model_dump_json(), "utf-8")
-            texts = {path.name: told_of(path) for path in sorted(folder.glob("*.json"))}
+            texts = {path.name: seal_of(path) for path in sorted(folder.glob("*.json"))}
             Manifest(texts | told).write(folder)
         return len(records)
 

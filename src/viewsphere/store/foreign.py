@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from viewsphere.errors import StoreError
 from viewsphere.geometry.mask import encode_rle, mask_box
-from viewsphere.model.sample import Box, ObjectAnnotation, Rle, Sample, View
+from viewsphere.model.sample import Box, ObjectAnnotation, ObjectView, Rle, Sample
 from viewsphere.store.records import Category, ModelInfo
 
 MOST_SHOWN = 10
@@ -94,7 +94,7 @@ def foreign_object(
         "world_from_object": np.full((4, 4), np.nan),
         "camera_from_object": np.full((4, 4), np.nan),
         "quaternion": (math.nan,) * 4,
-        "view": View(math.nan, math.nan, math.nan, math.nan),
+        "view": ObjectView(math.nan, math.nan, math.nan, math.nan),
         "pose_category": "",
         "size": (math.nan,) * 3,
         "real_size": None,

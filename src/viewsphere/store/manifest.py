@@ -24,7 +24,7 @@ MANIFEST = "manifest.json"
 BLOCK = 1 << 20
 """Bytes of a file that are read at once."""
 
-Told = tuple[int, str]
+Seal = tuple[int, str]
 """A file's size in bytes and its digest."""
 
 
@@ -47,7 +47,7 @@ def unsealed(text: str) -> dict[str, Any]:
     return json.loads(start + "}")
 
 
-def told_of(file: Path) -> Told:
+def seal_of(file: Path) -> Seal:
     """A file's size and digest, read block by block."""
     found, size = xxhash.xxh3_128(), 0
     with file.open("rb") as stream:
@@ -61,13 +61,13 @@ def told_of(file: Path) -> Told:
 class Manifest:
     """The files of a folder by their paths in it."""
 
-    files: Mapping[str, Told]
+    files: Mapping[str, Seal]
 
     @staticmethod
     def of(folder: Path) -> Manifest:
         """What lies in a folder and below, but for the manifest itself."""
         paths = sorted(path for path in folder.rglob("*") if path.is_file() and path != folder / MANIFEST)
-        return Manifest({path.relative_to(folder).as_posix(): told_of(path) for path in paths})
+        return Manifest({path.relative_to(folder).as_posix(): seal_of(path) for path in paths})
 
     @staticmethod
     def read(folder: Path) -> Manifest:
@@ -94,7 +94,7 @@ class Manifest:
         """What is not as it was written: files that are missing, changed, or too many."""
         for path, told in self.files.items():
             try:
-                found = told_of(folder / path)
+                found = seal_of(folder / path)
             except OSError as error:
                 yield f"{folder / path}: expected {said(told)}, found {error.strerror or error}"
                 continue
@@ -121,7 +121,7 @@ def refuse_another(damaged: Path, again: Path) -> None:
         manifest = Manifest.read(damaged)
         known = manifest.files if any(manifest.damage(damaged)) else {}
     except StoreError:
-        known = {name: told_of(damaged / name) for name in KNOWN if _is_json(damaged / name)}
+        known = {name: seal_of(damaged / name) for name in KNOWN if _is_json(damaged / name)}
     made = Manifest.read(again).files
     other = [path for path, told in known.items() if made.get(path) != told]
     if other:
@@ -143,6 +143,6 @@ REPAIR = "mend it with viewsphere check --repair"
 """What a user can do about damaged files."""
 
 
-def said(told: Told | None) -> str:
+def said(told: Seal | None) -> str:
     """A file's size and the beginning of its digest, in words."""
     return "no such file" if told is None else f"{told[0]:,} bytes with digest {told[1][:12]}"

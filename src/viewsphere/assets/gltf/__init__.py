@@ -10,7 +10,7 @@ from viewsphere.assets.gltf.document import Document
 from viewsphere.assets.gltf.material import read_materials
 from viewsphere.assets.gltf.scene import read_pieces
 from viewsphere.assets.mesh import Mesh
-from viewsphere.assets.piece import FileFacts, assemble
+from viewsphere.assets.primitive import FileFacts, assemble
 
 
 def read_gltf(folder: ModelFolder, node: str | None = None) -> tuple[Mesh, FileFacts]:

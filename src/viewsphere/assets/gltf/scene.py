@@ -9,7 +9,7 @@ import numpy as np
 
 from viewsphere.assets.gltf.document import DRACO, Document, ForBlenderError
 from viewsphere.assets.gltf.field import Field
-from viewsphere.assets.piece import Float, Int, Piece, compact
+from viewsphere.assets.primitive import Float, Int, Primitive, compact
 from viewsphere.assets.smoothing import flat
 from viewsphere.assets.transform import moved, unit
 from viewsphere.geometry.rotation import compose
@@ -17,15 +17,15 @@ from viewsphere.geometry.rotation import compose
 TRIANGLES, STRIP, FAN = 4, 5, 6
 
 
-def read_pieces(document: Document, below: str | None = None) -> list[Piece]:
+def read_pieces(document: Document, below: str | None = None) -> list[Primitive]:
     """The triangles of the default scene, or of what is `below` a node of a name, node by node, transforms applied.
 
     What is scaled to nothing is not drawn (glTF 2.0, section 3.5.3).
     """
     worlds = _world_matrices(document, below)
-    pieces: list[Piece] = []
+    pieces: list[Primitive] = []
     parts: dict[str, int] = {}
-    meshes: dict[int, list[Piece]] = {}  # read once without morphing or skinning, for instances
+    meshes: dict[int, list[Primitive]] = {}  # read once without morphing or skinning, for instances
     total = 0
     for index, world in worlds.items():
         node = document.root.at("nodes", index)
@@ -152,9 +152,9 @@ def _instances(document: Document, node: Field, world: Float) -> list[Float]:
     return [compose(world, local) for local in _compose(t, r, s)]
 
 
-def _primitives(document: Document, mesh: Field, weights: tuple[float, ...], joints: Float | None) -> list[Piece]:
+def _primitives(document: Document, mesh: Field, weights: tuple[float, ...], joints: Float | None) -> list[Primitive]:
     """A mesh's triangles in its own axes, or in the world's when `joints` (J, 4, 4) bend it."""
-    pieces: list[Piece] = []
+    pieces: list[Primitive] = []
     for entry in mesh.items("primitives"):
         piece = _primitive(document, entry)
         if piece is not None:
@@ -183,7 +183,7 @@ def _joints(document: Document, node: Field, worlds: dict[int, Float]) -> Float 
     return np.array([compose(joint, bind) for joint, bind in zip(matrices, local, strict=True)])
 
 
-def _skinned(document: Document, entry: Field, piece: Piece, joints: Float) -> Piece:
+def _skinned(document: Document, entry: Field, piece: Primitive, joints: Float) -> Primitive:
     """The piece bent by its skin's joints (linear blend skinning)."""
     attributes, count = entry.get("attributes"), len(piece.positions)
     blend = np.zeros((count, 4, 4))
@@ -209,7 +209,7 @@ def _skinned(document: Document, entry: Field, piece: Piece, joints: Float) -> P
     return replace(piece, positions=positions, normals=unit(np.einsum("nij,nj->ni", cofactor, piece.normals)))
 
 
-def _primitive(document: Document, entry: Field) -> Piece | None:
+def _primitive(document: Document, entry: Field) -> Primitive | None:
     attributes = entry.get("attributes")
     mode = entry.integer("mode", TRIANGLES)
     if mode not in {TRIANGLES, STRIP, FAN}:
@@ -226,7 +226,7 @@ def _primitive(document: Document, entry: Field) -> Piece | None:
     material = entry.integer("material") if "material" in entry else len(document.root.items("materials"))
     if "material" in entry:
         document.root.at("materials", material)
-    return Piece(
+    return Primitive(
         part="",
         material=material,
         positions=positions,
@@ -274,7 +274,7 @@ def _triangles(document: Document, entry: Field, mode: int, count: int) -> Int:
     return np.column_stack([indices[i], indices[i + 1 + i % 2], indices[i + 2 - i % 2]])
 
 
-def _morphed(document: Document, entry: Field, piece: Piece, weights: tuple[float, ...]) -> Piece:
+def _morphed(document: Document, entry: Field, piece: Primitive, weights: tuple[float, ...]) -> Primitive:
     """The piece with its morph targets at these weights."""
     for target, weight in zip(entry.items("targets"), weights, strict=False):
         if weight == 0:

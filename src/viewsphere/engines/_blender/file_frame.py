@@ -12,7 +12,7 @@ from viewsphere.geometry.rotation import compose, transform
 from viewsphere.model.scene import BlendScene
 
 Float = NDArray[np.float64]
-Told = dict[str, Any]
+Request = dict[str, Any]
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,24 +52,24 @@ class FileFrame:
         """A direction (3,) of the world in the file's axes."""
         return transform(self.file_from_world[:3, :3], direction).tolist()
 
-    def light(self, told: Told) -> Told:
+    def light(self, request: Request) -> Request:
         """A light in the file's axes and units; its power is scaled, as light falls off with the squared distance in units."""
         if self.is_same:
-            return told
-        if told["kind"] == "sun":
-            return {**told, "direction": self.direction(told["direction"])}
-        changed = {name: self.point(told[name]) for name in ("position", "toward") if name in told}
-        changed["irradiance"] = [value / self.unit**2 for value in told["irradiance"]]
-        if "radius" in told:
-            changed["radius"] = told["radius"] / self.unit
-        if "size" in told:
-            changed["size"] = [value / self.unit for value in told["size"]]
-        return {**told, **changed}
+            return request
+        if request["kind"] == "sun":
+            return {**request, "direction": self.direction(request["direction"])}
+        changed = {name: self.point(request[name]) for name in ("position", "toward") if name in request}
+        changed["irradiance"] = [value / self.unit**2 for value in request["irradiance"]]
+        if "radius" in request:
+            changed["radius"] = request["radius"] / self.unit
+        if "size" in request:
+            changed["size"] = [value / self.unit for value in request["size"]]
+        return {**request, **changed}
 
-    def camera(self, told: Told) -> Told:
+    def camera(self, request: Request) -> Request:
         """A camera in the file's axes and units; the rows of `R` are the camera's axes."""
         if self.is_same:
-            return told
-        axes = [self.direction(axis) for axis in told["R"]]
-        distances = {name: told[name] / self.unit for name in ("near", "far")}
-        return {**told, "R": axes, "center": self.point(told["center"]), **distances}
+            return request
+        axes = [self.direction(axis) for axis in request["R"]]
+        distances = {name: request[name] / self.unit for name in ("near", "far")}
+        return {**request, "R": axes, "center": self.point(request["center"]), **distances}

@@ -41,7 +41,7 @@ FACES: tuple[tuple[tuple[int, int, int], ...], ...] = (
 
 
 @dataclass(frozen=True, eq=False)
-class View:
+class PinholeView:
     """A covering pinhole picture: its `camera`, and where the rays of the lens's pixels meet it.
 
     pixels (N,): indices of the lens's pixels that this picture serves; x, y (N,): where their rays meet the picture, in its
@@ -54,12 +54,12 @@ class View:
     y: Float | None = None
 
 
-def views_of(camera: Camera) -> tuple[View, ...]:
+def views_of(camera: Camera) -> tuple[PinholeView, ...]:
     """The covering pictures of a camera: the camera's own for a pinhole without skew, one that is somewhat wider for a lens
     that bends rays a little, else up to six sides of a cube.
     """
     if camera.distortion is None and camera.intrinsics.skew == 0:
-        return (View(camera),)
+        return (PinholeView(camera),)
     rays = pixel_rays(camera.intrinsics).reshape(-1, 3)
     known = np.flatnonzero(np.isfinite(rays).all(axis=1))
     ahead = rays[known]
@@ -75,17 +75,17 @@ def views_of(camera: Camera) -> tuple[View, ...]:
     return tuple(views)
 
 
-def _view(camera: Camera, face: Float, pixels: NDArray[np.int64], rays: Float) -> View:
+def _view(camera: Camera, face: Float, pixels: NDArray[np.int64], rays: Float) -> PinholeView:
     """The smallest covering picture, with the axes `face`, through which these rays pass."""
     focal = FINER * max(camera.intrinsics.fx, camera.intrinsics.fy)
     x, y = focal * rays[:, 0] / rays[:, 2], focal * rays[:, 1] / rays[:, 2]
     left, top = math.floor(x.min()) - MARGIN, math.floor(y.min()) - MARGIN
     width, height = math.ceil(x.max()) + MARGIN - left, math.ceil(y.max()) + MARGIN - top
     pinhole = Intrinsics(width=width, height=height, fx=focal, fy=focal, cx=-left, cy=-top)
-    return View(Camera(pinhole, face @ camera.R, face @ camera.t), pixels, x - left, y - top)
+    return PinholeView(Camera(pinhole, face @ camera.R, face @ camera.t), pixels, x - left, y - top)
 
 
-def resampled(camera: Camera, views: Sequence[View], pictures: Sequence[Float32]) -> Float32:
+def resampled(camera: Camera, views: Sequence[PinholeView], pictures: Sequence[Float32]) -> Float32:
     """The lens's picture (H, W, 4) float32, bilinear; empty where it has no ray."""
     out = np.zeros((camera.height * camera.width, 4), np.float32)
     for view, picture in zip(views, pictures, strict=True):

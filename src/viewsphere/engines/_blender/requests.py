@@ -26,7 +26,7 @@ from viewsphere.truth.geometry import Geometry
 Put = Callable[[NDArray[Any]], str]
 """Writes an array to a file that the worker can read, and returns the file's path."""
 
-Told = dict[str, Any]
+Request = dict[str, Any]
 
 BEGIN, OVER = 4.0, 26.0
 """Distances behind the middle of all placed things, in halves of their extent: where the ground begins to fade into the sky,
@@ -41,7 +41,7 @@ which it fades altogether.
 ARRAYS = ("vertices", "triangles", "normals", "triangle_material", "uv0", "uv1", "colors")
 
 
-def told_scene(
+def scene_request(
     things: Sequence[Thing],
     meshes: Sequence[Mesh],
     geometry: Geometry,
@@ -49,19 +49,19 @@ def told_scene(
     options: AnyOptions,
     put: Put,
     levels: Sequence[Levels] | None = None,
-) -> Told:
+) -> Request:
     """The worker's `stage` request; `levels`: halvings of each kind's pictures, None for unchanged pictures.
 
     Raises UserError for a picture of sky or ground that cannot be read.
     """
     frame, blend = FileFrame.of(scene.blend), scene.blend
     kinds = kinds_of(things, meshes, scene)
-    shared: dict[int, Told] = {}
-    told: list[Told] = []
-    for kind, look in zip(kinds, told_looks(kinds, put, levels), strict=True):
+    shared: dict[int, Request] = {}
+    request: list[Request] = []
+    for kind, look in zip(kinds, materials_request(kinds, put, levels), strict=True):
         if id(kind.mesh) not in shared:
-            shared[id(kind.mesh)] = _told_mesh(kind.mesh, put)
-        told.append({**shared[id(kind.mesh)], **look, "name": kind.things[0].model.key})
+            shared[id(kind.mesh)] = _mesh_request(kind.mesh, put)
+        request.append({**shared[id(kind.mesh)], **look, "name": kind.things[0].model.key})
     numbers = {id(thing): number for number, kind in enumerate(kinds) for thing in kind.things}
     objects = [
         {"mesh": numbers[id(p)], "matrix": frame.placed(p.world_from_object), "index": p.id} for p in things if id(p) in numbers
@@ -72,14 +72,14 @@ def told_scene(
     middle = middle_of(geometry, sum(not p.scenery for p in things))
     has_scenery = any(p.scenery for p in things)
     return {
-        "meshes": told,
+        "meshes": request,
         "objects": objects,
-        "ground": None if scene.ground is None else _told_ground(scene.ground, geometry, has_scenery, put),
-        "lights": [frame.light(light) for light in _told_lights(scene, middle)],
-        "world": pictures and _told_world(pictures, put),
+        "ground": None if scene.ground is None else _ground_request(scene.ground, geometry, has_scenery, put),
+        "lights": [frame.light(light) for light in _lights_request(scene, middle)],
+        "world": pictures and _world_request(pictures, put),
         "hemispheres": pictures and _hemispheres(scene, pictures),
-        "file": None if blend is None else _told_file(blend),
-        "settings": told_settings(options),
+        "file": None if blend is None else _file_request(blend),
+        "settings": settings_request(options),
     }
 
 
@@ -94,7 +94,7 @@ def kinds_of(things: Sequence[Thing], meshes: Sequence[Mesh], scene: Scene) -> t
     return tuple(Kind(mesh, repaints, tuple(own)) for (_, repaints), (mesh, own) in found.items())
 
 
-def told_looks(kinds: Sequence[Kind], put: Put, levels: Sequence[Levels] | None) -> list[Told]:
+def materials_request(kinds: Sequence[Kind], put: Put, levels: Sequence[Levels] | None) -> list[Request]:
     """Pictures and materials of each kind; pictures that kinds have in common are put once."""
     paths: dict[int, str] = {}
 
@@ -103,52 +103,52 @@ def told_looks(kinds: Sequence[Kind], put: Put, levels: Sequence[Levels] | None)
             paths[id(pixels)] = put(pixels)
         return paths[id(pixels)]
 
-    told: list[Told] = []
+    request: list[Request] = []
     for number, kind in enumerate(kinds):
         materials, images = kind.mesh.materials, kind.mesh.images
         if levels is not None:
             materials, images = kind.pictured(levels[number])
-        told.append(
+        request.append(
             {
-                "images": _told_images(images, put_once),
-                "materials": [_told_material(material, kind.repaints) for material in materials],
+                "images": _images_request(images, put_once),
+                "materials": [_material_request(material, kind.repaints) for material in materials],
             }
         )
-    return told
+    return request
 
 
-def _told_file(blend: BlendScene) -> Told:
+def _file_request(blend: BlendScene) -> Request:
     path = Path(blend.file).resolve()
-    told = blend.model_dump(include={"shown", "hidden", "frame"})
-    return {"file": str(path), "root": str(path.parent) if blend.confined else None, **told}
+    request = blend.model_dump(include={"shown", "hidden", "frame"})
+    return {"file": str(path), "root": str(path.parent) if blend.confined else None, **request}
 
 
-def told_settings(options: AnyOptions) -> Told:
+def settings_request(options: AnyOptions) -> Request:
     """The worker's settings of a renderer."""
-    told = asdict(options)
-    told["own"] = dict(told.pop("settings"))
-    return {"renderer": options.renderer, **told}
+    request = asdict(options)
+    request["own"] = dict(request.pop("settings"))
+    return {"renderer": options.renderer, **request}
 
 
-def _told_mesh(mesh: Mesh, put: Put) -> Told:
+def _mesh_request(mesh: Mesh, put: Put) -> Request:
     arrays = {name: getattr(mesh, name) for name in ARRAYS}
     return {name: None if array is None else put(array) for name, array in arrays.items()}
 
 
-def _told_images(images: Sequence[Image], put: Put) -> list[Told]:
+def _images_request(images: Sequence[Image], put: Put) -> list[Request]:
     return [{"name": image.name, "pixels": put(image.pixels)} for image in images]
 
 
-def _told_material(material: Material, repaints: Sequence[Repaint]) -> Told:
+def _material_request(material: Material, repaints: Sequence[Repaint]) -> Request:
     """A material with its repaints; a repaint's metallic or roughness replaces both the factor and its texture."""
     tinted, repaint = repainted(material, repaints)
-    told = asdict(tinted)
-    told["fixed_metallic"] = None if repaint is None else repaint.metallic
-    told["fixed_roughness"] = None if repaint is None else repaint.roughness
-    return told
+    request = asdict(tinted)
+    request["fixed_metallic"] = None if repaint is None else repaint.metallic
+    request["fixed_roughness"] = None if repaint is None else repaint.roughness
+    return request
 
 
-def _told_ground(ground: Ground, geometry: Geometry, has_scenery: bool, put: Put) -> Told:
+def _ground_request(ground: Ground, geometry: Geometry, has_scenery: bool, put: Put) -> Request:
     """The ground with truth's own triangles, the texture coordinates of the raster engine, and the range of its fading."""
     vertices = geometry.vertices[geometry.vertex_start[-1] :]
     triangles = geometry.triangles[geometry.triangle_start[-1] :] - geometry.vertex_start[-1]
@@ -163,8 +163,8 @@ def _told_ground(ground: Ground, geometry: Geometry, has_scenery: bool, put: Put
         "uv0": put(uv.astype(np.float32)),
         "uv1": None,
         "colors": None,
-        "images": _told_images(images, put),
-        "materials": [_told_material(replace(material, specular=0.0) if only_scatters(ground) else material, ())],
+        "images": _images_request(images, put),
+        "materials": [_material_request(replace(material, specular=0.0) if only_scatters(ground) else material, ())],
     }
     middle, unit = extent(geometry, has_scenery)
     fading = {"begin": unit * BEGIN, "end": unit * (BEGIN + OVER), "flat": FLAT, "flattest": FLAT - FLATTER}
@@ -188,27 +188,27 @@ def middle_of(geometry: Geometry, count: int) -> NDArray[np.float64]:
     return (low + high) / 2
 
 
-def _told_lights(scene: Scene, middle: NDArray[np.float64]) -> list[Told]:
+def _lights_request(scene: Scene, middle: NDArray[np.float64]) -> list[Request]:
     """The sun, as the sky lets it through, and the lamps; hemisphere lights are part of the world's picture."""
-    told: list[Told] = []
+    request: list[Request] = []
     sun = sun_light(scene.sky, scene.sun) if scene.blend is None or not scene.blend.is_lit else None
     if sun is not None:
-        told.append(
+        request.append(
             {"kind": "sun", "direction": sun.direction, "irradiance": sun.irradiance, "angle_deg": sun.angle_deg},
         )
-    return told + [_told_lamp(light, middle) for light in scene.lights if not isinstance(light, HemisphereLight)]
+    return request + [_lamp_request(light, middle) for light in scene.lights if not isinstance(light, HemisphereLight)]
 
 
-def _told_lamp(light: AnyLight, middle: NDArray[np.float64]) -> Told:
-    told = light.model_dump()
-    told["irradiance"] = [light.strength * c for c in light.color]
+def _lamp_request(light: AnyLight, middle: NDArray[np.float64]) -> Request:
+    request = light.model_dump()
+    request["irradiance"] = [light.strength * c for c in light.color]
     for name in ("position", "toward"):
-        if name in told:
-            told[name] = (np.array(told[name]) + middle).tolist()
-    return told
+        if name in request:
+            request[name] = (np.array(request[name]) + middle).tolist()
+    return request
 
 
-def _told_world(pictures: SkyPictures, put: Put) -> Told:
+def _world_request(pictures: SkyPictures, put: Put) -> Request:
     lighting = put(pictures.lighting)
     seen = lighting if pictures.seen is pictures.lighting else put(pictures.seen)
     return {"picture": lighting, "seen": seen, "turn_deg": pictures.turn_deg}

@@ -14,7 +14,7 @@ from viewsphere.assets.deforming import Load
 from viewsphere.assets.srgb import encoded
 from viewsphere.codecs.png_tiff import encode_png
 from viewsphere.engines._blender.file_frame import FileFrame
-from viewsphere.engines._blender.staging import STAGE_SECONDS, Arrangement, build_stage, told_camera
+from viewsphere.engines._blender.staging import STAGE_SECONDS, Arrangement, build_stage, camera_request
 from viewsphere.errors import BlenderDied, ModelError
 from viewsphere.geometry.camera import orbit_angles
 from viewsphere.imaging.background import display_background
@@ -59,12 +59,12 @@ def save(shot: Shot, samples: Sequence[Sample], load: Load, file: Path, data: st
     own = shot.model_copy(update={"engine": "cycles", "engine_options": {**kept, "device": "cpu"}})
     stage = build_stage(own, load).arrangement(0)
     finishes = [shot.finish(instant) for instant in range(len(shot.instants))]
-    told = _told(shot, samples, finishes, file.stem, data)
+    request = _request(shot, samples, finishes, file.stem, data)
     died: BlenderDied | None = None
     for _ in range(2):
         try:
-            off = _ask(stage, told, finishes, samples[0].camera, file)
-            return tuple(_lacking(samples, finishes, off / max(pose["distance"] for pose in told["poses"])))
+            off = _ask(stage, request, finishes, samples[0].camera, file)
+            return tuple(_lacking(samples, finishes, off / max(pose["distance"] for pose in request["poses"])))
         except BlenderDied as error:
             stage.keeper.drop()
             died = error
@@ -81,11 +81,11 @@ def shows_sky(shot: Shot, finish: Finish) -> bool:
     return not is_clear(shot) and finish.background.color is None and finish.background.image is None
 
 
-def _ask(stage: Arrangement, told: dict[str, Any], finishes: Sequence[Finish], camera: Camera, file: Path) -> float:
+def _ask(stage: Arrangement, request: dict[str, Any], finishes: Sequence[Finish], camera: Camera, file: Path) -> float:
     """Ask Blender to write the file; returns the largest error of its cameras, in the file's units."""
     process = stage.keeper.process_for(stage)
     background, sequence = None, ""
-    if told["is_open"] and not told["transparent"] and not told["is_users"]:
+    if request["is_open"] and not request["transparent"] and not request["is_users"]:
         behind = [finish.background for finish in finishes]
         sequence = file.stem if any(b != behind[0] for b in behind) else ""
         folder = file.with_suffix("") if sequence else process.folder
@@ -97,20 +97,20 @@ def _ask(stage: Arrangement, told: dict[str, Any], finishes: Sequence[Finish], c
             pixels = np.round(encoded(display) * 255).astype(np.uint8).reshape(camera.height, camera.width, 3)
             (folder / f"{number:04d}.png").write_bytes(encode_png(pixels))
     saved = process.folder / "saved.blend"  # Blender may be kept from writing anywhere else
-    answer = process.ask("save", STAGE_SECONDS, **told, file=str(saved), background=background, sequence=sequence)
+    answer = process.ask("save", STAGE_SECONDS, **request, file=str(saved), background=background, sequence=sequence)
     shutil.move(saved, file)
     return answer["off"]
 
 
-def _told(shot: Shot, samples: Sequence[Sample], finishes: Sequence[Finish], name: str, data: str) -> dict[str, Any]:
+def _request(shot: Shot, samples: Sequence[Sample], finishes: Sequence[Finish], name: str, data: str) -> dict[str, Any]:
     """The worker's request, without the background pictures."""
     views = [finish.view for finish in finishes]
     temperatures = {view.temperature_k for view in views} - {NEUTRAL_K}
     return {
         "name": name,
         "text": TEXT.format(name=name, data=data),
-        "poses": _told_poses(samples, FileFrame.of(shot.scene.blend)),
-        "objects": _told_objects(samples),
+        "poses": _poses_request(samples, FileFrame.of(shot.scene.blend)),
+        "objects": _objects_request(samples),
         "members": {name: p.id for p in shot.objects for name in (p.model.parts and p.model.parts.only) or ()},
         "properties": {"data set": data, "frames": [sample.index for sample in samples]},
         "is_users": shot.scene.blend is not None,
@@ -122,7 +122,7 @@ def _told(shot: Shot, samples: Sequence[Sample], finishes: Sequence[Finish], nam
     }
 
 
-def _told_poses(samples: Sequence[Sample], frame: FileFrame) -> list[dict[str, Any]]:
+def _poses_request(samples: Sequence[Sample], frame: FileFrame) -> list[dict[str, Any]]:
     """The rig's pose at every sample, as an orbit around a point on the camera's axis, also for 6 DoF poses."""
     poses: list[dict[str, Any]] = []
     nearest, farthest = (f(sample.pose.distance for sample in samples) for f in (min, max))
@@ -132,7 +132,7 @@ def _told_poses(samples: Sequence[Sample], frame: FileFrame) -> list[dict[str, A
         target = sample.camera.center + distance * sample.camera.R[2]
         still = still if np.abs(target - still).max() <= SAME * distance else target
         clipped = {"near": NEAREST * nearest, "far": FARTHEST * farthest}
-        camera = frame.camera(told_camera(sample.camera) | clipped)
+        camera = frame.camera(camera_request(sample.camera) | clipped)
         azimuth, elevation, tilt = np.degrees(orbit_angles(camera["R"])).tolist()
         poses.append(
             {
@@ -148,15 +148,15 @@ def _told_poses(samples: Sequence[Sample], frame: FileFrame) -> list[dict[str, A
     return poses
 
 
-def _told_objects(samples: Sequence[Sample]) -> dict[str, dict[str, Any]]:
+def _objects_request(samples: Sequence[Sample]) -> dict[str, dict[str, Any]]:
     """Custom properties by object id; pose categories by frame of the timeline."""
-    told: dict[str, dict[str, Any]] = {}
+    request: dict[str, dict[str, Any]] = {}
     for number, sample in enumerate(samples, 1):
         for o in sample.objects:
             known = {"id": o.id, "category": o.category, "supercategory": o.supercategory, "model": o.key}
-            one = told.setdefault(str(o.id), {**known, "pose categories": {}})
+            one = request.setdefault(str(o.id), {**known, "pose categories": {}})
             one["pose categories"][str(number)] = o.pose_category
-    return told
+    return request
 
 
 def _lacking(samples: Sequence[Sample], finishes: Sequence[Finish], off: float) -> Iterator[str]:

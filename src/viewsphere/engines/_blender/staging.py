@@ -21,7 +21,7 @@ from viewsphere.engines._blender.backdrop import Backdrop
 from viewsphere.engines._blender.file_frame import FileFrame
 from viewsphere.engines._blender.lens import resampled, views_of
 from viewsphere.engines._blender.options import AnyOptions, options_of
-from viewsphere.engines._blender.requests import kinds_of, told_looks, told_scene
+from viewsphere.engines._blender.requests import kinds_of, materials_request, scene_request
 from viewsphere.engines._blender.texels import Kind, Levels
 from viewsphere.errors import BlenderDied, BlenderError, ModelError, RecipeError, UserError
 from viewsphere.imaging.background import display_background
@@ -239,8 +239,8 @@ class Arrangement:
         if border is not None and (border[0] >= border[2] or border[1] >= border[3]):
             return np.zeros((camera.height, camera.width, 4), np.float32)
         out = str(process.folder / "picture.npy")
-        told = FileFrame.of(self.shot.scene.blend).camera(told_camera(camera, clip))
-        process.ask("render", FRAME_SECONDS, camera=told, transparent=is_open, border=border, passes=[], out=out)
+        request = FileFrame.of(self.shot.scene.blend).camera(camera_request(camera, clip))
+        process.ask("render", FRAME_SECONDS, camera=request, transparent=is_open, border=border, passes=[], out=out)
         return np.load(out)
 
     @cached_property
@@ -259,15 +259,15 @@ class Arrangement:
     def paint(self, process: BlenderProcess, levels: AllLevels, before: AllLevels | None) -> None:
         """Rebuild the materials of the models whose pictures become finer or coarser."""
         changed = [i for i, level in enumerate(levels) if before is None or level != before[i]]
-        looks = told_looks([self.kinds[i] for i in changed], process.put, [levels[i] for i in changed])
+        looks = materials_request([self.kinds[i] for i in changed], process.put, [levels[i] for i in changed])
         process.ask("paint", STAGE_SECONDS, looks=[{"mesh": i, **look} for i, look in zip(changed, looks, strict=True)])
 
     def tell(self, process: BlenderProcess, levels: AllLevels | None = None) -> None:
         """Build the scene in this Blender. Raises UserError for settings or devices that the renderer lacks."""
         shot = self.shot
-        told = told_scene(self.things, self.meshes, self.geometry, shot.scene, self.options, process.put, levels)
+        request = scene_request(self.things, self.meshes, self.geometry, shot.scene, self.options, process.put, levels)
         try:
-            process.ask("stage", STAGE_SECONDS, **told)
+            process.ask("stage", STAGE_SECONDS, **request)
         except BlenderError as error:
             raise UserError(str(error).removeprefix("ValueError: ")) from error
 
@@ -284,7 +284,7 @@ def clip_of(visibility: Visibility, geometry: Geometry, camera: Camera) -> Clip:
     return near, min(far, SPARE * float(np.linalg.norm(corners - camera.center, axis=1).max()))
 
 
-def told_camera(camera: Camera, clip: Clip = (NEAREST, FARTHEST)) -> dict[str, Any]:
+def camera_request(camera: Camera, clip: Clip = (NEAREST, FARTHEST)) -> dict[str, Any]:
     """A pinhole camera without skew as the worker's `render` takes it."""
     return {
         **{name: getattr(camera.intrinsics, name) for name in ("width", "height", "fx", "fy", "cx", "cy")},

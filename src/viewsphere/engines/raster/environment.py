@@ -15,7 +15,7 @@ from viewsphere.engines.raster import kernels_environment as kernels
 from viewsphere.engines.raster.arriving import arriving
 from viewsphere.engines.raster.kernels_arrive import DISTANT
 from viewsphere.engines.raster.lights import Extent, Lights
-from viewsphere.engines.raster.records import Float32, Int32, View
+from viewsphere.engines.raster.records import Float32, Int32, PictureRays
 from viewsphere.model.scene import AnySky, Daylight, Environment, Sky, Sun
 from viewsphere.surroundings.daylight import daylight_picture, opening
 from viewsphere.surroundings.environment_file import read_environment
@@ -182,7 +182,7 @@ def bake_surrounding(
     )
 
 
-def sky_behind(view: View, surrounding: Surrounding, radiance: Float32) -> None:
+def sky_behind(view: PictureRays, surrounding: Surrounding, radiance: Float32) -> None:
     """Lay radiance (N, 4), scene-linear and premultiplied, over the sky, in place; no sky where the lens has no ray."""
     cosine, sine = surrounding.light[kernels.TURN, :2]
     turn = np.array([[cosine, sine, 0], [-sine, cosine, 0], [0, 0, 1]], np.float64)

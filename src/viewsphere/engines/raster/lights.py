@@ -78,7 +78,7 @@ class Lights(NamedTuple):
 
 
 @dataclass(frozen=True)
-class View:
+class ShadowView:
     """One map to draw: the (4, 4) matrix from the world, from which w on (from which distance on, if round), texels per length
     (at distance 1), the least distance from the border at which it is read, and half the light's sides (2, 3) along the view's
     axes (per length), or the radius and zeros if it is round, as every distant light is; whether wide penumbrae are filtered
@@ -222,7 +222,7 @@ def _views(source: _Source, points: Float, casters: Casters, size: int) -> Views
     return drawn
 
 
-def _is_in_bulb(views: Sequence[View], drawn: Views, radius: float) -> bool:
+def _is_in_bulb(views: Sequence[ShadowView], drawn: Views, radius: float) -> bool:
     """Whether most of what is seen in these views lies within the ball that shines: a bulb, which would hide all of its light.
     A table top that cuts through the ball hides half of it at most.
     """
@@ -234,7 +234,7 @@ def _is_in_bulb(views: Sequence[View], drawn: Views, radius: float) -> bool:
     return within > _BULB * count
 
 
-def _is_shut_in(views: Sequence[View], drawn: Views, has_ground: bool) -> bool:
+def _is_shut_in(views: Sequence[ShadowView], drawn: Views, has_ground: bool) -> bool:
     """Whether all that is seen in these views ends at a target, or on the ground."""
     for i, view in enumerate(views):
         right, up, ahead = view.matrix[0, 2] / view.texels, view.matrix[1, 2] / view.texels, view.matrix[3, 2]
@@ -276,14 +276,14 @@ def _wide_from_afar(backdrop: _Backdrop) -> Views:
     """
     away = -np.array(backdrop.direction)
     span, widest = backdrop.span, 2 * backdrop.reach
-    views: list[View] = []
+    views: list[ShadowView] = []
     while not views or (span < widest and len(views) < _MOST_WIDE):
         span = min(_WIDER * span, max(widest, backdrop.span))
         views.append(parallel_view(away, np.zeros(3), span, backdrop.tangent, backdrop.size))
     return draw_views(views, backdrop.casters)
 
 
-def parallel_view(away: Float, middle: Float, span: float, tangent: float, size: int, margin: int = _MARGIN) -> View:
+def parallel_view(away: Float, middle: Float, span: float, tangent: float, size: int, margin: int = _MARGIN) -> ShadowView:
     """What a distant light of this half angle's tangent sees in the direction `away`, `span` wide around a point."""
     right, up = _level_axes(away)
     texels = (size - 2 * margin) / span
@@ -291,14 +291,14 @@ def parallel_view(away: Float, middle: Float, span: float, tangent: float, size:
     matrix[:3, :3] = np.stack([texels * right, texels * up, away])
     matrix[:2, 3] = -matrix[:2, :3] @ middle
     matrix[3, 3] = 1.0
-    return View(matrix, 0.5, texels, size, 1.0, _ball(tangent), True)
+    return ShadowView(matrix, 0.5, texels, size, 1.0, _ball(tangent), True)
 
 
 def _ball(radius: float) -> Float:
     return np.array([[radius, 0.0, 0.0], [0.0, radius, 0.0]])
 
 
-def _fitted_from_afar(source: _Source, points: Float, casters: Casters, size: int) -> View:
+def _fitted_from_afar(source: _Source, points: Float, casters: Casters, size: int) -> ShadowView:
     """Around the targets and the penumbrae behind them."""
     away = -source.place
     axes = np.stack([*_level_axes(away), away])
@@ -318,7 +318,7 @@ def _fitted_from_afar(source: _Source, points: Float, casters: Casters, size: in
     return parallel_view(away, axes.T @ middle, span, tangent, size)
 
 
-def _perspective(source: _Source, axes: Float, tangent: float, size: int, guard: float) -> View:
+def _perspective(source: _Source, axes: Float, tangent: float, size: int, guard: float) -> ShadowView:
     """What a light at a place sees along the third of these axes, up to this tangent to all sides."""
     texels = size / 2 / tangent
     matrix = np.zeros((4, 4))
@@ -328,10 +328,10 @@ def _perspective(source: _Source, axes: Float, tangent: float, size: int, guard:
     near = max(1e-3, 0.02 * source.radius)
     is_round = source.kind != AREA or source.radius == 0
     sides = _ball(source.radius) if is_round else np.stack([source.right, source.up]) @ axes.T
-    return View(matrix, near, texels, size, guard, sides, is_round)
+    return ShadowView(matrix, near, texels, size, guard, sides, is_round)
 
 
-def _fitted_from_place(source: _Source, points: Float, casters: Casters, size: int) -> View | None:
+def _fitted_from_place(source: _Source, points: Float, casters: Casters, size: int) -> ShadowView | None:
     """One perspective of the targets, if they lie well within one: along a rectangle's own axis if that will do."""
     away = (casters.extent.low + casters.extent.high) / 2 - source.place
     distance = float(np.linalg.norm(away))
@@ -357,7 +357,7 @@ def _fitted_from_place(source: _Source, points: Float, casters: Casters, size: i
     return None
 
 
-def _all_round(source: _Source, size: int) -> list[View]:
+def _all_round(source: _Source, size: int) -> list[ShadowView]:
     """Everything the light may shine at: its cone, or the faces of a cube."""
     axis = source.axis if source.kind != POINT else np.array([0.0, 0.0, -1.0])
     right, up = _level_axes(axis)
@@ -372,7 +372,7 @@ def _all_round(source: _Source, size: int) -> list[View]:
     return [_perspective(source, np.stack(face), _FACE, size, guard) for face in faces]
 
 
-def draw_views(views: Sequence[View], casters: Casters, opposite: bool = False) -> Views:
+def draw_views(views: Sequence[ShadowView], casters: Casters, opposite: bool = False) -> Views:
     """Maps of all triangles seen in these views; `opposite` adds the same number of views from the other side, after them."""
     count = len(views) * (2 if opposite else 1)
     form, grid = np.zeros((count, kernels.FORM), np.float32), np.zeros((count, kernels.GRID), np.int64)
@@ -400,7 +400,7 @@ def draw_views(views: Sequence[View], casters: Casters, opposite: bool = False) 
     return result
 
 
-def _begin(view: View, tilt: float, casters: Casters, corners: Float, nearest: Float32) -> Surfaces:
+def _begin(view: ShadowView, tilt: float, casters: Casters, corners: Float, nearest: Float32) -> Surfaces:
     """Draw what stands still in a sequence into an empty map; returns what is still to be drawn."""
     maps, key = casters.maps, (view.matrix.tobytes(), view.near, tilt, view.size)
     kept = None if maps is None else maps.begun(key)
@@ -463,7 +463,7 @@ def _lay_out(row: NDArray[np.int64], size: int, texels: int, cells: int) -> tupl
     return texels, cells
 
 
-def _form_row(view: View, from_behind: bool) -> Float32:
+def _form_row(view: ShadowView, from_behind: bool) -> Float32:
     row = np.zeros(kernels.FORM, np.float32)
     matrix = view.matrix.copy()
     if from_behind:

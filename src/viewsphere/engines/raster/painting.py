@@ -11,7 +11,7 @@ from viewsphere.engines.raster import kernels_paint
 from viewsphere.engines.raster.environment import Surrounding, sky_behind
 from viewsphere.engines.raster.lights import Lights
 from viewsphere.engines.raster.occlusion import Occlusion
-from viewsphere.engines.raster.records import Float32, Int32, Surfaces, Textures, View
+from viewsphere.engines.raster.records import Float32, Int32, PictureRays, Surfaces, Textures
 from viewsphere.engines.raster.samples import Layer, Marks, Samples, differs_behind, edge_samples, layers
 from viewsphere.geometry.camera import inverse_camera_matrix
 from viewsphere.model.camera import Camera
@@ -117,7 +117,7 @@ def brighten_lines(pixels: Int32, means: Float32, width: int, radiance: Float32)
 def _shade(
     baked: Baked,
     camera: Camera,
-    view: View,
+    view: PictureRays,
     visibility: Visibility,
     triangle: Int32,
     depth: Float32,
@@ -143,7 +143,7 @@ def _shade(
 
 
 def _shade_some(
-    baked: Baked, view: View, slots: Int32, is_ground: bool, triangle: Int32, depth: Float32, radiance: Float32
+    baked: Baked, view: PictureRays, slots: Int32, is_ground: bool, triangle: Int32, depth: Float32, radiance: Float32
 ) -> None:
     if len(slots) == 0:
         return
@@ -154,7 +154,7 @@ def _shade_some(
         kernels_paint.shade(view, baked.surfaces, baked.textures, baked.floor, *light, is_ground, *seen, radiance)
 
 
-def view_of(baked: Baked, camera: Camera, samples: Samples | None = None) -> View:
+def view_of(baked: Baked, camera: Camera, samples: Samples | None = None) -> PictureRays:
     """The rays of a camera's pixel centres, or of these samples."""
     rays, places = _NO_RAYS, _NO_PLACES
     table = lens_rays(camera)
@@ -162,7 +162,7 @@ def view_of(baked: Baked, camera: Camera, samples: Samples | None = None) -> Vie
         rays = (table if samples is None else samples.rays).astype(np.float32).reshape(-1, 3)
     elif samples is not None:
         places = samples.position
-    return View(
+    return PictureRays(
         ((camera.center - baked.origin) / baked.unit).astype(np.float32),
         camera.R.astype(np.float32),
         inverse_camera_matrix(camera.intrinsics)[:2].astype(np.float32),

@@ -1,4 +1,4 @@
-"""The arrays that the shading kernels read, packed once per stage (View: once per picture). All float32 unless said.
+"""The arrays that the shading kernels read, packed once per stage (PictureRays: once per picture). All float32 unless said.
 
 Lengths are in units of half the diagonal of the objects' bounds, from their centre: models of any size keep their digits.
 """
@@ -46,7 +46,7 @@ class Textures(NamedTuple):
     transforms: Float32
 
 
-class View(NamedTuple):
+class PictureRays(NamedTuple):
     """One picture's rays: direction = rotation.T @ ray.
 
     eye (3,); rotation (3, 3) world to camera; lens (2, 3): ray = lens @ (column, row, 1) in samples;

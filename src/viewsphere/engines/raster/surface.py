@@ -11,7 +11,7 @@ from viewsphere.assets.mesh import Mesh
 from viewsphere.assets.repaint import repainted
 from viewsphere.engines.raster.bundles import BundlePacker
 from viewsphere.engines.raster.kernels_rows import place_rows
-from viewsphere.engines.raster.looks import look
+from viewsphere.engines.raster.material_rows import material_row
 from viewsphere.engines.raster.records import Float32, Int32, Surfaces, Textures
 from viewsphere.model.scene import Ground
 from viewsphere.model.thing import Repaint, Thing
@@ -64,13 +64,13 @@ def pack_materials(
             has_uv = mesh.uv0 is not None, mesh.uv1 is not None
             for original in mesh.materials:
                 m, repaint = repainted(original, repaints)
-                looks.append(look(m, repaint, scenery=i >= targets))
+                looks.append(material_row(m, repaint, scenery=i >= targets))
                 bundles.append(packer.add(m, mesh.images, has_uv))
         first.append(first_row[kind])
     ground = ground or Ground()
     floor, images = ground_material(ground)
     per_length, _, _ = ground_frame(ground, floor, lengths.origin, lengths.unit)
-    looks.append(look(floor, ground=True, catcher=ground.catcher, per_length=per_length))
+    looks.append(material_row(floor, ground=True, catcher=ground.catcher, per_length=per_length))
     bundles.append(packer.add(floor, images, (True, False)))
     packed = np.array(looks, np.float32), np.array(bundles, np.int32)
     return Materials(*packed, packer.pack(), tuple(first), made_of(meshes))

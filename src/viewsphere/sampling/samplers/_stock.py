@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import chain
-from typing import Any
 
 from viewsphere.errors import RecipeError
 from viewsphere.model.camera import Intrinsics
@@ -20,16 +19,17 @@ from viewsphere.recipe.recipe import Recipe
 from viewsphere.sampling.blend_scene import BlendScenery
 from viewsphere.sampling.camera import looking
 from viewsphere.sampling.composition import Composition
-from viewsphere.sampling.moments import Schedule, Timing, schedules
 from viewsphere.sampling.pictures import Pictures
 from viewsphere.sampling.scenery import draw_names
 from viewsphere.sampling.scenes import Scenes
+from viewsphere.sampling.sendable import Sendable
 from viewsphere.sampling.splits import dealt, hashed
+from viewsphere.sampling.time_steps import Schedule, Timing, schedules
 from viewsphere.sampling.viewpoints import Poses
 
 
 @dataclass(frozen=True, eq=False)
-class Stock:
+class Stock(Sendable):
     """What a sampler makes shots of; nothing here grows with the frames.
 
     `subjects`: what the frames are about, as the sampler says: models' keys, or scenes' names.
@@ -43,10 +43,6 @@ class Stock:
     composition: Composition | None = None  # of place, company and planes
     timings: tuple[Timing | None, ...] = ()  # of each model; none at all where nothing moves
     kept_splits: Mapping[str, str] = field(default_factory=dict[str, str])  # of models and scenes that a data set has already
-
-    def __getstate__(self) -> dict[str, Any]:
-        """What other processes are sent: not what was computed so far."""
-        return {field.name: getattr(self, field.name) for field in fields(self)}
 
     @cached_property
     def intrinsics(self) -> Intrinsics:

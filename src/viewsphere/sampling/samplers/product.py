@@ -13,8 +13,8 @@ from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.sampling.composition import BoxOf, center
-from viewsphere.sampling.moments import Run, TimedPoses, at_step
 from viewsphere.sampling.samplers import Standing, Stock
+from viewsphere.sampling.time_steps import Run, TimedPoses, at_step
 from viewsphere.store import Block
 
 

@@ -21,12 +21,12 @@ from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.scenes import ScenesEntry
 from viewsphere.sampling.cast import mixed
 from viewsphere.sampling.composition import BoxOf, center_of_all, placed, still
-from viewsphere.sampling.moments import is_animated
 from viewsphere.sampling.placing import Room
 from viewsphere.sampling.pose_numbers import as_ranges
 from viewsphere.sampling.samplers import Standing, Stock
 from viewsphere.sampling.seeds import generator, share
 from viewsphere.sampling.splits import drawn_split, shared
+from viewsphere.sampling.time_steps import is_animated
 from viewsphere.store import Block
 from viewsphere.store.index import Ranges, numbers
 

@@ -14,7 +14,7 @@ from viewsphere.model.scene import Matrix4
 
 
 @dataclass(frozen=True)
-class Piece:
+class PlacePiece:
     """One thing of a place: the member of a zoo family that `seed` draws, as `ModelSpec(source="zoo:<family>", seed=seed)`
     names it with centring and scale "as_is". Pieces of one family and seed are instances of one mesh.
 
@@ -34,7 +34,7 @@ class Place:
     None where this floor has no end.
     """
 
-    pieces: tuple[Piece, ...]
+    pieces: tuple[PlacePiece, ...]
     free: tuple[float, float, float, float] | None = None
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from viewsphere import plugins
 from viewsphere.zoo import driveway, fence, hedge, house, street, tree
-from viewsphere.zoo.places import Piece, Place, standing
+from viewsphere.zoo.places import Place, PlacePiece, standing
 from viewsphere.zoo.townscape.plan import HALF_LENGTH, ROAD, STEP
 from viewsphere.zoo.townscape.plots import Plot, allotted
 
@@ -84,14 +84,14 @@ def neighbourhood_random(rng: np.random.Generator) -> Place:
     )
 
 
-def _named(stands: Sequence[_Stand]) -> tuple[Piece, ...]:
+def _named(stands: Sequence[_Stand]) -> tuple[PlacePiece, ...]:
     """Pieces named by family and number."""
     count: Counter[str] = Counter()
-    pieces: list[Piece] = []
+    pieces: list[PlacePiece] = []
     for s in stands:
         count[s.family] += 1
         name = f"{s.family}_{count[s.family]}"
-        pieces.append(Piece(name, s.family, s.seed, s.family, standing(s.x, s.y, s.turn, s.z)))
+        pieces.append(PlacePiece(name, s.family, s.seed, s.family, standing(s.x, s.y, s.turn, s.z)))
     return tuple(pieces)
 
 

@@ -13,7 +13,7 @@ CLEAR = 0.5
 """A surface that lets more than this share of the light through casts no shadow."""
 
 
-def look(
+def material_row(
     m: Material,
     repaint: Repaint | None = None,
     *,

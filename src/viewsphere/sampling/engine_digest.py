@@ -13,7 +13,7 @@ SHARED = tuple(Path(__file__).parents[1] / name for name in ("imaging", "surroun
 
 
 @cache
-def engine_look(name: str) -> str:
+def engine_digest(name: str) -> str:
     """A digest of the sources of the engine of this name, of the programs it runs (its `PROGRAMS`, if it has any), and of what
     all engines share.
 

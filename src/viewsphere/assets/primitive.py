@@ -46,7 +46,7 @@ class FileFacts:
 
 
 @dataclass(frozen=True, eq=False)
-class Piece:
+class Primitive:
     """Some triangles of one part and material; arrays as in Mesh but float64, normals None if unknown."""
 
     part: str
@@ -59,7 +59,7 @@ class Piece:
     colors: Float | None = None
 
 
-def compact(piece: Piece) -> Piece:
+def compact(piece: Primitive) -> Primitive:
     """The piece without vertices that no triangle uses."""
     used, corners = np.unique(piece.triangles, return_inverse=True)
     if len(used) == len(piece.positions):
@@ -67,7 +67,7 @@ def compact(piece: Piece) -> Piece:
     return replace(pick(piece, used), triangles=corners.reshape(-1, 3))
 
 
-def pick(piece: Piece, vertices: NDArray[np.integer]) -> Piece:
+def pick(piece: Primitive, vertices: NDArray[np.integer]) -> Primitive:
     """The piece with these of its vertices, in this order; its triangles are left as they are."""
 
     def taken(array: Float | None) -> Float | None:
@@ -84,7 +84,7 @@ def pick(piece: Piece, vertices: NDArray[np.integer]) -> Piece:
 
 
 def assemble(
-    folder: ModelFolder, pieces: Sequence[Piece], materials: Sequence[Material], facts: FileFacts
+    folder: ModelFolder, pieces: Sequence[Primitive], materials: Sequence[Material], facts: FileFacts
 ) -> tuple[Mesh, FileFacts]:
     """Join pieces into one mesh, parts in order of first appearance, unused parts, materials and images left
     out.
@@ -140,8 +140,8 @@ def assemble(
 
 
 def _without_lost_textures(
-    folder: ModelFolder, pieces: Sequence[Piece], materials: Sequence[Material]
-) -> tuple[list[Piece], list[Material]]:
+    folder: ModelFolder, pieces: Sequence[Primitive], materials: Sequence[Material]
+) -> tuple[list[Primitive], list[Material]]:
     """The pieces, and materials without textures whose coordinates a piece lacks; a warning names each lost texture."""
     kept, all_materials = list(pieces), list(materials)
     known: dict[tuple[int, tuple[str, ...]], int] = {}
@@ -196,7 +196,7 @@ def _solid_triangles(folder: ModelFolder, positions: Float, triangles: Int) -> N
     return solid
 
 
-def _join(pieces: Sequence[Piece], name: str, width: int, empty: float, used: Int) -> NDArray[np.float32] | None:
+def _join(pieces: Sequence[Primitive], name: str, width: int, empty: float, used: Int) -> NDArray[np.float32] | None:
     arrays: list[Float | None] = [getattr(piece, name) for piece in pieces]
     if all(array is None for array in arrays):
         return None
@@ -208,7 +208,7 @@ def _join(pieces: Sequence[Piece], name: str, width: int, empty: float, used: In
 
 def _normals(
     folder: ModelFolder,
-    pieces: Sequence[Piece],
+    pieces: Sequence[Primitive],
     vertices: NDArray[np.float32],
     triangles: NDArray[np.int32],
     used: Int,

@@ -20,7 +20,7 @@ from viewsphere.model.thing import TimeStep
 from viewsphere.recipe.models import ModelEntry
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.time import Frames, Steps, chosen_frames
-from viewsphere.sampling.viewpoints import Poses, View
+from viewsphere.sampling.viewpoints import Orbit, Poses
 
 
 @dataclass(frozen=True)
@@ -94,7 +94,7 @@ class TimedPoses(Poses):
         name = self.base.name(pose)
         return name if moment is None else f"{name} at frame {moment.frame}, {moment.seconds!r} s"
 
-    def view(self, index: int) -> View:
+    def view(self, index: int) -> Orbit:
         """The pose's."""
         return self.base.view(index % len(self.base))
 

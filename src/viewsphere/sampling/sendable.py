@@ -1,0 +1,14 @@
+"""What the dataclasses of a plan have in common that travel to worker processes."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from typing import Any, cast
+
+
+class Sendable:
+    """A dataclass of which other processes are sent the fields alone: what was computed from them is computed again there."""
+
+    def __getstate__(self) -> dict[str, Any]:
+        """The fields by name."""
+        return {field.name: getattr(self, field.name) for field in fields(cast(Any, self))}
