@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from viewsphere.assets.piece import FileFacts
 
 from viewsphere.assets.isolated import READ_HERE
 from viewsphere.assets.mesh import Image, Material, Mesh, Texture
+from viewsphere.assets.primitive import FileFacts
 from viewsphere.assets.timeline import Blenders, Timeline
 
 LAST = 49

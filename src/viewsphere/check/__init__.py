@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import multiprocessing
 from collections import defaultdict
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass
 from functools import partial
 from typing import Any
@@ -57,13 +59,20 @@ class Report:
         return {"ok": self.ok, **asdict(self)}
 
 
-def check(dataset: Dataset, *, sample: int | None = 50, rays: bool | None = None, frames: int | None = None) -> Report:
+FEWEST = 128
+"""Frames for which a process of their own is worth its start."""
+
+
+def check(
+    dataset: Dataset, *, sample: int | None = 50, rays: bool | None = None, frames: int | None = None, workers: int = 0
+) -> Report:
     """Prove the finished frames of a data set, and all its exports.
 
     Every file is compared with its digest, and every frame is read whole, or with `frames` at most so many, spread evenly; the
     exports are then left to a whole check. On `sample` frames, spread evenly (None: on all), all labels are computed again from
     the exported models; and stored depth is lifted to points and compared with rays that Embree casts at these models: `rays`
-    False leaves that out, None does too (with a note) where embreex is not installed. Nothing is changed.
+    False leaves that out, None does too (with a note) where embreex is not installed. `workers` 0 proves all in the calling
+    process. Nothing is changed.
 
     Raises MissingExtraError for `rays` True without embreex.
     """
@@ -79,7 +88,11 @@ def check(dataset: Dataset, *, sample: int | None = 50, rays: bool | None = None
     positions = _spread(range(len(dataset)), frames)
     sampled = _spread(positions, sample)
     checked = {"digests": files, "models": len(dataset.models)}
-    findings += _frame_proofs(dataset, positions, sampled, rays, checked, notes)
+    notes += _alone(dataset)
+    for found in _frame_reports(dataset, positions, sampled, rays, workers):
+        findings += found.findings
+        notes += [note for note in found.notes if note not in notes]
+        checked |= {name: checked.get(name, 0) + count for name, count in found.checked.items()}
     names = exports(dataset)
     if len(positions) < len(dataset):
         notes.append(f"{len(positions):,} of {len(dataset):,} frames were read")
@@ -96,28 +109,39 @@ def _spread(positions: range, most: int | None) -> range:
     return positions if most is None else positions[:: max(1, -(-len(positions) // most))] if most else positions[:0]
 
 
-def _frame_proofs(
-    dataset: Dataset, positions: range, sampled: range, rays: bool | None, checked: dict[str, int], notes: list[str]
-) -> Iterator[Finding]:
-    """What is wrong with frames; `checked` counts those behind each proof."""
+def _frame_reports(dataset: Dataset, positions: range, sampled: range, rays: bool | None, workers: int) -> Iterator[Report]:
+    """What is wrong with frames, chunk by chunk."""
+    size = max(FEWEST, -(-len(positions) // max(2 * workers, 1)))
+    chunks = [positions[at : at + size] for at in range(0, len(positions), size)]
+    prove = partial(_frame_proofs, dataset, sampled, rays)
+    if workers < 2 or len(chunks) < 2:
+        yield prove(positions)
+        return
+    with ProcessPoolExecutor(min(workers, len(chunks)), multiprocessing.get_context("spawn")) as pool:
+        yield from pool.map(prove, chunks)
+
+
+def _frame_proofs(dataset: Dataset, sampled: range, rays: bool | None, positions: range) -> Report:
+    """What is wrong with the frames at these positions."""
     scenery, models = Scenery(dataset), {info.key: info for info in dataset.models}
-    notes += _alone(dataset)
+    notes: list[str] = []
+    findings: list[Finding] = []
     caster = None if rays is False else _caster(dataset, scenery, rays is True, notes)
     again = Again(dataset, scenery, models)
-    checked |= dict.fromkeys([*FRAME_PROOFS, *(name for name in labels() if _is_kept(dataset, name))], 0)
+    checked = dict.fromkeys([*FRAME_PROOFS, *(name for name in labels() if _is_kept(dataset, name))], 0)
     for position, index, read in _frames(dataset, positions):
         if not isinstance(read, Sample):
-            yield Finding("files", index, read)
+            findings.append(Finding("files", index, read))
             continue
         if read.index != index:
-            yield Finding("ids", index, f"expected a record of frame {index}, found one of {read.index}")
+            findings.append(Finding("ids", index, f"expected a record of frame {index}, found one of {read.index}"))
         found = [*_proofs(models, read), ("shot", _carried_out(partial(_as_shot, dataset, scenery, read)))]
         found += _proofs_by_models(read, again, caster) if position in sampled else ()
         for name, messages in found:
-            yield from (Finding(name, index, message) for message in messages)
+            findings += (Finding(name, index, message) for message in messages)
         for name in dict.fromkeys(name for name, _ in found):
             checked[name] = checked.get(name, 0) + 1
-    notes += scenery.notes
+    return Report(checked, tuple(findings), (*notes, *scenery.notes))
 
 
 def exports(dataset: Dataset) -> dict[str, Any]:

@@ -30,7 +30,7 @@ def repair(root: Path | str, *, workers: int = 0, listener: Listener | None = No
     what is computed again, and exports. `options` are those of `check`.
 
     A shot is rendered by its part's recipe, whose models have to be what they were; it takes the place of the damaged one when
-    it is whole and equal to what the manifest says of it. What cannot be made again stays as it is. `workers` 0 renders in the
+    it is whole and equal to what the manifest says of it. What cannot be made again stays as it is. `workers` 0 does all in the
     calling process. Raises StoreError where there is no plan that can be read.
     """
     dataset = Dataset(root)
@@ -39,10 +39,10 @@ def repair(root: Path | str, *, workers: int = 0, listener: Listener | None = No
         while mending.models(mending.damaged_models()):
             pass
         mending.shots(mending.damaged_shots())
-        report = check(Dataset(root), **options)
+        report = check(Dataset(root), workers=workers, **options)
         mending.shots(_found_shots(dataset, report.findings))
         mending.exports(report.findings)
-    report = check(Dataset(root), **options) if mending.done else report
+    report = check(Dataset(root), workers=workers, **options) if mending.done else report
     return Repaired(tuple(mending.done), replace(report, findings=(*report.findings, *mending.refused)))
 
 

@@ -69,7 +69,7 @@ def check(
     ] = False,
     workers: Annotated[
         int | None,
-        typer.Option(min=0, help="Processes for --repair; default: one a core. 0: this one.", show_default=False),
+        typer.Option(min=0, help="Processes; default: one a core. 0: this one.", show_default=False),
     ] = None,
     json_: AsJson = False,
 ) -> None:
@@ -80,13 +80,13 @@ def check(
     from viewsphere.check.repair import repair
     from viewsphere.store import Dataset
 
-    asked = None if all_ else sample
+    asked, crew = None if all_ else sample, cores() if workers is None else workers
     if mend:
         with ProgressBar(quiet=json_) as bar:
-            repaired = repair(folder, workers=cores() if workers is None else workers, listener=bar.show, sample=asked)
+            repaired = repair(folder, workers=crew, listener=bar.show, sample=asked)
         done, report = repaired.done, repaired.report
     else:
-        done, report = (), prove(Dataset(folder), sample=asked)
+        done, report = (), prove(Dataset(folder), sample=asked, workers=crew)
     if json_:
         print_json({**({"repaired": list(done)} if mend else {}), **report.to_json()})
     else:

@@ -242,6 +242,9 @@ class KernelCache(FunctionCache):
         try:
             with self._guard_against_spurious_io_errors():
                 return self._load_overload(sig, target_context)
+        except (AttributeError, ImportError):  # another version's entries, of classes that have other names now
+            self.flush()
+            return None
         finally:
             del codegen.unserialize_library
 

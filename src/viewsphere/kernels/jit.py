@@ -75,7 +75,9 @@ def _cached_in(folder: str) -> Generator[None]:
 
 @cache
 def _sources(file: str) -> frozenset[str]:
-    """A kernel's file, the files of the kernels it can reach, and the files from which these import their constants."""
+    """A kernel's file, the files of the kernels it can reach, those from which these import their constants, and the `records`
+    beside them: tuples that kernels are given, whose fields and names compiled code knows.
+    """
     found, waiting = {file}, [file]
     while waiting:
         for name in _IMPORT.findall(Path(waiting.pop()).read_text(encoding="utf-8")):
@@ -84,7 +86,8 @@ def _sources(file: str) -> frozenset[str]:
                 found.add(source)
                 if name.rpartition(".")[2].startswith("kernels"):
                     waiting.append(source)
-    return frozenset(found)
+    records = (Path(source).with_name("records.py") for source in found)
+    return frozenset(found).union(str(file) for file in records if file.is_file())
 
 
 @cache

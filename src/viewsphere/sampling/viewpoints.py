@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import NamedTuple, overload
+from typing import overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,19 +25,10 @@ from viewsphere.model.instant import Viewpoint
 from viewsphere.model.scene import Vector
 from viewsphere.recipe.values import Range
 from viewsphere.recipe.viewpoints import Grid, Jitter, Normal, PoseList, Sphere, Viewpoints, axis_value
-from viewsphere.sampling.pose_files import Motion, PoseFile, read_poses
+from viewsphere.sampling.pose_files import Extrinsics, Orbit, PoseFile, read_poses
 from viewsphere.sampling.seeds import generator
 
 Float = NDArray[np.float64]
-
-
-class Orbit(NamedTuple):
-    """Where the camera stands: degrees and metres."""
-
-    azimuth: float
-    elevation: float
-    distance: float
-    tilt: float
 
 
 @dataclass(frozen=True)
@@ -305,7 +296,7 @@ class ListedPoses(Poses):
     def _views(self) -> tuple[tuple[Orbit, Vector | None], ...]:
         turn = self._turn
         return tuple(
-            self._view_of(turn, entry) if isinstance(entry, Motion) else (Orbit(*entry), None) for entry in self.file.entries
+            self._view_of(turn, entry) if isinstance(entry, Extrinsics) else (entry, None) for entry in self.file.entries
         )
 
     @cached_property
@@ -324,7 +315,7 @@ class ListedPoses(Poses):
         up = self.viewpoints.up or self.file.up
         return axes_rotation(up, self.viewpoints.forward or ("-z" if up[1] == "y" else "-y"), "viewpoints")
 
-    def _view_of(self, turn: Float, motion: Motion) -> tuple[Orbit, Vector]:
+    def _view_of(self, turn: Float, motion: Extrinsics) -> tuple[Orbit, Vector]:
         rotation = transform(turn, motion.R)  # rows: the camera's axes, in our world
         center = self.viewpoints.scale * transform(turn, np.subtract(motion.center, self.viewpoints.origin))
         ahead = -float((rotation[2] * center).sum())

@@ -7,14 +7,14 @@ from pathlib import Path
 
 from viewsphere.errors import RecipeError
 from viewsphere.model.mistakes import one_of
-from viewsphere.sampling.pose_files.entries import Motion, Orbit, PoseFile
+from viewsphere.sampling.pose_files.entries import Extrinsics, Orbit, PoseFile
 from viewsphere.sampling.pose_files.lines import read_lines
 
 FORMATS = ("csv", "view", "tum", "kitti", "nerfstudio", "colmap")
 COLUMNS = {4: "view", 8: "tum", 12: "kitti"}
 """Numbers in a line of the formats that have nothing else."""
 
-__all__ = ["FORMATS", "Motion", "Orbit", "PoseFile", "read_poses"]
+__all__ = ["FORMATS", "Extrinsics", "Orbit", "PoseFile", "read_poses"]
 
 
 def read_poses(path: Path, kind: str = "auto", every: int = 1) -> PoseFile:

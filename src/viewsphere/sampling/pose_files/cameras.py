@@ -12,7 +12,7 @@ from viewsphere.errors import ModelError, RecipeError
 from viewsphere.model.camera import Intrinsics
 from viewsphere.recipe.time import chosen_frames
 from viewsphere.recipe.viewpoints import PoseList
-from viewsphere.sampling.pose_files.entries import Motion, PoseFile
+from viewsphere.sampling.pose_files.entries import Extrinsics, PoseFile
 from viewsphere.sampling.pose_files.lens import one_lens
 from viewsphere.sampling.pose_files.motions import motion
 
@@ -53,5 +53,5 @@ def _lens(told: dict[str, Any]) -> Intrinsics:
     return Intrinsics(width=told["width"], height=told["height"], fx=fx, fy=fy, cx=cx, cy=cy)
 
 
-def _motion(told: dict[str, Any], where: str) -> Motion:
+def _motion(told: dict[str, Any], where: str) -> Extrinsics:
     return motion(np.array(told["rotation"], np.float64), np.array(told["center"], np.float64), where)

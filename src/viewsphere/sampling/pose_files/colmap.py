@@ -10,7 +10,7 @@ import numpy as np
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.camera import Distortion, Intrinsics
-from viewsphere.sampling.pose_files.entries import Motion, PoseFile
+from viewsphere.sampling.pose_files.entries import Extrinsics, PoseFile
 from viewsphere.sampling.pose_files.lens import one_lens
 from viewsphere.sampling.pose_files.lines import counted, number, numbers, read_lines, read_text
 from viewsphere.sampling.pose_files.motions import from_quaternion, motion
@@ -78,9 +78,9 @@ def _distortion(model: str, p: dict[str, float]) -> Distortion | None:
     return Distortion(model="brown_conrady", coefficients=coefficients)
 
 
-def _images(file: Path) -> list[tuple[str, int, Motion]]:
+def _images(file: Path) -> list[tuple[str, int, Extrinsics]]:
     """Name, camera and motion of every image. Each has two lines; the second, its points, may be empty."""
-    images: list[tuple[str, int, Motion]] = []
+    images: list[tuple[str, int, Extrinsics]] = []
     is_points = False
     for line, text in enumerate(read_text(file).splitlines(), 1):
         if text.lstrip().startswith("#"):
@@ -96,7 +96,7 @@ def _images(file: Path) -> list[tuple[str, int, Motion]]:
     return images
 
 
-def _image(words: Sequence[str], where: str) -> tuple[str, int, Motion]:
+def _image(words: Sequence[str], where: str) -> tuple[str, int, Extrinsics]:
     """IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME: world to camera."""
     if len(words) < MOST_IN_ONE_LINE or not words[8].isdigit():
         raise RecipeError(f"{where}: expected IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME; found {' '.join(words)!r:.60}")

@@ -20,7 +20,7 @@ class Orbit(NamedTuple):
     tilt: float = 0.0
 
 
-class Motion(NamedTuple):
+class Extrinsics(NamedTuple):
     """A camera in the file's own world: `R` (3, 3) world to camera in OpenCV axes, `center` (3,) in the file's unit."""
 
     R: tuple[Row, Row, Row]
@@ -35,6 +35,6 @@ class PoseFile:
     that all frames share, None if the file names none.
     """
 
-    entries: tuple[Orbit, ...] | tuple[Motion, ...]
+    entries: tuple[Orbit, ...] | tuple[Extrinsics, ...]
     up: Axis = "+z"
     intrinsics: Intrinsics | None = None

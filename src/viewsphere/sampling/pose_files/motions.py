@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.rotation import matrix_from_quaternion
-from viewsphere.sampling.pose_files.entries import Motion, Row
+from viewsphere.sampling.pose_files.entries import Extrinsics, Row
 
 Float = NDArray[np.float64]
 
@@ -27,15 +27,15 @@ def from_quaternion(wxyz: Sequence[float], where: str) -> Float:
     return matrix_from_quaternion((w, x, y, z))
 
 
-def motion(world_from_camera: Float, center: Float, where: str) -> Motion:
+def motion(world_from_camera: Float, center: Float, where: str) -> Extrinsics:
     """A camera by its rotation to the world (3, 3), OpenCV axes, and its centre; RecipeError if that is no rotation."""
     rotation = _nearest_rotation(world_from_camera)
     if rotation is None or np.abs(rotation - world_from_camera).max() > RIGHT_ANGLES:
         raise RecipeError(f"{where}: expected a rotation; found a matrix that is none")
-    return Motion(_rows(rotation.T), _row(center))
+    return Extrinsics(_rows(rotation.T), _row(center))
 
 
-def from_matrix(values: Sequence[float], where: str) -> Motion:
+def from_matrix(values: Sequence[float], where: str) -> Extrinsics:
     """A camera by the 12 (or 16) numbers of its camera-to-world matrix, row by row, OpenCV axes."""
     matrix = np.array(values[:12], np.float64).reshape(3, 4)
     return motion(matrix[:, :3], matrix[:, 3], where)

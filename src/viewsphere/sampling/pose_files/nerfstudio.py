@@ -13,7 +13,7 @@ import numpy as np
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.camera import focal_from_fov
 from viewsphere.model.camera import Distortion, Intrinsics
-from viewsphere.sampling.pose_files.entries import Motion, PoseFile
+from viewsphere.sampling.pose_files.entries import Extrinsics, PoseFile
 from viewsphere.sampling.pose_files.lens import one_lens
 from viewsphere.sampling.pose_files.lines import number, read_text
 from viewsphere.sampling.pose_files.motions import motion
@@ -37,7 +37,7 @@ def read_nerfstudio(path: Path) -> PoseFile:
     if not isinstance(frames, list):
         raise RecipeError(f"{path}: expected a mapping with a list of frames; found none")
     whole = cast(dict[str, Any], data)
-    entries: list[Motion] = []
+    entries: list[Extrinsics] = []
     lenses: list[Intrinsics | None] = []
     for i, frame in enumerate(cast(list[Any], frames)):
         where = f"{path}: frames[{i}]"
@@ -49,7 +49,7 @@ def read_nerfstudio(path: Path) -> PoseFile:
     return PoseFile(tuple(entries), intrinsics=one_lens(lenses, str(path)))
 
 
-def _motion(value: Any, where: str) -> Motion:
+def _motion(value: Any, where: str) -> Extrinsics:
     rows = cast(list[Any], value) if isinstance(value, list) else []
     if len(rows) not in (3, 4) or any(not isinstance(r, list) or len(cast(list[Any], r)) != 4 for r in rows):
         raise RecipeError(f"{where}: expected a 4x4 matrix; found {value!r:.40}")

@@ -6,14 +6,14 @@ from pathlib import Path
 
 import numpy as np
 
-from viewsphere.sampling.pose_files.entries import Motion, PoseFile
+from viewsphere.sampling.pose_files.entries import Extrinsics, PoseFile
 from viewsphere.sampling.pose_files.lines import counted, read_lines
 from viewsphere.sampling.pose_files.motions import from_matrix, from_quaternion, motion
 
 
 def read_tum(path: Path) -> PoseFile:
     """Lines of time, x, y, z, qx, qy, qz, qw: camera to world (https://cvg.cit.tum.de/data/datasets/rgbd-dataset/file_formats)."""
-    entries: list[Motion] = []
+    entries: list[Extrinsics] = []
     for line, words in read_lines(path):
         where = f"{path}:{line}"
         _, x, y, z, qx, qy, qz, qw = counted(words, 8, where)
