@@ -10,6 +10,7 @@ from small import small_recipe, tree_hash
 from viewsphere import Dataset, generate
 from viewsphere.check import check
 from viewsphere.check.repair import repair
+from viewsphere.run.exporting import export
 from viewsphere.run.merging import merge
 from viewsphere.store.manifest import MANIFEST, Manifest
 
@@ -195,3 +196,29 @@ def test_what_came_from_elsewhere_cannot_be_rendered(small_run, tmp_path):
         found = repair(tmp_path / "out", rays=False)
         assert any("merge or import it anew" in finding.message for finding in found.report.findings)
         assert tree_hash(tmp_path / "out") == spoilt
+
+
+def test_exports_are_left_alone_while_frames_are_lost(small_run, tmp_path):
+    """A merged shot cannot be rendered here; its pictures in the exports are the last copy."""
+    generate(small_recipe(seed=1), tmp_path / "two")
+    merge([small_run, tmp_path / "two"], tmp_path / "out")
+    export(tmp_path / "out", ["coco"])
+    exported = tree_hash(tmp_path / "out" / "coco")
+    shutil.rmtree(next(tmp_path.glob("out/store/shots/*/*")))
+    found = repair(tmp_path / "out", rays=False)
+    assert not found.report.ok and found.done == ()
+    assert any("merge or import it anew" in finding.message for finding in found.report.findings)
+    assert any("export coco is not written again" in finding.message for finding in found.report.findings)
+    assert tree_hash(tmp_path / "out" / "coco") == exported
+
+
+def test_a_shot_without_records_is_made_again(small_run, spoilt):
+    file = sorted(spoilt.glob("store/shots/*/*/frames.json"))[0]
+    file.write_text("{}")
+    assert repair(spoilt, rays=False).report.ok
+    assert tree_hash(spoilt) == tree_hash(small_run)
+
+
+def test_frames_are_proved_by_several_processes_as_by_one(small_run, monkeypatch):
+    monkeypatch.setattr("viewsphere.check.FEWEST", 3)
+    assert check(Dataset(small_run), workers=2) == check(Dataset(small_run))

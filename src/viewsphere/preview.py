@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
+from viewsphere.errors import StoreError
 from viewsphere.labels import drawings
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.channel import picture_of
@@ -153,6 +154,10 @@ def draw_sample(sample: Sample, draw: Sequence[str] = (), width: int | None = No
     picture, depth beside it; (H, W, 3) uint8 sRGB.
     """
     chosen = [drawing for drawing in drawings() if drawing.name in draw]
+    if picture_of(sample.channels) is None:
+        raise StoreError(
+            "preview: expected pictures (rgb or rgba), found a data set that keeps neither: preview its recipe instead"
+        )
     rgb = _on_paper(sample.picture)
     for drawing in chosen:
         rgb = drawing.pixels(rgb, sample) if drawing.pixels else rgb

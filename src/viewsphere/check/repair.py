@@ -87,9 +87,16 @@ class _Mending:
         return bool(wanted)
 
     def exports(self, findings: Iterable[Finding]) -> None:
-        """Write those again of which something was found: also where their files are links of what was damaged."""
+        """Write those again of which something was found: also where their files are links of what was damaged. While frames
+        cannot be made again, exports stay: they may hold the last copy.
+        """
         names = exports(self._dataset).keys() & {finding.check for finding in findings}
+        lost = bool(self.refused) or any(finding.check == "counts" for finding in findings)
         for name in sorted(names):
+            if lost:
+                why = "frames or models are missing or damaged, of which it may hold the last copy"
+                self.refused.append(Finding("repair", None, f"export {name} is not written again: {why}"))
+                continue
             try:
                 export(self._dataset.root, [name])
                 self.done.append(f"export {name}: written again")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
@@ -94,8 +93,6 @@ class Mender:
         row = self.record.find(key)
         if row is None:
             raise StoreError(f"{key}: expected a shot of the plan, found another")
-        if _is_linked(self.store.shot_folder(key)):
-            raise StoreError(f"{key}: expected a shot that was rendered here, found another's: merge or import it anew")
         self._portion(row.part)
         return row.part
 
@@ -118,18 +115,24 @@ class Mender:
 
     def _planned(self, number: int) -> Portion:
         part = self.record.parts[number]
+        if part.merged or not part.is_sampled:
+            raise StoreError(
+                f"{self.store.root}: part {number + 1}: expected one that was rendered here, found another data set's: repair "
+                "that one, then merge or import it anew"
+            )
         check_whether_same(self.store, part)
-        problem: object = "another recipe"
+        problem: object = None
         for folder in dict.fromkeys(self._folders(number)):
             try:
                 planned = plan(Recipe.model_validate(part.recipe, context={"folder": folder}), part.shot_frames)
             except UserError as error:
-                problem = error
+                problem = problem or error
                 continue
             if planned.digest == part.digest:
                 return resumed(planned, self.record, number)
         raise StoreError(
-            f"{self.store.root}: recipe {part.name!r}: expected its files where they were, found {problem}: put them back, or "
+            f"{self.store.root}: recipe {part.name!r}: expected its files where they were, "
+            f"found {problem or 'another recipe'}: put them back, or "
             "delete the damaged folders and render the recipe again"
         )
 
@@ -157,12 +160,3 @@ def _sorted(keys: Iterable[str], part_of: Callable[[str], int]) -> tuple[Errors,
         except UserError as error:
             errors[key] = error
     return errors, found
-
-
-def _is_linked(folder: Path) -> bool:
-    """Whether a shot came from another data set: its records say everything."""
-    try:
-        records = json.loads((folder / "frames.json").read_text("utf-8"))
-        return all("camera" in record for record in records)
-    except (OSError, ValueError, TypeError):
-        return False

@@ -231,6 +231,7 @@ def _parts(source: _Source) -> Iterator[Part]:
                 new_poses=plan.poses if first == source.first_frame else 0,
                 pose_names=names if first == source.first_frame else "",
                 dealt_splits={source.model_keys.get(key, key): split for key, split in part.dealt_splits.items()},
+                merged=True,
             )
         first += frames
 

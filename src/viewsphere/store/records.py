@@ -113,6 +113,7 @@ class Part:
     of their own. `shot_frames`: most positions of a shot. `settings`: digests of what frames that are appended have to share.
     `new_poses`: how many poses no earlier part had; `pose_names`: their digests (see `sampling.extension`), None where they
     follow from the recipe. `dealt_splits`: where splits are by model or by scene, the split of each that no earlier part had.
+    `merged`: the part came from another data set, where its shots and models may have had other names and numbers.
     """
 
     digest: str
@@ -131,6 +132,7 @@ class Part:
     new_poses: int = 0
     pose_names: str | None = None
     dealt_splits: dict[str, str] = field(default_factory=dict[str, str])
+    merged: bool = False
 
     @property
     def subjects(self) -> tuple[str, ...]:
