@@ -8,6 +8,8 @@ import pytest
 import viewsphere.check
 from cube_dataset import LENS, make
 from sealing import seal_again
+from small import small_recipe
+from viewsphere import generate
 from viewsphere.check import check
 from viewsphere.check.digests import damaged
 from viewsphere.check.frames import FRAME_PROOFS
@@ -548,3 +550,15 @@ def test_every_field_of_every_record_is_proved(whole, merged, tmp_path, kind):
 def test_every_leaf_of_every_record_is_proved(merged, tmp_path):
     dataset = Dataset(shutil.copytree(merged.root, tmp_path / "out"))
     assert missed_leaves(dataset, 6, leaves(record_of(dataset, 6))) == []
+
+
+def test_frames_of_another_split_than_the_plan_dealt(tmp_path):
+    generate(small_recipe(formats=[]), tmp_path)
+    file = next(tmp_path.glob("store/shots/*/*/shot.json"))
+
+    def change(shot):
+        for instant in shot["instants"]:
+            instant["split"] = "val" if instant["split"] == "train" else "train"
+
+    edit_json(file, change)
+    assert {name for name, _ in failures(Dataset(tmp_path), rays=False)} == {"shot"}
