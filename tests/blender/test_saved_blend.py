@@ -79,7 +79,10 @@ def driers(blender, tmp_path_factory):
 
 def test_a_file_a_model(driers):
     dataset, _ = driers
-    assert sorted(path.name for path in (dataset.root / "blend").iterdir()) == ["hair_drier_000.blend", "hair_drier_001.blend"]
+    assert sorted(path.name for path in (dataset.root / "blend").glob("*.blend")) == [
+        "hair_drier_000.blend",
+        "hair_drier_001.blend",
+    ]
 
 
 def test_bpy_sees_the_same_objects_in_the_same_pixels(driers):
@@ -150,7 +153,7 @@ def test_nothing_leads_out_of_the_file(driers):
     imagecodecs = pytest.importorskip("imagecodecs")
     dataset, found = driers
     assert found["unpacked"] == []
-    for file in (dataset.root / "blend").iterdir():
+    for file in (dataset.root / "blend").glob("*.blend"):
         content = imagecodecs.zstd_decode(file.read_bytes())
         assert content.startswith(b"BLENDER")
         for place in {dataset.root.parent, Path.home(), Path.cwd(), Path(__file__).parents[2]} - {Path("/")}:
@@ -161,7 +164,7 @@ def test_nothing_leads_out_of_the_file(driers):
 def test_the_same_data_set_gives_the_same_scene(driers, blender, tmp_path):
     dataset, found = driers
     export(dataset.root, ["blend"], output=tmp_path, choice=Choice(("hair_drier_000",)))
-    assert [path.name for path in (tmp_path / "blend").iterdir()] == ["hair_drier_000.blend"]
+    assert [path.name for path in (tmp_path / "blend").glob("*.blend")] == ["hair_drier_000.blend"]
     again = opened(blender, tmp_path / "blend" / "hair_drier_000.blend", tmp_path / "opened", index=[4])
     assert {k: v for k, v in again.items() if k != "paths"} == {k: v for k, v in found.items() if k != "paths"}
     assert np.array_equal(numbers(tmp_path / "opened", 4), numbers(dataset.root / "opened", 4))
@@ -206,7 +209,7 @@ def test_a_scene_a_file_without_sources_without_background(blender, tmp_path):
     generate(recipe, tmp_path / "out")
     (tmp_path / "ball.glb").unlink()
     export(tmp_path / "out", ["blend"])
-    files = sorted((tmp_path / "out" / "blend").iterdir())
+    files = sorted((tmp_path / "out" / "blend").glob("*.blend"))
     assert [file.name for file in files] == ["ball-000000.blend", "ball-000001.blend"]
     samples = list(Dataset(tmp_path / "out"))
     for file, sample in zip(files, samples, strict=True):
@@ -230,7 +233,7 @@ def test_merged_and_unlit_data_sets(driers, blender, tmp_path):
         file.unlink()
     last = len(merged) - 1
     export(merged.root, ["blend"], output=tmp_path, choice=Choice((), ((last, last + 1),)))
-    (file,) = (tmp_path / "blend").iterdir()
+    (file,) = (tmp_path / "blend").glob("*.blend")
     found = opened(blender, file, tmp_path / "opened", index=[1])
     assert found["lights"] == ["SUN"]
     assert (numbers(tmp_path / "opened", 1) != merged[last].channels["instances"]).sum() <= 5
@@ -270,7 +273,7 @@ def test_a_users_own_scene_is_held_still(blender, tmp_path):
     )
     generate(recipe, tmp_path / "out")
     assert export(tmp_path / "out", ["blend"]) == ()
-    (file,) = (tmp_path / "out" / "blend").iterdir()
+    (file,) = (tmp_path / "out" / "blend").glob("*.blend")
     opened(blender, file, tmp_path / "opened", index=[1, 2], picture=[1])
     samples = list(Dataset(tmp_path / "out"))
     assert {"crate", "chair"} == {o.category for o in samples[0].objects}

@@ -90,6 +90,8 @@ def decode_png(data: bytes) -> NDArray[Any]:
         ended = kind == b"IEND"
     if len(header) != 13 or not ended or not body:
         raise UserError("PNG: expected a header and pixels, found the file's end: it is cut off")
+    if not data.endswith(_chunk(b"IEND", b"")):
+        raise UserError("PNG: expected nothing behind its last chunk, found more: the file is damaged")
     return _png_pixels(header, body)
 
 
