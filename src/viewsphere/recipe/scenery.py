@@ -63,7 +63,9 @@ class PlaceEntry(Frozen):
 
 
 def _renamed(value: Any) -> Any:
-    """`random` is an older word for `scatter`."""
+    """`random` is an older word for `scatter`; the placer of listed spots is asked for by the list."""
+    if value == "listed":
+        raise ValueError("expected a placer, such as scatter or row, or a list of [x, y, azimuth]; found listed without spots")
     return "scatter" if value == "random" else value
 
 

@@ -47,8 +47,6 @@ class ScenesEntry(Frozen):
 
     @model_validator(mode="after")
     def _check(self) -> ScenesEntry:
-        if self.layout == "listed":
-            raise ValueError("expected layout: a list of [x, y, azimuth], or a placer's name; found listed without spots")
         if not isinstance(self.layout, str) and span(self.objects) != (len(self.layout),) * 2:
             raise ValueError(f"expected objects: {len(self.layout)}, as many as the layout lists; found another number")
         return self
