@@ -178,7 +178,7 @@ def test_all_parts_of_a_scene_have_an_entry():
     entries = [kind for module in (finish, light, surface) for kind in vars(module).values() if isinstance(kind, type)]
     derived = {kind.part for kind in entries if issubclass(kind, Entry) and kind is not Entry}
     parts = {kind for kind in vars(scene).values() if isinstance(kind, type) and issubclass(kind, Frozen)}
-    assert parts - derived == {Frozen, scene.Finish, scene.BlendScene, scene.Scene}
+    assert parts - derived == {Frozen, scene.Finish, scene.BlendScene, scene.Floor, scene.Scene}
 
 
 def test_pictures_and_words_of_a_part_are_known():

@@ -8,6 +8,7 @@ import pytest
 from viewsphere.assets.timeline import Blenders, Timeline
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.box import box_vertices
+from viewsphere.model.scene import Floor
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.sampling.distances import Distances
 from viewsphere.sampling.extension import extend, whole
@@ -130,7 +131,7 @@ def test_the_ground_is_where_the_lowest_moment_touches_it():
     def sinking(spec, step=None):
         return box_of(spec, step) - [0, 0, frame_of(spec, step) / 50]
 
-    assert {s.scene.floor for s in plan(recipe()).shots(sinking)} == {-37 / 50}
+    assert {s.scene.floor for s in plan(recipe()).shots(sinking)} == {Floor(height=-37 / 50)}
     assert {s.scene.floor for s in plan(recipe(scene={"ground": "off"})).shots(sinking)} == {None}
     assert plan(recipe({"source": "zoo:car"})).shot(0, box_of).scene.floor is None
 

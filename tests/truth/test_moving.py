@@ -10,7 +10,7 @@ from shots import AHEAD, still_shot
 from viewsphere.geometry.rotation import matrix_from_quaternion
 from viewsphere.labels import observe
 from viewsphere.model.model_spec import ModelSpec
-from viewsphere.model.scene import Ground, Scene
+from viewsphere.model.scene import Floor, Ground, Scene
 from viewsphere.model.thing import Motion, Thing
 from viewsphere.truth.geometry import Geometry, build_geometry, present
 from viewsphere.truth.moving import MOVED, ROOMS, Ring, shot_floor
@@ -59,7 +59,7 @@ def test_what_moved_is_what_is_built_there(seed):
     """Random walks of five things: some stand, turn, deform, go and come back; one changes its triangles."""
     rng = np.random.default_rng(seed)
     ground = seed % 3 > 0
-    floor = -2.0 if seed % 3 == 2 else None
+    floor = Floor(height=-2.0) if seed % 3 == 2 else None
     shapes = [random_soup(rng, 60), sphere(2, 0.8), cube(0.7), mesh_of(np.zeros((0, 3)), []), cube(0.2)]
     others = [cube(0.1), sphere(2, 0.4), cube(0.3), shapes[3], random_soup(rng, 5)]
     poses, meshes, ring = [pose(rng) for _ in shapes], list(shapes), Ring(ground, 0.3)
@@ -78,6 +78,7 @@ def walk(count, standing=pose(np.random.default_rng(5))):
 
 
 MESHES = [sphere(2, 0.8), cube(0.5)]
+DEEP = Floor(height=-50000.0)
 
 
 def test_as_many_instants_as_there_are_rooms_live_at_once_and_share_what_stays():
@@ -96,8 +97,8 @@ def test_what_is_asked_for_again_is_the_same_object_and_what_moved_is_not():
     ring, (a, b, *_) = Ring(True, 0.3), walk(3)
     first, second = ring.at(a, MESHES), ring.at(b, MESHES)
     assert ring.at(list(a), list(MESHES)) is first and ring.at(b, MESHES) is second and first is not second
-    assert ring.at(a, MESHES, -50000.0) is not first
-    assert ring.at(a, MESHES, -50000.0).ground_z == -50000.0 and first.ground_z > -50000.0
+    assert ring.at(a, MESHES, DEEP) is not first
+    assert ring.at(a, MESHES, DEEP).ground_z == -50000.0 and first.ground_z > -50000.0
 
 
 def test_labels_of_what_moved_are_those_of_what_is_built_there():
@@ -131,15 +132,20 @@ def moving(*poses, floor=None, ground=True):
     return still_shot(things, viewpoints=[AHEAD] * 3, scene=Scene(ground=Ground() if ground else None, floor=floor))
 
 
-def floor_of(shot, meshes):
+def laid(shot, meshes):
     return shot_floor(shot, lambda _: meshes)
+
+
+def floor_of(shot, meshes):
+    floor = laid(shot, meshes)
+    return floor and floor.height
 
 
 def test_the_ground_is_as_high_as_at_the_lowest_instant():
     shot = moving(lifted(2, -1, 3, turn=0.3), lifted(0))
     assert floor_of(shot, [cube(0.5), cube(9.0)]) == -1 - (np.float64(0.5) * np.sin(0.3) + 0.5 * np.cos(0.3))
     grounds = {
-        Ring(True, 0.3).at(shot.things_at(i), [cube(0.5), cube(0.5)], floor_of(shot, [cube(0.5), cube(0.5)])).ground_z
+        Ring(True, 0.3).at(shot.things_at(i), [cube(0.5), cube(0.5)], laid(shot, [cube(0.5), cube(0.5)])).ground_z
         for i in range(3)
     }
     assert grounds == {floor_of(shot, [cube(0.5)] * 2)}
@@ -148,6 +154,14 @@ def test_the_ground_is_as_high_as_at_the_lowest_instant():
 def test_a_scene_says_that_its_ground_is_lower():
     assert floor_of(moving(lifted(2, -1, 3), floor=-4.0), [cube()]) == -4.0
     assert floor_of(moving(lifted(2, -1, 3), floor=4.0), [cube()]) == -1.5
+
+
+def test_a_fixed_ground_stays_where_it_is():
+    fixed = Floor(height=0.25, is_fixed=True)
+    shot = moving(lifted(2, -1, 3), floor=fixed)
+    assert laid(shot, [cube()]) == fixed
+    ring = Ring(True, 0.3)
+    assert [ring.at(shot.things_at(i), [cube()], fixed).ground_z for i in range(3)] == [0.25] * 3
 
 
 def test_what_is_not_there_or_stands_still_lays_no_ground():

@@ -142,7 +142,8 @@ class RayCaster:
         corners = np.concatenate([transform(world, soup.corners) - self._middle for _, world, soup in placed])
         opaque = np.concatenate([soup.opaque for _, _, soup in placed])
         self._owner = np.repeat([i for i, _, _ in placed], [len(soup.corners) for _, _, soup in placed])
-        self._lowest = min(float(corners[..., 2].min()), np.inf if floor is None else floor - self._middle[2])
+        lowest = float(corners[..., 2].min())
+        self._lowest = lowest if floor is None else floor.under(lowest + self._middle[2]) - self._middle[2]
         self._all, self._solid = _scene(corners), _scene(corners[opaque])
         self._key = key
 

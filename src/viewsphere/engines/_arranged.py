@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from viewsphere.assets.deforming import Load, sharing
 from viewsphere.assets.mesh import Mesh
 from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.scene import Floor
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing, TimeStep
 from viewsphere.truth.geometry import Geometry, placed_meshes, present
@@ -77,7 +78,7 @@ class Arrangements:
     shot: Shot
     shown: Shown
     meshes: tuple[Mesh, ...]  # at rest
-    floor: float | None
+    floor: Floor | None
     ring: Ring
 
     @classmethod

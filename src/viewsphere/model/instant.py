@@ -33,7 +33,8 @@ class Instant(Frozen):
 
     `index` counts the instants of a sequence from 0, of still pictures those of the data set. `world_from_rig` is the pose of
     the rig's first sensor (OpenCV axes, metres); `focus` (world metres) is what it looks at. `viewpoint` says how the pose was
-    asked for, where it comes from a grid or list. `finish` replaces the scene's.
+    asked for, where it comes from a grid or list. `finish` replaces the scene's. An instant that is not `recorded` is there
+    only because labels of others need it: no picture is taken then.
     """
 
     index: int
@@ -43,3 +44,4 @@ class Instant(Frozen):
     viewpoint: Viewpoint | None = None
     split: str = ""
     finish: Finish | None = None
+    recorded: bool = True

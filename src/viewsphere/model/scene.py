@@ -5,9 +5,9 @@ Light has one unit: a white Lambert surface that receives an irradiance of pi ha
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import Field
+from pydantic import BeforeValidator, Field
 
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.numbers import Amount, Length, Metres, Number, Portion, Signed, Strength
@@ -243,17 +243,32 @@ class BlendScene(Frozen):
     confined: bool = True  # textures and libraries may not lie outside of its folder
 
 
+class Floor(Frozen):
+    """How high the ground lies, metres: lower where something is below `height`, unless that `is_fixed`."""
+
+    height: float
+    is_fixed: bool = False
+
+    def under(self, lowest: float) -> float:
+        """The ground's height where the lowest point of all that is placed has this height."""
+        return self.height if self.is_fixed else min(self.height, lowest)
+
+
+def _floor(value: Any) -> Any:
+    return {"height": value} if isinstance(value, (int, float)) else value
+
+
 class Scene(Frozen):
     """Light, ground and finish; None for `sun` or `ground` means there is none. `blend` has its own light and ground.
 
-    `floor` (metres): the ground is at most this high. Without one the ground lies below all that is placed, at any instant of
-    the shot; where what moves is cut into several shots, it has one height only by a floor that nothing is below in any.
+    `floor`: how high the ground is; a number alone is the most. Without one the ground lies below all that is placed, at any
+    instant of the shot; where what moves is cut into several shots, it has one height only by a floor.
     """
 
     sun: Sun | None = Sun()
     sky: AnySky = Sky()
     lights: tuple[AnyLight, ...] = ()
     ground: Ground | None = None
-    floor: float | None = None
+    floor: Annotated[Floor | None, BeforeValidator(_floor)] = None
     finish: Finish = Finish()
     blend: BlendScene | None = None

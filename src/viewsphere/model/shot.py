@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Iterator
+from itertools import product
 
 import numpy as np
 from pydantic import Field, JsonValue, model_validator
@@ -20,8 +22,8 @@ from viewsphere.model.thing import Motion, Thing
 class Shot(Frozen):
     """Things, a rig, instants and a scene: all an engine needs. It is the unit of work, of resuming and of distribution.
 
-    A sample is one sensor's picture at one instant: those of an instant follow one another in the rig's order, and `first` is
-    the number of the first one in the data set.
+    A sample is one sensor's picture at one recorded instant: those of an instant follow one another in the rig's order, and
+    `first` is the number of the first one in the data set. Instants ascend by their indices.
     """
 
     key: str  # stable, unique, fit for a folder's name
@@ -57,10 +59,17 @@ class Shot(Frozen):
     @property
     def samples(self) -> Iterator[tuple[int, int, int]]:
         """Number in the data set, instant and sensor (both counted from 0 here) of every sample, in order."""
-        sensors = len(self.rig.sensors)
-        for instant in range(len(self.instants)):
-            for sensor in range(sensors):
-                yield self.first + instant * sensors + sensor, instant, sensor
+        recorded = (number for number, instant in enumerate(self.instants) if instant.recorded)
+        for place, (instant, sensor) in enumerate(product(recorded, range(len(self.rig.sensors)))):
+            yield self.first + place, instant, sensor
+
+    def instant_after(self, instant: int, offset: int) -> int | None:
+        """The instant so many after another one (before it, where negative), both counted from 0 in the shot, None where the
+        shot does not have it.
+        """
+        wanted = self.instants[instant].index + offset
+        found = bisect_left(self.instants, wanted, key=lambda one: one.index)
+        return found if found < len(self.instants) and self.instants[found].index == wanted else None
 
     def things_at(self, instant: int) -> tuple[Thing, ...]:
         """All things as they are at an instant, counted from 0 in the shot: standing still there, or not there."""

@@ -86,11 +86,6 @@ class BlendEntry(Frozen):
             raise ValueError("expected frames, for poses: moving; found none")
         return self
 
-    @property
-    def is_drawn_per_frame(self) -> bool:
-        """Whether the shown objects of the file can differ from frame to frame."""
-        return any(entry.draw == "per_frame" for entry in self.variants.values())
-
 
 def _blend(value: Any) -> Any:
     return {"file": value} if isinstance(value, str) else value

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeVar
 
 from pydantic import BeforeValidator, Field, model_validator
 
@@ -18,13 +18,23 @@ SOURCES = ("color", "image", "images", "environment", "transparent")
 OF_IMAGES = tuple(name for name in Background.model_fields if name not in SOURCES)
 
 
+Entry = TypeVar("Entry", bound=Frozen)
+
+
 class PerFrame(Frozen):
     """What may be drawn anew for every frame at no cost."""
 
     draw: Draw = Field(
         default="per_frame",
-        description="what is drawn in it: once for the whole data set (fixed), once a model (per_model) or a frame (per_frame)",
+        description="what is drawn in it: once for the whole data set (fixed), once a model (per_model), a sequence "
+        "(per_sequence, the default beside time) or a frame (per_frame)",
     )
+
+
+def once_a_sequence(entry: Entry) -> Entry:
+    """The entry, drawn once a sequence where it would be drawn for every frame and nobody asked for that."""
+    is_asked = "draw" in entry.model_fields_set or getattr(entry, "draw", None) != "per_frame"
+    return entry if is_asked else entry.model_copy(update={"draw": "per_sequence"})
 
 
 class BackgroundEntry(entry_of(Background, optional=("color", "image"), fixed=("transparent",)), PerFrame):

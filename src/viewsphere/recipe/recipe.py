@@ -35,11 +35,15 @@ from viewsphere.model.numbers import Count, Natural, Number
 from viewsphere.recipe.models import ModelEntry
 from viewsphere.recipe.scene import CameraEntry, EngineEntry, SceneEntry, engine_entry
 from viewsphere.recipe.scenes import ScenesField
+from viewsphere.recipe.sequence import TimeEntry
 from viewsphere.recipe.values import OrShort, shape_of
 from viewsphere.recipe.viewpoints import Viewpoints
 
 BEFORE_RENDERING = {"name", "formats", "max_frames", "shot_frames"}
 """Fields of a recipe that change neither a picture nor a label."""
+
+LATER = {"scenes", "time"}
+"""Fields that recipes once did not have: without them a recipe has the digest that it had then."""
 
 Share = Annotated[
     Annotated[Number, Field(ge=0, le=1), Tag("number")] | Annotated[tuple[str, ...], Tag("list")],
@@ -57,7 +61,7 @@ class Splits(Frozen):
     model_config = ConfigDict(extra="allow")
     __pydantic_extra__: dict[str, Share] = Field(init=False)  # pyright: ignore[reportIncompatibleVariableOverride]
 
-    by: Literal["model", "scene", "pose", "frame", "place"] = Field(
+    by: Literal["model", "scene", "sequence", "pose", "frame", "place"] = Field(
         default="model", description="what is kept together in one split"
     )
 
@@ -110,6 +114,11 @@ class Recipe(Frozen):
         description="how many random scenes to make of the models, or a mapping of count, objects, layout and more; by default "
         "each model is taken alone, or with its company",
     )
+    time: TimeEntry | None = Field(
+        default=None,
+        description="sequences instead of still pictures: {frames: 50, fps: 25}, or seconds; every model (or scene) is one, "
+        "from each viewpoint that stands still",
+    )
     camera: CameraEntry = Field(default=CameraEntry(fov_deg=40.0), description="image size and lens")
     scene: SceneEntry = Field(default=SceneEntry(), description="light, ground, background, effects, what stands around")
     engine: Annotated[EngineEntry, BeforeValidator(engine_entry), OrShort({"type": "string"})] = Field(
@@ -158,6 +167,14 @@ class Recipe(Frozen):
             return value
         return tuple(dict.fromkeys("rgba" if name == "rgb" else name for name in value))
 
+    @field_validator("scene")
+    @classmethod
+    def _drawn_when(cls, value: SceneEntry, info: ValidationInfo) -> SceneEntry:
+        if info.data.get("time") is not None:
+            return value.over_time()
+        value.check_still()
+        return value
+
     @field_validator("name")
     @classmethod
     def _one_line(cls, value: str) -> str:
@@ -201,12 +218,14 @@ class Recipe(Frozen):
     @property
     def sampler(self) -> str:
         """Name of the sampler that makes shots of the recipe."""
-        return "product" if self.scenes is None else self.scenes.sampler
+        if self.scenes is not None and self.scenes.sampler != "scenes":
+            return self.scenes.sampler
+        return "sequences" if self.time else "product" if self.scenes is None else "scenes"
 
     @property
     def digest(self) -> str:
         """SHA-256 (hexadecimal) of all that changes a picture or a label; formats, for one, do not."""
-        unused = BEFORE_RENDERING | ({"scenes"} if self.scenes is None else set[str]())
+        unused = BEFORE_RENDERING | {name for name in LATER if getattr(self, name) is None}
         text = json.dumps(self.model_dump(mode="json", exclude=unused), separators=(",", ":"))
         return hashlib.sha256(text.encode()).hexdigest()
 
@@ -214,7 +233,10 @@ class Recipe(Frozen):
         """The recipe as the text of a file, without fields that equal their defaults; paths are kept as they were written."""
         from viewsphere.recipe.file import dump
 
-        return dump(self.model_dump(mode="json", exclude_defaults=True))
+        plain = self.model_dump(mode="json", exclude_defaults=True)
+        for name in () if self.time is None else self.scene.flickering:
+            plain.setdefault("scene", {}).setdefault(name, {})["draw"] = "per_frame"
+        return dump(plain)
 
 
 def _plain(value: Any) -> Any:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import Annotated, Any, Literal, cast
 
 from pydantic import BeforeValidator, ConfigDict, Field, JsonValue, field_validator, model_validator
@@ -12,20 +13,22 @@ from viewsphere.model.camera import Distortion, Intrinsics
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.mistakes import at, shown
 from viewsphere.model.numbers import Count, Number, Positive
-from viewsphere.recipe.blend import BlendField
+from viewsphere.recipe.blend import BlendField, VariantEntry
 from viewsphere.recipe.draws import Drawn, alternatives, is_random
 from viewsphere.recipe.finish import (
     BackgroundEntry,
     BackgroundField,
     EffectsEntry,
     JitterEntry,
+    PerFrame,
     SmootherEntry,
     SmootherField,
     ViewEntry,
     ViewField,
+    once_a_sequence,
 )
 from viewsphere.recipe.light import SKY_SUFFIXES, GradientEntry, HdriSky, HemisphereEntry, LightsField, SkyField, SunField
-from viewsphere.recipe.scenery import CompanyField, Draw, PlaceField, PlanesField
+from viewsphere.recipe.scenery import CompanyEntry, CompanyField, Draw, PlaceEntry, PlaceField, PlaneEntry, PlanesField
 from viewsphere.recipe.surface import GroundEntry, GroundField, MaterialEntry
 from viewsphere.recipe.values import OrShort, pair
 
@@ -122,7 +125,8 @@ class SceneEntry(Frozen):
     draw: Draw = Field(
         default="per_model",
         description="when sun, sky, lights, ground and materials are drawn, as far as there is something to draw: once for the "
-        "whole data set (fixed), once a model (per_model) or a frame (per_frame, which builds the scene anew for each)",
+        "whole data set (fixed), once a model (per_model), a sequence (per_sequence) or a frame (per_frame, which builds the "
+        "scene anew for each)",
     )
     place: PlaceField = Field(
         default=None, description="where the targets stand: zoo:neighbourhood, a model file, or a mapping of source and more"
@@ -222,11 +226,49 @@ class SceneEntry(Frozen):
 
     @property
     def is_moved_each_frame(self) -> bool:
-        """Whether the surroundings (place, distractors, billboards, variants) are drawn anew for every frame."""
-        drawn = (self.place, self.company, *self.planes)
-        if self.blend is not None and self.blend.is_drawn_per_frame:
-            return True
-        return any(entry is not None and entry.draw == "per_frame" for entry in drawn)
+        """Whether the surroundings (place, distractors, billboards, variants) are drawn anew for every frame, or sequence."""
+        return any(entry.draw in ("per_frame", "per_sequence") for _, entry in self._around)
+
+    @property
+    def _around(self) -> Iterator[tuple[str, PlaceEntry | CompanyEntry | PlaneEntry | VariantEntry]]:
+        """What stands around the targets and is drawn, each with its field."""
+        if self.place is not None:
+            yield "place", self.place
+        if self.company is not None:
+            yield "company", self.company
+        yield from ((f"planes[{i}]", plane) for i, plane in enumerate(self.planes))
+        if self.blend is not None:
+            yield from ((f"blend.variants.{name}", variant) for name, variant in self.blend.variants.items())
+
+    def over_time(self) -> SceneEntry:
+        """The same for sequences: what is drawn for every frame unless a recipe says otherwise is drawn once a sequence.
+
+        Raises ValueError where a sequence's own scene would be drawn for every frame.
+        """
+        parts: dict[str, Frozen] = {name: once_a_sequence(part) for name, part in self if isinstance(part, PerFrame)}
+        if self.blend is not None:
+            variants = {name: once_a_sequence(variant) for name, variant in self.blend.variants.items()}
+            parts["blend"] = self.blend.model_copy(update={"variants": variants})
+        timed = self.model_copy(update=parts)
+        for name, entry in (("", self), *timed._around):
+            if entry.draw == "per_frame":
+                raise ValueError(
+                    f"{name + '.' if name else ''}draw: expected fixed, per_model or per_sequence beside time, as a sequence "
+                    "shows one scene; found per_frame"
+                )
+        return timed
+
+    @property
+    def flickering(self) -> Iterator[str]:
+        """Fields of what is drawn for every frame, which beside time has to be written."""
+        return (name for name, part in self if isinstance(part, PerFrame) and part.draw == "per_frame")
+
+    def check_still(self) -> None:
+        """Raise ValueError where something is drawn once a sequence, which only a recipe with `time` has."""
+        parts = ((name, part) for name, part in self if isinstance(part, PerFrame))
+        for name, entry in (("", self), *parts, *self._around):
+            if entry.draw == "per_sequence":
+                raise ValueError(f"{name + '.' if name else ''}draw: expected time beside per_sequence; found none: set time")
 
     @property
     def is_new_each_frame(self) -> bool:

@@ -15,11 +15,11 @@ from viewsphere.recipe.draws import Drawn, is_random
 from viewsphere.recipe.models import ZOO, Unit
 from viewsphere.recipe.values import Interval, OrShort, Point, shape_of
 
-Draw = Literal["fixed", "per_model", "per_frame"]
+Draw = Literal["fixed", "per_model", "per_sequence", "per_frame"]
 Labels = Literal["background", "own"]
 Spot = tuple[Metres, Metres, Number]
 
-DRAWS = "one for the whole data set (fixed), one a model (per_model) or one a frame (per_frame)"
+DRAWS = "one for the whole data set (fixed), one a model (per_model), a sequence (per_sequence) or a frame (per_frame)"
 LABELS = "background, or own: every piece is an object with a category, boxes and a mask"
 OF_FILES = ("origin", "up", "forward", "unit", "category")
 

@@ -84,11 +84,12 @@ class Portion(Sendable):
         """The shot of a row; `box_of` and errors as for `Plan.shot`."""
         poses = tuple(numbers(row.positions))
         made = self.plan.take(row.subject, [self._of_recipe(pose) for pose in poses], box_of, row.key, row.first)
-        renumbered = zip(made.instants, poses, strict=True)
+        number_of = iter(poses)
+        instants = (_at_pose(now, next(number_of)) if now.recorded else now for now in made.instants)
         return made.model_copy(
             update={
                 "things": tuple(thing.model_copy(update={"model": self._numbered(thing.model)}) for thing in made.things),
-                "instants": tuple(_at_pose(now, pose) for now, pose in renumbered),
+                "instants": tuple(instants),
                 "channels": self._channels(row.first),
             }
         )
@@ -226,7 +227,7 @@ def _missing(planned: Plan, there: PlanRecord, wanted: Sequence[int]) -> Iterato
     for block in planned.blocks:
         for poses, subjects in groupby(block.subjects, lambda key, block=block: lack(block.positions, tuple(held[key]))):
             if poses:
-                yield Block(tuple(subjects), poses)
+                yield Block(tuple(subjects), poses, block.each)
 
 
 def _supplies(planned: Plan, there: PlanRecord, wanted: Sequence[int]) -> Iterator[tuple[int, tuple[str, ...]]]:

@@ -42,6 +42,8 @@ def settings(planned: Plan) -> dict[str, str]:
     if recipe.scenes is not None:
         options = recipe.scenes.model_dump(mode="json", exclude={"count"})
         value |= {f"scenes.{name}": options[name] for name in options}
+    if recipe.time is not None:
+        value["time"] = recipe.time.model_dump(mode="json")
     digests = {name: hashlib.sha256(json.dumps(value[name]).encode()).hexdigest()[:16] for name in value}
     return digests | {LOOK: engine_digest(recipe.engine.name)}
 
@@ -57,7 +59,7 @@ def _check_sampler(planned: Plan, part: Part) -> None:
 def _check_settings(planned: Plan, part: Part) -> None:
     own = settings(planned)
     for name, digest in part.settings.items():
-        if own[name] != digest:
+        if own.get(name) != digest:
             found = planned.recipe.model_dump(mode="json")
             values = [_value(recipe, name) for recipe in (part.recipe, found)]
             differ = f"{values[0]}, as the data set has; found {values[1]}"

@@ -32,6 +32,7 @@ from viewsphere.sampling.pictures import check_pictures, proportions, scene_pict
 from viewsphere.sampling.recipe_warnings import hidden_by_exposure, no_light, out_of_view
 from viewsphere.sampling.samplers import Sampler, Stock, lens
 from viewsphere.sampling.scenes import is_night
+from viewsphere.sampling.sequence_poses import SequencePoses
 from viewsphere.sampling.splits import expected
 from viewsphere.sampling.time_steps import check_keys, timed
 from viewsphere.sampling.viewpoints import poses
@@ -109,12 +110,12 @@ class Plan(Stock):
     @cached_property
     def split_counts(self) -> dict[str, int]:
         """Split -> number of its frames; of hashed ones what is expected, where there are more than `COUNTED` to hash."""
-        by, first = self.recipe.splits.by, self.blocks[0].positions[0][0]
+        by = self.recipe.splits.by
         found = Counter({name: 0 for name in self.splits})
-        if by in ("model", "scene"):
+        if by in ("model", "scene", "sequence"):
             for block in self.blocks:
                 for subject in block.subjects:
-                    found[self.split(subject, first)] += block.size
+                    found[self.split(subject, block.positions[0][0])] += block.size * block.each
         elif by == "pose" and len(self.blocks) == 1 and self.poses <= COUNTED:
             for pose in numbers(self.blocks[0].positions):
                 found[self.split(self.subjects[0], pose)] += len(self.subjects)
@@ -220,12 +221,14 @@ def plan(recipe: Recipe, shot_frames: int | None = None) -> Plan:
         check_catcher(recipe)
         check_splits(recipe)
         views = poses(recipe.viewpoints, recipe.seed, recipe.folder)
+        views = views if recipe.time is None else SequencePoses.of(views, recipe.time)
         lens(recipe, views)
         check_frames(recipe, views)
         specs, timings, views = timed(recipe, numbered_specs(recipe), views)
         check_listed(recipe, specs)
         check_materials(recipe, specs)
-        frames = 1 if recipe.scene.is_new_each_frame else recipe.shot_frames or shot_frames or SHOT_FRAMES
+        most = recipe.shot_frames or shot_frames or SHOT_FRAMES
+        frames = 1 if recipe.scene.is_new_each_frame and recipe.time is None else most
         timings = timings if any(timings) else ()
         sampler: Sampler = plugins.load("samplers", recipe.sampler)
         planned = Plan(

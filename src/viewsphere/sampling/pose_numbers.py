@@ -15,7 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import TypeAdapter
 
+from viewsphere.recipe.sequence import TimeEntry
 from viewsphere.recipe.viewpoints import Viewpoints
+from viewsphere.sampling.sequence_poses import SequencePoses
 from viewsphere.sampling.time_steps import TimedPoses
 from viewsphere.sampling.viewpoints import ListedPoses, Poses, poses
 from viewsphere.store import Part, PlanRecord
@@ -38,7 +40,8 @@ def pose_names(views: Poses) -> Names:
 
 def follows_from_recipe(views: Poses) -> bool:
     """Whether a recipe alone says which poses these are, without any file."""
-    return not isinstance(views, ListedPoses | TimedPoses)
+    plain = views.base if isinstance(views, SequencePoses) else views
+    return not isinstance(plain, ListedPoses | TimedPoses)
 
 
 def kept(names: Names) -> str:
@@ -100,7 +103,8 @@ def as_ranges(numbers: Indices) -> Ranges:
 def _views(part: Part) -> Poses:
     """The poses of a part's recipe, one from which they follow."""
     recipe: dict[str, Any] = part.recipe
-    return poses(_VIEWPOINTS.validate_python(recipe["viewpoints"]), recipe["seed"])
+    views, time = poses(_VIEWPOINTS.validate_python(recipe["viewpoints"]), recipe["seed"]), recipe.get("time")
+    return views if time is None else SequencePoses.of(views, TimeEntry.model_validate(time))
 
 
 def _unknown(wanted: Names, known: Names) -> Names:

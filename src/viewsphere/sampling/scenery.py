@@ -53,7 +53,7 @@ class SceneryPiece:
 
 
 def draw_names(draw: str, model: str, pose: str | None) -> Names:
-    """What a draw is for; `pose` is only needed for one a frame."""
+    """What a draw is for; `pose` is only needed for one a frame, or a sequence: the frame's name, or the sequence's."""
     if draw == "fixed":
         return ()
     return (model,) if draw == "per_model" or pose is None else (model, pose)

@@ -49,7 +49,9 @@ PARTS = tuple(Finish.model_fields)
 
 @dataclass(frozen=True, eq=False)
 class Scenes:
-    """The scenes of a recipe. `model` is a model's key, `pose` a pose's name."""
+    """The scenes of a recipe. `model` is a model's key, `pose` a pose's name, or, for what all frames of a sequence share, the
+    name of the pose whenever it is taken.
+    """
 
     recipe: Recipe
     pictures: Pictures
@@ -68,22 +70,23 @@ class Scenes:
     def has_finish_per_frame(self) -> bool:
         """Whether every frame has a finish of its own."""
         return self.recipe.scene.effects.is_noisy or any(
-            _draw(part) == "per_frame" and (is_random(part) or getattr(part, "images", None) is not None)
+            self._draw(part) == "per_frame" and (is_random(part) or getattr(part, "images", None) is not None)
             for part in self._finishing
         )
 
     def scene(self, model: str, pose: str) -> Scene:
         """Light and ground for a shot, and the finish that its frames share."""
-        return self._scene(draw_names(self.recipe.scene.draw, model, pose), self._names_of_finish(model, None))
+        return self._scene(draw_names(self.recipe.scene.draw, model, pose), self._names_of_finish(model, None, pose))
 
-    def finish(self, model: str, pose: str) -> Finish:
-        """The finish of one frame."""
-        return self._finish(self._names_of_finish(model, pose), (model, pose))
+    def finish(self, model: str, pose: str, place: str) -> Finish:
+        """The finish of one frame; `place` is the name of its pose whenever it is taken."""
+        return self._finish(self._names_of_finish(model, pose, place), (model, pose))
 
     def repaints(self, spec: ModelSpec, model: str, pose: str) -> tuple[Repaint, ...]:
         """The changes to a target's materials, in a shot that is about `model`: a model looks alike beside any other."""
         entry = self.recipe.scene
-        names = (spec.key, model, pose) if entry.draw == "per_frame" else draw_names(entry.draw, spec.key, None)
+        each = entry.draw in ("per_frame", "per_sequence")
+        names = (spec.key, model, pose) if each else draw_names(entry.draw, spec.key, None)
         return tuple(
             concrete(drawn(material, self._rng_of(names), ("materials", str(i))))
             for i, material in enumerate(entry.materials)
@@ -111,11 +114,18 @@ class Scenes:
     def _rng_of(self, names: Names) -> RngOf:
         return scene_generators(self.recipe.seed, names)
 
-    def _names_of_finish(self, model: str, pose: str | None) -> tuple[Names, ...]:
+    def _names_of_finish(self, model: str, pose: str | None, place: str) -> tuple[Names, ...]:
         """What background, smoother, view and effects are drawn for; empty where every frame has a finish of its own."""
         if pose is None and self.has_finish_per_frame:
             return ()
-        return tuple(draw_names(_draw(part), model, pose) for part in self._finishing)
+        draws = map(self._draw, self._finishing)
+        return tuple(draw_names(draw, model, place if draw == "per_sequence" else pose) for draw in draws)
+
+    def _draw(self, entry: object) -> str:
+        """When a part of the finish is drawn; a choice between several is made for every frame, or sequence."""
+        if isinstance(entry, PerFrame):
+            return entry.draw
+        return "per_frame" if self.recipe.time is None else "per_sequence"
 
     @property
     def _finishing(self) -> tuple[object, ...]:
@@ -186,11 +196,6 @@ class Scenes:
         elif entry.image is not None:
             image = self.pictures["image", entry.image][0]
         return concrete(entry, image=image)
-
-
-def _draw(entry: object) -> str:
-    """When a part of the finish is drawn; a choice between several is made for every frame."""
-    return entry.draw if isinstance(entry, PerFrame) else "per_frame"
 
 
 def _sun(entry: Any, sky: AnySky) -> Sun | None:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from viewsphere.assets.deforming import Load
 from viewsphere.assets.mesh import Mesh
+from viewsphere.model.scene import Floor
 from viewsphere.model.thing import Thing
 from viewsphere.truth.cutouts import ENDLESS, NO_CUTOUTS, Cutouts, mesh_cutouts, stack_cutouts
 
@@ -92,10 +93,10 @@ def present(things: Sequence[Thing], meshes: Sequence[Mesh]) -> list[Mesh]:
 
 
 def build_geometry(
-    things: Sequence[Thing], meshes: Sequence[Mesh], ground: bool, label_alpha: float, floor: float | None = None
+    things: Sequence[Thing], meshes: Sequence[Mesh], ground: bool, label_alpha: float, floor: Floor | None = None
 ) -> Geometry:
-    """Place the meshes in the world and, if asked, lay the ground at their lowest point (z = 0 if there are none), or at
-    `floor` where that is lower: something that jumps leaves it.
+    """Place the meshes in the world and, if asked, lay the ground at their lowest point (z = 0 if there are none), or where
+    `floor` says: something that jumps leaves it.
 
     `meshes[i]` is the normalised model of `things[i]`; ids are 1..N in order, then 0 for scenery. A BLEND material is surface
     where alpha >= label_alpha, a MASK material where alpha >= its cutoff; transmission always counts as surface. Fully
@@ -124,7 +125,7 @@ def place(geometry: Geometry, i: int, thing: Thing, mesh: Mesh) -> None:
     _face(geometry, geometry.triangle_start[i], geometry.triangle_start[i + 1])
 
 
-def lay_ground(geometry: Geometry, floor: float | None) -> Geometry:
+def lay_ground(geometry: Geometry, floor: Floor | None) -> Geometry:
     """The same with its ground, if any, where `build_geometry` lays it; its corners are written in place."""
     if geometry.ground_z is None:
         return geometry
@@ -211,8 +212,8 @@ def _labels(thing: Thing, mesh: Mesh) -> NDArray[np.int32]:
     return labels
 
 
-def _ground(bounds: NDArray[np.float64], floor: float | None) -> Geometry:
-    """A plane in two halves, below all that is placed and not above `floor`, counter-clockwise seen from above."""
+def _ground(bounds: NDArray[np.float64], floor: Floor | None) -> Geometry:
+    """A plane in two halves, below all that is placed, or where `floor` says, counter-clockwise seen from above."""
     corners = _ground_corners(bounds, floor)
     up, background = np.tile(np.array([0, 0, 1], np.float32), (4, 1)), np.full(2, BACKGROUND, np.int32)
     ground = Geometry(
@@ -238,11 +239,11 @@ def _ground(bounds: NDArray[np.float64], floor: float | None) -> Geometry:
     return ground
 
 
-def _ground_corners(bounds: NDArray[np.float64], floor: float | None) -> Corner:
+def _ground_corners(bounds: NDArray[np.float64], floor: Floor | None) -> Corner:
     """Corners (4, 3) of the ground below things of these bounds (N, 2, 3)."""
     low, high = _extent(bounds)
     x, y = (low[:2] + high[:2]) / 2
-    z = low[2] if floor is None else min(low[2], floor)
+    z = low[2] if floor is None else floor.under(low[2])
     r = GROUND_REACH * (float(np.max(high - low)) or 1.0)
     return np.array([[x - r, y - r, z], [x + r, y - r, z], [x + r, y + r, z], [x - r, y + r, z]])
 

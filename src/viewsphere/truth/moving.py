@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.assets.mesh import Mesh
-from viewsphere.model.scene import Row
+from viewsphere.model.scene import Floor, Row
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
 from viewsphere.truth.geometry import Geometry, build_geometry, lay_ground, place, present
@@ -35,7 +35,7 @@ class _Room:
 
     things: Sequence[Thing]
     meshes: Sequence[Mesh]
-    floor: float | None
+    floor: Floor | None
     geometry: Geometry
 
     def changed(self, things: Sequence[Thing], meshes: Sequence[Mesh]) -> list[int]:
@@ -60,7 +60,7 @@ class Ring:
     label_alpha: float
     _rooms: list[_Room] = field(default_factory=list[_Room])
 
-    def at(self, things: Sequence[Thing], meshes: Sequence[Mesh], floor: float | None = None) -> Geometry:
+    def at(self, things: Sequence[Thing], meshes: Sequence[Mesh], floor: Floor | None = None) -> Geometry:
         """The geometry of these still things; `meshes[i]` is that of `things[i]` at this instant, whether it is there or not.
 
         The same object again where nothing moved. Where a thing comes or goes, or has other triangles, all is built anew.
@@ -69,13 +69,13 @@ class Ring:
         self._rooms.append(room)  # the last asked for comes last
         return room.geometry
 
-    def _held(self, things: Sequence[Thing], meshes: Sequence[Mesh], floor: float | None) -> _Room | None:
+    def _held(self, things: Sequence[Thing], meshes: Sequence[Mesh], floor: Floor | None) -> _Room | None:
         for number, room in enumerate(self._rooms):
             if room.floor == floor and not room.changed(things, meshes):
                 return self._rooms.pop(number)
         return None
 
-    def _made(self, things: Sequence[Thing], meshes: Sequence[Mesh], floor: float | None) -> _Room:
+    def _made(self, things: Sequence[Thing], meshes: Sequence[Mesh], floor: Floor | None) -> _Room:
         fitting = [room for room in self._rooms if room.fits(things, meshes)]
         free = self._rooms.pop(0) if len(self._rooms) == ROOMS else None
         if not fitting:
@@ -107,16 +107,17 @@ def _is_same(a: object, b: object) -> bool:
     return a is b or a == b
 
 
-def shot_floor(shot: Shot, meshes_at: Callable[[int], Sequence[Mesh]]) -> float | None:
-    """How high a shot's ground is at most, metres, None where nothing says: not above what moves is at any instant, nor above
-    `scene.floor`. So its height is one for the whole shot; `meshes_at` gives the mesh of each thing at an instant.
+def shot_floor(shot: Shot, meshes_at: Callable[[int], Sequence[Mesh]]) -> Floor | None:
+    """How high a shot's ground is, None where nothing says: unless that is fixed, not above what moves is at any instant, nor
+    above `scene.floor`. So its height is one for the whole shot; `meshes_at` gives the mesh of each thing at an instant.
 
-    Where a sequence is cut into shots, its maker gives a `scene.floor` that nothing is below in any of them.
+    Where a sequence is cut into shots, its maker gives a `scene.floor` that is fixed, or that nothing is below in any of them.
     """
     floor = shot.scene.floor
-    if shot.scene.ground is None or all(thing.motion.is_still for thing in shot.things):
+    is_fixed = floor is not None and floor.is_fixed
+    if is_fixed or shot.scene.ground is None or all(thing.motion.is_still for thing in shot.things):
         return floor
-    lowest = math.inf if floor is None else floor
+    lowest = math.inf if floor is None else floor.height
     models: dict[int, _Underside] = {}
     for instant in range(len(shot.instants)):
         held = zip(shot.things, shot.things_at(instant), meshes_at(instant), strict=True)
@@ -125,7 +126,7 @@ def shot_floor(shot: Shot, meshes_at: Callable[[int], Sequence[Mesh]]) -> float 
             if i not in models or models[i].mesh is not mesh:
                 models[i] = _Underside(mesh)
             lowest = models[i].lowest(thing.world_from_object[2], lowest)
-    return None if lowest == math.inf else lowest
+    return None if lowest == math.inf else Floor(height=lowest)
 
 
 @dataclass(eq=False)

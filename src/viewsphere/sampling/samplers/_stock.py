@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import chain
@@ -23,6 +23,7 @@ from viewsphere.sampling.pictures import Pictures
 from viewsphere.sampling.scenery import draw_names
 from viewsphere.sampling.scenes import Scenes
 from viewsphere.sampling.sendable import Sendable
+from viewsphere.sampling.sequence_poses import SequencePoses
 from viewsphere.sampling.splits import dealt, hashed
 from viewsphere.sampling.time_steps import Schedule, Timing, schedules
 from viewsphere.sampling.viewpoints import Poses
@@ -48,6 +49,11 @@ class Stock(Sendable):
     def intrinsics(self) -> Intrinsics:
         """The lens of all frames."""
         return lens(self.recipe, self.pose_list)
+
+    @cached_property
+    def rig(self) -> Rig:
+        """The rig of all shots."""
+        return Rig.of(self.intrinsics)
 
     @cached_property
     def scenes(self) -> Scenes:
@@ -91,9 +97,24 @@ class Stock(Sendable):
 
     @cached_property
     def dealt_splits(self) -> dict[str, str]:
-        """The split of every model or scene, where splits are by these; else none."""
+        """The split of every model, scene or sequence, where splits are by these; else none."""
+        by = self.recipe.splits.by
         names: Mapping[str, Sequence[str]] = {"model": tuple(self.position), "scene": self.subjects}
-        return dealt(self.recipe.splits, self.recipe.seed, names.get(self.recipe.splits.by, ()), self.kept_splits)
+        if by == "sequence":
+            names = {by: tuple(chain.from_iterable(self._sequences))}
+        return dealt(self.recipe.splits, self.recipe.seed, names.get(by, ()), self.kept_splits)
+
+    @property
+    def _sequences(self) -> Iterator[Iterator[str]]:
+        """The names of the sequences of each subject."""
+        assert isinstance(self.pose_list, SequencePoses)
+        starts = range(0, len(self.pose_list), self.pose_list.instants)
+        return ((self.sequence(subject, start) for start in starts) for subject in self.subjects)
+
+    def sequence(self, subject: str, pose: int) -> str:
+        """The name of the sequence that a pose belongs to: the subject's, and where it has several the viewpoint's number."""
+        assert isinstance(self.pose_list, SequencePoses)
+        return subject if len(self.pose_list.base) == 1 else f"{subject}-{pose // self.pose_list.instants:06d}"
 
     def hashed_split(self, subject: str, pose: int) -> str:
         """The split of a frame, where splits are by pose, place or frame."""
@@ -117,14 +138,18 @@ class Stock(Sendable):
         return scene.model_copy(update={"blend": blend, "sun": None if blend.is_lit else scene.sun})
 
     def scene_pose(self, pose: int) -> str | None:
-        """Name of the pose, where what stands around is drawn for each frame."""
-        return self.pose_list.name(pose) if self.recipe.scene.is_moved_each_frame else None
+        """Name of the pose, where what stands around is drawn for each frame, or each sequence."""
+        return self.scene_name(pose) if self.recipe.scene.is_moved_each_frame else None
+
+    def scene_name(self, pose: int) -> str:
+        """Name of what frames of a pose share no scene beyond: the frame, or the sequence."""
+        return self.pose_list.name(pose) if self.recipe.time is None else self.pose_list.place(pose)
 
     def repainted(self, things: Sequence[Thing], subject: str, pose: int) -> tuple[Thing, ...]:
         """The things with the changes to their materials."""
         if not self.recipe.scene.materials:
             return tuple(things)
-        return tuple(self._repainted(thing, subject, self.pose_list.name(pose)) for thing in things)
+        return tuple(self._repainted(thing, subject, self.scene_name(pose)) for thing in things)
 
     def _repainted(self, thing: Thing, subject: str, pose: str) -> Thing:
         repaints = () if thing.scenery else self.scenes.repaints(thing.model, subject, pose)
@@ -134,14 +159,19 @@ class Stock(Sendable):
         """The viewpoint of a subject's frame, jittered; it looks at `target` unless it has a target of its own."""
         if target is not None and view.target is None:
             view = view.model_copy(update={"target": target})
-        return self.scenes.jittered(view, subject, self.pose_list.place(view.index)) if self.scenes.is_jittered else view
+        if not self.scenes.is_jittered:
+            return view
+        flickers = self.recipe.time is not None and self.recipe.scene.jitter.draw == "per_frame"
+        name = self.pose_list.name if flickers else self.pose_list.place
+        return self.scenes.jittered(view, subject, name(view.index))
 
     def instant(self, subject: str, view: Viewpoint, target: Vector | None, focus: Vector, split: str, number: int) -> Instant:
         """The instant of a subject and a viewpoint; the camera looks at `target` unless the viewpoint has its own, and where
         there is neither at `focus`. `number` is the instant's own.
         """
-        pose = self.pose_list.name(view.index)
-        finish = self.scenes.finish(subject, pose) if self.scenes.has_finish_per_frame else None
+        finish = None
+        if self.scenes.has_finish_per_frame:
+            finish = self.scenes.finish(subject, self.pose_list.name(view.index), self.pose_list.place(view.index))
         return looking(self.viewpoint(subject, view, target), focus, index=number, split=split, finish=finish)
 
     def finished(self, key: str, first: int, things: Sequence[Thing], scene: Scene, instants: Sequence[Instant]) -> Shot:
@@ -149,7 +179,7 @@ class Stock(Sendable):
         return Shot(
             key=key,
             things=tuple(things),
-            rig=Rig.of(self.intrinsics),
+            rig=self.rig,
             scene=scene,
             first=first,
             instants=tuple(instants),

@@ -8,7 +8,7 @@ from itertools import groupby
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.model_spec import ModelSpec
-from viewsphere.model.scene import Scene, Vector
+from viewsphere.model.scene import Floor, Scene, Vector
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
 from viewsphere.recipe.recipe import Recipe
@@ -22,6 +22,8 @@ def subjects(recipe: Recipe, specs: Sequence[ModelSpec]) -> tuple[str, ...]:
     """The models' keys."""
     if recipe.splits.by == "scene":
         raise RecipeError("splits.by: expected model, pose, place or frame beside models x poses; found scene: set scenes")
+    if recipe.splits.by == "sequence":
+        raise RecipeError("splits.by: expected model, pose, place or frame beside models x poses; found sequence: set time")
     return tuple(spec.key for spec in specs)
 
 
@@ -113,13 +115,13 @@ def _target(stock: Stock, first: Thing, run: Run, target: Vector | None, box_of:
     return target
 
 
-def _floor(stock: Stock, spec: ModelSpec, things: Sequence[Thing], box_of: BoxOf) -> dict[str, float]:
+def _floor(stock: Stock, spec: ModelSpec, things: Sequence[Thing], box_of: BoxOf) -> dict[str, Floor]:
     """How high the ground is at most, in a scene's field: at the lowest that a model comes at its time steps."""
     steps = stock.steps_of(spec)
     if not steps or stock.recipe.scene.ground == "off":
         return {}
     world = things[0].world_from_object
-    return {"floor": min(float(transform(world, box_of(spec, step))[:, 2].min()) for step in steps)}
+    return {"floor": Floor(height=min(float(transform(world, box_of(spec, step))[:, 2].min()) for step in steps))}
 
 
 def _at(stock: Stock, things: Sequence[Thing], run: Run) -> tuple[Thing, ...]:

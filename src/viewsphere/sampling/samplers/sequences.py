@@ -1,0 +1,170 @@
+"""Worlds over time: every model with its company, or every random scene, is one sequence from each viewpoint that stands still.
+
+A sequence's things, and what its camera does, follow from its names alone, and an instant from its number: shots may cut it
+anywhere. Shots carry the instants that labels of theirs need, too.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterator, Sequence, Set
+
+from viewsphere.errors import RecipeError
+from viewsphere.labels import channel_labels
+from viewsphere.model.instant import Instant
+from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.scene import Floor, Vector
+from viewsphere.model.shot import Shot
+from viewsphere.model.thing import Thing
+from viewsphere.recipe.recipe import Recipe
+from viewsphere.recipe.sequence import TimeEntry
+from viewsphere.sampling.composition import BoxOf, center, center_of_all, still
+from viewsphere.sampling.placing import standing as upright
+from viewsphere.sampling.samplers import Standing, Stock
+from viewsphere.sampling.samplers._random import (
+    check_scene_models,
+    scene_cast,
+    scene_names,
+    scene_split,
+    scene_things,
+    scene_views,
+    scenes_entry,
+)
+from viewsphere.sampling.sequence_poses import SequencePoses
+from viewsphere.sampling.time_steps import is_animated
+from viewsphere.store import Block
+
+FLOOR = Floor(height=0.0, is_fixed=True)
+"""The floor of all sequences: what moves may be above it or below."""
+
+
+def subjects(recipe: Recipe, specs: Sequence[ModelSpec]) -> tuple[str, ...]:
+    """The models' keys, or the scenes' names."""
+    if is_animated(recipe):
+        raise RecipeError(
+            "time: expected models and a scene without frames of their files, which are still pictures; found frames: leave "
+            "frames out, and give the model a motion of kind clip"
+        )
+    if recipe.scenes is not None:
+        return scene_names(recipe)
+    if recipe.splits.by == "scene":
+        raise RecipeError("splits.by: expected model, sequence, pose, place or frame without scenes; found scene: set scenes")
+    return tuple(spec.key for spec in specs)
+
+
+def factors(stock: Stock) -> str:
+    """Models or scenes, viewpoints and instants."""
+    what = "scenes" if stock.recipe.scenes is not None else "models"
+    views = sum(len(names) for names in _taken(stock).values())
+    return f"{len(stock.subjects):,} {what}, {views:,} sequences x {_time(stock).count:,} instants"
+
+
+def blocks(stock: Stock) -> tuple[Block, ...]:
+    """Viewpoint by viewpoint, all subjects that are taken from it, instant by instant."""
+    if stock.recipe.scenes is not None:
+        check_scene_models(stock)
+    count, each = _time(stock).count, len(stock.rig.sensors)
+    taken = _taken(stock).items()
+    return tuple(Block(tuple(names), ((view * count, (view + 1) * count),), each) for view, names in taken)
+
+
+def most_objects(recipe: Recipe) -> int:
+    """The model and its company, or most models in a scene."""
+    if recipe.scenes is not None:
+        return scenes_entry(recipe).most_objects
+    return 1 + (recipe.scene.company.number if recipe.scene.company else 0)
+
+
+def cast(stock: Stock, subject: str, pose: int | None) -> tuple[ModelSpec, ...]:
+    """The recipe's models in a sequence; only the model itself where company is drawn for each sequence and none is named."""
+    if stock.recipe.scenes is not None:
+        return scene_cast(stock, subject)
+    spec = stock.spec(subject)
+    if stock.composition is None or (pose is None and stock.recipe.scene.is_moved_each_frame):
+        return (spec,)
+    return stock.composition.cast(spec, None if pose is None else stock.scene_pose(pose))
+
+
+def split(stock: Stock, subject: str, pose: int) -> str:
+    """The model's, the scene's or the sequence's, or what its pose, place or name draw."""
+    by = stock.recipe.splits.by
+    if by == "sequence":
+        return stock.dealt_splits[stock.sequence(subject, pose)]
+    if by == "model" and stock.recipe.scenes is not None:
+        return scene_split(stock, subject)
+    return stock.dealt_splits[subject] if by in ("model", "scene") else stock.hashed_split(subject, pose)
+
+
+def standing(stock: Stock, subject: str, box_of: BoxOf) -> Iterator[Standing]:
+    """The things as they are placed, seen by cameras that stand still; nothing where they are drawn for each sequence."""
+    if not stock.recipe.scene.is_moved_each_frame:
+        things = _targets(stock, subject, None, box_of)
+        count, views = _time(stock).count, stock.pose_list.drawn_for(subject)
+        poses = [view * count for view, names in _taken(stock).items() if subject in names]
+        yield Standing(things, _middle(things, box_of), views, poses)
+
+
+def shot(stock: Stock, subject: str, poses: Sequence[int], box_of: BoxOf, key: str, first: int) -> Shot:
+    """Some instants of a sequence, and those that their labels need."""
+    start = poses[0] - poses[0] % _time(stock).count
+    taken = {pose - start for pose in poses}
+    around = stock.scene_pose(start)
+    things = _targets(stock, subject, around, box_of)
+    focus = _middle(things, box_of)
+    if stock.composition is not None:
+        things = stock.composition.things(subject, things, around, box_of)
+    things = stock.repainted(things, subject, start)
+    scene = stock.scene(subject, stock.scene_name(start)).model_copy(update={"floor": FLOOR})
+    numbers = sorted(taken | _needed(stock, taken))
+    views = stock.pose_list.drawn_for(subject) if stock.recipe.scenes is not None else stock.pose_list
+    instants = [
+        _at(stock.instant(subject, views[start + i], focus, focus, split(stock, subject, start), i), stock, i in taken)
+        for i in numbers
+    ]
+    made = stock.finished(key, first, things, scene, instants)
+    return made.model_copy(update={"sequence": stock.sequence(subject, start)})
+
+
+def _at(instant: Instant, stock: Stock, recorded: bool) -> Instant:
+    return instant.model_copy(update={"seconds": _time(stock).at(instant.index), "recorded": recorded})
+
+
+def _time(stock: Stock) -> TimeEntry:
+    assert stock.recipe.time is not None
+    return stock.recipe.time
+
+
+def _needed(stock: Stock, taken: Set[int]) -> set[int]:
+    """The instants that labels of those that are taken need besides."""
+    known = channel_labels()
+    offsets = {offset for name in stock.recipe.channels if name in known for offset in known[name].needs.instants}
+    count = _time(stock).count
+    return {number + offset for number in taken for offset in offsets if 0 <= number + offset < count}
+
+
+def _taken(stock: Stock) -> dict[int, list[str]]:
+    """The subjects that are taken from each viewpoint, by the viewpoint's number."""
+    assert isinstance(stock.pose_list, SequencePoses)
+    base = stock.pose_list.base
+    if stock.recipe.scenes is None:
+        return {view: list(stock.subjects) for view in range(len(base))}
+    found: defaultdict[int, list[str]] = defaultdict(list)
+    for subject in stock.subjects:
+        for view in scene_views(stock, subject, base):
+            found[view].append(subject)
+    return dict(sorted(found.items()))
+
+
+def _targets(stock: Stock, subject: str, pose: str | None, box_of: BoxOf) -> tuple[Thing, ...]:
+    """The targets of a sequence where they are placed, on the floor; `pose` names what is drawn for each sequence."""
+    if stock.recipe.scenes is not None:
+        return scene_things(stock, subject, pose, box_of)
+    spec = stock.spec(subject)
+    if stock.composition is not None:
+        return stock.composition.targets(spec, pose, box_of)
+    return still((spec,), (upright(box_of(spec)),))
+
+
+def _middle(things: Sequence[Thing], box_of: BoxOf) -> Vector:
+    """What cameras look at that have no target of their own: where the targets are placed."""
+    return center(things[0], box_of) if len(things) == 1 else center_of_all(things, box_of)
