@@ -1,3 +1,5 @@
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -8,6 +10,8 @@ from viewsphere.geometry.rotation import (
     matrix_from_quaternion,
     quaternion_from_matrix,
     rigid,
+    rotation_about,
+    slerp,
     transform,
 )
 
@@ -64,3 +68,33 @@ def test_rigid_motions_compose_and_move_points():
     points = rng.normal(size=(4, 5, 3))
     np.testing.assert_allclose(transform(a, points), points @ a[:3, :3].T + a[:3, 3], atol=1e-15)
     np.testing.assert_allclose(transform(a[:3, :3], points), points @ a[:3, :3].T, atol=1e-15)
+
+
+def test_slerp_turns_evenly_and_the_shorter_way():
+    rng = np.random.default_rng(2)
+    for _ in range(50):
+        a, b = (q / np.linalg.norm(q) for q in rng.normal(size=(2, 4)))
+        steps = [slerp(a, b, share) for share in np.linspace(0, 1, 11)]
+        between = [abs(float(p @ q)) for p, q in pairwise(steps)]
+        np.testing.assert_allclose(between, np.cos(np.arccos(min(abs(a @ b), 1)) / 10), atol=1e-12)
+        np.testing.assert_allclose(np.linalg.norm(steps, axis=1), 1, atol=1e-14)
+        np.testing.assert_allclose(matrix_from_quaternion(steps[0]), matrix_from_quaternion(a), atol=1e-14)
+        np.testing.assert_allclose(matrix_from_quaternion(steps[-1]), matrix_from_quaternion(b), atol=1e-14)
+
+
+def test_slerp_between_equal_and_nearly_equal_rotations():
+    a = np.array([1.0, 0, 0, 0])
+    assert slerp(a, -a, 0.3).tolist() == a.tolist()
+    near = np.array([np.cos(1e-7), np.sin(1e-7), 0, 0])
+    np.testing.assert_allclose(slerp(a, near, 0.25)[1], 2.5e-8, rtol=1e-12)
+
+
+def test_rotation_about_a_vector():
+    np.testing.assert_allclose(rotation_about([0, 0, np.pi / 2]) @ [1, 0, 0], [0, 1, 0], atol=1e-15)
+    assert (rotation_about([0, 0, 0]) == np.eye(3)).all()
+    rng = np.random.default_rng(4)
+    for vector in rng.normal(size=(50, 3)) * 3:
+        k = np.array([[0, -vector[2], vector[1]], [vector[2], 0, -vector[0]], [-vector[1], vector[0], 0]])
+        angle = np.linalg.norm(vector)
+        rodrigues = np.eye(3) + np.sin(angle) / angle * k + (1 - np.cos(angle)) / angle**2 * k @ k
+        np.testing.assert_allclose(rotation_about(vector), rodrigues, atol=1e-14)

@@ -57,6 +57,33 @@ def quaternion_from_matrix(matrix: ArrayLike) -> tuple[float, float, float, floa
     return w, x, y, z
 
 
+def rotation_about(vector: ArrayLike) -> Float:
+    """Rotation matrix (3, 3) by |vector| radians about a vector (3,), counterclockwise seen from its tip.
+
+    By way of the unit quaternion, whose matrix is a rotation to the last digit; the identity for zero.
+    """
+    x, y, z = np.asarray(vector, np.float64).tolist()
+    angle = math.sqrt(x * x + y * y + z * z)
+    if angle == 0:
+        return np.eye(3)
+    s = math.sin(angle / 2) / angle
+    return matrix_from_quaternion((math.cos(angle / 2), x * s, y * s, z * s))
+
+
+def slerp(start: ArrayLike, end: ArrayLike, share: float) -> Float:
+    """The unit quaternion (4,) at a share of the way from one unit quaternion (w, x, y, z) to another, the shorter way around:
+    the angle turned grows evenly with the share. Shoemake 1985.
+    """
+    a, b = np.asarray(start, np.float64), np.asarray(end, np.float64)
+    if float((a * b).sum()) < 0:
+        b = -b
+    apart, along = math.sqrt(float(((b - a) ** 2).sum())), math.sqrt(float(((b + a) ** 2).sum()))
+    angle = 2 * math.atan2(apart, along)  # unlike the arc cosine, exact for small angles
+    if angle < 1e-12:
+        return a
+    return (math.sin((1 - share) * angle) * a + math.sin(share * angle) * b) / math.sin(angle)
+
+
 def _is_rotation(rows: list[list[float]]) -> bool:
     """Whether the rows are right-handed and orthonormal, about."""
     a, b, c = rows
