@@ -1,4 +1,4 @@
-"""Generated pages: the command line, the table of channels, the recipe's schema and its tables of fields."""
+"""Generated pages: the command line, the table of channels, the recipe's schema, and tables of fields and options."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from typing import Any, get_args
 import numpy as np
 from typer.models import ArgumentInfo
 
+from viewsphere import plugins
 from viewsphere.cli.commands import app
 from viewsphere.labels import Field, channels, object_labels
 from viewsphere.recipe.file import schema
@@ -85,6 +86,22 @@ def channels_page() -> str:
     return text
 
 
+OPTIONS = re.compile(r"(<!-- options of (\w+), written by scripts/docs -->\n).*?(?=\n<!-- end -->)", re.DOTALL)
+
+
+def motion_page() -> str:
+    """The hand-written page with a table of each kind's options."""
+    return OPTIONS.sub(lambda found: found[1] + options_table(found[2]), (DOCS / "motion.md").read_text("utf-8"))
+
+
+def options_table(kind: str) -> str:
+    """The options of a kind of motion, and of what it has lists of."""
+    told = plugins.load("motions", kind).Options.model_json_schema()
+    parts = {name: part for name, part in told.get("$defs", {}).items() if name not in ("Distribution", "Gaussian")}
+    text = fields_table({kind: told}, [kind])
+    return text + "".join(f"\nEach {name.lower()}:\n{fields_table(parts, [name])}" for name in parts)
+
+
 FIELDS = re.compile(r"(<!-- fields of (.+?), written by scripts/docs -->\n).*?(?=\n<!-- end -->)", re.DOTALL)
 
 
@@ -130,6 +147,7 @@ def field_type(field: Field) -> str:
 PAGES = {
     "cli.md": cli_page,
     "channels.md": channels_page,
+    "motion.md": motion_page,
     "recipe.md": recipe_page,
     "recipe.schema.json": lambda: json.dumps(schema(tuple(channels())), indent=1) + "\n",
 }

@@ -9,6 +9,7 @@ from viewsphere.geometry.rotation import (
     compose,
     matrix_from_quaternion,
     quaternion_from_matrix,
+    quaternion_product,
     rigid,
     rotation_about,
     slerp,
@@ -98,3 +99,9 @@ def test_rotation_about_a_vector():
         angle = np.linalg.norm(vector)
         rodrigues = np.eye(3) + np.sin(angle) / angle * k + (1 - np.cos(angle)) / angle**2 * k @ k
         np.testing.assert_allclose(rotation_about(vector), rodrigues, atol=1e-14)
+
+
+def test_the_product_of_quaternions_is_one_turn_after_the_other():
+    for a, b in np.random.default_rng(6).normal(size=(50, 2, 4)):
+        both = matrix_from_quaternion(a) @ matrix_from_quaternion(b)
+        np.testing.assert_allclose(matrix_from_quaternion(quaternion_product(a, b)), both, atol=1e-14)

@@ -52,7 +52,7 @@ POSITIONS = [
     (
         ("category:", "categry:"),
         "recipe.yaml:5: models[0].categry: expected one of source, category, supercategory, count, name, "
-        "frames, clip, poses, up, forward, "
+        "frames, clip, poses, motion, up, forward, "
         "unit, centring, real_size, scale, confined; found 'categry'; did you mean 'category'?",
     ),
     (("count: 2", "count: two"), "recipe.yaml:4: models[0].count: expected a whole number; found 'two'"),

@@ -182,7 +182,7 @@ def test_a_camera_inside_at_any_time_step_is_found():
         ({"source": "still.fbx"}, "something moves; found no animation in "),
         ({"source": "zoo:car"}, "expected a file for frames; found the zoo"),
         ({"frames": None, "poses": "moving"}, "expected frames, for poses: moving; found none"),
-        ({"frames": None, "clip": "a"}, "expected frames, for clip: a; found none"),
+        ({"frames": None, "clip": "a"}, "expected frames or the motion clip, for clip: a; found neither"),
         ({"frames": {"first": 1, "last": 48, "step": 0}}, "frames"),
     ],
 )

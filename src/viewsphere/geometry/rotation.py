@@ -58,16 +58,29 @@ def quaternion_from_matrix(matrix: ArrayLike) -> tuple[float, float, float, floa
 
 
 def rotation_about(vector: ArrayLike) -> Float:
-    """Rotation matrix (3, 3) by |vector| radians about a vector (3,), counterclockwise seen from its tip.
+    """Rotation matrix (3, 3) by |vector| radians about a vector (3,), counterclockwise seen from its tip."""
+    return matrix_from_quaternion(quaternion_about(vector))
 
-    By way of the unit quaternion, whose matrix is a rotation to the last digit; the identity for zero.
-    """
+
+def quaternion_about(vector: ArrayLike) -> Float:
+    """Unit quaternion (w, x, y, z) of a turn by |vector| radians about a vector (3,); (1, 0, 0, 0) for zero."""
     x, y, z = np.asarray(vector, np.float64).tolist()
     angle = math.sqrt(x * x + y * y + z * z)
-    if angle == 0:
-        return np.eye(3)
-    s = math.sin(angle / 2) / angle
-    return matrix_from_quaternion((math.cos(angle / 2), x * s, y * s, z * s))
+    s = math.sin(angle / 2) / angle if angle else 0.0
+    return np.array([math.cos(angle / 2), x * s, y * s, z * s])
+
+
+def quaternion_product(a: ArrayLike, b: ArrayLike) -> Float:
+    """Hamilton's product (4,) of two quaternions (w, x, y, z): the rotation `b` followed by `a`."""
+    (p, q, r, s), (w, x, y, z) = np.asarray(a, np.float64).tolist(), np.asarray(b, np.float64).tolist()
+    return np.array(
+        [
+            p * w - q * x - r * y - s * z,
+            p * x + q * w + r * z - s * y,
+            p * y - q * z + r * w + s * x,
+            p * z + q * y - r * x + s * w,
+        ]
+    )
 
 
 def slerp(start: ArrayLike, end: ArrayLike, share: float) -> Float:

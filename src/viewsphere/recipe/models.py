@@ -11,6 +11,7 @@ from viewsphere.model.frozen import Frozen
 from viewsphere.model.mistakes import nearest, shown
 from viewsphere.model.model_spec import Axis
 from viewsphere.model.numbers import Count, Positive
+from viewsphere.recipe.motion import MOTION, MotionField, Movable, has_clip
 from viewsphere.recipe.time import STEPS, Frames, Steps
 from viewsphere.recipe.values import OrShort, shape_of
 
@@ -81,7 +82,7 @@ Scale = Annotated[
 ]
 
 
-class ModelEntry(Frozen):
+class ModelEntry(Movable):
     """Some models of one category, treated alike."""
 
     source: Annotated[
@@ -114,9 +115,11 @@ class ModelEntry(Frozen):
     )
     clip: Annotated[str, Field(min_length=1)] | None = Field(
         default=None,
-        description="with frames: the animation to play, where the file has several (actions, takes); by default its first",
+        description="with frames or the motion clip: the animation to play, where the file has several (actions, takes); by "
+        "default its first",
     )
     poses: Steps = Field(default="each", description=f"with frames: {STEPS}")
+    motion: MotionField = Field(default=None, description=MOTION)
     up: Axis | None = Field(default=None, description="the file's axis that points up; by default what its format says")
     forward: Axis | None = Field(default=None, description="the file's axis that the model's front faces")
     unit: Unit | None = Field(default=None, description="the file's unit: m, cm, mm, in, ft or the metres in one unit")
@@ -154,9 +157,12 @@ class ModelEntry(Frozen):
             raise ValueError(f"expected up and forward along different axes; found {self.up} and {self.forward}")
         if families and self.frames is not None:
             raise ValueError("expected a file for frames; found the zoo, whose models do not move")
-        for name in ("poses", "clip"):
-            if self.frames is None and getattr(self, name) not in (None, "each"):
-                raise ValueError(f"expected frames, for {name}: {getattr(self, name)}; found none")
+        if families and has_clip(self.motion):
+            raise ValueError("expected a file for the motion clip; found the zoo, whose models have no clips")
+        if self.frames is None and self.poses != "each":
+            raise ValueError(f"expected frames, for poses: {self.poses}; found none")
+        if self.frames is None and self.clip is not None and not has_clip(self.motion):
+            raise ValueError(f"expected frames or the motion clip, for clip: {self.clip}; found neither")
         if self.scale == "real_size" and self.real_size is None and not families:
             raise ValueError("expected real_size to be set, for scale: real_size; found none")
         return self

@@ -13,6 +13,7 @@ from viewsphere.model.model_spec import Axis
 from viewsphere.model.numbers import FARTHEST, Count, Length, Metres, Number
 from viewsphere.recipe.draws import Drawn, is_random
 from viewsphere.recipe.models import ZOO, Unit
+from viewsphere.recipe.motion import MOTION, MotionField, Movable
 from viewsphere.recipe.values import Interval, OrShort, Point, shape_of
 
 Draw = Literal["fixed", "per_model", "per_sequence", "per_frame"]
@@ -80,7 +81,7 @@ Layout = Annotated[
 ]
 
 
-class CompanyEntry(Frozen):
+class CompanyEntry(Movable):
     """Other models of the recipe, of the same split, beside the one each frame is about."""
 
     count: Count | None = Field(default=None, description="how many; not needed where layout is a list")
@@ -91,6 +92,7 @@ class CompanyEntry(Frozen):
     )
     gap: Annotated[Number, Field(ge=0)] = Field(default=0.3, description="metres that are free between two of them, at least")
     draw: Draw = Field(default="per_model", description=f"who and where: {DRAWS}")
+    motion: MotionField = Field(default=None, description=f"{MOTION}; of distractors")
 
     @model_validator(mode="after")
     def _check(self) -> CompanyEntry:

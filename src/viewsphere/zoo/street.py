@@ -8,8 +8,10 @@ from typing import Literal
 import numpy as np
 
 from viewsphere.assets.mesh import Mesh
+from viewsphere.zoo.places import Lane
 from viewsphere.zoo.shapes.paint import Color
 from viewsphere.zoo.townscape import paving, roadway
+from viewsphere.zoo.townscape.paving import GUTTER
 from viewsphere.zoo.townscape.plan import HALF_LENGTH, PLOT
 from viewsphere.zoo.townscape.surfaces import finished
 
@@ -83,6 +85,15 @@ def draw(rng: np.random.Generator) -> Street:
         paving_color=color,
         wear=float(rng.uniform(0.1, 1.0)),
         seed=int(rng.integers(1 << 31)),
+    )
+
+
+def lanes() -> tuple[Lane, ...]:
+    """The two lanes of every street, of drivers who keep to the right: `right` (+X) leads to +Y, `left` to -Y."""
+    middle, width = GUTTER / 2, GUTTER
+    return tuple(
+        Lane(name, ((side * middle, -side * HALF_LENGTH, 0.0), (side * middle, side * HALF_LENGTH, 0.0)), width)
+        for name, side in (("right", 1.0), ("left", -1.0))
     )
 
 

@@ -10,7 +10,7 @@ import math
 from dataclasses import dataclass
 
 from viewsphere import plugins
-from viewsphere.model.scene import Matrix4
+from viewsphere.model.scene import Matrix4, Vector
 
 
 @dataclass(frozen=True)
@@ -29,13 +29,26 @@ class PlacePiece:
 
 
 @dataclass(frozen=True)
+class Lane:
+    """A way through a place: the points of its middle in the direction of travel, two at least, and its width, metres. From the
+    last point of a closed lane it goes on to the first. name is unique in its place.
+    """
+
+    name: str
+    points: tuple[Vector, ...]
+    width: float
+    closed: bool = False
+
+
+@dataclass(frozen=True)
 class Place:
     """A layout, of which nothing is built yet. `free`: lowest x and y, highest x and y of the floor that is left to targets;
-    None where this floor has no end.
+    None where this floor has no end. `lanes`: where things may drive.
     """
 
     pieces: tuple[PlacePiece, ...]
     free: tuple[float, float, float, float] | None = None
+    lanes: tuple[Lane, ...] = ()
 
 
 def places() -> tuple[str, ...]:

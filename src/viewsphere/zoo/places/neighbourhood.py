@@ -68,7 +68,7 @@ def neighbourhood(parameters: Neighbourhood | None = None) -> Place:
     stands += _trees(p, plots, green)
     stands += _shrubs(plots, green)
     stands += _furniture(plan, plots, props)
-    return Place(_named(stands), free=(-ROAD, -HALF_LENGTH, ROAD, HALF_LENGTH))
+    return Place(_named(stands), free=(-ROAD, -HALF_LENGTH, ROAD, HALF_LENGTH), lanes=street.lanes())
 
 
 def neighbourhood_random(rng: np.random.Generator) -> Place:

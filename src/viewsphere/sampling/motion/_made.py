@@ -1,0 +1,136 @@
+"""From what a recipe says of motions to where a thing is at each instant."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
+from pydantic import ValidationError
+
+from viewsphere import plugins
+from viewsphere.errors import RecipeError
+from viewsphere.model.frozen import Frozen
+from viewsphere.model.mistakes import one_of, report
+from viewsphere.model.scene import Matrix4
+from viewsphere.model.thing import Motion, TimeStep
+from viewsphere.recipe.draws import RngOf, drawn
+from viewsphere.recipe.motion import MotionEntry, Motions, listed
+from viewsphere.sampling.motion._start import Pose, Start
+
+if TYPE_CHECKING:
+    from viewsphere.sampling.motion import Move, Movement
+
+T = TypeVar("T")
+
+DIGITS = 10
+"""Decimals that poses are recorded with, 1e-10 m: beyond these, sines differ between processors."""
+
+
+def check_motion(motions: Motions | None, field: str) -> None:
+    """Raise RecipeError, which begins with the field, for a kind that is not known, and for options that it does not have."""
+    for where, entry in listed(motions, field):
+        _options(entry, where)
+
+
+def motion_of(motions: Motions | None, start: Start, times: Sequence[float]) -> Motion:
+    """Where a thing is at these times, seconds, and what of its file it shows; one for all times where they are equal.
+
+    It stands still where it has no motions. Each of several moves the pose that the ones before gave. Where one says that the
+    thing is not there, it is not. Poses are rounded to 1e-10 m; for the same bytes however a sequence is cut, ask for all its
+    times at once. Raises RecipeError where a motion cannot be.
+    """
+    moves = tuple(_moves(motions, start))
+    poses = [_at(time, start, moves) for time in times]
+    return Motion(
+        poses=_one([None if pose is None else _recorded(pose, start.placed) for pose in poses]),
+        steps=_one(_lasting([None if pose is None else pose.step for pose in poses])),
+    )
+
+
+def _at(time: float, start: Start, moves: Iterable[Move]) -> Pose | None:
+    pose: Pose | None = Pose(np.array(start.placed, np.float64))
+    for move in moves:
+        if pose is not None:
+            pose = move(time, pose)
+    return pose
+
+
+def _moves(motions: Motions | None, start: Start) -> Iterator[Move]:
+    """The motions one by one, everything drawn; draws are named by the kind, and by how often it came before."""
+    seen: Counter[str] = Counter()
+    for field, entry in listed(motions, start.field):
+        seen[entry.kind] += 1
+        rng = partial(start.rng, entry.kind, str(seen[entry.kind]))
+        yield _move(entry, replace(start, rng=rng, field=field))
+
+
+def _move(entry: MotionEntry, start: Start) -> Move:
+    module, options = _options(entry, start.field)
+
+    def generator_of(path: tuple[str, ...]) -> np.random.Generator:
+        return start.rng("option", ".".join(path))
+
+    move = module.moves(drawn(options, generator_of), start)
+    return _between(entry, move, generator_of)
+
+
+def _between(entry: MotionEntry, move: Move, generator_of: RngOf) -> Move:
+    """The motion of a thing that is there from when it enters until it leaves."""
+    if entry.enter is None and entry.leave is None:
+        return move
+    enter, leave = drawn(entry.enter, generator_of, ("enter",)), drawn(entry.leave, generator_of, ("leave",))
+
+    def moved(time: float, pose: Pose) -> Pose | None:
+        is_there = (enter is None or time >= enter) and (leave is None or time < leave)
+        return move(time, pose) if is_there else None
+
+    return moved
+
+
+def _options(entry: MotionEntry, field: str) -> tuple[Movement, Any]:
+    """The module of an entry's kind, and the entry's options as the module reads them."""
+    known = plugins.names("motions")
+    if entry.kind not in known:
+        raise RecipeError(f"{field}.kind: {one_of(entry.kind, known)}")
+    module: Movement = plugins.load("motions", entry.kind)
+    return module, _read(module.Options, entry.options, field)
+
+
+def _read(kind: type[Frozen], options: dict[str, Any], field: str) -> Frozen:
+    try:
+        return kind.model_validate(options)
+    except ValidationError as error:
+        lines = report(error, options).splitlines()
+        raise RecipeError("\n".join(_below(field, line) for line in lines)) from None
+
+
+def _below(field: str, line: str) -> str:
+    """A mistake of an option as one of the field's; `recipe` stands for all options."""
+    return f"{field}{line.removeprefix('recipe')}" if line.startswith("recipe: ") else f"{field}.{line}"
+
+
+def _recorded(pose: Pose, placed: Matrix4) -> Matrix4:
+    """The pose as plain data, as it was placed where it is not moved."""
+    if (pose.matrix == np.array(placed)).all():
+        return placed
+    rows: Any = tuple(map(tuple, (np.round(pose.matrix, DIGITS) + 0.0).tolist()))
+    return rows
+
+
+def _lasting(steps: Sequence[TimeStep | None]) -> list[TimeStep | None]:
+    """The steps, each lasting until the next one; what is not there at first shows already what it will show."""
+    shown = next((step for step in steps if step is not None), None)
+    lasting: list[TimeStep | None] = []
+    for step in steps:
+        shown = step or shown
+        lasting.append(shown)
+    return lasting
+
+
+def _one(values: Sequence[T]) -> tuple[T, ...]:
+    """The values, or one of them where they are equal."""
+    return tuple(values[:1]) if all(value == values[0] for value in values) else tuple(values)
