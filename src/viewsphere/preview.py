@@ -6,6 +6,7 @@ import math
 from bisect import bisect_right
 from collections.abc import Iterator, Sequence
 from itertools import accumulate, groupby
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,7 +50,7 @@ def preview_samples(recipe: Recipe, count: int = 12, width: int = 320) -> Iterat
         for poses in [[pose] for group in groups for pose in group] if recipe.scene.is_new_each_frame else groups:
             shot = planned.take(subject, poses, stages.box)
             channels = tuple(dict.fromkeys((*shot.channels, picture_of(shot.channels) or "rgb", "depth", "instances")))
-            small = shot.model_copy(update={"rig": _scaled(shot.rig, width), "channels": channels})
+            small = shot.model_copy(update=_scaled(shot, width) | {"channels": channels})
             yield from stages.render(small)
 
 
@@ -85,10 +86,13 @@ def _grouped(steps: Sequence[Ranges], places: Sequence[int]) -> list[list[int]]:
     return [[pose for _, pose in group] for _, group in groupby(found, lambda pair: pair[0])]
 
 
-def _scaled(rig: Rig, width: int) -> Rig:
-    """The same cameras with narrower pictures."""
-    sensors = (s.model_copy(update={"intrinsics": _narrowed(s.intrinsics, width)}) for s in rig.sensors)
-    return rig.model_copy(update={"sensors": tuple(sensors)})
+def _scaled(shot: Shot, width: int) -> dict[str, Any]:
+    """The same cameras with narrower pictures, and all channels of each, as a shot's fields."""
+    narrow = ({"intrinsics": _narrowed(sensor.intrinsics, width), "channels": None} for sensor in shot.rig.sensors)
+    sensors = tuple(sensor.model_copy(update=more) for sensor, more in zip(shot.rig.sensors, narrow, strict=True))
+    zooms = ({"intrinsics": now.intrinsics and _narrowed(now.intrinsics, width)} for now in shot.instants)
+    instants = tuple(now.model_copy(update=more) for now, more in zip(shot.instants, zooms, strict=True))
+    return {"rig": Rig(sensors=sensors), "instants": instants}
 
 
 def _narrowed(lens: Intrinsics, width: int) -> Intrinsics:

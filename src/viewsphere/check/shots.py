@@ -22,7 +22,7 @@ def contradictions(sample: Sample, shot: Shot, place: int) -> Iterator[str]:
     now, camera = shot.instants[instant], shot.camera(instant, sensor)
     if not _is_same_camera(sample.known_camera, camera):
         yield "expected the camera of the shot, found another"
-    wanted, found = (pose and _unnumbered(pose) for pose in (now.viewpoint, sample.known_pose))
+    wanted, found = (pose and _unnumbered(pose) for pose in (shot.viewpoint(instant, sensor), sample.known_pose))
     if wanted != found:
         yield f"expected the pose {wanted} of the shot, found {found}"
     said = (sample.split, sample.sequence, sample.sensor, sample.instant, sample.time)

@@ -2,10 +2,21 @@
 
 from __future__ import annotations
 
-from pydantic import Field
+import math
+from typing import Any
 
+import numpy as np
+from numpy.typing import ArrayLike
+from pydantic import Field, SerializerFunctionWrapHandler, model_serializer
+
+from viewsphere.geometry.camera import orbit_angles
+from viewsphere.geometry.pose_category import pose_category
+from viewsphere.model.camera import Intrinsics
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.scene import Finish, Matrix4, Vector
+
+NEAREST = 1e-3
+"""Metres ahead of a camera from which on a point may be what it looks at."""
 
 
 class Moment(Frozen):
@@ -27,14 +38,47 @@ class Viewpoint(Frozen):
     category: str = ""  # named bin: front, front-left, ..., top
     time: Moment | None = None  # where something is animated
 
+    def rounded(self) -> Viewpoint:
+        """The same to nine decimal places: the last digits of angles that follow from a matrix differ between processors."""
+        names = ("azimuth_deg", "elevation_deg", "distance", "tilt_deg")
+        values = {name: round(getattr(self, name), 9) + 0.0 for name in names}
+        values["azimuth_deg"] %= 360.0
+        target = None if self.target is None else tuple(round(v, 9) + 0.0 for v in self.target)
+        return self.model_copy(update={**values, "target": target})
+
+
+def viewpoint_of(
+    world_from_camera: ArrayLike, focus: Vector, index: int, bins: float = 45.0, time: Moment | None = None
+) -> Viewpoint:
+    """The viewpoint of a camera with this pose (4, 4), OpenCV axes: around the point on its axis that is nearest to `focus`,
+    1 m ahead of it if that lies behind. `bins`: width of the named categories, degrees.
+    """
+    pose = np.asarray(world_from_camera, np.float64)
+    rotation, center = np.ascontiguousarray(pose[:3, :3].T), pose[:3, 3]
+    ahead = float((rotation[2] * (np.asarray(focus) - center)).sum())
+    distance = ahead if ahead > NEAREST else 1.0
+    azimuth, elevation, tilt = (math.degrees(a) for a in orbit_angles(rotation))
+    x, y, z = (center + distance * rotation[2]).tolist()
+    return Viewpoint(
+        index=index,
+        azimuth_deg=azimuth % 360.0,
+        elevation_deg=elevation,
+        distance=distance,
+        tilt_deg=tilt,
+        target=(x, y, z),
+        category=pose_category(azimuth % 360.0, elevation, bins),
+        time=time,
+    )
+
 
 class Instant(Frozen):
     """One instant of a shot: where the rig is, what it looks at, and what the pictures are made of then.
 
     `index` counts the instants of a sequence from 0, of still pictures those of the data set. `world_from_rig` is the pose of
     the rig's first sensor (OpenCV axes, metres); `focus` (world metres) is what it looks at. `viewpoint` says how the pose was
-    asked for, where it comes from a grid or list. `finish` replaces the scene's. An instant that is not `recorded` is there
-    only because labels of others need it: no picture is taken then.
+    asked for, where it comes from a grid or list. `finish` replaces the scene's; `intrinsics`, where a lens zooms, that of the
+    rig's first sensor, and of those that have the same, at the same size. An instant that is not `recorded` is there only
+    because labels of others need it: no picture is taken then.
     """
 
     index: int
@@ -44,4 +88,15 @@ class Instant(Frozen):
     viewpoint: Viewpoint | None = None
     split: str = ""
     finish: Finish | None = None
+    intrinsics: Intrinsics | None = None
     recorded: bool = True
+
+    @model_serializer(mode="wrap")
+    def _as_ever(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Without `intrinsics` where nothing zooms, and without `recorded` where it is, as records always were."""
+        found: dict[str, Any] = handler(self)
+        if self.intrinsics is None:
+            found.pop("intrinsics", None)
+        if self.recorded:
+            found.pop("recorded", None)
+        return found

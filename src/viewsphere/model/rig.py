@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
-from pydantic import Field, model_validator
+from itertools import permutations
+from typing import Any, NamedTuple
 
+import numpy as np
+from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
+
+from viewsphere.geometry.rotation import transform
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.scene import IDENTITY, Matrix4
@@ -13,11 +18,35 @@ CAMERA = "camera"
 
 
 class Sensor(Frozen):
-    """A camera of a rig: its lens, and where it is mounted. `rig_from_sensor` is rigid, OpenCV axes on both sides, metres."""
+    """A camera of a rig: its lens, and where it is mounted. `rig_from_sensor` is rigid, OpenCV axes on both sides, metres.
+    `channels` are those of the shot's that it keeps, None: all.
+    """
 
     intrinsics: Intrinsics
     name: str = Field(default=CAMERA, pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$", max_length=64)
     rig_from_sensor: Matrix4 = IDENTITY
+    channels: tuple[str, ...] | None = None
+
+    @model_serializer(mode="wrap")
+    def _as_ever(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Without `channels` where a sensor keeps all, so that records of one camera are what they were before rigs."""
+        found: dict[str, Any] = handler(self)
+        if self.channels is None:
+            found.pop("channels", None)
+        return found
+
+    def kept(self, channels: tuple[str, ...]) -> tuple[str, ...]:
+        """Those of a shot's channels that the sensor keeps, in the shot's order."""
+        own = self.channels
+        return channels if own is None else tuple(name for name in channels if name in own)
+
+
+class Pair(NamedTuple):
+    """Two sensors of a rig, by their places in it, whose pictures are rectified, and the metres between them."""
+
+    left: int
+    right: int
+    baseline: float
 
 
 class Rig(Frozen):
@@ -34,7 +63,29 @@ class Rig(Frozen):
             raise ValueError(f"expected the rig's axes to be those of its first sensor; found {names[0]} mounted elsewhere")
         return self
 
+    @property
+    def rectified(self) -> tuple[Pair, ...]:
+        """All pairs of sensors with equal pinhole lenses and equal axes, of which one stands along the other's x axis."""
+        numbered = permutations(enumerate(self.sensors), 2)
+        found = ((i, j, _baseline(left, right)) for (i, left), (j, right) in numbered)
+        return tuple(Pair(i, j, baseline) for i, j, baseline in found if baseline is not None)
+
     @staticmethod
     def of(intrinsics: Intrinsics) -> Rig:
         """The rig of one camera with this lens."""
         return Rig(sensors=(Sensor(intrinsics=intrinsics),))
+
+
+STRAIGHT = 1e-9
+"""How far numbers of two axes that count as equal may differ, and a baseline's direction from the x axis."""
+
+
+def _baseline(left: Sensor, right: Sensor) -> float | None:
+    """Metres from the left sensor to the right one along x, None where they are not rectified in this order."""
+    if left.intrinsics != right.intrinsics or left.intrinsics.distortion is not None:
+        return None
+    a, b = np.array(left.rig_from_sensor), np.array(right.rig_from_sensor)
+    if np.abs(a[:3, :3] - b[:3, :3]).max() > STRAIGHT:
+        return None
+    x, y, z = transform(a[:3, :3].T, b[:3, 3] - a[:3, 3]).tolist()
+    return x if x > 0 and max(abs(y), abs(z)) <= STRAIGHT * x else None

@@ -10,10 +10,10 @@ import numpy as np
 from pydantic import Field, JsonValue, model_validator
 
 from viewsphere.geometry.rotation import compose, transform
-from viewsphere.model.camera import Camera
+from viewsphere.model.camera import Camera, Intrinsics
 from viewsphere.model.files import Files
 from viewsphere.model.frozen import Frozen
-from viewsphere.model.instant import Instant
+from viewsphere.model.instant import Instant, Viewpoint, viewpoint_of
 from viewsphere.model.rig import Rig
 from viewsphere.model.scene import IDENTITY, Finish, Scene
 from viewsphere.model.thing import Motion, Thing
@@ -49,6 +49,15 @@ class Shot(Frozen):
                     f"expected one pose and one time step of thing {thing.id}, or one an instant ({len(self.instants)}); "
                     f"found {len(motion.poses)} and {len(motion.steps)}"
                 )
+        return self
+
+    @model_validator(mode="after")
+    def _zooms_at_one_size(self) -> Shot:
+        lens = self.rig.sensors[0].intrinsics
+        for now in self.instants:
+            if now.intrinsics and (now.intrinsics.width, now.intrinsics.height) != (lens.width, lens.height):
+                found = f"{now.intrinsics.width} x {now.intrinsics.height}"
+                raise ValueError(f"expected pictures of {lens.width} x {lens.height} at all instants; found {found}")
         return self
 
     @property
@@ -88,7 +97,25 @@ class Shot(Frozen):
         if mounted.rig_from_sensor != IDENTITY:
             world_from_sensor = compose(world_from_sensor, np.array(mounted.rig_from_sensor))
         rotation = np.ascontiguousarray(world_from_sensor[:3, :3].T)
-        return Camera(mounted.intrinsics, rotation, -transform(rotation, world_from_sensor[:3, 3]))
+        return Camera(self._lens(instant, sensor), rotation, -transform(rotation, world_from_sensor[:3, 3]))
+
+    def viewpoint(self, instant: int, sensor: int = 0) -> Viewpoint | None:
+        """The viewpoint of a sensor at an instant, both counted from 0: as the instant's pose was asked for, of the rig's first
+        sensor; of one that is mounted elsewhere, as it follows from there.
+        """
+        now, mounted = self.instants[instant], self.rig.sensors[sensor]
+        if now.viewpoint is None or mounted.rig_from_sensor == IDENTITY:
+            return now.viewpoint
+        pose = compose(now.world_from_rig, mounted.rig_from_sensor)
+        return viewpoint_of(pose, now.focus, now.viewpoint.index, self.category_deg, now.viewpoint.time).rounded()
+
+    def _lens(self, instant: int, sensor: int) -> Intrinsics:
+        own, zoomed = self.rig.sensors[sensor].intrinsics, self.instants[instant].intrinsics
+        return zoomed if zoomed is not None and own == self.rig.sensors[0].intrinsics else own
+
+    def kept(self, sensor: int) -> tuple[str, ...]:
+        """The channels that a sensor keeps, counted from 0 in the rig."""
+        return self.rig.sensors[sensor].kept(self.channels)
 
     def finish(self, instant: int) -> Finish:
         """How light becomes a picture at an instant."""

@@ -33,6 +33,7 @@ from viewsphere.model.frozen import Frozen
 from viewsphere.model.mistakes import Marks, report, shown
 from viewsphere.model.numbers import Count, Natural, Number
 from viewsphere.recipe.models import ModelEntry
+from viewsphere.recipe.rig import RigField
 from viewsphere.recipe.scene import CameraEntry, EngineEntry, SceneEntry, engine_entry
 from viewsphere.recipe.scenes import ScenesField
 from viewsphere.recipe.sequence import TimeEntry
@@ -42,7 +43,7 @@ from viewsphere.recipe.viewpoints import Viewpoints
 BEFORE_RENDERING = {"name", "formats", "max_frames", "shot_frames"}
 """Fields of a recipe that change neither a picture nor a label."""
 
-LATER = {"scenes", "time"}
+LATER = {"scenes", "time", "rig"}
 """Fields that recipes once did not have: without them a recipe has the digest that it had then."""
 
 Share = Annotated[
@@ -108,7 +109,7 @@ class Recipe(Frozen):
     name: str = Field(default="dataset", min_length=1, max_length=200, description="name of the data set")
     seed: Natural = Field(default=0, description="every random choice follows from it")
     models: tuple[ModelEntry, ...] = Field(min_length=1, description="the models to place, each entry of one category")
-    viewpoints: Viewpoints = Field(description="where the camera stands; kind: grid (default), sphere, normal or jitter")
+    viewpoints: Viewpoints = Field(description="where the camera stands, or how it moves; kind: grid (default), sphere, ...")
     scenes: ScenesField | None = Field(
         default=None,
         description="how many random scenes to make of the models, or a mapping of count, objects, layout and more; by default "
@@ -120,6 +121,11 @@ class Recipe(Frozen):
         "from each viewpoint that stands still",
     )
     camera: CameraEntry = Field(default=CameraEntry(fov_deg=40.0), description="image size and lens")
+    rig: RigField | None = Field(
+        default=None,
+        description="several sensors that move together: {kind: stereo, baseline}, {kind: surround, count}, {sensors: {...}} "
+        "or {file: calibration}; the viewpoint is the first one's. By default one camera",
+    )
     scene: SceneEntry = Field(default=SceneEntry(), description="light, ground, background, effects, what stands around")
     engine: Annotated[EngineEntry, BeforeValidator(engine_entry), OrShort({"type": "string"})] = Field(
         default=EngineEntry(),
@@ -225,8 +231,10 @@ class Recipe(Frozen):
     @property
     def digest(self) -> str:
         """SHA-256 (hexadecimal) of all that changes a picture or a label; formats, for one, do not."""
-        unused = BEFORE_RENDERING | {name for name in LATER if getattr(self, name) is None}
-        text = json.dumps(self.model_dump(mode="json", exclude=unused), separators=(",", ":"))
+        value = self.model_dump(mode="json", exclude=BEFORE_RENDERING | {name for name in LATER if getattr(self, name) is None})
+        if value["viewpoints"]["shake"] is None:
+            del value["viewpoints"]["shake"]
+        text = json.dumps(value, separators=(",", ":"))
         return hashlib.sha256(text.encode()).hexdigest()
 
     def to_yaml(self) -> str:

@@ -1,4 +1,6 @@
-"""The viewpoints of a recipe: the paper's grid, and random ones. Angles in degrees, distances in metres."""
+"""The viewpoints of a recipe: the paper's grid, random ones, a file's, and motions of the camera. Angles in degrees, distances
+in metres.
+"""
 
 from __future__ import annotations
 
@@ -6,20 +8,13 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Discriminator, Field, Tag, field_validator, model_validator
 
-from viewsphere.geometry.pose_category import pose_category
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.model_spec import Axis
 from viewsphere.model.numbers import Count, Number, Positive
+from viewsphere.recipe.aim import AZIMUTH, DISTANCE, ELEVATION, FARTHEST, TILT, Aimed, in_elevation, in_reach
 from viewsphere.recipe.time import Frames
-from viewsphere.recipe.values import Interval, Point, Range, Values, shape_of
-
-AZIMUTH = "0: the camera faces the model's front; 90: it stands on the model's left, +X"
-ELEVATION = "above the horizon, -90 to 90"
-FARTHEST = 1e6
-"""Largest distance of a camera from its target, metres: ten times the largest model allowed."""
-
-DISTANCE = "from the target to the camera, metres"
-TILT = "roll of the camera about its axis, clockwise seen from behind"
+from viewsphere.recipe.trajectories import DrivePath, MastPost, OrbitPath, SplinePath, WalkPath
+from viewsphere.recipe.values import Interval, Point, Range, Values
 
 
 def axis_count(values: float | tuple[float, ...] | Range, *, turn: bool = False) -> int:
@@ -43,51 +38,7 @@ def _ends(values: float | tuple[float, ...] | Range) -> tuple[float, float]:
     return (min(values), max(values)) if isinstance(values, tuple) else (values, values)
 
 
-def _in_elevation(low: float, high: float) -> None:
-    if low < -90 or high > 90:
-        raise ValueError(f"expected elevations of -90 to 90 degrees; found {low if low < -90 else high:g}")
-
-
-def _in_reach(low: float, high: float) -> None:
-    if low <= 0:
-        raise ValueError(f"expected distances above 0 m; found {low:g}")
-    if high > FARTHEST:
-        raise ValueError(f"expected distances of at most {FARTHEST:,.0f} m; found {high:g}")
-
-
-class _Aimed(Frozen):
-    """What all kinds of viewpoints have."""
-
-    target: Annotated[
-        Annotated[Literal["center", "follow"], Tag("text")] | Annotated[Point, Tag("list")], Discriminator(shape_of)
-    ] = Field(
-        default="center",
-        description="what the camera looks at: the centre of the model's box, or a point [x, y, z] in metres. An animated "
-        "model's centre is that of the first frame; follow goes with it",
-    )
-    bins: Positive = Field(
-        default=45.0,
-        description="width in degrees of the named pose categories (front, front-left, ...); has to divide 360",
-    )
-
-    @field_validator("target", mode="before")
-    @classmethod
-    def _target(cls, value: Any) -> Any:
-        if value not in ("center", "follow") and not (isinstance(value, (list, tuple)) and len(value) == 3):
-            raise ValueError(f"expected center, follow or [x, y, z]; found {value!r}")
-        return value
-
-    @field_validator("bins")
-    @classmethod
-    def _bins(cls, value: float) -> float:
-        try:
-            pose_category(0.0, 0.0, value)
-        except ValueError:
-            raise ValueError(f"expected a number of degrees that divides 360; found {value:g}") from None
-        return value
-
-
-class _Axes(_Aimed):
+class _Axes(Aimed):
     """Angles and distances to combine."""
 
     azimuth: Values = Field(default=Range(start=0, stop=360, step=45), description=f"degrees; {AZIMUTH}; a full turn drops 360")
@@ -113,13 +64,13 @@ class _Axes(_Aimed):
     @field_validator("elevation")
     @classmethod
     def _elevation(cls, values: float | tuple[float, ...] | Range) -> float | tuple[float, ...] | Range:
-        _in_elevation(*_ends(values))
+        in_elevation(*_ends(values))
         return values
 
     @field_validator("distance")
     @classmethod
     def _distance(cls, values: float | tuple[float, ...] | Range) -> float | tuple[float, ...] | Range:
-        _in_reach(*_ends(values))
+        in_reach(*_ends(values))
         return values
 
     @property
@@ -158,11 +109,11 @@ class Jitter(_Axes):
     @model_validator(mode="after")
     def _in_front(self) -> Jitter:
         low, high = _ends(self.distance)
-        _in_reach(low - self.plus_minus.distance, high)
+        in_reach(low - self.plus_minus.distance, high)
         return self
 
 
-class Sphere(_Aimed):
+class Sphere(Aimed):
     """Random viewpoints, uniform by area on the sphere or on a part of it."""
 
     kind: Literal["sphere"] = Field(description="uniform on the sphere")
@@ -175,17 +126,17 @@ class Sphere(_Aimed):
     @field_validator("elevation")
     @classmethod
     def _elevation(cls, value: tuple[float, float]) -> tuple[float, float]:
-        _in_elevation(*value)
+        in_elevation(*value)
         return value
 
     @field_validator("distance")
     @classmethod
     def _distance(cls, value: tuple[float, float]) -> tuple[float, float]:
-        _in_reach(*value)
+        in_reach(*value)
         return value
 
 
-class Normal(_Aimed):
+class Normal(Aimed):
     """Random viewpoints, normal around one; draws beyond the poles or at no distance are drawn again."""
 
     kind: Literal["normal"] = Field(description="normal around a viewpoint")
@@ -197,7 +148,7 @@ class Normal(_Aimed):
     sd: Spread = Field(description="standard deviations")
 
 
-class PoseList(_Aimed):
+class PoseList(Aimed):
     """Viewpoints from a file: orbits around the target, or a camera's motion through the file's own world.
 
     A motion is turned so that the file's `up` is +Z and its `forward` is -Y, moved so that `origin` lies where the models
@@ -259,6 +210,11 @@ Viewpoints = Annotated[
     | Annotated[Sphere, Tag("sphere")]
     | Annotated[Normal, Tag("normal")]
     | Annotated[Jitter, Tag("jitter")]
-    | Annotated[PoseList, Tag("file")],
+    | Annotated[PoseList, Tag("file")]
+    | Annotated[OrbitPath, Tag("orbit")]
+    | Annotated[SplinePath, Tag("spline")]
+    | Annotated[DrivePath, Tag("drive")]
+    | Annotated[WalkPath, Tag("walk")]
+    | Annotated[MastPost, Tag("mast")],
     Discriminator(_kind),
 ]

@@ -22,6 +22,7 @@ from viewsphere.run.progress import Listener, Progress
 from viewsphere.sampling.pose_numbers import kept, names_of
 from viewsphere.store import Block, Category, Dataset, ModelInfo, Part, PlanRecord, Row, Store, encode
 from viewsphere.store.foreign import ForeignFrame
+from viewsphere.store.index import length
 from viewsphere.store.linking import link_model, link_shot
 
 
@@ -218,7 +219,11 @@ def _parts(source: _Source) -> Iterator[Part]:
         rows = [row for row in source.rows if row.part == number]
         frames = sum(row.count for row in rows)
         whole = frames == part.frames
-        blocks = part.blocks if whole else tuple(Block((row.subject,), row.positions) for row in rows)
+        blocks = (
+            part.blocks
+            if whole
+            else tuple(Block((row.subject,), row.positions, row.count // length(row.positions)) for row in rows)
+        )
         if frames:
             yield replace(
                 part,

@@ -228,9 +228,9 @@ def render_sample(
     ground = shot.scene.ground
     labelled = geometry if ground is None or ground.is_labelled else without_ground(geometry)
     visibility = rasterize(labelled, camera)
-    names = [name for name in shot.channels if name not in PASSES]
-    observed = observe(labelled, camera, visibility, names)
-    pictures = [name for name in PASSES if name in shot.channels]
+    kept = shot.kept(sensor)
+    observed = observe(labelled, camera, visibility, [name for name in kept if name not in PASSES])
+    pictures = [name for name in PASSES if name in kept]
     painted = with_ground(geometry, camera, visibility) if pictures and labelled is not geometry else visibility
     for name in pictures:
         observed[name] = stage.color(instant, sensor, painted, name == "rgba")
@@ -241,9 +241,9 @@ def render_sample(
         index=number,
         split=now.split,
         known_camera=camera,
-        known_pose=now.viewpoint,
+        known_pose=shot.viewpoint(instant, sensor),
         objects=objects,
-        channels={name: observed[name] for name in shot.channels},
+        channels={name: observed[name] for name in kept},
         files={},
         sequence=shot.sequence,
         sensor=shot.rig.sensors[sensor].name,

@@ -14,6 +14,9 @@ from viewsphere.store import Part, PlanRecord
 
 FITTING = "appended frames have to fit those that are there; choose another output folder for others"
 
+RIG = "rig"
+"""Name of the setting that only recipes with several sensors have."""
+
 LOOK = "the engine's program"
 """Name of the setting that says how the engine paints."""
 
@@ -35,6 +38,7 @@ def settings(planned: Plan) -> dict[str, str]:
     planes = () if planned.composition is None else planned.composition.images
     value |= {
         "camera": planned.intrinsics.model_dump(mode="json"),
+        **({} if planned.own_rig is None else {RIG: planned.own_rig.model_dump(mode="json")}),
         "viewpoints.target": viewpoints.get("target"),
         "viewpoints.bins": viewpoints.get("bins"),
         "scene's images": [file.rpartition("/")[2] for files in (planned.images, *planes) for file in files],
@@ -58,8 +62,9 @@ def _check_sampler(planned: Plan, part: Part) -> None:
 
 def _check_settings(planned: Plan, part: Part) -> None:
     own = settings(planned)
-    for name, digest in part.settings.items():
-        if own.get(name) != digest:
+    added = [name for name in own if part.settings and name not in part.settings and name == RIG]
+    for name in (*part.settings, *added):
+        if own.get(name) != part.settings.get(name):
             found = planned.recipe.model_dump(mode="json")
             values = [_value(recipe, name) for recipe in (part.recipe, found)]
             differ = f"{values[0]}, as the data set has; found {values[1]}"

@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import chain
+from itertools import chain, repeat
 from pathlib import Path
 
 from viewsphere import plugins
@@ -30,6 +30,7 @@ from viewsphere.sampling.composition import BoxOf, compose
 from viewsphere.sampling.models import categories, numbered_specs
 from viewsphere.sampling.pictures import check_pictures, proportions, scene_pictures
 from viewsphere.sampling.recipe_warnings import hidden_by_exposure, no_light, out_of_view
+from viewsphere.sampling.rigs import rig_of
 from viewsphere.sampling.samplers import Sampler, Stock, lens
 from viewsphere.sampling.scenes import is_night
 from viewsphere.sampling.sequence_poses import SequencePoses
@@ -82,7 +83,8 @@ class Plan(Stock):
     @property
     def factors(self) -> str:
         """What its frames are the product of, in words."""
-        return self.sampler.factors(self)
+        sensors = len(self.rig.sensors)
+        return self.sampler.factors(self) + (f" x {sensors} sensors" if sensors > 1 else "")
 
     @property
     def max_objects(self) -> int:
@@ -118,9 +120,10 @@ class Plan(Stock):
                     found[self.split(subject, block.positions[0][0])] += block.size * block.each
         elif by == "pose" and len(self.blocks) == 1 and self.poses <= COUNTED:
             for pose in numbers(self.blocks[0].positions):
-                found[self.split(self.subjects[0], pose)] += len(self.subjects)
+                found[self.split(self.subjects[0], pose)] += len(self.subjects) * len(self.rig.sensors)
         elif self.frames <= COUNTED:
-            found.update(self.split(s, i) for block in self.blocks for s in block.subjects for i in numbers(block.positions))
+            taken = (self.split(s, i) for block in self.blocks for s in block.subjects for i in numbers(block.positions))
+            found.update(chain.from_iterable(repeat(name, len(self.rig.sensors)) for name in taken))
         else:
             found = Counter(expected(self.recipe.splits, self.frames))
         return {name: found[name] for name in self.splits}
@@ -158,8 +161,8 @@ class Plan(Stock):
 
     @cached_property
     def blocks(self) -> tuple[Block, ...]:
-        """Which subjects are taken from which poses, time step by time step."""
-        return self.sampler.blocks(self)
+        """Which subjects are taken from which poses, time step by time step, by all sensors each."""
+        return tuple(replace(block, each=len(self.rig.sensors)) for block in self.sampler.blocks(self))
 
     @cached_property
     def rows(self) -> Index:
@@ -206,6 +209,7 @@ class Plan(Stock):
         images = [Path(i).name for files in (self.images, *planes) for i in files]
         value = [self.recipe.digest, models, self.pose_list.digest, images, self.shot_frames]
         value += [] if self.blend is None else [self.blend.digest]
+        value += [] if self.own_rig is None else [self.own_rig.model_dump(mode="json")]
         return hashlib.sha256(json.dumps(value, separators=(",", ":")).encode()).hexdigest()
 
 
@@ -222,7 +226,7 @@ def plan(recipe: Recipe, shot_frames: int | None = None) -> Plan:
         check_splits(recipe)
         views = poses(recipe.viewpoints, recipe.seed, recipe.folder)
         views = views if recipe.time is None else SequencePoses.of(views, recipe.time)
-        lens(recipe, views)
+        rig = rig_of(recipe, lens(recipe, views))
         check_frames(recipe, views)
         specs, timings, views = timed(recipe, numbered_specs(recipe), views)
         check_listed(recipe, specs)
@@ -240,6 +244,7 @@ def plan(recipe: Recipe, shot_frames: int | None = None) -> Plan:
             timings=timings,
             categories=categories(recipe),
             shot_frames=frames,
+            own_rig=rig,
         )
         check_all_frames(recipe, planned.frames, planned.factors)
         if timings:

@@ -17,11 +17,10 @@ from numpy.typing import NDArray
 
 from viewsphere.assets.normalise import rotation as axes_rotation
 from viewsphere.errors import RecipeError
-from viewsphere.geometry.camera import orbit_angles
 from viewsphere.geometry.pose_category import pose_category
-from viewsphere.geometry.rotation import transform
+from viewsphere.geometry.rotation import rigid, transform
 from viewsphere.model.camera import Intrinsics
-from viewsphere.model.instant import Viewpoint
+from viewsphere.model.instant import Viewpoint, viewpoint_of
 from viewsphere.model.scene import Vector
 from viewsphere.recipe.values import Range
 from viewsphere.recipe.viewpoints import Grid, Jitter, Normal, PoseList, Sphere, Viewpoints, axis_value
@@ -294,7 +293,7 @@ class ListedPoses(Poses):
 
     @cached_property
     def _views(self) -> tuple[tuple[Orbit, Vector | None], ...]:
-        turn = self._turn
+        turn = world_turn(self.viewpoints, self.file)
         return tuple(
             self._view_of(turn, entry) if isinstance(entry, Extrinsics) else (entry, None) for entry in self.file.entries
         )
@@ -309,20 +308,22 @@ class ListedPoses(Poses):
             seen[name] += 1
         return tuple(names)
 
-    @property
-    def _turn(self) -> Float:
-        """Our world from the file's, (3, 3)."""
-        up = self.viewpoints.up or self.file.up
-        return axes_rotation(up, self.viewpoints.forward or ("-z" if up[1] == "y" else "-y"), "viewpoints")
-
     def _view_of(self, turn: Float, motion: Extrinsics) -> tuple[Orbit, Vector]:
-        rotation = transform(turn, motion.R)  # rows: the camera's axes, in our world
-        center = self.viewpoints.scale * transform(turn, np.subtract(motion.center, self.viewpoints.origin))
-        ahead = -float((rotation[2] * center).sum())
-        distance = ahead if ahead > 1e-3 else 1.0
-        azimuth, elevation, tilt = (math.degrees(a) for a in orbit_angles(rotation))
-        x, y, z = (center + distance * rotation[2]).tolist()
-        return Orbit(azimuth % 360.0, elevation, distance, tilt), (x, y, z)
+        view = viewpoint_of(placed(motion, turn, self.viewpoints), (0.0, 0.0, 0.0), 0)
+        assert view.target is not None
+        return Orbit(view.azimuth_deg, view.elevation_deg, view.distance, view.tilt_deg), view.target
+
+
+def world_turn(viewpoints: PoseList, file: PoseFile) -> Float:
+    """Our world from a file's, (3, 3)."""
+    up = viewpoints.up or file.up
+    return axes_rotation(up, viewpoints.forward or ("-z" if up[1] == "y" else "-y"), "viewpoints")
+
+
+def placed(motion: Extrinsics, turn: Float, viewpoints: PoseList) -> Float:
+    """The pose of a file's camera in our world, (4, 4), metres, OpenCV axes."""
+    rotation = transform(turn, motion.R)  # rows: the camera's axes
+    return rigid(rotation.T, viewpoints.scale * transform(turn, np.subtract(motion.center, viewpoints.origin)))
 
 
 def poses(viewpoints: Viewpoints, seed: int, folder: Path = Path()) -> Poses:
@@ -333,7 +334,7 @@ def poses(viewpoints: Viewpoints, seed: int, folder: Path = Path()) -> Poses:
     match viewpoints:
         case PoseList():
             path = folder / Path(viewpoints.path).expanduser()
-            return ListedPoses(viewpoints, seed, _file(path, viewpoints))
+            return ListedPoses(viewpoints, seed, pose_file(path, viewpoints))
         case Jitter():
             return JitteredPoses(viewpoints, seed)
         case Sphere():
@@ -342,10 +343,17 @@ def poses(viewpoints: Viewpoints, seed: int, folder: Path = Path()) -> Poses:
             return NormalPoses(viewpoints, seed)
         case Grid():
             return GridPoses(viewpoints, seed)
+        case _:
+            raise RecipeError(
+                f"viewpoints.kind: expected grid, sphere, normal, jitter or file without time; found {viewpoints.kind}, which "
+                "needs time: set time: {frames: 50, fps: 25}"
+            )
 
 
-def _file(path: Path, viewpoints: PoseList) -> PoseFile:
-    """What a file of poses, or the camera of a 3D file, says."""
+def pose_file(path: Path, viewpoints: PoseList, zooms: bool = False) -> PoseFile:
+    """What a file of poses, or the camera of a 3D file, says; with `zooms` the camera's lens may change. Raises RecipeError for
+    files that cannot be read.
+    """
     from viewsphere.sampling.pose_files import cameras
 
     is_scene = viewpoints.format == "cameras" or (viewpoints.format == "auto" and path.suffix.lower() in cameras.SUFFIXES)
@@ -353,5 +361,4 @@ def _file(path: Path, viewpoints: PoseList) -> PoseFile:
         for name in viewpoints.of_cameras:
             raise RecipeError(f"viewpoints.{name}: expected a 3D file ({', '.join(cameras.SUFFIXES)}); found {path}")
         return read_poses(path, viewpoints.format, viewpoints.every)
-    found = cameras.read_cameras(path, viewpoints)
-    return replace(found, entries=found.entries[:: viewpoints.every])
+    return cameras.read_cameras(path, viewpoints, zooms).thinned(viewpoints.every)

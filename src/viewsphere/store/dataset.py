@@ -189,8 +189,10 @@ class Dataset(Sequence[Sample]):
             if "camera" in record or records.shot is None:
                 files: dict[str, str] = record["files"] | self._supplied(record)
                 return from_whole_sample(record, _ChannelFiles(self.root, files, self._manifests), files)
-            files = {name: head + f"{record['index']:08d}" + tail for name, head, tail in records.files}
-            files |= self._supplied(record)
+            kept, number = records.shot.kept(place), f"{record['index']:08d}"
+            files = {name: head + number + tail for name, head, tail in records.files if name in kept}
+            supplied = self._supplied(record)
+            files |= {name: file for name, file in supplied.items() if records.shot.keeps(place, name)}
             return records.shot.sample(place, record, _ChannelFiles(self.root, files, self._manifests), files)
         except (LookupError, TypeError, ValueError, AttributeError) as error:
             raise _damaged(records.file, error) from None

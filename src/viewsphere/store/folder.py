@@ -273,6 +273,7 @@ class Store:
         made: set[str] = set()
         told: dict[str, Seal] = {}
         kinds, table = kinds or Files(), channels()
+        own = {} if shot is None else {sensor.name: sensor.kept(shot.channels) for sensor in shot.rig.sensors}
         with self.aside(target, again) as folder:
             for sample in samples:
                 files: dict[str, str] = {}
@@ -287,7 +288,7 @@ class Store:
                     told[inside] = len(data), digest(data)
                     _write(f"{folder}/{inside}", data)
                     files[name] = f"{prefix}/{inside}"
-                short = shot is not None and shot.channels == tuple(files) and shot.files == kinds
+                short = own.get(sample.sensor) == tuple(files) and shot is not None and shot.files == kinds
                 records.append(short_sample(sample) if short else whole_sample(replace(sample, files=files)))
             lines = (json.dumps(r, separators=(",", ":"), allow_nan=False) for r in records)
             text = "[\n" + ",\n".join(lines) + "\n]\n"

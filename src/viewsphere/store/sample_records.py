@@ -105,6 +105,15 @@ class ShotRecords:
     def _makers(self) -> dict[str, Any]:
         return {field.name: label for label in object_labels() for field in label.fields}
 
+    def kept(self, place: int) -> tuple[str, ...]:
+        """The channels of the shot's that the sample at a place has, counted from 0."""
+        return self.shot.kept(self._samples[place][2])
+
+    def keeps(self, place: int, channel: str) -> bool:
+        """Whether a channel, that may have been added later, is one of the sample's sensor."""
+        own = self.shot.rig.sensors[self._samples[place][2]].channels
+        return own is None or channel in own
+
     def sample(self, place: int, record: Mapping[str, Any], channels: Channels, files: Mapping[str, str]) -> Sample:
         """The sample at a place of the shot, counted from 0, with these channels and files."""
         _, instant, sensor = self._samples[place]
@@ -113,7 +122,7 @@ class ShotRecords:
             index=record["index"],
             split=now.split,
             known_camera=camera,
-            known_pose=now.viewpoint,
+            known_pose=self.shot.viewpoint(instant, sensor),
             objects=tuple(self._objects(record["objects"], instant, camera)),
             channels=channels,
             files=files,

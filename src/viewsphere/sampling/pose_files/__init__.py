@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 from viewsphere.errors import RecipeError
@@ -27,7 +26,7 @@ def read_poses(path: Path, kind: str = "auto", every: int = 1) -> PoseFile:
     found = _read(path, kind)
     if not found.entries:
         raise RecipeError(f"{path}: expected at least one pose; found none")
-    return replace(found, entries=found.entries[::every])
+    return found.thinned(every)
 
 
 def _kind(path: Path) -> str:

@@ -19,10 +19,11 @@ from viewsphere.sampling.pose_files.motions import motion
 SUFFIXES = (".abc", ".blend", ".fbx", ".glb", ".gltf", ".usd", ".usda", ".usdc", ".usdz")
 
 
-def read_cameras(path: Path, entry: PoseList) -> PoseFile:
-    """The poses of the entry's camera at its frames, in metres, +z up, and its lens.
+def read_cameras(path: Path, entry: PoseList, zooms: bool = False) -> PoseFile:
+    """The poses of the entry's camera at its frames, in metres, +z up, and its lens; with `zooms` a lens for each where they
+    differ.
 
-    Raises RecipeError for a file without such a camera or such frames, and for a lens that changes.
+    Raises RecipeError for a file without such a camera or such frames, and without `zooms` for a lens that changes.
     """
     with Blenders.none_yet() as blenders:
         try:
@@ -31,8 +32,11 @@ def read_cameras(path: Path, entry: PoseList) -> PoseFile:
             told = blenders.told(path, entry.confined, "cameras", about)["cameras"]
         except ModelError as error:
             raise RecipeError(f"viewpoints: {error}") from None
-    lens = one_lens((_lens(one["lens"]) for one in told), str(path))
-    return PoseFile(tuple(_motion(one, str(path)) for one in told), up="+z", intrinsics=lens)
+    lenses = tuple(_lens(one["lens"]) for one in told)
+    entries = tuple(_motion(one, str(path)) for one in told)
+    if zooms and len(set(lenses)) > 1:
+        return PoseFile(entries, up="+z", lenses=lenses)
+    return PoseFile(entries, up="+z", intrinsics=one_lens(lenses, str(path)))
 
 
 def _frames(path: Path, entry: PoseList, blenders: Blenders) -> tuple[int, ...] | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 from viewsphere.model.camera import Intrinsics
@@ -32,9 +32,17 @@ class PoseFile:
     """All of a file's poses in its order, all orbits or all motions.
 
     `up` is the axis of the world that points up, as the format (or its usual writers) have it; `intrinsics` is the lens
-    that all frames share, None if the file names none.
+    that all frames share, None if the file names none, or several: then `lenses` has one for each. `times` are the seconds of
+    each pose, as the file counts them, None if it does not.
     """
 
     entries: tuple[Orbit, ...] | tuple[Extrinsics, ...]
     up: Axis = "+z"
     intrinsics: Intrinsics | None = None
+    times: tuple[float, ...] | None = field(default=None, repr=False)
+    lenses: tuple[Intrinsics, ...] = field(default=(), repr=False)
+
+    def thinned(self, every: int) -> PoseFile:
+        """Every so many-th pose."""
+        times = self.times and self.times[::every]
+        return replace(self, entries=self.entries[::every], times=times, lenses=self.lenses[::every])

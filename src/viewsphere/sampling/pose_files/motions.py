@@ -29,7 +29,7 @@ def from_quaternion(wxyz: Sequence[float], where: str) -> Float:
 
 def motion(world_from_camera: Float, center: Float, where: str) -> Extrinsics:
     """A camera by its rotation to the world (3, 3), OpenCV axes, and its centre; RecipeError if that is no rotation."""
-    rotation = _nearest_rotation(world_from_camera)
+    rotation = nearest_rotation(world_from_camera)
     if rotation is None or np.abs(rotation - world_from_camera).max() > RIGHT_ANGLES:
         raise RecipeError(f"{where}: expected a rotation; found a matrix that is none")
     return Extrinsics(_rows(rotation.T), _row(center))
@@ -41,7 +41,7 @@ def from_matrix(values: Sequence[float], where: str) -> Extrinsics:
     return motion(matrix[:, :3], matrix[:, 3], where)
 
 
-def _nearest_rotation(matrix: Float) -> Float | None:
+def nearest_rotation(matrix: Float) -> Float | None:
     """The rotation nearest to a matrix that nearly is one; None for a mirror image and for anything flat.
 
     Newton's iteration for the polar factor (Higham 1986), written out, because LAPACK rounds differently from processor to

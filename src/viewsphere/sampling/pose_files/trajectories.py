@@ -13,12 +13,13 @@ from viewsphere.sampling.pose_files.motions import from_matrix, from_quaternion,
 
 def read_tum(path: Path) -> PoseFile:
     """Lines of time, x, y, z, qx, qy, qz, qw: camera to world (https://cvg.cit.tum.de/data/datasets/rgbd-dataset/file_formats)."""
-    entries: list[Extrinsics] = []
+    entries, times = list[Extrinsics](), list[float]()
     for line, words in read_lines(path):
         where = f"{path}:{line}"
-        _, x, y, z, qx, qy, qz, qw = counted(words, 8, where)
+        seconds, x, y, z, qx, qy, qz, qw = counted(words, 8, where)
         entries.append(motion(from_quaternion((qw, qx, qy, qz), where), np.array([x, y, z]), where))
-    return PoseFile(tuple(entries))
+        times.append(seconds)
+    return PoseFile(tuple(entries), times=tuple(times))
 
 
 def read_kitti(path: Path) -> PoseFile:

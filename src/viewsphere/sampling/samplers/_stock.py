@@ -44,16 +44,17 @@ class Stock(Sendable):
     composition: Composition | None = None  # of place, company and planes
     timings: tuple[Timing | None, ...] = ()  # of each model; none at all where nothing moves
     kept_splits: Mapping[str, str] = field(default_factory=dict[str, str])  # of models and scenes that a data set has already
-
-    @cached_property
-    def intrinsics(self) -> Intrinsics:
-        """The lens of all frames."""
-        return lens(self.recipe, self.pose_list)
+    own_rig: Rig | None = None  # the recipe's; None: one camera
 
     @cached_property
     def rig(self) -> Rig:
-        """The rig of all shots."""
-        return Rig.of(self.intrinsics)
+        """The sensors of all shots."""
+        return self.own_rig or Rig.of(lens(self.recipe, self.pose_list))
+
+    @property
+    def intrinsics(self) -> Intrinsics:
+        """The lens of the rig's first sensor."""
+        return self.rig.sensors[0].intrinsics
 
     @cached_property
     def scenes(self) -> Scenes:

@@ -96,7 +96,9 @@ def shot(stock: Stock, subject: str, poses: Sequence[int], box_of: BoxOf, key: s
     target, placed = _target(stock, things[0], run, target, box_of), _at(stock, things, run)
     focus = target or center(placed[0], box_of)
     scene = _scene(stock, subject, stock.pose_list.name(poses[0]), run).model_copy(update=_floor(stock, spec, things, box_of))
-    views = ((i, stock.pose_list[pose], split(stock, subject, pose)) for i, pose in enumerate(poses, first))
+    views = (
+        (i, stock.pose_list[pose], split(stock, subject, pose)) for i, pose in enumerate(poses, first // len(stock.rig.sensors))
+    )
     instants = [stock.instant(subject, view, target, focus, part, i) for i, view, part in views]
     return stock.finished(key, first, placed, scene, instants)
 

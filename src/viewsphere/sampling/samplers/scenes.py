@@ -93,7 +93,7 @@ def shot(stock: Stock, subject: str, poses: Sequence[int], box_of: BoxOf, key: s
     views = stock.pose_list.drawn_for(subject)
     instants = [
         stock.instant(subject, views[pose], middle, middle, split(stock, subject, pose), i)
-        for i, pose in enumerate(poses, first)
+        for i, pose in enumerate(poses, first // len(stock.rig.sensors))
     ]
     scene = stock.scene(subject, stock.pose_list.name(poses[0]))
     return stock.finished(key, first, stock.repainted(things, subject, poses[0]), scene, instants)

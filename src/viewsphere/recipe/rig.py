@@ -1,0 +1,179 @@
+"""The rig of a recipe: sensors that are mounted to one another, listed, made by a rule, or read from calibrations."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Any, Literal, cast
+
+from pydantic import BeforeValidator, Discriminator, Field, Tag, field_validator, model_validator
+
+from viewsphere.model.camera import Distortion
+from viewsphere.model.frozen import Frozen
+from viewsphere.model.mistakes import shown
+from viewsphere.model.numbers import Count, Length, Metres, Number, Positive
+from viewsphere.recipe.scene import CameraEntry, Pixels, Row
+from viewsphere.recipe.values import OrShort, pair
+
+MOST_SENSORS = 64
+AXES = "OpenCV axes of the first sensor: x right, y down, z forward"
+OWN_LENSES = ("fov_deg", "focal_px", "K")
+LENS_FIELDS = ("size", "fov_deg", "fov_axis", "focal_px", "focal_mm", "sensor_mm", "K", "distortion")
+
+SensorName = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$", max_length=64)]
+Place = tuple[Metres, Metres, Metres]
+
+
+Rotation = Annotated[
+    Annotated[tuple[Number, Number, Number], Tag("angles")] | Annotated[tuple[Row, Row, Row], Tag("matrix")],
+    Discriminator(lambda value: "matrix" if _is_of_lists(value) else "angles"),
+]
+
+
+def _is_of_lists(value: object) -> bool:
+    return isinstance(value, (list, tuple)) and any(isinstance(row, (list, tuple)) for row in cast("Sequence[object]", value))
+
+
+class SensorEntry(Frozen):
+    """Where a sensor is mounted, and what of its lens and channels is not the recipe's."""
+
+    position: Place = Field(default=(0.0, 0.0, 0.0), description=f"[x, y, z] in metres; {AXES}")
+    rotation: Rotation | None = Field(
+        default=None,
+        description="[x, y, z] in degrees: y turns it to the right, then x up, then z clockwise seen from behind; or the 3x3 "
+        "matrix that turns the sensor's axes to the rig's",
+    )
+    look: Place | None = Field(
+        default=None, description=f"instead of rotation: the point [x, y, z] that it looks at, metres, {AXES}"
+    )
+    size: tuple[Pixels, Pixels] | None = Field(default=None, description="[width, height] in pixels; default: the camera's")
+    fov_deg: Annotated[Number, Field(gt=0, lt=180)] | None = Field(default=None, description="as in camera")
+    fov_axis: Literal["horizontal", "vertical"] | None = Field(default=None, description="as in camera")
+    focal_px: Annotated[tuple[Positive, Positive], BeforeValidator(pair), OrShort({"type": "number"})] | None = Field(
+        default=None, description="as in camera"
+    )
+    K: tuple[Row, Row, Row] | None = Field(default=None, description="as in camera")
+    distortion: Distortion | None = Field(
+        default=None, description="as in camera, whose own is left out where a sensor has a lens of its own"
+    )
+    channels: Annotated[tuple[str, ...], Field(min_length=1)] | None = Field(
+        default=None, description="those of the recipe's channels that this sensor keeps; default: all"
+    )
+
+    @model_validator(mode="after")
+    def _one_turn(self) -> SensorEntry:
+        if self.rotation is not None and self.look is not None:
+            raise ValueError("expected rotation or look; found both")
+        if self.look is not None and self.look == self.position:
+            raise ValueError(f"expected look away from position; found both at {shown(self.look)}")
+        return self
+
+    @model_validator(mode="after")
+    def _one_lens(self) -> SensorEntry:
+        given = [name for name in OWN_LENSES if getattr(self, name) is not None]
+        if len(given) > 1:
+            raise ValueError(f"expected one of {', '.join(OWN_LENSES)}; found {' and '.join(given)}")
+        if self.fov_axis and not self.fov_deg:
+            raise ValueError("expected fov_axis beside fov_deg; found it alone")
+        return self
+
+    @property
+    def has_lens(self) -> bool:
+        """Whether it says anything of its lens or its size."""
+        return any(getattr(self, name, None) is not None for name in LENS_FIELDS)
+
+    def lens(self, camera: CameraEntry) -> CameraEntry:
+        """Size and lens, the recipe's camera's as far as the sensor says nothing. Raises ValueError for a size beside a camera
+        whose lens is in pixels.
+        """
+        mine = {name: value for name in LENS_FIELDS if (value := getattr(self, name, None)) is not None}
+        states = any(name in mine for name in OWN_LENSES)
+        if not states and "size" in mine and (camera.focal_px or camera.K or camera.of_viewpoints):
+            raise ValueError(
+                "expected fov_deg, focal_px or K beside size, as the camera's lens is in its own pixels; found none"
+            )
+        if not states and camera.of_viewpoints:
+            raise ValueError(
+                "expected fov_deg, focal_px or K beside distortion, as the camera's lens is its file's; found none"
+            )
+        theirs = {n: v for n in LENS_FIELDS if (v := getattr(camera, n)) is not None and (n == "size" or not states)}
+        return CameraEntry.model_validate(theirs | mine)
+
+
+class SensorList(Frozen):
+    """Sensors by name. The first is the rig's origin: where it stands elsewhere, all are moved and turned with it there."""
+
+    kind: Literal["sensors"] = Field(default="sensors", description="listed by name")
+    sensors: Annotated[dict[SensorName, SensorEntry], Field(min_length=1, max_length=MOST_SENSORS)] = Field(
+        description="each sensor by its name; the viewpoint is the first one's"
+    )
+
+    @field_validator("sensors")
+    @classmethod
+    def _told_apart(cls, value: dict[str, SensorEntry]) -> dict[str, SensorEntry]:
+        seen: dict[str, str] = {}
+        for name in value:
+            if (other := seen.setdefault(name.casefold(), name)) != name:
+                raise ValueError(f"expected names that differ in more than capitals; found {name!r} beside {other!r}")
+        return value
+
+
+class StereoRig(Frozen):
+    """Two equal cameras side by side, rectified: `left`, whose the viewpoint is, and `right`."""
+
+    kind: Literal["stereo"] = Field(description="two equal cameras, left and right, side by side")
+    baseline: Length = Field(description="metres from the left camera to the right one")
+
+
+class SurroundRig(Frozen):
+    """Equal cameras that look all around: `camera0` ahead, each next one turned on to the right."""
+
+    kind: Literal["surround"] = Field(description="equal cameras all around: camera0 ahead, camera1 turned to the right, ...")
+    count: Annotated[Count, Field(ge=2, le=MOST_SENSORS)] = Field(description="how many cameras")
+    radius: Annotated[Metres, Field(ge=0)] = Field(default=0.0, description="metres from the rig's middle to each camera")
+
+
+class RigFile(Frozen):
+    """Sensors of calibration files. What the calibrations do not say, as sizes may be, is the recipe's camera's."""
+
+    kind: Literal["file"] = Field(default="file", description="from calibrations")
+    path: Annotated[tuple[Annotated[str, Field(min_length=1)], ...], Field(min_length=1)] = Field(
+        description="the file, or files: camera_info has one for each camera, OpenCV may have one for lenses and one for R, T"
+    )
+    format: Literal["auto", "opencv", "kalibr", "camera_info"] = Field(
+        default="auto", description="auto: by what the file holds"
+    )
+    rectified: bool = Field(
+        default=False, strict=True, description="the rectified pictures instead of the raw ones: pinholes, as P says"
+    )
+
+    @field_validator("path", mode="before")
+    @classmethod
+    def _listed(cls, value: Any) -> Any:
+        return (value,) if isinstance(value, str) else value
+
+
+AnyRig = SensorList | StereoRig | SurroundRig | RigFile
+
+
+def _as_written(value: Any) -> Any:
+    """`{file: PATH}` as `{kind: file, path: PATH}`; anything else unchanged."""
+    if isinstance(value, Mapping) and "file" in value and not {"kind", "path"} & value.keys():
+        entry = dict(cast("Mapping[str, Any]", value))
+        return {"kind": "file", "path": entry.pop("file"), **entry}
+    return value
+
+
+def _kind(value: Any) -> Any:
+    return value.get("kind", "sensors") if isinstance(value, dict) else getattr(value, "kind", None)
+
+
+RigField = Annotated[
+    Annotated[
+        Annotated[SensorList, Tag("sensors")]
+        | Annotated[StereoRig, Tag("stereo")]
+        | Annotated[SurroundRig, Tag("surround")]
+        | Annotated[RigFile, Tag("file")],
+        Discriminator(_kind),
+    ],
+    BeforeValidator(_as_written),
+]

@@ -1,0 +1,233 @@
+"""Kinds of viewpoints that are motions of the camera over time; without `time` in the recipe they are refused.
+
+World axes: metres, z up. Headings are counter-clockwise from above: at 0 the camera looks along +Y, as at azimuth 0.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Annotated, ClassVar, Literal
+
+from pydantic import Discriminator, Field, Tag, field_validator, model_validator
+
+from viewsphere.model.frozen import Frozen
+from viewsphere.model.mistakes import shown
+from viewsphere.model.numbers import Count, Length, Metres, Number, Positive
+from viewsphere.recipe.aim import AZIMUTH, DISTANCE, ELEVATION, SHAKE, TILT, Bins, Shake, in_elevation, in_reach
+from viewsphere.recipe.values import shape_of
+
+MOST_POINTS = 10_000
+MOST_TURNS = 1_000
+
+Place = tuple[Metres, Metres, Metres]
+Spot = tuple[Metres, Metres]
+
+
+Look = Annotated[
+    Annotated[Count, Tag("number")] | Annotated[str, Field(min_length=1), Tag("text")] | Annotated[Place, Tag("list")],
+    Discriminator(
+        shape_of,
+        custom_error_type="look",
+        custom_error_message="expected a thing's number or key, [x, y, z], ahead or center",
+    ),
+]
+LOOK = "a thing's number or key, a point [x, y, z] in metres, ahead, or center: the middle of the models at first"
+
+Drift = Annotated[
+    Annotated[Number, Tag("number")] | Annotated[tuple[Number, Number], Tag("list")],
+    Discriminator(
+        shape_of,
+        custom_error_type="drift",
+        custom_error_message="expected a number or [from, to]",
+    ),
+]
+"""A number that stays, or the numbers at the sequence's first and last instant; even in between."""
+
+
+def ends(drift: float | tuple[float, float]) -> tuple[float, float]:
+    """The numbers at the first and at the last instant."""
+    return drift if isinstance(drift, tuple) else (drift, drift)
+
+
+class Moving(Frozen):
+    """What all motions of the camera have."""
+
+    target: ClassVar[Literal["center"]] = "center"
+    """What still kinds of viewpoints look at; `look` stands in its place here."""
+
+    bins: Bins = 45.0
+    shake: Shake | None = Field(default=None, description=SHAKE)
+    follow: bool = Field(
+        default=True, strict=True, description="whether it goes on looking at a thing that moves, or at where it was at first"
+    )
+
+
+class OrbitPath(Moving):
+    """A circle, or a part of one, around what the camera looks at."""
+
+    kind: Literal["orbit"] = Field(description="a circle around what it looks at")
+    look: Look = Field(default="center", description=f"what it goes around: {LOOK}; not ahead")
+    azimuth: Drift = Field(default=0.0, description=f"degrees, a number or [from, to]; {AZIMUTH}")
+    elevation: Drift = Field(default=20.0, description=f"degrees {ELEVATION}; a number or [from, to]")
+    distance: Drift = Field(description=f"{DISTANCE}; a number or [from, to]")
+    tilt: Drift = Field(default=0.0, description=f"degrees, a number or [from, to]; {TILT}")
+    turns: Number | None = Field(
+        default=None,
+        description="whole turns over the sequence, counter-clockwise from above: the instant after the last would be the "
+        "first again; 1 by default where azimuth is a number",
+    )
+    speed_deg: Number | None = Field(default=None, description="instead of turns: degrees a second")
+
+    @field_validator("look")
+    @classmethod
+    def _around(cls, value: int | str | Place) -> int | str | Place:
+        if value == "ahead":
+            raise ValueError("expected what to go around; found ahead")
+        return value
+
+    @field_validator("elevation")
+    @classmethod
+    def _elevation(cls, value: float | tuple[float, float]) -> float | tuple[float, float]:
+        in_elevation(min(ends(value)), max(ends(value)))
+        return value
+
+    @field_validator("distance")
+    @classmethod
+    def _distance(cls, value: float | tuple[float, float]) -> float | tuple[float, float]:
+        in_reach(min(ends(value)), max(ends(value)))
+        return value
+
+    @model_validator(mode="after")
+    def _one_pace(self) -> OrbitPath:
+        given = [n for n in ("turns", "speed_deg") if getattr(self, n) is not None]
+        given += ["azimuth: [from, to]"] if isinstance(self.azimuth, tuple) else []
+        if len(given) > 1:
+            raise ValueError(f"expected one of azimuth: [from, to], turns and speed_deg; found {' and '.join(given)}")
+        return self
+
+
+class SplinePath(Moving):
+    """A smooth path through points."""
+
+    kind: Literal["spline"] = Field(description="a smooth path through points")
+    points: Annotated[tuple[Place, ...], Field(min_length=2, max_length=MOST_POINTS)] = Field(
+        description="[x, y, z] in metres, two or more: the camera passes through all of them"
+    )
+    closed: bool = Field(default=False, strict=True, description="whether the last point is followed by the first")
+    speed: Positive | None = Field(
+        default=None, description="metres a second; it stops at the end. Default: the whole path over the sequence"
+    )
+    times: Annotated[tuple[Number, ...], Field(min_length=2)] | None = Field(
+        default=None, description="instead of speed: seconds at which it passes each point, ascending"
+    )
+    look: Look = Field(default="ahead", description=LOOK)
+
+    @model_validator(mode="after")
+    def _apart(self) -> SplinePath:
+        around = (*self.points, self.points[0]) if self.closed else self.points
+        for i, (a, b) in enumerate(pairwise(around)):
+            if a == b:
+                raise ValueError(
+                    f"expected points that differ from the one before; found points[{i}] and the next at {shown(a)}"
+                )
+        if self.closed and len(self.points) < 3:
+            raise ValueError(f"expected three points or more of a closed path; found {len(self.points)}")
+        return self
+
+    @model_validator(mode="after")
+    def _in_time(self) -> SplinePath:
+        if self.times is None:
+            return self
+        if self.speed is not None:
+            raise ValueError("expected speed or times; found both")
+        wanted = len(self.points) + self.closed
+        if len(self.times) != wanted:
+            more = ", and one for the first point again" if self.closed else ""
+            raise ValueError(f"expected a time for each of {len(self.points)} points{more}; found {len(self.times)}")
+        for a, b in pairwise(self.times):
+            if b <= a:
+                raise ValueError(f"expected times that ascend; found {b:g} after {a:g}")
+        return self
+
+
+class DrivePath(Moving):
+    """Along a lane of the place, as a camera on a car."""
+
+    kind: Literal["drive"] = Field(description="along a lane of the place")
+    lane: Annotated[str, Field(min_length=1)] | None = Field(default=None, description="its name; default: the place's first")
+    speed: Positive = Field(default=10.0, description="metres a second; it stops at the lane's end, and goes on around a ring")
+    height: Length = Field(default=1.5, description="metres above the lane")
+    start: Annotated[Metres, Field(ge=0)] = Field(default=0.0, description="metres along the lane at the first instant")
+    offset: Metres = Field(default=0.0, description="metres to the right of the lane's middle")
+    look: Look = Field(default="ahead", description=LOOK)
+
+
+class Turn(Frozen):
+    """A turn of a walk."""
+
+    at: Annotated[Number, Field(ge=0)] = Field(description="seconds from the sequence's first instant at which it begins")
+    degrees: Number = Field(description="to the left; negative: to the right")
+
+
+class WalkPath(Moving):
+    """At eye height over the floor, straight on with turns, or through points, with a gentle bob."""
+
+    kind: Literal["walk"] = Field(description="at eye height over the floor")
+    start: Spot | None = Field(default=None, description="[x, y] in metres where it begins")
+    heading: Number = Field(default=0.0, description="degrees at first: 0 walks along +Y, 90 along -X")
+    turns: Annotated[tuple[Turn, ...], Field(max_length=MOST_TURNS)] = Field(
+        default=(), description="when it turns by how much: a list of {at, degrees}"
+    )
+    turn_rate: Positive = Field(default=45.0, description="degrees a second while it turns")
+    points: Annotated[tuple[Spot, ...], Field(min_length=2, max_length=MOST_POINTS)] | None = Field(
+        default=None, description="instead of start: [x, y] in metres, two or more, that it walks through"
+    )
+    speed: Positive = Field(default=1.4, description="metres a second; through points it stops at the last")
+    eye_height: Length = Field(default=1.6, description="metres above the floor, z = 0")
+    bob: Annotated[Metres, Field(ge=0, le=1)] = Field(
+        default=0.02, description="metres up and down from the middle, two a stride"
+    )
+    stride: Length = Field(default=1.5, description="metres of two steps")
+    look: Look = Field(default="ahead", description=LOOK)
+
+    @model_validator(mode="after")
+    def _one_way(self) -> WalkPath:
+        if (self.start is None) == (self.points is None):
+            raise ValueError(f"expected start or points; found {'neither' if self.start is None else 'both'}")
+        if self.points is not None and self.turns:
+            raise ValueError("expected turns beside start; found them beside points")
+        for i, (a, b) in enumerate(pairwise(self.points or ())):
+            if a == b:
+                raise ValueError(
+                    f"expected points that differ from the one before; found points[{i}] and the next at {shown(a)}"
+                )
+        for a, b in pairwise(self.turns):
+            end = a.at + abs(a.degrees) / self.turn_rate
+            if b.at < end:
+                raise ValueError(f"expected turns one after another, this after {end:g} s; found it at {b.at:g} s")
+        return self
+
+
+class MastPost(Moving):
+    """A camera on a mast, or straight overhead: it stays, and may turn or go with a thing."""
+
+    kind: Literal["mast"] = Field(description="a fixed place, or straight overhead")
+    position: Place | None = Field(default=None, description="[x, y, z] in metres")
+    overhead: Length | None = Field(
+        default=None, description="instead of position: metres straight above what it looks at; it goes with a thing that moves"
+    )
+    heading: Number = Field(default=0.0, description="straight down: degrees; what points up in the picture: 0 is +Y, 90 is -X")
+    look: Look = Field(default="center", description=f"{LOOK}; not ahead")
+
+    @model_validator(mode="after")
+    def _one_place(self) -> MastPost:
+        if (self.position is None) == (self.overhead is None):
+            raise ValueError(f"expected position or overhead; found {'neither' if self.position is None else 'both'}")
+        if self.look == "ahead":
+            raise ValueError("expected what to look at; found look: ahead")
+        if self.position is not None and self.look == self.position:
+            raise ValueError(f"expected look away from position; found both at {shown(self.look)}")
+        return self
+
+
+AnyTrajectory = OrbitPath | SplinePath | DrivePath | WalkPath | MastPost

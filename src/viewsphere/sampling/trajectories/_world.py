@@ -1,0 +1,63 @@
+"""What a trajectory is asked with, and what it answers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.model.camera import Intrinsics
+from viewsphere.model.scene import Vector
+
+Float = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class RigPose:
+    """Where the rig is at an instant: `world_from_rig` (4, 4), OpenCV axes of its first sensor, metres; what it looks at,
+    world metres; and its lens, where it zooms.
+    """
+
+    world_from_rig: Float
+    focus: Vector
+    intrinsics: Intrinsics | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class World:
+    """What is known of a sequence when its cameras are placed.
+
+    `center` gives the middle (3,) of a thing, by its number or its model's key, at an instant, counted from 0; it raises
+    RecipeError for one that is not there. `target` is what cameras look at that are told nothing else. `lanes`: the middles
+    (N, 3) of the place's lanes by their names, in order; of a ring the last point is the first again. `rng` gives the
+    generator of a purpose, seeded by the sequence's names.
+    """
+
+    fps: float
+    target: Vector
+    center: Callable[[int | str, int], Float]
+    rng: Callable[[str], np.random.Generator]
+    lanes: Mapping[str, Float] = field(default_factory=dict[str, Float])
+
+
+class Trajectory(Protocol):
+    """A motion of the rig. Equal times and worlds give equal poses, to the last bit."""
+
+    def poses(self, times: Float, world: World) -> tuple[RigPose, ...]:
+        """The rig at all instants of a sequence, whose times (T,) in seconds ascend from 0. Raises RecipeError where the world
+        lacks what the trajectory needs, or the rig would look at its own place.
+        """
+        ...
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 of what the recipe does not say, as it stands in a file; empty if there is no such thing."""
+        ...
+
+    @property
+    def intrinsics(self) -> Intrinsics | None:
+        """The lens at first, where a file names one."""
+        ...

@@ -1,0 +1,59 @@
+"""Along a lane of the place, as a camera on a car."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.errors import RecipeError
+from viewsphere.geometry.curve import Curve, spline
+from viewsphere.model.camera import Intrinsics
+from viewsphere.model.mistakes import one_of
+from viewsphere.recipe.trajectories import DrivePath
+from viewsphere.sampling.trajectories._aim import aimed, focuses
+from viewsphere.sampling.trajectories._along import level
+from viewsphere.sampling.trajectories._world import RigPose, World
+
+Float = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Drive:
+    """At an even speed, above the lane's middle or beside it."""
+
+    entry: DrivePath
+    digest: str = ""
+    intrinsics: Intrinsics | None = None
+
+    def poses(self, times: Float, world: World) -> tuple[RigPose, ...]:
+        """As `Trajectory.poses`; RecipeError for a place without lanes, or without this one, and a start beyond its end."""
+        entry, curve = self.entry, self._lane(world)
+        if entry.start >= curve.length:
+            raise RecipeError(
+                f"viewpoints.start: expected less than {curve.length:.4g} m, the lane's length; found {entry.start:g}"
+            )
+        lengths = entry.start + entry.speed * times
+        ahead = level(curve, lengths)
+        right = np.stack([ahead[:, 1], -ahead[:, 0], np.zeros(len(ahead))], axis=1)
+        centers = curve.at(lengths) + entry.offset * right + np.array([0.0, 0.0, entry.height])
+        return aimed(centers, ahead, focuses(entry, entry.look, times, world), world)
+
+    def _lane(self, world: World) -> Curve:
+        if not world.lanes:
+            raise RecipeError(
+                "viewpoints.kind: expected a place with lanes for drive; found none: set scene.place, or take spline"
+            )
+        name = self.entry.lane or next(iter(world.lanes))
+        if name not in world.lanes:
+            raise RecipeError(f"viewpoints.lane: {one_of(name, tuple(world.lanes))}")
+        points = world.lanes[name]
+        closed = len(points) > 3 and bool((points[0] == points[-1]).all())
+        return spline(points[:-1] if closed else points, closed)
+
+
+def trajectory(entry: DrivePath, folder: Path) -> Drive:
+    """The motion that an entry of a recipe means."""
+    return Drive(entry)
