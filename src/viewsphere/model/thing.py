@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from pydantic import Field
+from typing import Any
+
+from pydantic import Field, SerializerFunctionWrapHandler, model_serializer
 
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.model_spec import ModelSpec
@@ -33,16 +35,25 @@ class TimeStep(Frozen):
 class Motion(Frozen):
     """Where a thing is, and which time step of its file it shows: one rigid pose (world from object) for all instants of a
     shot, or one an instant, None where the thing is not there; and one time step for all instants, or one an instant, None for
-    a model as it rests.
+    a model as it rests. What `moves` in a sequence is not still where it rests during a shot.
     """
 
     poses: tuple[Matrix4 | None, ...] = Field(default=(IDENTITY,), min_length=1)
     steps: tuple[TimeStep | None, ...] = Field(default=(None,), min_length=1)
+    moves: bool = False
+
+    @model_serializer(mode="wrap")
+    def _as_ever(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Without `moves` where it says nothing, as records always were."""
+        found: dict[str, Any] = handler(self)
+        if not self.moves:
+            found.pop("moves", None)
+        return found
 
     @property
     def is_still(self) -> bool:
         """Whether one pose is for all instants, and no time step is shown."""
-        return len(self.poses) == 1 and self.steps == (None,)
+        return len(self.poses) == 1 and self.steps == (None,) and not self.moves
 
     def at(self, instant: int) -> Matrix4 | None:
         """World from object at an instant, counted from 0 in the shot."""

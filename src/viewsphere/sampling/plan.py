@@ -33,10 +33,9 @@ from viewsphere.sampling.recipe_warnings import hidden_by_exposure, no_light, ou
 from viewsphere.sampling.rigs import rig_of
 from viewsphere.sampling.samplers import Sampler, Stock, lens
 from viewsphere.sampling.scenes import is_night
-from viewsphere.sampling.sequence_poses import SequencePoses
+from viewsphere.sampling.sequence_poses import poses_of
 from viewsphere.sampling.splits import expected
 from viewsphere.sampling.time_steps import check_keys, timed
-from viewsphere.sampling.viewpoints import poses
 from viewsphere.store import Block, Category, Row
 from viewsphere.store.index import Index, numbers
 
@@ -224,11 +223,11 @@ def plan(recipe: Recipe, shot_frames: int | None = None) -> Plan:
         check_blend(recipe)
         check_catcher(recipe)
         check_splits(recipe)
-        views = poses(recipe.viewpoints, recipe.seed, recipe.folder)
-        views = views if recipe.time is None else SequencePoses.of(views, recipe.time)
+        views = poses_of(recipe.viewpoints, recipe.time, recipe.seed, recipe.folder)
         rig = rig_of(recipe, lens(recipe, views))
         check_frames(recipe, views)
-        specs, timings, views = timed(recipe, numbered_specs(recipe), views)
+        numbered = numbered_specs(recipe)
+        specs, timings, views = timed(recipe, numbered, views)
         check_listed(recipe, specs)
         check_materials(recipe, specs)
         most = recipe.shot_frames or shot_frames or SHOT_FRAMES
@@ -245,6 +244,7 @@ def plan(recipe: Recipe, shot_frames: int | None = None) -> Plan:
             categories=categories(recipe),
             shot_frames=frames,
             own_rig=rig,
+            entries=tuple(number for _, number in numbered),
         )
         check_all_frames(recipe, planned.frames, planned.factors)
         if timings:

@@ -17,9 +17,9 @@ from pydantic import TypeAdapter
 
 from viewsphere.recipe.sequence import TimeEntry
 from viewsphere.recipe.viewpoints import Viewpoints
-from viewsphere.sampling.sequence_poses import SequencePoses
+from viewsphere.sampling.sequence_poses import SequencePoses, poses_of
 from viewsphere.sampling.time_steps import TimedPoses
-from viewsphere.sampling.viewpoints import ListedPoses, Poses, poses
+from viewsphere.sampling.viewpoints import ListedPoses, Poses
 from viewsphere.store import Part, PlanRecord
 from viewsphere.store.index import Ranges
 
@@ -41,7 +41,7 @@ def pose_names(views: Poses) -> Names:
 def follows_from_recipe(views: Poses) -> bool:
     """Whether a recipe alone says which poses these are, without any file."""
     plain = views.base if isinstance(views, SequencePoses) else views
-    return not isinstance(plain, ListedPoses | TimedPoses)
+    return not isinstance(plain, ListedPoses | TimedPoses) and not plain.digest
 
 
 def kept(names: Names) -> str:
@@ -103,8 +103,9 @@ def as_ranges(numbers: Indices) -> Ranges:
 def _views(part: Part) -> Poses:
     """The poses of a part's recipe, one from which they follow."""
     recipe: dict[str, Any] = part.recipe
-    views, time = poses(_VIEWPOINTS.validate_python(recipe["viewpoints"]), recipe["seed"]), recipe.get("time")
-    return views if time is None else SequencePoses.of(views, TimeEntry.model_validate(time))
+    time = recipe.get("time")
+    viewpoints = _VIEWPOINTS.validate_python(recipe["viewpoints"])
+    return poses_of(viewpoints, time and TimeEntry.model_validate(time), recipe["seed"])
 
 
 def _unknown(wanted: Names, known: Names) -> Names:

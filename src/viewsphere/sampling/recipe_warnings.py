@@ -65,7 +65,7 @@ def out_of_view(scene: SceneEntry, views: Poses, lens: Intrinsics) -> Iterator[s
 
     How large the models are is not known yet: near ones may still be seen.
     """
-    if lens.distortion is not None:
+    if lens.distortion is not None or not views.are_known:
         return
     widest = math.hypot(max(lens.cx, lens.width - lens.cx) / lens.fx, max(lens.cy, lens.height - lens.cy) / lens.fy)
     chosen = np.unique(np.linspace(0, len(views) - 1, min(len(views), MOST_POSES)).round().astype(int)).tolist()

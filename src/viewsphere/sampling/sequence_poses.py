@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import hashlib
 from dataclasses import dataclass
+from pathlib import Path
 
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.instant import Viewpoint
 from viewsphere.model.scene import Vector
 from viewsphere.recipe.sequence import TimeEntry
-from viewsphere.sampling.viewpoints import Orbit, Poses
+from viewsphere.recipe.viewpoints import Viewpoints
+from viewsphere.sampling.trajectories import Trajectory, is_still, trajectory
+from viewsphere.sampling.viewpoints import Orbit, Poses, poses
 
 
 @dataclass(frozen=True)
@@ -18,11 +21,6 @@ class SequencePoses(Poses):
 
     base: Poses
     instants: int
-
-    @staticmethod
-    def of(base: Poses, time: TimeEntry) -> SequencePoses:
-        """Poses of a recipe with this time."""
-        return SequencePoses(base.viewpoints, base.seed, base, time.count)
 
     @property
     def digest(self) -> str:
@@ -43,6 +41,11 @@ class SequencePoses(Poses):
     def counts(self) -> dict[str, int]:
         """Those of the poses, then the number of instants."""
         return {**self.base.counts, "instants": self.instants}
+
+    @property
+    def are_known(self) -> bool:
+        """Whether the poses are."""
+        return self.base.are_known
 
     def target(self, index: int) -> Vector | None:
         """The pose's."""
@@ -67,3 +70,65 @@ class SequencePoses(Poses):
 
     def _pose(self, index: int) -> Viewpoint:
         return self.base[index // self.instants].model_copy(update={"index": index})
+
+
+@dataclass(frozen=True)
+class TrajectoryPoses(Poses):
+    """One motion of the camera; where that leads is known when its world is."""
+
+    trajectory: Trajectory
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 of what stands in a file of the motion."""
+        return self.trajectory.digest
+
+    @property
+    def intrinsics(self) -> Intrinsics | None:
+        """The lens that a file of the motion names."""
+        return self.trajectory.intrinsics
+
+    @property
+    def lowest_elevation(self) -> float:
+        """Nothing is known of it."""
+        return 90.0
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """One."""
+        return {"trajectories": 1}
+
+    @property
+    def are_known(self) -> bool:
+        """Not before the world is."""
+        return False
+
+    def target(self, index: int) -> Vector | None:
+        """None."""
+        return None
+
+    def name(self, index: int) -> str:
+        """What it is."""
+        return "trajectory"
+
+    def view(self, index: int) -> Orbit:
+        """No place: one that stands for all."""
+        return Orbit(0.0, 0.0, 1.0, 0.0)
+
+    def drawn_for(self, name: str) -> TrajectoryPoses:
+        """The same: what is random is drawn for each sequence."""
+        return self
+
+
+def poses_of(viewpoints: Viewpoints, time: TimeEntry | None, seed: int, folder: Path = Path()) -> Poses:
+    """The poses of a recipe's viewpoints; with a time, those of its sequences. `seed` and `folder` are the recipe's.
+
+    Raises RecipeError for files that cannot be read, and for viewpoints that move without a time.
+    """
+    if time is None:
+        return poses(viewpoints, seed, folder)
+    if is_still(viewpoints):
+        base = poses(viewpoints, seed, folder)
+    else:
+        base = TrajectoryPoses(viewpoints, seed, trajectory(viewpoints, folder))
+    return SequencePoses(viewpoints, seed, base, time.count)

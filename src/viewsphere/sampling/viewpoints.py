@@ -37,7 +37,7 @@ class Poses(Sequence[Viewpoint]):
     `counts` are the factors of their number, outermost loop first.
     """
 
-    viewpoints: Grid | Sphere | Normal | Jitter | PoseList
+    viewpoints: Viewpoints
     seed: int
 
     @property
@@ -53,11 +53,16 @@ class Poses(Sequence[Viewpoint]):
     @property
     def lowest_elevation(self) -> float:
         """The lowest elevation there can be, degrees; where they are normal around one, that one."""
-        assert not isinstance(self.viewpoints, PoseList)
+        assert isinstance(self.viewpoints, Grid | Sphere | Normal | Jitter)
         elevation = self.viewpoints.elevation
         if isinstance(elevation, Range):
             elevation = elevation.start
         return min(elevation) if isinstance(elevation, tuple) else elevation
+
+    @property
+    def are_known(self) -> bool:
+        """Whether the recipe alone says where cameras stand."""
+        return True
 
     def target(self, index: int) -> Vector | None:
         """What the camera looks at, world metres; None: the centre of the model's box."""

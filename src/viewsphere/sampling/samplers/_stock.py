@@ -12,7 +12,7 @@ from viewsphere.model.camera import Intrinsics
 from viewsphere.model.instant import Instant, Viewpoint
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.rig import Rig
-from viewsphere.model.scene import Scene, Vector
+from viewsphere.model.scene import Finish, Scene, Vector
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing, TimeStep
 from viewsphere.recipe.recipe import Recipe
@@ -45,6 +45,7 @@ class Stock(Sendable):
     timings: tuple[Timing | None, ...] = ()  # of each model; none at all where nothing moves
     kept_splits: Mapping[str, str] = field(default_factory=dict[str, str])  # of models and scenes that a data set has already
     own_rig: Rig | None = None  # the recipe's; None: one camera
+    entries: tuple[int, ...] = ()  # of each model, the number of its entry in the recipe
 
     @cached_property
     def rig(self) -> Rig:
@@ -112,6 +113,11 @@ class Stock(Sendable):
         starts = range(0, len(self.pose_list), self.pose_list.instants)
         return ((self.sequence(subject, start) for start in starts) for subject in self.subjects)
 
+    def views_of(self, subject: str) -> SequencePoses:
+        """The poses of a subject's sequences: random ones are drawn anew for each random scene."""
+        assert isinstance(self.pose_list, SequencePoses)
+        return self.pose_list if self.recipe.scenes is None else self.pose_list.drawn_for(subject)
+
     def sequence(self, subject: str, pose: int) -> str:
         """The name of the sequence that a pose belongs to: the subject's, and where it has several the viewpoint's number."""
         assert isinstance(self.pose_list, SequencePoses)
@@ -170,10 +176,14 @@ class Stock(Sendable):
         """The instant of a subject and a viewpoint; the camera looks at `target` unless the viewpoint has its own, and where
         there is neither at `focus`. `number` is the instant's own.
         """
-        finish = None
-        if self.scenes.has_finish_per_frame:
-            finish = self.scenes.finish(subject, self.pose_list.name(view.index), self.pose_list.place(view.index))
+        finish = self.finish(subject, view.index)
         return looking(self.viewpoint(subject, view, target), focus, index=number, split=split, finish=finish)
+
+    def finish(self, subject: str, pose: int) -> Finish | None:
+        """The finish of a subject's frame, None where all frames of a shot share one."""
+        if not self.scenes.has_finish_per_frame:
+            return None
+        return self.scenes.finish(subject, self.pose_list.name(pose), self.pose_list.place(pose))
 
     def finished(self, key: str, first: int, things: Sequence[Thing], scene: Scene, instants: Sequence[Instant]) -> Shot:
         """A shot with all that the recipe says alike for every shot."""

@@ -13,25 +13,24 @@ from viewsphere.errors import RecipeError
 from viewsphere.labels import channel_labels
 from viewsphere.model.instant import Instant
 from viewsphere.model.model_spec import ModelSpec
-from viewsphere.model.scene import Floor, Vector
+from viewsphere.model.scene import Floor
 from viewsphere.model.shot import Shot
-from viewsphere.model.thing import Thing
 from viewsphere.recipe.recipe import Recipe
-from viewsphere.recipe.sequence import TimeEntry
-from viewsphere.sampling.composition import BoxOf, center, center_of_all, still
-from viewsphere.sampling.placing import standing as upright
+from viewsphere.sampling.composition import BoxOf
 from viewsphere.sampling.samplers import Standing, Stock
+from viewsphere.sampling.samplers._course import Course, course, middle, placed_targets, time_of
 from viewsphere.sampling.samplers._random import (
     check_scene_models,
     scene_cast,
     scene_names,
     scene_split,
-    scene_things,
     scene_views,
     scenes_entry,
 )
 from viewsphere.sampling.sequence_poses import SequencePoses
 from viewsphere.sampling.time_steps import is_animated
+from viewsphere.sampling.trajectories import instant as instant_of
+from viewsphere.sampling.trajectories import is_still
 from viewsphere.store import Block
 
 FLOOR = Floor(height=0.0, is_fixed=True)
@@ -56,16 +55,15 @@ def factors(stock: Stock) -> str:
     """Models or scenes, viewpoints and instants."""
     what = "scenes" if stock.recipe.scenes is not None else "models"
     views = sum(len(names) for names in _taken(stock).values())
-    return f"{len(stock.subjects):,} {what}, {views:,} sequences x {_time(stock).count:,} instants"
+    return f"{len(stock.subjects):,} {what}, {views:,} sequences x {time_of(stock).count:,} instants"
 
 
 def blocks(stock: Stock) -> tuple[Block, ...]:
     """Viewpoint by viewpoint, all subjects that are taken from it, instant by instant."""
     if stock.recipe.scenes is not None:
         check_scene_models(stock)
-    count, each = _time(stock).count, len(stock.rig.sensors)
-    taken = _taken(stock).items()
-    return tuple(Block(tuple(names), ((view * count, (view + 1) * count),), each) for view, names in taken)
+    count = time_of(stock).count
+    return tuple(Block(tuple(names), ((view * count, (view + 1) * count),)) for view, names in _taken(stock).items())
 
 
 def most_objects(recipe: Recipe) -> int:
@@ -97,48 +95,42 @@ def split(stock: Stock, subject: str, pose: int) -> str:
 
 def standing(stock: Stock, subject: str, box_of: BoxOf) -> Iterator[Standing]:
     """The things as they are placed, seen by cameras that stand still; nothing where they are drawn for each sequence."""
-    if not stock.recipe.scene.is_moved_each_frame:
-        things = _targets(stock, subject, None, box_of)
-        count, views = _time(stock).count, stock.pose_list.drawn_for(subject)
+    if not stock.recipe.scene.is_moved_each_frame and is_still(stock.recipe.viewpoints):
+        things = placed_targets(stock, subject, None, box_of)
+        count, views = time_of(stock).count, stock.views_of(subject)
         poses = [view * count for view, names in _taken(stock).items() if subject in names]
-        yield Standing(things, _middle(things, box_of), views, poses)
+        yield Standing(things, middle(things, box_of), views, poses)
 
 
 def shot(stock: Stock, subject: str, poses: Sequence[int], box_of: BoxOf, key: str, first: int) -> Shot:
     """Some instants of a sequence, and those that their labels need."""
-    start = poses[0] - poses[0] % _time(stock).count
+    start = poses[0] - poses[0] % time_of(stock).count
     taken = {pose - start for pose in poses}
-    around = stock.scene_pose(start)
-    things = _targets(stock, subject, around, box_of)
-    focus = _middle(things, box_of)
-    if stock.composition is not None:
-        things = stock.composition.things(subject, things, around, box_of)
-    things = stock.repainted(things, subject, start)
-    scene = stock.scene(subject, stock.scene_name(start)).model_copy(update={"floor": FLOOR})
+    own = course(stock, subject, start, box_of)
     numbers = sorted(taken | _needed(stock, taken))
-    views = stock.pose_list.drawn_for(subject) if stock.recipe.scenes is not None else stock.pose_list
-    instants = [
-        _at(stock.instant(subject, views[start + i], focus, focus, split(stock, subject, start), i), stock, i in taken)
-        for i in numbers
-    ]
-    made = stock.finished(key, first, things, scene, instants)
+    instants = [_instant(stock, own, subject, start + i, box_of).model_copy(update={"recorded": i in taken}) for i in numbers]
+    scene = stock.scene(subject, stock.scene_name(start)).model_copy(update={"floor": FLOOR})
+    made = stock.finished(key, first, own.things_during(numbers), scene, instants)
     return made.model_copy(update={"sequence": stock.sequence(subject, start)})
 
 
-def _at(instant: Instant, stock: Stock, recorded: bool) -> Instant:
-    return instant.model_copy(update={"seconds": _time(stock).at(instant.index), "recorded": recorded})
-
-
-def _time(stock: Stock) -> TimeEntry:
-    assert stock.recipe.time is not None
-    return stock.recipe.time
+def _instant(stock: Stock, own: Course, subject: str, pose: int, box_of: BoxOf) -> Instant:
+    """The instant of a pose."""
+    time, part = time_of(stock), split(stock, subject, pose)
+    i = pose % time.count
+    if own.rig is None:
+        view, at = stock.views_of(subject)[pose], own.focus_at(i, stock.recipe.viewpoints.target == "follow", box_of)
+        return stock.instant(subject, view, at, at, part, i).model_copy(update={"seconds": time.at(i)})
+    finish = stock.finish(subject, pose)
+    return instant_of(own.rig[i], i, time.at(i), pose, stock.recipe.viewpoints.bins, split=part, finish=finish)
 
 
 def _needed(stock: Stock, taken: Set[int]) -> set[int]:
     """The instants that labels of those that are taken need besides."""
     known = channel_labels()
-    offsets = {offset for name in stock.recipe.channels if name in known for offset in known[name].needs.instants}
-    count = _time(stock).count
+    names = {name for sensor in stock.rig.sensors for name in sensor.channels or stock.recipe.channels}
+    offsets = {offset for name in names if name in known for offset in known[name].needs.instants}
+    count = time_of(stock).count
     return {number + offset for number in taken for offset in offsets if 0 <= number + offset < count}
 
 
@@ -153,18 +145,3 @@ def _taken(stock: Stock) -> dict[int, list[str]]:
         for view in scene_views(stock, subject, base):
             found[view].append(subject)
     return dict(sorted(found.items()))
-
-
-def _targets(stock: Stock, subject: str, pose: str | None, box_of: BoxOf) -> tuple[Thing, ...]:
-    """The targets of a sequence where they are placed, on the floor; `pose` names what is drawn for each sequence."""
-    if stock.recipe.scenes is not None:
-        return scene_things(stock, subject, pose, box_of)
-    spec = stock.spec(subject)
-    if stock.composition is not None:
-        return stock.composition.targets(spec, pose, box_of)
-    return still((spec,), (upright(box_of(spec)),))
-
-
-def _middle(things: Sequence[Thing], box_of: BoxOf) -> Vector:
-    """What cameras look at that have no target of their own: where the targets are placed."""
-    return center(things[0], box_of) if len(things) == 1 else center_of_all(things, box_of)

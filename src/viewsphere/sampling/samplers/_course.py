@@ -1,0 +1,147 @@
+"""What a whole sequence does: where its things and its rig are at all of its instants, however shots cut it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache, partial
+
+import numpy as np
+
+from viewsphere.errors import RecipeError
+from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.scene import Vector
+from viewsphere.model.thing import Motion, Thing
+from viewsphere.recipe.motion import Motions
+from viewsphere.recipe.sequence import TimeEntry
+from viewsphere.sampling.composition import BoxOf, center, center_of_all, still
+from viewsphere.sampling.motion import Start, motion_of
+from viewsphere.sampling.placing import standing
+from viewsphere.sampling.samplers._random import scene_things
+from viewsphere.sampling.samplers._stock import Stock
+from viewsphere.sampling.seeds import generator
+from viewsphere.sampling.sequence_poses import TrajectoryPoses
+from viewsphere.sampling.trajectories import RigPose, World, shaken
+from viewsphere.sampling.trajectories import standing as steady
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """One sequence: its things, moving at all instants; what cameras look at that have no target of their own; and where the
+    rig is at all instants, None where it stands still at its viewpoint.
+    """
+
+    things: tuple[Thing, ...]
+    focus: Vector
+    rig: tuple[RigPose, ...] | None
+
+    def things_during(self, instants: Sequence[int]) -> tuple[Thing, ...]:
+        """The things at some instants. What moves in the sequence is not still where it rests for a while."""
+        return tuple(thing.model_copy(update={"motion": _during(thing.motion, instants)}) for thing in self.things)
+
+    def focus_at(self, instant: int, follows: bool, box_of: BoxOf) -> Vector:
+        """What cameras look at that have no target of their own, and may follow the first thing."""
+        return center(self.things[0].at(instant), box_of) if follows else self.focus
+
+
+def time_of(stock: Stock) -> TimeEntry:
+    """The recipe's time."""
+    assert stock.recipe.time is not None
+    return stock.recipe.time
+
+
+@lru_cache(maxsize=2)
+def course(stock: Stock, subject: str, start: int, box_of: BoxOf) -> Course:
+    """The sequence of a subject whose first pose has this number. The last ones are kept: shots of one follow one another.
+
+    Raises RecipeError where there is no room, and for what cannot move as it should.
+    """
+    around = stock.scene_pose(start)
+    targets = placed_targets(stock, subject, around, box_of)
+    focus = middle(targets, box_of)
+    things = targets if stock.composition is None else stock.composition.things(subject, targets, around, box_of)
+    moved = (_moved(stock, thing, i, (subject, stock.pose_list.place(start)), box_of) for i, thing in enumerate(targets))
+    things = stock.repainted((*moved, *things[len(targets) :]), subject, start)
+    return Course(things, focus, _rig(stock, things, focus, subject, start, box_of))
+
+
+def placed_targets(stock: Stock, subject: str, pose: str | None, box_of: BoxOf) -> tuple[Thing, ...]:
+    """The targets of a sequence where they are placed, on the floor; `pose` names what is drawn for each sequence."""
+    if stock.recipe.scenes is not None:
+        return scene_things(stock, subject, pose, box_of)
+    spec = stock.spec(subject)
+    if stock.composition is not None:
+        return stock.composition.targets(spec, pose, box_of)
+    return still((spec,), (standing(box_of(spec)),))
+
+
+def middle(things: Sequence[Thing], box_of: BoxOf) -> Vector:
+    """What cameras look at that have no target of their own: where the targets are placed."""
+    return center(things[0], box_of) if len(things) == 1 else center_of_all(things, box_of)
+
+
+def _moved(stock: Stock, thing: Thing, slot: int, names: tuple[str, str], box_of: BoxOf) -> Thing:
+    """A target with its motion over the whole sequence."""
+    time, company = time_of(stock), stock.recipe.scene.company
+    motions, field = _motions(stock, thing.model)
+    if slot and company is not None:
+        motions, field = company.motion, "scene.company.motion"
+    if motions is None:
+        return thing
+    rng = partial(generator, stock.recipe.seed, "motion", *names, str(slot), thing.model.key)
+    times = [time.at(i) for i in range(time.count)]
+    start = Start(thing.world_from_object, thing.model, box_of(thing.model), times[-1], rng, field=field)
+    return thing.model_copy(update={"motion": motion_of(motions, start, times)})
+
+
+def _motions(stock: Stock, spec: ModelSpec) -> tuple[Motions | None, str]:
+    number = stock.entries[stock.position[spec.key]]
+    return stock.recipe.models[number].motion, f"models[{number}].motion"
+
+
+def _during(motion: Motion, instants: Sequence[int]) -> Motion:
+    if motion.is_still:
+        return motion
+    poses = motion.poses if len(motion.poses) == 1 else tuple(motion.poses[i] for i in instants)
+    steps = motion.steps if len(motion.steps) == 1 else tuple(motion.steps[i] for i in instants)
+    return Motion(poses=poses, steps=steps, moves=True)
+
+
+def _rig(
+    stock: Stock, things: Sequence[Thing], focus: Vector, subject: str, start: int, box_of: BoxOf
+) -> tuple[RigPose, ...] | None:
+    """Where the rig is at all instants, None where it stands still."""
+    time, views = time_of(stock), stock.views_of(subject)
+    times = np.array([time.at(i) for i in range(time.count)])
+    names = (subject, stock.pose_list.place(start))
+    world = World(
+        time.fps,
+        focus,
+        lambda thing, instant: np.array(_center(things, thing, instant, box_of)),
+        partial(generator, stock.recipe.seed, "rig", *names),
+    )
+    if isinstance(views.base, TrajectoryPoses):
+        return views.base.trajectory.poses(times, world)
+    shake = stock.recipe.viewpoints.shake
+    if shake is None:
+        return None
+    follows = stock.recipe.viewpoints.target == "follow"
+    held = []
+    for i in range(time.count):
+        at = center(things[0].at(i), box_of) if follows else focus
+        held.append(steady(stock.viewpoint(subject, views[start + i], at), at))
+    return shaken(held, shake, times, world)
+
+
+def _center(things: Sequence[Thing], wanted: int | str, instant: int, box_of: BoxOf) -> Vector:
+    """The middle of a thing, by its id or its model's key, at an instant."""
+    found = next((thing for thing in things if wanted in (thing.id, thing.model.key)), None)
+    if found is None:
+        known = ", ".join(f"{thing.id} ({thing.model.key})" for thing in things if thing.id)
+        raise RecipeError(f"viewpoints.look: expected a thing's number or key: {known}; found {wanted!r}")
+    now = found.at(instant)
+    if not now.is_there:
+        raise RecipeError(
+            f"viewpoints.look: expected a thing that is there all the time; found {wanted!r}, which is not at instant {instant}"
+        )
+    return center(now, box_of)
