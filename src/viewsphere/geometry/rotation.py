@@ -123,6 +123,20 @@ def transform(matrix: ArrayLike, points: ArrayLike) -> Float:
     return np.ascontiguousarray(moved.transpose(*range(1, moved.ndim), 0))
 
 
+def product(a: ArrayLike, b: ArrayLike) -> Float:
+    """The matrix products a b of (..., 3, 3) and (..., 3, n); no BLAS, as in `transform`."""
+    a, b = np.asarray(a, np.float64), np.asarray(b, np.float64)
+    return a[..., :, :1] * b[..., :1, :] + a[..., :, 1:2] * b[..., 1:2, :] + a[..., :, 2:] * b[..., 2:, :]
+
+
+def inverse(matrix: ArrayLike) -> Float:
+    """The inverses of matrices (..., 3, 3) by their cofactors; no LAPACK, which rounds differently by processor as well."""
+    m = np.asarray(matrix, np.float64)
+    cofactors = np.stack([np.cross(m[..., (i + 1) % 3, :], m[..., (i + 2) % 3, :]) for i in range(3)], axis=-1)
+    x, y, z = (m[..., 0, i] * cofactors[..., i, 0] for i in range(3))
+    return cofactors / (x + y + z)[..., None, None]
+
+
 def rigid(rotation: ArrayLike, translation: ArrayLike) -> Float:
     """The (4, 4) matrix of x -> rotation x + translation."""
     matrix = np.zeros((4, 4))

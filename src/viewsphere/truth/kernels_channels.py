@@ -94,7 +94,7 @@ def _edges(q, i0, i1, i2, px, py, pz):
 
 
 @inner
-def _weights(q, i0, i1, i2, px, py, pz):
+def weights_at(q, i0, i1, i2, px, py, pz):
     """Barycentrics of the ray in the triangle."""
     e0, e1, e2 = _edges(q, i0, i1, i2, px, py, pz)
     total = e0 + e1 + e2
@@ -117,7 +117,7 @@ def barycentrics(seen, triangles, q, rays, out):
                 continue
             px, py, pz = (rays[y, x, 0], rays[y, x, 1], rays[y, x, 2]) if table else (x + 0.5, y + 0.5, 1.0)
             i0, i1, i2 = np.uintp(triangles[t, 0]), np.uintp(triangles[t, 1]), np.uintp(triangles[t, 2])
-            out[y, x, 0], out[y, x, 1], out[y, x, 2] = _weights(q, i0, i1, i2, px, py, pz)
+            out[y, x, 0], out[y, x, 1], out[y, x, 2] = weights_at(q, i0, i1, i2, px, py, pz)
 
 
 @njit
@@ -133,7 +133,7 @@ def coordinates(seen, triangles, objects, q, rays, values, out):
                 continue
             px, py, pz = (rays[y, x, 0], rays[y, x, 1], rays[y, x, 2]) if table else (x + 0.5, y + 0.5, 1.0)
             i0, i1, i2 = np.uintp(triangles[t, 0]), np.uintp(triangles[t, 1]), np.uintp(triangles[t, 2])
-            b0, b1, b2 = _weights(q, i0, i1, i2, px, py, pz)
+            b0, b1, b2 = weights_at(q, i0, i1, i2, px, py, pz)
             for k in range(3):
                 out[y, x, k] = b0 * values[i0, k] + b1 * values[i1, k] + b2 * values[i2, k]
 

@@ -1,4 +1,4 @@
-"""Four neighbouring samples of a row at once, in the processor's vectors: the same sums as for single samples, bit for bit."""
+"""Four samples at once, in the processor's vectors: the same sums as for single samples, bit for bit."""
 
 from __future__ import annotations
 
@@ -75,3 +75,41 @@ def draw_four(
         return context.get_dummy_value()
 
     return nb.void(nearest, seen, at, nb.intp, nb.float64, nb.float64, _EDGES, _EDGES, nb.float64, nb.float64), code
+
+
+@intrinsic
+def meet_four(
+    typing: Any, x: Any, y: Any, nearest: Any, met: Any, own: Any, at: Any, t: Any, e0: Any, e1: Any, e2: Any, n: Any
+) -> Any:
+    """Let triangle t be met by those of four points that are inside it, behind it, and not its own; they begin at index `at`.
+
+    A point (x, y) is inside where e . (x, y, 1) is not negative for all three edges; its 1/z there, n . (x, y, 1), must exceed
+    the 1/z met so far times NEARER.
+    """
+
+    def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        x, y, nearest, met, own, at, t, e0, e1, e2, n = arguments
+        kinds = signature.args
+
+        def load(argument: int, array: Any, lanes: Any) -> tuple[Any, Any]:
+            place = _from(context, builder, kinds[argument], array, at, lanes)
+            return place, builder.load(place, align=4 if lanes is _WHOLES else 8)
+
+        (_, u), (_, v), (farther, shown) = load(0, x, _REALS), load(1, y, _REALS), load(2, nearest, _REALS)
+
+        def line(e: Any) -> Any:
+            a, b, c = (_spread(builder, builder.extract_value(e, i)) for i in range(3))
+            return builder.fadd(builder.fmul(a, u), builder.fadd(builder.fmul(b, v), c))
+
+        inverse, number = line(n), _spread(builder, builder.trunc(t, _WHOLE))
+        flags = builder.fcmp_ordered(">", inverse, builder.fmul(shown, ir.Constant(_REALS, [NEARER] * FOUR)))
+        for e in (e0, e1, e2):
+            flags = builder.and_(flags, builder.fcmp_ordered(">=", line(e), ir.Constant(_REALS, [0.0] * FOUR)))
+        flags = builder.and_(flags, builder.icmp_signed("!=", load(4, own, _WHOLES)[1], number))
+        with builder.if_then(builder.icmp_unsigned("!=", builder.bitcast(flags, _FLAGS), _FLAGS(0)), likely=False):
+            place, before = load(3, met, _WHOLES)
+            builder.store(builder.select(flags, inverse, shown), farther, align=8)
+            builder.store(builder.select(flags, number, before), place, align=4)
+        return context.get_dummy_value()
+
+    return nb.void(x, y, nearest, met, own, nb.intp, nb.intp, _EDGES, _EDGES, _EDGES, _EDGES), code

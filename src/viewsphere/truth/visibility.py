@@ -38,6 +38,7 @@ class Visibility:
     triangle: NDArray[np.int32]
     inverse_depth: NDArray[np.float32]
     corners: NDArray[np.float64] | None = None  # `homogeneous` of all vertices, which labels and the raster engine use again
+    exact: NDArray[np.float64] | None = None  # 1/s before it was rounded, of a whole picture of all triangles
     _instances: dict[Geometry, Instances] = field(default_factory=dict[Geometry, Instances], repr=False)
 
     def instances(self, geometry: Geometry) -> Instances:
@@ -77,7 +78,10 @@ def rasterize(
     everything = (0, len(geometry.triangles), 0, len(geometry.vertices))
     part = _range(geometry, object_id) if object_id else everything
     nearest, seen, q = _draw(geometry, camera, subdivision, part, window)
-    return Visibility(seen, nearest.astype(np.float32), q if part == everything else None)
+    if part != everything:
+        return Visibility(seen, nearest.astype(np.float32))
+    is_picture = subdivision == 1 and window is None
+    return Visibility(seen, nearest.astype(np.float32), q, nearest if is_picture else None)
 
 
 def with_ground(geometry: Geometry, camera: Camera, visibility: Visibility) -> Visibility:

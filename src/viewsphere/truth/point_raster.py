@@ -1,0 +1,181 @@
+"""Which triangle of a view each of any points meets first, and so which points are hidden: exact, for any lens.
+
+A distorted lens' points are sorted by pinholes that stand where it stands: one that sees all, or the six sides of a cube.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.geometry.camera import project
+from viewsphere.geometry.rotation import product
+from viewsphere.truth.kernels_row import FOUR, NEARER
+from viewsphere.truth.view import View
+
+Float = NDArray[np.float64]
+Whole = NDArray[np.int32]
+VISIBLE, OCCLUDED, OUTSIDE, BEHIND, INVALID = range(5)
+"""Whether a point is seen in a view, in the order in which this is decided from behind.
+
+INVALID: it is nowhere (its thing is not there or has other triangles, a flat picture). BEHIND: behind the camera, or the lens
+has no pixel for its direction. OUTSIDE: not in [0, W) x [0, H). OCCLUDED: the segment from the camera's centre to the point
+meets surface other than its own triangle, nearer by more than `GAP` of its depth.
+"""
+
+GAP = 1e-6
+FACES = ((0, 1, 2, 1.0), (0, 1, 2, -1.0), (1, 2, 0, 1.0), (1, 2, 0, -1.0), (2, 0, 1, 1.0), (2, 0, 1, -1.0))
+"""Sides of the cube around a fisheye: the axes that are right and down in it, the axis it faces, and which way."""
+
+LARGEST_SIDE = 1024  # pixels of a side of the cube
+
+
+@dataclass(frozen=True, eq=False)
+class Placed:
+    """Points in a view, in arrays of any one shape.
+
+    xy (..., 2) float64 pixels, NaN where the lens has none; near (...) float64: 1/s, s as `truth.visibility.Visibility` has
+    it, 0 of what is infinitely far and of what has no pixel, NaN of what is nowhere. rays (..., 3) in camera axes, so that the
+    point is ray / near: None for a pinhole, which needs none. `own` gives (...) int32: the view's triangle that the point is
+    on, -1 for none; of the ground's always the first.
+    """
+
+    view: View
+    xy: Float
+    near: Float
+    rays: Float | None
+    own: Callable[[], Whole]
+
+
+def placed_at(view: View, points: Float, own: Callable[[], Whole]) -> Placed:
+    """Points (N, 3) in a view's camera axes, none of which is at infinity."""
+    xy, _ = project(view.camera.intrinsics, points)
+    if view.is_fisheye:
+        x, y, z = points.T
+        s = np.sqrt(x * x + y * y + z * z)
+    else:
+        s = points[:, 2]
+    has_pixel = ~np.isnan(xy[:, 0])
+    near = np.divide(1.0, s, out=np.where(np.isnan(s), np.nan, 0.0), where=has_pixel)
+    return Placed(view, xy, near, None if view.is_pinhole else points * near[:, None], own)
+
+
+def states(placed: Sequence[Placed]) -> list[NDArray[np.uint8]]:
+    """The state of each of the points, (...) uint8 each, all of which are in one view, whose triangles are drawn once."""
+    from viewsphere.truth import kernels_points as kernels
+
+    view = placed[0].view
+    if any(points.view is not view for points in placed):
+        raise ValueError("states: expected points of one view, got several views")
+    xy = _joined([points.xy.reshape(-1, 2) for points in placed])
+    near = _joined([points.near.reshape(-1) for points in placed])
+    own = _joined([points.own().reshape(-1) for points in placed])
+    rays = None if view.is_pinhole else _joined([p.rays.reshape(-1, 3) for p in placed if p.rays is not None])
+    state = np.empty(len(near), np.uint8)
+    kernels.classify(xy, near, view.camera.width, view.camera.height, state)
+    inside = state == VISIBLE if rays is not None else None
+    hidden = first_met(view, xy, near, own, rays, inside) >= 0
+    state[hidden] = OCCLUDED
+    stops = np.cumsum([points.near.size for points in placed])[:-1]
+    return [part.reshape(points.near.shape) for part, points in zip(np.split(state, stops), placed, strict=True)]
+
+
+def _joined(arrays: Sequence[NDArray[Any]]) -> NDArray[Any]:
+    return arrays[0] if len(arrays) == 1 else np.concatenate(arrays)
+
+
+def first_met(
+    view: View,
+    xy: Float,
+    near: Float,
+    own: Whole,
+    rays: Float | None = None,
+    chosen: NDArray[np.bool_] | None = None,
+) -> Whole:
+    """The triangle that the ray to each point meets first before the point, (N,) int32, -1 where it meets none.
+
+    Points are as in `Placed`. Of those at `near` 0 whatever is in front counts. The points of a pinhole's view have to lie in
+    the picture, the others meet nothing; of a distorted lens those count that are `chosen`, by default all.
+    """
+    from viewsphere.truth import kernels_points as kernels
+
+    triangle = np.full(len(near), -1, np.int32)
+    if rays is None:
+        _meet(view, view.corners, (view.camera.width, view.camera.height), xy, near, own, triangle)
+        return triangle
+    index = np.flatnonzero(np.ones(len(near), np.bool_) if chosen is None else chosen)
+    for q, size, at, own_xy, own_near in _pinholes(view, rays[index], near[index]):
+        part = np.full(len(at), -1, np.int32)
+        _meet(view, q, size, own_xy, own_near, own[index[at]], part)
+        kernels.mark(part, index[at], triangle)
+    return triangle
+
+
+def _meet(view: View, q: Float, size: tuple[int, int], xy: Float, near: Float, own: Whole, triangle: Whole) -> None:
+    """Write the triangles that points of a pinhole of this size meet first; q: `homogeneous` vertices of that pinhole."""
+    from viewsphere.truth import kernels_points as kernels
+
+    geometry, (width, height) = view.geometry, size
+    start, far = np.empty(width * height + 2, np.int32), np.empty(width * height)
+    order, number = np.empty(len(near), np.int32), np.full(len(near) + FOUR, -1, np.int32)
+    points, nearest = np.zeros((2, len(near) + FOUR)), np.full(len(near) + FOUR, np.inf)
+    least = near * ((1.0 + GAP) / NEARER)
+    inside = kernels.sort(xy, least, own, size, start, order, points, nearest, number, far)
+    if not inside:
+        return
+    box, met = np.empty((len(q), 4), np.int32), np.full(len(near) + FOUR, -1, np.int32)
+    kernels.boxes(q, geometry.vertex_start[-1], width, height, box)
+    cut = (geometry.triangle_cutout, geometry.cutouts.arrays)
+    ground = geometry.triangle_start[-1]
+    kernels.meet(q, box, geometry.triangles, ground, *cut, size, start, points, nearest, met, number, far)
+    kernels.mark(met, order[:inside], triangle)
+
+
+def _pinholes(view: View, rays: Float, near: Float) -> Iterator[tuple[Float, tuple[int, int], NDArray[np.intp], Float, Float]]:
+    """Pinholes that together show all points of a distorted lens: the vertices as each one projects them, its size, the points
+    that it shows, their pixels and their 1/z there.
+    """
+    side = 1.0
+    if view.is_fisheye:
+        axis = np.argmax(np.abs(rays), axis=1)
+        count = min(max(math.ceil(math.sqrt(len(near))), 16), LARGEST_SIDE)
+        for right, down, ahead, sign in FACES:
+            at = np.flatnonzero((axis == ahead) & (rays[:, ahead] * sign > 0.0))
+            if len(at):
+                turned = np.zeros((3, 3))
+                turned[0, right], turned[1, down], turned[2, ahead] = 1.0, sign, sign
+                yield _pinhole(view, turned, rays[at], near[at], at, (count, count), (-side, -side, side, side))
+        return
+    if len(near):
+        low, high = rays[:, :2].min(axis=0), rays[:, :2].max(axis=0)
+        bounds = (float(low[0]), float(low[1]), float(high[0]), float(high[1]))
+        size = (view.camera.width, view.camera.height)
+        yield _pinhole(view, np.eye(3), rays, near, np.arange(len(near)), size, bounds)
+
+
+def _pinhole(
+    view: View,
+    turned: Float,
+    rays: Float,
+    near: Float,
+    at: NDArray[np.intp],
+    size: tuple[int, int],
+    bounds: tuple[float, float, float, float],
+) -> tuple[Float, tuple[int, int], NDArray[np.intp], Float, Float]:
+    """The pinhole of this size whose picture shows x/z and y/z within `bounds`, turned from the view's camera axes."""
+    from viewsphere.truth import kernels_draw
+
+    u0, v0, u1, v1 = bounds
+    du, dv = size[0] / ((u1 - u0) * (1 + 1e-9) or 1.0), size[1] / ((v1 - v0) * (1 + 1e-9) or 1.0)
+    k = np.array([[du, 0.0, -du * u0], [0.0, dv, -dv * v0], [0.0, 0.0, 1.0]])
+    projected = product(k, product(turned, np.column_stack((view.camera.R, view.camera.t))))
+    q = np.empty((len(view.geometry.vertices), 4))
+    kernels_draw.transform(view.geometry.vertices, 0, len(q), projected, q)
+    x, y, z = product(turned, rays.T)
+    xy = np.column_stack((du * (x / z) - du * u0, dv * (y / z) - dv * v0))
+    return q, size, at, np.clip(xy, 0.0, np.nextafter(np.array(size, np.float64), 0.0)), near / z

@@ -1,0 +1,68 @@
+"""Points drawn at random on the surfaces of things."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.truth.cutouts import NEVER
+from viewsphere.truth.points import SurfacePoints
+from viewsphere.truth.view import View
+
+Float = NDArray[np.float64]
+ROUNDS = 100
+"""How often as many points are drawn as are wanted, until enough of them are on surface, not in the gaps of cut-outs."""
+
+
+def points_on(view: View, count: int, rng: np.random.Generator, things: Sequence[int] | None = None) -> SurfacePoints:
+    """Points drawn evenly, by area, on the surfaces of a view's things, by default of all objects that are there.
+
+    Raises ValueError where these have no surface, or next to none.
+    """
+    triangles, total = _surface(view, range(view.geometry.object_count) if things is None else things)
+    if not len(total) or total[-1] <= 0.0:
+        raise ValueError("points_on: expected things that have a surface, found none")
+    picked, weights = np.zeros(0, np.int64), np.zeros((0, 3))
+    for _ in range(ROUNDS):
+        drawn, barycentrics = _drawn(triangles, total, count, rng)
+        is_surface = _is_surface(view, drawn, barycentrics)
+        picked = np.concatenate((picked, drawn[is_surface]))[:count]
+        weights = np.concatenate((weights, barycentrics[is_surface]))[:count]
+        if len(picked) == count:
+            break
+    else:
+        raise ValueError(
+            f"points_on: expected things that have a surface, found {len(picked)} of {count * ROUNDS} points on it"
+        )
+    thing = view.owners[picked]
+    triangle = (picked - np.array(view.geometry.triangle_start)[thing]).astype(np.int32)
+    return SurfacePoints(thing, triangle, weights, np.zeros((count, 3)), view.bodies(thing), view.geometry.ground_z)
+
+
+def _surface(view: View, things: Sequence[int]) -> tuple[NDArray[np.int64], Float]:
+    """Triangles of the things that may be seen, and the sums of their areas so far."""
+    geometry = view.geometry
+    spans = [np.arange(geometry.triangle_start[i], geometry.triangle_start[i + 1]) for i in things]
+    triangles = np.concatenate([np.zeros(0, np.int64), *spans])
+    triangles = triangles[geometry.triangle_cutout[triangles] != NEVER]
+    corners = geometry.vertices[geometry.triangles[triangles]]
+    x, y, z = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]).T
+    return triangles, np.cumsum(np.sqrt(x * x + y * y + z * z))
+
+
+def _drawn(triangles: NDArray[np.int64], total: Float, count: int, rng: np.random.Generator) -> tuple[NDArray[np.int64], Float]:
+    """Triangles (count,) and barycentrics (count, 3), evenly by area (Turk 1990, "Generating random points in triangles")."""
+    at = np.searchsorted(total, rng.random(count) * total[-1], side="right")
+    root, share = np.sqrt(rng.random(count)), rng.random(count)
+    weights = np.column_stack((1.0 - root, root * (1.0 - share), root * share))
+    return triangles[np.minimum(at, len(total) - 1)], weights
+
+
+def _is_surface(view: View, triangles: NDArray[np.int64], weights: Float) -> NDArray[np.bool_]:
+    from viewsphere.truth import kernels_stick as kernels
+
+    out = np.empty(len(triangles), np.bool_)
+    kernels.on_surface(triangles, weights, view.geometry.triangle_cutout, view.geometry.cutouts.arrays, out)
+    return out

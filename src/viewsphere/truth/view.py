@@ -1,0 +1,153 @@
+"""A view: what one camera may see at one instant, and which things of two views are the same."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.geometry.camera import inverse_camera_matrix
+from viewsphere.geometry.rotation import inverse, transform
+from viewsphere.model.camera import Camera
+from viewsphere.model.thing import Thing
+from viewsphere.truth.geometry import Geometry
+from viewsphere.truth.visibility import homogeneous, lens_rays
+
+Float = NDArray[np.float64]
+Change = Literal["moved", "deformed", "gone"]
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """One thing of a view, as far as points depend on it that stick to it: they are on its triangles (n, 3), whose vertices
+    are counted from `base` on.
+    """
+
+    thing: Thing
+    triangles: NDArray[np.int32]
+    base: int
+
+    def has_triangles_of(self, other: Body) -> bool:
+        """Whether both are the same thing, there, and made of the same triangles, wherever its vertices are."""
+        one, two = self.thing, other.thing
+        if one is not two and not (one.is_there and two.is_there and (one.model is two.model or one.model == two.model)):
+            return False
+        return one.step == two.step or (
+            len(self.triangles) == len(other.triangles)
+            and np.array_equal(self.triangles - np.int32(self.base), other.triangles - np.int32(other.base))
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """One camera at one instant. `geometry` has the triangles of `things` as they are then, each standing still: see
+    `Shot.things_at` and `Stage.at`. Use a view as long as its geometry is not written to again: see `truth.moving.Ring`.
+
+    is_sky_endless: whether a pixel without a triangle shows a direction (sky, surrounding), or a flat picture, which is
+    nowhere.
+    """
+
+    things: Sequence[Thing]
+    geometry: Geometry
+    camera: Camera
+    is_sky_endless: bool
+
+    @cached_property
+    def corners(self) -> Float:
+        """All vertices before the perspective division, as `truth.visibility.homogeneous` gives them."""
+        return homogeneous(self.geometry, self.camera)
+
+    @cached_property
+    def rays(self) -> Float:
+        """The ray of each pixel of a distorted lens (H, W, 3), camera axes; (0, 0, 3) for a pinhole, which needs none."""
+        rays = lens_rays(self.camera)
+        if rays is None:
+            rays = np.empty((0, 0, 3))
+            rays.setflags(write=False)
+        return rays
+
+    @cached_property
+    def camera_from_ray(self) -> Float:
+        """Matrix (3, 3) from rays to camera axes: K^-1 for a pinhole, whose rays are pixels (x, y, 1); else the identity."""
+        return inverse_camera_matrix(self.camera.intrinsics) if self.is_pinhole else np.eye(3)
+
+    @cached_property
+    def world_from_camera(self) -> Float:
+        """The inverse of the camera's R, (3, 3): of a rotation that is one to a few digits only, too."""
+        return inverse(self.camera.R)
+
+    @cached_property
+    def center(self) -> Float:
+        """The camera's centre, (3,) world metres."""
+        return -transform(self.world_from_camera, self.camera.t)
+
+    @property
+    def is_pinhole(self) -> bool:
+        """Whether the lens has no distortion."""
+        return self.camera.distortion is None
+
+    @property
+    def is_fisheye(self) -> bool:
+        """Whether s is measured along rays of length 1, see `truth.visibility.Visibility`."""
+        lens = self.camera.distortion
+        return lens is not None and lens.model == "fisheye"
+
+    @property
+    def owners(self) -> NDArray[np.int32]:
+        """The thing of each triangle, by its position in `things`; the ground's is the number of things."""
+        return _owners(self.geometry.triangle_start, len(self.geometry.triangles))
+
+    def body(self, i: int) -> Body:
+        """Thing i."""
+        first, stop = self.geometry.triangle_start[i : i + 2]
+        return Body(self.things[i], self.geometry.triangles[first:stop], self.geometry.vertex_start[i])
+
+    def bodies(self, things: NDArray[np.int32]) -> dict[int, Body]:
+        """Those of the things in a list of their positions, which may hold numbers below 0, too."""
+        return {i: self.body(i) for i in np.unique(things[things >= 0]).tolist()}
+
+    def change(self, i: int, other: View) -> Change:
+        """What thing i of this view did until another: moved (or stood still), deformed, or gone, which it is, too, where it is
+        not there, or is made of other triangles.
+        """
+        if i >= len(other.things):
+            return "gone"
+        if self.things[i] is other.things[i]:
+            return "moved"
+        one, two = self.body(i), other.body(i)
+        if not one.has_triangles_of(two):
+            return "gone"
+        is_rigid = one.thing.step == two.thing.step or np.array_equal(self._own_axes(i), other._own_axes(i))
+        return "moved" if is_rigid else "deformed"
+
+    def _own_axes(self, i: int) -> NDArray[np.float32]:
+        """Vertices of thing i in its own axes."""
+        first, stop = self.geometry.vertex_start[i : i + 2]
+        return self.geometry.coordinates[first:stop]
+
+    def has_camera_of(self, other: View) -> bool:
+        """Whether both cameras are the same, and stand in one place."""
+        return self.turns_like(other) and np.array_equal(self.camera.t, other.camera.t)
+
+    def turns_like(self, other: View) -> bool:
+        """Whether both cameras see all directions in the same pixels."""
+        same_lens = self.camera.intrinsics == other.camera.intrinsics
+        return same_lens and np.array_equal(self.camera.R, other.camera.R)
+
+    def has_ground_of(self, other: View) -> bool:
+        """Whether both views have a ground, and it is one."""
+        return self.geometry.ground_z is not None and self.geometry.ground_z == other.geometry.ground_z
+
+    def has_sky_of(self, other: View) -> bool:
+        """Whether pixels without a triangle show directions in both views."""
+        return self.is_sky_endless and other.is_sky_endless
+
+
+@lru_cache(maxsize=4)
+def _owners(triangle_start: tuple[int, ...], triangles: int) -> NDArray[np.int32]:
+    counts = np.diff([*triangle_start, triangles])
+    return np.repeat(np.arange(len(counts), dtype=np.int32), counts)
