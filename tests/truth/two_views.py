@@ -7,6 +7,7 @@ from truth_scenes import cast, least_weight
 
 from viewsphere.geometry.camera import pixel_rays, project
 from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.scene import Floor
 from viewsphere.model.thing import Motion, Thing, TimeStep
 from viewsphere.truth.correspondence import Match
 from viewsphere.truth.geometry import build_geometry, present
@@ -31,8 +32,9 @@ def thing(i, where, step=None, key=None):
 def view(meshes, poses, camera, ground=False, sky=True, steps=None, floor=None):
     """A view of these meshes in these poses, None for what is not there; `steps` are the frames of their files."""
     steps = steps or [None] * len(poses)
+    under = None if floor is None else Floor(height=floor)
     things = [thing(i, where, step) for i, (where, step) in enumerate(zip(poses, steps, strict=True))]
-    return View(things, build_geometry(things, present(things, meshes), ground, 0.01, floor), camera, sky)
+    return View(things, build_geometry(things, present(things, meshes), ground, 0.01, under), camera, sky)
 
 
 def matched(here, there):

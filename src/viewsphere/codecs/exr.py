@@ -18,20 +18,20 @@ from viewsphere.errors import UserError
 _MAGIC = struct.pack("<II", 20000630, 2)
 _ZIP, _LINES = 3, 16
 _KINDS = {np.dtype(np.int32): 0, np.dtype(np.float32): 2}
-_NAMES = {1: ("Z",), 3: ("R", "G", "B")}
+_NAMES = {1: ("Z",), 2: ("R", "G"), 3: ("R", "G", "B")}
 _WINDOW = b"dataWindow\0box2i\0" + struct.pack("<I", 16)
 MOST_DEFLATED = 1032  # greatest ratio of a deflated stream's content to its own size
 _FOREIGN = "EXR: expected viewsphere's own, found a damaged file or another program's"
 
 
 def encode_exr(array: NDArray[Any]) -> bytes:
-    """An EXR file of (H, W), as channel Z, or (H, W, 3), as channels R, G and B; float32 or int32, not empty.
+    """An EXR file of (H, W), as channel Z, or (H, W, 2 or 3), as channels R, G and B; float32 or int32, not empty.
 
     EXR knows no signed integers: int32 numbers become the UINT numbers of equal bits.
     """
     components = 1 if array.ndim == 2 else array.shape[-1]
     if array.ndim not in (2, 3) or array.size == 0 or components not in _NAMES or array.dtype not in _KINDS:
-        raise ValueError(f"encode_exr: expected (H, W) or (H, W, 3) float32 or int32, got {array.shape} {array.dtype}")
+        raise ValueError(f"encode_exr: expected (H, W) or (H, W, 2..3) float32 or int32, got {array.shape} {array.dtype}")
     height, width = array.shape[:2]
     head = _header(width, height, components, _KINDS[array.dtype])
     planes = array.reshape(height, width, components)[:, :, ::-1]  # channels lie in the order of their names: B, G, R

@@ -37,23 +37,23 @@ def trusted(sample: Sample, models: Models) -> Iterator[str]:
 
 @dataclass(frozen=True)
 class Needs:
-    """The inputs of a label besides its own instant and sensor: offsets of instants (-1 is the one before), and names
-    of other sensors.
+    """The inputs of a label besides its own instant and sensor: offsets of instants (-1 is the one before), and whether a
+    sensor that is rectified with its own.
     """
 
     instants: tuple[int, ...] = ()
-    sensors: tuple[str, ...] = ()
+    rectified: bool = False
 
     def __str__(self) -> str:
         instants = ", ".join(f"{offset:+d}" for offset in self.instants)
         return " and ".join(
-            [*([f"instants {instants}"] if instants else []), *([f"sensors {', '.join(self.sensors)}"] if self.sensors else [])]
+            [*([f"instants {instants}"] if instants else []), *(["a sensor rectified with its own"] if self.rectified else [])]
         )
 
     @property
     def is_some(self) -> bool:
         """Whether the label needs other instants or sensors."""
-        return bool(self.instants or self.sensors)
+        return bool(self.instants or self.rectified)
 
 
 @dataclass(frozen=True)

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,20 +15,50 @@ from viewsphere.geometry.box import Bounds, projected_bounds
 from viewsphere.geometry.camera import inverse_camera_matrix
 from viewsphere.labels._placement import Placement
 from viewsphere.model.camera import Camera
+from viewsphere.truth.correspondence import Match
 from viewsphere.truth.geometry import Geometry
+from viewsphere.truth.view import View
 from viewsphere.truth.visibility import Instances, Visibility, homogeneous, lens_rays
+
+
+class Around(Protocol):
+    """The views beside that of a picture."""
+
+    @property
+    def sensors(self) -> Sequence[str]:
+        """Names of the rig's other sensors, in its order."""
+        ...
+
+    def view(self, instants: int, sensor: str | None) -> View | None:
+        """That of a sensor, None for the picture's own, so many instants later; None without such a sensor or instant."""
+        ...
 
 
 @dataclass(frozen=True, eq=False)
 class Sight:
     """A camera's view of a geometry: `visibility` is `rasterize(geometry, camera)`. `placements` belong to the objects 1, 2,
-    ...; an absent object's is None; labels of pixels need no placements.
+    ...; an absent object's is None; labels of pixels need no placements. `around`: what the picture is compared with.
     """
 
     geometry: Geometry
     camera: Camera
     visibility: Visibility
     placements: Sequence[Placement | None] = ()
+    around: Around | None = None
+    _matches: dict[tuple[int, str | None], Match | None] = field(
+        default_factory=dict[tuple[int, str | None], "Match | None"], repr=False
+    )
+
+    def neighbour(self, instants: int = 0, sensor: str | None = None) -> View | None:
+        """What a sensor, by default the own one, may see so many instants later; None without such a sensor or instant."""
+        return self.around.view(instants, sensor) if self.around else None
+
+    def match(self, instants: int = 0, sensor: str | None = None) -> Match | None:
+        """Where the picture's points are in a neighbour; kept, so that labels share it."""
+        if (instants, sensor) not in self._matches:
+            own, other = self.neighbour(), self.neighbour(instants, sensor)
+            self._matches[instants, sensor] = Match(own, self.visibility, other) if own and other else None
+        return self._matches[instants, sensor]
 
     @cached_property
     def rays(self) -> NDArray[np.float64]:
@@ -48,6 +78,11 @@ class Sight:
     def camera_from_ray(self) -> NDArray[np.float64]:
         """Matrix (3, 3) from rays to camera axes: K^-1 for a pinhole, whose rays are pixels (x, y, 1); else the identity."""
         return inverse_camera_matrix(self.camera.intrinsics) if self.camera.distortion is None else np.eye(3)
+
+    @property
+    def inverse_depth(self) -> NDArray[np.float64]:
+        """1/s of what is seen, (H, W), before it was rounded, if that is known; 0 where nothing is seen."""
+        return self.visibility.inverse_depth.astype(np.float64) if self.visibility.exact is None else self.visibility.exact
 
     @property
     def instances(self) -> Instances:

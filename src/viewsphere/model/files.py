@@ -47,7 +47,7 @@ class Files(Frozen):
         default="png16", description="file of instances, categories and parts: 16-bit grey, or a palette of distinct colours"
     )
     geometry: Literal["tiff", "exr", "npz"] = Field(
-        default="tiff", description="file of normals, coordinates, triangles and barycentrics"
+        default="tiff", description="file of normals, coordinates, flow, disparity and all else that is exact"
     )
 
     @model_validator(mode="after")
@@ -74,6 +74,8 @@ class Files(Frozen):
                 return self.depth
             case _, "png16":
                 return self.masks
+            case _, "png":
+                return "png"
             case _:
                 return self.geometry
 

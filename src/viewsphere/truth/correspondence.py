@@ -129,7 +129,7 @@ class Match:
         kernels.as_rays(*self._pixels, matrices, self.other.is_fisheye, rays, near)
         xy, _ = project(self.other.camera.intrinsics, rays)
         still = self._shows(STILL)
-        xy[still] = _centers(self._inverse.shape)[still]
+        xy[still] = pixel_centers(self._inverse.shape)[still]
         near[np.isnan(xy[..., 0]) & ~np.isnan(near)] = 0.0
         return xy, near, rays
 
@@ -144,7 +144,7 @@ class Match:
             return None
         pixel = np.flatnonzero(self._shows(OTHER))
         triangle = self.visibility.triangle.reshape(-1)[pixel]
-        centers = _centers(self._inverse.shape).reshape(-1, 2)[pixel]
+        centers = pixel_centers(self._inverse.shape).reshape(-1, 2)[pixel]
         rays = np.column_stack((centers, np.ones(len(pixel)))) if self.view.is_pinhole else self.view.rays.reshape(-1, 3)[pixel]
         weights = weights_of(self.view, triangle, rays)
         further = triangle + shifts(self.view, self.other)[self.view.owners[triangle]]
@@ -160,7 +160,7 @@ class Match:
         assert self._deformed is not None
         pixel, is_still = self._deformed.pixel, self._deformed.is_still
         there = placed_at(self.other, self._deformed.there, lambda: self._own.reshape(-1)[pixel])
-        centers = _centers(near.shape).reshape(-1, 2)[pixel]
+        centers = pixel_centers(near.shape).reshape(-1, 2)[pixel]
         xy.reshape(-1, 2)[pixel] = np.where(is_still[:, None], centers, there.xy)
         near.reshape(-1)[pixel] = there.near
         if rays is not None and there.rays is not None:
@@ -177,7 +177,7 @@ class Match:
         return own
 
 
-def _centers(shape: tuple[int, ...]) -> Float:
+def pixel_centers(shape: tuple[int, ...]) -> Float:
     """The centres of pixels, (H, W, 2)."""
     y, x = np.indices(shape, np.float64)
     return np.stack((x + 0.5, y + 0.5), axis=-1)

@@ -1,0 +1,47 @@
+"""The usual colours of flow: its direction is the hue, its length the saturation."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Picture = NDArray[np.uint8]
+STEPS = ((15, 0, 1, 1), (6, 1, 0, -1), (4, 1, 2, 1), (11, 2, 1, -1), (13, 2, 0, 1), (6, 0, 2, -1))
+"""Parts of the wheel: how many colours it has, which of red, green and blue stays, which changes, and whether it rises."""
+
+DARKER = 0.75
+"""Factor of colours beyond the longest flow."""
+
+
+def wheel() -> NDArray[np.float64]:
+    """The 55 colours of Baker et al. 2007, "A Database and Evaluation Methodology for Optical Flow", (55, 3), 0 to 255.
+
+    They are those of the code that goes with the paper, https://vision.middlebury.edu/flow/code/ (colorcode.cpp).
+    """
+    parts = list[NDArray[np.float64]]()
+    for count, full, changing, way in STEPS:
+        part = np.zeros((count, 3))
+        rising = np.floor(255 * np.arange(count) / count)
+        part[:, full], part[:, changing] = 255, rising if way > 0 else 255 - rising
+        parts.append(part)
+    return np.concatenate(parts)
+
+
+def picture(flow: NDArray[np.floating], longest: float | None = None) -> Picture:
+    """Flow (H, W, 2) as a picture (H, W, 3) uint8: white is none, black where it is NaN.
+
+    `longest` flow has the full colour; by default that which 99 % of the pixels do not exceed.
+    """
+    known: NDArray[np.bool_] = np.isfinite(flow[..., 0] + flow[..., 1])
+    u, v = np.where(known[..., None], flow, 0.0).astype(np.float64).transpose(2, 0, 1)
+    length = np.hypot(u, v)
+    if longest is None:
+        longest = float(np.percentile(length[known], 99)) if known.any() else 1.0
+    share = length / max(longest, 1e-9)
+    colors = wheel() / 255
+    at = (np.arctan2(-v, -u) / np.pi + 1) / 2 * (len(colors) - 1)
+    first = np.floor(at).astype(np.intp)
+    between = (at - first)[..., None]
+    color = (1 - between) * colors[first] + between * colors[(first + 1) % len(colors)]
+    color = np.where(share[..., None] <= 1, 1 - share[..., None] * (1 - color), DARKER * color)
+    return np.where(known[..., None], np.floor(255 * color), 0).astype(np.uint8)

@@ -1,0 +1,64 @@
+"""disparity: how far apart a stereo pair's pictures show a point."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.labels._label import ChannelLabel, Drawing, Models, Needs, Picture, channel_of
+from viewsphere.labels._sight import Sight
+from viewsphere.labels._stereo import pair
+from viewsphere.model.sample import Sample
+
+
+def compute(sight: Sight) -> NDArray[np.float32]:
+    """fx baseline / z, (H, W) pixels, positive in both pictures of the pair; 0 of the sky.
+
+    The other picture is that of the first of the rig's sensors that is rectified with the own one. NaN without such a sensor,
+    and where a flat picture is seen.
+    """
+    out, other, own = sight.empty(np.float32), pair(sight), sight.neighbour()
+    if other is None or own is None:
+        out.fill(np.nan)
+        return out
+    np.multiply(sight.inverse_depth, sight.camera.intrinsics.fx * other.baseline, out=out, casting="same_kind")
+    if not own.is_sky_endless:
+        out[sight.visibility.triangle < 0] = np.nan
+    return out
+
+
+def prove(sample: Sample, models: Models) -> Iterator[str]:
+    """Disparity is never negative, and 0 of what is infinitely far."""
+    disparity, depth = channel_of(sample, "disparity"), channel_of(sample, "depth")
+    if disparity is None:
+        return
+    if (disparity < 0).any() or np.isinf(disparity).any():
+        yield "expected pixels of at least 0, or NaN; found others"
+    elif depth is not None and (np.isinf(depth) & (disparity > 0)).any():
+        yield f"expected 0 or NaN where depth is infinite; found others at {(np.isinf(depth) & (disparity > 0)).sum()} pixels"
+
+
+def picture(disparity: NDArray[np.float32]) -> Picture:
+    """Disparity as a picture (H, W, 3): near is light, far is dark, NaN black."""
+    known = np.isfinite(disparity)
+    grey = np.zeros(disparity.shape, np.float64)
+    if known.any():
+        far, near = np.percentile(disparity[known], (2, 100))
+        grey[known] = 0.15 + 0.85 * np.clip((disparity[known] - far) / max(near - far, 1e-9), 0, 1)
+    return np.repeat((grey * 255).astype(np.uint8)[..., None], 3, axis=2)
+
+
+LABEL = ChannelLabel(
+    name="disparity",
+    meaning="x in the left picture less x in the right one, of the rectified pair",
+    axes="image",
+    needs=Needs(rectified=True),
+    dtype=np.float32,
+    unit="px",
+    empty=np.nan,
+    compute=compute,
+    prove=prove,
+    drawing=Drawing("disparity", beside=lambda sample: picture(sample.channels["disparity"])),
+)

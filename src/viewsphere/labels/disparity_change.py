@@ -1,0 +1,59 @@
+"""disparity_change: by how much the seen point's disparity changes until the next instant."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.labels._label import ChannelLabel, Drawing, Models, Needs, Picture, channel_of
+from viewsphere.labels._sight import Sight
+from viewsphere.labels._stereo import pair
+from viewsphere.model.sample import Sample
+
+
+def compute(sight: Sight) -> NDArray[np.float32]:
+    """The same point's disparity an instant later less that now, (H, W) pixels; 0 of the sky.
+
+    NaN where the point is behind the camera then, where it is gone, and without a rectified sensor or a later instant.
+    """
+    out, other, match = sight.empty(np.float32), pair(sight), sight.match(1)
+    if other is None or match is None:
+        out.fill(np.nan)
+        return out
+    now, then = sight.camera.intrinsics.fx, match.other.camera.intrinsics.fx
+    out[...] = other.baseline * (then * match.inverse_depth - now * sight.inverse_depth)
+    out[np.isnan(match.xy[..., 0]) & (sight.visibility.triangle >= 0)] = np.nan
+    return out
+
+
+def prove(sample: Sample, models: Models) -> Iterator[str]:
+    """Disparity is not negative afterwards, either."""
+    change, now = channel_of(sample, "disparity_change"), channel_of(sample, "disparity")
+    if change is not None and now is not None and (now + change < -1e-3 * np.maximum(np.abs(change), 1)).any():
+        yield "expected disparity of at least 0 afterwards; found less"
+
+
+def picture(change: NDArray[np.float32]) -> Picture:
+    """A change as a picture (H, W, 3): nearer is red, farther is blue, none white, NaN black."""
+    known = np.isfinite(change)
+    most = float(np.percentile(np.abs(change[known]), 99)) if known.any() else 1.0
+    share = np.clip(np.where(known, change, 0) / max(most, 1e-9), -1, 1)
+    other = 255 * (1 - np.abs(share))
+    red, blue = np.where(share >= 0, 255, other), np.where(share <= 0, 255, other)
+    return np.where(known[..., None], np.stack((red, other, blue), axis=-1), 0).astype(np.uint8)
+
+
+LABEL = ChannelLabel(
+    name="disparity_change",
+    meaning="the seen point's disparity one instant later, less its disparity",
+    axes="image",
+    needs=Needs(instants=(1,), rectified=True),
+    dtype=np.float32,
+    unit="px",
+    empty=np.nan,
+    compute=compute,
+    prove=prove,
+    drawing=Drawing("disparity_change", beside=lambda sample: picture(sample.channels["disparity_change"])),
+)

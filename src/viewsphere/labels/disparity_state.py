@@ -1,0 +1,29 @@
+"""disparity_state: whether the seen point is seen by the sensor that is rectified with the picture's own."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.labels import _state
+from viewsphere.labels._label import ChannelLabel, Drawing, Needs
+from viewsphere.labels._sight import Sight
+from viewsphere.labels._stereo import pair_match
+
+
+def compute(sight: Sight) -> NDArray[np.uint8]:
+    """The state of the seen point in the other sensor's picture of the same instant, (H, W)."""
+    return _state.state(sight, pair_match(sight))
+
+
+LABEL = ChannelLabel(
+    name="disparity_state",
+    meaning=f"the seen point in the rectified sensor's picture: {_state.MEANING}",
+    needs=Needs(rectified=True),
+    dtype=np.uint8,
+    empty=4,
+    encoding="png",
+    compute=compute,
+    prove=_state.state_proof("disparity_state"),
+    drawing=Drawing("disparity_state", beside=lambda sample: _state.picture(sample.channels["disparity_state"])),
+)

@@ -1,0 +1,34 @@
+"""flow: optical flow, where the seen point is one instant later."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.labels import _flow
+from viewsphere.labels._label import ChannelLabel, Drawing, Needs
+from viewsphere.labels._sight import Sight
+from viewsphere.labels._wheel import picture
+
+
+def compute(sight: Sight) -> NDArray[np.float32]:
+    """Where the seen point is an instant later, less where it is now, (H, W, 2) pixels, right and down.
+
+    NaN where it has no pixel then: behind the camera, on nothing that is there then, on a flat picture.
+    """
+    return _flow.flow(sight, 1).astype(np.float32)
+
+
+LABEL = ChannelLabel(
+    name="flow",
+    meaning="where the seen point is one instant later, right and down of where it is",
+    axes="image",
+    needs=Needs(instants=(1,)),
+    dtype=np.float32,
+    components=2,
+    unit="px",
+    empty=np.nan,
+    compute=compute,
+    prove=_flow.flow_proof("flow", "flow_state"),
+    drawing=Drawing("flow", beside=lambda sample: picture(sample.channels["flow"])),
+)

@@ -1,0 +1,28 @@
+"""flow_backward_state: whether the seen point is seen one instant earlier."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.labels import _state
+from viewsphere.labels._label import ChannelLabel, Drawing, Needs
+from viewsphere.labels._sight import Sight
+
+
+def compute(sight: Sight) -> NDArray[np.uint8]:
+    """The state of the seen point in the same sensor's picture an instant earlier, (H, W); 4 at the first instant."""
+    return _state.state(sight, sight.match(-1))
+
+
+LABEL = ChannelLabel(
+    name="flow_backward_state",
+    meaning=f"the seen point one instant earlier: {_state.MEANING}",
+    needs=Needs(instants=(-1,)),
+    dtype=np.uint8,
+    empty=4,
+    encoding="png",
+    compute=compute,
+    prove=_state.state_proof("flow_backward_state"),
+    drawing=Drawing("flow_backward_state", beside=lambda sample: _state.picture(sample.channels["flow_backward_state"])),
+)

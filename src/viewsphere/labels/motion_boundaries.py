@@ -1,0 +1,81 @@
+"""motion_boundaries: pixels beside which something else moves otherwise."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.labels._flow import flow
+from viewsphere.labels._label import ChannelLabel, Drawing, Models, Needs, channel_of
+from viewsphere.labels._sight import Sight
+from viewsphere.model.sample import Sample
+
+APART = 1.5
+"""Pixels by which flows differ at a boundary (Mayer et al. 2016, "A Large Dataset to Train Convolutional Networks for
+Disparity, Optical Flow, and Scene Flow Estimation"; that its boundaries are of 10 pixels at least is not asked for here).
+"""
+
+JOINED = 0.05
+"""Greatest relative difference of the 1/s of neighbouring pixels of one thing that are one surface."""
+
+
+def compute(sight: Sight) -> NDArray[np.uint8]:
+    """1 on both sides of a boundary, else 0, (H, W).
+
+    A boundary is between two pixels, one beside or below the other, of different things, or of surfaces that do not join, whose
+    flows to the next instant differ by more than `APART`.
+    """
+    out = np.zeros(sight.visibility.triangle.shape, np.uint8)
+    own = sight.neighbour()
+    if own is None or sight.match(1) is None:
+        return out
+    vectors = flow(sight, 1)
+    thing = np.append(own.owners, -1)[sight.visibility.triangle]
+    inverse = sight.visibility.inverse_depth
+    for axis in (0, 1):
+        a, b = _sides(axis)
+        u, v = (vectors[b] - vectors[a]).transpose(2, 0, 1)
+        torn = (thing[a] != thing[b]) | (np.abs(inverse[a] - inverse[b]) > JOINED * np.maximum(inverse[a], inverse[b]))
+        boundary = torn & (u * u + v * v > APART * APART)
+        out[a] |= boundary
+        out[b] |= boundary
+    return out
+
+
+def _sides(axis: int) -> tuple[tuple[slice, ...], tuple[slice, ...]]:
+    """All pixels but the last along an axis, and all but the first."""
+    before = (slice(None),) * axis
+    return (*before, slice(None, -1)), (*before, slice(1, None))
+
+
+def prove(sample: Sample, models: Models) -> Iterator[str]:
+    """A boundary has a neighbour that moves otherwise."""
+    boundaries, vectors = channel_of(sample, "motion_boundaries"), channel_of(sample, "flow")
+    if boundaries is None or vectors is None:
+        return
+    moves_otherwise = np.zeros(boundaries.shape, np.bool_)
+    for axis in (0, 1):
+        a, b = _sides(axis)
+        differs = np.hypot(*(vectors[b] - vectors[a]).transpose(2, 0, 1)) > APART * (1 - 1e-5)
+        moves_otherwise[a] |= differs
+        moves_otherwise[b] |= differs
+    wrong = (boundaries > 0) & ~moves_otherwise
+    if wrong.any():
+        yield f"expected neighbours whose flow differs; found none at {wrong.sum()} pixels"
+
+
+LABEL = ChannelLabel(
+    name="motion_boundaries",
+    meaning="1 where a pixel beside shows something else that moves otherwise",
+    needs=Needs(instants=(1,)),
+    dtype=np.uint8,
+    encoding="png",
+    compute=compute,
+    prove=prove,
+    drawing=Drawing(
+        "motion_boundaries",
+        beside=lambda sample: np.repeat(255 * sample.channels["motion_boundaries"][..., None], 3, axis=2).astype(np.uint8),
+    ),
+)
