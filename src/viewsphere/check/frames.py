@@ -29,9 +29,8 @@ def files(sample: Sample) -> Iterator[str]:
             yield str(error)
             continue
         channel = channels()[name]
-        if array.shape != channel.shape(height, width) or array.dtype != channel.dtype:
-            wanted = f"{channel.shape(height, width)} {np.dtype(channel.dtype)}"
-            yield f"{file}: expected {wanted}, found {array.shape} {array.dtype}"
+        if not channel.fits(array, height, width):
+            yield f"{file}: expected {channel.expected(height, width)}, found {array.shape} {array.dtype}"
 
 
 def ids(sample: Sample) -> Iterator[str]:

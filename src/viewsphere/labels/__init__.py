@@ -18,7 +18,7 @@ from viewsphere import plugins
 from viewsphere.labels._label import ChannelLabel, Drawing, Field, Label, ModelFacts, Needs, ObjectLabel
 from viewsphere.labels._placement import Placement
 from viewsphere.labels._record import annotation_of, from_short_record, from_whole_record, short_record, whole_record
-from viewsphere.labels._sight import Sight
+from viewsphere.labels._sight import Around, Sight
 from viewsphere.model.camera import Camera
 from viewsphere.model.channel import DEFAULT_CHANNELS, PASSES, Channel
 from viewsphere.model.model_spec import Size
@@ -87,13 +87,16 @@ def drawings() -> tuple[Drawing, ...]:
     return tuple(label.drawing for _, label in sorted(labels().items()) if label.drawing)
 
 
-def observe(geometry: Geometry, camera: Camera, visibility: Visibility, names: Iterable[str]) -> dict[str, NDArray[Any]]:
+def observe(
+    geometry: Geometry, camera: Camera, visibility: Visibility, names: Iterable[str], around: Around | None = None
+) -> dict[str, NDArray[Any]]:
     """The named labels of pixels, each (H, W) or (H, W, components) as its file says.
 
-    `visibility` is `rasterize(geometry, camera)`. The array of `instances` is shared with the visibility and must not be
-    written to. Raises ValueError for names that are no labels of pixels.
+    `visibility` is `rasterize(geometry, camera)`; `around`: what labels of motion and of stereo pairs compare it with. The
+    array of `instances` is shared with the visibility and must not be written to. Raises ValueError for names that are no
+    labels of pixels.
     """
-    known, sight, names = channel_labels(), Sight(geometry, camera, visibility), tuple(names)
+    known, sight, names = channel_labels(), Sight(geometry, camera, visibility, around=around), tuple(names)
     unknown = [name for name in names if name not in known]
     if unknown:
         raise ValueError(f"channel {unknown[0]!r}: expected one of {', '.join(known)}")

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 
 from viewsphere.errors import ViewsphereError
 from viewsphere.labels._placement import ModelFacts, Placement
@@ -37,23 +37,13 @@ def trusted(sample: Sample, models: Models) -> Iterator[str]:
 
 @dataclass(frozen=True)
 class Needs:
-    """The inputs of a label besides its own instant and sensor: offsets of instants (-1 is the one before), and whether a
-    sensor that is rectified with its own.
+    """The inputs of a label besides its own instant and sensor: offsets of instants (-1 is the one before), whether a sensor
+    that is rectified with its own, and whether points that are followed.
     """
 
     instants: tuple[int, ...] = ()
     rectified: bool = False
-
-    def __str__(self) -> str:
-        instants = ", ".join(f"{offset:+d}" for offset in self.instants)
-        return " and ".join(
-            [*([f"instants {instants}"] if instants else []), *(["a sensor rectified with its own"] if self.rectified else [])]
-        )
-
-    @property
-    def is_some(self) -> bool:
-        """Whether the label needs other instants or sensors."""
-        return bool(self.instants or self.rectified)
+    tracks: bool = False
 
 
 @dataclass(frozen=True)
@@ -90,7 +80,7 @@ class ChannelLabel(Label):
     """
 
     compute: Callable[[Sight], Array]
-    dtype: type[np.generic]
+    dtype: DTypeLike
     components: int = 1
     unit: str = "1"
     empty: float = 0
@@ -212,4 +202,5 @@ def channel_of(sample: Sample, name: str) -> Array | None:
         array = sample.channels[name]
     except (KeyError, ViewsphereError):
         return None
-    return array if array.shape[:2] == (sample.height, sample.width) else None
+    is_picture = array.shape[:2] == (sample.height, sample.width)
+    return array if is_picture or array.dtype.names else None

@@ -17,6 +17,7 @@ from viewsphere.labels._placement import Placement
 from viewsphere.model.camera import Camera
 from viewsphere.truth.correspondence import Match
 from viewsphere.truth.geometry import Geometry
+from viewsphere.truth.shot_views import Followed
 from viewsphere.truth.view import View
 from viewsphere.truth.visibility import Instances, Visibility, homogeneous, lens_rays
 
@@ -31,6 +32,11 @@ class Around(Protocol):
 
     def view(self, instants: int, sensor: str | None) -> View | None:
         """That of a sensor, None for the picture's own, so many instants later; None without such a sensor or instant."""
+        ...
+
+    @property
+    def followed(self) -> Followed:
+        """The points that the picture's sensor follows."""
         ...
 
 

@@ -4,21 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Container, Iterable
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import DTypeLike, NDArray
 
 
 @dataclass(frozen=True)
 class Channel:
-    """One array of pixels: (height, width) + (components,) if components > 1; `encoding` is its default file."""
+    """One array of pixels: (height, width) + (components,) if components > 1; `encoding` is its default file. With no
+    components it is no picture but rows, as many as there are.
+    """
 
     name: str
-    dtype: type[np.generic]
+    dtype: DTypeLike
     components: int
     unit: str
     empty: float
-    encoding: Literal["png", "png16", "tiff"]
+    encoding: Literal["png", "png16", "tiff", "npz"]
     meaning: str
 
     @property
@@ -29,6 +32,15 @@ class Channel:
     def shape(self, height: int, width: int) -> tuple[int, ...]:
         """Shape of this channel's array for an image of this size."""
         return (height, width) if self.components == 1 else (height, width, self.components)
+
+    def fits(self, array: NDArray[Any], height: int, width: int) -> bool:
+        """Whether an array may be this channel's, for an image of this size."""
+        is_shaped = array.ndim == 1 if self.components == 0 else array.shape == self.shape(height, width)
+        return is_shaped and array.dtype == self.dtype
+
+    def expected(self, height: int, width: int) -> str:
+        """What fits, in words."""
+        return f"{self.shape(height, width) if self.components else 'rows of'} {np.dtype(self.dtype)}"
 
 
 PASSES: dict[str, Channel] = {

@@ -74,8 +74,8 @@ class Files(Frozen):
                 return self.depth
             case _, "png16":
                 return self.masks
-            case _, "png":
-                return "png"
+            case _, "png" | "npz" as own:
+                return own
             case _:
                 return self.geometry
 

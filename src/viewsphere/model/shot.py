@@ -17,6 +17,7 @@ from viewsphere.model.instant import Instant, Viewpoint, viewpoint_of
 from viewsphere.model.rig import Rig
 from viewsphere.model.scene import IDENTITY, Finish, Scene
 from viewsphere.model.thing import Motion, Thing
+from viewsphere.model.tracks import Tracks
 
 
 class Shot(Frozen):
@@ -33,6 +34,7 @@ class Shot(Frozen):
     scene: Scene
     first: int = 0
     sequence: str = ""  # of still pictures none
+    tracks: Tracks | None = None
     engine: str = "raster"
     engine_options: dict[str, JsonValue] = Field(default_factory=dict)
     channels: tuple[str, ...]
@@ -128,5 +130,5 @@ class Shot(Frozen):
             thing if thing.motion.is_still else thing.model_copy(update={"motion": Motion(poses=(None,))})
             for thing in self.things
         )
-        alike = {"key": "", "first": 0, "sequence": "", "instants": (), "things": things}
+        alike = {"key": "", "first": 0, "sequence": "", "tracks": None, "instants": (), "things": things}
         return self.model_copy(update=alike).model_dump_json()

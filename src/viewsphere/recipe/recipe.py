@@ -37,13 +37,14 @@ from viewsphere.recipe.rig import RigField
 from viewsphere.recipe.scene import CameraEntry, EngineEntry, SceneEntry, engine_entry
 from viewsphere.recipe.scenes import ScenesField
 from viewsphere.recipe.sequence import TimeEntry
+from viewsphere.recipe.tracks import TracksEntry
 from viewsphere.recipe.values import OrShort, shape_of
 from viewsphere.recipe.viewpoints import Viewpoints
 
 BEFORE_RENDERING = {"name", "formats", "max_frames", "shot_frames"}
 """Fields of a recipe that change neither a picture nor a label."""
 
-LATER = {"scenes", "time", "rig"}
+LATER = {"scenes", "time", "rig", "tracks"}
 """Fields that recipes once did not have: without them a recipe has the digest that it had then."""
 
 Share = Annotated[
@@ -126,6 +127,10 @@ class Recipe(Frozen):
         description="several sensors that move together: {kind: stereo, baseline}, {kind: surround, count}, {sensors: {...}} "
         "or {file: calibration}; the viewpoint is the first one's. By default one camera",
     )
+    tracks: TracksEntry | None = Field(
+        default=None,
+        description="points that are followed through each sequence: {grid: 16}, {count: 1024, on: objects}, or {points: file}",
+    )
     scene: SceneEntry = Field(default=SceneEntry(), description="light, ground, background, effects, what stands around")
     engine: Annotated[EngineEntry, BeforeValidator(engine_entry), OrShort({"type": "string"})] = Field(
         default=EngineEntry(),
@@ -167,8 +172,11 @@ class Recipe(Frozen):
 
     @field_validator("channels")
     @classmethod
-    def _with_alpha(cls, value: tuple[str, ...], info: ValidationInfo) -> tuple[str, ...]:
+    def _as_meant(cls, value: tuple[str, ...], info: ValidationInfo) -> tuple[str, ...]:
+        """With what other fields ask for: tracks, and pictures with alpha."""
         scene: SceneEntry | None = info.data.get("scene")
+        if info.data.get("tracks") is not None:
+            value = tuple(dict.fromkeys((*value, "tracks")))
         if scene is None or not any(entry.transparent for entry in scene.backgrounds):
             return value
         return tuple(dict.fromkeys("rgba" if name == "rgb" else name for name in value))

@@ -15,7 +15,7 @@ from viewsphere.assets.parts import taken
 from viewsphere.errors import ModelError, RecipeError
 from viewsphere.geometry.box import box_size, box_vertices
 from viewsphere.geometry.rotation import transform
-from viewsphere.labels import annotate, observe
+from viewsphere.labels import annotate, channel_labels, observe
 from viewsphere.model.channel import PASSES
 from viewsphere.model.model_spec import ModelSpec, Size, step_key
 from viewsphere.model.sample import Float, Sample
@@ -24,7 +24,7 @@ from viewsphere.model.thing import Thing, TimeStep
 from viewsphere.sampling.camera import inside_box
 from viewsphere.store import ModelInfo, Store
 from viewsphere.truth.enclosure import sky_hidden
-from viewsphere.truth.geometry import without_ground
+from viewsphere.truth.shot_views import ShotViews
 from viewsphere.truth.visibility import rasterize, with_ground
 from viewsphere.zoo import build_zoo_model
 
@@ -193,6 +193,7 @@ class Stages:
         """The shot's samples in order, channels in memory; raises RecipeError for a camera inside of scenery or a target."""
         stage = self.stage(shot)
         self._check_shot(shot)
+        views = ShotViews(shot, stage.at)
         shown: tuple[TimeStep | None, ...] | None = None
         boxes, sizes = list[Float](), list[Size | None]()
         for sample in shot.samples:
@@ -202,7 +203,7 @@ class Stages:
                 boxes = [self.box(thing.model, step) for thing, step in both]
                 sizes = [self.real_size(thing.model, step) for thing, step in both]
                 shown = steps
-            yield render_sample(shot, sample, stage, boxes, sizes)
+            yield render_sample(views, sample, stage, boxes, sizes)
 
 
 def _name(spec: ModelSpec, step: TimeStep | None) -> str:
@@ -217,19 +218,21 @@ def _size(mesh: Mesh) -> int:
 
 
 def render_sample(
-    shot: Shot, sample: tuple[int, int, int], stage: Stage, boxes: Sequence[Float], sizes: Sequence[Size | None]
+    views: ShotViews, sample: tuple[int, int, int], stage: Stage, boxes: Sequence[Float], sizes: Sequence[Size | None]
 ) -> Sample:
-    """One of `shot.samples`: colour from the engine, every label from truth, for which a shadow catcher may not be there.
+    """One of the samples of the views' shot: colour from the engine, every label from truth, for which a shadow catcher may not
+    be there.
 
     `boxes` and `sizes`: each object's 3D box then in its own axes, and its real size if known.
     """
-    number, instant, sensor = sample
-    now, camera, geometry = shot.instants[instant], shot.camera(instant, sensor), stage.at(instant)
-    ground = shot.scene.ground
-    labelled = geometry if ground is None or ground.is_labelled else without_ground(geometry)
-    visibility = rasterize(labelled, camera)
+    shot, (number, instant, sensor) = views.shot, sample
     kept = shot.kept(sensor)
-    observed = observe(labelled, camera, visibility, [name for name in kept if name not in PASSES])
+    names = [name for name in kept if name not in PASSES]
+    _arrange(views, instant, names)
+    view, geometry = views.view(instant, sensor), stage.at(instant)
+    now, camera, labelled = shot.instants[instant], view.camera, view.geometry
+    visibility = rasterize(labelled, camera)
+    observed = observe(labelled, camera, visibility, names, views.around(instant, sensor))
     pictures = [name for name in PASSES if name in kept]
     painted = with_ground(geometry, camera, visibility) if pictures and labelled is not geometry else visibility
     for name in pictures:
@@ -250,3 +253,12 @@ def render_sample(
         instant=now.index,
         time=now.seconds,
     )
+
+
+def _arrange(views: ShotViews, instant: int, names: Sequence[str]) -> None:
+    """Ask for the triangles of all instants that labels compare, in their order, which reuses those of the sample before."""
+    offsets = {offset for name in names for offset in channel_labels()[name].needs.instants}
+    for offset in sorted({0, *offsets}):
+        other = views.shot.instant_after(instant, offset)
+        if other is not None:
+            views.labelled(other)

@@ -8,7 +8,7 @@ import math
 import os
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from pydantic import JsonValue
@@ -20,20 +20,24 @@ from viewsphere.kernels.garbage import pause_collection
 from viewsphere.kernels.kernel_cache import kernel_folder, sources_digest
 from viewsphere.labels import channels
 from viewsphere.model.camera import Intrinsics
-from viewsphere.model.instant import Viewpoint
+from viewsphere.model.instant import Instant, Viewpoint
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.rig import Rig, Sensor
+from viewsphere.model.scene import IDENTITY, Matrix4
 from viewsphere.model.shot import Shot
-from viewsphere.model.thing import Thing
+from viewsphere.model.thing import Motion, Thing
+from viewsphere.model.tracks import Tracks
 from viewsphere.run.stages import render_sample
 from viewsphere.sampling.camera import looking
 from viewsphere.sampling.engine_digest import engine_digest
 from viewsphere.store import encode
+from viewsphere.truth.shot_views import ShotViews
 
 if TYPE_CHECKING:
     from viewsphere.engines import Engine  # which takes a third of a worker's start
 
 SIZE = 16
+BESIDE: Matrix4 = ((1.0, 0.0, 0.0, 0.1), *IDENTITY[1:])
 PACKAGE = Path(plugins.__file__).parent
 
 
@@ -67,13 +71,23 @@ def _small(shot: Shot) -> Shot:
     tiny = Intrinsics(width=SIZE, height=SIZE, fx=SIZE, fy=SIZE, cx=SIZE / 2, cy=SIZE / 2)
     lenses = dict.fromkeys(sensor.intrinsics.distortion for sensor in shot.rig.sensors)
     bent = (tiny.model_copy(update={"distortion": lens}) for lens in lenses)
-    sensors = (Sensor(name=f"{i}", intrinsics=lens) for i, lens in enumerate(bent))
+    sensors = [Sensor(name=f"{i}", intrinsics=lens) for i, lens in enumerate(bent)]
+    if len(shot.rig.sensors) > 1:
+        sensors.append(Sensor(name="beside", intrinsics=sensors[0].intrinsics, rig_from_sensor=BESIDE))
     spec = ModelSpec(key="card", source="card", category="card", category_id=1)
     things = tuple(Thing(id=i, model=spec) for i in (1, 2))
     above = Viewpoint(index=0, azimuth_deg=0, elevation_deg=20, distance=2)
     first = looking(above, (0.0, 0.0, 0.0), index=0, finish=shot.finish(0))
     alike = {"key": "", "first": 0, "sequence": "", "rig": Rig(sensors=tuple(sensors)), "things": things, "instants": (first,)}
-    return shot.model_copy(update=alike)
+    return shot.model_copy(update=alike | (_sequence(shot, first, things) if shot.sequence else {}))
+
+
+def _sequence(shot: Shot, first: Instant, things: tuple[Thing, ...]) -> dict[str, Any]:
+    """Two instants, in between which one of the things moves."""
+    moved = things[0].model_copy(update={"motion": Motion(poses=(IDENTITY, BESIDE))})
+    tracks = shot.tracks and Tracks(at=(0,), count=4, on="objects")
+    instants = (first, first.model_copy(update={"index": 1, "seconds": 1.0}))
+    return {"sequence": "tiny", "things": (moved, *things[1:]), "instants": instants, "tracks": tracks}
 
 
 def _mark(small: Shot) -> Path:
@@ -111,8 +125,9 @@ def _render(shot: Shot) -> None:
     engine: Engine = plugins.load("engines", shot.engine)
     stage = engine.stage(shot, lambda spec, step=None, /: card)
     boxes = [box_vertices(*card.bounds)] * len(shot.things)
+    views = ShotViews(shot, stage.at)
     for number in shot.samples:
-        sample = render_sample(shot, number, stage, boxes, [None] * len(boxes))
+        sample = render_sample(views, number, stage, boxes, [None] * len(boxes))
         for name, array in sample.channels.items():
             encode(channels()[name], array, shot.files)
 

@@ -7,7 +7,7 @@ from fnmatch import fnmatchcase
 
 from viewsphere import plugins
 from viewsphere.errors import RecipeError
-from viewsphere.labels import channel_labels, channels
+from viewsphere.labels import Needs, channel_labels, channels
 from viewsphere.model.mistakes import nearest, one_of
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.recipe.draws import alternatives
@@ -38,9 +38,20 @@ def check_names(recipe: Recipe) -> None:
     for i, name in enumerate(recipe.channels):
         if name not in channels():
             raise RecipeError(f"channels[{i}]: {one_of(name, tuple(channels()))}")
-        if name in channel_labels() and channel_labels()[name].needs.is_some:
-            needs = channel_labels()[name].needs
-            raise RecipeError(f"channels[{i}]: expected a label of single pictures; found {name!r}, which needs {needs}")
+        _check_needs(recipe, f"channels[{i}]", name)
+
+
+def _check_needs(recipe: Recipe, where: str, name: str) -> None:
+    """A label that compares pictures needs these."""
+    label = channel_labels().get(name)
+    needs = label.needs if label else Needs()
+    for field, what, is_lacking in (
+        ("time", "whose instants are compared", bool(needs.instants) and recipe.time is None),
+        ("rig", "with a sensor that is rectified with its own", needs.rectified and recipe.rig is None),
+        ("tracks", "which say what is followed", needs.tracks and recipe.tracks is None),
+    ):
+        if is_lacking:
+            raise RecipeError(f"{where}: expected {field} beside {name}, {what}; found none: set {field}")
 
 
 def check_blend(recipe: Recipe) -> None:

@@ -13,6 +13,7 @@ from pathlib import Path
 
 from viewsphere import plugins
 from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.rig import Rig
 from viewsphere.model.shot import Shot
 from viewsphere.recipe.draws import alternatives, span
 from viewsphere.recipe.recipe import Recipe
@@ -36,6 +37,7 @@ from viewsphere.sampling.scenes import is_night
 from viewsphere.sampling.sequence_poses import poses_of
 from viewsphere.sampling.splits import expected
 from viewsphere.sampling.time_steps import check_keys, timed
+from viewsphere.sampling.tracks import tracks_digest, tracks_of
 from viewsphere.store import Block, Category, Row
 from viewsphere.store.index import Index, numbers
 
@@ -209,6 +211,7 @@ class Plan(Stock):
         value = [self.recipe.digest, models, self.pose_list.digest, images, self.shot_frames]
         value += [] if self.blend is None else [self.blend.digest]
         value += [] if self.own_rig is None else [self.own_rig.model_dump(mode="json")]
+        value += [] if self.tracks is None else [tracks_digest(self.tracks)]
         return hashlib.sha256(json.dumps(value, separators=(",", ":")).encode()).hexdigest()
 
 
@@ -245,6 +248,7 @@ def plan(recipe: Recipe, shot_frames: int | None = None) -> Plan:
             shot_frames=frames,
             own_rig=rig,
             entries=tuple(number for _, number in numbered),
+            tracks=tracks_of(recipe, rig or Rig.of(lens(recipe, views))),
         )
         check_all_frames(recipe, planned.frames, planned.factors)
         if timings:

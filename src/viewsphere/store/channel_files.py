@@ -27,11 +27,9 @@ def encode(channel: Channel, array: NDArray[Any], files: Files | None = None) ->
     from viewsphere.codecs import exr, npz, pictures, png_tiff
 
     files = files or Files()
-    height, width = array.shape[:2]
-    if array.dtype != channel.dtype or array.shape != channel.shape(height, width):
-        raise ValueError(
-            f"channel {channel.name}: expected {channel.shape(height, width)} {channel.dtype}, got {array.shape} {array.dtype}"
-        )
+    height, width = (*array.shape, 1)[:2]
+    if not channel.fits(array, height, width):
+        raise ValueError(f"channel {channel.name}: expected {channel.expected(height, width)}, got {array.shape} {array.dtype}")
     match files.encoding(channel):
         case "tiff":
             return png_tiff.encode_tiff(array)

@@ -15,6 +15,7 @@ from viewsphere.model.rig import Rig
 from viewsphere.model.scene import Finish, Scene, Vector
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing, TimeStep
+from viewsphere.model.tracks import Tracks
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.sampling.blend_scene import BlendScenery
 from viewsphere.sampling.camera import looking
@@ -46,6 +47,7 @@ class Stock(Sendable):
     kept_splits: Mapping[str, str] = field(default_factory=dict[str, str])  # of models and scenes that a data set has already
     own_rig: Rig | None = None  # the recipe's; None: one camera
     entries: tuple[int, ...] = ()  # of each model, the number of its entry in the recipe
+    tracks: Tracks | None = None  # what every sequence's sensors follow
 
     @cached_property
     def rig(self) -> Rig:

@@ -15,6 +15,7 @@ from viewsphere.model.instant import Instant
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Floor
 from viewsphere.model.shot import Shot
+from viewsphere.model.tracks import Tracks
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.sampling.composition import BoxOf
 from viewsphere.sampling.samplers import Standing, Stock
@@ -27,6 +28,7 @@ from viewsphere.sampling.samplers._random import (
     scene_views,
     scenes_entry,
 )
+from viewsphere.sampling.seeds import generator
 from viewsphere.sampling.sequence_poses import SequencePoses
 from viewsphere.sampling.time_steps import is_animated
 from viewsphere.sampling.trajectories import instant as instant_of
@@ -111,7 +113,15 @@ def shot(stock: Stock, subject: str, poses: Sequence[int], box_of: BoxOf, key: s
     instants = [_instant(stock, own, subject, start + i, box_of).model_copy(update={"recorded": i in taken}) for i in numbers]
     scene = stock.scene(subject, stock.scene_name(start)).model_copy(update={"floor": FLOOR})
     made = stock.finished(key, first, own.things_during(numbers), scene, instants)
-    return made.model_copy(update={"sequence": stock.sequence(subject, start)})
+    return made.model_copy(update={"sequence": stock.sequence(subject, start), "tracks": _tracks(stock, subject, start)})
+
+
+def _tracks(stock: Stock, subject: str, start: int) -> Tracks | None:
+    """The points that sensors follow through a sequence."""
+    if stock.tracks is None or stock.tracks.count is None:
+        return stock.tracks
+    rng = generator(stock.recipe.seed, "tracks", subject, stock.pose_list.place(start))
+    return stock.tracks.model_copy(update={"seed": int(rng.integers(2**63))})
 
 
 def _instant(stock: Stock, own: Course, subject: str, pose: int, box_of: BoxOf) -> Instant:
@@ -131,7 +141,8 @@ def _needed(stock: Stock, taken: Set[int]) -> set[int]:
     names = {name for sensor in stock.rig.sensors for name in sensor.channels or stock.recipe.channels}
     offsets = {offset for name in names if name in known for offset in known[name].needs.instants}
     count = time_of(stock).count
-    return {number + offset for number in taken for offset in offsets if 0 <= number + offset < count}
+    compared = {number + offset for number in taken for offset in offsets if 0 <= number + offset < count}
+    return compared if stock.tracks is None else compared | set(stock.tracks.at)
 
 
 def _taken(stock: Stock) -> dict[int, list[str]]:

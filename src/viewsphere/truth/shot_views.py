@@ -1,0 +1,152 @@
+"""What the sensors of a shot may see at its instants, and the points that they follow."""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.model.shot import Shot
+from viewsphere.model.tracks import Tracks
+from viewsphere.truth.geometry import Geometry, without_ground
+from viewsphere.truth.moving import ROOMS
+from viewsphere.truth.points import SurfacePoints, points_seen
+from viewsphere.truth.view import View
+from viewsphere.truth.visibility import rasterize
+
+Float = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Followed:
+    """Points that a sensor follows: query (N, 3) float64, the instant and the position (x, y), pixels, at which each was
+    picked; object (N,) int32, the id of what it lies on, 0 for none.
+    """
+
+    query: Float
+    object: NDArray[np.int32]
+    points: SurfacePoints
+
+
+@dataclass(frozen=True, eq=False)
+class ShotViews:
+    """The views of a shot's sensors; instants count from 0 in the shot. `geometry_at` gives all triangles at an instant: those
+    of as many instants as `truth.moving.ROOMS` are there at once.
+    """
+
+    shot: Shot
+    geometry_at: Callable[[int], Geometry]
+    _geometries: dict[int, tuple[Geometry, Geometry]] = field(default_factory=dict[int, "tuple[Geometry, Geometry]"])
+    _views: dict[tuple[int, int], View] = field(default_factory=dict[tuple[int, int], View])
+    _followed: dict[int, Followed] = field(default_factory=dict[int, Followed])
+
+    def labelled(self, instant: int) -> Geometry:
+        """The triangles that labels know at an instant: a shadow catcher may not be there for them."""
+        ground = self.shot.scene.ground
+        whole = self.geometry_at(instant)
+        if ground is None or ground.is_labelled:
+            return whole
+        known = self._geometries.pop(instant, None)
+        if known is None or known[0] is not whole:
+            known = whole, without_ground(whole)
+        self._geometries[instant] = known
+        while len(self._geometries) > ROOMS:
+            del self._geometries[next(iter(self._geometries))]
+        return known[1]
+
+    def view(self, instant: int, sensor: int) -> View:
+        """What a sensor may see at an instant; the last views are kept."""
+        geometry = self.labelled(instant)
+        view = self._views.pop((instant, sensor), None)
+        if view is None or view.geometry is not geometry:
+            things = self.shot.things_at(instant)
+            view = View(things, geometry, self.shot.camera(instant, sensor), self._is_sky_endless(instant))
+        self._views[instant, sensor] = view
+        while len(self._views) > ROOMS * len(self.shot.rig.sensors):
+            del self._views[next(iter(self._views))]
+        return view
+
+    def _is_sky_endless(self, instant: int) -> bool:
+        background = self.shot.finish(instant).background
+        return background.color is None and background.image is None and not background.transparent
+
+    def around(self, instant: int, sensor: int) -> SampleViews:
+        """The views beside that of a sensor at an instant."""
+        return SampleViews(self, instant, sensor)
+
+    def followed(self, sensor: int) -> Followed:
+        """The points that a sensor follows through the sequence; picked once for the shot."""
+        if sensor not in self._followed:
+            self._followed[sensor] = self._picked(sensor)
+        return self._followed[sensor]
+
+    def _picked(self, sensor: int) -> Followed:
+        tracks = self.shot.tracks
+        if tracks is None:
+            raise ValueError(f"shot {self.shot.key}: expected tracks, found none")
+        queries, objects, points = list[Float](), list[NDArray[np.int32]](), list[SurfacePoints]()
+        numbers = {instant.index: i for i, instant in enumerate(self.shot.instants)}
+        for at in tracks.at:
+            view = self.view(numbers[at], sensor)
+            xy = self._positions(tracks, at, view, sensor)
+            seen = points_seen(view, xy)
+            ids = np.array([*(thing.id for thing in view.things), 0], np.int32)
+            queries.append(np.column_stack((np.full(len(xy), at, np.float64), xy)))
+            objects.append(np.where(seen.thing >= 0, ids[np.minimum(seen.thing, len(view.things))], 0).astype(np.int32))
+            points.append(seen)
+        return Followed(np.concatenate(queries), np.concatenate(objects), SurfacePoints.joined(points))
+
+    def _positions(self, tracks: Tracks, at: int, view: View, sensor: int) -> Float:
+        """Where points are picked in a picture, (N, 2) pixels."""
+        width, height = view.camera.width, view.camera.height
+        if tracks.grid is not None:
+            x, y = (np.arange(tracks.grid / 2, size, tracks.grid) for size in (width, height))
+            return np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+        if tracks.count is None:
+            return np.array([(x, y) for instant, x, y in tracks.points if instant == at], np.float64).reshape(-1, 2)
+        name = zlib.crc32(self.shot.rig.sensors[sensor].name.encode())
+        return _drawn(view, tracks.count, tracks.on == "objects", np.random.default_rng((tracks.seed, name, at)))
+
+
+def _drawn(view: View, count: int, on_objects: bool, rng: np.random.Generator) -> Float:
+    """Positions (n, 2) drawn evenly over a picture, or over the pixels that show objects: none where there are none."""
+    width, height = view.camera.width, view.camera.height
+    pixels = np.arange(width * height, dtype=np.intp)
+    if on_objects:
+        visibility = rasterize(view.geometry, view.camera)
+        pixels = np.flatnonzero(visibility.instances(view.geometry).ids)
+    if not len(pixels):
+        return np.zeros((0, 2))
+    chosen = pixels[rng.integers(len(pixels), size=count)]
+    corner = np.stack((chosen % width, chosen // width), axis=1).astype(np.float64)
+    return corner + (0.5 if on_objects else rng.random((count, 2)))  # a pixel's centre shows what the pixel says
+
+
+@dataclass(frozen=True, eq=False)
+class SampleViews:
+    """The views beside that of one sample: of a sensor at an instant of a shot."""
+
+    views: ShotViews
+    instant: int
+    sensor: int
+
+    @property
+    def sensors(self) -> Sequence[str]:
+        """Names of the rig's other sensors, in its order."""
+        return tuple(one.name for i, one in enumerate(self.views.shot.rig.sensors) if i != self.sensor)
+
+    def view(self, instants: int, sensor: str | None) -> View | None:
+        """That of a sensor, None for the sample's own, so many instants later; None without such a sensor or instant."""
+        instant = self.views.shot.instant_after(self.instant, instants)
+        names = [one.name for one in self.views.shot.rig.sensors]
+        if instant is None or (sensor is not None and sensor not in names):
+            return None
+        return self.views.view(instant, self.sensor if sensor is None else names.index(sensor))
+
+    @property
+    def followed(self) -> Followed:
+        """The points that the sample's sensor follows."""
+        return self.views.followed(self.sensor)
