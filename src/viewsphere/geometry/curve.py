@@ -51,16 +51,19 @@ class Curve:
 
     def at(self, length: ArrayLike) -> Float:
         """Points (..., D) at these lengths (...): beyond an open curve its end, and once more around a closed one."""
-        span, u = self._found(length)
-        c = self.cubics[span]
-        u = u[..., None]
-        return c[..., 0, :] + u * (c[..., 1, :] + u * (c[..., 2, :] + u * c[..., 3, :]))
+        return self.along(length)[0]
 
     def direction(self, length: ArrayLike) -> Float:
         """Unit vectors (..., D) along the curve at these lengths (...), as `at` counts them."""
+        return self.along(length)[1]
+
+    def along(self, length: ArrayLike) -> tuple[Float, Float]:
+        """Points and unit vectors along the curve, (..., D) each, at these lengths (...), as `at` counts them."""
         span, u = self._found(length)
-        slope = _slope(self.cubics[span], u)
-        return slope / _norm(slope)[..., None]
+        c, slope = self.cubics[span], _slope(self.cubics[span], u)
+        u = u[..., None]
+        points = c[..., 0, :] + u * (c[..., 1, :] + u * (c[..., 2, :] + u * c[..., 3, :]))
+        return points, slope / _norm(slope)[..., None]
 
     def _found(self, length: ArrayLike) -> tuple[NDArray[np.intp], Float]:
         """Span and u (...) of these lengths (...)."""

@@ -1,8 +1,8 @@
 """Motions: where a thing is at a time, and what of its file it shows. One module a kind, named as its file; none imports
 another.
 
-What a kind needs stands here: what it is asked (`Start`, `Pose`), where it may go (`Lane`), and how it turns on its way
-(`headed`). What a recipe says becomes a thing's motion by `motion_of`.
+What a kind needs stands here: what it is asked (`Start`, `Pose`), where it may go (`Lane`, `curve_through`), and how it
+turns on its way (`headed`). What a recipe says becomes a thing's motion by `motion_of`.
 """
 
 from __future__ import annotations
@@ -11,12 +11,16 @@ from collections.abc import Callable
 from typing import Any, Protocol
 
 from viewsphere.model.frozen import Frozen
+from viewsphere.model.numbers import Strength
+from viewsphere.recipe.draws import Drawn
 from viewsphere.sampling.motion._heading import Heading, headed, to_the_right
 from viewsphere.sampling.motion._made import check_motion, motion_of
 from viewsphere.sampling.motion._start import Origin, Pose, Start
+from viewsphere.sampling.motion._way import curve_through
 from viewsphere.zoo.places import Lane
 
 __all__ = [
+    "Amplitude",
     "Heading",
     "Lane",
     "Move",
@@ -25,10 +29,14 @@ __all__ = [
     "Pose",
     "Start",
     "check_motion",
+    "curve_through",
     "headed",
     "motion_of",
     "to_the_right",
 ]
+
+Amplitude = Drawn[tuple[Drawn[Strength], Drawn[Strength], Drawn[Strength]]]
+"""How far to either side, along or about x, y and z; 0 or more."""
 
 Move = Callable[[float, Pose], Pose | None]
 """The pose at a time, seconds from the sequence's first instant, of a thing that is at a pose without this motion; None where
