@@ -1,5 +1,6 @@
 """Motions of things: closed forms of every kind, composition, entering and leaving, mistakes, a motion of somebody else."""
 
+import re
 import sys
 from functools import partial
 from importlib.metadata import EntryPoint
@@ -10,15 +11,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from small import ROOT
 from viewsphere import plugins
 from viewsphere.assets.timeline import Timeline
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.box import box_vertices
 from viewsphere.model.model_spec import ModelSpec
+from viewsphere.recipe.file import read
 from viewsphere.recipe.motion import MotionEntry
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.sampling import motion
-from viewsphere.sampling.motion import Lane, Start, check_motion, motion_of
+from viewsphere.sampling.motion import Lane, Start, check_motion, check_motions, motion_of
 from viewsphere.sampling.placing import standing
 from viewsphere.sampling.seeds import generator
 from viewsphere.zoo.places.neighbourhood import neighbourhood
@@ -429,51 +432,46 @@ def test_a_plan_finds_mistakes_without_a_start():
         check_motion(entries({"kind": "clip"}, {"kind": "clip", "spedd": 3}), "scene.company.motion")
 
 
-CIRCLE = '''
-import math
-
-from pydantic import Field
-
-from viewsphere.model.frozen import Frozen
-
-
-class Options(Frozen):
-    """Around a circle."""
-
-    radius: float = Field(description="metres")
-
-
-def moves(options, start):
-    turn = start.rng("begin").random()
-    return lambda time, pose: pose.moved([options.radius * f(2 * math.pi * (turn + time)) for f in (math.cos, math.sin)] + [0])
-'''
+(FALL,) = (
+    block
+    for block in re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "extending.md").read_text("utf-8"), re.DOTALL)
+    if "def moves(" in block
+)
 
 
 @pytest.fixture(params=["entry point", "file beside the others"])
-def circle(request, tmp_path, monkeypatch):
-    """A motion of somebody's, in a package of their own or beside ours."""
+def fall(request, tmp_path, monkeypatch):
+    """The motion in the docs, in a package of somebody's or beside ours."""
     if request.param == "entry point":
-        name = "my_circle"
+        name = "my_fall"
         monkeypatch.syspath_prepend(tmp_path)
-        entry = EntryPoint("circle", name, "viewsphere.motions")
+        entry = EntryPoint("fall", name, "viewsphere.motions")
         monkeypatch.setattr(plugins, "entry_points", lambda group: (entry,) if group == entry.group else ())
     else:
-        name = "circle"
+        name = "fall"
         monkeypatch.setattr(motion, "__path__", [*motion.__path__, str(tmp_path)])
-    (tmp_path / f"{name}.py").write_text(CIRCLE)
+    (tmp_path / f"{name}.py").write_text(FALL)
     yield
     for module in (name, f"{motion.__name__}.{name}"):
         sys.modules.pop(module, None)
-    motion.__dict__.pop("circle", None)
+    motion.__dict__.pop("fall", None)
 
 
-@pytest.mark.usefixtures("circle")
-def test_a_motion_of_somebody_else_is_one_file():
-    assert plugins.names("motions").count("circle") == 1
-    found = poses({"kind": "circle", "radius": 3}, {"kind": "constant", "velocity": [0, 0, 1]})[:, :3, 3]
-    np.testing.assert_allclose(np.linalg.norm(found[:, :2] - [3, 4], axis=1), 3, atol=1e-9)
-    np.testing.assert_allclose(found[:, 2], TIMES + 0.5, atol=1e-9)
-    assert mistake({"kind": "circle"}) == f"{WHERE}.radius: expected a value; found nothing"
+@pytest.mark.usefixtures("fall")
+def test_the_motion_in_the_docs_is_one_file():
+    assert plugins.names("motions").count("fall") == 1
+    times = np.arange(0, 800) / 100
+    found = poses({"kind": "fall", "height": 2, "keeps": 0.5}, {"kind": "constant", "velocity": [1, 0, 0]}, times=times)
+    np.testing.assert_allclose(found[:, 0, 3], 3 + times, atol=1e-9)
+    height = found[:, 2, 3] - 0.5
+    lands = np.sqrt(2 * 2 / 9.81)
+    falling = times < lands
+    np.testing.assert_allclose(height[falling], 2 - 9.81 / 2 * times[falling] ** 2, atol=1e-9)
+    assert height[times > lands].max() == pytest.approx(0.5, abs=1e-3)  # half the speed: a quarter of the height
+    assert height.min() >= -1e-9 and height[-1] == 0
+    assert mistake({"kind": "fall"}) == f"{WHERE}.height: expected a value; found nothing"
+    drawn = {poses({"kind": "fall", "height": [1, 2]}, key=f"car_{i:03}", times=[0.0])[0, 2, 3] for i in range(9)}
+    assert len(drawn) == 9
 
 
 def recipe(*models, **fields):
@@ -524,3 +522,20 @@ def test_mistakes_of_recipes(fields, message):
 def test_the_motion_clip_takes_a_clips_name():
     made = recipe({"source": "walk.fbx", "category": "person", "clip": "Walk", "motion": {"kind": "clip"}})
     assert made.models[0].clip == "Walk"
+
+
+BLOCKS = re.findall(r"```yaml\n(.*?)```", (ROOT / "docs" / "motion.md").read_text("utf-8"), re.DOTALL)
+
+
+@pytest.mark.parametrize("block", BLOCKS)
+def test_every_block_of_the_page_is_a_recipe_with_motions(block, tmp_path):
+    (tmp_path / "recipe.yaml").write_text(block)
+    fields, _ = read(tmp_path / "recipe.yaml")
+    made = Recipe(**{"viewpoints": {"distance": 5}, "time": {"frames": 2}, **fields})
+    check_motions(made)
+    assert has_motion(made)
+
+
+def has_motion(made):
+    place = made.scene.place
+    return any(entry.motion for entry in made.models) or bool(place and place.motion)

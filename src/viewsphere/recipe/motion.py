@@ -51,17 +51,16 @@ class MotionEntry(Frozen):
 Motions = MotionEntry | tuple[MotionEntry, ...]
 """One motion, or several, of which each moves what the ones before it moved."""
 
-MotionField = (
-    Annotated[
-        Annotated[MotionEntry, Tag("mapping")] | Annotated[tuple[MotionEntry, ...], Field(min_length=1), Tag("list")],
-        Discriminator(
-            shape_of,
-            custom_error_type="motion",
-            custom_error_message="expected {kind: ...} or a list of these",
-        ),
-    ]
-    | None
-)
+MotionsField = Annotated[
+    Annotated[MotionEntry, Tag("mapping")] | Annotated[tuple[MotionEntry, ...], Field(min_length=1), Tag("list")],
+    Discriminator(
+        shape_of,
+        custom_error_type="motion",
+        custom_error_message="expected {kind: ...} or a list of these",
+    ),
+]
+
+MotionField = MotionsField | None
 
 MOTION = "under time, how it moves: {kind: constant, velocity: [0, -1, 0]}, or a list of motions, one upon another"
 

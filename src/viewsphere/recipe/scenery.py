@@ -13,7 +13,7 @@ from viewsphere.model.model_spec import Axis
 from viewsphere.model.numbers import FARTHEST, Count, Length, Metres, Number
 from viewsphere.recipe.draws import Drawn, is_random
 from viewsphere.recipe.models import ZOO, Unit
-from viewsphere.recipe.motion import MOTION, MotionField, Movable
+from viewsphere.recipe.motion import MOTION, MotionField, MotionsField, Movable
 from viewsphere.recipe.values import Interval, OrShort, Point, shape_of
 
 Draw = Literal["fixed", "per_model", "per_sequence", "per_frame"]
@@ -25,7 +25,7 @@ LABELS = "background, or own: every piece is an object with a category, boxes an
 OF_FILES = ("origin", "up", "forward", "unit", "category")
 
 
-class PlaceEntry(Frozen):
+class PlaceEntry(Movable):
     """Where the targets stand."""
 
     source: str = Field(min_length=1, description="zoo:<place>, such as zoo:neighbourhood, or a model file")
@@ -37,6 +37,9 @@ class PlaceEntry(Frozen):
     forward: Axis | None = Field(default=None, description="of a file: its axis that becomes -Y")
     unit: Unit | None = Field(default=None, description="of a file: m, cm, mm, in, ft or the metres in one unit")
     category: str = Field(default="", max_length=200, description="of a file with labels: own")
+    motion: Annotated[dict[Annotated[str, Field(min_length=1)], MotionsField], Field(min_length=1)] | None = Field(
+        default=None, description="under time, how pieces move, by patterns of their names: {tree_*: {kind: oscillate, ...}}"
+    )
 
     @property
     def name(self) -> str:

@@ -28,6 +28,7 @@ from viewsphere.sampling.scenery import (
     draw_names,
     draw_place,
     free_floor,
+    place_lanes,
     place_pieces,
     plane_images,
     plane_pieces,
@@ -39,6 +40,7 @@ from viewsphere.sampling.time_steps import TimedPoses
 from viewsphere.sampling.viewpoints import Poses
 from viewsphere.store import Category
 from viewsphere.zoo import build_zoo_model
+from viewsphere.zoo.places import Lane
 
 
 class BoxOf(Protocol):
@@ -47,6 +49,14 @@ class BoxOf(Protocol):
     def __call__(self, spec: ModelSpec, step: TimeStep | None = None, /) -> NDArray[np.float64]:
         """The box, float64."""
         ...
+
+
+Moved = Callable[[Thing, SceneryPiece], Thing]
+"""A piece of scenery with its motion."""
+
+
+def _as_it_stands(thing: Thing, piece: SceneryPiece) -> Thing:
+    return thing
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,14 +161,24 @@ class Composition(Sendable):
         place = self.recipe.scene.place
         return free_floor(self.recipe, place, draw_names(place.draw, subject, pose)) if place else None
 
-    def things(self, subject: str, targets: Sequence[Thing], pose: str | None, box_of: BoxOf) -> tuple[Thing, ...]:
-        """All that is placed: targets, labelled scenery, then the scenery that is background."""
+    def lanes(self, subject: str, pose: str | None) -> tuple[Lane, ...]:
+        """The lanes of the place where it stands, world axes; none where it has none."""
+        place = self.recipe.scene.place
+        return place_lanes(self.recipe, place, draw_names(place.draw, subject, pose)) if place else ()
+
+    def things(
+        self, subject: str, targets: Sequence[Thing], pose: str | None, box_of: BoxOf, moved: Moved = _as_it_stands
+    ) -> tuple[Thing, ...]:
+        """All that is placed: targets, labelled scenery, then the scenery that is background.
+
+        `moved` gives pieces of scenery that the recipe moves (`piece.motion`) their motion.
+        """
         pieces = self._pieces(subject, targets, pose, box_of)
         labelled = [p for p in pieces if p.labels == "own"]
         rest = [p for p in pieces if p.labels != "own"]
         ids = [*range(len(targets) + 1, len(targets) + len(labelled) + 1), *[0] * len(rest)]
         return tuple(targets) + tuple(
-            Thing(id=i, model=p.model, motion=Motion.still(p.world_from_piece), scenery=True)
+            moved(Thing(id=i, model=p.model, motion=Motion.still(p.world_from_piece), scenery=True), p)
             for i, p in zip(ids, labelled + rest, strict=True)
         )
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from fnmatch import fnmatchcase
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, Protocol
@@ -17,17 +18,19 @@ from viewsphere import plugins
 from viewsphere.assets.inside import split_source
 from viewsphere.errors import ModelError, RecipeError, UserError
 from viewsphere.geometry.box import box_vertices
-from viewsphere.geometry.rotation import compose
-from viewsphere.model.mistakes import one_of
+from viewsphere.geometry.rotation import compose, transform
+from viewsphere.model.mistakes import nearest, one_of
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Matrix4
 from viewsphere.recipe.draws import drawn
 from viewsphere.recipe.models import ZOO, unit_metres
+from viewsphere.recipe.motion import Motions
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.scenery import Labels, PlaceEntry, PlaneEntry
 from viewsphere.sampling.pictures import IMAGE_SUFFIXES, files_in, proportions
 from viewsphere.sampling.placing import Footprint, footprint, standing
 from viewsphere.sampling.seeds import Names, generator, scene_generators, share
+from viewsphere.zoo.places import Lane
 
 TRIES = 200
 """Spots that are tried for one plane."""
@@ -45,11 +48,17 @@ class Naming(Protocol):
 
 @dataclass(frozen=True)
 class SceneryPiece:
-    """A model and where it stands; `labels` says whether it is an object of its own."""
+    """A model and where it stands; `labels` says whether it is an object of its own.
+
+    name: unique in its place; motion: how it moves under time, as the recipe's `field` says.
+    """
 
     model: ModelSpec
     world_from_piece: Matrix4
     labels: Labels
+    name: str = ""
+    motion: Motions | None = None
+    field: str = ""
 
 
 def draw_names(draw: str, model: str, pose: str | None) -> Names:
@@ -62,11 +71,17 @@ def draw_names(draw: str, model: str, pose: str | None) -> Names:
 def place_pieces(recipe: Recipe, entry: PlaceEntry, names: Names, category_id: Naming) -> tuple[SceneryPiece, ...]:
     """The place's pieces, turned as the entry says; of a file there is one.
 
-    Raises RecipeError for an unknown place and for a file that is not there.
+    Raises RecipeError for an unknown place, for a file that is not there, and for motions of pieces that it does not have.
     """
     world_from_place = _turned(recipe, entry, names)
-    if not entry.name:
-        return (_place_file(recipe, entry, world_from_place, category_id),)
+    if entry.name:
+        return _moving(entry, _laid_pieces(recipe, entry, world_from_place, names, category_id))
+    return _moving(entry, (_place_file(recipe, entry, world_from_place, category_id),))
+
+
+def _laid_pieces(
+    recipe: Recipe, entry: PlaceEntry, world_from_place: Matrix4, names: Names, category_id: Naming
+) -> tuple[SceneryPiece, ...]:
     laid = draw_place(recipe.seed, entry.name, names)
     pieces: list[SceneryPiece] = []
     for piece in laid.pieces:
@@ -78,8 +93,41 @@ def place_pieces(recipe: Recipe, entry: PlaceEntry, names: Names, category_id: N
             category_id=category_id(piece.category, entry.labels),
             centring="as_is",
         )
-        pieces.append(SceneryPiece(spec, _composed(world_from_place, piece.world_from_piece), entry.labels))
+        pieces.append(SceneryPiece(spec, _composed(world_from_place, piece.world_from_piece), entry.labels, piece.name))
     return tuple(pieces)
+
+
+def _moving(entry: PlaceEntry, pieces: tuple[SceneryPiece, ...]) -> tuple[SceneryPiece, ...]:
+    """The pieces with their motions: the first pattern that a piece's name matches counts."""
+    motions = entry.motion or {}
+    for pattern in motions:
+        if not any(fnmatchcase(piece.name, pattern) for piece in pieces):
+            known = sorted({piece.name.rstrip("0123456789") + "*" for piece in pieces})
+            raise RecipeError(
+                f"scene.place.motion: expected patterns of its pieces' names, such as {', '.join(known)}; found {pattern!r}"
+                f"{nearest(pattern, known)}"
+            )
+    return tuple(_with_motion(piece, motions) for piece in pieces)
+
+
+def _with_motion(piece: SceneryPiece, motions: Mapping[str, Motions]) -> SceneryPiece:
+    for pattern, motion in motions.items():
+        if fnmatchcase(piece.name, pattern):
+            return replace(piece, motion=motion, field=f"scene.place.motion.{pattern}")
+    return piece
+
+
+def place_lanes(recipe: Recipe, entry: PlaceEntry | None, names: Names) -> tuple[Lane, ...]:
+    """The lanes of a place where it stands, world axes; none where it has none."""
+    if entry is None or not entry.name:
+        return ()
+    world_from_place = np.array(_turned(recipe, entry, names))
+    return tuple(_carried(lane, world_from_place) for lane in draw_place(recipe.seed, entry.name, names).lanes)
+
+
+def _carried(lane: Lane, world_from_place: NDArray[np.float64]) -> Lane:
+    points: Any = tuple(map(tuple, transform(world_from_place, lane.points).tolist()))
+    return replace(lane, points=points)
 
 
 @lru_cache(maxsize=16)
@@ -132,7 +180,7 @@ def _place_file(recipe: Recipe, entry: PlaceEntry, world_from_place: Matrix4, ca
     )
     x, y, z = entry.origin
     moved = ((1.0, 0.0, 0.0, -x), (0.0, 1.0, 0.0, -y), (0.0, 0.0, 1.0, -z), (0.0, 0.0, 0.0, 1.0))
-    return SceneryPiece(spec, _composed(world_from_place, moved), entry.labels)
+    return SceneryPiece(spec, _composed(world_from_place, moved), entry.labels, path.stem)
 
 
 def scenery_key(name: str, rest: str) -> str:

@@ -199,18 +199,26 @@ def _steps(
     path: Path, confined: bool, frames: Frames, where: str, blenders: Blenders, clip: str | None = None
 ) -> tuple[Timeline, tuple[tuple[int, Moment], ...]]:
     """When the file begins and ends, and the frames that are meant of it with their moments."""
-    try:
-        line = blenders.timeline(path, confined, clip)
-    except ModelError as error:
-        raise RecipeError(f"{where}.frames: {error}") from None
-    if not line.moves:
-        raise RecipeError(f"{where}.frames: expected a file in which something moves; found no animation in {path}")
+    line = animation(path, confined, clip, f"{where}.frames", blenders)
     chosen = chosen_frames(frames, line.first, line.last)
     beyond = [frame for frame in chosen if not line.first <= frame <= line.last]
     if beyond or not chosen:
         found = f"{beyond[0]}" if beyond else "none of them"
         raise RecipeError(f"{where}.frames: expected frames of {line.first} to {line.last}, as {path} has; found {found}")
     return line, tuple((frame, Moment(frame=frame, seconds=line.seconds(frame))) for frame in chosen)
+
+
+def animation(path: Path, confined: bool, clip: str | None, field: str, blenders: Blenders) -> Timeline:
+    """When a file begins and ends while this clip plays, None: its first one. Raises RecipeError, which begins with the field,
+    for a file that cannot be read, for a clip that it does not have, and where nothing moves.
+    """
+    try:
+        line = blenders.timeline(path, confined, clip)
+    except ModelError as error:
+        raise RecipeError(f"{field}: {error}") from None
+    if not line.moves:
+        raise RecipeError(f"{field}: expected a file in which something moves; found no animation in {path}")
+    return line
 
 
 def at_step(timing: Timing | None, number: int | None) -> TimeStep | None:

@@ -14,7 +14,7 @@ from viewsphere.model.frozen import Frozen
 from viewsphere.model.numbers import Strength
 from viewsphere.recipe.draws import Drawn
 from viewsphere.sampling.motion._heading import Heading, headed, to_the_right
-from viewsphere.sampling.motion._made import check_motion, motion_of
+from viewsphere.sampling.motion._made import check_motion, check_motions, motion_of
 from viewsphere.sampling.motion._start import Origin, Pose, Start
 from viewsphere.sampling.motion._way import curve_through
 from viewsphere.zoo.places import Lane
@@ -29,6 +29,7 @@ __all__ = [
     "Pose",
     "Start",
     "check_motion",
+    "check_motions",
     "curve_through",
     "headed",
     "motion_of",

@@ -19,6 +19,7 @@ from viewsphere.model.scene import Matrix4
 from viewsphere.model.thing import Motion, TimeStep
 from viewsphere.recipe.draws import RngOf, drawn
 from viewsphere.recipe.motion import MotionEntry, Motions, listed
+from viewsphere.recipe.recipe import Recipe
 from viewsphere.sampling.motion._start import Pose, Start
 
 if TYPE_CHECKING:
@@ -28,6 +29,26 @@ T = TypeVar("T")
 
 DIGITS = 10
 """Decimals that poses are recorded with, 1e-10 m: beyond these, sines differ between processors."""
+
+
+def check_motions(recipe: Recipe) -> None:
+    """Raise RecipeError for the first of a recipe's motions that cannot be: without `time`, or as `check_motion` says."""
+    for field, motions in _all_motions(recipe):
+        if recipe.time is None:
+            raise RecipeError(f"{field}: expected time beside motions; found none: set time, such as time: {{frames: 50}}")
+        check_motion(motions, field)
+
+
+def _all_motions(recipe: Recipe) -> Iterator[tuple[str, Motions]]:
+    """All that a recipe says of motions, with their fields."""
+    place, company = recipe.scene.place, recipe.scene.company
+    for i, entry in enumerate(recipe.models):
+        if entry.motion is not None:
+            yield f"models[{i}].motion", entry.motion
+    if company is not None and company.motion is not None:
+        yield "scene.company.motion", company.motion
+    for pattern, motions in (place.motion or {} if place else {}).items():
+        yield f"scene.place.motion.{pattern}", motions
 
 
 def check_motion(motions: Motions | None, field: str) -> None:
