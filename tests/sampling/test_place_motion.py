@@ -13,6 +13,7 @@ from viewsphere.recipe.recipe import Recipe
 from viewsphere.sampling.composition import compose
 from viewsphere.sampling.motion import Start, check_motions, motion_of
 from viewsphere.sampling.placing import standing
+from viewsphere.sampling.plan import plan
 from viewsphere.sampling.scenery import place_lanes, place_pieces
 from viewsphere.sampling.seeds import generator
 from viewsphere.zoo.street import lanes
@@ -127,3 +128,18 @@ def test_motions_take_time():
 def test_mistakes_of_a_place_s_motions():
     with pytest.raises(RecipeError, match=r"scene\.place\.motion\.tree_1\.kind: expected a value; found nothing"):
         recipe({"source": "zoo:neighbourhood", "motion": {"tree_1": {}}})
+
+
+def test_a_sequence_in_a_place_moves_its_cars_and_its_pieces():
+    place = {
+        "source": "zoo:neighbourhood",
+        "turn": 90,
+        "motion": {"wheelie_bin_*": {"kind": "constant", "velocity": [0, 0, 1]}},
+    }
+    car = {"source": "zoo:car", "motion": {"kind": "path", "lane": "left", "speed": 10}}
+    shot = plan(recipe(place, models=[car], time={"frames": 3, "fps": 2})).shot(0, lambda spec, step=None: BOX)
+    moving = {thing.model.source: thing.motion for thing in shot.things if not thing.motion.is_still}
+    assert set(moving) == {"zoo:car", "zoo:wheelie_bin"}
+    for source, way in (("zoo:car", [5, 0, 0]), ("zoo:wheelie_bin", [0, 0, 0.5])):
+        spots = np.array(moving[source].poses)[:, :3, 3]
+        np.testing.assert_allclose(np.diff(spots, axis=0), [way, way], atol=1e-9)

@@ -29,6 +29,7 @@ from viewsphere.sampling.checks import (
 )
 from viewsphere.sampling.composition import BoxOf, compose
 from viewsphere.sampling.models import categories, numbered_specs
+from viewsphere.sampling.motion import check_motions
 from viewsphere.sampling.pictures import check_pictures, proportions, scene_pictures
 from viewsphere.sampling.recipe_warnings import hidden_by_exposure, no_light, out_of_view
 from viewsphere.sampling.rigs import rig_of
@@ -226,6 +227,7 @@ def plan(recipe: Recipe, shot_frames: int | None = None) -> Plan:
         check_blend(recipe)
         check_catcher(recipe)
         check_splits(recipe)
+        check_motions(recipe)
         views = poses_of(recipe.viewpoints, recipe.time, recipe.seed, recipe.folder)
         rig = rig_of(recipe, lens(recipe, views))
         check_frames(recipe, views)

@@ -15,11 +15,12 @@ from viewsphere.model.thing import Motion, Thing
 from viewsphere.recipe.motion import Motions
 from viewsphere.recipe.sequence import TimeEntry
 from viewsphere.sampling.composition import BoxOf, center, center_of_all, still
-from viewsphere.sampling.motion import Start, motion_of
+from viewsphere.sampling.motion import Lane, Start, motion_of
 from viewsphere.sampling.placing import standing
 from viewsphere.sampling.samplers._random import scene_things
 from viewsphere.sampling.samplers._stock import Stock
-from viewsphere.sampling.seeds import generator
+from viewsphere.sampling.scenery import SceneryPiece
+from viewsphere.sampling.seeds import Names, generator
 from viewsphere.sampling.sequence_poses import TrajectoryPoses
 from viewsphere.sampling.trajectories import RigPose, World, shaken
 from viewsphere.sampling.trajectories import standing as steady
@@ -59,8 +60,19 @@ def course(stock: Stock, subject: str, start: int, box_of: BoxOf) -> Course:
     around = stock.scene_pose(start)
     targets = placed_targets(stock, subject, around, box_of)
     focus = middle(targets, box_of)
-    things = targets if stock.composition is None else stock.composition.things(subject, targets, around, box_of)
-    moved = (_moved(stock, thing, i, (subject, stock.pose_list.place(start)), box_of) for i, thing in enumerate(targets))
+    names = (subject, stock.pose_list.place(start))
+    lanes = () if stock.composition is None else stock.composition.lanes(subject, around)
+
+    def piece_moved(thing: Thing, piece: SceneryPiece) -> Thing:
+        return _moved(stock, thing, piece.motion, piece.field, (*names, piece.name), lanes, box_of)
+
+    things = targets
+    if stock.composition is not None:
+        things = stock.composition.things(subject, targets, around, box_of, piece_moved)
+    moved = (
+        _moved(stock, thing, *_motions(stock, thing.model, i), (*names, str(i), thing.model.key), lanes, box_of)
+        for i, thing in enumerate(targets)
+    )
     things = stock.repainted((*moved, *things[len(targets) :]), subject, start)
     return Course(things, focus, _rig(stock, things, focus, subject, start, box_of))
 
@@ -80,21 +92,23 @@ def middle(things: Sequence[Thing], box_of: BoxOf) -> Vector:
     return center(things[0], box_of) if len(things) == 1 else center_of_all(things, box_of)
 
 
-def _moved(stock: Stock, thing: Thing, slot: int, names: tuple[str, str], box_of: BoxOf) -> Thing:
-    """A target with its motion over the whole sequence."""
-    time, company = time_of(stock), stock.recipe.scene.company
-    motions, field = _motions(stock, thing.model)
-    if slot and company is not None:
-        motions, field = company.motion, "scene.company.motion"
+def _moved(
+    stock: Stock, thing: Thing, motions: Motions | None, field: str, names: Names, lanes: tuple[Lane, ...], box_of: BoxOf
+) -> Thing:
+    """A thing with its motion over the whole sequence, drawn for these names."""
     if motions is None:
         return thing
-    rng = partial(generator, stock.recipe.seed, "motion", *names, str(slot), thing.model.key)
+    time, rng = time_of(stock), partial(generator, stock.recipe.seed, "motion", *names)
     times = [time.at(i) for i in range(time.count)]
-    start = Start(thing.world_from_object, thing.model, box_of(thing.model), times[-1], rng, field=field)
+    start = Start(thing.world_from_object, thing.model, box_of(thing.model), times[-1], rng, lanes, field=field)
     return thing.model_copy(update={"motion": motion_of(motions, start, times)})
 
 
-def _motions(stock: Stock, spec: ModelSpec) -> tuple[Motions | None, str]:
+def _motions(stock: Stock, spec: ModelSpec, slot: int) -> tuple[Motions | None, str]:
+    """How a target moves: its model's way, or in company as the recipe says of distractors; and the recipe's field."""
+    company = stock.recipe.scene.company
+    if slot and company is not None:
+        return company.motion, "scene.company.motion"
     number = stock.entries[stock.position[spec.key]]
     return stock.recipe.models[number].motion, f"models[{number}].motion"
 
