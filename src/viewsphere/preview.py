@@ -57,7 +57,8 @@ def preview_samples(recipe: Recipe, count: int = 12, width: int = 320) -> Iterat
 def dataset_samples(dataset: Dataset, count: int = 12) -> list[Sample]:
     """`count` frames spread evenly over a data set."""
     picks = np.unique(np.linspace(0, len(dataset) - 1, min(count, len(dataset))).round().astype(int))
-    return [dataset[int(i)] for i in picks]
+    found = [dataset[int(i)] for i in picks]
+    return [sample for sample in found if sample.picture_file] or found  # some sensors may keep labels alone
 
 
 def _spread(planned: Plan, count: int) -> list[tuple[str, list[list[int]]]]:

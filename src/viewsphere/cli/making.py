@@ -11,7 +11,7 @@ import typer
 
 from viewsphere.cli import completion
 from viewsphere.cli.arguments import AsJson, Changes, Formats, RecipeFile, cores, load_recipe, split
-from viewsphere.cli.next_step import for_render
+from viewsphere.cli.next_step import for_command, for_render
 from viewsphere.cli.terminal import ProgressBar, print_estimate, print_json, print_plan, print_summary, write, write_picture
 from viewsphere.errors import StoreError, UserError
 
@@ -54,8 +54,9 @@ def schema() -> None:
 
 def inspect(
     model: Annotated[
-        str, typer.Argument(help="Model file, or zoo:<family>.", show_default=False, autocompletion=completion.models)
-    ],
+        str | None,
+        typer.Argument(help="Model file, or zoo:<family>.", show_default=False, autocompletion=completion.models),
+    ] = None,
     output: Annotated[
         Path | None,
         typer.Option("-o", "--output", help="Where the picture goes; default: beside you, <model>-sides.png."),
@@ -68,12 +69,27 @@ def inspect(
     ] = None,
     unit: Annotated[float | None, typer.Option(help="Metres in one unit; default: the file's.")] = None,
     seed: Annotated[int, typer.Option(help="Which draw of a zoo family.")] = 0,
+    rig: Annotated[
+        Path | None,
+        typer.Option(
+            help="Instead of a model: a recipe, whose sensors are shown, also as <recipe>-rig.glb.", show_default=False
+        ),
+    ] = None,
+    changes: Changes = None,
     json_: AsJson = False,
 ) -> None:
-    """Show a model's size, axes, parts, materials, textures and warnings, and a picture from four sides."""
+    """Show a model's size, axes, parts, materials, textures and warnings, and a picture from four sides; or a recipe's rig."""
     from viewsphere.preview import four_sides
     from viewsphere.run.inspection import inspect_model, model_spec, report_lines
 
+    if (model is None) == (rig is None):
+        raise UserError(
+            for_command("inspect") if rig is None else f"inspect: expected a model or --rig; found {model} and --rig"
+        )
+    if rig is not None:
+        _inspect_rig(rig, output, changes, json_)
+        return
+    assert model is not None
     _announce_compilation()
     spec = model_spec(model, up=up, forward=forward, unit=unit, seed=seed)
     report = inspect_model(spec)
@@ -85,6 +101,29 @@ def inspect(
     for line in report_lines(report):
         typer.echo(line)
     typer.echo(f"picture from four sides: {picture} (the first view must show the front; if not, set up and forward)")
+
+
+def _inspect_rig(recipe: Path, output: Path | None, changes: list[str] | None, json_: bool) -> None:
+    """Show the sensors of a recipe: in words, as a model (GLB), and in a picture of this model from four sides."""
+    from viewsphere.assets.glb import glb_bytes
+    from viewsphere.preview import four_sides
+    from viewsphere.run.inspection import model_spec
+    from viewsphere.run.rig_view import recipe_rig, rig_lines, rig_mesh, sensor_facts
+
+    shown = recipe_rig(load_recipe(recipe, changes))
+    _announce_compilation()
+    picture = output or Path(f"{recipe.stem}-rig.png")
+    frusta = picture.with_suffix(".glb")
+    write(frusta, glb_bytes(rig_mesh(shown)))
+    write_picture(picture, four_sides(model_spec(str(frusta))))
+    if json_:
+        sensors = [asdict(facts) for facts in sensor_facts(shown)]
+        pairs = [pair._asdict() for pair in shown.rectified]
+        print_json({"sensors": sensors, "rectified": pairs, "model": str(frusta), "picture": str(picture)})
+        return
+    for line in rig_lines(shown):
+        typer.echo(line)
+    typer.echo(f"frusta: {frusta} (front: ahead of the first sensor); from four sides: {picture}")
 
 
 def plan(

@@ -11,7 +11,7 @@ from viewsphere.model.camera import Distortion
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.mistakes import shown
 from viewsphere.model.numbers import Count, Length, Metres, Number, Positive
-from viewsphere.recipe.scene import CameraEntry, Pixels, Row
+from viewsphere.recipe.scene import CameraEntry, CameraMatrix, Pixels, Row
 from viewsphere.recipe.values import OrShort, pair
 
 MOST_SENSORS = 64
@@ -51,7 +51,7 @@ class SensorEntry(Frozen):
     focal_px: Annotated[tuple[Positive, Positive], BeforeValidator(pair), OrShort({"type": "number"})] | None = Field(
         default=None, description="as in camera"
     )
-    K: tuple[Row, Row, Row] | None = Field(default=None, description="as in camera")
+    K: CameraMatrix | None = Field(default=None, description="as in camera")
     distortion: Distortion | None = Field(
         default=None, description="as in camera, whose own is left out where a sensor has a lens of its own"
     )

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 from typing import Annotated, Any, Literal, cast
 
-from pydantic import BeforeValidator, ConfigDict, Field, JsonValue, field_validator, model_validator
+from pydantic import AfterValidator, BeforeValidator, ConfigDict, Field, JsonValue, field_validator, model_validator
 
 from viewsphere.geometry.camera import focal_from_fov, focal_from_sensor
 from viewsphere.model.camera import Distortion, Intrinsics
@@ -41,6 +41,15 @@ Row = tuple[Number, Number, Number]
 Pixels = Annotated[Count, Field(le=LARGEST_IMAGE)]
 
 
+def _of_pinhole(value: tuple[Row, Row, Row]) -> tuple[Row, Row, Row]:
+    if value[0][0] <= 0 or value[1][0] != 0 or value[1][1] <= 0 or value[2] != (0, 0, 1):
+        raise ValueError("expected [[fx, skew, cx], [0, fy, cy], [0, 0, 1]] with fx and fy above 0")
+    return value
+
+
+CameraMatrix = Annotated[tuple[Row, Row, Row], AfterValidator(_of_pinhole)]
+
+
 class CameraEntry(Frozen):
     """Image size, and one description of the lens."""
 
@@ -56,7 +65,7 @@ class CameraEntry(Frozen):
     sensor_mm: Positive | tuple[Positive, Positive] | None = Field(
         default=None, description="sensor width in millimetres (square pixels), or [width, height]"
     )
-    K: tuple[Row, Row, Row] | None = Field(
+    K: CameraMatrix | None = Field(
         default=None,
         description="full 3x3 camera matrix in pixels, origin at the image's corner (centre: width/2, height/2)",
     )
@@ -77,13 +86,6 @@ class CameraEntry(Frozen):
         numbers = [v for v in cast(tuple[Any, ...], sizes) if isinstance(v, (int, float)) and v is not True and v > 0]
         if value is not None and (len(numbers) != len(sizes) or len(sizes) > 2):
             raise ValueError(f"expected millimetres above 0, one number or [width, height]; found {shown(value)}")
-        return value
-
-    @field_validator("K")
-    @classmethod
-    def _pinhole(cls, value: tuple[Row, Row, Row] | None) -> tuple[Row, Row, Row] | None:
-        if value and (value[0][0] <= 0 or value[1][0] != 0 or value[1][1] <= 0 or value[2] != (0, 0, 1)):
-            raise ValueError("expected [[fx, skew, cx], [0, fy, cy], [0, 0, 1]] with fx and fy above 0")
         return value
 
     @model_validator(mode="after")

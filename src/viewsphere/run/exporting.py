@@ -9,6 +9,9 @@ from pathlib import Path
 from viewsphere import plugins
 from viewsphere.errors import UserError
 from viewsphere.formats import Format
+from viewsphere.model.channel import missing
+from viewsphere.model.rig import CAMERA
+from viewsphere.model.sample import Sample
 from viewsphere.run.progress import Listener, Progress, unheard
 from viewsphere.store import Choice, Dataset, new_folder
 from viewsphere.store.checksums import write_checksums
@@ -61,15 +64,27 @@ def write(dataset: Dataset, folders: Mapping[str, Path], tell: Listener = unhear
     notes: list[str] = []
     total = len(dataset)
     with ExitStack() as stack:
-        adds = [stack.enter_context(_format(name).writer(dataset, folder, notes.append)) for name, folder in folders.items()]
+        formats = {name: _format(name) for name in folders}
+        adds = {name: stack.enter_context(formats[name].writer(dataset, at, notes.append)) for name, at in folders.items()}
         for done, sample in enumerate(dataset):
             tell(Progress("exports", done, total))
-            for add in adds:
+            for name, add in adds.items():
+                _check_sensor(dataset, name, formats[name], sample)
                 add(sample)
     for folder in folders.values():
         write_checksums(folder)
     tell(Progress("exports", total, total))
     return tuple(notes)
+
+
+def _check_sensor(dataset: Dataset, name: str, module: Format, sample: Sample) -> None:
+    """Raise UserError where a sensor keeps less than all channels, and lacks one that the format needs of every frame."""
+    lacking = missing(getattr(module, "CHANNELS", ()), sample.files)
+    if sample.sensor != CAMERA and lacking:
+        raise UserError(
+            f"{dataset.root}: format {name}: expected channel {lacking[0]} of every frame, found none of sensor "
+            f"{sample.sensor} (frame {sample.index}): leave {name} out, or render that sensor with {lacking[0]}"
+        )
 
 
 def writable(name: str) -> Format:

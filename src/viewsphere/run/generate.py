@@ -7,7 +7,7 @@ import time
 from collections import Counter
 from collections.abc import Container, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
-from itertools import chain
+from itertools import chain, product
 from pathlib import Path
 
 from viewsphere import plugins
@@ -79,8 +79,8 @@ def generate(
     if portion.number:  # what is there would be out of date
         wanted += tuple(n for n in plugins.names("formats") if n not in wanted and (store.root / n).is_dir())
     with recipe.located():
-        for name in wanted:
-            _check_channels(name, portion.record.channels)
+        for name, sensor in product(wanted, planned.rig.sensors):
+            _check_channels(name, sensor.kept(portion.record.channels), "" if sensor.channels is None else sensor.name)
     if portion.number:
         store.make_ready()
     else:
@@ -104,13 +104,16 @@ def generate(
     return Summary(store.root, len(dataset), rendered, skipped, time.monotonic() - begun, wanted, notes, warnings)
 
 
-def _check_channels(name: str, channels: Sequence[str]) -> None:
-    """Raises UserError for a format that is not known, does not work here, or needs a channel which is not kept."""
+def _check_channels(name: str, channels: Sequence[str], sensor: str) -> None:
+    """Raises UserError for a format that is not known, does not work here, or needs a channel which is not kept; `sensor` names
+    the one that keeps but these.
+    """
     needed: Sequence[str] = getattr(writable(name), "CHANNELS", ())
     lacking = missing(needed, channels)
     if lacking:
+        where = f"rig.sensors.{sensor}.channels" if sensor else "channels"
         raise RecipeError(
-            f"channels: expected {lacking[0]}, which format {name} needs; found {', '.join(channels)}: "
+            f"{where}: expected {lacking[0]}, which format {name} needs; found {', '.join(channels)}: "
             f"add it, or leave {name} out of formats"
         )
 

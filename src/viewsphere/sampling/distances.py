@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,15 +16,19 @@ from viewsphere.geometry.rotation import transform
 from viewsphere.model.instant import Viewpoint
 from viewsphere.model.scene import Vector
 from viewsphere.model.thing import Thing
-from viewsphere.sampling.camera import distance_problem, inside_box
+from viewsphere.sampling.camera import distance_problem, inside_box, looking
 from viewsphere.sampling.composition import BoxOf
 from viewsphere.sampling.plan import Plan
+from viewsphere.sampling.samplers import Standing
 from viewsphere.sampling.viewpoints import Poses
 
 Float = NDArray[np.float64]
 
 MOST_CAMERAS = 20_000
 """Poses of a model that are looked at beforehand, evenly over all; the others are when their shot is rendered."""
+
+MOST_RIGS = 1000
+"""Poses of a model for which all sensors of a rig are looked at beforehand, evenly over all."""
 
 MOST_PAIRS = 1_000_000
 """Likewise of all models together."""
@@ -53,7 +58,34 @@ class Distances:
                     view = there.views[poses[int(np.flatnonzero(inside)[0])]]
                     pose = self.plan.viewpoint(subject, view, there.target)
                     return RecipeError(f"viewpoints.distance: {distance_problem(pose, box)} (model {thing.key})")
+            if problem := self._of_other_sensors(there, poses[:: -(-len(poses) // MOST_RIGS)], subject):
+                return problem
         return None
+
+    def _of_other_sensors(self, there: Standing, poses: Sequence[int], subject: str) -> RecipeError | None:
+        """The first pose at which a sensor that is not the rig's first one would stand inside an object's box."""
+        others = self.plan.rig.sensors[1:]
+        if not others:
+            return None
+        x, y, z = self._middle(there.things).tolist() if there.target is None else there.target
+        views = [self.plan.viewpoint(subject, there.views[i], (x, y, z)) for i in poses]
+        rigs = [looking(view, (x, y, z), index=0).world_from_rig for view in views]
+        boxes = [(thing, transform(thing.world_from_object, self.box_of(thing.model, thing.step))) for thing in there.things]
+        for sensor, (thing, box) in product(others, boxes):
+            centers = np.array([transform(rig, np.array(sensor.rig_from_sensor)[:3, 3]) for rig in rigs])
+            for i in np.flatnonzero(inside_box(box, centers)):
+                place = ", ".join(f"{v:.3g}" for v in centers[i])
+                return RecipeError(
+                    f"rig: expected all sensors outside of the models; found {sensor.name} at ({place}) inside the box of "
+                    f"model {thing.key} (pose {views[i].index}): move the sensor nearer to the first one, or the rig away"
+                )
+        return None
+
+    def _middle(self, things: Sequence[Thing]) -> Float:
+        """The middle (3,) of the targets."""
+        targets = [thing for thing in things if thing.id and not thing.scenery]
+        corners = np.concatenate([transform(t.world_from_object, self.box_of(t.model, t.step)) for t in targets])
+        return corners.mean(axis=0) if len(targets) == 1 else (corners.min(axis=0) + corners.max(axis=0)) / 2
 
     def cameras(
         self,
@@ -66,10 +98,7 @@ class Distances:
         """Where the cameras of these poses of a subject (by default the plan's first) stand, (poses, 3) world metres, when
         these things are placed; they look at `target`, by default at the middle of what is placed.
         """
-        targets = [thing for thing in things if thing.id and not thing.scenery]
-        corners = np.concatenate([transform(t.world_from_object, self.box_of(t.model, t.step)) for t in targets])
-        middle = corners.mean(axis=0) if len(targets) == 1 else (corners.min(axis=0) + corners.max(axis=0)) / 2
-        middle = middle if target is None else np.array(target)
+        middle = self._middle(things) if target is None else np.array(target)
         subject, views = subject or self.plan.subjects[0], views or self.plan.pose_list
         if not self.plan.scenes.is_jittered:
             offsets, own = self._stand(poses, views)

@@ -11,14 +11,14 @@ from viewsphere.errors import RecipeError
 LARGEST_FILE = 1 << 30
 
 
-def read_text(path: Path) -> str:
+def read_text(path: Path, of: str = "poses") -> str:
     """The text of a file in UTF-8; raises RecipeError if there is none."""
     try:
         if path.stat().st_size > LARGEST_FILE:
             raise RecipeError(f"{path}: expected a file of at most {LARGEST_FILE:,} bytes; found {path.stat().st_size:,}")
         return path.read_text("utf-8-sig")
     except OSError as error:
-        raise RecipeError(f"{path}: expected a readable file of poses; found: {error.strerror or error}") from None
+        raise RecipeError(f"{path}: expected a readable file of {of}; found: {error.strerror or error}") from None
     except UnicodeDecodeError:
         raise RecipeError(f"{path}: expected text in UTF-8; found something else") from None
 

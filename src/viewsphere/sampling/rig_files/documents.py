@@ -34,7 +34,7 @@ def read_document(path: Path) -> dict[str, Any]:
 
     OpenCV writes `%YAML:1.0`, which is no directive of YAML (https://docs.opencv.org/4.x/da/d56/group__core__xml.html).
     """
-    text = read_text(path)
+    text = read_text(path, "a calibration")
     if len(text) > LARGEST:
         raise RecipeError(f"{path}: expected a calibration of at most {LARGEST:,} characters; found {len(text):,}")
     if text.startswith("%YAML:"):

@@ -1,0 +1,197 @@
+"""What `viewsphere inspect --rig` says and shows of a rig: its sensors as text, and their frusta as a model."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.assets.mesh import Material, Mesh
+from viewsphere.geometry.camera import pixel_rays
+from viewsphere.geometry.rotation import transform
+from viewsphere.model.camera import Intrinsics
+from viewsphere.model.rig import Rig, Sensor
+from viewsphere.recipe.recipe import Recipe
+from viewsphere.sampling.rigs import rig_of
+from viewsphere.sampling.samplers import lens
+from viewsphere.sampling.viewpoints import poses
+
+Float = NDArray[np.float64]
+
+COLORS = {
+    "blue": (0.05, 0.18, 0.6),
+    "orange": (0.9, 0.25, 0.02),
+    "green": (0.04, 0.4, 0.06),
+    "red": (0.65, 0.02, 0.02),
+    "purple": (0.3, 0.12, 0.5),
+    "brown": (0.25, 0.1, 0.06),
+    "pink": (0.8, 0.18, 0.5),
+    "grey": (0.2, 0.2, 0.2),
+    "olive": (0.5, 0.5, 0.02),
+    "cyan": (0.01, 0.5, 0.6),
+}
+"""Of the sensors, one after another; linear."""
+
+DEPTH = 0.75
+"""Length of a frustum's edges, times the largest distance between two sensors."""
+
+LEAST_DEPTH = 0.1
+"""Metres."""
+
+BAR, BODY = 0.012, 0.1
+"""Thickness of a frustum's edges and width of a camera's body, times the length of the edges."""
+
+ALONG = 8
+"""Pieces of each side of a picture's border, which lenses bend."""
+
+
+@dataclass(frozen=True)
+class SensorFacts:
+    """A sensor in words: `fov_deg` across and down; `position` in metres and `rotation` in degrees as recipes write them."""
+
+    name: str
+    color: str
+    size: tuple[int, int]
+    fov_deg: tuple[float, float]
+    position: tuple[float, float, float]
+    rotation: tuple[float, float, float]
+    distortion: str | None
+    channels: tuple[str, ...] | None
+
+
+def recipe_rig(recipe: Recipe) -> Rig:
+    """The rig that a recipe means, of one camera where it has none; no model is read. Raises RecipeError as `rig_of`."""
+    with recipe.located():
+        asked = recipe.camera.of_viewpoints
+        own = lens(recipe, poses(recipe.viewpoints, recipe.seed, recipe.folder)) if asked else recipe.camera.intrinsics
+        return rig_of(recipe, own) or Rig.of(own)
+
+
+def sensor_facts(rig: Rig) -> tuple[SensorFacts, ...]:
+    """What there is to say of each sensor."""
+    colors = list(COLORS)
+    return tuple(_facts(sensor, colors[i % len(colors)]) for i, sensor in enumerate(rig.sensors))
+
+
+def _facts(sensor: Sensor, color: str) -> SensorFacts:
+    pose, own = np.array(sensor.rig_from_sensor), sensor.intrinsics
+    x, y, z = (round(float(v), 9) + 0.0 for v in pose[:3, 3])
+    distortion = own.distortion and own.distortion.model
+    size = own.width, own.height
+    return SensorFacts(sensor.name, color, size, _fov(own), (x, y, z), _angles(pose), distortion, sensor.channels)
+
+
+def _fov(own: Intrinsics) -> tuple[float, float]:
+    """Angles of view across and down, degrees, through the principal point; of bent lenses between the outermost pixels."""
+    if own.distortion is None:
+        across = math.atan(own.cx / own.fx) + math.atan((own.width - own.cx) / own.fx)
+        return math.degrees(across), math.degrees(math.atan(own.cy / own.fy) + math.atan((own.height - own.cy) / own.fy))
+    column, row = (int(np.clip(v, 0, most - 1)) for v, most in ((own.cx, own.width), (own.cy, own.height)))
+    strips = (0, row, own.width, row + 1), (column, 0, column + 1, own.height)
+    angles = (_off_axis(pixel_rays(own, 1, strip).reshape(-1, 3)) for strip in strips)
+    first, second = (float(np.nanmax(a[: len(a) // 2]) + np.nanmax(a[len(a) // 2 :])) for a in angles)
+    return first, second
+
+
+def _off_axis(rays: Float) -> Float:
+    """Angles of rays (N, 3) to the optical axis, degrees."""
+    return np.degrees(np.arctan2(np.hypot(rays[:, 0], rays[:, 1]), rays[:, 2]))
+
+
+def _angles(pose: Float) -> tuple[float, float, float]:
+    """A sensor's rotation [x, y, z] in degrees: y to the right, then x up, then z clockwise."""
+    turns = -math.asin(min(max(pose[1, 2], -1.0), 1.0)), math.atan2(pose[0, 2], pose[2, 2]), math.atan2(pose[1, 0], pose[1, 1])
+    x, y, z = (round(math.degrees(a), 6) + 0.0 for a in turns)
+    return x, y, z
+
+
+def rig_lines(rig: Rig) -> Iterator[str]:
+    """The rig as lines of text."""
+    facts = sensor_facts(rig)
+    yield f"{len(facts)} sensors" if len(facts) > 1 else "1 sensor"
+    for one in facts:
+        place, turn = (", ".join(f"{v:.6g}" for v in values) for values in (one.position, one.rotation))
+        lens = f"{one.size[0]} x {one.size[1]}, {one.fov_deg[0]:.4g} x {one.fov_deg[1]:.4g} degrees"
+        yield f"  {one.name} ({one.color})"
+        yield f"    lens      {lens}" + (f", {one.distortion}" if one.distortion else "")
+        yield f"    position  [{place}] m (right, down, ahead)"
+        yield f"    rotation  [{turn}] degrees (up, right, clockwise)"
+        if one.channels is not None:
+            yield f"    channels  {', '.join(one.channels)}"
+    for left, right, baseline in rig.rectified:
+        yield f"  rectified   {facts[left].name} and {facts[right].name}, baseline {baseline:.6g} m"
+
+
+def rig_mesh(rig: Rig) -> Mesh:
+    """The sensors' bodies and frusta, each in a colour of its own, one part each; front -Y, up +Z, metres."""
+    centers = np.array([np.array(sensor.rig_from_sensor)[:3, 3] for sensor in rig.sensors])
+    reach = float(np.linalg.norm(centers[:, None] - centers[None], axis=-1).max())
+    depth = max(DEPTH * reach, LEAST_DEPTH)
+    shapes = [
+        _in_model_axes(transform(sensor.rig_from_sensor, _camera_shape(sensor.intrinsics, depth))) for sensor in rig.sensors
+    ]
+    corners = np.concatenate(shapes)
+    count = 3 * len(corners)
+    owner = np.repeat(np.arange(len(shapes), dtype=np.int32), [len(shape) for shape in shapes])
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    colors = list(COLORS.values())
+    return Mesh(
+        vertices=corners.reshape(-1, 3).astype(np.float32),
+        triangles=np.arange(count, dtype=np.int32).reshape(-1, 3),
+        normals=np.repeat(normals, 3, axis=0).astype(np.float32),
+        triangle_material=owner,
+        triangle_part=owner,
+        materials=tuple(Material(name=s.name, base_color=(*colors[i % len(colors)], 1.0)) for i, s in enumerate(rig.sensors)),
+        parts=tuple(sensor.name for sensor in rig.sensors),
+    )
+
+
+def _in_model_axes(points: Float) -> Float:
+    """Points of the rig's axes as a model's, whose front is -Y: a turn."""
+    return np.stack([-points[..., 0], -points[..., 2], -points[..., 1]], axis=-1)
+
+
+def _camera_shape(own: Intrinsics, depth: float) -> Float:
+    """Triangles (T, 3, 3) of a sensor in its own axes: its body, the edges of what it sees, and a mark above its upper side."""
+    border = [depth * _unit(rays) for rays in _borders(own)]
+    thick, body = BAR * depth, BODY * depth
+    bars = [_bar(a, b, thick) for side in border for a, b in pairwise(side)]
+    bars += [_bar(np.zeros(3), side[0], thick) for side in border if len(side)]
+    bars.append(_bar(np.array([0.0, 0.0, -1.2 * body]), np.array([0.0, 0.0, 0.2 * body]), body))
+    top = border[0]
+    if len(top) > 2:
+        middle = top[len(top) // 2]
+        bars.append(_bar(middle, middle - np.array([0.0, 1.5 * body, 0.0]), 2 * thick))
+    return np.concatenate(bars)
+
+
+def _borders(own: Intrinsics) -> list[Float]:
+    """Rays (N, 3) along the upper, right, lower and left side of the picture, clockwise, from corner to corner."""
+    w, h = own.width, own.height
+    strips = (0, 0, w, 1), (w - 1, 0, w, h), (0, h - 1, w, h), (0, 0, 1, h)
+    sides = [pixel_rays(own, 1, strip).reshape(-1, 3) for strip in strips]
+    sides = [sides[0], sides[1], sides[2][::-1], sides[3][::-1]]
+    picked = (side[np.unique(np.linspace(0, len(side) - 1, ALONG + 1).astype(int))] for side in sides)
+    return [side[~np.isnan(side).any(axis=1)] for side in picked]
+
+
+def _unit(rays: Float) -> Float:
+    return rays / np.linalg.norm(rays, axis=-1, keepdims=True)
+
+
+def _bar(start: Float, end: Float, thick: float) -> Float:
+    """A bar with a square section between two points, as triangles (12, 3, 3)."""
+    along = _unit(end - start)
+    beside = _unit(np.cross(along, np.eye(3)[int(np.argmin(np.abs(along)))]))
+    other = np.cross(along, beside)
+    ring: Sequence[tuple[int, int]] = ((-1, -1), (1, -1), (1, 1), (-1, 1))
+    square = np.array([thick / 2 * (u * beside + v * other) for u, v in ring])
+    near, far = start + square, end + square
+    faces = [(near[i], near[(i + 1) % 4], far[(i + 1) % 4], far[i]) for i in range(4)]
+    faces += [(near[3], near[2], near[1], near[0]), (far[0], far[1], far[2], far[3])]
+    return np.array([triangle for a, b, c, d in faces for triangle in ((a, b, c), (a, c, d))])
