@@ -23,14 +23,13 @@ from viewsphere.sampling.pose_files import PoseFile
 from viewsphere.sampling.pose_files.motions import motion
 from viewsphere.sampling.trajectories import World, instant, is_still, shaken, standing, trajectory
 from viewsphere.sampling.trajectories.file import FileTrajectory
+from viewsphere.zoo.places import Lane
 
 FPS = 25.0
 TIMES = np.arange(50) / FPS
 TARGET = (0.2, -0.3, 0.5)
-LANES = {
-    "out": np.array([[0.0, 0, 0], [50, 0, 0]]),
-    "ring": np.array([10 * np.round((math.cos(k * math.pi / 8), math.sin(k * math.pi / 8), 0.0), 9) for k in range(17)]),
-}
+RING = tuple((round(10 * math.cos(k * math.pi / 8), 9), round(10 * math.sin(k * math.pi / 8), 9), 0.0) for k in range(16))
+LANES = Lane("out", ((0.0, 0.0, 0.0), (50.0, 0.0, 0.0)), 3.0), Lane("ring", RING, 3.0, closed=True)
 
 
 def passing(thing, instant):
@@ -66,7 +65,7 @@ KINDS = {
     "orbit": {"kind": "orbit", "distance": [4, 6], "elevation": [10, 80], "look": 1},
     "spline": {"kind": "spline", "points": [[0, -5, 1], [4, -3, 2], [6, 2, 1.5], [2, 6, 1]]},
     "ring": {"kind": "spline", "points": [[0, -5, 1], [4, -3, 2], [6, 2, 1.5]], "closed": True, "speed": 9.0, "look": "car"},
-    "drive": {"kind": "drive", "lane": "ring", "speed": 20.0, "offset": 1.5},
+    "drive": {"kind": "drive", "lane": "ring", "speed": 20.0, "side": 1.5},
     "walk": {"kind": "walk", "start": [0, -6], "turns": [{"at": 0.4, "degrees": 40}, {"at": 1.6, "degrees": -15}]},
     "way": {"kind": "walk", "points": [[0, -6], [1, -3], [4, -1]], "look": [0, 0, 1]},
     "mast": {"kind": "mast", "position": [3, -4, 5], "look": 2, "shake": {"degrees": 0.2, "mm": 5}},
@@ -163,7 +162,7 @@ def test_a_camera_overhead_looks_straight_down():
 
 
 def test_a_drive_is_on_its_lane():
-    straight = centers(poses(kind="drive", speed=10, height=1.2, start=3, offset=2))
+    straight = centers(poses(kind="drive", speed=10, height=1.2, offset=3, side=2))
     np.testing.assert_allclose(straight, np.stack([3 + 10 * TIMES, -2 + 0 * TIMES, 1.2 + 0 * TIMES], axis=1), atol=1e-9)
     ring = poses(np.arange(400) / FPS, kind="drive", lane="ring", speed=10)
     radius = np.hypot(*centers(ring)[:, :2].T)
@@ -334,9 +333,9 @@ def test_mistakes_of_entries_are_one_line(entry, expected):
 
 LATER = [
     ({"kind": "mast", "position": list(TARGET)}, {}, "viewpoints.look: expected another place than the camera's own"),
-    ({"kind": "drive"}, {"lanes": {}}, "expected a place with lanes"),
+    ({"kind": "drive"}, {"lanes": ()}, "expected a place with lanes"),
     ({"kind": "drive", "lane": "owt"}, {}, "viewpoints.lane: .*did you mean 'out'"),
-    ({"kind": "drive", "start": 60}, {}, "viewpoints.start: expected less than 50 m"),
+    ({"kind": "drive", "offset": 60}, {}, "viewpoints.offset: expected less than 50 m"),
     ({"kind": "orbit", "distance": 3, "look": 9}, {}, "expected 1 or 2; found 9"),
 ]
 

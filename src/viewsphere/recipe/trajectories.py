@@ -157,8 +157,8 @@ class DrivePath(Moving):
     lane: Annotated[str, Field(min_length=1)] | None = Field(default=None, description="its name; default: the place's first")
     speed: Positive = Field(default=10.0, description="metres a second; it stops at the lane's end, and goes on around a ring")
     height: Length = Field(default=1.5, description="metres above the lane")
-    start: Annotated[Metres, Field(ge=0)] = Field(default=0.0, description="metres along the lane at the first instant")
-    offset: Metres = Field(default=0.0, description="metres to the right of the lane's middle")
+    offset: Annotated[Metres, Field(ge=0)] = Field(default=0.0, description="metres along the lane at the first instant")
+    side: Metres = Field(default=0.0, description="metres to the right of the lane's middle; below 0 to the left")
     look: Look = Field(default="ahead", description=LOOK)
 
 

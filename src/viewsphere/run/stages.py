@@ -139,7 +139,9 @@ class Stages:
         if planned.composition is None or not scene.has_fixed_scenery:
             return
         subject = planned.subjects[0]
-        there = next(planned.sampler.standing(planned, subject, self.box))
+        there = next(planned.sampler.standing(planned, subject, self.box), None)
+        if there is None:  # the camera moves: where it is, is known with its shot
+            return
         things = planned.composition.things(subject, there.things, None, self.box)
         poses = range(0, planned.poses, -(-planned.poses // MOST_CAMERAS))
         cameras = Distances(planned, self.box).cameras(things, poses, views=there.views)

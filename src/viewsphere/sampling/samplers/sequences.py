@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterator, Sequence, Set
+from dataclasses import replace
 
 from viewsphere.errors import RecipeError
 from viewsphere.labels import channel_labels
@@ -131,8 +132,10 @@ def _instant(stock: Stock, own: Course, subject: str, pose: int, box_of: BoxOf) 
     if own.rig is None:
         view, at = stock.views_of(subject)[pose], own.focus_at(i, stock.recipe.viewpoints.target == "follow", box_of)
         return stock.instant(subject, view, at, at, part, i).model_copy(update={"seconds": time.at(i)})
-    finish = stock.finish(subject, pose)
-    return instant_of(own.rig[i], i, time.at(i), pose, stock.recipe.viewpoints.bins, split=part, finish=finish)
+    finish, now = stock.finish(subject, pose), own.rig[i]
+    if not stock.recipe.camera.of_viewpoints:
+        now = replace(now, intrinsics=None)
+    return instant_of(now, i, time.at(i), pose, stock.recipe.viewpoints.bins, split=part, finish=finish)
 
 
 def _needed(stock: Stock, taken: Set[int]) -> set[int]:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.scene import Vector
+from viewsphere.zoo.places import Lane
 
 Float = NDArray[np.float64]
 
@@ -31,16 +32,15 @@ class World:
     """What is known of a sequence when its cameras are placed.
 
     `center` gives the middle (3,) of a thing, by its number or its model's key, at an instant, counted from 0; it raises
-    RecipeError for one that is not there. `target` is what cameras look at that are told nothing else. `lanes`: the middles
-    (N, 3) of the place's lanes by their names, in order; of a ring the last point is the first again. `rng` gives the
-    generator of a purpose, seeded by the sequence's names.
+    RecipeError for one that is not there. `target` is what cameras look at that are told nothing else. `rng` gives the
+    generator of a purpose, seeded by the sequence's names. `lanes` are the place's, in world axes.
     """
 
     fps: float
     target: Vector
     center: Callable[[int | str, int], Float]
     rng: Callable[[str], np.random.Generator]
-    lanes: Mapping[str, Float] = field(default_factory=dict[str, Float])
+    lanes: tuple[Lane, ...] = ()
 
 
 class Trajectory(Protocol):

@@ -31,14 +31,14 @@ class Drive:
     def poses(self, times: Float, world: World) -> tuple[RigPose, ...]:
         """As `Trajectory.poses`; RecipeError for a place without lanes, or without this one, and a start beyond its end."""
         entry, curve = self.entry, self._lane(world)
-        if entry.start >= curve.length:
+        if entry.offset >= curve.length:
             raise RecipeError(
-                f"viewpoints.start: expected less than {curve.length:.4g} m, the lane's length; found {entry.start:g}"
+                f"viewpoints.offset: expected less than {curve.length:.4g} m, the lane's length; found {entry.offset:g}"
             )
-        lengths = entry.start + entry.speed * times
+        lengths = entry.offset + entry.speed * times
         ahead = level(curve, lengths)
         right = np.stack([ahead[:, 1], -ahead[:, 0], np.zeros(len(ahead))], axis=1)
-        centers = curve.at(lengths) + entry.offset * right + np.array([0.0, 0.0, entry.height])
+        centers = curve.at(lengths) + entry.side * right + np.array([0.0, 0.0, entry.height])
         return aimed(centers, ahead, focuses(entry, entry.look, times, world), world)
 
     def _lane(self, world: World) -> Curve:
@@ -46,12 +46,11 @@ class Drive:
             raise RecipeError(
                 "viewpoints.kind: expected a place with lanes for drive; found none: set scene.place, or take spline"
             )
-        name = self.entry.lane or next(iter(world.lanes))
-        if name not in world.lanes:
-            raise RecipeError(f"viewpoints.lane: {one_of(name, tuple(world.lanes))}")
-        points = world.lanes[name]
-        closed = len(points) > 3 and bool((points[0] == points[-1]).all())
-        return spline(points[:-1] if closed else points, closed)
+        lanes = {lane.name: lane for lane in world.lanes}
+        name = self.entry.lane or world.lanes[0].name
+        if name not in lanes:
+            raise RecipeError(f"viewpoints.lane: {one_of(name, tuple(lanes))}")
+        return spline(lanes[name].points, lanes[name].closed)
 
 
 def trajectory(entry: DrivePath, folder: Path) -> Drive:
