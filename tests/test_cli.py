@@ -100,6 +100,21 @@ def test_inspect(tmp_path):
     assert Image.open(tmp_path / "sides.png").width > 4 * 300
 
 
+def test_inspect_shows_rigs(tmp_path):
+    recipe = tmp_path / "two.yaml"
+    recipe.write_text("models: [{source: gone.glb}]\nviewpoints: {distance: 4}\nrig: {kind: stereo, baseline: 0.2}\n")
+    run = viewsphere("inspect", "--rig", recipe, "-o", tmp_path / "rig.png")
+    assert run.returncode == 0, run.stderr
+    assert "left (blue)" in run.stdout and "baseline 0.2 m" in run.stdout
+    assert Image.open(tmp_path / "rig.png").width > 4 * 300 and (tmp_path / "rig.glb").read_bytes()[:4] == b"glTF"
+    run = viewsphere(
+        "inspect", "--rig", recipe, "-o", tmp_path / "rig.png", "--json", "--set", "rig={kind: surround, count: 3}"
+    )
+    told = json.loads(run.stdout)
+    assert [sensor["name"] for sensor in told["sensors"]] == ["camera0", "camera1", "camera2"] and told["rectified"] == []
+    assert fails("inspect", "zoo:car", "--rig", recipe).count("\n") == 1
+
+
 def test_mistakes_are_one_line_and_status_2(tmp_path):
     (tmp_path / "typo.yaml").write_text("name: x\nmodels:\n  - source: zoo:car\n    categry: car\n")
     line = fails("plan", tmp_path / "typo.yaml")

@@ -11,6 +11,7 @@ from viewsphere.errors import UserError
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.model.rig import Rig
 from viewsphere.model.shot import Shot
+from viewsphere.preview import contact_sheet, dataset_samples, preview_samples
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.run.exporting import export
 from viewsphere.run.generate import generate
@@ -64,6 +65,14 @@ def test_what_is_rendered_in_memory_is_what_is_stored(mixed):
         assert (again.sensor, again.pose) == (kept.sensor, kept.pose) and tuple(again.channels) == tuple(kept.channels)
         assert all(np.array_equal(again.channels[n], kept.channels[n]) for n in kept.channels)
         assert [o.rle for o in again.objects] == [o.rle for o in kept.objects]
+
+
+def test_a_preview_shows_the_sensors_with_pictures(mixed):
+    shown = dataset_samples(mixed)
+    assert [s.sensor for s in shown] == ["front", "wide"] * 2
+    assert contact_sheet(shown, ["depth"]).ndim == 3
+    small = list(preview_samples(Recipe(**BASE, rig=MIXED), width=40))
+    assert [s.width for s in small] == [40] * 6 and all("rgb" in s.channels for s in small)
 
 
 def test_a_format_that_lacks_a_sensor_s_channel_is_refused(mixed, tmp_path):

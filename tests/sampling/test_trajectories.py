@@ -353,6 +353,11 @@ def test_without_time_they_are_refused(kind):
         plan(recipe)
 
 
+def test_still_pictures_are_not_shaken():
+    with pytest.raises(RecipeError, match=r"^viewpoints\.shake: expected time beside it"):
+        plan(Recipe(models=[{"source": "zoo:car"}], viewpoints={"distance": 4, "shake": {"mm": 1}}))
+
+
 def test_what_is_left_out_leaves_the_digest_as_it_was():
     """Digests of before there were rigs and shake: data sets can be gone on with."""
     old = Recipe(models=[{"source": "zoo:chair"}], viewpoints={"distance": 4})

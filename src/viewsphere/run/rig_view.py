@@ -18,7 +18,7 @@ from viewsphere.model.rig import Rig, Sensor
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.sampling.rigs import rig_of
 from viewsphere.sampling.samplers import lens
-from viewsphere.sampling.viewpoints import poses
+from viewsphere.sampling.sequence_poses import poses_of
 
 Float = NDArray[np.float64]
 
@@ -67,7 +67,8 @@ def recipe_rig(recipe: Recipe) -> Rig:
     """The rig that a recipe means, of one camera where it has none; no model is read. Raises RecipeError as `rig_of`."""
     with recipe.located():
         asked = recipe.camera.of_viewpoints
-        own = lens(recipe, poses(recipe.viewpoints, recipe.seed, recipe.folder)) if asked else recipe.camera.intrinsics
+        views = poses_of(recipe.viewpoints, recipe.time, recipe.seed, recipe.folder) if asked else None
+        own = recipe.camera.intrinsics if views is None else lens(recipe, views)
         return rig_of(recipe, own) or Rig.of(own)
 
 

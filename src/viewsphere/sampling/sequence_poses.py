@@ -6,6 +6,7 @@ import hashlib
 from dataclasses import dataclass
 from pathlib import Path
 
+from viewsphere.errors import RecipeError
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.instant import Viewpoint
 from viewsphere.model.scene import Vector
@@ -126,6 +127,10 @@ def poses_of(viewpoints: Viewpoints, time: TimeEntry | None, seed: int, folder: 
     Raises RecipeError for files that cannot be read, and for viewpoints that move without a time.
     """
     if time is None:
+        if viewpoints.shake is not None:
+            raise RecipeError(
+                "viewpoints.shake: expected time beside it, as still pictures are not shaken; found none: set time"
+            )
         return poses(viewpoints, seed, folder)
     if is_still(viewpoints):
         base = poses(viewpoints, seed, folder)
