@@ -102,7 +102,9 @@ def test_inspect(tmp_path):
 
 def test_inspect_shows_rigs(tmp_path):
     recipe = tmp_path / "two.yaml"
-    recipe.write_text("models: [{source: gone.glb}]\nviewpoints: {distance: 4}\nrig: {kind: stereo, baseline: 0.2}\n")
+    recipe.write_text(
+        "models: [{source: gone.glb, category: car}]\nviewpoints: {distance: 4}\nrig: {kind: stereo, baseline: 0.2}\n"
+    )
     run = viewsphere("inspect", "--rig", recipe, "-o", tmp_path / "rig.png")
     assert run.returncode == 0, run.stderr
     assert "left (blue)" in run.stdout and "baseline 0.2 m" in run.stdout

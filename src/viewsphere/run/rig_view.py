@@ -188,7 +188,8 @@ def _unit(rays: Float) -> Float:
 def _bar(start: Float, end: Float, thick: float) -> Float:
     """A bar with a square section between two points, as triangles (12, 3, 3)."""
     along = _unit(end - start)
-    beside = _unit(np.cross(along, np.eye(3)[int(np.argmin(np.abs(along)))]))
+    across: Float = np.cross(along, np.eye(3)[int(np.argmin(np.abs(along)))])
+    beside = _unit(across)
     other = np.cross(along, beside)
     ring: Sequence[tuple[int, int]] = ((-1, -1), (1, -1), (1, 1), (-1, 1))
     square = np.array([thick / 2 * (u * beside + v * other) for u, v in ring])

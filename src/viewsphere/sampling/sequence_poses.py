@@ -128,9 +128,7 @@ def poses_of(viewpoints: Viewpoints, time: TimeEntry | None, seed: int, folder: 
     """
     if time is None:
         if viewpoints.shake is not None:
-            raise RecipeError(
-                "viewpoints.shake: expected time beside it, as still pictures are not shaken; found none: set time"
-            )
+            raise RecipeError("viewpoints.shake: expected time beside it: still pictures are not shaken; found none: set it")
         return poses(viewpoints, seed, folder)
     if is_still(viewpoints):
         base = poses(viewpoints, seed, folder)
