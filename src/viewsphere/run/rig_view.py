@@ -188,7 +188,7 @@ def _unit(rays: Float) -> Float:
 def _bar(start: Float, end: Float, thick: float) -> Float:
     """A bar with a square section between two points, as triangles (12, 3, 3)."""
     along = _unit(end - start)
-    across: Float = np.cross(along, np.eye(3)[int(np.argmin(np.abs(along)))])
+    across = np.cross(along, np.eye(3)[int(np.argmin(np.abs(along)))]).astype(np.float64)
     beside = _unit(across)
     other = np.cross(along, beside)
     ring: Sequence[tuple[int, int]] = ((-1, -1), (1, -1), (1, 1), (-1, 1))
