@@ -4,12 +4,12 @@ from pathlib import Path
 
 import numpy as np
 
+from small import still_channels
 from viewsphere.assets.export import export_glb, export_obj
 from viewsphere.assets.mesh import Mesh
 from viewsphere.geometry.box import FACES, box_vertices
 from viewsphere.geometry.pose_category import pose_category
 from viewsphere.labels import annotate, observe
-from viewsphere.labels import channels as known_channels
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.channel import PASSES
 from viewsphere.model.files import Files
@@ -28,7 +28,7 @@ from viewsphere.truth.visibility import rasterize
 
 HALVES = ((0, 1, 2), (0, 2, 3))
 TRIANGLES = np.array([[face[i] for i in half] for face in FACES.values() for half in HALVES], np.int32)
-CHANNELS = tuple(known_channels())
+CHANNELS = still_channels()
 PLAIN = Files()
 LENS = Intrinsics(width=96, height=72, fx=80, fy=80, cx=48, cy=36)
 CATEGORIES = (Category(1, "hair_drier", "appliance"), Category(2, "gizmo", ""), Category(3, "car", "vehicle"))

@@ -8,10 +8,17 @@ from pathlib import Path
 ROOT = Path(__file__).parent.parent
 
 
+def still_channels() -> tuple[str, ...]:
+    """Names of the channels that need no other picture."""
+    from viewsphere.labels import channel_labels, channels
+
+    labels = channel_labels()
+    return tuple(name for name in channels() if name not in labels or not labels[name].needs.is_some)
+
+
 def small_recipe(**changes):
-    """Two post boxes from six sides on 96 x 72 pixels, with ground and all channels."""
+    """Two post boxes from six sides on 96 x 72 pixels, with ground and all channels of still pictures."""
     from viewsphere import Recipe
-    from viewsphere.labels import channels
 
     values = {
         "name": "small",
@@ -19,7 +26,7 @@ def small_recipe(**changes):
         "viewpoints": {"azimuth": [0, 120, 240], "elevation": [15, 50], "distance": 1.0},
         "camera": {"size": [96, 72], "fov_deg": 35},
         "scene": {"ground": True},
-        "channels": list(channels()),
+        "channels": list(still_channels()),
         "formats": ["native", "coco"],
         "shot_frames": 2,
     }

@@ -99,7 +99,7 @@ def test_exr_is_compressed():
     assert len(encode_exr(depth)) < depth.nbytes / 20
 
 
-@pytest.mark.parametrize("array", [np.zeros((4, 4)), np.zeros((4, 4, 2), np.float32), np.zeros((0, 4), np.int32)])
+@pytest.mark.parametrize("array", [np.zeros((4, 4)), np.zeros((4, 4, 4), np.float32), np.zeros((0, 4), np.int32)])
 def test_exr_refuses_what_it_cannot_hold(array):
     with pytest.raises(ValueError, match="encode_exr: expected"):
         encode_exr(array)
