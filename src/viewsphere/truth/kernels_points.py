@@ -176,6 +176,15 @@ def classify(xy, near, width, height, state):
 
 
 @njit
+def hide(met, order, occluded, state):
+    """state[order[p]] = occluded where a sorted point met a triangle."""
+    for p in range(order.shape[0]):
+        up = np.uintp(p)
+        if met[up] >= 0:
+            state[np.uintp(order[up])] = occluded
+
+
+@njit
 def mark(met, order, triangle):
     """triangle[order[p]] = met[p] where a sorted point met one."""
     for p in range(order.shape[0]):

@@ -79,8 +79,8 @@ def states(placed: Sequence[Placed]) -> list[NDArray[np.uint8]]:
     state = np.empty(len(near), np.uint8)
     kernels.classify(xy, near, view.camera.width, view.camera.height, state)
     inside = state == VISIBLE if rays is not None else None
-    hidden = first_met(view, xy, near, own, rays, inside) >= 0
-    state[hidden] = OCCLUDED
+    for index, met in _meetings(view, xy, near, own, rays, inside):
+        kernels.hide(met, index, np.uint8(OCCLUDED), state)
     stops = np.cumsum([points.near.size for points in placed])[:-1]
     return [part.reshape(points.near.shape) for part, points in zip(np.split(state, stops), placed, strict=True)]
 
@@ -105,19 +105,26 @@ def first_met(
     from viewsphere.truth import kernels_points as kernels
 
     triangle = np.full(len(near), -1, np.int32)
-    if rays is None:
-        _meet(view, view.corners, (view.camera.width, view.camera.height), xy, near, own, triangle)
-        return triangle
-    index = np.flatnonzero(np.ones(len(near), np.bool_) if chosen is None else chosen)
-    for q, size, at, own_xy, own_near in _pinholes(view, rays[index], near[index]):
-        part = np.full(len(at), -1, np.int32)
-        _meet(view, q, size, own_xy, own_near, own[index[at]], part)
-        kernels.mark(part, index[at], triangle)
+    for index, met in _meetings(view, xy, near, own, rays, chosen):
+        kernels.mark(met, index, triangle)
     return triangle
 
 
-def _meet(view: View, q: Float, size: tuple[int, int], xy: Float, near: Float, own: Whole, triangle: Whole) -> None:
-    """Write the triangles that points of a pinhole of this size meet first; q: `homogeneous` vertices of that pinhole."""
+def _meetings(
+    view: View, xy: Float, near: Float, own: Whole, rays: Float | None, chosen: NDArray[np.bool_] | None
+) -> Iterator[tuple[Whole, Whole]]:
+    """Points, by their numbers (n,), and the triangle that each of them meets first (n,), -1 for none; see `first_met`."""
+    if rays is None:
+        yield _meet(view, view.corners, (view.camera.width, view.camera.height), xy, near, own)
+        return
+    index = np.flatnonzero(np.ones(len(near), np.bool_) if chosen is None else chosen).astype(np.int32)
+    for q, size, at, own_xy, own_near in _pinholes(view, rays[index], near[index]):
+        order, met = _meet(view, q, size, own_xy, own_near, own[index[at]])
+        yield index[at][order], met
+
+
+def _meet(view: View, q: Float, size: tuple[int, int], xy: Float, near: Float, own: Whole) -> tuple[Whole, Whole]:
+    """The same for a pinhole of this size; q: `homogeneous` vertices of that pinhole."""
     from viewsphere.truth import kernels_points as kernels
 
     geometry, (width, height) = view.geometry, size
@@ -126,14 +133,14 @@ def _meet(view: View, q: Float, size: tuple[int, int], xy: Float, near: Float, o
     points, nearest = np.zeros((2, len(near) + FOUR)), np.full(len(near) + FOUR, np.inf)
     least = near * ((1.0 + GAP) / NEARER)
     inside = kernels.sort(xy, least, own, size, start, order, points, nearest, number, far)
-    if not inside:
-        return
-    box, met = np.empty((len(q), 4), np.int32), np.full(len(near) + FOUR, -1, np.int32)
-    kernels.boxes(q, geometry.vertex_start[-1], width, height, box)
-    cut = (geometry.triangle_cutout, geometry.cutouts.arrays)
-    ground = geometry.triangle_start[-1]
-    kernels.meet(q, box, geometry.triangles, ground, *cut, size, start, points, nearest, met, number, far)
-    kernels.mark(met, order[:inside], triangle)
+    met = np.full(inside + FOUR, -1, np.int32)
+    if inside:
+        box = np.empty((len(q), 4), np.int32)
+        kernels.boxes(q, geometry.vertex_start[-1], width, height, box)
+        cut = (geometry.triangle_cutout, geometry.cutouts.arrays)
+        ground = geometry.triangle_start[-1]
+        kernels.meet(q, box, geometry.triangles, ground, *cut, size, start, points, nearest, met, number, far)
+    return order[:inside], met[:inside]
 
 
 def _pinholes(view: View, rays: Float, near: Float) -> Iterator[tuple[Float, tuple[int, int], NDArray[np.intp], Float, Float]]:
