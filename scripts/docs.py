@@ -73,8 +73,9 @@ def channels_page() -> str:
         "| channel | type | components | unit | empty | file | what it is |\n|---|---|---|---|---|---|---|\n"
     )
     for c in channels().values():
-        file = {"png": "PNG", "png16": "16-bit PNG", "tiff": "TIFF"}[c.encoding]
-        text += f"| `{c.name}` | {np.dtype(c.dtype)} | {c.components} | {c.unit} | {c.empty:g} | {file} | {c.meaning} |\n"
+        file = {"png": "PNG", "png16": "16-bit PNG", "tiff": "TIFF", "npz": "NPZ"}[c.encoding]
+        of_what = "rows" if c.components == 0 else np.dtype(c.dtype)
+        text += f"| `{c.name}` | {of_what} | {c.components or ''} | {c.unit} | {c.empty:g} | {file} | {c.meaning} |\n"
     text += (
         "\n## Annotations\n\nEvery object of a frame, seen or not, has these fields. They are computed for every data set. "
         "Beside its shot and models, the store keeps only what does not follow from them.\n\n"
