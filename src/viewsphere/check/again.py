@@ -22,6 +22,8 @@ from viewsphere.model.thing import Motion, Thing, TimeStep
 from viewsphere.store import Dataset, ModelInfo, depth_step
 from viewsphere.store.channel_files import MOST_STEPS
 from viewsphere.truth.geometry import Geometry, build_geometry, present
+from viewsphere.truth.moving import Ring, shot_floor
+from viewsphere.truth.shot_views import SampleViews, ShotViews
 from viewsphere.truth.visibility import rasterize
 
 Findings = Iterator[tuple[str, str]]
@@ -38,6 +40,7 @@ class Again:
         self._dataset, self._scenery, self._models = dataset, scenery, models
         self._mesh = lru_cache(maxsize=MODELS)(self._read)
         self._geometry: tuple[object, Geometry | None] = None, None
+        self._views: tuple[str, ShotViews | None] = "", None
 
     def is_possible(self, sample: Sample) -> bool:
         """Whether it is known what was seen: the shot is kept, and the objects are placed."""
@@ -54,7 +57,7 @@ class Again:
             return
         camera, by_id = sample.camera, {o.id: o for o in sample.objects}
         placed = tuple(self._placement(by_id.get(i + 1), sample, shot) for i in range(geometry.object_count))
-        sight = Sight(geometry, camera, rasterize(geometry, camera), placed)
+        sight = Sight(geometry, camera, rasterize(geometry, camera), placed, self._compared(sample, shot, key))
         for name, label in channel_labels().items():
             if name in sample.files:
                 yield from ((name, problem) for problem in self._pixels(sample, name, label.compute(sight)))
@@ -72,10 +75,11 @@ class Again:
         step = depth_step(self._dataset.path(sample.files[name])) if name == "depth" else 0.0
         wrong = _beyond(kept, again, step) if step else _unequal(kept, again)
         if wrong.any():
-            y, x = (int(i[0]) for i in np.nonzero(wrong))
+            where = tuple(int(i[0]) for i in np.nonzero(wrong))
+            what, at = ("pixels", f"pixel {where[::-1]}") if wrong.ndim == 2 else ("rows", f"row {where[0]}")
             yield (
-                f"{wrong.sum()} of {wrong.size} pixels are not those of the exported models: at pixel ({x}, {y}) expected "
-                f"{again[y, x].tolist()}, found {kept[y, x].tolist()}"
+                f"{wrong.sum()} of {wrong.size} {what} are not those of the exported models: at {at} expected "
+                f"{again[where].tolist()}, found {kept[where].tolist()}"
             )
 
     def _placement(self, o: ObjectAnnotation | None, sample: Sample, shot: Shot) -> Placement | None:
@@ -90,18 +94,47 @@ class Again:
         around = self._scenery.around(key)
         there = {o.id: o for o in sample.objects}
         objects = tuple(self._thing(there.get(thing.id), thing) for thing in shot.objects)
+        instant, _ = self._scenery.taken(sample, shot)
+        behind = tuple(thing.at(instant) for thing in around.things)
         ground = shot.scene.ground is not None and shot.scene.ground.is_labelled
-        now = objects, around.things, ground, shot.label_alpha, shot.scene.floor
+        now = objects, behind, ground, shot.label_alpha, shot.scene.floor
         if self._geometry[0] != now:
             meshes = [self._mesh(thing.key) for thing in objects]
-            scenery = [self._scenery.mesh(around, thing) for thing in around.things]
+            scenery = [self._scenery.mesh(around, thing) for thing in behind]
             whole = [mesh for mesh in scenery if mesh is not None]
-            things = (*objects, *around.things)
+            things = (*objects, *behind)
             built = None
             if len(whole) == len(scenery):
                 built = build_geometry(things, present(things, [*meshes, *whole]), ground, shot.label_alpha, shot.scene.floor)
             self._geometry = now, built
         return self._geometry[1]
+
+    def _compared(self, sample: Sample, shot: Shot, key: str) -> SampleViews | None:
+        """What labels of motion and of stereo pairs compare a sample with; None where scenery is not what it was."""
+        if self._views[0] != key:
+            self._views = key, self._shot_views(shot, key)
+        views = self._views[1]
+        if views is None:
+            return None
+        return views.around(*self._scenery.taken(sample, shot))
+
+    def _shot_views(self, shot: Shot, key: str) -> ShotViews | None:
+        """The views of a shot whose things stand where the shot says, in the exported models."""
+        around = self._scenery.around(key)
+        if len(around.things) != len(shot.things) - len(shot.objects):
+            return None
+        if any(self._scenery.mesh(around, thing.at(i)) is None for thing in around.things for i in range(len(shot.instants))):
+            return None
+        ground = shot.scene.ground is not None and shot.scene.ground.is_labelled
+        ring = Ring(ground, shot.label_alpha)
+
+        def meshes_at(instant: int) -> list[Mesh]:
+            now = shot.things_at(instant)
+            own = [self._mesh(thing.key) for thing in now[: len(shot.objects)]]
+            return own + [mesh for thing in now[len(own) :] if (mesh := self._scenery.mesh(around, thing)) is not None]
+
+        floor = shot_floor(shot, meshes_at)
+        return ShotViews(shot, lambda instant: ring.at(shot.things_at(instant), meshes_at(instant), floor))
 
     def _thing(self, o: ObjectAnnotation | None, thing: Thing) -> Thing:
         """An object as a sample says that it stands, or not there."""
@@ -137,11 +170,18 @@ def _matrix(values: NDArray[np.float64]) -> Matrix4:
 
 
 def _unequal(kept: NDArray[Any], again: NDArray[Any]) -> NDArray[np.bool_]:
-    """(H, W): where any component differs; NaN equals itself."""
+    """(H, W): where any component differs; NaN equals itself. Of rows (N,): which differ in any byte."""
+    if kept.dtype.names:
+        return (_bytes(kept) != _bytes(again)).any(axis=1)
     different = kept != again
     if np.issubdtype(kept.dtype, np.floating):
         different &= ~(np.isnan(kept) & np.isnan(again))
     return different if different.ndim == 2 else different.any(axis=2)
+
+
+def _bytes(rows: NDArray[Any]) -> NDArray[np.uint8]:
+    """The bytes of each row, (N, bytes)."""
+    return np.ascontiguousarray(rows).view(np.uint8).reshape(len(rows), -1)
 
 
 def _beyond(kept: NDArray[Any], again: NDArray[Any], step: float) -> NDArray[np.bool_]:

@@ -131,18 +131,21 @@ class RayCaster:
         floor = None if shot is None else shot.scene.floor
         ground = None if shot is None else shot.scene.ground
         self._has_ground = ground is not None and ground.is_labelled
-        key = [(o.key, o.world_from_object.tobytes()) for o in sample.objects], scenery, floor
+        instant = 0 if shot is None else self._scenery.taken(sample, shot)[0]
+        behind = [thing for thing in (piece.at(instant) for piece in scenery.things) if thing.is_there]
+        key = [(o.key, o.world_from_object.tobytes()) for o in sample.objects], behind, scenery, floor
         if key == self._key:
             return
-        self._middle = np.mean([o.box3d.mean(axis=0) for o in sample.objects], axis=0)
+        self._middle = np.mean([o.box3d.mean(axis=0) for o in sample.objects] or [np.zeros(3)], axis=0)
         placed = [(o.id, o.world_from_object, self._exported(o.key)) for o in sample.objects]
-        remade = [(p.world_from_object, self._remade(scenery, p)) for p in scenery.things]
+        remade = [(p.world_from_object, self._remade(scenery, p)) for p in behind]
         self._complete = all(soup is not None for _, soup in remade)
         placed += [(0, np.array(world), soup) for world, soup in remade if soup is not None]
-        corners = np.concatenate([transform(world, soup.corners) - self._middle for _, world, soup in placed])
-        opaque = np.concatenate([soup.opaque for _, _, soup in placed])
+        nothing = np.zeros((0, 3, 3))
+        corners = np.concatenate([nothing, *(transform(world, soup.corners) - self._middle for _, world, soup in placed)])
+        opaque = np.concatenate([np.zeros(0, np.bool_), *(soup.opaque for _, _, soup in placed)])
         self._owner = np.repeat([i for i, _, _ in placed], [len(soup.corners) for _, _, soup in placed])
-        lowest = float(corners[..., 2].min())
+        lowest = float(corners[..., 2].min(initial=np.inf))
         self._lowest = lowest if floor is None else floor.under(lowest + self._middle[2]) - self._middle[2]
         self._all, self._solid = _scene(corners), _scene(corners[opaque])
         self._key = key

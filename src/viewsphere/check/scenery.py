@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import lru_cache
+from itertools import islice
 
 from viewsphere.assets.mesh import Mesh
 from viewsphere.errors import ViewsphereError
+from viewsphere.model.sample import Sample
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
 from viewsphere.run.models import mesh_digest
@@ -33,6 +35,12 @@ class Scenery:
     def key_of(self, frame: int) -> str:
         """Key of the shot that a frame is of."""
         return self.dataset.plan.row_at(frame).key
+
+    def taken(self, sample: Sample, shot: Shot) -> tuple[int, int]:
+        """The instant and the sensor of a sample, both counted from 0 in its shot."""
+        place = sample.index - self.dataset.plan.row_at(sample.index).first
+        _, instant, sensor = next(islice(shot.samples, place, None))
+        return instant, sensor
 
     def _shot(self, key: str) -> Shot | None:
         return self.dataset.store.labelled(key)

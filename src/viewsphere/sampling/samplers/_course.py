@@ -74,7 +74,7 @@ def course(stock: Stock, subject: str, start: int, box_of: BoxOf) -> Course:
         for i, thing in enumerate(targets)
     )
     things = stock.repainted((*moved, *things[len(targets) :]), subject, start)
-    return Course(things, focus, _rig(stock, things, focus, subject, start, box_of))
+    return Course(things, focus, _rig(stock, things, focus, subject, start, lanes, box_of))
 
 
 def placed_targets(stock: Stock, subject: str, pose: str | None, box_of: BoxOf) -> tuple[Thing, ...]:
@@ -122,7 +122,7 @@ def _during(motion: Motion, instants: Sequence[int]) -> Motion:
 
 
 def _rig(
-    stock: Stock, things: Sequence[Thing], focus: Vector, subject: str, start: int, box_of: BoxOf
+    stock: Stock, things: Sequence[Thing], focus: Vector, subject: str, start: int, lanes: tuple[Lane, ...], box_of: BoxOf
 ) -> tuple[RigPose, ...] | None:
     """Where the rig is at all instants, None where it stands still."""
     time, views = time_of(stock), stock.views_of(subject)
@@ -133,6 +133,7 @@ def _rig(
         focus,
         lambda thing, instant: np.array(_center(things, thing, instant, box_of)),
         partial(generator, stock.recipe.seed, "rig", *names),
+        lanes,
     )
     if isinstance(views.base, TrajectoryPoses):
         return views.base.trajectory.poses(times, world)
