@@ -20,18 +20,20 @@ if TYPE_CHECKING:
     from viewsphere.recipe.recipe import Recipe
     from viewsphere.run.exporting import export
     from viewsphere.run.generate import generate
+    from viewsphere.run.matching import matches
     from viewsphere.run.memory import render
     from viewsphere.sampling.plan import plan
     from viewsphere.store import Dataset
     from viewsphere.store import Dataset as open
 
-__all__ = ["Dataset", "Recipe", "export", "generate", "open", "plan", "render"]
+__all__ = ["Dataset", "Recipe", "export", "generate", "matches", "open", "plan", "render"]
 
 _HOMES = {
     "Dataset": "store.Dataset",
     "Recipe": "recipe.recipe.Recipe",
     "export": "run.exporting.export",
     "generate": "run.generate.generate",
+    "matches": "run.matching.matches",
     "open": "store.Dataset",
     "plan": "sampling.plan.plan",
     "render": "run.memory.render",

@@ -22,8 +22,7 @@ from viewsphere.model.thing import Motion, Thing, TimeStep
 from viewsphere.store import Dataset, ModelInfo, depth_step
 from viewsphere.store.channel_files import MOST_STEPS
 from viewsphere.truth.geometry import Geometry, build_geometry, present
-from viewsphere.truth.moving import Ring, shot_floor
-from viewsphere.truth.shot_views import SampleViews, ShotViews
+from viewsphere.truth.shot_views import SampleViews, ShotViews, views_of
 from viewsphere.truth.visibility import rasterize
 
 Findings = Iterator[tuple[str, str]]
@@ -121,20 +120,13 @@ class Again:
     def _shot_views(self, shot: Shot, key: str) -> ShotViews | None:
         """The views of a shot whose things stand where the shot says, in the exported models."""
         around = self._scenery.around(key)
-        if len(around.things) != len(shot.things) - len(shot.objects):
-            return None
         if any(self._scenery.mesh(around, thing.at(i)) is None for thing in around.things for i in range(len(shot.instants))):
             return None
-        ground = shot.scene.ground is not None and shot.scene.ground.is_labelled
-        ring = Ring(ground, shot.label_alpha)
 
-        def meshes_at(instant: int) -> list[Mesh]:
-            now = shot.things_at(instant)
-            own = [self._mesh(thing.key) for thing in now[: len(shot.objects)]]
-            return own + [mesh for thing in now[len(own) :] if (mesh := self._scenery.mesh(around, thing)) is not None]
+        def mesh(thing: Thing) -> Mesh:
+            return self._mesh(thing.key) if thing.id else self._scenery.known(around, thing)
 
-        floor = shot_floor(shot, meshes_at)
-        return ShotViews(shot, lambda instant: ring.at(shot.things_at(instant), meshes_at(instant), floor))
+        return views_of(shot.model_copy(update={"things": (*shot.things, *around.things)}), mesh)
 
     def _thing(self, o: ObjectAnnotation | None, thing: Thing) -> Thing:
         """An object as a sample says that it stands, or not there."""

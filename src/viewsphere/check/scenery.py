@@ -65,3 +65,9 @@ class Scenery:
             except ViewsphereError as error:
                 self.notes.append(f"background not checked where {thing.key} stands: {error}")
         return self._known[digest]
+
+    def known(self, record: SceneryRecord, thing: Thing) -> Mesh:
+        """The same of scenery that is what it was."""
+        mesh = self.mesh(record, thing)
+        assert mesh is not None
+        return mesh

@@ -16,6 +16,7 @@ from viewsphere.model.channel import picture_of
 from viewsphere.model.instant import Viewpoint
 from viewsphere.model.model_spec import Size
 from viewsphere.model.rig import CAMERA
+from viewsphere.model.shot import Shot
 
 Float = NDArray[np.float64]
 Box = tuple[float, float, float, float]
@@ -126,6 +127,19 @@ class ObjectAnnotation:
 
 
 @dataclass(frozen=True, eq=False)
+class Taken:
+    """Of which shot a sample is, at which instant and by which sensor, both counted from 0 there: the shot itself, or the root
+    of a data set and the key of the shot in it.
+    """
+
+    instant: int
+    sensor: int
+    shot: Shot | None = None
+    root: str = ""
+    key: str = ""
+
+
+@dataclass(frozen=True, eq=False)
 class Sample:
     """One sensor's picture at one instant: camera, pose, objects and channels. `channels` maps names to arrays (loaded
     when asked). Imported pictures may have no known camera and pose; these have an `image_size`.
@@ -144,6 +158,7 @@ class Sample:
     sensor: str = CAMERA
     instant: int = 0  # counted from 0 in the sequence, or, for still pictures, in the data set
     time: float = 0.0  # seconds from the sequence's first instant
+    taken: Taken | None = None  # None: nobody knows what was there
 
     @property
     def camera(self) -> Camera:

@@ -18,7 +18,7 @@ from viewsphere.geometry.rotation import transform
 from viewsphere.labels import annotate, channel_labels, observe
 from viewsphere.model.channel import PASSES
 from viewsphere.model.model_spec import ModelSpec, Size, step_key
-from viewsphere.model.sample import Float, Sample
+from viewsphere.model.sample import Float, Sample, Taken
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing, TimeStep
 from viewsphere.sampling.camera import inside_box
@@ -254,6 +254,7 @@ def render_sample(
         sensor=shot.rig.sensors[sensor].name,
         instant=now.index,
         time=now.seconds,
+        taken=Taken(instant, sensor, shot),
     )
 
 

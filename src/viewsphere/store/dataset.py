@@ -16,7 +16,9 @@ from numpy.typing import NDArray
 from viewsphere.errors import StoreError
 from viewsphere.labels import channels
 from viewsphere.model.files import Files
+from viewsphere.model.mistakes import one_of
 from viewsphere.model.model_spec import step_key
+from viewsphere.model.rig import CAMERA
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.store.channel_files import decode
 from viewsphere.store.choice import Choice
@@ -24,6 +26,7 @@ from viewsphere.store.folder import Store
 from viewsphere.store.index import Row
 from viewsphere.store.linking import link_file
 from viewsphere.store.manifest import MANIFEST, Manifest
+from viewsphere.store.point_tracks import PointTracks, joined
 from viewsphere.store.records import Category, ModelInfo
 from viewsphere.store.sample_records import ShotRecords, from_whole_sample
 
@@ -133,6 +136,42 @@ class Dataset(Sequence[Sample]):
         for place in places:
             yield self._sample(records, place)
 
+    @property
+    def sequences(self) -> tuple[str, ...]:
+        """Names of the sequences of its frames, in their order; none where all are still pictures."""
+        return tuple(self._sequences)
+
+    @cached_property
+    def _sequences(self) -> dict[str, list[tuple[str, list[int]]]]:
+        """The chosen places of each sequence's shots, by the sequence's name."""
+        found: dict[str, list[tuple[str, list[int]]]] = {}
+        for key, places in self._shots[0]:
+            names = self._records(key).sequences
+            for name in dict.fromkeys(names[place] for place in places):
+                if name:
+                    found.setdefault(name, []).append((key, [place for place in places if names[place] == name]))
+        return found
+
+    def sequence(self, name: str, sensor: str = CAMERA) -> tuple[Sample, ...]:
+        """The samples of one sensor in a sequence, in the order of its instants; raises StoreError for a sequence or a sensor
+        that is not there.
+        """
+        if name not in self._sequences:
+            known = one_of(name, self.sequences) if self.sequences else "expected sequences, found still pictures only"
+            raise StoreError(f"{self.root}: sequence: {known}")
+        samples = [sample for key, places in self._sequences[name] for sample in self.samples_of(key, places)]
+        own = sorted((sample for sample in samples if sample.sensor == sensor), key=lambda sample: sample.instant)
+        if not own:
+            sensors = tuple(dict.fromkeys(sample.sensor for sample in samples))
+            raise StoreError(f"{self.root}: sensor: {one_of(sensor, sensors)}")
+        return tuple(own)
+
+    def tracks(self, sequence: str, sensor: str = CAMERA) -> PointTracks:
+        """The points that a sensor followed through a sequence; raises StoreError for a sequence or a sensor that is not there,
+        or follows no points.
+        """
+        return joined(self.sequence(sequence, sensor))
+
     def _places(self, row: Row) -> Sequence[int]:
         """Which of a finished shot's frames are chosen, by the model's key, or by the key of its moment if the model is
         animated. Where the plan does not know a frame's model, as in imported data sets, the frame belongs to all models that
@@ -175,7 +214,8 @@ class Dataset(Sequence[Sample]):
         shot = self.store.labelled(key) if is_short else None
         if shot is None:
             return _Records(file, records)
-        return _Records(file, records, ShotRecords(shot, self._facts, str(file)), self.store.channel_files(key, shot))
+        kept = ShotRecords(shot, self._facts, str(file), str(self.root))
+        return _Records(file, records, kept, self.store.channel_files(key, shot))
 
     def _model_facts(self, key: str, frame: int | None) -> ModelInfo:
         info = self._info(key)
@@ -248,6 +288,13 @@ class _Records:
     records: list[dict[str, Any]]
     shot: ShotRecords | None = None
     files: tuple[tuple[str, str, str], ...] = ()
+
+    @property
+    def sequences(self) -> list[str]:
+        """The sequence of each sample, empty for still pictures."""
+        if self.shot is None:
+            return [record.get("sequence", "") for record in self.records]
+        return [self.shot.shot.sequence] * len(self.records)
 
 
 class _ChannelFiles(Mapping[str, NDArray[Any]]):

@@ -26,7 +26,7 @@ from viewsphere.labels import (
 from viewsphere.model.camera import Camera, Intrinsics
 from viewsphere.model.instant import Viewpoint
 from viewsphere.model.rig import CAMERA
-from viewsphere.model.sample import ObjectAnnotation, Sample
+from viewsphere.model.sample import ObjectAnnotation, Sample, Taken
 from viewsphere.model.shot import Shot
 
 Channels = Mapping[str, NDArray[Any]]
@@ -91,11 +91,14 @@ def from_whole_sample(record: Mapping[str, Any], channels: Channels, files: Mapp
 
 @dataclass(frozen=True, eq=False)
 class ShotRecords:
-    """Restores a shot's samples from short records; `facts` describes its models, `where` names the file in messages."""
+    """Restores a shot's samples from short records; `facts` describes its models, `where` names the file in messages, `root` is
+    the data set's folder.
+    """
 
     shot: Shot
     facts: Facts
     where: str
+    root: str
 
     @cached_property
     def _samples(self) -> tuple[tuple[int, int, int], ...]:
@@ -130,6 +133,7 @@ class ShotRecords:
             sensor=self.shot.rig.sensors[sensor].name,
             instant=now.index,
             time=now.seconds,
+            taken=Taken(instant, sensor, None, self.root, self.shot.key),
         )
 
     def _objects(self, records: list[dict[str, Any]], instant: int, camera: Camera) -> Iterator[ObjectAnnotation]:

@@ -9,10 +9,12 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from viewsphere.assets.mesh import Mesh
 from viewsphere.model.shot import Shot
+from viewsphere.model.thing import Thing
 from viewsphere.model.tracks import Tracks
 from viewsphere.truth.geometry import Geometry, without_ground
-from viewsphere.truth.moving import ROOMS
+from viewsphere.truth.moving import ROOMS, Ring, shot_floor
 from viewsphere.truth.points import SurfacePoints, points_seen
 from viewsphere.truth.view import View
 from viewsphere.truth.visibility import rasterize
@@ -109,6 +111,20 @@ class ShotViews:
             return np.array([(x, y) for instant, x, y in tracks.points if instant == at], np.float64).reshape(-1, 2)
         name = zlib.crc32(self.shot.rig.sensors[sensor].name.encode())
         return _drawn(view, tracks.count, tracks.on == "objects", np.random.default_rng((tracks.seed, name, at)))
+
+
+def views_of(shot: Shot, mesh_of: Callable[[Thing], Mesh]) -> ShotViews:
+    """The views of a shot in which no engine has a part; `mesh_of` gives the mesh of a still thing, which is the same object
+    where it has not changed.
+    """
+    ground = shot.scene.ground is not None and shot.scene.ground.is_labelled
+    ring = Ring(ground, shot.label_alpha)
+
+    def meshes_at(instant: int) -> list[Mesh]:
+        return [mesh_of(thing) for thing in shot.things_at(instant)]
+
+    floor = shot_floor(shot, meshes_at)
+    return ShotViews(shot, lambda instant: ring.at(shot.things_at(instant), meshes_at(instant), floor))
 
 
 def _drawn(view: View, count: int, on_objects: bool, rng: np.random.Generator) -> Float:

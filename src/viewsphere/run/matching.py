@@ -1,0 +1,113 @@
+"""Matches: where each pixel's point of one sample is in another, from geometry."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.assets.exported import read_exported
+from viewsphere.assets.mesh import Mesh
+from viewsphere.errors import StoreError, UserError
+from viewsphere.model.sample import Sample, Taken
+from viewsphere.model.shot import Shot
+from viewsphere.model.thing import Thing
+from viewsphere.run.stages import Stages
+from viewsphere.store import Store
+from viewsphere.truth.correspondence import Match
+from viewsphere.truth.shot_views import views_of
+from viewsphere.truth.view import View
+from viewsphere.truth.visibility import rasterize
+
+SHOTS = 4
+"""Shots whose things are kept for the next matches."""
+
+
+@dataclass(frozen=True, eq=False)
+class Matches:
+    """Where the point that each pixel of a picture shows is in another picture.
+
+    xy (H, W, 2) float64, pixels, NaN where it has none; z (H, W) float64, metres along the other camera's axis, infinite for
+    the sky, NaN where there is no pixel; state (H, W) uint8: 0 visible, 1 occluded, 2 outside, 3 behind, 4 invalid.
+    """
+
+    xy: NDArray[np.float64]
+    z: NDArray[np.float64]
+    state: NDArray[np.uint8]
+
+
+def matches(a: Sample, b: Sample) -> Matches:
+    """The matches of each pixel of `a` in `b`: two samples of one sequence, or of still pictures of one subject.
+
+    Raises UserError for other pairs, and StoreError for samples of which nobody knows what was there, imported ones for one.
+    """
+    shots = tuple(map(_shot_of, (a, b)))
+    if a.sequence != b.sequence or (not a.sequence and _subject(shots[0]) != _subject(shots[1])):
+        names = (sample.sequence or f"stills of {_subject(shot)}" for sample, shot in zip((a, b), shots, strict=True))
+        raise UserError(
+            f"matches: expected two samples of one sequence, or of one subject's stills; found {' and '.join(names)}"
+        )
+    one, other = (_view(sample, shot) for sample, shot in zip((a, b), shots, strict=True))
+    found = Match(one, rasterize(one.geometry, one.camera), other)
+    z = np.where(np.isnan(found.xy[..., 0]), np.nan, found.xyz[..., 2])
+    return Matches(found.xy, z, found.state)
+
+
+def _shot_of(sample: Sample) -> Shot:
+    taken = sample.taken
+    if taken is None:
+        raise StoreError(f"frame {sample.index}: expected a sample whose shot is kept; found one that was imported or merged")
+    if taken.shot is not None:
+        return taken.shot
+    found = _stored(taken.root, taken.key)
+    if found is None:
+        raise StoreError(f"{taken.root}: frame {sample.index}: expected its shot {taken.key}, found none")
+    return found
+
+
+@lru_cache(maxsize=SHOTS)
+def _stored(root: str, key: str) -> Shot | None:
+    return Store(Path(root)).shot(key)
+
+
+def _subject(shot: Shot) -> str:
+    return shot.things[0].model.key
+
+
+def _view(sample: Sample, shot: Shot) -> View:
+    """What a sample's sensor may see."""
+    assert sample.taken is not None
+    return views_of(shot, _meshes(sample.taken)).view(sample.taken.instant, sample.taken.sensor)
+
+
+def _meshes(taken: Taken) -> Callable[[Thing], Mesh]:
+    """Gives the mesh of a thing: what was exported of objects of a data set, what sources say of all else."""
+
+    def mesh(thing: Thing) -> Mesh:
+        if taken.shot is None and thing.id:
+            return _exported(taken.root, thing.model.key, thing.step and thing.step.frame)
+        return _built(thing)
+
+    return mesh
+
+
+@lru_cache(maxsize=64)
+def _exported(root: str, key: str, frame: int | None) -> Mesh:
+    info = Store(Path(root)).model_info(key)
+    if info is None:
+        raise StoreError(f"{root}: expected a finished model {key}, found none")
+    shown = info.at(frame)
+    return read_exported(Path(root) / shown.glb, shown.parts, shown.node)
+
+
+def _built(thing: Thing) -> Mesh:
+    return _models().model(thing.model, thing.step)
+
+
+@lru_cache(maxsize=1)
+def _models() -> Stages:
+    return Stages()

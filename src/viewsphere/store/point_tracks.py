@@ -1,0 +1,74 @@
+"""Point tracks of a sequence, joined from its samples."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.errors import StoreError
+from viewsphere.geometry.camera import project
+from viewsphere.geometry.rotation import transform
+from viewsphere.model.sample import Sample
+
+Float = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class PointTracks:
+    """N points that one sensor followed through the T instants of a sequence that are finished.
+
+    ids (N,) int64: their numbers, in the order of the queries; query (N, 3) float64: the instant, and the position (x, y) in
+    pixels, at which each was picked; object (N,) int32: id of the object that it lies on, 0 for none.
+
+    At each instant: xy (T, N, 2) float64 pixels, NaN where it has none; xyz (T, N, 3) float64 metres in the camera's axes,
+    world (T, N, 3) in the world's, NaN where it is nowhere: points of the sky have xyz (NaN, NaN, inf) and world NaN; state (T, N)
+    uint8: 0 visible, 1 occluded, 2 outside, 3 behind, 4 invalid. instants (T,) int64 are the instants' numbers.
+    """
+
+    ids: NDArray[np.int64]
+    query: Float
+    object: NDArray[np.int32]
+    xy: Float
+    xyz: Float
+    world: Float
+    state: NDArray[np.uint8]
+    instants: NDArray[np.int64]
+
+
+def joined(samples: Sequence[Sample]) -> PointTracks:
+    """The tracks of one sensor's samples of one sequence, instant by instant; raises StoreError where samples have none, or
+    follow other points.
+    """
+    rows = [sample.channels.get("tracks") for sample in samples]
+    known = [row for row in rows if row is not None]
+    if not known or len(known) < len(rows):
+        raise StoreError("tracks: expected samples with points that are followed; found none: set tracks in the recipe")
+    first = known[0]
+    for sample, row in zip(samples, known, strict=True):
+        if not all(np.array_equal(row[name], first[name]) for name in ("instant", "query", "object")):
+            raise StoreError(f"tracks: expected the same points all through a sequence; found others in frame {sample.index}")
+    parts = [_in_picture(sample, row["point"]) for sample, row in zip(samples, known, strict=True)]
+    xy, xyz, world = (np.stack([part[k] for part in parts]) for k in range(3))
+    return PointTracks(
+        ids=np.arange(len(first)),
+        query=np.column_stack((first["instant"].astype(np.float64), first["query"])),
+        object=first["object"].copy(),
+        xy=xy,
+        xyz=xyz,
+        world=world,
+        state=np.stack([row["state"] for row in known]),
+        instants=np.array([sample.instant for sample in samples], np.int64),
+    )
+
+
+def _in_picture(sample: Sample, points: Float) -> tuple[Float, Float, Float]:
+    """Where homogeneous points (N, 4) of the world are in a sample's picture (N, 2), in its camera's axes and in the world."""
+    camera, is_sky = sample.camera, points[:, 3] == 0.0
+    turned = transform(camera.R, points[:, :3])
+    xyz = np.where(is_sky[:, None], turned, turned + camera.t)
+    xy, _ = project(camera.intrinsics, xyz)
+    xyz[is_sky] = (np.nan, np.nan, np.inf)
+    return xy, xyz, np.where(is_sky[:, None], np.nan, points[:, :3])
