@@ -104,10 +104,16 @@ def test_stills_of_what_moves_are_those_of_what_stands(has_scenery):
         assert np.array_equal(picture(stage, i), picture(stage_of(alone), i))
 
 
-@pytest.mark.parametrize("scene, most, share", [("sun", 0.6, 0.02), ("lamp", 0.3, 0.01)])
-def test_a_sequence_looks_like_stills(scene, most, share):
-    """But for the shadows' edges: maps are a little coarser where they stay in place for a while."""
-    moving, still = (stage_of(sequence_of(scene, sequence=name)) for name in ("drive", ""))
+@pytest.mark.parametrize(
+    "scene, occlusion, most, share",
+    [("sun", "off", 0.6, 0.02), ("lamp", "off", 0.3, 0.01), ("sun", "fast", 2.0, 0.03), ("lamp", "fast", 2.0, 0.03)],
+)
+def test_a_sequence_looks_like_stills(scene, occlusion, most, share):
+    """But for the shadows' edges, as maps are a little coarser where they stay in place for a while; and for ambient
+    occlusion, which each target has of its own.
+    """
+    option = {"engine_options": {"ambient_occlusion": occlusion}}
+    moving, still = (stage_of(sequence_of(scene, sequence=name).model_copy(update=option)) for name in ("drive", ""))
     for i in range(COUNT):
         apart = np.abs(picture(moving, i).astype(int) - picture(still, i)).max(axis=-1)
         assert apart.mean() < most and (apart > 8).mean() < share, (apart.mean(), (apart > 8).mean())

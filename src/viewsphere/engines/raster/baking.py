@@ -22,6 +22,7 @@ from viewsphere.engines.raster.painting import Baked
 from viewsphere.engines.raster.records import Float32, Int32, Surfaces
 from viewsphere.engines.raster.still_maps import StillMaps
 from viewsphere.engines.raster.surface import Lengths, Materials, made_of, move_surfaces, pack_materials, pack_surfaces
+from viewsphere.engines.raster.thing_occlusion import TargetShades
 from viewsphere.model.scene import Ground, Scene
 from viewsphere.surroundings.ground import ground_albedo, ground_frame, ground_material, only_scatters
 from viewsphere.surroundings.sky import even_light
@@ -102,8 +103,8 @@ def sequence_lengths(meshes: Sequence[Mesh]) -> Lengths:
     return Lengths((0.0, 0.0, 0.0), 2.0 ** math.ceil(math.log2(unit)))
 
 
-def bake(packed: Packed, scene: Scene, options: Options) -> Baked:
-    """What pictures of things are painted from, as they are arranged."""
+def bake(packed: Packed, scene: Scene, options: Options, shades: TargetShades) -> Baked:
+    """What pictures of things are painted from, as they are arranged. `shades` keeps what targets of a sequence hide."""
     geometry, surfaces, lengths = packed.arranged.geometry, packed.surfaces, packed.lengths
     has_ground = scene.ground is not None
     casters = _casters(packed, has_ground)
@@ -112,7 +113,10 @@ def bake(packed: Packed, scene: Scene, options: Options) -> Baked:
     floor, albedo = _floor(scene.ground, lengths, still_lengths(packed.arranged), len(surfaces.looks) - 1)
     lamps = lamps_on_ground(lights, casters.extent)
     surrounding = bake_surrounding(scene.sky, scene.sun, albedo, distant, even_light(scene.lights), lamps)
-    occlusion = bake_occlusion(casters, has_ground, options.ambient_occlusion)
+    if packed.arranged.is_sequence:
+        occlusion = shades.bake(packed.arranged, casters, lengths.unit, has_ground, options.ambient_occlusion)
+    else:
+        occlusion = bake_occlusion(casters, has_ground, options.ambient_occlusion)
     return Baked(
         geometry=geometry,
         origin=np.array(lengths.origin),

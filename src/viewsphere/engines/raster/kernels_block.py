@@ -33,6 +33,9 @@ T0, T1, T2, T3, T4, T5, T6, T7 = range(62 * BLOCK, 70 * BLOCK, BLOCK)
 # THROUGH the share that a transmissive surface lets through, before its tint.
 FACE_R, FACE_G, FACE_B, EDGE_R, EDGE_G, EDGE_B, BASE_R, BASE_G, BASE_B = range(70 * BLOCK, 79 * BLOCK, BLOCK)
 LOBE, RIM, TAKEN, THROUGH = range(79 * BLOCK, 83 * BLOCK, BLOCK)
-# 1 on scenery, else 0. The last row is room for vectors that begin in the row before.
+# 1 on scenery, else 0.
 SCENERY = 83 * BLOCK
-ROWS = 85
+# Position and shading normal in the axes in which what hides the sky was baked. The last row is room for vectors that begin in
+# the row before.
+OX, OY, OZ, ONX, ONY, ONZ = range(84 * BLOCK, 90 * BLOCK, BLOCK)
+ROWS = 91

@@ -383,16 +383,13 @@ def draw_views(views: Sequence[ShadowView], casters: Casters, opposite: bool = F
         form[i] = _form_row(view, i >= len(views))
     result = Views(form, grid, np.empty(texels, np.float32), np.empty((cells, 4), np.float32))
     result.bounds[:] = np.inf, -np.inf, 0, 0
-    places = np.ascontiguousarray(casters.surfaces.vertices[:, 11:14])
-    corners = np.empty((len(places), 4))
     for i, view in enumerate(views):
-        kernels.see_vertices(places, view.matrix, corners)
         nearest = _level(result, i, view.size)
         farthest = _level(result, i + len(views), view.size) if opposite else np.empty((0, 0), np.float32)
         farthest.fill(-np.inf)
         tilt = float(form[i, kernels.TILT]) if view.is_round else 0.0
-        last = _begin(view, tilt, casters, corners, nearest)
-        kernels.draw_depth(corners, last, casters.textures, view.near, tilt, nearest, farthest)
+        last = _begin(view, tilt, casters, nearest)
+        _draw(view, tilt, last, casters.textures, nearest, farthest)
         np.negative(farthest, out=farthest)
     for i in range(count):
         _thin_out(result, i)
@@ -400,7 +397,20 @@ def draw_views(views: Sequence[ShadowView], casters: Casters, opposite: bool = F
     return result
 
 
-def _begin(view: ShadowView, tilt: float, casters: Casters, corners: Float, nearest: Float32) -> Surfaces:
+def _draw(
+    view: ShadowView, tilt: float, surfaces: Surfaces, textures: Textures, nearest: Float32, farthest: Float32 | None = None
+) -> None:
+    """Draw these surfaces over a map of a view, and over that of the farthest, if asked."""
+    if not len(surfaces.triangles):
+        return
+    first, stop = int(surfaces.triangles.min()), int(surfaces.triangles.max()) + 1
+    corners = np.empty((stop, 4))  # those before the first are not looked at
+    kernels.see_vertices(np.ascontiguousarray(surfaces.vertices[first:stop, 11:14]), view.matrix, corners[first:])
+    other = np.empty((0, 0), np.float32) if farthest is None else farthest
+    kernels.draw_depth(corners, surfaces, textures, view.near, tilt, nearest, other)
+
+
+def _begin(view: ShadowView, tilt: float, casters: Casters, nearest: Float32) -> Surfaces:
     """Draw what stands still in a sequence into an empty map; returns what is still to be drawn."""
     maps, key = casters.maps, (view.matrix.tobytes(), view.near, tilt, view.size)
     kept = None if maps is None else maps.begun(key)
@@ -408,8 +418,7 @@ def _begin(view: ShadowView, tilt: float, casters: Casters, corners: Float, near
     if maps is None:
         return casters.surfaces
     if kept is None:
-        nothing = np.empty((0, 0), np.float32)
-        kernels.draw_depth(corners, maps.still, casters.textures, view.near, tilt, nearest, nothing)
+        _draw(view, tilt, maps.still, casters.textures, nearest)
         maps.keep(key, nearest)
     return maps.moving
 

@@ -6,7 +6,7 @@ Depths from 32 or 48 directions all over the sphere, each looked up as softly as
 from __future__ import annotations
 
 import math
-from collections.abc import Hashable
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import Literal, NamedTuple
@@ -20,6 +20,7 @@ from viewsphere.engines.raster.kernels_arrive import DISTANT
 from viewsphere.engines.raster.kernels_block import BLOCK, ROWS
 from viewsphere.engines.raster.lights import Casters, Lights, Views, draw_views, parallel_view
 from viewsphere.engines.raster.records import Float32
+from viewsphere.geometry.rotation import transform
 
 Float = NDArray[np.float64]
 Quality = Literal["off", "fast", "fine"]
@@ -37,10 +38,42 @@ _DEEPEST = 0.92  # the rest is light that objects and ground throw back and fort
 
 
 class Occlusion(NamedTuple):
-    """volume (layers, rows, columns, 8) float32, see `kernels_occlusion`; frame (8,): x, y, z of its first point, cells per
-    length, how far from a surface it is read in cells, whether there is a volume, whether there is a ground; floor (n, n, 2):
-    share of the sky's and of all light that the targets leave to what they stand on; floor_frame (6,): its cells per length,
-    its corner's x and y, the z they stand on, their height, whether they stand on anything.
+    """N volumes and maps, one of each for all targets of a still picture, or for each target of a sequence.
+
+    volume (cells, 8) float32, see `kernels_occlusion`, of all volumes one after another; grid (N, 4) int64: where each begins,
+    its layers, rows and columns; frame (N, 8): x, y, z of its first point, cells per length, how far from a surface it is read
+    in cells, whether there is a volume, whether there is a ground; floor (N, n, n, 2): share of the sky's and of all light that
+    the targets leave to what they stand on; floor_frame (N, 7): its cells per length, its corner's x and y, the z they stand
+    on, their height, whether they stand on anything, whether they do not darken what is high above. All of these are in the
+    axes of baking; pose (N, 12): rows of the (3, 4) matrix from the stage to these axes, which is rigid; reach (N, 6): lowest
+    and highest x, lowest and highest y and z in the stage where anything can be hidden.
+    """
+
+    volume: Float32
+    grid: NDArray[np.int64]
+    frame: Float32
+    floor: Float32
+    floor_frame: Float32
+    pose: Float32
+    reach: Float32
+
+
+NO_OCCLUSION = Occlusion(
+    np.zeros((1, kernels.COEFFICIENTS), np.float32),
+    np.zeros((0, 4), np.int64),
+    np.zeros((0, 8), np.float32),
+    np.ones((0, 2, 2, 2), np.float32),
+    np.zeros((0, 7), np.float32),
+    np.zeros((0, 12), np.float32),
+    np.zeros((0, 6), np.float32),
+)
+IN_PLACE = np.eye(4)
+"""World from the axes of baking, in the stage's unit, of what is baked where it stands."""
+
+
+class Hidden(NamedTuple):
+    """What some targets hide, in the axes of baking: `Occlusion` of one volume and map, without pose and reach. volume (layers,
+    rows, columns, 8); floor (n, n): the sky's share alone.
     """
 
     volume: Float32
@@ -49,20 +82,22 @@ class Occlusion(NamedTuple):
     floor_frame: Float32
 
 
-NO_OCCLUSION = Occlusion(
-    np.zeros((1, 1, 1, kernels.COEFFICIENTS), np.float32),
-    np.zeros(8, np.float32),
-    np.ones((2, 2, 2), np.float32),
-    np.zeros(6, np.float32),
-)
+class Fineness(NamedTuple):
+    """quality: how many directions and cells; most: cells of a volume at most; floor: cells of the ground's map, each way;
+    is_open: whether anything else may be near, which reads any of the cells.
+    """
+
+    quality: Literal["fast", "fine"]
+    most: int
+    floor: int
+    is_open: bool
 
 
 @dataclass(frozen=True)
 class _Baking:
     targets: Hashable
-    has_scenery: bool
     has_ground: bool
-    quality: Literal["fast", "fine"]
+    fineness: Fineness
     casters: Casters = field(compare=False)
 
 
@@ -73,45 +108,79 @@ def bake_occlusion(casters: Casters, has_ground: bool, quality: Quality) -> Occl
     """
     if quality == "off" or not casters.extent.triangles or not (casters.extent.high - casters.extent.low).max() > 0:
         return NO_OCCLUSION
-    baking = _Baking(casters.targets, casters.scenery is not None, has_ground, quality, casters)
+    has_scenery = casters.scenery is not None
+    fineness = Fineness(quality, _MOST_OPEN_CELLS if has_scenery else _MOST_CELLS[quality], _FLOOR, has_scenery)
+    baking = _Baking(casters.targets, has_ground, fineness, casters)
     return _bake.__wrapped__(baking) if casters.targets is None else _bake(baking)
 
 
 @lru_cache(maxsize=1)
 def _bake(baking: _Baking) -> Occlusion:
-    casters = baking.casters
-    directions, views = _sky_views(casters, baking.quality)
-    volume, corner, cells = _volume(casters, directions, views, baking.quality)
-    floor, floor_frame = NO_OCCLUSION.floor, NO_OCCLUSION.floor_frame
+    everywhere = np.array([-np.inf, np.inf] * 3)
+    return joined([hidden_by(baking.casters, baking.has_ground, baking.fineness)], [IN_PLACE], everywhere[None])
+
+
+def hidden_by(casters: Casters, has_ground: bool, fineness: Fineness) -> Hidden:
+    """What the targets hide from what is near them, and from the ground."""
+    directions, views = _sky_views(casters, fineness.quality)
+    volume, corner, cells = _volume(casters, directions, views, fineness)
+    floor, floor_frame = np.ones((fineness.floor, fineness.floor), np.float32), np.zeros(7, np.float32)
     if casters.extent.ground_z is not None:
-        floor, floor_frame = _floor(casters, casters.extent.ground_z, directions, views)
-    frame = np.array([*corner, cells, _PUSH, 1.0, baking.has_ground, 0.0], np.float32)
-    return Occlusion(volume, frame, floor, floor_frame)
+        floor, floor_frame = _floor(casters, casters.extent.ground_z, directions, views, fineness.floor)
+    frame = np.array([*corner, cells, _PUSH, 1.0, has_ground, 0.0], np.float32)
+    return Hidden(volume, frame, floor, floor_frame)
+
+
+def joined(hidden: Sequence[Hidden], poses: Sequence[Float], reach: Float) -> Occlusion:
+    """All of these, each where it stands: `poses` (4, 4) are rigid, from the axes of baking to the stage, and `reach` (N, 6)
+    is that of `Occlusion`.
+    """
+    volumes = {id(each.volume): each.volume for each in hidden}
+    firsts = dict(zip(volumes, np.cumsum([0, *(v[..., 0].size for v in volumes.values())]).tolist(), strict=False))
+    inverse = [np.column_stack([pose[:3, :3].T, -transform(pose[:3, :3].T, pose[:3, 3])]) for pose in poses]
+    flat = [volume.reshape(-1, kernels.COEFFICIENTS) for volume in volumes.values()]
+    return Occlusion(
+        volume=flat[0] if len(flat) == 1 else np.concatenate(flat),
+        grid=np.array([[firsts[id(each.volume)], *each.volume.shape[:3]] for each in hidden], np.int64),
+        frame=np.array([each.frame for each in hidden]),
+        floor=np.repeat(np.array([each.floor for each in hidden])[..., None], 2, axis=3),
+        floor_frame=np.array([each.floor_frame for each in hidden]),
+        pose=np.array(inverse, np.float32).reshape(-1, 12),
+        reach=np.asarray(reach, np.float32),
+    )
 
 
 def with_ground_light(occlusion: Occlusion, lights: Lights, ambient: float) -> Occlusion:
     """The same where these lights and the sky light the ground: `ambient` is the sum over red, green and blue of the irradiance
     that the open ground has from the sky.
     """
-    if not occlusion.floor_frame[5]:
+    if not occlusion.floor_frame[:, 5].any():
         return occlusion
-    cells, left, front, z, height = (float(v) for v in occlusion.floor_frame[:5])
-    at = (np.arange(_FLOOR) + 0.5) / cells
+    floor = occlusion.floor.copy()
+    for k in range(len(floor)):
+        floor[k, ..., 1] = _all_light(occlusion, k, lights, ambient)
+    return occlusion._replace(floor=floor)
+
+
+def _all_light(occlusion: Occlusion, k: int, lights: Lights, ambient: float) -> Float:
+    """Share of all light that reaches the cells of map k, (n, n)."""
+    cells, left, front, z, height = (float(v) for v in occlusion.floor_frame[k, :5])
+    sky = occlusion.floor[k, ..., 0]
+    at = (np.arange(len(sky)) + 0.5) / cells
     x, y = np.meshgrid(left + at, front + at)
-    arrived, whole = ambient * occlusion.floor[..., 0], np.full((_FLOOR, _FLOOR), ambient)
-    for k, kind in enumerate(lights.kind.tolist()):
+    pose = occlusion.pose[k].reshape(3, 4).astype(np.float64)
+    arrived, whole = ambient * sky, np.full(sky.shape, ambient)
+    for which, kind in enumerate(lights.kind.tolist()):
         # What lamps give the ground around has their shadows taken off already; what lies on it keeps their light in.
         is_lamp = kind != DISTANT
-        depth = 0.02 * height if is_lamp and occlusion.frame[6] else 0.0  # scenery may be the ground
+        depth = 0.02 * height if is_lamp and occlusion.frame[k, 6] else 0.0  # scenery may be the ground
         places = np.stack([x, y, np.full_like(x, z - depth)], axis=-1).reshape(-1, 3)
-        irradiance, share = arriving(lights, k, places, 2 / cells)
+        irradiance, share = arriving(lights, which, transform(pose[:, :3].T, places - pose[:, 3]), 2 / cells)
         got = irradiance.sum(axis=1)
         arrived = arrived + (got * share).reshape(x.shape)
         whole = whole + (got * share if is_lamp else got).reshape(x.shape)
-    floor = occlusion.floor.copy()
     reaching = np.minimum(arrived / np.maximum(whole, 1e-30), 1)
-    floor[..., 1] = 1 - np.where(whole > 0, 1 - reaching, 0) * _window()
-    return occlusion._replace(floor=floor)
+    return 1 - np.where(whole > 0, 1 - reaching, 0) * _window(len(sky))
 
 
 def sky_directions(axes: int) -> Float32:
@@ -146,20 +215,16 @@ def _sky_views(casters: Casters, quality: Literal["fast", "fine"]) -> tuple[Floa
     return directions, draw_views(views, casters.alone(own), opposite=True)
 
 
-def _volume(
-    casters: Casters, directions: Float32, views: Views, quality: Literal["fast", "fine"]
-) -> tuple[Float32, Float, float]:
+def _volume(casters: Casters, directions: Float32, views: Views, fineness: Fineness) -> tuple[Float32, Float, float]:
     """The volume, where its first point lies and how many cells there are per length."""
     low, size = casters.extent.low, casters.extent.high - casters.extent.low
-    has_scenery = casters.scenery is not None
-    pad = _WIDE_PAD if has_scenery else _PAD
-    most = _MOST_OPEN_CELLS if has_scenery else _MOST_CELLS[quality]
-    cells = _LONGEST[quality] / float(size.max())
-    while np.prod(np.ceil(size * cells) + 2 * pad + 1) > most:
+    pad = _WIDE_PAD if fineness.is_open else _PAD
+    cells = _LONGEST[fineness.quality] / float(size.max())
+    while np.prod(np.ceil(size * cells) + 2 * pad + 1) > fineness.most:
         cells *= 0.9
     shape = (np.ceil(size * cells) + 2 * pad + 1).astype(int)[::-1]
     corner = low - pad / cells
-    wanted = np.full(shape, True) if has_scenery else _read_points(casters, corner, cells, shape)
+    wanted = np.full(shape, True) if fineness.is_open else _read_points(casters, corner, cells, shape)
     points = corner + np.argwhere(wanted)[:, ::-1] / cells
     seen = _seen(points, views, directions)
     volume = np.empty((*shape, kernels.COEFFICIENTS), np.float32)
@@ -235,25 +300,24 @@ def _mark(known: Float32, is_first: NDArray[np.bool_]) -> None:
         is_first[layer[inside], row[inside], column[inside]] = True
 
 
-def _floor(casters: Casters, z: float, directions: Float32, views: Views) -> tuple[Float32, Float32]:
-    """Share of the sky's light that the targets leave to what they stand on, and where it lies."""
+def _floor(casters: Casters, z: float, directions: Float32, views: Views, size: int) -> tuple[Float32, Float32]:
+    """Share of the sky's light that the targets leave to what they stand on, (size, size), and where it lies."""
     low, high = casters.extent.low, casters.extent.high
     height = float(high[2]) - z
     half = float(max((high - low)[:2].max() / 2, 1e-3) + 0.9 * height)
     corner = (low + high)[:2] / 2 - half
-    cells = _FLOOR / (2 * half)
-    at = (np.arange(_FLOOR) + 0.5) / cells
+    cells = size / (2 * half)
+    at = (np.arange(size) + 0.5) / cells
     x, y = np.meshgrid(corner[0] + at, corner[1] + at)
     points = np.stack([x, y, np.full_like(x, z)], axis=-1).reshape(-1, 3)
     upper = len(directions) // 2
     seen = _seen(points, views, directions[:upper])
     share = (seen[:, 3] / directions[:upper, 2].mean()).reshape(x.shape)
-    floor = np.empty((_FLOOR, _FLOOR, 2), np.float32)
-    floor[:] = (1 - (1 - np.clip(share, 0, 1)) * _DEEPEST * _window())[..., None]
-    return floor, np.array([cells, *corner, z, max(height, 1e-6), 1.0], np.float32)
+    floor = (1 - (1 - np.clip(share, 0, 1)) * _DEEPEST * _window(size)).astype(np.float32)
+    return floor, np.array([cells, *corner, z, max(height, 1e-6), 1.0, 0.0], np.float32)
 
 
-def _window() -> Float:
+def _window(size: int) -> Float:
     """1 within the ground's map, falling to 0 at its border."""
-    inward = np.minimum(np.arange(_FLOOR) + 0.5, _FLOOR - np.arange(_FLOOR) - 0.5) / (0.15 * _FLOOR)
+    inward = np.minimum(np.arange(size) + 0.5, size - np.arange(size) - 0.5) / (0.15 * size)
     return np.clip(np.minimum(inward[:, None], inward), 0, 1)

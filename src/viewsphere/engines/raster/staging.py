@@ -15,6 +15,7 @@ from viewsphere.engines.raster.options import Options, parse_options
 from viewsphere.engines.raster.painting import Baked, paint
 from viewsphere.engines.raster.records import Float32
 from viewsphere.engines.raster.surface import Lengths
+from viewsphere.engines.raster.thing_occlusion import TargetShades
 from viewsphere.imaging.background import display_background
 from viewsphere.imaging.finish import finished
 from viewsphere.imaging.seen import seen_by
@@ -31,6 +32,7 @@ class RasterStage:
     options: Options
     _packed: list[Packed] = field(default_factory=list[Packed])
     _baked: dict[tuple[Geometry, bool], Baked] = field(default_factory=dict[tuple[Geometry, bool], Baked])
+    _shades: TargetShades = field(default_factory=TargetShades)
     _canvases: dict[int, Float32] = field(default_factory=dict[int, Float32])
 
     @property
@@ -52,7 +54,7 @@ class RasterStage:
         key = arranged.geometry, arranged.is_sequence
         if key not in self._baked:
             self._baked.clear()
-            self._baked[key] = bake(self._pack(arranged), self.shot.scene, self.options)
+            self._baked[key] = bake(self._pack(arranged), self.shot.scene, self.options, self._shades)
         return self._baked[key]
 
     def _pack(self, arranged: Arranged) -> Packed:
