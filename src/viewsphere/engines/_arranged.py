@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
+import numpy as np
+
 from viewsphere.assets.deforming import Load, sharing
 from viewsphere.assets.mesh import Mesh
 from viewsphere.model.model_spec import ModelSpec
@@ -11,7 +13,7 @@ from viewsphere.model.scene import Floor
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing, TimeStep
 from viewsphere.truth.geometry import Geometry, placed_meshes, present
-from viewsphere.truth.moving import Ring, changed, shot_floor
+from viewsphere.truth.moving import Ring, changed, differs_in_shape_only, shot_floor
 
 STEPS = 16
 """Time steps of models whose meshes are kept for the next instants."""
@@ -22,14 +24,16 @@ class Arranged:
     """All things of a shot as they stand at an instant. meshes[i] is that of things[i], without triangles if that is not there;
     `whole` has the triangles of those, too. `geometry` is another object where anything is elsewhere, and only then.
 
-    moving: which of the things are not still in the shot; is_sequence: whether the shot is part of one, else it has pictures
-    that have nothing to do with one another.
+    moving: which of the things are not still in the shot, or while its shutter is open; known: meshes that stand for `whole`
+    where much depends on a mesh: between two time steps the nearer one's; is_sequence: whether the shot is part of one, else
+    it has pictures that have nothing to do with one another.
     """
 
     things: tuple[Thing, ...]
     whole: tuple[Mesh, ...]
     geometry: Geometry
     moving: tuple[int, ...]
+    known: tuple[Mesh, ...]
     is_sequence: bool
 
     @property
@@ -97,10 +101,48 @@ class Arrangements:
         """The things as they stand at an instant, counted from 0 in the shot."""
         things = self.shot.things_at(instant)
         meshes = self._meshes(things)
-        moving = tuple(i for i, thing in enumerate(self.shot.things) if not thing.motion.is_still)
-        return Arranged(things, meshes, self.ring.at(things, meshes, self.floor), moving, bool(self.shot.sequence))
+        return self._arranged(things, meshes, meshes, self.ring.at(things, meshes, self.floor))
+
+    def during(self, instant: int, moment: float) -> Arranged:
+        """The things a moment after an instant (see `model.exposure.Sweep`) while the shutter is open. Its geometry is good
+        until this is called again.
+        """
+        things = self.shot.things_during(instant, moment)
+        known = self._meshes(things)
+        sweeps = self.shot.exposures[instant].things
+        meshes = tuple(
+            mesh if sweep is None or now.step is None else self._deformed(now.model, sweep.steps(moment), rest, mesh)
+            for now, sweep, rest, mesh in zip(things, sweeps, self.meshes, known, strict=True)
+        )
+        return self._arranged(things, meshes, known, self.ring.passing(things, meshes, self.floor))
+
+    def _arranged(
+        self, things: tuple[Thing, ...], meshes: tuple[Mesh, ...], known: tuple[Mesh, ...], geometry: Geometry
+    ) -> Arranged:
+        swept = {i for exposure in self.shot.exposures for i, sweep in enumerate(exposure.things) if sweep is not None}
+        moving = tuple(i for i, thing in enumerate(self.shot.things) if i in swept or not thing.motion.is_still)
+        return Arranged(things, meshes, geometry, moving, known, bool(self.shot.sequence))
+
+    def _deformed(
+        self, spec: ModelSpec, steps: tuple[TimeStep | None, TimeStep | None, float], rest: Mesh, nearest: Mesh
+    ) -> Mesh:
+        """The mesh between two time steps, or the nearest where these are not made of the same triangles."""
+        before, after, share = steps
+        if before is None or after is None or before == after:
+            return nearest
+        return blended(*(self.shown.mesh(spec, step, rest) for step in (before, after)), share) or nearest
 
     def _meshes(self, things: tuple[Thing, ...]) -> tuple[Mesh, ...]:
         """Of these things, at the time steps that they show."""
         held = zip(things, self.meshes, strict=True)
         return tuple(mesh if now.step is None else self.shown.mesh(now.model, now.step, mesh) for now, mesh in held)
+
+
+def blended(a: Mesh, b: Mesh, share: float) -> Mesh | None:
+    """A mesh at a share of the way from one to another that differs in shape only, else None."""
+    if not differs_in_shape_only(a, b):
+        return None
+    vertices, normals = ((1 - share) * x + share * y for x, y in ((a.vertices, b.vertices), (a.normals, b.normals)))
+    length = np.sqrt((normals * normals).sum(axis=1, keepdims=True))
+    unit = normals / np.where(length > 0, length, 1)
+    return replace(a, vertices=vertices.astype(np.float32), normals=unit.astype(np.float32))

@@ -5,12 +5,14 @@ from __future__ import annotations
 from bisect import bisect_left
 from collections.abc import Iterator
 from itertools import product
+from typing import Any
 
 import numpy as np
-from pydantic import Field, JsonValue, model_validator
+from pydantic import Field, JsonValue, SerializerFunctionWrapHandler, model_serializer, model_validator
 
 from viewsphere.geometry.rotation import compose, transform
 from viewsphere.model.camera import Camera, Intrinsics
+from viewsphere.model.exposure import Exposure, Sweep
 from viewsphere.model.files import Files
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.instant import Instant, Viewpoint, viewpoint_of
@@ -25,6 +27,10 @@ class Shot(Frozen):
 
     A sample is one sensor's picture at one recorded instant: those of an instant follow one another in the rig's order, and
     `first` is the number of the first one in the data set. Instants ascend by their indices.
+
+    Where `shutter` is not 0, pictures show all that is there while the shutter is open, for this share of the time between two
+    instants with the instant in the middle, and `exposures`, one an instant, say how things move then. Labels are those of
+    the instant.
     """
 
     key: str  # stable, unique, fit for a folder's name
@@ -41,6 +47,8 @@ class Shot(Frozen):
     files: Files = Files()
     label_alpha: float = 0.01
     category_deg: float = Field(default=45.0, gt=0)  # angular resolution of the pose categories
+    shutter: float = Field(default=0.0, ge=0, le=1)
+    exposures: tuple[Exposure, ...] = ()
 
     @model_validator(mode="after")
     def _as_many_poses_as_instants(self) -> Shot:
@@ -61,6 +69,24 @@ class Shot(Frozen):
                 found = f"{now.intrinsics.width} x {now.intrinsics.height}"
                 raise ValueError(f"expected pictures of {lens.width} x {lens.height} at all instants; found {found}")
         return self
+
+    @model_validator(mode="after")
+    def _exposed_at_all_instants(self) -> Shot:
+        if len(self.exposures) != (len(self.instants) if self.shutter else 0):
+            expected = "an exposure an instant" if self.shutter else "none without a shutter"
+            raise ValueError(f"exposures: expected {expected} ({len(self.instants)}); found {len(self.exposures)}")
+        if any(len(exposure.things) != len(self.things) for exposure in self.exposures):
+            raise ValueError(f"exposures: expected a sweep or None for each of {len(self.things)} things")
+        return self
+
+    @model_serializer(mode="wrap")
+    def _unexposed_as_ever(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Without shutter and exposures where there is no shutter, so that records of such shots are what they were before."""
+        found: dict[str, Any] = handler(self)
+        if not self.shutter:
+            found.pop("shutter", None)
+            found.pop("exposures", None)
+        return found
 
     @property
     def objects(self) -> tuple[Thing, ...]:
@@ -119,6 +145,22 @@ class Shot(Frozen):
         """The channels that a sensor keeps, counted from 0 in the rig."""
         return self.rig.sensors[sensor].kept(self.channels)
 
+    def things_during(self, instant: int, moment: float) -> tuple[Thing, ...]:
+        """All things as they are a moment (see `Sweep`) after an instant while the shutter is open, standing still there; of
+        two time steps they show the nearer one.
+        """
+        return tuple(
+            now if sweep is None or not now.is_there else now.model_copy(update={"motion": _held(sweep, moment)})
+            for now, sweep in zip(self.things_at(instant), self.exposures[instant].things, strict=True)
+        )
+
+    def camera_during(self, instant: int, moment: float, sensor: int = 0) -> Camera:
+        """The camera of a sensor a moment after an instant while the shutter is open."""
+        sweep, now = self.exposures[instant].rig, self.instants[instant]
+        pose = now.world_from_rig if sweep is None else sweep.pose(moment)
+        then = now.model_copy(update={"world_from_rig": pose})
+        return self.model_copy(update={"instants": (then,)}).camera(0, sensor)
+
     def finish(self, instant: int) -> Finish:
         """How light becomes a picture at an instant."""
         return self.instants[instant].finish or self.scene.finish
@@ -130,5 +172,10 @@ class Shot(Frozen):
             thing if thing.motion.is_still else thing.model_copy(update={"motion": Motion(poses=(None,))})
             for thing in self.things
         )
-        alike = {"key": "", "first": 0, "sequence": "", "tracks": None, "instants": (), "things": things}
+        alike = {"key": "", "first": 0, "sequence": "", "tracks": None, "instants": (), "things": things, "exposures": ()}
         return self.model_copy(update=alike).model_dump_json()
+
+
+def _held(sweep: Sweep, moment: float) -> Motion:
+    before, after, share = sweep.steps(moment)
+    return Motion(poses=(sweep.pose(moment),), steps=(before if share < 0.5 else after,))

@@ -59,14 +59,25 @@ class Ring:
     ground: bool
     label_alpha: float
     _rooms: list[_Room] = field(default_factory=list[_Room])
+    _passing: list[_Room] = field(default_factory=list[_Room])
 
     def at(self, things: Sequence[Thing], meshes: Sequence[Mesh], floor: Floor | None = None) -> Geometry:
         """The geometry of these still things; `meshes[i]` is that of `things[i]` at this instant, whether it is there or not.
 
         The same object again where nothing moved. Where a thing comes or goes, or has other triangles, all is built anew.
         """
-        room = self._held(things, meshes, floor) or self._made(things, meshes, floor)
+        room = self._held(things, meshes, floor)
+        if room is None:
+            fitting = [room for room in self._rooms if room.fits(things, meshes)]
+            room = self._made(things, meshes, floor, fitting, self._rooms.pop(0) if len(self._rooms) == ROOMS else None)
         self._rooms.append(room)  # the last asked for comes last
+        return room.geometry
+
+    def passing(self, things: Sequence[Thing], meshes: Sequence[Mesh], floor: Floor | None = None) -> Geometry:
+        """The same between two instants: the arrays are written to again by the next call of this."""
+        fitting = [room for room in (*self._passing, *self._rooms) if room.fits(things, meshes)]
+        room = self._made(things, meshes, floor, fitting, self._passing.pop() if self._passing else None)
+        self._passing.append(room)
         return room.geometry
 
     def _held(self, things: Sequence[Thing], meshes: Sequence[Mesh], floor: Floor | None) -> _Room | None:
@@ -75,9 +86,10 @@ class Ring:
                 return self._rooms.pop(number)
         return None
 
-    def _made(self, things: Sequence[Thing], meshes: Sequence[Mesh], floor: Floor | None) -> _Room:
-        fitting = [room for room in self._rooms if room.fits(things, meshes)]
-        free = self._rooms.pop(0) if len(self._rooms) == ROOMS else None
+    def _made(
+        self, things: Sequence[Thing], meshes: Sequence[Mesh], floor: Floor | None, fitting: list[_Room], free: _Room | None
+    ) -> _Room:
+        """Made of one of the fitting rooms, of the free one if it is the first of them."""
         if not fitting:
             geometry = build_geometry(things, present(things, meshes), self.ground, self.label_alpha, floor)
             return _Room(things, meshes, floor, geometry)

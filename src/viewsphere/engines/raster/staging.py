@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from viewsphere.assets.deforming import Load
 from viewsphere.engines._arranged import Arranged, Arrangements
 from viewsphere.engines.raster.baking import Packed, bake, pack, sequence_lengths, still_lengths
+from viewsphere.engines.raster.blurring import Blur
 from viewsphere.engines.raster.options import Options, parse_options
 from viewsphere.engines.raster.painting import Baked, paint
 from viewsphere.engines.raster.records import Float32
@@ -19,6 +20,7 @@ from viewsphere.engines.raster.thing_occlusion import TargetShades
 from viewsphere.imaging.background import display_background
 from viewsphere.imaging.finish import finished
 from viewsphere.imaging.seen import seen_by
+from viewsphere.model.camera import Camera
 from viewsphere.model.shot import Shot
 from viewsphere.truth.geometry import Geometry
 from viewsphere.truth.visibility import Visibility
@@ -72,16 +74,30 @@ class RasterStage:
 
         `visibility` is truth's buffer of this instant and camera. Raises UserError for an unreadable background image.
         """
-        camera, finish, baked = self.shot.camera(instant, sensor), self.shot.finish(instant), self.baked(instant)
-        finish = finish.with_background(transparent)
+        camera, finish = self.shot.camera(instant, sensor), self.shot.finish(instant).with_background(transparent)
         background = display_background(finish.background, camera.width, camera.height)
         has_sky = background is None and not transparent
         radiance = self._canvas(camera.width * camera.height)
-        paint(baked, camera, visibility, self.options.antialias == 4, has_sky, radiance)
+        self._paint(instant, sensor, visibility, has_sky, radiance)
         shape, focus = (camera.height, camera.width, 4), np.array(self.shot.instants[instant].focus)
-        owner = baked.geometry.triangle_object
+        owner = self.at(instant).triangle_object
         seen = partial(seen_by, camera, focus, visibility.inverse_depth, visibility.triangle, owner)
         return finished(radiance.reshape(shape), background, finish, seen)
+
+    def _paint(self, instant: int, sensor: int, visibility: Visibility, has_sky: bool, radiance: Float32) -> None:
+        """Fill `radiance` with the light of a picture, blurred where anything moves while the shutter is open."""
+        is_smooth, blur = self.options.antialias == 4, Blur(self.arrangements, instant, sensor)
+
+        def paint_moment(arranged: Arranged, camera: Camera, seen: Visibility, light: Float32) -> None:
+            baked = bake(self._pack(arranged), self.shot.scene, self.options, self._shades)
+            paint(baked, camera, seen, is_smooth, has_sky, light)
+
+        count = blur.count(self.at(instant), visibility)
+        if count > 1:
+            self._baked.clear()  # what is packed is written over
+            blur.paint(count, paint_moment, radiance)
+        else:
+            paint(self.baked(instant), self.shot.camera(instant, sensor), visibility, is_smooth, has_sky, radiance)
 
     def _canvas(self, pixels: int) -> Float32:
         """Room for the light of a picture, the same one every time: fresh memory costs as much as the sky."""

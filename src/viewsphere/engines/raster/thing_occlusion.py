@@ -66,7 +66,7 @@ class TargetShades:
     def _hidden(
         self, arranged: Arranged, i: int, casters: Casters, unit: float, has_ground: bool, fineness: Fineness
     ) -> Hidden:
-        thing, mesh = arranged.things[i], arranged.whole[i]
+        thing, mesh = arranged.things[i], arranged.known[i]
         up = _rounded_up(thing.world_from_object)
         key = mesh, thing.repaints, up
         found = self._known.pop(key, None)
@@ -121,7 +121,7 @@ def _levelled(world_from_object: Matrix4, unit: float) -> Float:
 
 def _alone(arranged: Arranged, i: int, casters: Casters, level: Float, unit: float, stands: bool) -> Casters:
     """A target alone in the axes of baking, in units, with what it stands on at its lowest point, if it stands on anything."""
-    geometry, surfaces, mesh = arranged.geometry, casters.surfaces, arranged.whole[i]
+    geometry, surfaces, mesh = arranged.geometry, casters.surfaces, arranged.known[i]
     vertices = surfaces.vertices[geometry.vertex_start[i] : geometry.vertex_start[i + 1]].copy()
     vertices[:, :3] = transform(level, np.nan_to_num(mesh.normals))
     vertices[:, 11:14] = transform(level / unit, mesh.vertices)
