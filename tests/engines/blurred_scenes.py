@@ -119,21 +119,31 @@ def picture(shot: Shot, known) -> np.ndarray:
     return stage.color(0, 0, rasterize(stage.at(0), shot.camera(0)), False)
 
 
-def sharp(shot: Shot, moment: float = 0.0) -> Shot:
-    """What the shot shows at a moment while its shutter is open, without a shutter."""
-    camera = shot.camera_during(0, moment)
-    pose = np.eye(4)
-    pose[:3, :3], pose[:3, 3] = camera.R.T, camera.center
-    now = shot.instants[0].model_copy(update={"world_from_rig": tuple(map(tuple, pose.tolist()))})
-    alone = {"shutter": 0.0, "exposures": (), "instants": (now,), "things": shot.things_during(0, moment)}
+def sharp(shot: Shot, *moments: float) -> Shot:
+    """What the shot shows at moments while its shutter is open, an instant each, without a shutter."""
+    moments = moments or (0.0,)
+    instants, poses = [], []
+    for moment in moments:
+        camera, pose = shot.camera_during(0, moment), np.eye(4)
+        pose[:3, :3], pose[:3, 3] = camera.R.T, camera.center
+        instants.append(shot.instants[0].model_copy(update={"world_from_rig": tuple(map(tuple, pose.tolist()))}))
+        poses.append([thing.world_from_object for thing in shot.things_during(0, moment)])
+    things = [
+        each if len(set(own)) == 1 else each.model_copy(update={"motion": Motion(poses=own)})
+        for each, own in zip(shot.things_during(0, moments[0]), zip(*poses, strict=True), strict=True)
+    ]
+    alone = {"shutter": 0.0, "exposures": (), "instants": tuple(instants), "things": tuple(things)}
     return shot.model_copy(update=alone)
 
 
 def averaged(shot: Shot, known, count: int = 64) -> np.ndarray:
     """Sharp pictures at so many moments, averaged in linear light, (H, W, 3) float sRGB of 0 to 255."""
     total = np.zeros((LENS.height, LENS.width, 3))
+    many = sharp(shot, *(((k + 0.5) / count - 0.5) * shot.shutter for k in range(count)))
+    stage = raster.stage(many, load(known))
     for k in range(count):
-        total += linear(picture(sharp(shot, ((k + 0.5) / count - 0.5) * shot.shutter), known) / 255.0)
+        shown = stage.color(k, 0, rasterize(stage.at(k), many.camera(k)), False)
+        total += linear(shown / 255.0)
     return encoded(total / count) * 255.0
 
 

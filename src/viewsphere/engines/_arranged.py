@@ -130,7 +130,8 @@ class Arrangements:
         before, after, share = steps
         if before is None or after is None or before == after:
             return nearest
-        return blended(*(self.shown.mesh(spec, step, rest) for step in (before, after)), share) or nearest
+        start, end = self.shown.mesh(spec, before, rest), self.shown.mesh(spec, after, rest)
+        return blended(start, end, share) or nearest
 
     def _meshes(self, things: tuple[Thing, ...]) -> tuple[Mesh, ...]:
         """Of these things, at the time steps that they show."""

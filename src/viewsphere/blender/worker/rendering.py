@@ -12,9 +12,10 @@ from pathlib import Path
 import bpy
 import cycles
 import numpy as np
-from mathutils import Matrix
 
 from . import compositing, ground, renderers
+from .blurring import exposed
+from .posing import camera_matrix
 
 SENSOR = 36.0
 """Width of the camera's sensor in millimetres; any value will do, as the focal length is given in proportion."""
@@ -40,7 +41,8 @@ PASSES = {"index": ("use_pass_object_index", ("Object Index", "IndexOB")), "dept
 def render(told):
     """Write (H, W, 4) float32 to `out`: scene-linear, premultiplied, the first row on top; empty outside of the border.
 
-    Each of the `passes` is written beside it, (H, W, 1): beside `picture.npy`, for one, `picture.index.npy`.
+    With `blur`, see `blurring.exposed`, what moves is blurred. Each of the `passes` is written beside the colours, (H, W, 1):
+    beside `picture.npy`, for one, `picture.index.npy`.
     """
     scene = bpy.context.scene
     view = told["camera"]
@@ -53,9 +55,9 @@ def render(told):
         scene.update_tag()  # else persistent data hides the change; updates meshes' tangents, too
     begun, cpu = time.monotonic(), time.process_time()
     file = Path(told["out"]).with_suffix(".exr")
-    found = (
-        _drawn(scene, file) if renderers.is_drawn(scene) else _rendered(wanted, file if compositing.is_used(scene) else None)
-    )
+    composed = file if compositing.is_used(scene) else None
+    with exposed(scene, told.get("blur")):
+        found = _drawn(scene, file) if renderers.is_drawn(scene) else _rendered(wanted, composed)
     for name, pixels in found.items():
         np.save(wanted[name], _whole(pixels, told["border"], view))
     return {"seconds": time.monotonic() - begun, "cpu_seconds": time.process_time() - cpu}
@@ -102,8 +104,7 @@ def place_camera(scene, view):
     data.shift_x = 0.5 - view["cx"] / width
     data.shift_y = (view["cy"] - height / 2) / width * fx / fy
     data.clip_start, data.clip_end = view["near"], view["far"]
-    rotation = np.array(view["R"]).T @ np.diag([1, -1, -1])  # Blender's camera looks along -Z, up is +Y
-    camera.matrix_world = Matrix.Translation(view["center"]) @ Matrix(rotation.tolist()).to_4x4()
+    camera.matrix_world = camera_matrix(view["R"], view["center"])
 
 
 def _set_border(scene, border, view):

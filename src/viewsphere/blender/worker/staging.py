@@ -6,6 +6,7 @@ import bpy
 from mathutils import Matrix
 
 from . import ground, lights, materials, meshes, renderers, studio
+from .blurring import ORDER
 from .scene_file import open_scene
 
 NUMBER = "number"
@@ -25,8 +26,8 @@ def stage(told):
     kinds = [_mesh(mesh["name"], mesh, made, renderer) for mesh in told["meshes"]]
     for number, kind in enumerate(kinds):
         kind[NUMBER] = number
-    for item in told["objects"]:
-        _place(scene, kinds[item["mesh"]], item["matrix"], item["index"])
+    for order, item in enumerate(told["objects"]):
+        _place(scene, kinds[item["mesh"]], item["matrix"], item["index"])[ORDER] = order
     for light in told["lights"]:
         lights.add_light(scene, light)
     sky = lights.add_world(scene, told["world"]) if told["world"] else None

@@ -64,7 +64,9 @@ def scene_request(
         request.append({**shared[id(kind.mesh)], **look, "name": kind.things[0].model.key})
     numbers = {id(thing): number for number, kind in enumerate(kinds) for thing in kind.things}
     objects = [
-        {"mesh": numbers[id(p)], "matrix": frame.placed(p.world_from_object), "index": p.id} for p in things if id(p) in numbers
+        {"mesh": numbers[id(p)], "matrix": frame.placed(p.world_from_object), "index": p.id}
+        for p in things
+        if is_staged(p, scene)
     ]
     pictures = None
     if blend is None or not blend.is_lit:
@@ -83,13 +85,18 @@ def scene_request(
     }
 
 
+def is_staged(thing: Thing, scene: Scene) -> bool:
+    """Whether a thing is put into the scene: it is there, and a .blend scene does not contain it already."""
+    return thing.is_there and (scene.blend is None or thing.model.parts is None)
+
+
 def kinds_of(things: Sequence[Thing], meshes: Sequence[Mesh], scene: Scene) -> tuple[Kind, ...]:
     """The models that are put into the scene, each with its changes to materials; without absent things, and without things
     that a .blend scene contains already.
     """
     found: dict[tuple[int, tuple[Repaint, ...]], tuple[Mesh, list[Thing]]] = {}
     for thing, mesh in zip(things, meshes, strict=True):
-        if thing.is_there and (scene.blend is None or thing.model.parts is None):
+        if is_staged(thing, scene):
             found.setdefault((id(mesh), thing.repaints), (mesh, []))[1].append(thing)
     return tuple(Kind(mesh, repaints, tuple(own)) for (_, repaints), (mesh, own) in found.items())
 

@@ -21,7 +21,8 @@ from viewsphere.engines._blender.backdrop import Backdrop
 from viewsphere.engines._blender.file_frame import FileFrame
 from viewsphere.engines._blender.lens import resampled, views_of
 from viewsphere.engines._blender.options import AnyOptions, options_of
-from viewsphere.engines._blender.requests import kinds_of, materials_request, scene_request
+from viewsphere.engines._blender.requests import Request, kinds_of, materials_request, scene_request
+from viewsphere.engines._blender.sweeping import Sweeping
 from viewsphere.engines._blender.texels import Kind, Levels
 from viewsphere.errors import BlenderDied, BlenderError, ModelError, RecipeError, UserError
 from viewsphere.imaging.background import display_background
@@ -172,7 +173,8 @@ class CyclesStage:
         camera, arranged = self.shot.camera(instant, sensor), self.arrangement(instant)
         finish = self.shot.finish(instant).with_background(transparent)
         background = display_background(finish.background, camera.width, camera.height)
-        radiance = arranged.radiance(camera, background is not None or transparent, visibility)
+        sweeping = Sweeping(self.shot, instant, sensor)
+        radiance = arranged.radiance(camera, background is not None or transparent, visibility, sweeping)
         focus, owner = np.array(self.shot.instants[instant].focus), arranged.geometry.triangle_object
         seen = partial(seen_by, camera, focus, visibility.inverse_depth, visibility.triangle, owner)
         return finished(radiance, background, finish, seen)
@@ -197,16 +199,18 @@ class Arrangement:
             return None
         return (Path(blend.file).resolve().parent,) if blend.confined else (Path("/"),)
 
-    def radiance(self, camera: Camera, is_open: bool, visibility: Visibility) -> Float32:
+    def radiance(self, camera: Camera, is_open: bool, visibility: Visibility, sweeping: Sweeping) -> Float32:
         """Scene-linear, premultiplied, (H, W, 4) float32; with `is_open` the background is left empty."""
-        return self._drawn(camera, is_open, visibility) if self.options.draws else self._radiance(camera, is_open)
+        if self.options.draws:
+            return self._drawn(camera, is_open, visibility, sweeping)
+        return self._radiance(camera, is_open, sweeping)
 
-    def _drawn(self, camera: Camera, is_open: bool, visibility: Visibility) -> Float32:
+    def _drawn(self, camera: Camera, is_open: bool, visibility: Visibility, sweeping: Sweeping) -> Float32:
         """The picture of a renderer that draws: with a tight clipping range, as the depth buffer has a limited precision."""
         clip = clip_of(visibility, self.geometry, camera)
         if self.backdrop is None:
-            return self._radiance(camera, is_open, clip)
-        colors = self._radiance(camera, True, clip)
+            return self._radiance(camera, is_open, sweeping, clip)
+        colors = self._radiance(camera, True, sweeping, clip)
         return self.backdrop.behind(colors, camera, visibility, is_open)
 
     @cached_property
@@ -216,31 +220,32 @@ class Arrangement:
             return None
         return Backdrop.of(self.shot, self.geometry)
 
-    def _radiance(self, camera: Camera, is_open: bool, clip: Clip = (NEAREST, FARTHEST)) -> Float32:
+    def _radiance(self, camera: Camera, is_open: bool, sweeping: Sweeping, clip: Clip = (NEAREST, FARTHEST)) -> Float32:
         """Scene-linear, premultiplied, (H, W, 4) float32; a Blender that dies is started again, once."""
         died: BlenderDied | None = None
         for _ in range(2):
             try:
-                return self._rendered(camera, is_open, clip)
+                return self._rendered(camera, is_open, sweeping, clip)
             except BlenderDied as error:
                 self.keeper.drop()
                 died = error
         raise ModelError(f"{', '.join(sorted({p.model.key for p in self.things}))}: {died}")
 
-    def _rendered(self, camera: Camera, is_open: bool, clip: Clip) -> Float32:
+    def _rendered(self, camera: Camera, is_open: bool, sweeping: Sweeping, clip: Clip) -> Float32:
         views = views_of(camera)
         process = self.keeper.process_for(self, self._levels([view.camera for view in views]))
-        pictures = [self._picture(process, view.camera, is_open, clip) for view in views]
+        pictures = [self._picture(process, view.camera, is_open, clip, sweeping.request(i)) for i, view in enumerate(views)]
         return resampled(camera, views, pictures)
 
-    def _picture(self, process: BlenderProcess, camera: Camera, is_open: bool, clip: Clip) -> Float32:
-        is_empty = is_open and self.shot.scene.ground is None and self.shot.scene.blend is None
+    def _picture(self, process: BlenderProcess, camera: Camera, is_open: bool, clip: Clip, blur: Request | None) -> Float32:
+        is_empty = is_open and blur is None and self.shot.scene.ground is None and self.shot.scene.blend is None
         border = border_of(self.geometry, camera) if is_empty else None
         if border is not None and (border[0] >= border[2] or border[1] >= border[3]):
             return np.zeros((camera.height, camera.width, 4), np.float32)
         out = str(process.folder / "picture.npy")
         request = FileFrame.of(self.shot.scene.blend).camera(camera_request(camera, clip))
-        process.ask("render", FRAME_SECONDS, camera=request, transparent=is_open, border=border, passes=[], out=out)
+        told: Request = {"transparent": is_open, "border": border, "passes": [], "blur": blur}
+        process.ask("render", FRAME_SECONDS, camera=request, out=out, **told)
         return np.load(out)
 
     @cached_property
@@ -320,4 +325,6 @@ def build_stage(shot: Shot, load: Load) -> CyclesStage:
             f"scene.ground: expected on, off or a material for engine: {options.renderer}, found catcher, which auto is before "
             "background: environment: set it to off, or take engine: cycles or raster"
         )
+    if options.renderer == "workbench" and shot.shutter:
+        raise RecipeError("time.shutter: expected 0 with engine: workbench, which cannot blur; take raster, cycles or eevee")
     return CyclesStage(Arrangements.build(shot, load), options, keeper_of(find_blender(options.python)))

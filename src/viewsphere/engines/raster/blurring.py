@@ -57,8 +57,8 @@ class Blur:
         """
         if not self._shot.shutter or self._stands():
             return 1
-        ways = [self._way(geometry, visibility, 0.0, *ends) for ends in ((-0.5, 0.0), (0.0, 0.5))]
-        longest = float(sum(np.sqrt((way * way).sum(axis=-1)) for way in ways).max()) + self._deforms(geometry, visibility)
+        start, end = (self._way(geometry, visibility, 0.0, *ends) for ends in ((-0.5, 0.0), (0.0, 0.5)))
+        longest = float((_lengths(start) + _lengths(end)).max()) + self._deforms(geometry, visibility)
         return 1 if longest < LEAST else min(1 + math.ceil(longest / STRIDE), MOST)
 
     def paint(self, count: int, paint: Paint, radiance: Float32) -> None:
@@ -125,6 +125,10 @@ class Blur:
             kernels.carry(rays, visibility.inverse_depth, visibility.triangle, owner, moves, points)
             places.append(project(then.intrinsics, points)[0])
         return np.nan_to_num(places[1] - places[0], nan=0.0, posinf=0.0, neginf=0.0).astype(np.float32)
+
+
+def _lengths(way: Float32) -> Float32:
+    return np.sqrt((way * way).sum(axis=-1))
 
 
 def _moves(camera: Camera, poses: Sequence[Matrix4], then: Camera, others: Sequence[Matrix4]) -> Float:

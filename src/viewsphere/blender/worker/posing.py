@@ -1,0 +1,12 @@
+"""A camera's pose, as the requests tell it, as Blender has it."""
+
+from __future__ import annotations
+
+import numpy as np
+from mathutils import Matrix
+
+
+def camera_matrix(rotation, center):
+    """World from Blender's camera, which looks along -Z with +Y up, from rows of OpenCV axes and a place."""
+    turned = np.array(rotation).T @ np.diag([1, -1, -1])
+    return Matrix.Translation(center) @ Matrix(turned.tolist()).to_4x4()
