@@ -43,8 +43,8 @@ def thing(number, key, motion, scenery=False):
     return Thing(id=number, model=spec, motion=motion, scenery=scenery)
 
 
-def sequence_of(scene, has_scenery=False, sequence="drive"):
-    """A tall box that drives and turns, a pane that comes and goes, a long box that stands still."""
+def sequence_of(scene, has_scenery=False, sequence="drive", moves=False):
+    """A tall box that drives and turns, a pane that comes and goes, a long box that stands still; scenery that `moves`."""
     gone = Motion(poses=tuple(pose(i, -0.25, 0.3) if i not in (2, 5) else None for i in range(COUNT)))
     things = [
         thing(1, "tall", Motion(poses=tuple(pose(i, 0.2, 0.5) for i in range(COUNT)))),
@@ -52,6 +52,7 @@ def sequence_of(scene, has_scenery=False, sequence="drive"):
         thing(3, "long", Motion.still(pose(3, 0.1, 0.2))),
     ]
     things += [thing(0, "wall", Motion(), scenery=True)] * has_scenery
+    things += [thing(0, "long", Motion(poses=tuple(pose(i, 0.4, 0.1) for i in range(COUNT))), scenery=True)] * moves
     views = [Viewpoint(index=i, azimuth_deg=20, elevation_deg=35, distance=5) for i in range(COUNT)]
     return still_shot(things, LENS, views, scene=SCENES[scene], sequence=sequence)
 
@@ -73,11 +74,11 @@ def cut(shot, first, stop):
     return shot.model_copy(update={"things": tuple(things), "instants": shot.instants[first:stop]})
 
 
-@pytest.mark.parametrize("has_scenery", [False, True])
+@pytest.mark.parametrize("has_scenery, moves", [(False, False), (True, False), (True, True)])
 @pytest.mark.parametrize("scene", SCENES)
-def test_an_instant_looks_as_if_it_were_built_alone(scene, has_scenery):
+def test_an_instant_looks_as_if_it_were_built_alone(scene, has_scenery, moves):
     """In any order, with a neighbour's geometry asked for between, on one stage or cut into shots of any length."""
-    shot = sequence_of(scene, has_scenery)
+    shot = sequence_of(scene, has_scenery, moves=moves)
     alone = [picture(stage_of(shot), i) for i in range(COUNT)]
     assert len({one.tobytes() for one in alone}) == COUNT
     stage = stage_of(shot)
@@ -147,7 +148,7 @@ def test_what_stands_still_is_drawn_once():
 
 def test_few_maps_are_kept():
     surfaces = stage_of(sequence_of("sun")).baked(0).surfaces
-    maps = StillMaps.of(surfaces, (0, len(surfaces.triangles)), ())
+    maps = StillMaps.of(surfaces, (0, len(surfaces.triangles)), (), 1)
     for i in range(3 * MOST):
         maps.keep((b"", float(i), 0.0, 4), np.full((4, 20), i, np.float32))
     assert maps.begun((b"", 0.0, 0.0, 4)) is None

@@ -78,7 +78,9 @@ def pack(arranged: Arranged, ground: Ground | None, lengths: Lengths, materials:
         owner=(geometry.triangle_object * len(surfaces.looks) + surfaces.material).astype(np.int32),
         see_through=see_through,
         blended=with_blended_colors(geometry, meshes),
-        maps=StillMaps.of(surfaces, geometry.triangle_start, arranged.moving) if arranged.is_sequence else None,
+        maps=StillMaps.of(surfaces, geometry.triangle_start, arranged.moving, arranged.targets)
+        if arranged.is_sequence
+        else None,
     )
 
 

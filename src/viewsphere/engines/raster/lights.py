@@ -110,9 +110,9 @@ class Casters:
     maps: StillMaps | None = None
     corners: Float | None = None
 
-    def alone(self, surfaces: Surfaces) -> Casters:
-        """The same, but only these cast shadows."""
-        return replace(self, surfaces=surfaces, maps=None)
+    def alone(self, surfaces: Surfaces, maps: StillMaps | None = None) -> Casters:
+        """The same, but only these cast shadows; `maps` are those of them that stand still in a sequence."""
+        return replace(self, surfaces=surfaces, maps=maps)
 
 
 @dataclass(frozen=True)
@@ -263,7 +263,8 @@ def _backdrop(source: _Source, casters: Casters, size: int) -> _Backdrop:
     low, high = casters.extent.low, casters.extent.high
     span = 2.0 ** math.ceil(math.log2(float(np.linalg.norm(high - low)) or 1.0))
     surfaces, start = casters.surfaces, casters.extent.triangles
-    scenery = casters.alone(surfaces._replace(triangles=surfaces.triangles[start:], material=surfaces.material[start:]))
+    behind = surfaces._replace(triangles=surfaces.triangles[start:], material=surfaces.material[start:])
+    scenery = casters.alone(behind, casters.maps and casters.maps.backdrop)
     reach = casters.extent.reach if casters.maps is None else rounded(casters.extent.reach)
     return _Backdrop(casters.scenery, (x, y, z), math.tan(source.radius), span, reach, size, scenery)
 

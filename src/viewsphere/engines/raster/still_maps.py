@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -25,23 +25,26 @@ Key = tuple[bytes, float, float, int]
 
 @dataclass(frozen=True, eq=False)
 class StillMaps:
-    """Triangles that stand still in a sequence, those that move, and maps of the former. All share their vertices."""
+    """Triangles that stand still in a sequence, those that move, and maps of the former. All share their vertices.
+    backdrop: the same of scenery alone.
+    """
 
     still: Surfaces
     moving: Surfaces
+    backdrop: StillMaps | None = None
     _maps: dict[Key, Float32] = field(default_factory=dict[Key, Float32])
 
     @classmethod
-    def of(cls, surfaces: Surfaces, triangle_start: Sequence[int], moving: Sequence[int]) -> StillMaps:
-        """Of the triangles of things, thing i's beginning at `triangle_start[i]`, of which these are `moving`."""
+    def of(cls, surfaces: Surfaces, triangle_start: Sequence[int], moving: Sequence[int], targets: int) -> StillMaps:
+        """Of the triangles of things, thing i's beginning at `triangle_start[i]`, of which these are `moving`; those behind the
+        first `targets` are scenery.
+        """
         moves = np.zeros(len(surfaces.triangles), np.bool_)
         for i in moving:
             moves[triangle_start[i] : triangle_start[i + 1]] = True
-        still, others = (
-            surfaces._replace(triangles=surfaces.triangles[chosen], material=surfaces.material[chosen])
-            for chosen in (~moves, moves)
-        )
-        return cls(still, others)
+        is_scenery = np.arange(len(moves)) >= triangle_start[targets]
+        backdrop = cls(*_split(surfaces, is_scenery & ~moves, is_scenery & moves))
+        return cls(*_split(surfaces, ~moves, moves), backdrop)
 
     def begun(self, key: Key) -> Float32 | None:
         """The map of what stands still in this view, if it is kept."""
@@ -52,6 +55,11 @@ class StillMaps:
         if len(self._maps) == MOST:
             del self._maps[next(iter(self._maps))]
         self._maps[key] = depth.copy()
+
+
+def _split(surfaces: Surfaces, *chosen: NDArray[np.bool_]) -> Iterator[Surfaces]:
+    for which in chosen:
+        yield surfaces._replace(triangles=surfaces.triangles[which], material=surfaces.material[which])
 
 
 def snapped(span: float, middle: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
