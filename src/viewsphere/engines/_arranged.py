@@ -109,7 +109,8 @@ class Arrangements:
         """
         things = self.shot.things_during(instant, moment)
         known = self._meshes(things)
-        sweeps = self.shot.exposures[instant].things
+        exposure = self.shot.exposures[instant]
+        sweeps = exposure.things if exposure else [None] * len(things)
         meshes = tuple(
             mesh if sweep is None or now.step is None else self._deformed(now.model, sweep.steps(moment), rest, mesh)
             for now, sweep, rest, mesh in zip(things, sweeps, self.meshes, known, strict=True)
@@ -119,7 +120,7 @@ class Arrangements:
     def _arranged(
         self, things: tuple[Thing, ...], meshes: tuple[Mesh, ...], known: tuple[Mesh, ...], geometry: Geometry
     ) -> Arranged:
-        swept = {i for exposure in self.shot.exposures for i, sweep in enumerate(exposure.things) if sweep is not None}
+        swept = {i for each in self.shot.exposures if each for i, sweep in enumerate(each.things) if sweep}
         moving = tuple(i for i, thing in enumerate(self.shot.things) if i in swept or not thing.motion.is_still)
         return Arranged(things, meshes, geometry, moving, known, bool(self.shot.sequence))
 

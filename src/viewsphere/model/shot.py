@@ -48,7 +48,7 @@ class Shot(Frozen):
     label_alpha: float = 0.01
     category_deg: float = Field(default=45.0, gt=0)  # angular resolution of the pose categories
     shutter: float = Field(default=0.0, ge=0, le=1)
-    exposures: tuple[Exposure, ...] = ()
+    exposures: tuple[Exposure | None, ...] = ()  # None: nothing moves, or the instant is not recorded
 
     @model_validator(mode="after")
     def _as_many_poses_as_instants(self) -> Shot:
@@ -75,7 +75,7 @@ class Shot(Frozen):
         if len(self.exposures) != (len(self.instants) if self.shutter else 0):
             expected = "an exposure an instant" if self.shutter else "none without a shutter"
             raise ValueError(f"exposures: expected {expected} ({len(self.instants)}); found {len(self.exposures)}")
-        if any(len(exposure.things) != len(self.things) for exposure in self.exposures):
+        if any(exposure and len(exposure.things) != len(self.things) for exposure in self.exposures):
             raise ValueError(f"exposures: expected a sweep or None for each of {len(self.things)} things")
         return self
 
@@ -149,15 +149,16 @@ class Shot(Frozen):
         """All things as they are a moment (see `Sweep`) after an instant while the shutter is open, standing still there; of
         two time steps they show the nearer one.
         """
+        exposure, things = self.exposures[instant], self.things_at(instant)
         return tuple(
             now if sweep is None or not now.is_there else now.model_copy(update={"motion": _held(sweep, moment)})
-            for now, sweep in zip(self.things_at(instant), self.exposures[instant].things, strict=True)
+            for now, sweep in zip(things, exposure.things if exposure else [None] * len(things), strict=True)
         )
 
     def camera_during(self, instant: int, moment: float, sensor: int = 0) -> Camera:
         """The camera of a sensor a moment after an instant while the shutter is open."""
-        sweep, now = self.exposures[instant].rig, self.instants[instant]
-        pose = now.world_from_rig if sweep is None else sweep.pose(moment)
+        exposure, now = self.exposures[instant], self.instants[instant]
+        pose = exposure.rig.pose(moment) if exposure and exposure.rig else now.world_from_rig
         then = now.model_copy(update={"world_from_rig": pose})
         return self.model_copy(update={"instants": (then,)}).camera(0, sensor)
 

@@ -28,9 +28,9 @@ class Sweeping:
         """For the worker's `render` of one of the `views_of` the sensor's camera: matrices of objects that move, by their
         places among all, and the camera's rotations and centres; None where nothing moves.
         """
-        if not self.shot.shutter:
+        exposure = self.shot.exposures[self.instant] if self.shot.shutter else None
+        if exposure is None:
             return None
-        exposure = self.shot.exposures[self.instant]
         moments = (np.linspace(-0.5, 0.5, MOMENTS) * self.shot.shutter).tolist()
         frame = FileFrame.of(self.shot.scene.blend)
         staged = [i for i, thing in enumerate(self.shot.things_at(self.instant)) if is_staged(thing, self.shot.scene)]

@@ -81,12 +81,13 @@ class Blur:
 
     def _stands(self) -> bool:
         exposure = self._shot.exposures[self.instant]
-        return exposure.rig is None and not any(exposure.things)
+        return exposure is None or (exposure.rig is None and not any(exposure.things))
 
     def _deforms(self, geometry: Geometry, visibility: Visibility) -> float:
         """Pixels by which vertices of what deforms move at most in its own axes, if they are as near as what is seen of it."""
-        camera, sweeps = self._camera(0.0), self._shot.exposures[self.instant].things
-        deforming = [i for i, sweep in enumerate(sweeps) if sweep is not None and len(set(sweep.motion.steps)) > 1]
+        camera, exposure = self._camera(0.0), self._shot.exposures[self.instant]
+        sweeps = enumerate(exposure.things if exposure else ())
+        deforming = [i for i, sweep in sweeps if sweep and len(set(sweep.motion.steps)) > 1]
         if not deforming:
             return 0.0
         ends = [self.arrangements.during(self.instant, u * self._shot.shutter).whole for u in (-0.5, 0.5)]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -43,8 +43,8 @@ class StillMaps:
         for i in moving:
             moves[triangle_start[i] : triangle_start[i + 1]] = True
         is_scenery = np.arange(len(moves)) >= triangle_start[targets]
-        backdrop = cls(*_split(surfaces, is_scenery & ~moves, is_scenery & moves))
-        return cls(*_split(surfaces, ~moves, moves), backdrop)
+        backdrop = cls(_chosen(surfaces, is_scenery & ~moves), _chosen(surfaces, is_scenery & moves))
+        return cls(_chosen(surfaces, ~moves), _chosen(surfaces, moves), backdrop)
 
     def begun(self, key: Key) -> Float32 | None:
         """The map of what stands still in this view, if it is kept."""
@@ -57,9 +57,8 @@ class StillMaps:
         self._maps[key] = depth.copy()
 
 
-def _split(surfaces: Surfaces, *chosen: NDArray[np.bool_]) -> Iterator[Surfaces]:
-    for which in chosen:
-        yield surfaces._replace(triangles=surfaces.triangles[which], material=surfaces.material[which])
+def _chosen(surfaces: Surfaces, which: NDArray[np.bool_]) -> Surfaces:
+    return surfaces._replace(triangles=surfaces.triangles[which], material=surfaces.material[which])
 
 
 def snapped(span: float, middle: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
