@@ -40,7 +40,7 @@ def entries(*options):
 def start(key="car_000", seed=0, **fields):
     spec = ModelSpec(key=key, source="walk.fbx", category="thing", category_id=1)
     rng = partial(generator, seed, "motion", key)
-    return Start(placed=PLACED, spec=spec, box=BOX, seconds=2.0, rng=rng, **{"field": "models[2].motion", **fields})
+    return Start(placed=PLACED, spec=spec, seconds=2.0, rng=rng, **{"field": "models[2].motion", **fields})
 
 
 def moved(*options, times=TIMES, **fields):

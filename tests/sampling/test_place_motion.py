@@ -46,7 +46,6 @@ def test_a_car_follows_the_lane_of_a_turned_place():
     start = Start(
         placed=standing(BOX),
         spec=piece.model,
-        box=BOX,
         seconds=2.0,
         rng=partial(generator, 0, "motion"),
         lanes=place_lanes(made, made.scene.place, ()),

@@ -20,6 +20,7 @@ from viewsphere.kernels.garbage import pause_collection
 from viewsphere.kernels.kernel_cache import kernel_folder, sources_digest
 from viewsphere.labels import channels
 from viewsphere.model.camera import Intrinsics
+from viewsphere.model.exposure import Exposure, Sweep
 from viewsphere.model.instant import Instant, Viewpoint
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.rig import Rig, Sensor
@@ -83,11 +84,14 @@ def _small(shot: Shot) -> Shot:
 
 
 def _sequence(shot: Shot, first: Instant, things: tuple[Thing, ...]) -> dict[str, Any]:
-    """Two instants, in between which one of the things moves."""
-    moved = things[0].model_copy(update={"motion": Motion(poses=(IDENTITY, BESIDE))})
+    """Two instants, in between which one of the things moves, blurred where the shutter is open."""
+    there_and_back = Motion(poses=(IDENTITY, BESIDE))
+    moved = things[0].model_copy(update={"motion": there_and_back})
+    sweeps = (Sweep(moments=(-0.5, 0.5), motion=there_and_back), *[None] * (len(things) - 1))
+    exposures = (Exposure(things=sweeps),) * 2 if shot.shutter else ()
     tracks = shot.tracks and Tracks(at=(0,), count=4, on="objects")
     instants = (first, first.model_copy(update={"index": 1, "seconds": 1.0}))
-    return {"sequence": "tiny", "things": (moved, *things[1:]), "instants": instants, "tracks": tracks}
+    return {"sequence": "tiny", "things": (moved, *things[1:]), "instants": instants, "tracks": tracks, "exposures": exposures}
 
 
 def _mark(small: Shot) -> Path:

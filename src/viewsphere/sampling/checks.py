@@ -10,7 +10,7 @@ from viewsphere.errors import RecipeError
 from viewsphere.labels import Needs, channel_labels, channels
 from viewsphere.model.mistakes import nearest, one_of
 from viewsphere.model.model_spec import ModelSpec
-from viewsphere.recipe.draws import alternatives
+from viewsphere.recipe.draws import alternatives, span
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.scenes import ScenesEntry
 from viewsphere.recipe.surface import GroundEntry
@@ -115,6 +115,16 @@ def check_listed(recipe: Recipe, specs: tuple[ModelSpec, ...]) -> None:
             seen[key] = name
     if all(isinstance(s, tuple) for s in recipe.splits.shares.values()) and keys - seen.keys():
         raise RecipeError(f"splits: expected every model to be listed; found no split for {min(keys - seen.keys())!r}")
+
+
+def check_shutter(recipe: Recipe) -> None:
+    """What moves is blurred once: by an open shutter, or by an effect."""
+    blurs = alternatives(recipe.scene.effects.motion_blur)
+    if recipe.time is not None and recipe.time.shutter and any(span(blur)[1] > 0 for blur in blurs):
+        raise RecipeError(
+            "time.shutter: expected 0 beside scene.effects.motion_blur, which blurs pictures, too; found "
+            f"{recipe.time.shutter:g}: leave one of them out"
+        )
 
 
 def check_splits(recipe: Recipe) -> None:

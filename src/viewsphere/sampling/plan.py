@@ -12,6 +12,7 @@ from itertools import chain, repeat
 from pathlib import Path
 
 from viewsphere import plugins
+from viewsphere.assets.timeline import Timeline
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.rig import Rig
 from viewsphere.model.shot import Shot
@@ -25,8 +26,10 @@ from viewsphere.sampling.checks import (
     check_listed,
     check_materials,
     check_names,
+    check_shutter,
     check_splits,
 )
+from viewsphere.sampling.clips import with_clips
 from viewsphere.sampling.composition import BoxOf, compose
 from viewsphere.sampling.models import categories, numbered_specs
 from viewsphere.sampling.motion import check_motions
@@ -227,12 +230,16 @@ def plan(recipe: Recipe, shot_frames: int | None = None) -> Plan:
         check_blend(recipe)
         check_catcher(recipe)
         check_splits(recipe)
+        check_shutter(recipe)
         check_motions(recipe)
         views = poses_of(recipe.viewpoints, recipe.time, recipe.seed, recipe.folder)
         rig = rig_of(recipe, lens(recipe, views))
         check_frames(recipe, views)
         numbered = numbered_specs(recipe)
         specs, timings, views = timed(recipe, numbered, views)
+        lines: tuple[Timeline | None, ...] = (None,) * len(specs)
+        if recipe.time is not None:
+            specs, lines = with_clips(recipe, numbered)
         check_listed(recipe, specs)
         check_materials(recipe, specs)
         most = recipe.shot_frames or shot_frames or SHOT_FRAMES
@@ -250,10 +257,11 @@ def plan(recipe: Recipe, shot_frames: int | None = None) -> Plan:
             shot_frames=frames,
             own_rig=rig,
             entries=tuple(number for _, number in numbered),
+            timelines=lines,
             tracks=tracks_of(recipe, rig or Rig.of(lens(recipe, views))),
         )
         check_all_frames(recipe, planned.frames, planned.factors)
-        if timings:
+        if timings or any(lines):
             check_keys(planned.kept_keys)
         return _composed(planned)
 

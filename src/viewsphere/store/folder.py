@@ -296,7 +296,8 @@ class Store:
             if scenery:
                 (folder / "scenery.json").write_text(scenery, "utf-8")
             if shot is not None:
-                labelled = shot.model_copy(update={"things": shot.objects})  # the others are in scenery.json
+                # The other things are in scenery.json, and labels are those of the instant, not of what moves around it.
+                labelled = shot.model_copy(update={"things": shot.objects, "shutter": 0.0, "exposures": ()})
                 (folder / "shot.json").write_text(labelled.model_dump_json(), "utf-8")
             texts = {path.name: seal_of(path) for path in sorted(folder.glob("*.json"))}
             Manifest(texts | told).write(folder)

@@ -24,8 +24,8 @@ class PointTracks:
     pixels, at which each was picked; object (N,) int32: id of the object that it lies on, 0 for none.
 
     At each instant: xy (T, N, 2) float64 pixels, NaN where it has none; xyz (T, N, 3) float64 metres in the camera's axes,
-    world (T, N, 3) in the world's, NaN where it is nowhere: points of the sky have xyz (NaN, NaN, inf) and world NaN; state (T, N)
-    uint8: 0 visible, 1 occluded, 2 outside, 3 behind, 4 invalid. instants (T,) int64 are the instants' numbers.
+    world (T, N, 3) in the world's, NaN where it is nowhere: points of the sky have xyz (NaN, NaN, inf) and world NaN; state
+    (T, N) uint8: 0 visible, 1 occluded, 2 outside, 3 behind, 4 invalid. instants (T,) int64 are the instants' numbers.
     """
 
     ids: NDArray[np.int64]

@@ -53,16 +53,19 @@ class Pose:
 class Start:
     """What a motion starts from.
 
-    placed: world from object as the thing's placer put it; box: the model's (8, 3), in its own axes, metres; seconds: length
-    of the sequence; rng: a generator for what is drawn for these names; lanes: of the place, world axes; timeline: frames of
-    the model's file while its clip plays, None where it has none; field: the recipe's, which messages begin with.
+    placed: world from object as the thing's placer put it; seconds: length of the sequence; rng: a generator for what is drawn
+    for these names; lanes: of the place, world axes; timeline: frames of the model's file while its clip plays, None where it
+    has none; field: the recipe's, which messages begin with.
     """
 
     placed: Matrix4
     spec: ModelSpec
-    box: Float
     seconds: float
     rng: Draws
     lanes: tuple[Lane, ...] = ()
     timeline: Timeline | None = None
     field: str = "models[0].motion"
+
+    def playing(self, timeline: Timeline | None, field: str) -> Start:
+        """The same of a thing whose file has this timeline, and whose motion stands in this field of the recipe."""
+        return replace(self, timeline=timeline, field=field)

@@ -27,12 +27,25 @@ from viewsphere.sampling.trajectories import standing as steady
 
 
 @dataclass(frozen=True, eq=False)
+class Mover:
+    """What moves a thing."""
+
+    motions: Motions
+    start: Start
+
+    def at(self, times: Sequence[float]) -> Motion:
+        """Where the thing is at these times."""
+        return motion_of(self.motions, self.start, times)
+
+
+@dataclass(frozen=True, eq=False)
 class Course:
-    """One sequence: its things, moving at all instants; what cameras look at that have no target of their own; and where the
-    rig is at all instants, None where it stands still at its viewpoint.
+    """One sequence: its things, moving at all instants, and what moves each; what cameras look at that have no target of their
+    own; and where the rig is at all instants, None where it stands still at its viewpoint.
     """
 
     things: tuple[Thing, ...]
+    movers: tuple[Mover | None, ...]
     focus: Vector
     rig: tuple[RigPose, ...] | None
 
@@ -63,18 +76,27 @@ def course(stock: Stock, subject: str, start: int, box_of: BoxOf) -> Course:
     names = (subject, stock.pose_list.place(start))
     lanes = () if stock.composition is None else stock.composition.lanes(subject, around)
 
+    pieces: list[Mover | None] = []
+
     def piece_moved(thing: Thing, piece: SceneryPiece) -> Thing:
-        return _moved(stock, thing, piece.motion, piece.field, (*names, piece.name), lanes, box_of)
+        pieces.append(_mover(stock, thing, piece.motion, piece.field, (*names, piece.name), lanes))
+        return thing
 
     things = targets
     if stock.composition is not None:
         things = stock.composition.things(subject, targets, around, box_of, piece_moved)
-    moved = (
-        _moved(stock, thing, *_motions(stock, thing.model, i), (*names, str(i), thing.model.key), lanes, box_of)
+    movers = [
+        _mover(stock, thing, *_motions(stock, thing.model, i), (*names, str(i), thing.model.key), lanes)
         for i, thing in enumerate(targets)
+    ]
+    movers += pieces
+    times = [time_of(stock).at(i) for i in range(time_of(stock).count)]
+    moved = (
+        thing if mover is None else thing.model_copy(update={"motion": mover.at(times)})
+        for thing, mover in zip(things, movers, strict=True)
     )
-    things = stock.repainted((*moved, *things[len(targets) :]), subject, start)
-    return Course(things, focus, _rig(stock, things, focus, subject, start, lanes, box_of))
+    things = stock.repainted(tuple(moved), subject, start)
+    return Course(things, tuple(movers), focus, _rig(stock, things, focus, subject, start, lanes, box_of))
 
 
 def placed_targets(stock: Stock, subject: str, pose: str | None, box_of: BoxOf) -> tuple[Thing, ...]:
@@ -92,16 +114,17 @@ def middle(things: Sequence[Thing], box_of: BoxOf) -> Vector:
     return center(things[0], box_of) if len(things) == 1 else center_of_all(things, box_of)
 
 
-def _moved(
-    stock: Stock, thing: Thing, motions: Motions | None, field: str, names: Names, lanes: tuple[Lane, ...], box_of: BoxOf
-) -> Thing:
-    """A thing with its motion over the whole sequence, drawn for these names."""
+def _mover(
+    stock: Stock, thing: Thing, motions: Motions | None, field: str, names: Names, lanes: tuple[Lane, ...]
+) -> Mover | None:
+    """What moves a thing, drawn for these names; None where it stands still."""
     if motions is None:
-        return thing
+        return None
     time, rng = time_of(stock), partial(generator, stock.recipe.seed, "motion", *names)
-    times = [time.at(i) for i in range(time.count)]
-    start = Start(thing.world_from_object, thing.model, box_of(thing.model), times[-1], rng, lanes, field=field)
-    return thing.model_copy(update={"motion": motion_of(motions, start, times)})
+    place = stock.position.get(thing.model.key)
+    line = None if place is None else stock.timelines[place]
+    start = Start(thing.world_from_object, thing.model, time.at(time.count - 1), rng, lanes)
+    return Mover(motions, start.playing(line, field))
 
 
 def _motions(stock: Stock, spec: ModelSpec, slot: int) -> tuple[Motions | None, str]:

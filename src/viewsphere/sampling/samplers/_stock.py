@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import chain
 
+from viewsphere.assets.timeline import Timeline
 from viewsphere.errors import RecipeError
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.instant import Instant, Viewpoint
@@ -19,6 +20,7 @@ from viewsphere.model.tracks import Tracks
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.sampling.blend_scene import BlendScenery
 from viewsphere.sampling.camera import looking
+from viewsphere.sampling.clips import shown_steps
 from viewsphere.sampling.composition import Composition
 from viewsphere.sampling.pictures import Pictures
 from viewsphere.sampling.scenery import draw_names
@@ -48,6 +50,7 @@ class Stock(Sendable):
     own_rig: Rig | None = None  # the recipe's; None: one camera
     entries: tuple[int, ...] = ()  # of each model, the number of its entry in the recipe
     tracks: Tracks | None = None  # what every sequence's sensors follow
+    timelines: tuple[Timeline | None, ...] = ()  # of each model, the animation of its file that it plays in sequences
 
     @cached_property
     def rig(self) -> Rig:
@@ -80,6 +83,10 @@ class Stock(Sendable):
 
     def steps_of(self, spec: ModelSpec) -> tuple[TimeStep, ...]:
         """The time steps of a model's file that the data set keeps, ascending; none where it does not move."""
+        place = self.position.get(spec.key)
+        line = self.timelines[place] if self.timelines and place is not None else None
+        if place is not None and line is not None:
+            return shown_steps(self.recipe, self.entries[place], spec, line)
         timing = self.timings[self.position[spec.key]] if self.timings and spec.key in self.position else None
         own = (step.model for step in (timing.steps if timing else ()))
         blend = () if self.blend is None else self.blend.steps(spec)

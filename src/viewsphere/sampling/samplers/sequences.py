@@ -14,13 +14,14 @@ from viewsphere.errors import RecipeError
 from viewsphere.labels import channel_labels
 from viewsphere.model.instant import Instant
 from viewsphere.model.model_spec import ModelSpec
-from viewsphere.model.scene import Floor
+from viewsphere.model.scene import Floor, Matrix4
 from viewsphere.model.shot import Shot
 from viewsphere.model.tracks import Tracks
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.sampling.composition import BoxOf
 from viewsphere.sampling.samplers import Standing, Stock
 from viewsphere.sampling.samplers._course import Course, course, middle, placed_targets, time_of
+from viewsphere.sampling.samplers._exposing import exposures
 from viewsphere.sampling.samplers._random import (
     check_scene_models,
     scene_cast,
@@ -114,7 +115,13 @@ def shot(stock: Stock, subject: str, poses: Sequence[int], box_of: BoxOf, key: s
     instants = [_instant(stock, own, subject, start + i, box_of).model_copy(update={"recorded": i in taken}) for i in numbers]
     scene = stock.scene(subject, stock.scene_name(start)).model_copy(update={"floor": FLOOR})
     made = stock.finished(key, first, own.things_during(numbers), scene, instants)
-    return made.model_copy(update={"sequence": stock.sequence(subject, start), "tracks": _tracks(stock, subject, start)})
+
+    def rig_at(instant: int) -> Matrix4:
+        return _instant(stock, own, subject, start + instant, box_of).world_from_rig
+
+    blurred = exposures(own, [i if i in taken else None for i in numbers], time_of(stock), rig_at)
+    more = {"sequence": stock.sequence(subject, start), "tracks": _tracks(stock, subject, start)}
+    return made.model_copy(update=more | {"shutter": time_of(stock).shutter, "exposures": blurred})
 
 
 def _tracks(stock: Stock, subject: str, start: int) -> Tracks | None:
