@@ -14,7 +14,7 @@ from viewsphere.assets.mesh import Mesh
 from viewsphere.check.scenery import Scenery
 from viewsphere.errors import ViewsphereError
 from viewsphere.labels import Placement, Sight, annotated, channel_labels, object_labels
-from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.model_spec import ModelSpec, step_key
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.model.scene import Matrix4
 from viewsphere.model.shot import Shot
@@ -40,6 +40,7 @@ class Again:
         self._mesh = lru_cache(maxsize=MODELS)(self._read)
         self._geometry: tuple[object, Geometry | None] = None, None
         self._views: tuple[str, ShotViews | None] = "", None
+        self._keys: dict[int, str] = {}  # of the objects of the views' shot: merged data sets have names of their own
 
     def is_possible(self, sample: Sample) -> bool:
         """Whether it is known what was seen: the shot is kept, and the objects are placed."""
@@ -109,13 +110,18 @@ class Again:
         return self._geometry[1]
 
     def _compared(self, sample: Sample, shot: Shot, key: str) -> SampleViews | None:
-        """What labels of motion and of stereo pairs compare a sample with; None where scenery is not what it was."""
-        if self._views[0] != key:
-            self._views = key, self._shot_views(shot, key)
-        views = self._views[1]
-        if views is None:
+        """What labels of motion and of stereo pairs compare a sample with; None where it has none, and where scenery is not what
+        it was.
+        """
+        known = channel_labels()
+        if not any(known[name].needs.is_some for name in sample.files if name in known):
             return None
-        return views.around(*self._scenery.taken(sample, shot))
+        if self._views[0] != key:
+            self._keys.clear()
+            self._views = key, self._shot_views(shot, key)
+        self._keys.update({o.id: o.track or o.key for o in sample.objects})
+        views = self._views[1]
+        return views and views.around(*self._scenery.taken(sample, shot))
 
     def _shot_views(self, shot: Shot, key: str) -> ShotViews | None:
         """The views of a shot whose things stand where the shot says, in the exported models."""
@@ -124,7 +130,9 @@ class Again:
             return None
 
         def mesh(thing: Thing) -> Mesh:
-            return self._mesh(thing.key) if thing.id else self._scenery.known(around, thing)
+            if not thing.id:
+                return self._scenery.known(around, thing)
+            return self._mesh(step_key(self._keys.get(thing.id, thing.model.key), thing.step and thing.step.frame))
 
         return views_of(shot.model_copy(update={"things": (*shot.things, *around.things)}), mesh)
 

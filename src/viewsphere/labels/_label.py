@@ -45,6 +45,11 @@ class Needs:
     rectified: bool = False
     tracks: bool = False
 
+    @property
+    def is_some(self) -> bool:
+        """Whether one still picture of one sensor is not enough."""
+        return bool(self.instants or self.rectified or self.tracks)
+
 
 @dataclass(frozen=True)
 class Drawing:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from viewsphere.geometry.camera import project
 from viewsphere.geometry.rotation import product, transform
-from viewsphere.truth.kernels_correspond import OTHER, STILL
+from viewsphere.truth.kernel_constants import OTHER, STILL
 from viewsphere.truth.maps import Maps, maps_between
 from viewsphere.truth.point_raster import Placed, placed_at, states
 from viewsphere.truth.stuck import shifts, stick, weights_of

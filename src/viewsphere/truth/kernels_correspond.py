@@ -12,8 +12,8 @@ import math
 import numpy as np
 
 from viewsphere.kernels.jit import inner, njit
+from viewsphere.truth.kernel_constants import GONE, OTHER, RIGID, STILL
 
-STILL, RIGID, OTHER, GONE = 0, 1, 2, 3  # what a thing did: OTHER pixels are left as they are
 A, B, C, D = np.uintp(0), np.uintp(1), np.uintp(2), np.uintp(3)
 
 

@@ -14,7 +14,8 @@ import math
 import numpy as np
 
 from viewsphere.kernels.jit import inner, njit
-from viewsphere.truth.kernels_row import FOUR, NEARER, draw_four, shows_farther
+from viewsphere.truth.kernel_constants import FOUR, NEARER
+from viewsphere.truth.kernels_row import draw_four, shows_farther
 
 EPSILON = 1e-5  # pixels by which a bounding box is widened: more than the edge functions' rounding
 BEHIND = -(1 << 30)

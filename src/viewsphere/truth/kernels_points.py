@@ -12,8 +12,9 @@ import math
 import numpy as np
 
 from viewsphere.kernels.jit import inner, njit
+from viewsphere.truth.kernel_constants import FOUR, NEARER
 from viewsphere.truth.kernels_draw import BEHIND, NEVER, ROUNDED_UP, SLIVER, edge, edges_inside, hits_surface, plane
-from viewsphere.truth.kernels_row import FOUR, NEARER, meet_four
+from viewsphere.truth.kernels_row import meet_four
 
 WIDER = 1e-6  # pixels by which a triangle's box is widened: more than the rounding of its corners and of the edge functions
 SMALL = 8  # pixels: up to this width all points of a box are tested, and looked at beforehand if its height is no more

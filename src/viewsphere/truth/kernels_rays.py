@@ -14,8 +14,8 @@ import math
 import numpy as np
 
 from viewsphere.kernels.jit import inner, njit
+from viewsphere.truth.kernel_constants import NEARER
 from viewsphere.truth.kernels_draw import NEVER, edges_inside, hits_surface, plane
-from viewsphere.truth.kernels_row import NEARER
 
 LEAF = 8  # pixels along a leaf's side
 MANY_CELLS, MANY_PIXELS = 64, 1024  # cells and pixels of a triangle's box beyond which the tree is faster

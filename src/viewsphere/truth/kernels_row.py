@@ -8,12 +8,8 @@ import numba as nb
 from llvmlite import ir
 from numba.extending import intrinsic
 
-FOUR = 4
-NEARER = 1.0 + 2.0**-22
-"""Factor by which 1/z of a surface must exceed that of the surface seen so far to replace it; surfaces closer to each other
-count as lying in one place. Its excess over 1 is four times the rounding of the models' float32 coordinates, which split one
-plane into two, and of float32 depth.
-"""
+from viewsphere.truth.kernel_constants import FOUR, NEARER
+
 _REAL, _WHOLE, _FLAGS = ir.DoubleType(), ir.IntType(32), ir.IntType(FOUR)
 _REALS, _WHOLES = ir.VectorType(_REAL, FOUR), ir.VectorType(_WHOLE, FOUR)
 _EDGES = nb.types.UniTuple(nb.float64, 3)

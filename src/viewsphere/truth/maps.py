@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.geometry.rotation import inverse, product, transform
-from viewsphere.truth.kernels_correspond import GONE, OTHER, RIGID, STILL
+from viewsphere.truth.kernel_constants import GONE, OTHER, RIGID, STILL
 from viewsphere.truth.view import View
 
 Float = NDArray[np.float64]

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from viewsphere.geometry.camera import project
 from viewsphere.geometry.rotation import product
-from viewsphere.truth.kernels_row import FOUR, NEARER
+from viewsphere.truth.kernel_constants import FOUR, NEARER
 from viewsphere.truth.view import View
 
 Float = NDArray[np.float64]

@@ -15,6 +15,7 @@ import numpy as np
 
 from viewsphere.engines.raster.kernels_chosen import CLOSED, TILE, level
 from viewsphere.kernels.jit import inner, njit
+from viewsphere.truth.kernel_constants import NEARER
 from viewsphere.truth.kernels_draw import (
     BEHIND,
     EPSILON,
@@ -27,7 +28,6 @@ from viewsphere.truth.kernels_draw import (
     plane,
 )
 from viewsphere.truth.kernels_rays import ANY_DEPTH, LEAF, NO_BOX, leaf_list, limits, pixel_box, touched
-from viewsphere.truth.kernels_row import NEARER
 
 U = nb.uintp
 TIE = 1e-5  # relative difference of 1/z below which two surfaces count as lying on one another
