@@ -110,9 +110,7 @@ class Again:
         return self._geometry[1]
 
     def _compared(self, sample: Sample, shot: Shot, key: str) -> SampleViews | None:
-        """What labels of motion and of stereo pairs compare a sample with; None where it has none, and where scenery is not what
-        it was.
-        """
+        """What labels of motion and stereo compare a sample with; None without one, and where scenery is not what it was."""
         known = channel_labels()
         if not any(known[name].needs.is_some for name in sample.files if name in known):
             return None
