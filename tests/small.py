@@ -10,10 +10,10 @@ ROOT = Path(__file__).parent.parent
 
 def still_channels() -> tuple[str, ...]:
     """Names of the channels that need no other picture."""
-    from viewsphere.labels import channel_labels, channels
+    from viewsphere.labels import Needs, channel_labels, channels
 
     labels = channel_labels()
-    return tuple(name for name in channels() if name not in labels or not labels[name].needs.is_some)
+    return tuple(name for name in channels() if name not in labels or labels[name].needs == Needs())
 
 
 def small_recipe(**changes):

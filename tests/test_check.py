@@ -15,7 +15,7 @@ from viewsphere.check.digests import damaged
 from viewsphere.check.frames import FRAME_PROOFS
 from viewsphere.errors import MissingExtraError
 from viewsphere.geometry.mask import decode_rle, encode_rle
-from viewsphere.labels import channel_labels, channels, labels, object_labels
+from viewsphere.labels import Needs, channel_labels, channels, labels, object_labels
 from viewsphere.labels._label import nothing
 from viewsphere.model.camera import Distortion
 from viewsphere.model.files import Files
@@ -80,14 +80,14 @@ def test_a_whole_data_set_passes(whole):
     report = check(whole)
     assert report.ok, report.findings
     assert report.notes == ()
-    names = ["files", "ids", "camera", "shot", *(name for name in labels() if not labels()[name].needs.is_some), "surface"]
+    names = ["files", "ids", "camera", "shot", *(name for name in labels() if labels()[name].needs == Needs()), "surface"]
     assert report.checked.pop("digests") > 12 * len(whole.plan.channels)
     assert report.checked.pop("models") == 3
     assert report.checked == dict.fromkeys(names, 12)
     assert json.loads(json.dumps(report.to_json()))["ok"] is True
 
 
-STILL = [name for name, label in channel_labels().items() if not label.needs.is_some]
+STILL = [name for name, label in channel_labels().items() if label.needs == Needs()]
 LENSES = {
     "brown_conrady": Distortion(model="brown_conrady", coefficients=(-0.2, 0.05, 0.001, 0.0, 0.0)),
     "fisheye": Distortion(model="fisheye", coefficients=(0.02, 0.05, 0.001, 0.0)),
