@@ -10,9 +10,9 @@ import time
 from collections import Counter
 
 import pytest
-from sequence_recipe import CHANNELS, eventful_recipe
 
 import viewsphere as vs
+from sequence_recipe import CHANNELS, eventful_recipe
 from small import tree_hash
 from viewsphere.check import check
 
