@@ -168,7 +168,7 @@ def test_our_own_tracks_score_one_in_tapvid(dataset, tmp_path, mode):
 
 
 SEEN = 6
-"""Pictures that have to agree on a piece of surface: a TSDF is no measure of what hardly any camera saw, or at a grazing angle."""
+"""Pictures that have to agree on a piece of surface: one that sees it at a grazing angle only is no measure of it."""
 
 
 def test_a_tsdf_of_an_orbit_lies_on_the_model():
