@@ -10,6 +10,7 @@ from two_views import brute_points, brute_xy, centers, matched, pose, view
 from viewsphere.geometry.camera import pixel_rays, project
 from viewsphere.geometry.rotation import matrix_from_quaternion
 from viewsphere.model.camera import Camera
+from viewsphere.truth.surface_draws import points_on
 
 AHEAD = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])  # looks along +Y, Z up
 STILL = pose(0, 0, 0)
@@ -118,6 +119,40 @@ def test_a_skinned_bar_moves_with_its_triangles(name, moves):
         there.geometry.triangles[triangle]]).all(axis=(-1, -2))  # fmt: skip
     assert still.any() != moves
     assert (match.xy == centers(camera))[still].all()
+
+
+def divided(mesh):
+    """The same triangles, none of which share a vertex."""
+    return mesh_of(mesh.vertices[mesh.triangles].reshape(-1, 3), np.arange(3 * len(mesh.triangles)))
+
+
+def test_vertices_may_be_divided_where_triangles_fold():
+    """Files of faceted models have one vertex where two triangles are level, and two where they fold."""
+    camera = orbit_camera(lens(96, 72, 0.8), 0.2, 0.3, 3.0)
+    straight, bent = bar(0.0), bar(0.5)
+    here, there = (view([mesh], [STILL], camera, steps=[k]) for k, mesh in ((1, straight), (2, bent)))
+    expected = matched(here, there)
+    points = points_on(here, 200, np.random.default_rng(0))
+    for first, second in ((straight, divided(bent)), (divided(straight), bent), (divided(straight), divided(bent))):
+        one, other = (view([mesh], [STILL], camera, steps=[k]) for k, mesh in ((1, first), (2, second)))
+        np.testing.assert_array_equal(matched(one, other).xy, expected.xy)
+        np.testing.assert_array_equal(matched(one, other).state, expected.state)
+        np.testing.assert_array_equal(points.in_view(other).xy, points.in_view(there).xy)
+
+
+def test_as_many_other_triangles_are_others():
+    """The quads of a bar cut along their other diagonals, and a bar in another order, whether vertices are shared or not."""
+    camera = orbit_camera(lens(96, 72, 0.8), 0.2, 0.3, 3.0)
+    straight, bent = bar(0.0), bar(0.5)
+    quads = len(bent.triangles) // 2
+    a, b, c, d = *bent.triangles[:quads].T, bent.triangles[quads:, 2]
+    others = mesh_of(bent.vertices, np.concatenate([np.stack([a, b, d], 1), np.stack([b, c, d], 1)]))
+    backwards = mesh_of(bent.vertices, bent.triangles[::-1])
+    here = view([straight], [STILL], camera, steps=[1])
+    seen = matched(here, here).visibility.triangle >= 0
+    for mesh in (others, backwards, divided(others)):
+        match = matched(here, view([mesh], [STILL], camera, steps=[2]))
+        assert (match.state[seen] == 4).all() and np.isnan(match.xy[seen]).all()
 
 
 def test_what_does_not_move_has_no_flow_at_all():

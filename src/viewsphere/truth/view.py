@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import Literal
 
@@ -24,22 +24,41 @@ Change = Literal["moved", "deformed", "gone"]
 @dataclass(frozen=True, eq=False)
 class Body:
     """One thing of a view, as far as points depend on it that stick to it: they are on its triangles (n, 3), whose vertices
-    are counted from `base` on.
+    are counted from `base` on, and lie at `places` (v, 3) in the thing's own axes.
     """
 
     thing: Thing
     triangles: NDArray[np.int32]
     base: int
+    places: NDArray[np.float32]
+
+    @property
+    def corners(self) -> NDArray[np.int32]:
+        """The vertex of each corner of its triangles, (3 n,), counted from 0."""
+        return (self.triangles - np.int32(self.base)).reshape(-1)
 
     def has_triangles_of(self, other: Body) -> bool:
-        """Whether both are the same thing, there, and made of the same triangles, wherever its vertices are."""
+        """Whether both are the same thing, there, and made of the same triangles, wherever its vertices are.
+
+        Normals divide vertices: corners that share one while two triangles are level need two once they are not. So corners are
+        compared by their places: those that are one vertex in either have to be in one place in the other.
+        """
         one, two = self.thing, other.thing
         if one is not two and not (one.is_there and two.is_there and (one.model is two.model or one.model == two.model)):
             return False
-        return one.step == two.step or (
-            len(self.triangles) == len(other.triangles)
-            and np.array_equal(self.triangles - np.int32(self.base), other.triangles - np.int32(other.base))
-        )
+        if one.step == two.step:
+            return True
+        if len(self.triangles) != len(other.triangles):
+            return False
+        return np.array_equal(self.corners, other.corners) or (self._is_joined_in(other) and other._is_joined_in(self))
+
+    def _is_joined_in(self, other: Body) -> bool:
+        """Whether the corners of each vertex are in one place in another body of as many triangles."""
+        corners = self.corners
+        first = np.zeros(len(self.places), np.intp)
+        first[corners[::-1]] = np.arange(len(corners))[::-1]
+        there = other.places[other.corners]
+        return np.array_equal(there, there[first[corners]])
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,11 +123,12 @@ class View:
     def body(self, i: int) -> Body:
         """Thing i."""
         first, stop = self.geometry.triangle_start[i : i + 2]
-        return Body(self.things[i], self.geometry.triangles[first:stop], self.geometry.vertex_start[i])
+        return Body(self.things[i], self.geometry.triangles[first:stop], self.geometry.vertex_start[i], self._own_axes(i))
 
     def bodies(self, things: NDArray[np.int32]) -> dict[int, Body]:
-        """Those of the things in a list of their positions, which may hold numbers below 0, too."""
-        return {i: self.body(i) for i in np.unique(things[things >= 0]).tolist()}
+        """Those of the things in a list of their positions, which may hold numbers below 0, too; they outlast the geometry."""
+        found = {i: self.body(i) for i in np.unique(things[things >= 0]).tolist()}
+        return {i: replace(body, places=body.places.copy()) if body.thing.step else body for i, body in found.items()}
 
     def change(self, i: int, other: View) -> Change:
         """What thing i of this view did until another: moved (or stood still), deformed, or gone, which it is, too, where it is
