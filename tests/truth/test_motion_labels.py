@@ -110,7 +110,8 @@ def test_a_whole_picture_contradicts_nothing():
         channels = observed(sight, *NAMES, "depth")
         assert proofs(sight, channels) == []
         for drawing in (channel_labels()[name].drawing for name in NAMES):
-            drawn = drawing.beside(sample_of(sight, channels))
+            sample = sample_of(sight, channels)
+            drawn = drawing.pixels(np.zeros((72, 96, 3), np.uint8), sample) if drawing.pixels else drawing.picture(sample)
             assert drawn.shape == (72, 96, 3) and drawn.dtype == np.uint8 and drawn.std() > 0
 
 

@@ -31,6 +31,13 @@ def formats(incomplete: str) -> list[str]:
     return [given + comma + name for name in plugins.names("formats") if name not in given.split(",")]
 
 
+def drawings() -> list[str]:
+    """What `preview` draws; the labels' files have to be imported to know."""
+    from viewsphere.labels import drawings as known
+
+    return [drawing.name for drawing in known()]
+
+
 def axes() -> list[str]:
     """Axes with signs, such as +x."""
     return [sign + axis for axis in "xyz" for sign in "+-"]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -18,15 +17,6 @@ from viewsphere.errors import StoreError, UserError
 if TYPE_CHECKING:
     from viewsphere.recipe.recipe import Recipe
     from viewsphere.run.estimate import Estimate
-
-
-class Draw(StrEnum):
-    """What a contact sheet shows over its pictures."""
-
-    boxes = "boxes"
-    boxes3d = "boxes3d"
-    masks = "masks"
-    depth = "depth"
 
 
 def new(
@@ -173,26 +163,65 @@ def plan(
 def preview(
     source: Annotated[Path, typer.Argument(help="Recipe (YAML), or a folder that `render` wrote.", show_default=False)],
     output: Annotated[Path, typer.Option("-o", "--output", help="Picture to write.")] = Path("preview.png"),
-    count: Annotated[int, typer.Option("-n", "--count", min=1, help="Frames shown.")] = 12,
-    draw: Annotated[list[Draw] | None, typer.Option(help="Draw over the pictures; may be given several times.")] = None,
-    columns: Annotated[int, typer.Option(min=1, help="Pictures in a row.")] = 4,
+    count: Annotated[int, typer.Option("-n", "--count", min=1, help="Frames shown; of sequences instants.")] = 12,
+    draw: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Label to draw: boxes, boxes3d, masks, depth, flow, tracks, ...; several times for several.",
+            autocompletion=completion.drawings,
+        ),
+    ] = None,
+    columns: Annotated[int, typer.Option(min=1, help="Pictures in a row; of a sequence instants.")] = 4,
+    video: Annotated[
+        Path | None,
+        typer.Option(help="Instead of a picture: a video of a data set's sequences, .mp4 or .webp.", show_default=False),
+    ] = None,
+    sequence: Annotated[
+        str | None, typer.Option(help="Only this sequence, in the video; default: one after another.", show_default=False)
+    ] = None,
     changes: Changes = None,
 ) -> None:
-    """Write a contact sheet: a recipe's frames rendered small, or a data set's."""
-    from viewsphere.preview import contact_sheet, dataset_samples, preview_samples
+    """Write a contact sheet (of sequences, filmstrips): a recipe's frames rendered small, or a data set's; or a video."""
+    from viewsphere.preview import Earlier, contact_sheet, dataset_samples, films_of, preview_samples
     from viewsphere.store import Dataset
 
+    names = draw or []
+    if video is not None:
+        _write_video(source, video, names, sequence)
+        return
+    if sequence is not None:
+        raise UserError("--sequence: expected --video beside it; found none: say which file to write")
     if source.is_dir():
-        samples = dataset_samples(Dataset(source), count)
+        dataset = Dataset(source)
+        films = films_of(dataset)
+        samples, before = dataset_samples(dataset, count, columns, films), Earlier(dataset, films)
     else:
         recipe = load_recipe(source, changes)
         _announce_compilation()
         with recipe.located():
-            samples = list(preview_samples(recipe, count))
+            samples = list(preview_samples(recipe, count, draw=names, row=columns))
+        before = Earlier(samples, ())
     if not samples:
         raise StoreError(f"{source}: expected finished frames, found none: render first")
-    write_picture(output, contact_sheet(samples, [d.value for d in draw or ()], columns))
+    write_picture(output, contact_sheet(samples, names, columns, before=before))
     typer.echo(f"wrote {output} ({len(samples)} frames)")
+
+
+def _write_video(source: Path, file: Path, draw: list[str], sequence: str | None) -> None:
+    from viewsphere.preview import write_video
+    from viewsphere.run.progress import Progress
+    from viewsphere.store import Dataset
+
+    if not source.is_dir():
+        raise UserError(f"--video: expected a folder that `render` wrote; found {source}: render it first")
+    with ProgressBar(quiet=False) as bar:
+
+        def tell(done: int, total: int) -> None:
+            bar.show(Progress("video", done, total))
+
+        made = write_video(Dataset(source), file, draw, sequence, tell)
+    many = f"{made.sequences} sequences" if made.sequences > 1 else "1 sequence"
+    typer.echo(f"wrote {file} ({many}, {made.pictures} pictures, {made.seconds:g} s)")
 
 
 def render(

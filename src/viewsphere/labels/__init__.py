@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere import plugins
-from viewsphere.labels._label import ChannelLabel, Drawing, Field, Label, ModelFacts, Needs, ObjectLabel
+from viewsphere.labels._label import TAIL, ChannelLabel, Color, Drawing, Extent, Field, Label, ModelFacts, Needs, ObjectLabel
 from viewsphere.labels._placement import Placement
 from viewsphere.labels._record import annotation_of, from_short_record, from_whole_record, short_record, whole_record
 from viewsphere.labels._sight import Around, Sight
@@ -29,8 +29,11 @@ from viewsphere.truth.geometry import Geometry
 from viewsphere.truth.visibility import Visibility
 
 __all__ = [
+    "TAIL",
     "ChannelLabel",
+    "Color",
     "Drawing",
+    "Extent",
     "Field",
     "Label",
     "ModelFacts",

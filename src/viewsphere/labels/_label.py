@@ -47,20 +47,45 @@ class Needs:
 
     @property
     def is_some(self) -> bool:
-        """Whether one still picture of one sensor is not enough."""
+        """Whether still pictures of one sensor do not have the label."""
         return bool(self.instants or self.rectified or self.tracks)
+
+
+TAIL = 8
+"""Instants before a sample's own that drawings with trails are given."""
+
+Color = tuple[int, int, int]
+"""sRGB, 0 to 255."""
+
+Extent = tuple[float, float]
+"""The least and the greatest value that a picture of numbers tells apart."""
 
 
 @dataclass(frozen=True)
 class Drawing:
     """How `preview` shows a label, and under which name: pixels of the picture changed, lines drawn over it at a scale, or
     another picture (of the sample's size) beside it.
+
+    `trails` are lines that show what was before, too: they are given what the sensor's samples so far are, the sample itself
+    last, none of them more than `labels.TAIL` instants before it. Instead of `beside`, `within` gives a picture that tells
+    apart the values of an extent, and `extent` a sample's own, so that all pictures of a sequence may have the same colours.
+    `key` says what colours mean, None: words alone.
     """
 
     name: str
     pixels: Callable[[Picture, Sample], Picture] | None = None
     lines: Callable[[ImageDraw, Sample, float], None] | None = None
+    trails: Callable[[ImageDraw, Sequence[Sample], float], None] | None = None
     beside: Callable[[Sample], Picture] | None = None
+    extent: Callable[[Sample], Extent] | None = None
+    within: Callable[[Sample, Extent], Picture] | None = None
+    key: tuple[tuple[str, Color | None], ...] = ()
+
+    def picture(self, sample: Sample, extent: Extent | None = None) -> Picture | None:
+        """The picture beside a sample's, (H, W, 3) uint8 sRGB, None where nothing is shown there; `extent`: else its own."""
+        if self.within and self.extent:
+            return self.within(sample, extent or self.extent(sample))
+        return self.beside(sample) if self.beside else None
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.labels._label import Models, Picture, Proof, channel_of
+from viewsphere.labels._label import Drawing, Models, Picture, Proof, channel_of
 from viewsphere.labels._sight import Sight
 from viewsphere.model.sample import Sample
 from viewsphere.truth.correspondence import Match
@@ -20,6 +20,17 @@ COLORS = np.array([(235, 235, 235), (200, 60, 50), (60, 110, 200), (120, 70, 160
 def state(sight: Sight, match: Match | None) -> NDArray[np.uint8]:
     """The states of the seen points in another view, (H, W); all invalid without one."""
     return np.full(sight.visibility.triangle.shape, INVALID, np.uint8) if match is None else match.state
+
+
+def drawing(channel: str) -> Drawing:
+    """How a channel of states is shown beside a picture."""
+    colors: list[list[int]] = COLORS.tolist()
+    names = (f"{channel}: visible", "occluded", "outside", "behind", "invalid")
+    return Drawing(
+        channel,
+        beside=lambda sample: picture(sample.channels[channel]),
+        key=tuple((name, (r, g, b)) for name, (r, g, b) in zip(names, colors, strict=True)),
+    )
 
 
 def picture(states: NDArray[np.uint8]) -> Picture:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from viewsphere.labels._label import Drawing
+
 Picture = NDArray[np.uint8]
 STEPS = ((15, 0, 1, 1), (6, 1, 0, -1), (4, 1, 2, 1), (11, 2, 1, -1), (13, 2, 0, 1), (6, 0, 2, -1))
 """Parts of the wheel: how many colours it has, which of red, green and blue stays, which changes, and whether it rises."""
@@ -27,6 +29,13 @@ def wheel() -> NDArray[np.float64]:
     return np.concatenate(parts)
 
 
+def longest_of(flow: NDArray[np.floating]) -> float:
+    """The length of flow (H, W, 2) that 99 % of the pixels do not exceed; 1 where there is none."""
+    length = np.hypot(flow[..., 0], flow[..., 1], dtype=np.float64)
+    known = length[np.isfinite(length)]
+    return float(np.percentile(known, 99)) if known.size else 1.0
+
+
 def picture(flow: NDArray[np.floating], longest: float | None = None) -> Picture:
     """Flow (H, W, 2) as a picture (H, W, 3) uint8: white is none, black where it is NaN.
 
@@ -35,9 +44,7 @@ def picture(flow: NDArray[np.floating], longest: float | None = None) -> Picture
     known: NDArray[np.bool_] = np.isfinite(flow[..., 0] + flow[..., 1])
     u, v = np.where(known[..., None], flow, 0.0).astype(np.float64).transpose(2, 0, 1)
     length = np.hypot(u, v)
-    if longest is None:
-        longest = float(np.percentile(length[known], 99)) if known.any() else 1.0
-    share = length / max(longest, 1e-9)
+    share = length / max(longest_of(flow) if longest is None else longest, 1e-9)
     colors = wheel() / 255
     at = (np.arctan2(-v, -u) / np.pi + 1) / 2 * (len(colors) - 1)
     first = np.floor(at).astype(np.intp)
@@ -45,3 +52,16 @@ def picture(flow: NDArray[np.floating], longest: float | None = None) -> Picture
     color = (1 - between) * colors[first] + between * colors[(first + 1) % len(colors)]
     color = np.where(share[..., None] <= 1, 1 - share[..., None] * (1 - color), DARKER * color)
     return np.where(known[..., None], np.floor(255 * color), 0).astype(np.uint8)
+
+
+def drawing(channel: str) -> Drawing:
+    """How a channel of flow, or the x and y of one of scene flow, is shown beside a picture."""
+    ways = np.array([[[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]]])
+    colors: list[list[int]] = picture(ways, 1.0)[0].tolist()
+    names = (f"{channel}: right", "down", "left", "up")
+    return Drawing(
+        channel,
+        within=lambda sample, extent: picture(sample.channels[channel][..., :2], extent[1]),
+        extent=lambda sample: (0.0, longest_of(sample.channels[channel][..., :2])),
+        key=tuple((name, (r, g, b)) for name, (r, g, b) in zip(names, colors, strict=True)),
+    )

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.labels._label import ChannelLabel, Drawing, Models, Picture, channel_of
+from viewsphere.labels._label import ChannelLabel, Drawing, Extent, Models, Picture, channel_of
 from viewsphere.labels._sight import Sight
 from viewsphere.model.sample import Sample
 
@@ -32,13 +32,18 @@ def prove(sample: Sample, models: Models) -> Iterator[str]:
         yield f"expected metres where an object is seen; found infinity at {np.isinf(depth[instances > 0]).sum()} pixels"
 
 
-def picture(depth: NDArray[np.float32]) -> Picture:
+def extent(depth: NDArray[np.float32]) -> Extent:
+    """The nearest depth, and that which 98 % of the pixels do not exceed, so that a ground up to the horizon leaves greys."""
+    seen = depth[np.isfinite(depth)]
+    return (0.0, 0.0) if not seen.size else (float(seen.min()), float(np.percentile(seen, 98)))
+
+
+def picture(depth: NDArray[np.float32], within: Extent | None = None) -> Picture:
     """Depth as a picture (H, W, 3) uint8: near is light, far is dark, and pixels without depth are black."""
     seen = np.isfinite(depth)
     grey = np.zeros(depth.shape, np.float64)
-    if seen.any():
-        near, far = np.percentile(depth[seen], (0, 98))
-        grey[seen] = 1.0 - 0.85 * np.clip((depth[seen] - near) / max(far - near, 1e-9), 0, 1)
+    near, far = within or extent(depth)
+    grey[seen] = 1.0 - 0.85 * np.clip((depth[seen] - near) / max(far - near, 1e-9), 0, 1)
     return np.repeat((grey * 255).astype(np.uint8)[..., None], 3, axis=2)
 
 
@@ -51,5 +56,10 @@ LABEL = ChannelLabel(
     empty=np.inf,
     compute=compute,
     prove=prove,
-    drawing=Drawing("depth", beside=lambda sample: picture(sample.channels["depth"])),
+    drawing=Drawing(
+        "depth",
+        within=lambda sample, within: picture(sample.channels["depth"], within),
+        extent=lambda sample: extent(sample.channels["depth"]),
+        key=(("depth: light is near", None),),
+    ),
 )

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.labels._label import ChannelLabel, Drawing, Models, Needs, Picture, channel_of
+from viewsphere.labels._label import ChannelLabel, Drawing, Extent, Models, Needs, Picture, channel_of
 from viewsphere.labels._sight import Sight
 from viewsphere.labels._stereo import pair
 from viewsphere.model.sample import Sample
@@ -40,13 +40,18 @@ def prove(sample: Sample, models: Models) -> Iterator[str]:
         yield f"expected 0 or NaN where depth is infinite; found others at {(np.isinf(depth) & (disparity > 0)).sum()} pixels"
 
 
-def picture(disparity: NDArray[np.float32]) -> Picture:
+def extent(disparity: NDArray[np.float32]) -> Extent:
+    """The disparity that 98 % of the pixels exceed, and the greatest."""
+    known = disparity[np.isfinite(disparity)]
+    return (0.0, 0.0) if not known.size else (float(np.percentile(known, 2)), float(known.max()))
+
+
+def picture(disparity: NDArray[np.float32], within: Extent | None = None) -> Picture:
     """Disparity as a picture (H, W, 3): near is light, far is dark, NaN black."""
     known = np.isfinite(disparity)
     grey = np.zeros(disparity.shape, np.float64)
-    if known.any():
-        far, near = np.percentile(disparity[known], (2, 100))
-        grey[known] = 0.15 + 0.85 * np.clip((disparity[known] - far) / max(near - far, 1e-9), 0, 1)
+    far, near = within or extent(disparity)
+    grey[known] = 0.15 + 0.85 * np.clip((disparity[known] - far) / max(near - far, 1e-9), 0, 1)
     return np.repeat((grey * 255).astype(np.uint8)[..., None], 3, axis=2)
 
 
@@ -60,5 +65,10 @@ LABEL = ChannelLabel(
     empty=np.nan,
     compute=compute,
     prove=prove,
-    drawing=Drawing("disparity", beside=lambda sample: picture(sample.channels["disparity"])),
+    drawing=Drawing(
+        "disparity",
+        within=lambda sample, within: picture(sample.channels["disparity"], within),
+        extent=lambda sample: extent(sample.channels["disparity"]),
+        key=(("disparity: light is near", None),),
+    ),
 )

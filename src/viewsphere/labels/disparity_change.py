@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.labels._label import ChannelLabel, Drawing, Models, Needs, Picture, channel_of
+from viewsphere.labels._label import ChannelLabel, Drawing, Extent, Models, Needs, Picture, channel_of
 from viewsphere.labels._sight import Sight
 from viewsphere.labels._stereo import pair
 from viewsphere.model.sample import Sample
@@ -35,10 +35,17 @@ def prove(sample: Sample, models: Models) -> Iterator[str]:
         yield "expected disparity of at least 0 afterwards; found less"
 
 
-def picture(change: NDArray[np.float32]) -> Picture:
+def extent(change: NDArray[np.float32]) -> Extent:
+    """The change that 99 % of the pixels do not exceed, either way."""
+    known = np.abs(change[np.isfinite(change)])
+    most = float(np.percentile(known, 99)) if known.size else 0.0
+    return -most, most
+
+
+def picture(change: NDArray[np.float32], within: Extent | None = None) -> Picture:
     """A change as a picture (H, W, 3): nearer is red, farther is blue, none white, NaN black."""
     known = np.isfinite(change)
-    most = float(np.percentile(np.abs(change[known]), 99)) if known.any() else 1.0
+    most = (within or extent(change))[1]
     share = np.clip(np.where(known, change, 0) / max(most, 1e-9), -1, 1)
     other = 255 * (1 - np.abs(share))
     red, blue = np.where(share >= 0, 255, other), np.where(share <= 0, 255, other)
@@ -55,5 +62,10 @@ LABEL = ChannelLabel(
     empty=np.nan,
     compute=compute,
     prove=prove,
-    drawing=Drawing("disparity_change", beside=lambda sample: picture(sample.channels["disparity_change"])),
+    drawing=Drawing(
+        "disparity_change",
+        within=lambda sample, within: picture(sample.channels["disparity_change"], within),
+        extent=lambda sample: extent(sample.channels["disparity_change"]),
+        key=(("comes nearer", (255, 0, 0)), ("goes farther", (0, 0, 255))),
+    ),
 )

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.labels import _state
-from viewsphere.labels._label import ChannelLabel, Drawing, Needs
+from viewsphere.labels._label import ChannelLabel, Needs
 from viewsphere.labels._sight import Sight
 from viewsphere.labels._stereo import pair_match
 
@@ -25,5 +25,5 @@ LABEL = ChannelLabel(
     encoding="png",
     compute=compute,
     prove=_state.state_proof("disparity_state"),
-    drawing=Drawing("disparity_state", beside=lambda sample: _state.picture(sample.channels["disparity_state"])),
+    drawing=_state.drawing("disparity_state"),
 )

@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.labels import _flow
-from viewsphere.labels._label import ChannelLabel, Drawing, Needs
+from viewsphere.labels._label import ChannelLabel, Needs
 from viewsphere.labels._sight import Sight
-from viewsphere.labels._wheel import picture
+from viewsphere.labels._wheel import drawing
 
 
 def compute(sight: Sight) -> NDArray[np.float32]:
@@ -30,5 +30,5 @@ LABEL = ChannelLabel(
     empty=np.nan,
     compute=compute,
     prove=_flow.flow_proof("flow", "flow_state"),
-    drawing=Drawing("flow", beside=lambda sample: picture(sample.channels["flow"])),
+    drawing=drawing("flow"),
 )

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.labels import _state
-from viewsphere.labels._label import ChannelLabel, Drawing, Needs
+from viewsphere.labels._label import ChannelLabel, Needs
 from viewsphere.labels._sight import Sight
 
 
@@ -24,5 +24,5 @@ LABEL = ChannelLabel(
     encoding="png",
     compute=compute,
     prove=_state.state_proof("flow_backward_state"),
-    drawing=Drawing("flow_backward_state", beside=lambda sample: _state.picture(sample.channels["flow_backward_state"])),
+    drawing=_state.drawing("flow_backward_state"),
 )

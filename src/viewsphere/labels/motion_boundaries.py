@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.labels._flow import flow
-from viewsphere.labels._label import ChannelLabel, Drawing, Models, Needs, channel_of
+from viewsphere.labels._label import ChannelLabel, Drawing, Models, Needs, Picture, channel_of
 from viewsphere.labels._sight import Sight
 from viewsphere.model.sample import Sample
 
@@ -16,6 +16,9 @@ APART = 1.5
 """Pixels by which flows differ at a boundary (Mayer et al. 2016, "A Large Dataset to Train Convolutional Networks for
 Disparity, Optical Flow, and Scene Flow Estimation"; that its boundaries are of 10 pixels at least is not asked for here).
 """
+
+COLOR = (255, 40, 170)
+"""That boundaries are drawn in, which few pictures have."""
 
 JOINED = 0.05
 """Greatest relative difference of the 1/s of neighbouring pixels of one thing that are one surface."""
@@ -66,6 +69,11 @@ def prove(sample: Sample, models: Models) -> Iterator[str]:
         yield f"expected neighbours whose flow differs; found none at {wrong.sum()} pixels"
 
 
+def lined(picture: Picture, sample: Sample) -> Picture:
+    """The picture with its boundaries as lines of one colour."""
+    return np.where(sample.channels["motion_boundaries"][..., None] > 0, np.array(COLOR, np.uint8), picture)
+
+
 LABEL = ChannelLabel(
     name="motion_boundaries",
     meaning="1 where a pixel beside shows something else that moves otherwise",
@@ -74,8 +82,5 @@ LABEL = ChannelLabel(
     encoding="png",
     compute=compute,
     prove=prove,
-    drawing=Drawing(
-        "motion_boundaries",
-        beside=lambda sample: np.repeat(255 * sample.channels["motion_boundaries"][..., None], 3, axis=2).astype(np.uint8),
-    ),
+    drawing=Drawing("motion_boundaries", pixels=lined, key=(("motion boundaries", COLOR),)),
 )

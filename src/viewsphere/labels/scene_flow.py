@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.labels import _flow
-from viewsphere.labels._label import ChannelLabel, Drawing, Needs
+from viewsphere.labels._label import ChannelLabel, Needs
 from viewsphere.labels._sight import Sight
-from viewsphere.labels._wheel import picture
+from viewsphere.labels._wheel import drawing
 
 
 def compute(sight: Sight) -> NDArray[np.float32]:
@@ -30,5 +30,5 @@ LABEL = ChannelLabel(
     empty=np.nan,
     compute=compute,
     prove=_flow.scene_flow_proof("scene_flow", "flow_state"),
-    drawing=Drawing("scene_flow", beside=lambda sample: picture(sample.channels["scene_flow"][..., :2])),
+    drawing=drawing("scene_flow"),
 )

@@ -2,16 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from colorsys import hls_to_rgb
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.labels._label import ChannelLabel, Models, Needs, channel_of
+from viewsphere.geometry.camera import project
+from viewsphere.labels._label import ChannelLabel, Color, Drawing, Models, Needs, channel_of
 from viewsphere.labels._sight import Sight
 from viewsphere.model.sample import Sample
 from viewsphere.model.tracks import TRACK
+from viewsphere.truth.point_raster import OCCLUDED, VISIBLE
 from viewsphere.truth.points import SKY
+
+if TYPE_CHECKING:
+    from PIL.ImageDraw import ImageDraw
+
+RADIUS = 3.0
+"""Pixels of a point's radius in a picture that is 640 pixels wide."""
 
 WORST = 4
 """The last of the states."""
@@ -51,6 +61,45 @@ def prove(sample: Sample, models: Models) -> Iterator[str]:
         yield f"expected points on objects of the sample; found {absent.sum()} on others that are not invalid"
 
 
+def draw(pen: ImageDraw, samples: Sequence[Sample], scale: float) -> None:
+    """Each point in the colour of the position where it was picked: filled where it is seen, hollow where something hides it,
+    and a line behind it from where it was at the instants before. A sample's points are the rows of its own sensor.
+    """
+    now = samples[-1]
+    rows = now.channels["tracks"]
+    colors = colors_of(rows, now.width, now.height)
+    places = [positions(sample) * scale for sample in samples]
+    radius = max(1.5, RADIUS * scale * now.width / 640)
+    for i in np.flatnonzero(rows["state"] <= OCCLUDED):
+        line = _whole_end([tuple(place[i]) for place in places])
+        if len(line) > 1:
+            pen.line(line, fill=(*colors[i], 150), width=max(1, round(radius / 2)))
+        x, y = line[-1] if line else (np.nan, np.nan)
+        if np.isfinite(x):
+            box = (x - radius, y - radius, x + radius, y + radius)
+            filled = rows["state"][i] == VISIBLE
+            pen.ellipse(box, fill=colors[i] if filled else None, outline=colors[i], width=max(1, round(radius / 3)))
+
+
+def _whole_end(places: list[tuple[float, float]]) -> list[tuple[float, float]]:
+    """The last places, as many as are known."""
+    unknown = next((i for i, place in enumerate(reversed(places)) if not np.isfinite(place).all()), len(places))
+    return places[len(places) - unknown :]
+
+
+def positions(sample: Sample) -> NDArray[np.float64]:
+    """Where a sample's points are in its picture, (N, 2) pixels; NaN where its lens does not show them."""
+    camera, point = sample.camera, sample.channels["tracks"]["point"]
+    return project(camera.intrinsics, point[:, :3] @ camera.R.T + point[:, 3:] * camera.t)[0]
+
+
+def colors_of(rows: NDArray[np.void], width: int, height: int) -> list[Color]:
+    """A colour for each of the points: its hue goes with x, its lightness with y of the position where it was picked."""
+    hue, light = rows["query"][:, 0] / width, 0.68 - 0.28 * rows["query"][:, 1] / height
+    tones = (hls_to_rgb(0.83 * h, v, 1.0) for h, v in zip(hue.tolist(), light.tolist(), strict=True))
+    return [(round(255 * r), round(255 * g), round(255 * b)) for r, g, b in tones]
+
+
 LABEL = ChannelLabel(
     name="tracks",
     meaning="points followed through the sequence, a row each: where each was picked, where it is now, whether it is seen",
@@ -63,4 +112,5 @@ LABEL = ChannelLabel(
     encoding="npz",
     compute=compute,
     prove=prove,
+    drawing=Drawing("tracks", trails=draw, key=(("tracks: filled is visible, hollow is occluded", None),)),
 )

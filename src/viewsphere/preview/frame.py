@@ -1,0 +1,131 @@
+"""One picture with labels as they are drawn, and one instant of a rig."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw
+
+from viewsphere.errors import StoreError
+from viewsphere.labels import ChannelLabel, Drawing, Extent, labels
+from viewsphere.model.channel import picture_of
+from viewsphere.model.mistakes import one_of
+from viewsphere.model.sample import Sample
+
+Picture = NDArray[np.uint8]
+
+INK = (30, 32, 36)
+PAPER = (250, 250, 248)
+GAP = 4
+"""Pixels between the sensors of an instant."""
+
+Extents = Mapping[str, Extent]
+"""What the pictures beside tell apart, by the names of drawings; of others that are not there, each its own."""
+
+
+Before = Callable[[Sample], Sequence[Sample]]
+"""Gives what a sample's sensor saw before it."""
+
+
+def nothing(sample: Sample) -> Sequence[Sample]:
+    """No samples before."""
+    return ()
+
+
+def check_drawn(samples: Sequence[Sample], draw: Sequence[str]) -> None:
+    """Raise StoreError for what nobody can draw: names of no drawing, and of channels that none of the samples has."""
+    known = {label.drawing.name: label for label in labels().values() if label.drawing}
+    for name in draw:
+        if name not in known:
+            raise StoreError(f"--draw: {one_of(name, sorted(known))}")
+        label = known[name]
+        if samples and isinstance(label, ChannelLabel) and not any(label.name in sample.channels for sample in samples):
+            kept = ", ".join(samples[0].channels)
+            raise StoreError(f"--draw: expected the channel {label.name}, to draw {name}; found pictures that have {kept}")
+
+
+def drawn(sample: Sample, draw: Sequence[str]) -> list[Drawing]:
+    """The chosen drawings of what a sample has."""
+    found = (label for _, label in sorted(labels().items()) if label.drawing and label.drawing.name in draw)
+    return [
+        label.drawing
+        for label in found
+        if label.drawing and (not isinstance(label, ChannelLabel) or label.name in sample.channels)
+    ]
+
+
+def extents(samples: Sequence[Sample], draw: Sequence[str]) -> Extents:
+    """What the pictures beside some samples tell apart together."""
+    found: dict[str, list[Extent]] = {}
+    for sample in samples:
+        for drawing in drawn(sample, draw):
+            if drawing.extent:
+                found.setdefault(drawing.name, []).append(drawing.extent(sample))
+    return {name: (min(low for low, _ in pairs), max(high for _, high in pairs)) for name, pairs in found.items()}
+
+
+def draw_sample(
+    sample: Sample,
+    draw: Sequence[str] = (),
+    width: int | None = None,
+    before: Before = nothing,
+    within: Extents | None = None,
+) -> Picture:
+    """One frame with labels as they are drawn (`labels.drawings`): masks, 3D boxes (front face filled), 2D boxes and tracks
+    over the picture, depth and flow beside it; (H, W, 3) uint8 sRGB. What the sample does not have is not drawn.
+
+    `before` gives what its sensor saw before it, for trails; `within`: what pictures beside it tell apart.
+    """
+    return np.hstack(_pictures(sample, draw, width, before, within or {}))
+
+
+def draw_instant(samples: Sequence[Sample], draw: Sequence[str], width: int | None, before: Before, within: Extents) -> Picture:
+    """All sensors of an instant side by side, as `draw_sample` draws them, but what is beside their pictures below them."""
+    if len(samples) == 1:
+        return draw_sample(samples[0], draw, width, before, within)
+    columns = [np.vstack(_pictures(sample, draw, width, before, within)) for sample in samples]
+    height = max(column.shape[0] for column in columns)
+    padded = [_padded(column, height, GAP if i else 0) for i, column in enumerate(columns)]
+    return np.hstack(padded)
+
+
+def _padded(picture: Picture, height: int, left: int) -> Picture:
+    """The picture on paper, so high, with a margin at its left."""
+    out = np.full((height, left + picture.shape[1], 3), PAPER, np.uint8)
+    out[: picture.shape[0], left:] = picture
+    return out
+
+
+def _pictures(sample: Sample, draw: Sequence[str], width: int | None, before: Before, within: Extents) -> list[Picture]:
+    """The picture, and what is drawn beside it, all of one size."""
+    chosen = drawn(sample, draw)
+    if picture_of(sample.channels) is None:
+        raise StoreError(
+            "preview: expected pictures (rgb or rgba), found a data set that keeps neither: preview its recipe instead"
+        )
+    rgb = _on_paper(sample.picture)
+    for drawing in chosen:
+        rgb = drawing.pixels(rgb, sample) if drawing.pixels else rgb
+    scale = 1.0 if width is None else min(1.0, width / rgb.shape[1])
+    size = (round(rgb.shape[1] * scale), round(rgb.shape[0] * scale))
+    picture = Image.fromarray(rgb).resize(size, Image.Resampling.LANCZOS) if scale < 1 else Image.fromarray(rgb)
+    pen = ImageDraw.Draw(picture, "RGBA")
+    for drawing in chosen:
+        if drawing.lines:
+            drawing.lines(pen, sample, scale)
+        if drawing.trails:
+            drawing.trails(pen, (*before(sample), sample), scale)
+    beside = (drawing.picture(sample, within.get(drawing.name)) for drawing in chosen)
+    others = [Image.fromarray(other).resize(size, Image.Resampling.BILINEAR) for other in beside if other is not None]
+    return [np.asarray(picture), *map(np.asarray, others)]
+
+
+def _on_paper(picture: Picture) -> Picture:
+    """The picture, laid over paper's colour where it is transparent."""
+    if picture.shape[2] == 3:
+        return picture
+    sheet, clear = Image.new("RGB", picture.shape[1::-1], PAPER), Image.fromarray(picture)
+    sheet.paste(clear, mask=clear)
+    return np.asarray(sheet)

@@ -1,0 +1,155 @@
+"""Which samples a preview shows."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Iterator, Sequence
+from itertools import accumulate, groupby
+from typing import Any
+
+import numpy as np
+
+from viewsphere.labels import ChannelLabel, labels
+from viewsphere.model.camera import Intrinsics
+from viewsphere.model.channel import picture_of
+from viewsphere.model.rig import Rig
+from viewsphere.model.sample import Sample
+from viewsphere.model.shot import Shot
+from viewsphere.model.tracks import Tracks
+from viewsphere.preview.films import Film
+from viewsphere.recipe.recipe import Recipe
+from viewsphere.run.opening import prepare
+from viewsphere.run.stages import Stages
+from viewsphere.sampling.plan import Plan
+from viewsphere.store import Dataset
+from viewsphere.store.index import Ranges, length, nth, numbers
+
+ROW = 4
+"""Instants of a sequence that a preview shows, where there are several sequences."""
+
+
+def preview_samples(
+    recipe: Recipe, count: int = 12, width: int = 320, draw: Sequence[str] = (), row: int = ROW
+) -> Iterator[Sample]:
+    """Render `count` frames spread over all models (or scenes) and poses, `width` pixels wide, in memory.
+
+    With a time: `row` evenly spaced instants of each of some sequences, by all sensors; of one sequence alone `count` instants.
+    What is named in `draw` they have, too.
+    """
+    if recipe.time is not None:
+        yield from _instants(recipe, count, width, draw, row)
+        return
+    planned = prepare(_with_channels(recipe, recipe.channels, draw))
+    stages = Stages()
+    for subject, groups in _spread(planned, count):
+        stages.read_ahead(planned, planned.cast(subject))
+        stages.check_distances(planned, subject)
+        for poses in [[pose] for group in groups for pose in group] if recipe.scene.is_new_each_frame else groups:
+            yield from _rendered(stages, planned, subject, poses, width)
+
+
+def _instants(recipe: Recipe, count: int, width: int, draw: Sequence[str], row: int) -> Iterator[Sample]:
+    """The labels that nobody draws are not computed: they compare instants, of which a preview shows few."""
+    pictures = [name for name in recipe.channels if name == picture_of(recipe.channels)]
+    planned = prepare(_with_channels(recipe, pictures or ["rgb"], draw))
+    stages, instants = Stages(), recipe.time.count if recipe.time else 1
+    starts = [(subject, first) for block in planned.blocks for subject in block.subjects for first, _ in block.positions]
+    films = min(len(starts), max(1, count // row))
+    taken = np.linspace(0, instants - 1, min(instants, _each(count, films, row))).round().astype(int)
+    for i in np.linspace(0, len(starts) - 1, films).round().astype(int):
+        subject, first = starts[i]
+        stages.check_distances(planned, subject)
+        yield from _rendered(stages, planned, subject, (first + taken).tolist(), width)
+
+
+def _each(count: int, films: int, row: int) -> int:
+    """How many instants each of some sequences shows, so that rows are full."""
+    each = max(1, count // films)
+    return each - each % row if each > row else each
+
+
+def _rendered(stages: Stages, planned: Plan, subject: str, poses: Sequence[int], width: int) -> Iterator[Sample]:
+    shot = planned.take(subject, poses, stages.box)
+    channels = tuple(dict.fromkeys((*shot.channels, picture_of(shot.channels) or "rgb", "depth", "instances")))
+    return stages.render(shot.model_copy(update=_scaled(shot, width) | {"channels": channels}))
+
+
+def _with_channels(recipe: Recipe, channels: Sequence[str], draw: Sequence[str]) -> Recipe:
+    """The recipe with these channels, and with those that are drawn."""
+    wanted = (label for label in labels().values() if isinstance(label, ChannelLabel))
+    named = (label.name for label in wanted if label.drawing and label.drawing.name in draw)
+    return recipe.model_copy(update={"channels": tuple(dict.fromkeys((*channels, *named)))})
+
+
+def dataset_samples(dataset: Dataset, count: int = 12, row: int = ROW, films: Sequence[Film] = ()) -> list[Sample]:
+    """`count` frames spread evenly over a data set; of its sequences (`films`), where it has some, those instants that
+    `preview_samples` shows of a recipe.
+    """
+    if films:
+        rows = min(len(films), max(1, count // row))
+        chosen = [films[i] for i in np.linspace(0, len(films) - 1, rows).round().astype(int)]
+        return [dataset[place] for film in chosen for i in film.spread(_each(count, rows, row)) for place in film.places[i]]
+    picks = np.unique(np.linspace(0, len(dataset) - 1, min(count, len(dataset))).round().astype(int))
+    found = [dataset[int(i)] for i in picks]
+    return [sample for sample in found if sample.picture_file] or found  # some sensors may keep labels alone
+
+
+def _spread(planned: Plan, count: int) -> list[tuple[str, list[list[int]]]]:
+    """Subjects and their poses, those of one time step together, such that subjects follow in order and poses step through
+    the grid; all where there are so few.
+    """
+    subjects, taken = planned.subjects, planned.rows.taken
+    if count >= planned.frames:
+        return [(subject, [list(numbers(poses)) for poses in taken(subject)]) for subject in subjects]
+    chosen: dict[str, list[int]] = {}
+    for i, number in enumerate(np.linspace(0, len(subjects) - 1, count).round().astype(int).tolist()):
+        size = sum(map(length, taken(subjects[number])))
+        places = chosen.setdefault(subjects[number], [])
+        place = int(i * size / count * (1 + 1 / max(count, 1)))
+        places.append(next((p % size for p in range(place, place + size) if p % size not in places), place % size))
+    return [(subject, _grouped(taken(subject), places)) for subject, places in chosen.items()]
+
+
+def _grouped(steps: Sequence[Ranges], places: Sequence[int]) -> list[list[int]]:
+    """The poses at some places of all time steps' poses, parted where the time step changes."""
+    edges = list(accumulate(map(length, steps), initial=0))
+    found: list[tuple[int, int]] = []
+    for place in places:
+        step = bisect_right(edges, place) - 1
+        found.append((step, nth(steps[step], place - edges[step])))
+    return [[pose for _, pose in group] for _, group in groupby(found, lambda pair: pair[0])]
+
+
+def _scaled(shot: Shot, width: int) -> dict[str, Any]:
+    """The same cameras with narrower pictures, and all channels of each, as a shot's fields; points that are followed are
+    picked at the same places.
+    """
+    narrow = ({"intrinsics": _narrowed(sensor.intrinsics, width), "channels": None} for sensor in shot.rig.sensors)
+    sensors = tuple(sensor.model_copy(update=more) for sensor, more in zip(shot.rig.sensors, narrow, strict=True))
+    zooms = ({"intrinsics": now.intrinsics and _narrowed(now.intrinsics, width)} for now in shot.instants)
+    instants = tuple(now.model_copy(update=more) for now, more in zip(shot.instants, zooms, strict=True))
+    share = min(1.0, width / shot.rig.sensors[0].intrinsics.width)
+    return {"rig": Rig(sensors=sensors), "instants": instants, "tracks": shot.tracks and _nearer(shot.tracks, share)}
+
+
+def _nearer(tracks: Tracks, share: float) -> Tracks:
+    """The same points in pictures that are smaller by this share."""
+    points = tuple((instant, x * share, y * share) for instant, x, y in tracks.points)
+    return tracks.model_copy(update={"points": points, "grid": tracks.grid and max(1, round(tracks.grid * share))})
+
+
+def _narrowed(lens: Intrinsics, width: int) -> Intrinsics:
+    """The same view at another width; a preview is never wider than its recipe's pictures."""
+    k = min(1.0, width / lens.width)
+    sizes = {"width": max(1, round(lens.width * k)), "height": max(1, round(lens.height * k))}
+    x, y = sizes["width"] / lens.width, sizes["height"] / lens.height
+    return lens.model_copy(
+        update={
+            **sizes,
+            "fx": lens.fx * x,
+            "cx": lens.cx * x,
+            "skew": lens.skew * x,
+            "fy": lens.fy * y,
+            "cy": lens.cy * y,
+        }
+    )

@@ -1,0 +1,48 @@
+"""A model from four sides."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from viewsphere.model.camera import Intrinsics
+from viewsphere.model.instant import Viewpoint
+from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.rig import Rig
+from viewsphere.model.scene import Ground, Scene
+from viewsphere.model.shot import Shot
+from viewsphere.model.thing import Thing
+from viewsphere.preview.frame import Picture
+from viewsphere.preview.tiles import tiled
+from viewsphere.run.stages import Stages
+from viewsphere.sampling.camera import looking
+
+SIDES = (("front", 0.0), ("left side", 90.0), ("back", 180.0), ("right side", 270.0))
+
+
+def four_sides(spec: ModelSpec, size: int = 320) -> Picture:
+    """A model from azimuth 0, 90, 180 and 270 at elevation 15, each view with its name; (H, W, 3) uint8 sRGB.
+
+    The first view shows the front if the model faces -Y, as all labels assume.
+    """
+    stages = Stages()
+    low, high = stages.model(spec).bounds
+    radius = float(np.linalg.norm(high - low)) / 2
+    focal = 1.6 * size
+    distance = radius / math.sin(math.atan(0.5 * size / focal)) * 1.02
+    x, y, z = ((low + high) / 2).tolist()
+    sides = (
+        Viewpoint(index=i, azimuth_deg=a, elevation_deg=15, distance=distance, category=name)
+        for i, (name, a) in enumerate(SIDES)
+    )
+    shot = Shot(
+        key=spec.key,
+        things=(Thing(id=1, model=spec),),
+        rig=Rig.of(Intrinsics(width=size, height=size, fx=focal, fy=focal, cx=size / 2, cy=size / 2)),
+        scene=Scene(ground=Ground()),
+        instants=tuple(looking(side, (x, y, z), index=side.index) for side in sides),
+        channels=("rgb", "instances"),
+    )
+    tiles = [(s.rgb, f"{s.pose.category} (azimuth {s.pose.azimuth_deg:g})") for s in stages.render(shot)]
+    return tiled(tiles, columns=4)
