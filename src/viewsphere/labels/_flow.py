@@ -17,11 +17,10 @@ EDGE = 1e-3
 """Pixels from the picture's border within which the rounding of stored flow decides whether it leads outside."""
 
 
-def flow(sight: Sight, instants: int) -> NDArray[np.float64]:
+def flow(sight: Sight, instants: int) -> NDArray[np.float32]:
     """How far the seen point is so many instants later from where it is, (H, W, 2) pixels; NaN where it has no pixel then."""
     match = sight.match(instants)
-    shape = sight.visibility.triangle.shape
-    return np.full((*shape, 2), np.nan) if match is None else match.xy - pixel_centers(shape)
+    return np.full((*sight.visibility.triangle.shape, 2), np.nan, np.float32) if match is None else match.flow
 
 
 def scene_flow(sight: Sight, instants: int) -> NDArray[np.float64]:

@@ -16,7 +16,7 @@ def compute(sight: Sight) -> NDArray[np.float32]:
 
     NaN where it has no pixel then: behind the camera, on nothing that is there then, on a flat picture.
     """
-    return _flow.flow(sight, 1).astype(np.float32)
+    return _flow.flow(sight, 1)
 
 
 LABEL = ChannelLabel(

@@ -7,10 +7,10 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.labels._flow import flow
 from viewsphere.labels._label import ChannelLabel, Drawing, Models, Needs, Picture, channel_of
 from viewsphere.labels._sight import Sight
 from viewsphere.model.sample import Sample
+from viewsphere.truth.correspondence import pixel_centers
 
 APART = 1.5
 """Pixels by which flows differ at a boundary (Mayer et al. 2016, "A Large Dataset to Train Convolutional Networks for
@@ -31,10 +31,10 @@ def compute(sight: Sight) -> NDArray[np.uint8]:
     flows to the next instant differ by more than `APART`.
     """
     out = np.zeros(sight.visibility.triangle.shape, np.uint8)
-    own = sight.neighbour()
-    if own is None or sight.match(1) is None:
+    own, match = sight.neighbour(), sight.match(1)
+    if own is None or match is None:
         return out
-    vectors = flow(sight, 1)
+    vectors = match.xy - pixel_centers(out.shape)
     thing = np.append(own.owners, -1)[sight.visibility.triangle]
     inverse = sight.visibility.inverse_depth
     for axis in (0, 1):

@@ -34,13 +34,12 @@ def compute(sight: Sight) -> NDArray[np.void]:
         raise ValueError("tracks: expected a sample of a sequence, found none")
     followed = sight.around.followed
     now = followed.points.in_view(own)
-    out = np.empty(len(followed.query), TRACK)
-    out["instant"], out["query"], out["object"] = followed.query[:, 0], followed.query[:, 1:], followed.object
-    out["point"][:, :3], out["point"][:, 3] = now.world, 1.0
-    sky = followed.points.thing == SKY
-    out["point"][sky, :3], out["point"][sky, 3] = followed.points.place[sky], 0.0
-    out["state"] = now.state
-    out["point"][np.isnan(out["point"][:, 0])] = np.nan
+    out, point = followed.rows.copy(), np.ones((len(followed.query), 4))
+    point[:, :3] = now.world
+    sky = np.flatnonzero(followed.points.thing == SKY)
+    point[sky, :3], point[sky, 3] = followed.points.place[sky], 0.0
+    point[np.isnan(point[:, 0])] = np.nan
+    out["point"], out["state"] = point, now.state
     return out
 
 

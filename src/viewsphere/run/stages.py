@@ -25,7 +25,7 @@ from viewsphere.sampling.camera import inside_box
 from viewsphere.store import ModelInfo, Store
 from viewsphere.truth.enclosure import sky_hidden
 from viewsphere.truth.shot_views import ShotViews
-from viewsphere.truth.visibility import rasterize, with_ground
+from viewsphere.truth.visibility import with_ground
 from viewsphere.zoo import build_zoo_model
 
 if TYPE_CHECKING:
@@ -232,8 +232,7 @@ def render_sample(
     names = [name for name in kept if name not in PASSES]
     _arrange(views, instant, names)
     view, geometry = views.view(instant, sensor), stage.at(instant)
-    now, camera, labelled = shot.instants[instant], view.camera, view.geometry
-    visibility = rasterize(labelled, camera)
+    now, camera, labelled, visibility = shot.instants[instant], view.camera, view.geometry, view.visibility
     observed = observe(labelled, camera, visibility, names, views.around(instant, sensor))
     pictures = [name for name in PASSES if name in kept]
     painted = with_ground(geometry, camera, visibility) if pictures and labelled is not geometry else visibility

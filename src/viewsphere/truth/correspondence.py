@@ -51,6 +51,19 @@ class Match:
         return self.placed.xy
 
     @cached_property
+    def flow(self) -> NDArray[np.float32]:
+        """How far `xy` is from the centres of the pixels, (H, W, 2)."""
+        from viewsphere.truth import kernels_correspond as kernels
+
+        out = np.empty((*self._inverse.shape, 2), np.float32)
+        if self.view.is_pinhole and self.other.is_pinhole and self._deformed is None:
+            seen, owners, inverse, _, kinds = self._pixels
+            kernels.flow_on_pinhole(seen, owners, inverse, kinds, self._maps.projected(self.view, self.other), out)
+        else:
+            kernels.from_centers(self.xy, out)
+        return out
+
+    @cached_property
     def xyz(self) -> Float:
         """Where the points are then, in the other camera's axes, (H, W, 3) metres; NaN of what is nowhere; of the sky
         (NaN, NaN, inf).

@@ -137,15 +137,69 @@ def in_axes(seen, owners, inverse, rays, kinds, maps, out):
             if kinds[k] == OTHER:
                 x = stop
                 continue
-            m, is_point = maps[k], kinds[k] != GONE
-            for i in range(x, stop):
-                ui = np.uintp(i)
-                px, py, pz = (rays[uy, ui, A], rays[uy, ui, B], rays[uy, ui, C]) if table else (i + 0.5, y + 0.5, 1.0)
-                s = 1.0 / inverse[uy, ui] if is_point and inverse[uy, ui] > 0.0 else np.nan
-                out[uy, ui, A] = (m[A, A] * px + m[A, B] * py + m[A, C] * pz) * s + m[A, D]
-                out[uy, ui, B] = (m[B, A] * px + m[B, B] * py + m[B, C] * pz) * s + m[B, D]
-                out[uy, ui, C] = (m[C, A] * px + m[C, B] * py + m[C, C] * pz) * s + m[C, D]
+            if kinds[k] == GONE:
+                for i in range(x, stop):
+                    ui = np.uintp(i)
+                    out[uy, ui, A] = out[uy, ui, B] = out[uy, ui, C] = np.nan
+            elif table:
+                for i in range(x, stop):
+                    ui = np.uintp(i)
+                    s = 1.0 / inverse[uy, ui] if inverse[uy, ui] > 0.0 else np.nan
+                    _place(maps[k], rays[uy, ui, A], rays[uy, ui, B], rays[uy, ui, C], s, out, uy, ui)
+            else:
+                for i in range(x, stop):
+                    ui = np.uintp(i)
+                    s = 1.0 / inverse[uy, ui] if inverse[uy, ui] > 0.0 else np.nan
+                    _place(maps[k], i + 0.5, y + 0.5, 1.0, s, out, uy, ui)
             x = stop
+
+
+@inner
+def _place(m, px, py, pz, s, out, y, x):
+    out[y, x, A] = (m[A, A] * px + m[A, B] * py + m[A, C] * pz) * s + m[A, D]
+    out[y, x, B] = (m[B, A] * px + m[B, B] * py + m[B, C] * pz) * s + m[B, D]
+    out[y, x, C] = (m[C, A] * px + m[C, B] * py + m[C, C] * pz) * s + m[C, D]
+
+
+@njit
+def flow_on_pinhole(seen, owners, inverse, kinds, maps, out):
+    """From pixels of a pinhole to their points in another one, (H, W, 2) float32: `on_pinhole` less the pixels' centres."""
+    height, width = seen.shape
+    sky = np.int32(kinds.shape[0] - 1)
+    for y in range(height):
+        uy, x = np.uintp(y), 0
+        while x < width:
+            k, stop = _run(seen, owners, uy, x, sky)
+            if kinds[k] == RIGID:
+                _row_of_flow(maps[k], inverse, uy, x, stop, out)
+            else:
+                nothing = np.float32(0.0 if kinds[k] == STILL else np.nan)
+                for i in range(x, stop):
+                    ui = np.uintp(i)
+                    out[uy, ui, A] = out[uy, ui, B] = nothing
+            x = stop
+
+
+@inner
+def _row_of_flow(m, inverse, y, first, stop, out):
+    py = y + 0.5
+    a0, a1, a2, c0, c1, c2 = m[A, A], m[B, A], m[C, A], m[A, D], m[B, D], m[C, D]
+    b0, b1, b2 = m[A, B] * py + m[A, C], m[B, B] * py + m[B, C], m[C, B] * py + m[C, C]
+    for i in range(first, stop):
+        ui, px = np.uintp(i), i + 0.5
+        s = inverse[y, ui]
+        w = a2 * px + b2 + c2 * s
+        r = 1.0 / w if w > 0.0 else np.nan
+        out[y, ui, A], out[y, ui, B] = (a0 * px + b0 + c0 * s) * r - px, (a1 * px + b1 + c1 * s) * r - py
+
+
+@njit
+def from_centers(xy, out):
+    """How far positions xy (H, W, 2) are from the centres of their pixels, (H, W, 2) float32."""
+    for y in range(xy.shape[0]):
+        for x in range(xy.shape[1]):
+            uy, ux = np.uintp(y), np.uintp(x)
+            out[uy, ux, A], out[uy, ux, B] = xy[uy, ux, A] - (x + 0.5), xy[uy, ux, B] - (y + 0.5)
 
 
 @njit

@@ -145,7 +145,7 @@ def draw(q, cell, triangles, span, canvas, cutout, cutouts, nearest, seen):
             continue
         most = max(q[i0, d], q[i1, d], q[i2, d]) * (ROUNDED_UP / NEARER)
         is_small = xb - xa < SMALL and width >= FOUR
-        if is_small and _hidden(nearest, xa, ya, xb, yb, most):
+        if is_small and hidden(nearest, xa, ya, xb, yb, most):
             continue
         q0, q1, q2 = (q[i0, a], q[i0, b], q[i0, c]), (q[i1, a], q[i1, b], q[i1, c]), (q[i2, a], q[i2, b], q[i2, c])
         crossing = xa == BEHIND
@@ -172,7 +172,7 @@ def draw(q, cell, triangles, span, canvas, cutout, cutouts, nearest, seen):
 
 
 @inner
-def _hidden(nearest, xa, ya, xb, yb, most):
+def hidden(nearest, xa, ya, xb, yb, most):
     """Whether all pixels of a narrow box, and the pixels drawn together with them, show something nearer than 1/z = most."""
     width = nearest.shape[1]
     left, right, is_wide = _fours(xa, xb, width)

@@ -13,7 +13,7 @@ import numpy as np
 
 from viewsphere.kernels.jit import inner, njit
 from viewsphere.truth.kernel_constants import FOUR, NEARER
-from viewsphere.truth.kernels_draw import BEHIND, NEVER, ROUNDED_UP, SLIVER, edge, edges_inside, hits_surface, plane
+from viewsphere.truth.kernels_draw import BEHIND, NEVER, ROUNDED_UP, SLIVER, edge, edges_inside, hidden, hits_surface, plane
 from viewsphere.truth.kernels_row import meet_four
 
 WIDER = 1e-6  # pixels by which a triangle's box is widened: more than the rounding of its corners and of the edge functions
@@ -39,32 +39,34 @@ def boxes(q, endless, width, height, box):
 
 
 @njit
-def sort(xy, least, own, size, start, order, points, nearest, number, far):
-    """Sort the points xy (N, 2) that lie in a picture of size (width, height) by pixel; returns how many these are.
+def sort(xy, near, gap, own, cell, start, order, points, nearest, number, far):
+    """Sort the points xy (N, 2) by their pixels, `cell` (N,), leaving out those of -1; returns how many are left.
 
-    Point order[p] is at points[:, p]; its `own` triangle is in number[p], and `least`, the 1/z to be exceeded, in nearest[p].
-    Pixel i has the points [start[i], start[i + 1]), and far[i] is the least of their `nearest`. start: (pixels + 2,).
+    Point order[p] is at points[:, p]; its `own` triangle is in number[p], and `near` times `gap`, the 1/z to be exceeded, in
+    nearest[p]. Pixel i has the points [start[i], start[i + 1]), and far[i] is the least of their `nearest`. start: (pixels +
+    2,). Behind the sorted points are FOUR that meet nothing: `points`, `nearest` and `number` have room for so many more.
     """
-    width, height = size
     start[:] = 0
-    for k in range(xy.shape[0]):
-        uk = np.uintp(k)
-        x, y = xy[uk, A], xy[uk, B]
-        if x >= 0.0 and y >= 0.0 and x < width and y < height:
-            start[np.uintp(np.int64(y) * width + np.int64(x) + 2)] += 1
-    for c in range(width * height + 1):
+    for k in range(cell.shape[0]):
+        c = cell[np.uintp(k)]
+        if c >= 0:
+            start[np.uintp(c + 2)] += 1
+    for c in range(far.shape[0] + 1):
         start[np.uintp(c + 1)] += start[np.uintp(c)]
     far[:] = np.inf
-    for k in range(xy.shape[0]):
+    for k in range(cell.shape[0]):
         uk = np.uintp(k)
-        x, y = xy[uk, A], xy[uk, B]
-        if x >= 0.0 and y >= 0.0 and x < width and y < height:
-            c = np.uintp(np.int64(y) * width + np.int64(x))
+        if cell[uk] >= 0:
+            c = np.uintp(cell[uk])
             p = np.uintp(start[c + B])
             start[c + B] += 1
-            order[p], points[A, p], points[B, p], nearest[p], number[p] = k, x, y, least[uk], own[uk]
+            order[p], points[A, p], points[B, p], nearest[p], number[p] = k, xy[uk, A], xy[uk, B], near[uk] * gap, own[uk]
             far[c] = min(far[c], nearest[p])
-    return np.int64(start[width * height])
+    inside = np.int64(start[far.shape[0]])
+    for p in range(inside, inside + FOUR):
+        up = np.uintp(p)
+        points[A, up], points[B, up], nearest[up], number[up] = 0.0, 0.0, np.inf, -1
+    return inside
 
 
 @njit
@@ -72,7 +74,8 @@ def meet(q, box, triangles, ground, cutout, cutouts, size, start, points, neares
     """Write the first triangle that each sorted point meets into `met`, and its 1/z into `nearest`.
 
     A triangle is met if it is nearer than 1/z = `nearest` by more than a factor NEARER, and is not the point's own: `number`;
-    those from `ground` on are one. `points`, `nearest`, `met` and `number` have 3 entries more than there are points.
+    those from `ground` on are one. far: (height, width), as `sort` fills it. `points`, `nearest`, `met` and `number` have 3
+    entries more than there are points.
     """
     width, height = size
     us, vs = points[0], points[1]
@@ -91,7 +94,8 @@ def meet(q, box, triangles, ground, cutout, cutouts, size, start, points, neares
             xa, ya, xb, yb = 0, 0, width - 1, height - 1
         area = (xa, ya, xb, yb)
         most = max(q[i, D], q[j, D], q[k, D]) * (ROUNDED_UP / NEARER)
-        if not crossing and xb - xa < SMALL and yb - ya < SMALL and not _has_farther(far, area, width, most):
+        is_small = xb - xa < SMALL and yb - ya < SMALL and width >= FOUR
+        if is_small and not crossing and hidden(far, xa, ya, xb, yb, most):
             continue
         nx, ny, nz, det = plane(q0, q1, q2)
         if det == 0.0:
@@ -109,16 +113,6 @@ def meet(q, box, triangles, ground, cutout, cutouts, size, start, points, neares
             first, last = _run(e0, e1, e2, y, xa, xb, width, start)
             for p in range(first, last, FOUR):
                 meet_four(us, vs, nearest, met, number, p, own, e0, e1, e2, n)
-
-
-@inner
-def _has_farther(far, area, width, most):
-    """Whether a box of pixels has a point that is farther than 1/z = most."""
-    found = False
-    for y in range(area[1], area[3] + 1):
-        for x in range(area[0], area[2] + 1):
-            found |= far[np.uintp(y * width + x)] < most
-    return found
 
 
 @inner
@@ -163,17 +157,17 @@ def _meet_checked(t, own, q0, q1, q2, area, width, bounds, cutout, cutouts, star
 
 
 @njit
-def classify(xy, near, width, height, state):
-    """Fill state (N,): 4 where `near` is NaN, else 3 where xy (N, 2) is, 2 outside of the picture, 0 inside."""
+def classify(xy, near, width, height, state, cell):
+    """Fill state (N,): 4 where `near` is NaN, else 3 where xy (N, 2) is, 2 outside of the picture, 0 inside; and cell (N,)
+    int32: the pixel of what is inside, counted row by row, else -1.
+    """
     for i in range(xy.shape[0]):
         ui = np.uintp(i)
         x, y = xy[ui, A], xy[ui, B]
-        if math.isnan(near[ui]):
-            state[ui] = 4
-        elif math.isnan(x) or math.isnan(y):
-            state[ui] = 3
+        if x >= 0.0 and y >= 0.0 and x < width and y < height and not math.isnan(near[ui]):
+            state[ui], cell[ui] = 0, np.int32(y) * width + np.int32(x)
         else:
-            state[ui] = 0 if x >= 0.0 and y >= 0.0 and x < width and y < height else 2
+            state[ui], cell[ui] = 4 if math.isnan(near[ui]) else 3 if math.isnan(x) or math.isnan(y) else 2, -1
 
 
 @njit

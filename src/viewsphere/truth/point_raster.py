@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from viewsphere.geometry.camera import project
 from viewsphere.geometry.rotation import product
 from viewsphere.truth.kernel_constants import FOUR, NEARER
 from viewsphere.truth.view import View
+from viewsphere.truth.visibility import pixels_of
 
 Float = NDArray[np.float64]
 Whole = NDArray[np.int32]
@@ -76,13 +78,20 @@ def states(placed: Sequence[Placed]) -> list[NDArray[np.uint8]]:
     near = _joined([points.near.reshape(-1) for points in placed])
     own = _joined([points.own().reshape(-1) for points in placed])
     rays = None if view.is_pinhole else _joined([p.rays.reshape(-1, 3) for p in placed if p.rays is not None])
-    state = np.empty(len(near), np.uint8)
-    kernels.classify(xy, near, view.camera.width, view.camera.height, state)
-    inside = state == VISIBLE if rays is not None else None
-    for index, met in _meetings(view, xy, near, own, rays, inside):
+    state, cell = _classified(xy, near, (view.camera.width, view.camera.height))
+    for index, met in _meetings(view, xy, near, own, cell, rays):
         kernels.hide(met, index, np.uint8(OCCLUDED), state)
     stops = np.cumsum([points.near.size for points in placed])[:-1]
     return [part.reshape(points.near.shape) for part, points in zip(np.split(state, stops), placed, strict=True)]
+
+
+def _classified(xy: Float, near: Float, size: tuple[int, int]) -> tuple[NDArray[np.uint8], Whole]:
+    """The states of points by their places alone, and the pixels that they are in, see `kernels_points.classify`."""
+    from viewsphere.truth import kernels_points as kernels
+
+    state, cell = np.empty(len(near), np.uint8), np.empty(len(near), np.int32)
+    kernels.classify(xy, near, *size, state, cell)
+    return state, cell
 
 
 def _joined(arrays: Sequence[NDArray[Any]]) -> NDArray[Any]:
@@ -99,47 +108,52 @@ def first_met(
 ) -> Whole:
     """The triangle that the ray to each point meets first before the point, (N,) int32, -1 where it meets none.
 
-    Points are as in `Placed`. Of those at `near` 0 whatever is in front counts. The points of a pinhole's view have to lie in
-    the picture, the others meet nothing; of a distorted lens those count that are `chosen`, by default all.
+    Points are as in `Placed`. Of those at `near` 0 whatever is in front counts. Those that are not `chosen`, by default all, or
+    do not lie in the picture, meet nothing.
     """
     from viewsphere.truth import kernels_points as kernels
 
     triangle = np.full(len(near), -1, np.int32)
-    for index, met in _meetings(view, xy, near, own, rays, chosen):
+    _, cell = _classified(xy, near, (view.camera.width, view.camera.height))
+    if chosen is not None:
+        cell[~chosen] = -1
+    for index, met in _meetings(view, xy, near, own, cell, rays):
         kernels.mark(met, index, triangle)
     return triangle
 
 
-def _meetings(
-    view: View, xy: Float, near: Float, own: Whole, rays: Float | None, chosen: NDArray[np.bool_] | None
-) -> Iterator[tuple[Whole, Whole]]:
-    """Points, by their numbers (n,), and the triangle that each of them meets first (n,), -1 for none; see `first_met`."""
+def _meetings(view: View, xy: Float, near: Float, own: Whole, cell: Whole, rays: Float | None) -> Iterator[tuple[Whole, Whole]]:
+    """Points, by their numbers (n,), and the triangle that each of them meets first (n,), -1 for none; see `first_met`.
+
+    The points are those whose pixel `cell` is not -1.
+    """
     if rays is None:
-        yield _meet(view, view.corners, (view.camera.width, view.camera.height), xy, near, own)
+        yield _meet(view, view.corners, lambda: view.boxes, (view.camera.width, view.camera.height), xy, near, own, cell)
         return
-    index = np.flatnonzero(np.ones(len(near), np.bool_) if chosen is None else chosen).astype(np.int32)
+    index = np.flatnonzero(cell >= 0).astype(np.int32)
     for q, size, at, own_xy, own_near in _pinholes(view, rays[index], near[index]):
-        order, met = _meet(view, q, size, own_xy, own_near, own[index[at]])
+        _, own_cell = _classified(own_xy, own_near, size)
+        boxes = partial(pixels_of, view.geometry, q, size)
+        order, met = _meet(view, q, boxes, size, own_xy, own_near, own[index[at]], own_cell)
         yield index[at][order], met
 
 
-def _meet(view: View, q: Float, size: tuple[int, int], xy: Float, near: Float, own: Whole) -> tuple[Whole, Whole]:
-    """The same for a pinhole of this size; q: `homogeneous` vertices of that pinhole."""
+def _meet(
+    view: View, q: Float, boxes: Callable[[], Whole], size: tuple[int, int], xy: Float, near: Float, own: Whole, cell: Whole
+) -> tuple[Whole, Whole]:
+    """The same for a pinhole of this size; q: `homogeneous` vertices of that pinhole, `boxes` gives their pixels."""
     from viewsphere.truth import kernels_points as kernels
 
     geometry, (width, height) = view.geometry, size
-    start, far = np.empty(width * height + 2, np.int32), np.empty(width * height)
-    order, number = np.empty(len(near), np.int32), np.full(len(near) + FOUR, -1, np.int32)
-    points, nearest = np.zeros((2, len(near) + FOUR)), np.full(len(near) + FOUR, np.inf)
-    least = near * ((1.0 + GAP) / NEARER)
-    inside = kernels.sort(xy, least, own, size, start, order, points, nearest, number, far)
+    start, far = np.empty(width * height + 2, np.int32), np.empty((height, width))
+    order, number = np.empty(len(near), np.int32), np.empty(len(near) + FOUR, np.int32)
+    points, nearest = np.empty((2, len(near) + FOUR)), np.empty(len(near) + FOUR)
+    inside = kernels.sort(xy, near, (1.0 + GAP) / NEARER, own, cell, start, order, points, nearest, number, far.reshape(-1))
     met = np.full(inside + FOUR, -1, np.int32)
     if inside:
-        box = np.empty((len(q), 4), np.int32)
-        kernels.boxes(q, geometry.vertex_start[-1], width, height, box)
         cut = (geometry.triangle_cutout, geometry.cutouts.arrays)
         ground = geometry.triangle_start[-1]
-        kernels.meet(q, box, geometry.triangles, ground, *cut, size, start, points, nearest, met, number, far)
+        kernels.meet(q, boxes(), geometry.triangles, ground, *cut, size, start, points, nearest, met, number, far)
     return order[:inside], met[:inside]
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import zlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,12 +13,11 @@ from numpy.typing import NDArray
 from viewsphere.assets.mesh import Mesh
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
-from viewsphere.model.tracks import Tracks
+from viewsphere.model.tracks import TRACK, Tracks
 from viewsphere.truth.geometry import Geometry, without_ground
 from viewsphere.truth.moving import ROOMS, Ring, shot_floor
 from viewsphere.truth.points import SurfacePoints, points_seen
 from viewsphere.truth.view import View
-from viewsphere.truth.visibility import rasterize
 
 Float = NDArray[np.float64]
 
@@ -31,6 +31,13 @@ class Followed:
     query: Float
     object: NDArray[np.int32]
     points: SurfacePoints
+
+    @cached_property
+    def rows(self) -> NDArray[np.void]:
+        """What of each point's track stays the same, (N,) of `viewsphere.model.tracks.TRACK`; the rest is 0."""
+        out = np.zeros(len(self.query), TRACK)
+        out["instant"], out["query"], out["object"] = self.query[:, 0], self.query[:, 1:], self.object
+        return out
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +74,8 @@ class ShotViews:
             things = self.shot.things_at(instant)
             view = View(things, geometry, self.shot.camera(instant, sensor), self._is_sky_endless(instant))
         self._views[instant, sensor] = view
-        while len(self._views) > ROOMS * len(self.shot.rig.sensors):
+        instants = ROOMS if self.shot.sequence else 1  # still pictures are not compared with others
+        while len(self._views) > instants * len(self.shot.rig.sensors):
             del self._views[next(iter(self._views))]
         return view
 
@@ -132,8 +140,7 @@ def _drawn(view: View, count: int, on_objects: bool, rng: np.random.Generator) -
     width, height = view.camera.width, view.camera.height
     pixels = np.arange(width * height, dtype=np.intp)
     if on_objects:
-        visibility = rasterize(view.geometry, view.camera)
-        pixels = np.flatnonzero(visibility.instances(view.geometry).ids)
+        pixels = np.flatnonzero(view.visibility.instances(view.geometry).ids)
     if not len(pixels):
         return np.zeros((0, 2))
     chosen = pixels[rng.integers(len(pixels), size=count)]

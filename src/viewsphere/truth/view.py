@@ -15,7 +15,7 @@ from viewsphere.geometry.rotation import inverse, transform
 from viewsphere.model.camera import Camera
 from viewsphere.model.thing import Thing
 from viewsphere.truth.geometry import Geometry
-from viewsphere.truth.visibility import homogeneous, lens_rays
+from viewsphere.truth.visibility import Visibility, homogeneous, lens_rays, pixels_of, rasterize
 
 Float = NDArray[np.float64]
 Change = Literal["moved", "deformed", "gone"]
@@ -79,6 +79,16 @@ class View:
     def corners(self) -> Float:
         """All vertices before the perspective division, as `truth.visibility.homogeneous` gives them."""
         return homogeneous(self.geometry, self.camera)
+
+    @cached_property
+    def boxes(self) -> NDArray[np.int32]:
+        """The pixel that each vertex is in, (n, 4), as `truth.visibility.pixels_of` says; of a pinhole."""
+        return pixels_of(self.geometry, self.corners, (self.camera.width, self.camera.height))
+
+    @cached_property
+    def visibility(self) -> Visibility:
+        """What the camera sees."""
+        return rasterize(self.geometry, self.camera, corners=self.corners)
 
     @cached_property
     def rays(self) -> Float:

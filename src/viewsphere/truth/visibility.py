@@ -65,6 +65,7 @@ def rasterize(
     subdivision: int = 1,
     object_id: int | None = None,
     window: Window | None = None,
+    corners: NDArray[np.float64] | None = None,
 ) -> Visibility:
     """Cast one ray through the centre of each pixel, exactly.
 
@@ -73,11 +74,12 @@ def rasterize(
 
     `subdivision` 2 gives the (2H, 2W) buffer of the centres of a pixel's 2 x 2 quarters (edge anti-aliasing). With an
     `object_id` only that object is drawn, without scenery and ground. `window` replaces the image by another rectangle of
-    pixels, which may lie outside the image.
+    pixels, which may lie outside the image. `corners`: `homogeneous` of all vertices, where it is known.
     """
     everything = (0, len(geometry.triangles), 0, len(geometry.vertices))
     part = _range(geometry, object_id) if object_id else everything
-    nearest, seen, q = _draw(geometry, camera, subdivision, part, window)
+    q = homogeneous(geometry, camera, *part[2:]) if corners is None or part != everything else corners
+    nearest, seen = _draw(geometry, camera, subdivision, part, window, q)
     if part != everything:
         return Visibility(seen, nearest.astype(np.float32))
     is_picture = subdivision == 1 and window is None
@@ -88,7 +90,7 @@ def with_ground(geometry: Geometry, camera: Camera, visibility: Visibility) -> V
     """A new buffer: `visibility`, which shows everything else, with the ground of this geometry drawn into it."""
     ground = geometry.triangle_start[-1], len(geometry.triangles), geometry.vertex_start[-1], len(geometry.vertices)
     shown = visibility.inverse_depth.astype(np.float64), visibility.triangle.copy()
-    nearest, seen, _ = _draw(geometry, camera, 1, ground, None, shown)
+    nearest, seen = _draw(geometry, camera, 1, ground, None, homogeneous(geometry, camera, *ground[2:]), shown)
     return Visibility(seen, nearest.astype(np.float32))
 
 
@@ -97,7 +99,8 @@ def silhouette(geometry: Geometry, camera: Camera, object_id: int, window: Windo
 
     The window may reach outside the image; False where the lens has no ray for a pixel.
     """
-    return _draw(geometry, camera, 1, _range(geometry, object_id), window)[1] >= 0
+    part = _range(geometry, object_id)
+    return _draw(geometry, camera, 1, part, window, homogeneous(geometry, camera, *part[2:]))[1] >= 0
 
 
 def _range(geometry: Geometry, object_id: int) -> tuple[int, int, int, int]:
@@ -121,6 +124,17 @@ def homogeneous(geometry: Geometry, camera: Camera, base: int = 0, stop: int | N
     moved = np.column_stack((camera.R, camera.t))
     kernels.transform(geometry.vertices, base, stop, k[:, :1] * moved[0] + k[:, 1:2] * moved[1] + k[:, 2:] * moved[2], q)
     return q
+
+
+def pixels_of(geometry: Geometry, corners: NDArray[np.float64], size: tuple[int, int]) -> NDArray[np.int32]:
+    """The range of pixels that each vertex may touch in a pinhole's picture of this (width, height), (n, 4), as
+    `kernels_points.boxes` has it; corners: `homogeneous` vertices.
+    """
+    from viewsphere.truth import kernels_points as kernels
+
+    box = np.empty((len(corners), 4), np.int32)
+    kernels.boxes(corners, geometry.vertex_start[-1], *size, box)
+    return box
 
 
 def lens_rays(camera: Camera) -> NDArray[np.float64] | None:
@@ -187,10 +201,11 @@ def _draw(
     samples: int,
     part: tuple[int, int, int, int],
     window: Window | None,
+    q: NDArray[np.float64],
     shown: tuple[NDArray[np.float64], NDArray[np.int32]] | None = None,
-) -> tuple[NDArray[np.float64], NDArray[np.int32], NDArray[np.float64]]:
-    """Draw a part's triangles over the window: 1/s (0 where none) and triangle (-1 where none); the part's `homogeneous`
-    vertices.
+) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+    """Draw a part's triangles, whose vertices are `homogeneous` in q, over the window: 1/s (0 where none) and triangle (-1
+    where none).
 
     The triangles are drawn into the arrays `shown` already, if these are given.
     """
@@ -202,7 +217,6 @@ def _draw(
     nearest, seen = shown or (np.zeros((y1 - y0, x1 - x0)), np.full((y1 - y0, x1 - x0), -1, np.int32))
     first, last, base, stop = part
     span = (first, last, base)
-    q = homogeneous(geometry, camera, base, stop)
     cut = (geometry.triangle_cutout, geometry.cutouts.arrays)
     if camera.distortion is not None:
         canvas = _canvas(camera, window)
@@ -210,9 +224,9 @@ def _draw(
         origin = (x0 - samples * canvas[0], y0 - samples * canvas[1])
         table, unit = t.arrays, camera.distortion.model == "fisheye"
         kernels_rays.draw(q, geometry.triangles, span, table, origin, unit, *cut, nearest, seen)
-        return nearest, seen, q
+        return nearest, seen
     cell = np.empty((stop - base, 4), np.int32)
     kernels.cells(q, samples, x0, y0, x1 - x0, y1 - y0, cell)
     cell[geometry.vertex_start[-1] - base :] = kernels.BEHIND
     kernels.draw(q, cell, geometry.triangles, span, (samples, x0, y0), *cut, nearest, seen)
-    return nearest, seen, q
+    return nearest, seen
