@@ -264,3 +264,20 @@ def test_forward_and_backward_agree(name):
     assert visible.sum() > 800
     assert (off <= 0.01).mean() > 0.9995  # on an edge a ray may meet the neighbour, which lies elsewhere
     assert np.median(off) < 1e-9
+
+
+@pytest.mark.parametrize("name", LENSES)
+def test_flow_is_the_way_from_the_pixels_centers(name):
+    rng = np.random.default_rng(5)
+    here, there = (
+        view(
+            [cube(0.4), sphere(2, 0.5)],
+            [pose(-0.6, 4, 0, turn=turned(rng)), pose(0.5, 3, 0.1)],
+            at(lens(96, 72, 1.0, LENSES[name]), (x, 0, 0)),
+        )
+        for x in (0.0, 0.2)
+    )
+    match = matched(here, there)
+    way = (match.xy - centers(here.camera)).astype(np.float32)
+    assert np.nanmax(np.abs(way)) > 1
+    assert match.flow.tobytes() == way.tobytes()
