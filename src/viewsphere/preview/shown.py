@@ -16,12 +16,12 @@ from viewsphere.model.rig import Rig
 from viewsphere.model.sample import Sample
 from viewsphere.model.shot import Shot
 from viewsphere.model.tracks import Tracks
-from viewsphere.preview.films import Film
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.run.opening import prepare
 from viewsphere.run.stages import Stages
 from viewsphere.sampling.plan import Plan
 from viewsphere.store import Dataset
+from viewsphere.store.films import Film
 from viewsphere.store.index import Ranges, length, nth, numbers
 
 ROW = 4

@@ -9,8 +9,8 @@ from PIL import Image, ImageDraw, ImageFont
 
 from viewsphere.labels import Color, drawings
 from viewsphere.model.sample import Sample
-from viewsphere.preview.films import Film, films_of
 from viewsphere.preview.frame import INK, PAPER, Before, Picture, check_drawn, draw_instant, draw_sample, extents, nothing
+from viewsphere.store.films import Film, films_of
 
 MARGIN = 8
 CAPTION = 18

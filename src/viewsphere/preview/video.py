@@ -14,9 +14,9 @@ from PIL import Image, ImageDraw, ImageFont
 
 from viewsphere.errors import MissingExtraError, StoreError, UserError
 from viewsphere.model.sample import Sample
-from viewsphere.preview.films import Earlier, Film, film_named, films_of
 from viewsphere.preview.frame import INK, PAPER, Picture, check_drawn, draw_instant, extents
 from viewsphere.preview.tiles import CAPTION, MARGIN, film_caption, fitting, with_key
+from viewsphere.store.films import Earlier, Film, film_named, films_of
 
 PROBES = 12
 """Instants of a sequence that say which values all of its pictures tell apart."""

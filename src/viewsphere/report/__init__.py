@@ -9,16 +9,19 @@ from typing import Any
 
 from viewsphere.errors import StoreError, UserError, ViewsphereError
 from viewsphere.geometry.box import EDGES, FACES, VERTEX_SIGNS
+from viewsphere.labels import drawings
 from viewsphere.report.choice import chosen_frames
 from viewsphere.report.facts import facts
 from viewsphere.report.frames import frame_data
 from viewsphere.report.meshes import mesh_data, read_small, spread
 from viewsphere.report.page import page, script_json
 from viewsphere.report.pictures import layers_within
+from viewsphere.report.sequences import extents_of, played, sequence_data
 from viewsphere.report.summary import summary
 from viewsphere.report.table import FrameTable, read_table
 from viewsphere.report.unknown import numbers
 from viewsphere.store import Dataset, ModelInfo
+from viewsphere.store.films import Film, films_of
 
 LIMIT = 20_000_000
 """Bytes that the page may have at most."""
@@ -67,10 +70,15 @@ def write_report(
     if not len(dataset):
         raise StoreError(f"{dataset.root}: expected finished frames, found none: render first")
     table = read_table(dataset, workers=workers, listener=lambda done, total: tell("records", done, total))
-    positions = chosen_frames(table, frames)
+    whole = {film.sequence: film for film in films_of(dataset)}
+    films = played(list(whole.values()), frames)
+    positions = _positions(films, table, frames)
     data = report_data(dataset, table, positions, proof, tell)
+    data["summary"]["sequences"] = len(whole)
+    data["sequences"] = [sequence_data(film, positions, len(whole[film.sequence].instants)) for film in films]
     room = LIMIT - len(page(dataset.name, data).encode())
-    pictures = layers_within(dataset, positions, room, lambda done: tell("pictures", done, len(positions)))
+    within = {film.sequence: extents_of(dataset, film) for film in films}
+    pictures = layers_within(dataset, positions, room, lambda done: tell("pictures", done, len(positions)), within)
     data["shown"] = [{**frame, "layers": found} for frame, found in zip(data["shown"], pictures, strict=True)]
     text = page(dataset.name, data).encode()
     try:
@@ -81,6 +89,15 @@ def write_report(
     return len(text)
 
 
+def _positions(films: Sequence[Film], table: FrameTable, frames: int) -> list[int]:
+    """Positions of the shown frames, ascending: those of the films that are played, and others where these leave room."""
+    own = {place for film in films for places in film.places for place in places}
+    if not own:
+        return chosen_frames(table, frames)
+    stills = [i for i in chosen_frames(table, frames) if i not in own] if len(own) < frames else []
+    return sorted(own | set(stills[: frames - len(own)]))
+
+
 def report_data(
     dataset: Dataset, table: FrameTable, positions: Sequence[int], proof: Proof | None, tell: Listener
 ) -> dict[str, Any]:
@@ -89,6 +106,8 @@ def report_data(
         "facts": facts(dataset),
         "summary": summary(dataset, table),
         "shown": [{**frame_data(sample), "layers": {}} for sample in map(dataset.__getitem__, positions)],
+        "sequences": [],
+        "keys": {drawing.name: drawing.key for drawing in drawings() if drawing.key},
         "models": _models(dataset, table, tell),
         "box": {"faces": FACES, "edges": EDGES, "signs": VERTEX_SIGNS},
         "proof": None if proof is None else asdict(proof),

@@ -10,11 +10,12 @@ from viewsphere.geometry.box import FACES
 from viewsphere.model.camera import Camera
 from viewsphere.model.instant import Viewpoint
 from viewsphere.model.sample import ObjectAnnotation, Sample
+from viewsphere.report.sequences import moment_data
 from viewsphere.report.unknown import number, numbers
 
 
 def frame_data(sample: Sample) -> dict[str, Any]:
-    """Frame index, split, picture's path, pose, camera and objects; unknown values are null."""
+    """Frame index, split, picture's path, pose, camera and objects, of a sequence also its moment; unknown values are null."""
     pose, camera = sample.known_pose, sample.known_camera
     return {
         "index": sample.index,
@@ -24,6 +25,7 @@ def frame_data(sample: Sample) -> dict[str, Any]:
         "pose": None if pose is None else _pose_data(pose),
         "camera": None if camera is None else _camera_data(camera),
         "objects": [_object_data(o) for o in sample.objects],
+        **moment_data(sample),
     }
 
 

@@ -15,6 +15,12 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from viewsphere.errors import UserError
+from viewsphere.labels import Extent
+from viewsphere.labels._state import picture as state_colors
+from viewsphere.labels._wheel import longest_of
+from viewsphere.labels._wheel import picture as flow_colors
+from viewsphere.labels.disparity import extent as disparity_extent
+from viewsphere.labels.motion_boundaries import COLOR as BOUNDARY
 from viewsphere.model.channel import picture_of
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.report.unknown import number
@@ -66,21 +72,31 @@ THREADS = 4
 
 Layers = dict[str, Any]
 
+Within = Mapping[str, Mapping[str, Extent]]
+"""Of sequences, by their names: of layers, by theirs, what their pictures tell apart."""
+
+MOTION = ("flow", "flow_state", "disparity", "motion_boundaries")
+
 
 def layers_within(
-    dataset: Sequence[Sample], positions: Sequence[int], budget: int, progress: Callable[[int], None] | None = None
+    dataset: Sequence[Sample],
+    positions: Sequence[int],
+    budget: int,
+    progress: Callable[[int], None] | None = None,
+    within: Within | None = None,
 ) -> list[Layers]:
     """The layers of the samples at these positions, as large as fit together into `budget` bytes of text.
 
-    Only one sample is in memory at a time, since its arrays are many times larger than its pictures. The scale is tried on a
-    few frames first. Raises UserError if the smallest scale does not fit.
+    `within`: what layers of a sequence tell apart, by its name. Only one sample is in memory at a time, since its arrays are
+    many times larger than its pictures. The scale is tried on a few frames first. Raises UserError if the smallest scale does
+    not fit.
     """
     probes = [positions[i] for i in np.unique(np.linspace(0, len(positions) - 1, PROBES).astype(int))] if positions else []
     for scale in SCALES:
-        probed = [_weight(layers(dataset[i], scale)) for i in probes]
+        probed = [_weight(_at(dataset, scale, within or {}, i)) for i in probes]
         if sum(probed) / max(1, len(probed)) * len(positions) > 0.97 * budget:
             continue
-        found = list(_all(dataset, positions, scale, progress))
+        found = list(_all(dataset, positions, scale, progress, within or {}))
         if sum(map(_weight, found)) <= budget:
             return found
     raise UserError(
@@ -90,28 +106,30 @@ def layers_within(
 
 
 def _all(
-    dataset: Sequence[Sample], positions: Sequence[int], scale: Scale, progress: Callable[[int], None] | None
+    dataset: Sequence[Sample], positions: Sequence[int], scale: Scale, progress: Callable[[int], None] | None, within: Within
 ) -> Iterator[Layers]:
     with ThreadPoolExecutor(THREADS) as pool:
-        for done, found in enumerate(pool.map(partial(_at, dataset, scale), positions), 1):
+        for done, found in enumerate(pool.map(partial(_at, dataset, scale, within), positions), 1):
             if progress is not None:
                 progress(done)
             yield found
 
 
-def _at(dataset: Sequence[Sample], scale: Scale, position: int) -> Layers:
-    return layers(dataset[position], scale)
+def _at(dataset: Sequence[Sample], scale: Scale, within: Within, position: int) -> Layers:
+    sample = dataset[position]
+    return layers(sample, scale, within.get(sample.sequence))
 
 
 def _weight(found: Mapping[str, Any]) -> int:
     return sum(len(value) for value in found.values() if isinstance(value, str))
 
 
-def layers(sample: Sample, scale: Scale) -> Layers:
-    """The frame's pictures as data URLs, by name, for the channels that it has, and the range of depth in metres.
+def layers(sample: Sample, scale: Scale, within: Mapping[str, Extent] | None = None) -> Layers:
+    """The frame's pictures as data URLs, by name, for the channels that it has, and the ranges of numbers: of depth in metres,
+    of disparity and of flow in pixels. `within`: the ranges of all the sequence.
 
-    `rgb` is the picture, with alpha where only the picture with alpha is kept; `depth`, `normals`, `coordinates` and `parts`
-    are transparent where they have no value.
+    `rgb` is the picture, with alpha where only the picture with alpha is kept; all others are transparent where they have no
+    value.
     """
     found: Layers = {}
     channels = sample.channels
@@ -127,7 +145,38 @@ def layers(sample: Sample, scale: Scale) -> Layers:
         found["coordinates"] = webp(coordinate_colors(coordinates, instances, sample.objects), 75)
     if "parts" in channels:
         found["parts"] = webp(part_colors(_thinned(channels["parts"], scale.layer_width)), 60)
+    return found | _motion_layers(sample, scale, within or {})
+
+
+def _motion_layers(sample: Sample, scale: Scale, within: Mapping[str, Extent]) -> Layers:
+    """The layers of labels of motion and of stereo."""
+    found: Layers = {}
+    channels = {name: sample.channels[name] for name in MOTION if name in sample.channels}
+    thin = {name: _thinned(array, scale.layer_width) for name, array in channels.items()}
+    if "flow" in channels:
+        longest = within["flow"][1] if "flow" in within else longest_of(channels["flow"])
+        colors = flow_colors(thin["flow"], longest)
+        found["flow"], found["flowRange"] = webp(_rgba(colors, np.isfinite(thin["flow"][..., 0])), 75), [0, number(longest)]
+    if "disparity" in channels:
+        far, near = within.get("disparity") or disparity_extent(channels["disparity"])
+        known = np.isfinite(thin["disparity"])
+        share = np.clip((np.where(known, thin["disparity"], far) - far) / max(near - far, 1e-9), 0, 1)
+        found["disparity"] = webp(_rgba(viridis(share), known), 75)
+        found["disparityRange"] = [number(near), number(far)]
+    if "flow_state" in channels:
+        found["flow_state"] = webp(_rgba(state_colors(thin["flow_state"]), thin["flow_state"] < 4), 60)
+    if "motion_boundaries" in channels:
+        lines = _widened(channels["motion_boundaries"] > 0, scale.layer_width)
+        found["motion_boundaries"] = webp(_rgba(np.full((*lines.shape, 3), BOUNDARY, np.uint8), lines), 60)
     return found
+
+
+def _widened(lines: NDArray[np.bool_], width: int) -> NDArray[np.bool_]:
+    """Lines in a picture that is at most so wide: no pixel of them gets lost."""
+    if lines.shape[1] <= width:
+        return lines
+    size = (width, max(1, round(lines.shape[0] * width / lines.shape[1])))
+    return np.asarray(Image.fromarray(lines.astype(np.uint8) * 255).resize(size, Image.Resampling.BOX)) > 0
 
 
 def webp(picture: Picture, quality: int) -> str:

@@ -3,7 +3,7 @@
 import { byId } from "report/dom.js";
 
 export const data = JSON.parse(byId("data").textContent);
-export const { facts, summary, shown, models, proof, box } = data;
+export const { facts, summary, shown, models, proof, box, sequences, keys } = data;
 
 const categories = new Map(summary.categories.map((category) => [category.id, category]));
 

@@ -13,6 +13,7 @@ let cards = [];
 const hasObjects = shown.some((frame) => frame.objects.length);
 const present = (layer) => {
   if (layer.surface) return shown.some((frame) => frame.layers[layer.name]);
+  if (layer.name === "tracks") return shown.some((frame) => frame.points?.length);
   if (layer.name === "boxes3d") return shown.some((frame) => frame.objects.some((o) => o.corners));
   return hasObjects;
 };
@@ -50,6 +51,7 @@ function card(frame) {
   const first = frame.objects[0];
   const about = [
     frame.pose ? `${poseName(first?.pose || frame.pose.name)}` : first ? categoryName(first.category) : "",
+    frame.sequence ? `${frame.sensor} ${decimal(frame.time, 3)} s` : "",
     first && first.visibility !== null && first.visibility < 0.9995 ? `${percent(first.visibility)} visible` : "",
     frame.split,
   ].filter(Boolean).join(" · ");

@@ -1,6 +1,6 @@
 // One picture enlarged, with its numbers; arrow keys turn to its neighbours.
 
-import { categoryName, categoryToken, poseName, subject } from "report/data.js";
+import { categoryName, categoryToken, keys, poseName, subject } from "report/data.js";
 import { byId, count, decimal, degrees, el, percent, table } from "report/dom.js";
 import { layerButtons, picture } from "report/gallery.js";
 import { subscribe } from "report/state.js";
@@ -68,12 +68,22 @@ function refresh() {
   current.legend.replaceChildren(...legend(current.frame));
 }
 
-function legend(frame) {
+/** What the colours of a layer mean, as swatches. */
+const key = (layer) => keys[layer].map(([words, color]) =>
+  el("span", {}, color ? el("b", { class: "swatch", style: `background:rgb(${color})` }) : null, words.replace(/^[a-z_]+: /, "")));
+
+export function legend(frame) {
   const layer = surfaceLayer(frame)?.name;
   if (layer === "depth") {
     const [near, far] = frame.layers.depthRange;
     return [`${decimal(near)} m`, el("i", { class: "viridis" }), `${decimal(far)} m and farther`];
   }
+  if (layer === "disparity") {
+    const [near, far] = frame.layers.disparityRange;
+    return [`${decimal(near)} px`, el("i", { class: "viridis" }), `${decimal(far)} px and less`];
+  }
+  if (layer === "flow") return [...key("flow"), `full colour: ${decimal(frame.layers.flowRange[1])} px to the next instant`];
+  if (keys[layer]) return key(layer);
   return {
     normals: ["red: right, green: up, blue: towards the camera"],
     coordinates: ["in the object's box: red to its left, green to its back, blue up"],
@@ -83,6 +93,7 @@ function legend(frame) {
 
 function numbers(frame) {
   const facts = [["Split", frame.split]];
+  if (frame.sequence) facts.push(["Sequence", frame.sequence], ["Sensor", frame.sensor], ["Instant", `${frame.instant} (${decimal(frame.time, 3)} s)`]);
   if (frame.file) facts.push(["File", frame.file]);
   if (frame.pose) {
     const { azimuth, elevation, distance, tilt, name } = frame.pose;

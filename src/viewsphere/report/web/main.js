@@ -3,6 +3,7 @@
 import { facts, summary } from "report/data.js";
 import { byId, count, el, plural } from "report/dom.js";
 import { showDistributions } from "report/charts.js";
+import { showPlayer } from "report/player.js";
 import { showGallery } from "report/gallery.js";
 import { showModels } from "report/models.js";
 import { showProvenance, verdict } from "report/provenance.js";
@@ -18,6 +19,7 @@ function overview() {
     figure(summary.frames, "frame"),
     figure(summary.objects, "object"),
     figure(summary.models.length, "model"),
+    ...(summary.sequences ? [figure(summary.sequences, "sequence")] : []),
     figure(summary.categories.length, "category", "categories"),
     ["pixels", sizes],
   ].filter(([, value]) => value);
@@ -64,11 +66,14 @@ function markSection() {
       links.get(entry.target.id).setAttribute("aria-current", "true");
     }
   }, { rootMargin: "-20% 0px -70% 0px" });
-  links.forEach((_, id) => watcher.observe(byId(id)));
+  links.forEach((link, id) => {
+    if (!link.hidden) watcher.observe(byId(id));
+  });
 }
 
 theme();
 overview();
+showPlayer();
 showGallery();
 showSphere();
 showDistributions();

@@ -22,24 +22,63 @@ function bitmap(url) {
 
 export const surfaceLayer = (frame) => LAYERS.find((layer) => layer.surface && layers.has(layer.name) && frame.layers[layer.name]);
 
-/** Draw everything that is switched on; `large` adds words. The canvas takes the size it has on the page. */
-export async function draw(canvas, frame, large) {
+/** Draw everything that is switched on; `large` adds words, `base` the picture itself. The canvas takes the size it has on the
+ *  page; `trail`: the sensor's frames before, in order. */
+export async function draw(canvas, frame, large, base = false, trail = []) {
   const turn = (canvas.drawing = (canvas.drawing ?? 0) + 1);
   const surface = surfaceLayer(frame);
   canvas.parentElement.classList.toggle("dimmed", Boolean(surface));
   const image = surface ? await bitmap(frame.layers[surface.name]) : null;
+  const picture = base && frame.layers.rgb ? await bitmap(frame.layers.rgb) : null;
   if (canvas.drawing !== turn) return; // something newer is being drawn
   const ratio = Math.min(window.devicePixelRatio || 1, 3);
   const size = frameSize(frame);
   canvas.width = Math.max(1, Math.round(canvas.clientWidth * ratio));
   canvas.height = Math.max(1, Math.round(canvas.clientHeight * ratio));
   const pen = canvas.getContext("2d");
+  if (picture) drawPicture(pen, picture, surface);
   if (image) pen.drawImage(image, 0, 0, canvas.width, canvas.height);
   const scale = canvas.width / size.width;
   const view = { pen, scale, ratio, large };
   if (layers.has("masks")) drawMasks(view, frame, canvas);
   if (layers.has("boxes3d")) for (const object of frame.objects) drawBox3d(view, object);
   if (layers.has("boxes")) for (const object of frame.objects) drawBox(view, object);
+  if (layers.has("tracks") && frame.points) drawTracks(view, frame, trail);
+}
+
+/** The picture itself, pale where a layer covers it. */
+function drawPicture(pen, picture, surface) {
+  pen.globalAlpha = surface ? 0.22 : 1;
+  pen.filter = surface ? "grayscale(1)" : "none";
+  pen.drawImage(picture, 0, 0, pen.canvas.width, pen.canvas.height);
+  pen.globalAlpha = 1;
+  pen.filter = "none";
+}
+
+/** Each point filled where it is visible and hollow where it is occluded, with a line from where it was before. */
+function drawTracks(view, frame, trail) {
+  const { pen, ratio } = view;
+  const scale = view.scale / 10;
+  const radius = Math.max(2, pen.canvas.width / 200);
+  const frames = [...trail, frame];
+  pen.lineWidth = Math.max(1, radius / 2.5);
+  frame.pointColors.forEach((tone, i) => {
+    const [x, y, state] = frame.points.slice(3 * i, 3 * i + 3);
+    if (x === null || state > 1) return;
+    pen.strokeStyle = pen.fillStyle = tone;
+    const path = frames.map((f) => f.points.slice(3 * i, 3 * i + 2));
+    const first = path.findLastIndex(([u]) => u === null) + 1;
+    pen.globalAlpha = 0.6;
+    pen.beginPath();
+    for (const [u, v] of path.slice(first)) pen.lineTo(u * scale, v * scale);
+    pen.stroke();
+    pen.globalAlpha = 1;
+    pen.beginPath();
+    pen.arc(x * scale, y * scale, radius, 0, 2 * Math.PI);
+    if (state === 0) pen.fill();
+    pen.lineWidth = Math.max(1, ratio);
+    pen.stroke();
+  });
 }
 
 const color = (object) => token(categoryToken(object.category));

@@ -8,6 +8,11 @@ export const LAYERS = [
   { name: "normals", label: "Normals", key: "n", surface: true },
   { name: "coordinates", label: "Coordinates", key: "c", surface: true },
   { name: "parts", label: "Parts", key: "p", surface: true },
+  { name: "flow", label: "Flow", key: "f", surface: true },
+  { name: "flow_state", label: "Seen next", key: "s", surface: true },
+  { name: "disparity", label: "Disparity", key: "i", surface: true },
+  { name: "motion_boundaries", label: "Motion boundaries", key: "o", surface: true },
+  { name: "tracks", label: "Tracks", key: "t" },
 ];
 
 export const layers = new Set();

@@ -14,7 +14,7 @@ from viewsphere.labels import TAIL
 from viewsphere.model.channel import picture_of
 from viewsphere.model.sample import Sample
 from viewsphere.model.shot import Shot
-from viewsphere.store import Dataset
+from viewsphere.store.dataset import Dataset
 
 ALONE = 1.0
 """Seconds for which the only instant of a film is shown."""
