@@ -54,3 +54,12 @@ def test_readme_s_recipe_is_valid(tmp_path):
         (tmp_path / "models" / f"{name}.glb").write_bytes(b"")
     (tmp_path / "recipe.yaml").write_text(text[1])
     assert vs.plan(vs.Recipe.load(tmp_path / "recipe.yaml")).frames == 2 * 36 * 9 * 2
+
+
+def test_readme_s_world_in_motion_is_valid(tmp_path):
+    import viewsphere as vs
+
+    (text,) = (text for text in re.findall(r"```yaml\n(.*?)```", README, re.DOTALL) if "time:" in text)
+    (tmp_path / "recipe.yaml").write_text(text)
+    planned = vs.plan(vs.Recipe.load(tmp_path / "recipe.yaml"))
+    assert planned.frames == 3 * 50 * 2 and len(planned.subjects) == 3
