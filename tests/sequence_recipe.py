@@ -38,7 +38,7 @@ def eventful_recipe(frames: int = 100, **changes) -> Recipe:
                        "shake": {"degrees": 0.4, "mm": 6}},
         "rig": {"kind": "stereo", "baseline": 0.1},
         "time": {"frames": frames, "fps": 10},
-        "tracks": {"count": 24, "on": "all", "at": [0, frames // 2]},
+        "tracks": {"count": 12, "on": "all", "at": [0, frames // 4, frames // 2, frames - 1]},
         "scene": {
             "ground": True,
             "sun": {"azimuth_deg": {"uniform": [0, 360]}, "elevation_deg": {"uniform": [30, 60]}},

@@ -29,10 +29,10 @@ WORST = 4
 
 def compute(sight: Sight) -> NDArray[np.void]:
     """One row a point, (N,) of `viewsphere.model.tracks.TRACK`. Raises ValueError where the sample's shot follows none."""
+    followed = None if sight.around is None else sight.around.followed  # first: its triangles may take the place of a view's
     own = sight.neighbour()
-    if own is None or sight.around is None:
+    if own is None or followed is None:
         raise ValueError("tracks: expected a sample of a sequence, found none")
-    followed = sight.around.followed
     now = followed.points.in_view(own)
     out, point = followed.rows.copy(), np.ones((len(followed.query), 4))
     point[:, :3] = now.world

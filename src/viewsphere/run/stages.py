@@ -230,7 +230,7 @@ def render_sample(
     shot, (number, instant, sensor) = views.shot, sample
     kept = shot.kept(sensor)
     names = [name for name in kept if name not in PASSES]
-    _arrange(views, instant, names)
+    _arrange(views, instant, sensor, names)
     view, geometry = views.view(instant, sensor), stage.at(instant)
     now, camera, labelled, visibility = shot.instants[instant], view.camera, view.geometry, view.visibility
     observed = observe(labelled, camera, visibility, names, views.around(instant, sensor))
@@ -257,9 +257,15 @@ def render_sample(
     )
 
 
-def _arrange(views: ShotViews, instant: int, names: Sequence[str]) -> None:
-    """Ask for the triangles of all instants that labels compare, in their order, which reuses those of the sample before."""
-    offsets = {offset for name in names for offset in channel_labels()[name].needs.instants}
+def _arrange(views: ShotViews, instant: int, sensor: int, names: Sequence[str]) -> None:
+    """Ask for the triangles of all instants that labels compare, in their order, which reuses those of the sample before.
+
+    Before that the points that the sensor follows are picked: at so many instants that these triangles would be written over.
+    """
+    needs = [channel_labels()[name].needs for name in names]
+    if any(need.tracks for need in needs):
+        views.followed(sensor)
+    offsets = {offset for need in needs for offset in need.instants}
     for offset in sorted({0, *offsets}):
         other = views.shot.instant_after(instant, offset)
         if other is not None:
