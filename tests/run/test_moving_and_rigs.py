@@ -166,3 +166,12 @@ def test_shots_that_cannot_be_are_refused():
     with pytest.raises(ValueError, match="axes to be those of its first sensor"):
         Rig(sensors=(Sensor(intrinsics=LENS, rig_from_sensor=at(0, 0, 1, 0)),))
     assert Instant(index=0, world_from_rig=IDENTITY, focus=(0, 0, 0)).viewpoint is None
+
+
+def test_an_instant_at_which_nothing_is_there():
+    shot = moving_shot()
+    alone = shot.model_copy(update={"things": shot.things[:1], "scene": Scene()})
+    *before, last = Stages().render(alone)
+    assert all(len(sample.objects) == 1 for sample in before)
+    assert last.objects == ()
+    assert not last.channels["instances"].any() and np.isinf(last.channels["depth"]).all()

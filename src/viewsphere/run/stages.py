@@ -152,9 +152,12 @@ class Stages:
         """Raise RecipeError for the first of the cameras (N, 3) that is inside of something.
 
         Inside of a target means its box. Inside of scenery means that it hides the sky from the camera, but not from the
-        frame's model: under a tree, among hills or in the room where the model stands a camera may well be.
+        frame's model: under a tree, among hills or in the room where the model stands a camera may well be. So cameras are not
+        looked at where no target is there.
         """
-        own = things[0]
+        own = next((thing for thing in things if not thing.scenery), None)
+        if own is None:
+            return
         model = transform(own.world_from_object, self.box(own.model, own.step)).mean(axis=0)
         for thing in things:
             box = transform(thing.world_from_object, self.box(thing.model, thing.step))
