@@ -26,7 +26,6 @@ from viewsphere.preview import (
 )
 from viewsphere.preview.frame import draw_instant, extents
 from viewsphere.preview.tiles import film_caption
-from viewsphere.preview.video import rate
 from viewsphere.run.generate import generate
 from viewsphere.store import Choice, Dataset
 
@@ -232,33 +231,21 @@ def _durations(file: Path) -> list[int]:
     return found
 
 
-def test_an_mp4_has_the_rate_of_its_sequence_and_every_instant_in_order(moving, tmp_path):
-    av = pytest.importorskip("av")
+def test_an_mp4_shows_every_instant_in_order(moving, tmp_path):
+    ffmpeg = pytest.importorskip("imageio_ffmpeg")
     made = write_video(moving, tmp_path / "one.mp4", ["flow", "tracks"], "post_box_001")
     assert (made.sequences, made.pictures, made.seconds) == (1, 6, 0.48)
-    with av.open(str(tmp_path / "one.mp4")) as container:
-        stream = container.streams.video[0]
-        assert stream.average_rate == 12.5
-        assert stream.frames == 6
-        assert float(stream.duration * stream.time_base) == pytest.approx(0.48, abs=1e-4)
-        frames = [(frame.time, frame.to_ndarray(format="rgb24").astype(int)) for frame in container.decode(video=0)]
-    assert np.allclose([time for time, _ in frames], np.arange(6) / 12.5, atol=1e-4)
+    read = ffmpeg.read_frames(str(tmp_path / "one.mp4"))
+    meta = next(read)
+    assert (meta["codec"], meta["fps"], meta["duration"]) == ("h264", 12.5, 0.48)
+    width, height = meta["size"]
+    frames = [np.frombuffer(frame, np.uint8).reshape(height, width, 3).astype(int) for frame in read]
     film = films_of(moving)[1]
     within = extents([moving[place] for places in film.places for place in places], ["flow"])
     before = Earlier(moving, [film])
-    for (_, frame), places in zip(frames, film.places, strict=True):
+    for frame, places in zip(frames, film.places, strict=True):
         expected = draw_instant([moving[p] for p in places], ["flow", "tracks"], None, before, within)
         assert np.abs(frame[: expected.shape[0], : expected.shape[1]] - expected).mean() < 10
-
-
-def test_rates_stay_what_they_are():
-    assert [str(rate(1 / fps)) for fps in (25.0, 29.97, 30000 / 1001, 12.5, 0.5)] == [
-        "25",
-        "2997/100",
-        "30000/1001",
-        "25/2",
-        "1/2",
-    ]
 
 
 def test_a_video_of_still_pictures_is_refused(tmp_path):
@@ -278,7 +265,7 @@ def test_mistakes_in_videos_are_named(moving, tmp_path, monkeypatch):
     monkeypatch.setattr("viewsphere.preview.video.MOST_BYTES", 1000)
     with pytest.raises(UserError, match=r"expected pictures of at most .* write .mp4"):
         write_video(moving, tmp_path / "v.webp")
-    monkeypatch.setitem(sys.modules, "av", None)
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
     with pytest.raises(MissingExtraError, match=r"pip install 'viewsphere\[video\]', or write .webp"):
         write_video(moving, tmp_path / "v.mp4")
     (tmp_path / "file").write_text("")

@@ -4,17 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from fractions import Fraction
 from itertools import accumulate, pairwise
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-from viewsphere.errors import MissingExtraError, StoreError, UserError
+from viewsphere.errors import StoreError, UserError
 from viewsphere.model.sample import Sample
 from viewsphere.preview.frame import INK, PAPER, Picture, check_drawn, draw_instant, extents
+from viewsphere.preview.mp4 import Shown, encoder, write_mp4
 from viewsphere.preview.tiles import CAPTION, MARGIN, film_caption, fitting, with_key
 from viewsphere.store.films import Earlier, Film, film_named, films_of
 
@@ -26,15 +25,6 @@ WIDEST = 3840
 
 MOST_BYTES = 2_000_000_000
 """Of all pictures of an animated WebP, which are in memory together."""
-
-TICKS = 90_000
-"""Parts of a second in which an MP4 counts."""
-
-CODECS = ("libx264", "libopenh264", "libsvtav1")
-"""Encoders, of which the first that PyAV brings is taken: H.264 plays everywhere."""
-
-Shown = tuple[Picture, float]
-"""A picture, and the seconds for which it is shown."""
 
 Listener = Callable[[int, int], None]
 
@@ -58,8 +48,8 @@ def write_video(
     """Write all sequences of samples (or the one named) one after another, their sensors side by side, at their own frame
     rates, with the labels named in `draw`, as MP4 or animated WebP, whichever the file's ending says.
 
-    Raises StoreError for samples without sequences, unknown names and labels that are not there, UserError for other endings
-    and for more pictures than a WebP may hold, MissingExtraError where the encoder of MP4 is not installed.
+    Raises StoreError for samples without sequences, unknown names and labels that are not there, UserError for other endings,
+    for more pictures than a WebP may hold and where ffmpeg fails, MissingExtraError where ffmpeg is not installed.
     """
     write = _writer(file)
     films = films_of(samples)
@@ -151,8 +141,8 @@ def _writer(file: Path) -> Write:
         return _write_webp
     if file.suffix.lower() != ".mp4":
         raise UserError(f"--video: expected a file that ends in .mp4 or .webp; found {file}")
-    _encoder()
-    return _write_mp4
+    by = encoder()
+    return lambda file, shown, size, total: write_mp4(file, shown, by)
 
 
 def _write_webp(file: Path, shown: Iterator[Shown], size: tuple[int, int], total: int) -> None:
@@ -165,42 +155,3 @@ def _write_webp(file: Path, shown: Iterator[Shown], size: tuple[int, int], total
     ends = [round(1000 * end) for end in accumulate(lengths, initial=0.0)]
     milliseconds = [stop - start for start, stop in pairwise(ends)]
     pages[0].save(file, "WEBP", save_all=True, append_images=pages[1:], duration=milliseconds, loop=0, quality=85, method=2)
-
-
-def _encoder() -> tuple[Any, str]:
-    """PyAV and the name of its encoder; raises MissingExtraError without."""
-    try:
-        import av
-    except ImportError:
-        raise MissingExtraError(
-            "--video: expected the package av for .mp4, found none: pip install 'viewsphere[video]', or write .webp"
-        ) from None
-    known = next((name for name in CODECS if name in av.codecs_available), None)
-    if known is None:
-        raise MissingExtraError(
-            f"--video: expected an encoder of {', '.join(CODECS)} in the package av; found none: write .webp"
-        )
-    return av, known
-
-
-def _write_mp4(file: Path, shown: Iterator[Shown], size: tuple[int, int], total: int) -> None:
-    av, codec = _encoder()
-    clock, start = Fraction(1, TICKS), 0.0
-    with av.open(str(file), "w", format="mp4", options={"movflags": "+faststart"}) as container:
-        stream = None
-        for page, seconds in shown:
-            if stream is None:
-                stream = container.add_stream(codec, rate=rate(seconds), options={"crf": "18"})
-                stream.width, stream.height, stream.pix_fmt = page.shape[1], page.shape[0], "yuv420p"
-                stream.time_base = stream.codec_context.time_base = clock
-            frame = av.VideoFrame.from_ndarray(page, format="rgb24")
-            frame.pts, frame.time_base, frame.duration = round(start * TICKS), clock, round(seconds * TICKS)
-            start += seconds
-            container.mux(stream.encode(frame))
-        if stream is not None:
-            container.mux(stream.encode())
-
-
-def rate(seconds: float) -> Fraction:
-    """Pictures a second, each of which is shown for so many seconds: 29.97 and its like stay what they are."""
-    return Fraction(1 / seconds).limit_denominator(1001)

@@ -1,0 +1,191 @@
+"""MP4, written by the program ffmpeg in a process of its own.
+
+Pictures go to ffmpeg's standard input as Matroska, the plainest container that says for how long each of them is shown.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import subprocess
+import tempfile
+from collections.abc import Generator, Iterable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from fractions import Fraction
+from itertools import chain
+from pathlib import Path
+from typing import IO
+
+from viewsphere.errors import MissingExtraError, UserError
+from viewsphere.preview.frame import Picture
+
+Shown = tuple[Picture, float]
+"""A picture, and the seconds for which it is shown."""
+
+CODECS = {"libx264": ("-crf", "18"), "libopenh264": ("-b:v", "20M"), "libsvtav1": ("-crf", "24")}
+"""Encoders and their quality, of which the first that ffmpeg has is taken: H.264 plays everywhere."""
+
+THREADS = 4
+"""Of the encoder, whatever the machine: x264 writes other bytes with another number of threads."""
+
+TICKS = 90_000
+"""Least parts of a second in which an MP4 counts."""
+
+REPEATABLE = ("-map_metadata", "-1", "-fflags", "+bitexact", "-flags:v", "+bitexact", "-threads", str(THREADS))
+"""Neither dates nor versions in the file."""
+
+ANSWER_S = 60.0
+
+GRACE_S = 5.0
+"""Seconds that ffmpeg has to end by itself once it reads no more."""
+
+
+@dataclass(frozen=True)
+class Encoder:
+    """The program ffmpeg, and the name of its encoder."""
+
+    program: str
+    codec: str
+
+
+def encoder() -> Encoder:
+    """The ffmpeg of the package imageio-ffmpeg (or that IMAGEIO_FFMPEG_EXE names), and the first of `CODECS` that it has.
+
+    Raises MissingExtraError without the package, an ffmpeg that starts, or any of these encoders.
+    """
+    try:
+        from imageio_ffmpeg import get_ffmpeg_exe
+    except ImportError:
+        raise MissingExtraError(
+            "--video: expected the package imageio-ffmpeg for .mp4, found none: pip install 'viewsphere[video]', or write .webp"
+        ) from None
+    try:
+        program = get_ffmpeg_exe()
+        listed = subprocess.run([program, "-hide_banner", "-encoders"], capture_output=True, check=True, timeout=ANSWER_S)
+    except (OSError, RuntimeError, subprocess.SubprocessError) as error:
+        raise MissingExtraError(
+            f"--video: expected an ffmpeg that starts; found: {error}: let IMAGEIO_FFMPEG_EXE name another, or write .webp"
+        ) from None
+    names = set(listed.stdout.decode(errors="replace").split())
+    codec = next((name for name in CODECS if name in names), None)
+    if codec is None:
+        raise MissingExtraError(f"--video: expected an encoder of {', '.join(CODECS)} in {program}; found none: write .webp")
+    return Encoder(program, codec)
+
+
+def write_mp4(file: Path, shown: Iterable[Shown], by: Encoder) -> None:
+    """Write pictures of one even size (height, width, 3; uint8, sRGB) as MP4, each for exactly its time if all have one rate,
+    and to 1/90000 s if not. The same pictures are the same bytes from the same ffmpeg.
+
+    Raises UserError where ffmpeg cannot write them; ffmpeg has ended in any case.
+    """
+    pictures = iter(shown)
+    first = next(pictures)
+    with tempfile.TemporaryFile() as said, _started(_command(file, first[1], by), said) as (process, pipe):
+        taken = _fed(pipe, _matroska(first, chain([first], pictures)))
+        with suppress(subprocess.TimeoutExpired):
+            process.wait(None if taken else GRACE_S)
+        if process.returncode != 0 or not taken:
+            found = _end(process.returncode, said)
+            raise UserError(f"--video: expected ffmpeg to write the video; found {found}: mend that, or write .webp")
+
+
+def rate(seconds: float) -> Fraction:
+    """Pictures a second, each of which is shown for so many seconds: 29.97 and its like stay what they are."""
+    return Fraction(1 / seconds).limit_denominator(1001)
+
+
+def ticks(seconds: float) -> int:
+    """Parts of a second, at least `TICKS`, of which such a picture is shown for a whole number."""
+    whole = rate(seconds).numerator
+    return whole * -(-TICKS // whole)
+
+
+def _command(file: Path, seconds: float, by: Encoder) -> list[str]:
+    clock = ticks(seconds)
+    taken = ("-v", "error", "-nostdin", "-y", "-f", "matroska", "-i", "pipe:0")
+    coded = ("-c:v", by.codec, *CODECS[by.codec], "-pix_fmt", "yuv420p", "-sws_flags", "bicubic+accurate_rnd+bitexact")
+    timed = ("-fps_mode", "passthrough", "-enc_time_base", f"1:{clock}", "-video_track_timescale", str(clock))
+    return [by.program, *taken, *coded, *timed, *REPEATABLE, "-movflags", "+faststart", "-f", "mp4", f"file:{file}"]
+
+
+@contextmanager
+def _started(command: list[str], said: IO[bytes]) -> Generator[tuple[subprocess.Popen[bytes], IO[bytes]]]:
+    """The process of a command, which is over afterwards, and its standard input.
+
+    The process is a group of its own: an interrupt from the terminal comes to this process alone, which ends the other.
+    """
+    process = subprocess.Popen(
+        command,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.DEVNULL,
+        stderr=said,
+        process_group=0 if os.name == "posix" else None,
+        creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
+    )
+    pipe = process.stdin
+    assert pipe is not None  # for type checkers
+    try:
+        yield process, pipe
+    finally:
+        process.kill()
+        process.wait()
+        with suppress(OSError):
+            pipe.close()
+
+
+def _fed(pipe: IO[bytes], parts: Iterator[bytes]) -> bool:
+    """Whether a program took all parts; errors of who makes the parts are raised."""
+    for part in parts:
+        try:
+            pipe.write(part)
+        except OSError:
+            return False
+    try:
+        pipe.close()
+    except OSError:
+        return False
+    return True
+
+
+def _end(code: int | None, said: IO[bytes]) -> str:
+    """How ffmpeg ended, None for not at all, and the first thing that it said: what went wrong, before what came of that."""
+    how = "that it reads no more" if code is None else f"exit code {code}"
+    if code is not None and -code in set(signal.Signals):
+        how = signal.Signals(-code).name
+    said.seek(0)
+    lines = (re.sub(r" @ 0x[0-9a-f]+", "", line).strip() for line in said.read().decode(errors="replace").split("\n"))
+    why = next((line[:200] for line in lines if line), "")
+    return f"{how} ({why})" if why else how
+
+
+def _matroska(first: Shown, shown: Iterable[Shown]) -> Iterator[bytes]:
+    """As much of Matroska as ffmpeg asks for, counted in nanoseconds (RFC 9559; RFC 8794 for the elements)."""
+    height, width = first[0].shape[:2]
+    size = _element("B0", _number(width)) + _element("BA", _number(height)) + _element("2EB524", b"RGB\x18")
+    kind = _element("D7", _number(1)) + _element("73C5", _number(1)) + _element("83", _number(1))
+    coded = _element("86", b"V_UNCOMPRESSED") + _element("23E383", _number(_nanoseconds(first[1])))
+    yield _element("1A45DFA3", _element("4282", b"matroska"))
+    yield bytes.fromhex("18538067 01FFFFFFFFFFFFFF")  # the segment, of unknown length
+    yield _element("1549A966", _element("2AD7B1", _number(1)))
+    yield _element("1654AE6B", _element("AE", kind + coded + _element("E0", size)))
+    start = 0.0
+    for picture, seconds in shown:
+        block = _element("A1", b"\x81\0\0\0" + picture.tobytes())
+        lasts = _element("9B", _number(_nanoseconds(seconds)))
+        yield _element("1F43B675", _element("E7", _number(_nanoseconds(start))) + _element("A0", block + lasts))
+        start += seconds
+
+
+def _element(name: str, content: bytes) -> bytes:
+    return bytes.fromhex(name) + (1 << 56 | len(content)).to_bytes(8, "big") + content
+
+
+def _number(value: int) -> bytes:
+    return value.to_bytes(8, "big")
+
+
+def _nanoseconds(seconds: float) -> int:
+    return round(seconds * 1e9)
