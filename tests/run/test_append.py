@@ -584,3 +584,43 @@ def test_folders_never_overflow_and_what_is_there_stays(spans, size):
     assert max(objects.values(), default=0) <= size
     if grown[0].frames * spans[0][1] > size + spans[0][1]:
         assert None not in objects
+
+
+def moving_recipe(viewpoints, **changes):
+    """A post box that moves, two instants from each viewpoint; sequences have splits of their own."""
+    said = {
+        "models": [{**BOX, "motion": {"kind": "constant", "velocity": [0.5, 0, 0]}}],
+        "time": {"frames": 2, "fps": 10},
+        "viewpoints": {"distance": 1.5, **viewpoints},
+        "camera": {"size": [32, 24]},
+        "channels": ["rgb", "flow"],
+        "splits": {"by": "sequence", "train": 0.5, "val": 0.5},
+        "formats": [],
+    }
+    return vs.Recipe.model_validate({**said, **changes})
+
+
+def test_appended_sequences_have_names_of_their_own(tmp_path):
+    generate(moving_recipe({"azimuth": 30}), tmp_path / "out", workers=0)
+    for azimuth in ([90, 30], 60):
+        generate(moving_recipe({"azimuth": azimuth}), tmp_path / "out", workers=0, append=True)
+    dataset = Dataset(tmp_path / "out")
+    seen = {sample.sequence: sample.pose.azimuth_deg for sample in dataset}
+    assert seen == {"post_box_000": 30, "post_box_000-000001": 90, "post_box_000-000002": 60}
+    assert all(len(list(dataset.sequence(name, "camera"))) == 2 for name in dataset.sequences)
+    report = check(dataset, sample=None)
+    assert report.ok, report.findings
+
+
+def test_another_motion_of_the_camera_is_another_sequence(tmp_path):
+    for distance in (1.5, 2.5):
+        orbit = moving_recipe({"kind": "orbit", "elevation": 20, "distance": distance})
+        generate(orbit, tmp_path / "out", workers=0, append=distance > 2)
+    dataset = Dataset(tmp_path / "out")
+    assert dataset.sequences == ("post_box_000", "post_box_000-000001")
+    assert [round(sample.pose.distance, 6) for sample in dataset] == [1.5, 1.5, 2.5, 2.5]
+    generate(orbit, tmp_path / "out", workers=0, append=True)
+    assert len(Dataset(tmp_path / "out")) == 4
+    shaken = moving_recipe({"kind": "orbit", "elevation": 20, "distance": 2.5, "shake": {"degrees": 1}})
+    with pytest.raises(RecipeError, match=r"viewpoints\.shake: expected null, as the data set has; found a mapping"):
+        generate(shaken, tmp_path / "out", workers=0, append=True)

@@ -258,20 +258,22 @@ def _as_shot(dataset: Dataset, scenery: Scenery, sample: Sample) -> Iterator[str
         wanted = poses[place * len(poses) // row.count]
         if sample.pose.index != wanted:
             yield f"expected pose {wanted} of the plan, found {sample.pose.index}"
-    split = _dealt_split(dataset, row)
+    dealt = _dealt_splits(dataset, row)
+    subject = sample.sequence if sample.sequence in dealt else row.subject
+    split = dealt.get(subject)
     if split is not None and sample.split != split:
-        yield f"expected split {split!r}, which the plan dealt to {row.subject}, found {sample.split!r}"
+        yield f"expected split {split!r}, which the plan dealt to {subject}, found {sample.split!r}"
     if shot:
         yield from contradictions(sample, shot, place)
 
 
-def _dealt_split(dataset: Dataset, row: Row) -> str | None:
-    """The split that the plan dealt to a row's model or scene, None where splits are drawn otherwise. A merged part knows its
-    own alone.
+def _dealt_splits(dataset: Dataset, row: Row) -> dict[str, str]:
+    """The splits that the plan dealt to models, scenes or sequences by the time of a row, none where splits are drawn
+    otherwise. A merged part knows its own alone.
     """
     part = dataset.plan.parts[row.part]
     parts = (part,) if part.merged else dataset.plan.parts[: row.part + 1]
-    return next((one.dealt_splits[row.subject] for one in parts if row.subject in one.dealt_splits), None)
+    return {name: split for one in reversed(parts) for name, split in one.dealt_splits.items()}
 
 
 def _proofs_by_models(sample: Sample, again: Again, caster: RayCaster | None) -> Iterator[tuple[str, list[str]]]:

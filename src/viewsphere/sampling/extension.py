@@ -133,7 +133,8 @@ def whole(planned: Plan) -> Portion:
 
 def resumed(planned: Plan, there: PlanRecord, number: int) -> Portion:
     """A part of a data set that this plan began before."""
-    return Portion(planned.keeping(_splits(there.parts[:number])), there, number)
+    wanted, _ = numbered(there, planned.pose_list)
+    return Portion(planned.keeping(_splits(there.parts[:number]), wanted), there, number)
 
 
 def extend(planned: Plan, there: PlanRecord) -> Portion:
@@ -144,8 +145,8 @@ def extend(planned: Plan, there: PlanRecord) -> Portion:
     with planned.recipe.located():
         check_fit(planned, there)
         held_splits = _splits(there.parts)
-        planned = planned.keeping(held_splits)
         wanted, names = numbered(there, planned.pose_list)
+        planned = planned.keeping(held_splits, wanted)
         blocks = tuple(_missing(planned, there, wanted))
         supplies = tuple(_supplies(planned, there, wanted))
         categories = _categories(planned, there)
@@ -186,7 +187,7 @@ def extend(planned: Plan, there: PlanRecord) -> Portion:
 
 
 def _splits(parts: Sequence[Part]) -> dict[str, str]:
-    """The split of every model or scene that these parts brought, where splits are by these."""
+    """The split of every model, scene or sequence that these parts brought, where splits are by these."""
     return {key: split for part in parts for key, split in part.dealt_splits.items()}
 
 

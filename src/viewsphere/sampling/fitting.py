@@ -48,6 +48,7 @@ def settings(planned: Plan) -> dict[str, str]:
         value |= {f"scenes.{name}": options[name] for name in options}
     if recipe.time is not None:
         value["time"] = recipe.time.model_dump(mode="json")
+        value["viewpoints.shake"] = viewpoints.get("shake")
     if recipe.tracks is not None:
         value["tracks"] = recipe.tracks.model_dump(mode="json")
     digests = {name: hashlib.sha256(json.dumps(value[name]).encode()).hexdigest()[:16] for name in value}

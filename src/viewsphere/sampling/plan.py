@@ -38,7 +38,7 @@ from viewsphere.sampling.recipe_warnings import hidden_by_exposure, no_light, ou
 from viewsphere.sampling.rigs import rig_of
 from viewsphere.sampling.samplers import Sampler, Stock, lens
 from viewsphere.sampling.scenes import is_night
-from viewsphere.sampling.sequence_poses import poses_of
+from viewsphere.sampling.sequence_poses import SequencePoses, poses_of
 from viewsphere.sampling.splits import expected
 from viewsphere.sampling.time_steps import check_keys, timed
 from viewsphere.sampling.tracks import tracks_digest, tracks_of
@@ -159,10 +159,18 @@ class Plan(Stock):
         """The split of a frame."""
         return self.sampler.split(self, subject, pose)
 
-    def keeping(self, splits: Mapping[str, str]) -> Plan:
-        """The same plan for a data set that has some of its models and scenes in these splits already."""
-        kept = {key: name for key, name in splits.items() if key in self.dealt_splits}
-        return _composed(replace(self, kept_splits=kept)) if kept else self
+    def keeping(self, splits: Mapping[str, str], poses: Sequence[int] = ()) -> Plan:
+        """The same plan for a data set that has some of its models, scenes and sequences in these splits already, and these
+        numbers for the plan's poses.
+        """
+        own = self if not isinstance(self.pose_list, SequencePoses) else self._numbering(self.pose_list.instants, poses)
+        kept = {key: name for key, name in splits.items() if key in own.dealt_splits}
+        return _composed(replace(own, kept_splits=kept)) if kept else own
+
+    def _numbering(self, instants: int, poses: Sequence[int]) -> Plan:
+        """The same plan, whose sequences are numbered as those of a data set, where it has these numbers for their poses."""
+        numbers = tuple(pose // instants for pose in poses[::instants])
+        return self if numbers == tuple(range(len(numbers))) else _composed(replace(self, sequence_numbers=numbers))
 
     @cached_property
     def blocks(self) -> tuple[Block, ...]:

@@ -17,7 +17,7 @@ from pydantic import TypeAdapter
 
 from viewsphere.recipe.sequence import TimeEntry
 from viewsphere.recipe.viewpoints import Viewpoints
-from viewsphere.sampling.sequence_poses import SequencePoses, poses_of
+from viewsphere.sampling.sequence_poses import SequencePoses, TrajectoryPoses, poses_of
 from viewsphere.sampling.time_steps import TimedPoses
 from viewsphere.sampling.viewpoints import ListedPoses, Poses
 from viewsphere.store import Part, PlanRecord
@@ -30,9 +30,11 @@ _VIEWPOINTS: TypeAdapter[Viewpoints] = TypeAdapter(Viewpoints)
 
 
 def pose_names(views: Poses) -> Names:
-    """The digest of every pose."""
+    """The digest of every pose; one of a camera that moves is known by its whole motion."""
+    moving = isinstance(views, SequencePoses) and isinstance(views.base, TrajectoryPoses)
+    motion = (views.viewpoints.model_dump_json(), views.digest) if moving else ()
     digests = (
-        hashlib.blake2b(repr((views.name(i), tuple(views.view(i)), views.target(i))).encode(), digest_size=8).digest()
+        hashlib.blake2b(repr((views.name(i), tuple(views.view(i)), views.target(i), *motion)).encode(), digest_size=8).digest()
         for i in range(len(views))
     )
     return np.frombuffer(b"".join(digests), np.dtype("<u8"))

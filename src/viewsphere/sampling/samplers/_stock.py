@@ -51,6 +51,7 @@ class Stock(Sendable):
     entries: tuple[int, ...] = ()  # of each model, the number of its entry in the recipe
     tracks: Tracks | None = None  # what every sequence's sensors follow
     timelines: tuple[Timeline | None, ...] = ()  # of each model, the animation of its file that it plays in sequences
+    sequence_numbers: tuple[int, ...] = ()  # of each viewpoint of sequences, a data set's number; none where it has the same
 
     @cached_property
     def rig(self) -> Rig:
@@ -130,7 +131,9 @@ class Stock(Sendable):
     def sequence(self, subject: str, pose: int) -> str:
         """The name of the sequence that a pose belongs to: the subject's, and where it has several the viewpoint's number."""
         assert isinstance(self.pose_list, SequencePoses)
-        return subject if len(self.pose_list.base) == 1 else f"{subject}-{pose // self.pose_list.instants:06d}"
+        view = pose // self.pose_list.instants
+        number = self.sequence_numbers[view] if self.sequence_numbers else view
+        return f"{subject}-{number:06d}" if number or len(self.pose_list.base) > 1 else subject
 
     def hashed_split(self, subject: str, pose: int) -> str:
         """The split of a frame, where splits are by pose, place or frame."""
