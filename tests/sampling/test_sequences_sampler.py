@@ -8,6 +8,7 @@ from small import small_recipe, tree_hash
 from viewsphere.check import check
 from viewsphere.errors import RecipeError
 from viewsphere.model.scene import Floor
+from viewsphere.run.merging import merge
 
 
 def recipe(**changes):
@@ -142,3 +143,16 @@ def test_a_data_set_of_sequences_is_proved_and_does_not_depend_on_how_it_was_cut
             ("post_box_001-000000", 0, 0.0),
         ]
     assert made[2] == made[5]
+
+
+def test_merged_sequences_of_one_name_stay_apart(tmp_path):
+    for name, elevation in (("a", 20), ("b", 40)):
+        seen_from = {"azimuth": 0, "elevation": elevation, "distance": 4}
+        vs.generate(recipe(models=MODELS, viewpoints=seen_from, time={"frames": 3}), tmp_path / name, workers=0)
+    merged = merge([tmp_path / "a", tmp_path / "b"], tmp_path / "both")
+    names = ("post_box_000", "post_box_001")
+    assert merged.sequences == (*names, *(f"{name}-merged-2" for name in names))
+    for name, elevation in [*((name, 20) for name in names), *((f"{name}-merged-2", 40) for name in names)]:
+        samples = merged.sequence(name)
+        assert [(s.instant, s.pose.elevation_deg) for s in samples] == [(i, elevation) for i in range(3)]
+    assert check(merged).ok

@@ -18,6 +18,9 @@ from viewsphere.model.model_spec import Size
 from viewsphere.model.rig import CAMERA
 from viewsphere.model.shot import Shot
 
+MERGED = "-merged-"
+"""Between the name of a sequence and its number, where merged data sets have several of one name."""
+
 Float = NDArray[np.float64]
 Box = tuple[float, float, float, float]
 

@@ -17,7 +17,7 @@ import numpy as np
 from viewsphere.errors import StoreError, UserError
 from viewsphere.labels import channels
 from viewsphere.model.camera import Intrinsics
-from viewsphere.model.sample import ObjectAnnotation, Sample
+from viewsphere.model.sample import MERGED, ObjectAnnotation, Sample
 from viewsphere.run.progress import Listener, Progress
 from viewsphere.sampling.pose_numbers import kept, names_of
 from viewsphere.store import Block, Category, Dataset, ModelInfo, Part, PlanRecord, Row, Store, encode
@@ -36,6 +36,11 @@ class _Source:
     first_pose: int
     categories: Mapping[int, Category]
     model_keys: Mapping[str, str]
+    sequences: Mapping[str, str]  # of those that an earlier source has, too, the new names
+
+    def named(self, old: str) -> str:
+        """The new name of a model or of a sequence."""
+        return self.sequences.get(old) or self.model_keys.get(old, old)
 
     @property
     def keeps_categories(self) -> bool:
@@ -155,10 +160,17 @@ def _reconciled(datasets: Sequence[Dataset]) -> tuple[tuple[Category, ...], tupl
             joined[category.id] = _joined(categories, category, {c.id for c in joined.values()})
         own = (info for info in dataset.models if not info.track)
         model_keys = {info.key: _key_for(contents, info, joined[info.category_id]) for info in own}
-        sources.append(_Source(dataset, number, frames, poses, joined, model_keys))
+        taken = {source.sequences.get(name, name) for source in sources for name in source.dataset.sequences}
+        renamed = {name: _free(name, taken) for name in dataset.sequences if name in taken}
+        sources.append(_Source(dataset, number, frames, poses, joined, model_keys, renamed))
         frames += len(dataset)
         poses += dataset.plan.poses
     return tuple(sorted(categories.values(), key=lambda c: c.id)), tuple(contents), tuple(sources)
+
+
+def _free(name: str, taken: set[str]) -> str:
+    """A sequence's new name, which no earlier source has."""
+    return next(new for number in count(2) if (new := f"{name}{MERGED}{number}") not in taken)
 
 
 def _joined(categories: dict[int, Category], category: Category, others: set[int]) -> Category:
@@ -235,7 +247,7 @@ def _parts(source: _Source) -> Iterator[Part]:
                 supplies=(),
                 new_poses=plan.poses if first == source.first_frame else 0,
                 pose_names=names if first == source.first_frame else "",
-                dealt_splits={source.model_keys.get(key, key): split for key, split in part.dealt_splits.items()},
+                dealt_splits={source.named(key): split for key, split in part.dealt_splits.items()},
                 merged=True,
             )
         first += frames
@@ -271,6 +283,7 @@ def _renumbered(source: _Source, sample: Sample, index: int) -> ForeignFrame:
     moved = replace(
         sample,
         index=index,
+        sequence=source.sequences.get(sample.sequence, sample.sequence),
         known_pose=pose and pose.model_copy(update={"index": pose.index + source.first_pose}),
         objects=tuple(_moved_object(source, o) for o in sample.objects),
     )
