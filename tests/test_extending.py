@@ -111,7 +111,7 @@ def test_a_label_of_another_name_than_its_file_is_refused(labelled):
 def test_a_channel_that_needs_its_neighbours_is_refused_for_still_pictures(labelled):
     code = EXAMPLES["borders"].replace("import ChannelLabel", "import ChannelLabel, Needs")
     labelled("borders", code.replace("compute=compute,", "compute=compute, needs=Needs(instants=(-1, 1)),"))
-    with pytest.raises(RecipeError, match=r"channels\[1\]: expected a label of single pictures; found 'borders', .* -1, \+1"):
+    with pytest.raises(RecipeError, match=r"channels\[1\]: expected time beside borders, .*; found none: set time"):
         plan(small_recipe(channels=["rgb", "borders"]))
 
 

@@ -203,14 +203,14 @@ class Arrangement:
         """Scene-linear, premultiplied, (H, W, 4) float32; with `is_open` the background is left empty."""
         if self.options.draws:
             return self._drawn(camera, is_open, visibility, sweeping)
-        return self._radiance(camera, is_open, sweeping)
+        return self._radiance(camera, is_open, sweeping=sweeping)
 
     def _drawn(self, camera: Camera, is_open: bool, visibility: Visibility, sweeping: Sweeping) -> Float32:
         """The picture of a renderer that draws: with a tight clipping range, as the depth buffer has a limited precision."""
         clip = clip_of(visibility, self.geometry, camera)
         if self.backdrop is None:
-            return self._radiance(camera, is_open, sweeping, clip)
-        colors = self._radiance(camera, True, sweeping, clip)
+            return self._radiance(camera, is_open, clip, sweeping)
+        colors = self._radiance(camera, True, clip, sweeping)
         return self.backdrop.behind(colors, camera, visibility, is_open)
 
     @cached_property
@@ -220,21 +220,24 @@ class Arrangement:
             return None
         return Backdrop.of(self.shot, self.geometry)
 
-    def _radiance(self, camera: Camera, is_open: bool, sweeping: Sweeping, clip: Clip = (NEAREST, FARTHEST)) -> Float32:
+    def _radiance(
+        self, camera: Camera, is_open: bool, clip: Clip = (NEAREST, FARTHEST), sweeping: Sweeping | None = None
+    ) -> Float32:
         """Scene-linear, premultiplied, (H, W, 4) float32; a Blender that dies is started again, once."""
         died: BlenderDied | None = None
         for _ in range(2):
             try:
-                return self._rendered(camera, is_open, sweeping, clip)
+                return self._rendered(camera, is_open, clip, sweeping)
             except BlenderDied as error:
                 self.keeper.drop()
                 died = error
         raise ModelError(f"{', '.join(sorted({p.model.key for p in self.things}))}: {died}")
 
-    def _rendered(self, camera: Camera, is_open: bool, sweeping: Sweeping, clip: Clip) -> Float32:
+    def _rendered(self, camera: Camera, is_open: bool, clip: Clip, sweeping: Sweeping | None) -> Float32:
         views = views_of(camera)
         process = self.keeper.process_for(self, self._levels([view.camera for view in views]))
-        pictures = [self._picture(process, view.camera, is_open, clip, sweeping.request(i)) for i, view in enumerate(views)]
+        swept = (sweeping and sweeping.request(i) for i in range(len(views)))
+        pictures = [self._picture(process, view.camera, is_open, clip, sweep) for view, sweep in zip(views, swept, strict=True)]
         return resampled(camera, views, pictures)
 
     def _picture(self, process: BlenderProcess, camera: Camera, is_open: bool, clip: Clip, blur: Request | None) -> Float32:
