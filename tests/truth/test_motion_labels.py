@@ -9,10 +9,12 @@ import pytest
 from truth_scenes import FISHEYE, cube, lens, mesh_of, orbit_camera, sphere
 from two_views import pose, view
 
+from viewsphere.geometry.rotation import rigid
 from viewsphere.labels import Needs, Sight, channel_labels
 from viewsphere.labels._wheel import picture, wheel
 from viewsphere.model.camera import Camera
 from viewsphere.model.files import Files
+from viewsphere.model.rig import Rig, Sensor
 from viewsphere.model.sample import Sample
 from viewsphere.store.channel_files import decode, encode
 from viewsphere.truth.view import View
@@ -26,12 +28,23 @@ AHEAD = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])  # looks along +Y, Z up
 FLOOR = -1.0
 
 
+def from_own(own, camera):
+    """The pose of a camera in the axes of another."""
+    return rigid(own.R @ camera.R.T, own.R @ (camera.center - own.center)).tolist()
+
+
 @dataclass(frozen=True)
 class Beside:
     """Views by instant and sensor; None is the picture's own."""
 
     views: dict[tuple[int, str | None], View]
-    sensors: tuple[str, ...] = ()
+
+    @property
+    def partner(self):
+        own = self.views[0, None].camera
+        others = {name: view.camera for (step, name), view in self.views.items() if name and not step}
+        mounted = (Sensor(name=n, intrinsics=c.intrinsics, rig_from_sensor=from_own(own, c)) for n, c in others.items())
+        return Rig(sensors=(Sensor(name="own", intrinsics=own.intrinsics), *mounted)).partner(0)
 
     def view(self, instants, sensor):
         return self.views.get((instants, sensor))
@@ -40,8 +53,7 @@ class Beside:
 def sight_of(own, around=None):
     around = around or {}
     views = {(0, None): own} | around
-    sensors = tuple(dict.fromkeys(name for _, name in around if name))
-    return Sight(own.geometry, own.camera, rasterize(own.geometry, own.camera), (), Beside(views, sensors))
+    return Sight(own.geometry, own.camera, rasterize(own.geometry, own.camera), (), Beside(views))
 
 
 def observed(sight, *names):
@@ -198,6 +210,13 @@ def test_sensors_that_are_not_rectified_give_no_disparity(camera):
     assert (observed(there, "disparity_state")["disparity_state"] == 4).all()
     both = sight_of(own, {(0, "odd"): replace(own, camera=camera), (0, "even"): replace(own, camera=at(LENS, -0.2))})
     assert np.nanmax(observed(both, "disparity")["disparity"]) > 0
+
+
+def test_a_calibration_s_rounding_is_no_turn():
+    own = scene(at(LENS), 0)
+    turned = Camera(LENS, AHEAD + 1e-12, at(LENS, 0.1).t)
+    found = observed(sight_of(own, {(0, "right"): replace(own, camera=turned)}), "disparity", "disparity_state")
+    assert np.nanmax(found["disparity"]) > 0 and (found["disparity_state"] == 0).any()
 
 
 def test_a_bent_lens_has_no_rectified_sensor():

@@ -26,8 +26,8 @@ class Around(Protocol):
     """The views beside that of a picture."""
 
     @property
-    def sensors(self) -> Sequence[str]:
-        """Names of the rig's other sensors, in its order."""
+    def partner(self) -> tuple[str, float] | None:
+        """Name of a sensor that is rectified with the picture's own, and the metres between them; None without one."""
         ...
 
     def view(self, instants: int, sensor: str | None) -> View | None:
@@ -65,6 +65,17 @@ class Sight:
             own, other = self.neighbour(), self.neighbour(instants, sensor)
             self._matches[instants, sensor] = Match(own, self.visibility, other) if own and other else None
         return self._matches[instants, sensor]
+
+    @property
+    def baseline(self) -> float | None:
+        """Metres to the sensor that is rectified with the picture's own, None without one."""
+        partner = self.around.partner if self.around else None
+        return partner and partner[1]
+
+    def partner_match(self) -> Match | None:
+        """Where the picture's points are in the picture that is rectified with it, None without one."""
+        partner = self.around.partner if self.around else None
+        return None if partner is None else self.match(0, partner[0])
 
     @cached_property
     def rays(self) -> NDArray[np.float64]:

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from viewsphere.labels._label import ChannelLabel, Drawing, Extent, Models, Needs, Picture, channel_of
 from viewsphere.labels._sight import Sight
-from viewsphere.labels._stereo import pair
 from viewsphere.model.sample import Sample
 
 
@@ -19,11 +18,11 @@ def compute(sight: Sight) -> NDArray[np.float32]:
     The other picture is that of the first of the rig's sensors that is rectified with the own one. NaN without such a sensor,
     and where a flat picture is seen.
     """
-    out, other, own = sight.empty(np.float32), pair(sight), sight.neighbour()
-    if other is None or own is None:
+    out, baseline, own = sight.empty(np.float32), sight.baseline, sight.neighbour()
+    if baseline is None or own is None:
         out.fill(np.nan)
         return out
-    np.multiply(sight.inverse_depth, sight.camera.intrinsics.fx * other.baseline, out=out, casting="same_kind")
+    np.multiply(sight.inverse_depth, sight.camera.intrinsics.fx * baseline, out=out, casting="same_kind")
     if not own.is_sky_endless:
         out[sight.visibility.triangle < 0] = np.nan
     return out

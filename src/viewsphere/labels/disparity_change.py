@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from viewsphere.labels._label import ChannelLabel, Drawing, Extent, Models, Needs, Picture, channel_of
 from viewsphere.labels._sight import Sight
-from viewsphere.labels._stereo import pair
 from viewsphere.model.sample import Sample
 
 
@@ -18,12 +17,12 @@ def compute(sight: Sight) -> NDArray[np.float32]:
 
     NaN where the point is behind the camera then, where it is gone, and without a rectified sensor or a later instant.
     """
-    out, other, match = sight.empty(np.float32), pair(sight), sight.match(1)
-    if other is None or match is None:
+    out, baseline, match = sight.empty(np.float32), sight.baseline, sight.match(1)
+    if baseline is None or match is None:
         out.fill(np.nan)
         return out
     now, then = sight.camera.intrinsics.fx, match.other.camera.intrinsics.fx
-    out[...] = other.baseline * (then * match.inverse_depth - now * sight.inverse_depth)
+    out[...] = baseline * (then * match.inverse_depth - now * sight.inverse_depth)
     out[np.isnan(match.xy[..., 0]) & (sight.visibility.triangle >= 0)] = np.nan
     return out
 

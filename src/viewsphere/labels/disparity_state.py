@@ -8,12 +8,11 @@ from numpy.typing import NDArray
 from viewsphere.labels import _state
 from viewsphere.labels._label import ChannelLabel, Needs
 from viewsphere.labels._sight import Sight
-from viewsphere.labels._stereo import pair_match
 
 
 def compute(sight: Sight) -> NDArray[np.uint8]:
     """The state of the seen point in the other sensor's picture of the same instant, (H, W)."""
-    return _state.state(sight, pair_match(sight))
+    return _state.state(sight, sight.partner_match())
 
 
 LABEL = ChannelLabel(

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.geometry.camera import project
+from viewsphere.geometry.rotation import transform
 from viewsphere.labels._label import ChannelLabel, Color, Drawing, Models, Needs, channel_of
 from viewsphere.labels._sight import Sight
 from viewsphere.model.sample import Sample
@@ -88,8 +89,14 @@ def _whole_end(places: list[tuple[float, float]]) -> list[tuple[float, float]]:
 
 def positions(sample: Sample) -> NDArray[np.float64]:
     """Where a sample's points are in its picture, (N, 2) pixels; NaN where its lens does not show them."""
+    return project(sample.camera.intrinsics, in_camera(sample))[0]
+
+
+def in_camera(sample: Sample) -> NDArray[np.float64]:
+    """A sample's points in its camera's axes, (N, 3) metres; of the sky a direction."""
     camera, point = sample.camera, sample.channels["tracks"]["point"]
-    return project(camera.intrinsics, point[:, :3] @ camera.R.T + point[:, 3:] * camera.t)[0]
+    turned = transform(camera.R, point[:, :3])
+    return np.where(point[:, 3:] == 0.0, turned, turned + camera.t)
 
 
 def colors_of(rows: NDArray[np.void], width: int, height: int) -> list[Color]:

@@ -70,6 +70,12 @@ class Rig(Frozen):
         found = ((i, j, _baseline(left, right)) for (i, left), (j, right) in numbered)
         return tuple(Pair(i, j, baseline) for i, j, baseline in found if baseline is not None)
 
+    def partner(self, sensor: int) -> tuple[str, float] | None:
+        """Name of the first sensor that is rectified with another one, counted from 0, and the metres between them; or None."""
+        pairs = self.rectified
+        beside = sorted((right if left == sensor else left, b) for left, right, b in pairs if sensor in (left, right))
+        return (self.sensors[beside[0][0]].name, beside[0][1]) if beside else None
+
     @staticmethod
     def of(intrinsics: Intrinsics) -> Rig:
         """The rig of one camera with this lens."""

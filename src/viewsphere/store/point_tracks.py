@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.errors import StoreError
-from viewsphere.geometry.camera import project
-from viewsphere.geometry.rotation import transform
+from viewsphere.labels.tracks import in_camera, positions
 from viewsphere.model.sample import Sample
 
 Float = NDArray[np.float64]
@@ -50,7 +49,7 @@ def joined(samples: Sequence[Sample]) -> PointTracks:
     for sample, row in zip(samples, known, strict=True):
         if not all(np.array_equal(row[name], first[name]) for name in ("instant", "query", "object")):
             raise StoreError(f"tracks: expected the same points all through a sequence; found others in frame {sample.index}")
-    parts = [_in_picture(sample, row["point"]) for sample, row in zip(samples, known, strict=True)]
+    parts = [_in_picture(sample) for sample in samples]
     xy, xyz, world = (np.stack([part[k] for part in parts]) for k in range(3))
     return PointTracks(
         ids=np.arange(len(first)),
@@ -64,11 +63,9 @@ def joined(samples: Sequence[Sample]) -> PointTracks:
     )
 
 
-def _in_picture(sample: Sample, points: Float) -> tuple[Float, Float, Float]:
-    """Where homogeneous points (N, 4) of the world are in a sample's picture (N, 2), in its camera's axes and in the world."""
-    camera, is_sky = sample.camera, points[:, 3] == 0.0
-    turned = transform(camera.R, points[:, :3])
-    xyz = np.where(is_sky[:, None], turned, turned + camera.t)
-    xy, _ = project(camera.intrinsics, xyz)
+def _in_picture(sample: Sample) -> tuple[Float, Float, Float]:
+    """Where a sample's points are in its picture (N, 2), in its camera's axes and in the world, (N, 3)."""
+    point, xyz = sample.channels["tracks"]["point"], in_camera(sample)
+    is_sky = point[:, 3] == 0.0
     xyz[is_sky] = (np.nan, np.nan, np.inf)
-    return xy, xyz, np.where(is_sky[:, None], np.nan, points[:, :3])
+    return positions(sample), xyz, np.where(is_sky[:, None], np.nan, point[:, :3])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import zlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -157,9 +157,9 @@ class SampleViews:
     sensor: int
 
     @property
-    def sensors(self) -> Sequence[str]:
-        """Names of the rig's other sensors, in its order."""
-        return tuple(one.name for i, one in enumerate(self.views.shot.rig.sensors) if i != self.sensor)
+    def partner(self) -> tuple[str, float] | None:
+        """Name of a sensor that is rectified with the sample's own, and the metres between them; None without one."""
+        return self.views.shot.rig.partner(self.sensor)
 
     def view(self, instants: int, sensor: str | None) -> View | None:
         """That of a sensor, None for the sample's own, so many instants later; None without such a sensor or instant."""

@@ -93,6 +93,13 @@ class Stock(Sendable):
         blend = () if self.blend is None else self.blend.steps(spec)
         return tuple(chain((step for step in own if step is not None), blend))
 
+    def with_company(self, key: str, pose: int | None) -> tuple[ModelSpec, ...]:
+        """The model of this key and its company; without a pose only the model, where company is drawn for each frame."""
+        spec = self.spec(key)
+        if self.composition is None or (pose is None and self.recipe.scene.is_moved_each_frame):
+            return (spec,)
+        return self.composition.cast(spec, None if pose is None else self.scene_pose(pose))
+
     def spec(self, key: str) -> ModelSpec:
         """The model of this key."""
         return self.model_specs[self.position[key]]

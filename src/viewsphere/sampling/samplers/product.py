@@ -60,10 +60,7 @@ def most_objects(recipe: Recipe) -> int:
 
 def cast(stock: Stock, subject: str, pose: int | None) -> tuple[ModelSpec, ...]:
     """The model and those that stand beside it; only the model without a pose where company is drawn for each frame."""
-    spec = stock.spec(subject)
-    if stock.composition is None or (pose is None and stock.recipe.scene.is_moved_each_frame):
-        return (spec,)
-    return stock.composition.cast(spec, None if pose is None else stock.scene_pose(pose))
+    return stock.with_company(subject, pose)
 
 
 def split(stock: Stock, subject: str, pose: int) -> str:

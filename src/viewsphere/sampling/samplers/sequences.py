@@ -81,10 +81,7 @@ def cast(stock: Stock, subject: str, pose: int | None) -> tuple[ModelSpec, ...]:
     """The recipe's models in a sequence; only the model itself where company is drawn for each sequence and none is named."""
     if stock.recipe.scenes is not None:
         return scene_cast(stock, subject)
-    spec = stock.spec(subject)
-    if stock.composition is None or (pose is None and stock.recipe.scene.is_moved_each_frame):
-        return (spec,)
-    return stock.composition.cast(spec, None if pose is None else stock.scene_pose(pose))
+    return stock.with_company(subject, pose)
 
 
 def split(stock: Stock, subject: str, pose: int) -> str:
@@ -148,7 +145,7 @@ def _instant(stock: Stock, own: Course, subject: str, pose: int, box_of: BoxOf) 
 def _needed(stock: Stock, taken: Set[int]) -> set[int]:
     """The instants that labels of those that are taken need besides."""
     known = channel_labels()
-    names = {name for sensor in stock.rig.sensors for name in sensor.channels or stock.recipe.channels}
+    names = {name for sensor in stock.rig.sensors for name in sensor.kept(stock.recipe.channels)}
     offsets = {offset for name in names if name in known for offset in known[name].needs.instants}
     count = time_of(stock).count
     compared = {number + offset for number in taken for offset in offsets if 0 <= number + offset < count}
