@@ -13,14 +13,13 @@ from viewsphere.model.scene import Vector
 from viewsphere.recipe.sequence import TimeEntry
 from viewsphere.recipe.viewpoints import Viewpoints
 from viewsphere.sampling.trajectories import Trajectory, is_still, trajectory
-from viewsphere.sampling.viewpoints import Orbit, Poses, poses
+from viewsphere.sampling.viewpoints import Orbit, Poses, RepeatedPoses, poses
 
 
 @dataclass(frozen=True)
-class SequencePoses(Poses):
+class SequencePoses(RepeatedPoses):
     """Poses that stand still for all instants of a sequence; the pose is the outer loop, the instant the inner one."""
 
-    base: Poses
     instants: int
 
     @property
@@ -29,24 +28,9 @@ class SequencePoses(Poses):
         return hashlib.sha256(repr((self.base.digest, self.instants)).encode()).hexdigest()
 
     @property
-    def intrinsics(self) -> Intrinsics | None:
-        """The lens that a file of poses names."""
-        return self.base.intrinsics
-
-    @property
-    def lowest_elevation(self) -> float:
-        """That of the poses."""
-        return self.base.lowest_elevation
-
-    @property
     def counts(self) -> dict[str, int]:
         """Those of the poses, then the number of instants."""
         return {**self.base.counts, "instants": self.instants}
-
-    @property
-    def are_known(self) -> bool:
-        """Whether the poses are."""
-        return self.base.are_known
 
     def target(self, index: int) -> Vector | None:
         """The pose's."""

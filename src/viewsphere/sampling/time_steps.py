@@ -12,7 +12,6 @@ from pathlib import Path
 
 from viewsphere.assets.timeline import Blenders, Timeline
 from viewsphere.errors import ModelError, RecipeError
-from viewsphere.model.camera import Intrinsics
 from viewsphere.model.instant import Moment, Viewpoint
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Vector
@@ -20,7 +19,7 @@ from viewsphere.model.thing import TimeStep
 from viewsphere.recipe.models import ModelEntry
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.time import Frames, Steps, chosen_frames
-from viewsphere.sampling.viewpoints import Orbit, Poses
+from viewsphere.sampling.viewpoints import Orbit, Poses, RepeatedPoses
 
 
 @dataclass(frozen=True)
@@ -53,26 +52,15 @@ class Run:
 
 
 @dataclass(frozen=True)
-class TimedPoses(Poses):
+class TimedPoses(RepeatedPoses):
     """Poses at moments; the moment is the outer loop. At no moment (None) they are the poses themselves."""
 
-    base: Poses
     moments: tuple[Moment | None, ...]
 
     @property
     def digest(self) -> str:
         """SHA-256 of the moments, and of what stands in a file of poses."""
         return hashlib.sha256(repr((self.base.digest, self.moments)).encode()).hexdigest()
-
-    @property
-    def intrinsics(self) -> Intrinsics | None:
-        """The lens that a file of poses names."""
-        return self.base.intrinsics
-
-    @property
-    def lowest_elevation(self) -> float:
-        """That of the poses."""
-        return self.base.lowest_elevation
 
     @property
     def counts(self) -> dict[str, int]:

@@ -123,6 +123,28 @@ class Poses(Sequence[Viewpoint]):
 
 
 @dataclass(frozen=True)
+class RepeatedPoses(Poses):
+    """Poses that are each taken several times."""
+
+    base: Poses
+
+    @property
+    def intrinsics(self) -> Intrinsics | None:
+        """The lens that a file of poses names."""
+        return self.base.intrinsics
+
+    @property
+    def lowest_elevation(self) -> float:
+        """That of the poses."""
+        return self.base.lowest_elevation
+
+    @property
+    def are_known(self) -> bool:
+        """Whether the poses are."""
+        return self.base.are_known
+
+
+@dataclass(frozen=True)
 class GridPoses(Poses):
     """All combinations of a grid: tilt outermost, then distance, elevation, azimuth innermost."""
 
