@@ -1,16 +1,26 @@
-"""Generated pages: the command line, the table of channels, the recipe's schema, and tables of fields and options."""
+"""The documentation: pages and pictures that are made from the code, and the site made of all pages.
+
+scripts/docs                 # generate: write what is generated; with --check only say whether it is true
+scripts/docs build           # the site, into site/; a warning is an error, and so is a link that leads nowhere
+scripts/docs serve           # the site at http://localhost:8000, built again whenever a page changes
+"""
 
 from __future__ import annotations
 
+import argparse
 import inspect
 import json
 import re
+import subprocess
 import sys
 from enum import Enum
+from functools import partial
 from pathlib import Path
 from typing import Any, get_args
 
 import numpy as np
+import site_links
+from figures import FIGURES
 from typer.models import ArgumentInfo
 
 from viewsphere import plugins
@@ -36,7 +46,18 @@ def cli_page() -> str:
         if rows:
             cells = "".join(f"| {', '.join(f'`{n}`' for n in name.split())} | {help_} |\n" for name, help_ in rows)
             text += f"\n| | |\n|---|---|\n{cells}"
-    return text
+    return text + "\n## Options of formats\n" + format_options()
+
+
+def format_options() -> str:
+    """All options of all formats, as `--format-option` sets them."""
+    told = {name: getattr(plugins.load("formats", name), "Options", None) for name in plugins.names("formats")}
+    fields = {f"{name}.{field}": spec for name, kind in told.items() if kind for field, spec in properties(kind).items()}
+    return fields_table({"": {"properties": fields}}, ["="])
+
+
+def properties(kind: Any) -> dict[str, Any]:
+    return kind.model_json_schema()["properties"]
 
 
 def row(parameter: inspect.Parameter) -> tuple[str, str]:
@@ -90,14 +111,14 @@ def channels_page() -> str:
 OPTIONS = re.compile(r"(<!-- options of (\w+), written by scripts/docs -->\n).*?(?=\n<!-- end -->)", re.DOTALL)
 
 
-def motion_page() -> str:
+def options_page(plugin: plugins.Kind, page: str) -> str:
     """The hand-written page with a table of each kind's options."""
-    return OPTIONS.sub(lambda found: found[1] + options_table(found[2]), (DOCS / "motion.md").read_text("utf-8"))
+    return OPTIONS.sub(lambda found: found[1] + options_table(plugin, found[2]), (DOCS / page).read_text("utf-8"))
 
 
-def options_table(kind: str) -> str:
-    """The options of a kind of motion, and of what it has lists of."""
-    told = plugins.load("motions", kind).Options.model_json_schema()
+def options_table(plugin: plugins.Kind, kind: str) -> str:
+    """The options of a plug-in, and of what it has lists of."""
+    told = plugins.load(plugin, kind).Options.model_json_schema()
     parts = {name: part for name, part in told.get("$defs", {}).items() if name not in ("Distribution", "Gaussian")}
     text = fields_table({kind: told}, [kind])
     return text + "".join(f"\nEach {name.lower()}:\n{fields_table(parts, [name])}" for name in parts)
@@ -148,21 +169,51 @@ def field_type(field: Field) -> str:
 PAGES = {
     "cli.md": cli_page,
     "channels.md": channels_page,
-    "motion.md": motion_page,
+    "formats.md": partial(options_page, "formats", "formats.md"),
+    "motion.md": partial(options_page, "motions", "motion.md"),
     "recipe.md": recipe_page,
     "recipe.schema.json": lambda: json.dumps(schema(tuple(channels())), indent=1) + "\n",
+    **FIGURES,
 }
 
 
-def main() -> None:
+def generate(check: bool) -> None:
     stale = [name for name, make in PAGES.items() if not (DOCS / name).exists() or (DOCS / name).read_text("utf-8") != make()]
-    if "--check" in sys.argv:
+    if check:
         if stale:
             sys.exit(f"docs/{', docs/'.join(stale)}: expected what the code says, found something else: run scripts/docs")
         return
     for name in stale:
         (DOCS / name).write_text(PAGES[name](), "utf-8")
         print(f"wrote docs/{name}")
+
+
+def zensical(*words: str) -> None:
+    """Run the generator of the site; its own errors are enough."""
+    program = Path(sys.executable).with_name("zensical")
+    status = subprocess.run([program, *words, "--config-file", DOCS.parent / "mkdocs.yml"]).returncode
+    if status:
+        sys.exit(status)
+
+
+def build() -> None:
+    zensical("build", "--clean", "--strict")
+    broken = list(site_links.broken(DOCS.parent / "site"))
+    if broken:
+        sys.exit("\n".join(broken))
+
+
+def main() -> None:
+    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    options.add_argument("do", nargs="?", choices=["generate", "build", "serve"], default="generate")
+    options.add_argument("--check", action="store_true", help="write nothing")
+    told = options.parse_args()
+    if told.do == "generate":
+        generate(told.check)
+    elif told.do == "build":
+        build()
+    else:
+        zensical("serve")
 
 
 if __name__ == "__main__":

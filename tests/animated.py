@@ -1,6 +1,9 @@
-"""Files that move without Blender: what `load_frames` would read of them is computed."""
+"""Files that move: one without Blender, as what `load_frames` would read of it is computed, and glTF."""
 
 from __future__ import annotations
+
+import base64
+import json
 
 import numpy as np
 
@@ -43,7 +46,7 @@ def let_walk(monkeypatch, folder) -> None:
     """Let `walker.fbx`, in this folder, be a file of `LAST` frames, 24 a second, that holds a walker."""
     (folder / "walker.fbx").write_bytes(b"walks")
 
-    def timeline(_, path, confined, clip=None):
+    def timeline(_, path, confined, clip=None, fps=None):
         return Timeline(1, LAST, 24.0, True)
 
     def load_frames(path, frames, **_):
@@ -54,3 +57,40 @@ def let_walk(monkeypatch, folder) -> None:
     monkeypatch.setattr("viewsphere.assets.load.load_frames", load_frames)
     monkeypatch.setenv(READ_HERE, "1")
     monkeypatch.setenv("VIEWSPHERE_CACHE", str(folder / "cache"))
+
+
+def leaf(path, clips: dict[str, float]) -> None:
+    """Write a glTF file of a triangle that moves by 1 m, in animations of these names that take so many seconds each."""
+    corners, way = np.float32([[0, 0, 0], [1, 0, 0], [0, 1, 1]]), np.float32([[0, 0, 0], [1, 0, 0]])
+    arrays = [corners, way, *(np.float32([[0], [seconds]]) for seconds in clips.values())]
+    starts = np.cumsum([0, *(array.nbytes for array in arrays)]).tolist()
+    data = base64.b64encode(b"".join(array.tobytes() for array in arrays)).decode()
+    target = {"node": 0, "path": "translation"}
+    gltf = {
+        "asset": {"version": "2.0"},
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+        "buffers": [{"byteLength": starts[-1], "uri": f"data:application/octet-stream;base64,{data}"}],
+        "bufferViews": [
+            {"buffer": 0, "byteOffset": start, "byteLength": array.nbytes} for start, array in zip(starts, arrays, strict=False)
+        ],
+        "accessors": [
+            {
+                "bufferView": i,
+                "componentType": 5126,
+                "count": len(array),
+                "type": "VEC3" if array.shape[1] == 3 else "SCALAR",
+                "min": array.min(0).tolist(),
+                "max": array.max(0).tolist(),
+            }
+            for i, array in enumerate(arrays)
+        ],
+        "animations": [
+            {"name": name, "samplers": [{"input": i, "output": 1}], "channels": [{"sampler": 0, "target": target}]}
+            for i, name in enumerate(clips, 2)
+        ],
+    }
+    if not clips:
+        del gltf["animations"]  # an empty list is not valid
+    path.write_text(json.dumps(gltf))

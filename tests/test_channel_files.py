@@ -240,7 +240,7 @@ def test_it_is_checked_and_its_exports_name_its_files(other_run):
     assert images
     for image in images:
         assert image["file_name"].endswith(".jpg")
-        with Image.open(other_run / "coco/train" / image["file_name"]) as picture_:
+        with Image.open(other_run / "coco/images/train" / image["file_name"]) as picture_:
             assert (picture_.format, picture_.size) == ("JPEG", (image["width"], image["height"]))
     poses = json.loads((other_run / "native/dataset1.json").read_text())["poses"]
     entry = next(iter(poses["0"]["vehicles_rendered"].values()))

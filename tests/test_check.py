@@ -112,7 +112,7 @@ def test_every_export_that_is_there_is_proved_by_its_format(dataset):
     report = check(Dataset(dataset.root), rays=False)
     assert report.ok, report.findings
     assert (report.checked["coco"], report.checked["native"]) == (12, 12)
-    (dataset.root / "coco" / "train" / "000000000003.png").unlink()
+    (dataset.root / "coco" / "images" / "train" / "000000000003.png").unlink()
     (dataset.root / "native" / "more.txt").touch()
     assert failures(dataset, rays=False) == {("coco", 2), ("native", None)}
     part = check(Dataset(dataset.root), rays=False, frames=6)

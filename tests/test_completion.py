@@ -161,7 +161,7 @@ def test_a_command_without_arguments_says_what_to_write(name, tmp_path, monkeypa
 def test_one_argument_short(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     formats = f"expected one or more of {', '.join(plugins.names('formats'))}"
-    for words, expected in (("export out", formats), ("merge a -o b", "expected a data set")):
+    for words, expected in (("export out", formats), ("merge a -o b", "found no such folder")):
         monkeypatch.setattr(sys, "argv", ["viewsphere", *words.split()])
         with pytest.raises(SystemExit) as end:
             cli.main()

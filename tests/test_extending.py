@@ -15,6 +15,7 @@ import pytest
 from PIL import Image
 
 from sealing import seal_again
+from sequence_recipe import eventful_recipe
 from small import small_recipe
 from viewsphere import Dataset, generate, labels, plan, plugins, render
 from viewsphere.check import check
@@ -60,6 +61,29 @@ def labelled(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[str, str], N
     yield add
     monkeypatch.undo()
     forget()
+
+
+UNSEEN = """
+import numpy as np
+from viewsphere.labels import ChannelLabel, Needs
+
+LABEL = ChannelLabel(
+    name="unseen", meaning="whether the point is hidden an instant later", needs=Needs(instants=(1,)), dtype=np.uint8, empty=4,
+    encoding="png", compute=lambda sight: np.zeros(sight.visibility.triangle.shape, np.uint8)
+    if sight.match(1) is None else sight.match(1).state,
+)
+"""
+
+
+def test_a_label_of_motion_after_tracks_in_the_alphabet_is_computed_again_from_its_own_instants(labelled, tmp_path):
+    """Picking points at four instants writes over the triangles of the instants that labels before it have asked for."""
+    labelled("unseen", UNSEEN)
+    recipe = eventful_recipe(8, channels=["rgb", "flow", "unseen", "tracks"], formats=[])
+    generate(recipe, tmp_path / "out")
+    dataset = Dataset(tmp_path / "out")
+    report = check(dataset)
+    assert report.ok, report.findings
+    assert report.checked["unseen"] == report.checked["tracks"] == len(dataset) > 0
 
 
 def test_a_label_of_pixels_is_one_file(labelled, tmp_path):

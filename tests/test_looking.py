@@ -1,5 +1,6 @@
 """Looking at sequences: filmstrips, drawings of labels of motion, videos."""
 
+import shutil
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -9,7 +10,9 @@ import pytest
 from PIL import Image
 
 from moving import moving_recipe
+from sequence_recipe import eventful_recipe
 from small import small_recipe
+from viewsphere.check import check
 from viewsphere.errors import MissingExtraError, StoreError, UserError
 from viewsphere.labels import TAIL, drawings
 from viewsphere.labels._wheel import picture as wheel_picture
@@ -285,3 +288,25 @@ def test_keys_of_drawings_are_the_colours_that_are_drawn():
     ways = np.array([[[5.0, 0.0], [0.0, 5.0], [-5.0, 0.0], [0.0, -5.0]]])
     assert [list(color) for _, color in known["flow"].key] == wheel_picture(ways, 5.0)[0].tolist()
     assert len({color for _, color in known["flow_state"].key}) == 5
+
+
+def test_what_an_unfinished_data_set_lacks_is_said(tmp_path):
+    sensors = {"left": {}, "right": {"position": [0.1, 0, 0], "channels": ["rgb"]}}
+    made = eventful_recipe(
+        4, rig={"sensors": sensors}, channels=["rgb"], tracks={"grid": 40}, scenes=None, shot_frames=2, formats=[], scene={}
+    )
+    generate(made, tmp_path, workers=0)
+    dataset = Dataset(tmp_path)
+    (name, *_) = dataset.sequences
+    assert dataset.tracks(name, "left").xy.shape[0] == 4
+    with pytest.raises(
+        StoreError, match=r"found right, whose channels lack tracks: add tracks to rig\.sensors\.right\.channels"
+    ):
+        dataset.tracks(name, "right")
+    for row in dataset.plan.rows:
+        shutil.rmtree(dataset.store.shot_folder(row.key))
+    dataset = Dataset(tmp_path)
+    (finding, *_) = check(dataset).findings
+    assert f"{len(made.models)} sequences x 4 instants" in str(finding)
+    with pytest.raises(StoreError, match="--video: expected finished frames, found none: render first"):
+        write_video(dataset, tmp_path / "none.webp")

@@ -76,6 +76,29 @@ def test_near_is_light_and_nothing_is_black():
     assert not depth_picture(np.full((2, 2), np.inf, np.float32)).any()
 
 
+def test_a_picture_of_depth_tells_near_things_apart_before_a_far_horizon():
+    """Each doubling of the distance is as much darker."""
+    picture = depth_picture(np.array([[2.0, 4.0, 8.0, 16.0, 32.0, 64.0]], np.float32), (2.0, 64.0))[0, :, 0].astype(int)
+    assert np.ptp(np.diff(picture)) <= 1 and picture[0] == 255
+
+
+def test_normals_are_drawn_as_in_normal_maps(samples):
+    normals = np.zeros((36, 48, 3), np.float32)
+    normals[:12], normals[12:24], normals[24:30] = (1, 0, 0), (0, -1, 0), (0, 0, -1)
+    channels = {"rgb": np.zeros((36, 48, 3), np.uint8), "normals": normals}
+    right, up, near, nothing = draw_sample(replace(samples[0], channels=channels), ["normals"])[[0, 12, 24, 35], -1].tolist()
+    assert (right, up, near, nothing) == ([255, 128, 128], [128, 255, 128], [128, 128, 255], [0, 0, 0])
+
+
+def test_parts_have_colours_of_their_own_and_the_rest_is_grey(samples):
+    parts = np.repeat(np.arange(12, dtype=np.int32)[None], 4, axis=0)
+    channels = {"rgb": np.full((4, 12, 3), (200, 120, 100), np.uint8), "parts": parts}
+    drawn = draw_sample(replace(samples[0], channels=channels), ["parts"])[0].astype(int)
+    assert np.ptp(drawn[0]) == 0 and (np.ptp(drawn[1:], axis=1) > 100).all()
+    apart = np.abs(drawn[:, None] - drawn[None]).max(axis=2) + 255 * np.eye(12, dtype=int)
+    assert apart.min() > 25
+
+
 def test_contact_sheet_holds_every_tile(samples):
     sheet = contact_sheet(samples, columns=2)
     tile = samples[0].rgb

@@ -13,8 +13,10 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
+from animated import leaf
 from command_line import viewsphere
 from small import ROOT
+from viewsphere.errors import MissingExtraError
 from viewsphere.store.manifest import sealed, unsealed
 
 PAGE = (ROOT / "docs" / "troubleshooting.md").read_text("utf-8")
@@ -41,6 +43,7 @@ FILES = {
     "t.yaml": LIGHT,
     "tab.yaml": "models:\n\t- source: zoo:car\n",
     "star.yaml": "models:\n  - source: *.obj\n",
+    "comma.yaml": "models: [{source: zoo:chair count: 1}]\n",
     "walk.csv": "azimuth,elevation,distance\n0,10,nan\n",
     "short.csv": "azimuth,height\n0,1\n",
     "here/ok.obj": TRIANGLE,
@@ -51,6 +54,8 @@ FILES = {
     "here/empty.glb": "",
     "here/a.step": "ISO-10303-21;",
     "here/a.txt": "no model",
+    "here/a.fbx": "",
+    "here/b.USD": "",
     "here/plain.obj": "mtllib lost.mtl\nusemtl red\n" + TRIANGLE,
     "here/lost.obj": "mtllib lost.mtl\nusemtl a\n" + TRIANGLE,
     "here/away.obj": "mtllib away.mtl\nusemtl a\n" + TRIANGLE,
@@ -87,6 +92,10 @@ def said(tmp_path, monkeypatch):
 COMMANDS = {
     "found a tab": "plan tab.yaml",
     "found a mistake": "plan star.yaml",
+    "expected a comma or the end": "plan comma.yaml",
+    "found a model: look": "render here/ok.obj -o out",
+    "left out: name them": "plan t.yaml --set 'models=[{source: here, category: x}]'",
+    "found no such folder": "check nowhere",
     "did you mean": "plan r.yaml --set scene.grond=on",
     "expected a readable recipe file": "plan gone.yaml",
     "expected field=value": "plan r.yaml --set scene.ground",
@@ -96,6 +105,7 @@ COMMANDS = {
     "shares that add up to 1": "plan r.yaml --set splits.train=0.7",
     "split <name> is empty": "plan r.yaml --set splits.train=0.8 --set splits.val=0.1 --set splits.test=0.1",
     "the ground hides the models": "plan r.yaml --set viewpoints.elevation=-10 --set scene.ground=on",
+    "ground hides about": "plan r.yaml --set viewpoints.elevation=60 --set 'scene={ground: on, background: {image: wood.png}}'",
     "no light<in some>": "plan r.yaml --set scene.sun=off --set scene.sky.strength=0",
     "white is black": "plan r.yaml --set scene.view.exposure=-16",
     "move the models' centre": "plan r.yaml --set scene.jitter.target=[9,9,9]",
@@ -106,7 +116,7 @@ COMMANDS = {
     "normals are missing": "inspect here/dull.obj",
     "set max_frames": "plan r.yaml --set max_frames=3",
     "which format <format> needs": "render r.yaml -o out --workers 0 --set channels=[instances] --format coco",
-    "format: expected one of": "render r.yaml -o out --workers 0 --format kitti",
+    "--format: expected one of": "render r.yaml -o out --workers 0 --format kitti",
     "the camera outside the model": "render r.yaml -o out --workers 0 --set viewpoints.distance=0.1",
     "scene.company.count": "plan r.yaml --set scene.company=5",
     "expected columns": "plan r.yaml --set 'viewpoints={kind: file, path: short.csv}'",
@@ -137,6 +147,7 @@ COMMANDS = {
 """Words of a heading, and a command that prints such a message."""
 
 ON_DATA = {
+    "and no format uses": "render t.yaml -o large --workers 0 --set channels=[rgb,depth,normals] --format coco",
     "choose another output folder, add to it": "render r.yaml -o small --workers 0",
     "expected the channels of": "merge small other -o both",
 }
@@ -158,6 +169,7 @@ TRIED = {
     "limit MAX_READ_SECONDS",
     "files are read by Blender",
     "Blender cannot read it",
+    "its frames are not known",
     "reading it takes more",
     "reading it crashed",
     "it was killed",
@@ -258,6 +270,16 @@ def test_reading_crashes_or_is_killed(said, monkeypatch, tmp_path, how, words):
     monkeypatch.setenv("VIEWSPHERE_CACHE", str(tmp_path / "cache"))
     monkeypatch.setattr(sys, "executable", str(program))
     assert_shown(words, said("inspect here/ok.obj"))
+
+
+def test_an_animated_file_without_blender(said, monkeypatch, tmp_path):
+    def none():
+        raise MissingExtraError("no Blender")
+
+    leaf(tmp_path / "leaf.gltf", {"Walk": 1})
+    monkeypatch.setenv("VIEWSPHERE_CACHE", str(tmp_path / "cache"))
+    monkeypatch.setattr("viewsphere.assets.via_blender.find_blender", none)
+    assert_shown("its frames are not known", said("inspect leaf.gltf"))
 
 
 def test_a_full_disk(said, monkeypatch):

@@ -2,11 +2,10 @@
 
     import viewsphere as vs
 
-    recipe = vs.Recipe.load("recipe.yaml")
-    vs.plan(recipe).frames                     # known before anything is rendered
-    for sample in vs.render(recipe):           # in memory, no disk
+    vs.plan("recipe.yaml").frames              # known before anything is rendered
+    for sample in vs.render("recipe.yaml"):    # in memory, no disk; vs.Recipe.load and vs.Recipe make recipes to pass, too
         sample.rgb, sample.depth, sample.objects[0].box3d
-    vs.generate(recipe, "out", workers=4)      # on disk, resumable
+    vs.generate("recipe.yaml", "out", workers=4)  # on disk, resumable
     dataset = vs.open("out")                   # the same samples from disk
 
 Names are imported when first used, so that importing the package is quick.
@@ -15,6 +14,8 @@ Names are imported when first used, so that importing the package is quick.
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
+
+from viewsphere.model.notebook import Shown
 
 if TYPE_CHECKING:
     from viewsphere.recipe.recipe import Recipe
@@ -26,7 +27,9 @@ if TYPE_CHECKING:
     from viewsphere.store import Dataset
     from viewsphere.store import Dataset as open
 
-__all__ = ["Dataset", "Recipe", "export", "generate", "matches", "open", "plan", "render"]
+    __version__: str
+
+__all__ = ["Dataset", "Recipe", "__version__", "export", "generate", "matches", "open", "plan", "render"]
 
 _HOMES = {
     "Dataset": "store.Dataset",
@@ -40,10 +43,24 @@ _HOMES = {
 }
 
 
+def _html_of(value: Any) -> str:
+    """What notebooks show; drawing is imported when they do."""
+    from viewsphere.plugins import attribute
+
+    return attribute("preview.notebook.html")(value)
+
+
+Shown.html_of = _html_of
+
+
 def __getattr__(name: str) -> Any:
     """Import a public name from its home."""
     from viewsphere.plugins import attribute
 
+    if name == "__version__":
+        from importlib.metadata import version
+
+        return version("viewsphere")
     if name not in _HOMES:
         raise AttributeError(f"module 'viewsphere' has no attribute {name!r}")
     return attribute(_HOMES[name])

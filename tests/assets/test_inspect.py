@@ -2,9 +2,12 @@
 
 import pytest
 
+from animated import leaf
 from viewsphere.assets.inspect import describe
-from viewsphere.errors import ModelError
+from viewsphere.assets.timeline import Blenders
+from viewsphere.errors import MissingExtraError, ModelError
 from viewsphere.model.model_spec import ModelSpec
+from viewsphere.run.inspection import report_lines
 
 WIDE = "v 0 0 0\nv 300 0 0\nv 0 20 0\nv 0 0 100\n"
 
@@ -35,3 +38,26 @@ def test_settings_are_obeyed(write):
 def test_a_bad_file_is_one_error(write):
     with pytest.raises(ModelError, match="empty"):
         describe(write("a.obj", b""))
+
+
+def test_of_what_cannot_move_nothing_is_said_and_blender_is_not_asked(write, monkeypatch, tmp_path):
+    monkeypatch.delattr(Blenders, "timeline")
+    leaf(tmp_path / "leaf.gltf", {})
+    for file in (write("a.obj", WIDE + "f 1 3 2\n"), tmp_path / "leaf.gltf"):
+        report = describe(file)
+        assert report.animation is None
+        assert not any("animation" in line or "clips" in line for line in report_lines(report))
+        assert not any("may move" in line for line in report.suggestions)
+
+
+def test_without_blender_an_animated_file_is_told_to_need_it(monkeypatch, tmp_path):
+    def none():
+        raise MissingExtraError("no Blender")
+
+    monkeypatch.setattr("viewsphere.assets.via_blender.find_blender", none)
+    monkeypatch.setenv("VIEWSPHERE_CACHE", str(tmp_path / "cache"))
+    leaf(tmp_path / "leaf.gltf", {"Walk": 1, "Wave": 0.5})
+    report = describe(tmp_path / "leaf.gltf")
+    assert report.animation is None
+    (said,) = [line for line in report.suggestions if "may move" in line]
+    assert "animated and compressed glTF files are read by Blender, found none" in said

@@ -126,6 +126,22 @@ def composed():
     save("composed.blend")
 
 
+def layerless():
+    """Compositors for which Blender renders nothing: without nodes, of one colour, of muted layers."""
+    for name in ("none", "flat", "muted"):
+        anew()
+        world((1, 1, 1))
+        box("Floor", at(0, 0, -1, 0, (10, 10, 1)))
+        tree, output = compositor()
+        if name == "none":
+            tree.nodes.clear()
+        else:
+            node = tree.nodes.new("CompositorNodeRGB" if name == "flat" else "CompositorNodeRLayers")
+            node.mute = name == "muted"
+            tree.links.new(node.outputs[0], output.inputs[0])
+        save(f"layers_{name}.blend")
+
+
 def foggy():
     """A compositor that shows how far things are, by a pass that it asks for."""
     anew()
@@ -258,9 +274,29 @@ def foreign():
     save("apart/foreign.blend")
 
 
+def grown():
+    """A bush of particle hair, one whose hair no render shows, and ground that its material displaces, or bumps."""
+    anew()
+    world((1, 1, 1))
+    for x, name in ((-1, "Bush"), (1, "Bald")):
+        modifier = box(name, at(x, 1.5, 0.3)).modifiers.new("hair", "PARTICLE_SYSTEM")
+        modifier.particle_system.settings.type = "HAIR"
+        modifier.particle_system.settings.count = 200
+        modifier.show_render = name == "Bush"
+    for x, method, color in ((0, "DISPLACEMENT", (0.3, 0.3, 0.3)), (12, "BUMP", (0.4, 0.4, 0.4))):
+        made = box(f"Floor{x}", at(x, 0, -1, 0, (10, 10, 1)), color).data.materials[0]
+        made.name, made.displacement_method = method.lower(), method
+        height = made.node_tree.nodes.new("ShaderNodeDisplacement")
+        output = next(node for node in made.node_tree.nodes if node.type == "OUTPUT_MATERIAL")
+        made.node_tree.links.new(height.outputs[0], output.inputs["Displacement"])
+    save("grown.blend")
+
+
+grown()
 street("street.blend", 1.0)
 street("feet.blend", 0.3048, turn=35.0, moved=(40, -25, 3))
 composed()
+layerless()
 dark()
 foggy()
 moving()

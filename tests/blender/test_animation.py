@@ -9,17 +9,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from animated import leaf
 from shots import camera_of
 from viewsphere import Dataset, Recipe, generate, plan
 from viewsphere.assets import cache
 from viewsphere.assets.cache import load, load_normalised, read_ahead
-from viewsphere.assets.timeline import Blenders
+from viewsphere.assets.inspect import describe
+from viewsphere.assets.timeline import Blenders, Clip
 from viewsphere.check import check
 from viewsphere.errors import ModelError, RecipeError
 from viewsphere.geometry.camera import project
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.thing import TimeStep
 from viewsphere.run.importing import import_dataset
+from viewsphere.run.inspection import report_lines
 from viewsphere.run.stages import Stages
 from viewsphere.store import Choice
 
@@ -192,6 +195,69 @@ def test_layers_are_each_file_s_own(tmp_path, monkeypatch):
     assert not timeline(first).moves
     monkeypatch.setattr("viewsphere.assets.timeline.started", None)
     assert timeline(second).moves
+
+
+@pytest.fixture(scope="module")
+def rates(blender, tmp_path_factory):
+    """Files of a plane that goes 5 m in ten frames of 60 a second, or of 30 / 1.001."""
+    folder = tmp_path_factory.mktemp("rates")
+    subprocess.run([blender, "-c", RATES, folder], check=True, capture_output=True)
+    made = usd(folder / "fast.usda", MOVES.replace("25: (2", "11: (5"), layers="timeCodesPerSecond = 60")
+    made.write_text(made.read_text().replace("endTimeCode = 25", "endTimeCode = 11"))
+    return folder
+
+
+RATES = """
+import bpy, sys
+for name, fps, base in (("fast", 60, 1.0), ("ntsc", 30, 1.001)):
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    scene = bpy.context.scene
+    scene.render.fps, scene.render.fps_base, scene.frame_start, scene.frame_end = fps, base, 1, 11
+    bpy.ops.mesh.primitive_plane_add()
+    for frame, x in ((1, 0), (11, 5)):
+        bpy.context.object.location.x = x
+        bpy.context.object.keyframe_insert("location", frame=frame)
+    bpy.ops.wm.alembic_export(filepath=f"{sys.argv[-1]}/{name}.abc", as_background_job=False)
+    bpy.ops.export_scene.gltf(filepath=f"{sys.argv[-1]}/{name}.glb")
+"""
+
+
+def steps_of(path, **fields):
+    """Frame, seconds and middle in x of all time steps of a file."""
+    recipe = Recipe(
+        models=[{"source": str(path), "category": "plane", "centring": "as_is", "up": None, "frames": "all", **fields}],
+        viewpoints={"distance": 5},
+        formats=[],
+    )
+    planned = plan(recipe)
+    (spec,) = planned.kept_specs
+    read_ahead(spec, [step.frame for step in planned.steps_of(spec)])
+    middles = [load_normalised(spec, step=step).vertices.mean(axis=0) for step in planned.steps_of(spec)]
+    assert planned.steps_of(spec)[0].seconds == 0
+    return np.array([(s.frame, s.seconds, *m) for s, m in zip(planned.steps_of(spec), middles, strict=True)])
+
+
+@pytest.mark.usefixtures("own_cache")
+@pytest.mark.parametrize(("name", "fps"), [("fast.usda", 60), ("fast.glb", 60), ("fast.abc", 60), ("ntsc.abc", 30 / 1.001)])
+def test_files_keep_their_own_times(rates, name, fps):
+    steps = steps_of(rates / name)
+    assert len(steps) == 11
+    assert np.allclose(steps[:, 1], np.arange(11) / fps, rtol=1e-6)
+    went = np.linalg.norm(steps[:, 2:] - steps[0, 2:], axis=1)
+    assert went[-1] == pytest.approx(5, abs=1e-4)
+    assert (np.diff(went) > 0.1).all() if "usda" not in name else np.allclose(np.diff(went), 0.5, atol=1e-4)
+
+
+@pytest.mark.usefixtures("own_cache")
+def test_frames_are_as_many_a_second_as_the_recipe_says(rates):
+    for name in ("fast.glb", "fast.abc"):
+        steps = steps_of(rates / name, fps=120)
+        assert len(steps) == 21
+        assert np.allclose(steps[:, 1], np.arange(21) / 120)
+        assert np.allclose(steps[::2, 2:], steps_of(rates / name)[:, 2:], atol=1e-4)
+    assert np.allclose(steps_of(rates / "fast.usda", fps=30)[:, 1], np.arange(11) / 30)
+    fresh = plan(Recipe(models=[{"source": str(rates / "fast.glb"), "category": "c"}], viewpoints={"distance": 5}, formats=[]))
+    assert "fps" not in fresh.model_specs[0].model_dump()
 
 
 LINK = """
@@ -388,3 +454,35 @@ def test_cameras_that_are_none_cost_one_line(files):
     assert "expected one camera, found none at all" in said(path=str(files / "still.blend"))
     (files.parent / "poses.csv").write_text("azimuth,elevation,distance\n1,2,3\n")
     assert "viewpoints.camera: expected a 3D file" in said(path=str(files.parent / "poses.csv"), camera="eye")
+
+
+# Being inspected.
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_inspect_lists_frames_rate_and_clips_of_every_format(files, kind):
+    line = describe(files / f"jump.{kind}").animation
+    assert (line.first, line.last, line.fps) == (1, 25, 24)
+    cube, eye = Clip("cubeAction", 1, 25), Clip("eyeAction", 1, 25)
+    assert line.clips == {"usdc": (), "abc": ()}.get(kind, (cube, eye))
+
+
+def test_inspect_says_nothing_of_a_blend_file_in_which_nothing_moves(files):
+    assert describe(files / "still.blend").animation is None
+
+
+@pytest.mark.usefixtures("blender")
+def test_inspect_lists_the_frames_that_each_clip_has(tmp_path):
+    seconds = {"Walk": 1, "Wave": 0.5}
+    leaf(tmp_path / "leaf.gltf", seconds)
+    report = describe(tmp_path / "leaf.gltf")
+    assert [clip.name for clip in report.animation.clips] == list(seconds)
+    with Blenders.none_yet() as blenders:
+        for clip in report.animation.clips:
+            line = blenders.timeline(tmp_path / "leaf.gltf", True, clip.name)
+            assert (clip.first, clip.last) == (line.first, line.last)
+            assert line.seconds(clip.last) == seconds[clip.name]
+    lines = list(report_lines(report))
+    assert "  animation  frames 0 to 24, 24 fps: 1 s" in lines
+    at = lines.index("  clips      2 (choose one by clip)")
+    assert lines[at + 1 : at + 3] == ["    Walk: frames 0 to 24", "    Wave: frames 0 to 12"]

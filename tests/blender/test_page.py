@@ -45,10 +45,14 @@ def test_the_table_has_every_option_and_preset():
 @pytest.mark.usefixtures("blender")
 def test_commands_run(tmp_path):
     (tmp_path / "drier.yaml").write_text(RECIPE, "utf-8")
+    (tmp_path / "rust.py").write_text(re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)[0], "utf-8")
     commands = [line for block in re.findall(r"```sh\n(.*?)```", PAGE, re.DOTALL) for line in block.splitlines()]
-    assert [line.split()[1] for line in commands] == ["doctor", "doctor", "render", "check"]
+    assert [line.split()[1] for line in commands] == ["doctor", "doctor", "render", "check", "render"]
     for line in commands:
         if "--setup-blender" not in line:  # downloads a gigabyte
             run = subprocess.run([sys.executable, "-m", *line.split()], cwd=tmp_path, capture_output=True, text=True)
             assert run.returncode == 0, f"{line}\n{run.stdout}{run.stderr}"
+    plain, rusty = (next(iter(Dataset(tmp_path / name))).channels for name in ("drier", "rusty"))
+    assert (plain["instances"] == rusty["instances"]).all()
+    assert (plain["rgb"] != rusty["rgb"]).any()
     assert len(Dataset(tmp_path / "drier")) == 2

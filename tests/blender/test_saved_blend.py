@@ -282,3 +282,50 @@ def test_a_users_own_scene_is_held_still(blender, tmp_path):
         assert set(np.unique(truth)) == {0, 1, 2}
         assert (numbers(tmp_path / "opened", frame) != truth).sum() <= 5
     assert np.abs(picture(tmp_path / "opened", 1) - samples[0].channels["rgb"]).mean() < 6
+
+
+@pytest.fixture(scope="module")
+def instanced(blender, tmp_path_factory):
+    """The data set of a user's scene with instances of all kinds and a library, and its exported file, moved elsewhere."""
+    folder = tmp_path_factory.mktemp("instanced")
+    script = Path(__file__).with_name("make_instances.py")
+    done = subprocess.run([blender, script, folder], capture_output=True, text=True)
+    assert (folder / "instances.blend").exists(), done.stderr[-3000:]
+    names = {"Crate": "crate", "Bush": "bush", "Hedge": "bush", "Car": "car", "Body42": "car"}
+    recipe = recipe_of(
+        models=[{"source": "zoo:chair", "category": "chair", "count": 1}],
+        scene={
+            "blend": {
+                "file": str(folder / "instances.blend"),
+                "labels": [{"name": name, "category": category} for name, category in names.items()],
+            }
+        },
+        viewpoints={"azimuth": [0, 40], "elevation": [25], "distance": 6.0},
+        camera={"size": [160, 120], "fov_deg": 50},
+        engine={"name": "cycles", "samples": 8},
+    )
+    generate(recipe, folder / "out")
+    export(folder / "out", ["blend"])
+    (file,) = (folder / "out" / "blend").glob("*.blend")
+    (folder / "elsewhere").mkdir()
+    return Dataset(folder / "out"), file.replace(folder / "elsewhere" / file.name)
+
+
+def test_instances_have_the_numbers_of_what_they_belong_to(instanced, blender, tmp_path):
+    """An `id` of the user's stays and does not count; a leaf that two bushes and the floor share is each one's own."""
+    dataset, file = instanced
+    found = opened(blender, file, tmp_path / "opened", index=[1, 2], picture=[1])
+    samples = list(dataset)
+    for frame, sample in enumerate(samples, 1):
+        truth = sample.channels["instances"]
+        assert set(np.unique(truth)) == {0, 1, 2, 3, 4, 5, 6}
+        assert (numbers(tmp_path / "opened", frame) != truth).sum() <= 8
+    assert found["objects"]["Crate"]["id"] == 77
+    assert found["objects"]["Crate"]["category"] == "crate"
+    assert np.abs(picture(tmp_path / "opened", 1) - samples[0].channels["rgb"]).mean() < 6
+
+
+def test_an_exported_scene_needs_no_library(instanced, blender):
+    _, file = instanced
+    script = "import bpy, sys; bpy.ops.wm.open_mainfile(filepath=sys.argv[-1]); assert not bpy.data.libraries; print('alone')"
+    assert "alone" in subprocess.run([blender, "-c", script, file], capture_output=True, text=True).stdout

@@ -227,6 +227,27 @@ def test_the_compositor_acts_on_colours_alone_and_writes_nothing(made):
     assert not (made / "written").exists()
 
 
+@pytest.mark.parametrize("name", ["none", "flat", "muted"])
+def test_a_compositor_without_layers_is_left_out(made, name):
+    one, plain = (recipe_of(made / f"{file}.blend", viewpoints={"distance": 6}) for file in (f"layers_{name}", "no_output"))
+    assert np.array_equal(*(next(iter(render(recipe))).channels["rgb"] for recipe in (one, plain)))
+    said = [line for line in plan(one).warnings if "compositor" in line]
+    assert [line[: line.index(" (")] for line in said] == (
+        [] if name == "none" else [f"scene.blend: layers_{name}.blend: the compositor has no render layers"]
+    )
+
+
+def test_warnings_of_a_file_name_the_file(made, tmp_path):
+    """Not one of the models that are parts of it; only what a model alone is warned of carries its key."""
+    labels = [{"name": "Floor", "category": "floor"}, {"name": "Far", "category": "box"}]
+    recipe = recipe_of(
+        made / "apart" / "foreign.blend", blend={"labels": labels, "confined": False}, viewpoints={"distance": 6}
+    )
+    warnings = generate(recipe, tmp_path / "out").warnings
+    assert list(warnings) == ["foreign.blend"]
+    assert len(warnings["foreign.blend"]) == len(set(warnings["foreign.blend"])) > 0
+
+
 def test_the_compositor_has_the_passes_that_it_asks_for(made):
     """Here the distance: what is farther is brighter, whatever it is."""
     scene = {"view": {"exposure": -5}}
@@ -249,6 +270,15 @@ def test_the_compositor_has_the_passes_that_it_asks_for(made):
 )
 def test_what_the_file_lacks_is_said(made, name, said):
     assert any(said in line for line in plan(recipe_of(made / f"{name}.blend")).warnings)
+
+
+def test_hair_of_particles_and_displacement_are_said(made):
+    """Of what a render shows: they are in pictures and in no label."""
+    said = [line for line in plan(recipe_of(made / "grown.blend")).warnings if "no label knows" in line]
+    assert [line.partition(";")[0] for line in said] == [
+        "scene.blend: grown.blend: particle hair is rendered, but no label knows of it: 'Bush'",
+        "scene.blend: grown.blend: displacement by materials is rendered, but no label knows of it: 'displacement'",
+    ]
 
 
 def test_what_needs_others_is_said(made):

@@ -21,6 +21,7 @@ from viewsphere.engines._blender.staging import SPARE, clip_of
 from viewsphere.errors import RecipeError
 from viewsphere.imaging.finish import finished
 from viewsphere.sampling.engine_digest import engine_digest
+from viewsphere.surroundings.sun import sun_light
 from viewsphere.truth.geometry import build_geometry
 from viewsphere.truth.visibility import rasterize
 
@@ -129,7 +130,9 @@ def test_what_is_told_is_plain_and_light_comes_from_above(scene):
     assert json.loads(json.dumps(told)).keys() == told.keys()
     above, below = np.array(told["hemispheres"])
     assert (above > 0).all() and (below > 0).all()
-    assert above.sum() > 0.8 * below.sum()
+    sun = sun_light(shot.scene.sky, shot.scene.sun)
+    direct = 0 if sun is None else np.array(sun.irradiance) * sun.direction[2] / np.pi
+    assert (above + direct).sum() > 0.8 * below.sum()
 
 
 def test_the_ground_fades_where_blender_is_told_to():

@@ -213,7 +213,6 @@ def test_air_dims_and_reddens_a_low_sun_and_leaves_a_high_one():
 
 def test_daylight_is_a_sky():
     picture = daylight_picture(30, Daylight(), 128)
-    d, area = directions(128)
     assert np.isfinite(picture).all() and (picture >= 0).all()
     zenith = picture[0].mean(axis=0)
     assert zenith[2] > 1.5 * zenith[0]  # blue
@@ -221,8 +220,6 @@ def test_daylight_is_a_sky():
     assert abs(brightest[1] - 128) <= 2 and abs((0.5 - (brightest[0] + 0.5) / 128) * 180 - 30) < 12  # around the sun
     overcast = daylight_picture(30, Daylight(clouds=1), 128)
     assert overcast[0, 0] == pytest.approx(3 * overcast[63, 0], rel=0.05)  # CIE: three times the horizon
-    floor = (np.maximum(d[..., 2:], 0) * area[..., None] * daylight_picture(60, Daylight(), 128)).sum(axis=(0, 1)) / math.pi
-    assert floor.mean() == pytest.approx(0.55, abs=0.1)
 
 
 @pytest.mark.parametrize("turbidity", [1.8, 3, 10])

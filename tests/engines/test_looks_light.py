@@ -50,8 +50,8 @@ def test_level_ground_is_seen_all_day(turbidity, clouds):
         up = bake_surrounding(sky, sun, np.full(3, 0.2), lights).up.mean()
         up += sum(np.mean(d.irradiance) * d.direction[2] / math.pi for d in lights)
         noon = noon or up
-        assert 0.5 < up / noon < 1.05
-        assert 0.5 < up < 1.7
+        assert 0.38 < up / noon < 1.1
+        assert 1.0 < up < 3.0
 
 
 def test_lens_opens_for_sun_and_sky_alike_and_not_for_strength():
@@ -65,7 +65,7 @@ def test_lens_opens_for_sun_and_sky_alike_and_not_for_strength():
         np.testing.assert_allclose(twice, 2 * once, rtol=1e-5)
         np.testing.assert_allclose(bake_surrounding(sky, sun, None).scale, factor, rtol=1e-6)
     openings = [opening(e, Daylight()) for e in (90, 60, 30, 15, 8, 3, 1)]
-    assert openings == sorted(openings) and openings[1] == pytest.approx(1)
+    assert openings == sorted(openings)
 
 
 @pytest.mark.parametrize("sky", [Daylight(), Daylight(clouds=1), Sky()], ids=["clear", "overcast", "gradient"])

@@ -11,9 +11,12 @@ from pycocotools.cocoeval import COCOeval
 from cube_dataset import MESHES, make
 from viewsphere.errors import UserError
 from viewsphere.formats.coco.categories import CATEGORY_IDS, category_ids, official_ids
+from viewsphere.formats.coco.options import Options
 from viewsphere.geometry.mask import encode_rle
 from viewsphere.run.exporting import write
 from viewsphere.store import Category
+
+COCOS_OWN = {"category_ids": "coco"}
 
 
 @pytest.fixture(scope="module", params=[False, True], ids=["one object", "three objects"])
@@ -21,7 +24,7 @@ def exported(request, tmp_path_factory):
     root = tmp_path_factory.mktemp("coco")
     dataset = make(root / "out", request.param)
     (root / "coco").mkdir()
-    write(dataset, {"coco": root / "coco"})
+    write(dataset, {"coco": root / "coco"}, {"coco": COCOS_OWN})
     return dataset, root / "coco"
 
 
@@ -59,7 +62,7 @@ def test_detections_rebuilt_from_the_stored_maps_score_one(exported):
     dataset, folder = exported
     for split in dataset.splits:
         truth, detections = load(folder, split), []
-        ids = category_ids(dataset)
+        ids = category_ids(dataset, Options(**COCOS_OWN))
         for sample in dataset:
             if sample.split != split:
                 continue
@@ -96,7 +99,7 @@ def test_annotations_are_the_masks(exported):
         sample, o = expected[number]
         mask = truth.annToMask(annotation).astype(bool)
         np.testing.assert_array_equal(mask, sample.instances == o.id)
-        picture = np.array(Image.open(folder / split / annotation["path_mask"]))
+        picture = np.array(Image.open(folder / "images" / split / annotation["path_mask"]))
         np.testing.assert_array_equal(picture, mask)
         assert annotation["area"] == mask.sum()
         x, y, w, h = annotation["bbox"]
@@ -112,7 +115,7 @@ def test_images_carry_the_papers_keys(exported):
         for number, image in truth.imgs.items():
             sample = samples.pop(number)
             assert sample.split == split
-            np.testing.assert_array_equal(np.array(Image.open(folder / split / image["file_name"])), sample.rgb)
+            np.testing.assert_array_equal(np.array(Image.open(folder / "images" / split / image["file_name"])), sample.rgb)
             pose = sample.pose
             assert (image["distance"], image["elevation"], image["azimuth"], image["tilt"], image["id_pose"]) == (
                 *(pose.distance, pose.elevation_deg, pose.azimuth_deg, pose.tilt_deg, pose.index),
@@ -175,7 +178,7 @@ def test_ids_do_not_depend_on_what_is_finished(tmp_path):
 
 def test_equal_bytes(exported, tmp_path):
     dataset, folder = exported
-    write(dataset, {"coco": tmp_path})
+    write(dataset, {"coco": tmp_path}, {"coco": COCOS_OWN})
     names = sorted(p.relative_to(folder) for p in folder.rglob("*") if p.is_file())
     assert names == sorted(p.relative_to(tmp_path) for p in tmp_path.rglob("*") if p.is_file())
     for name in names:
@@ -186,14 +189,41 @@ def test_large_data_sets_have_numbered_folders(exported, monkeypatch, tmp_path):
     dataset, _ = exported
     monkeypatch.setattr("viewsphere.formats.coco.entries.FOLDER_SIZE", 3)
     write(dataset, {"coco": tmp_path})
-    for folder in [p for s in dataset.splits for p in [tmp_path / s, *(tmp_path / s).rglob("*")] if p.is_dir()]:
+    for folder in [
+        p for s in dataset.splits for p in [tmp_path / "images" / s, *(tmp_path / "images" / s).rglob("*")] if p.is_dir()
+    ]:
         assert sum(p.is_file() for p in folder.iterdir()) <= 3
     for split in dataset.splits:
         truth = load(tmp_path, split)
-        assert all((tmp_path / split / i["file_name"]).is_file() for i in truth.imgs.values())
-        assert all((tmp_path / split / a["path_mask"]).is_file() for a in truth.anns.values())
+        assert all((tmp_path / "images" / split / i["file_name"]).is_file() for i in truth.imgs.values())
+        assert all((tmp_path / "images" / split / a["path_mask"]).is_file() for a in truth.anns.values())
 
 
 def test_a_data_set_without_pictures_is_refused(tmp_path):
     with pytest.raises(UserError, match="expected channel rgb"):
         write(make(tmp_path / "out", channels=("instances",)), {"coco": tmp_path})
+
+
+def test_categories_count_from_one_without_gaps_unless_cocos_own_are_asked_for(exported, tmp_path):
+    """Trainings that make a classifier of so many outputs fail at ids like 89 and 92."""
+    dataset, folder = exported
+    write(dataset, {"coco": tmp_path})
+    for split in dataset.splits:
+        ours, cocos = load(tmp_path, split), load(folder, split)
+        assert [ours.cats[i]["name"] for i in (1, 2, 3)] == [c.name for c in dataset.categories]
+        assert ours.imgs == cocos.imgs and ours.anns.keys() == cocos.anns.keys()
+        for number, annotation in ours.anns.items():
+            other = cocos.anns[number]
+            assert ours.cats[annotation["category_id"]]["name"] == cocos.cats[other["category_id"]]["name"]
+            assert {**annotation, "category_id": 0} == {**other, "category_id": 0}
+
+
+def test_the_papers_tree_has_the_same_files_a_folder_higher(exported, tmp_path):
+    dataset, folder = exported
+    write(dataset, {"coco": tmp_path}, {"coco": {**COCOS_OWN, "pictures": "splits"}})
+    for split in dataset.splits:
+        for one, other in ((tmp_path / split, folder / "images" / split), (tmp_path / "annotations",) * 2):
+            names = sorted(p.relative_to(one) for p in one.rglob("*") if p.is_file())
+            assert names == sorted(p.relative_to(other) for p in other.rglob("*") if p.is_file()) != []
+        name = f"annotations/instances_{split}.json"
+        assert (tmp_path / name).read_bytes() == (folder / name).read_bytes()

@@ -45,7 +45,7 @@ def held(root: Path, folder: Path) -> int:
         target.mkdir(parents=True)
     tracemalloc.start()
     try:
-        write(dataset, folders, tell)
+        write(dataset, folders, tell=tell)
     finally:
         tracemalloc.stop()
     return found[0]

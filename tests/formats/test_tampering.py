@@ -11,7 +11,7 @@ import math
 import re
 import shutil
 from collections import defaultdict
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
@@ -26,6 +26,7 @@ from cube_dataset import LENS, make
 from viewsphere import Dataset, plugins
 from viewsphere.model.camera import Distortion
 from viewsphere.model.instant import Moment
+from viewsphere.recipe.formats import FormatEntry
 from viewsphere.run.exporting import export
 from viewsphere.run.importing import import_dataset
 from viewsphere.store.checksums import CHECKSUMS
@@ -70,14 +71,18 @@ def exported(request, tmp_path_factory):
     return dataset
 
 
+def verified(dataset: Dataset, name: str, sampled: Collection[int]):
+    return plugins.load("formats", name).verify(dataset, dataset.root / name, sampled, *FormatEntry(name=name).arguments())
+
+
 def found(dataset: Dataset, name: str) -> bool:
-    return any(plugins.load("formats", name).verify(dataset, dataset.root / name, ()))
+    return any(verified(dataset, name, ()))
 
 
 @pytest.mark.parametrize("name", FORMATS)
 def test_nothing_is_found_in_a_whole_export(exported, name):
     everything = range(len(exported))
-    assert list(plugins.load("formats", name).verify(exported, exported.root / name, everything)) == []
+    assert list(verified(exported, name, everything)) == []
 
 
 # the JSON's fields

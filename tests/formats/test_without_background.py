@@ -48,7 +48,7 @@ def test_coco_links_it(dataset, tmp_path):
             for i in json.loads((tmp_path / "annotations" / f"instances_{sample.split}.json").read_text())["images"]
             if i["id"] == sample.index + 1
         )
-        file = tmp_path / sample.split / image["file_name"]
+        file = tmp_path / "images" / sample.split / image["file_name"]
         assert file.read_bytes() == dataset.path(sample.files["rgba"]).read_bytes()
         with Image.open(file) as opened:
             assert opened.mode == "RGBA"

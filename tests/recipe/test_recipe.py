@@ -29,7 +29,7 @@ def test_the_least_recipe_has_the_documented_defaults():
     r = recipe()
     assert (r.name, r.seed, r.max_frames, r.shot_frames, r.label_alpha) == ("dataset", 0, 1_000_000, None, 0.01)
     assert r.channels == ("rgb", "depth", "instances", "normals")
-    assert r.formats == ("native", "coco")
+    assert [(entry.name, entry.options) for entry in r.formats] == [("native", {}), ("coco", {})]
     assert r.splits.shares == {"train": 0.7, "val": 0.3}
     assert r.splits.by == "model"
     assert r.camera.size == (640, 480)
@@ -235,7 +235,7 @@ MISTAKES = [
     ({"scene": {"lights": [{**LAMP, "blend": 1}]}}, "scene.lights[0].blend: expected one of count, strength, color", ""),
     ({"scene": {"lights": [{"position": [0, 0, 3]}]}}, "scene.lights[0].strength: expected a value; found nothing", ""),
     ({"scene": {"ground": {"roughnes": 1}}}, "scene.ground.roughnes: expected one of color, image, ro", "'roughness'?"),
-    ({"scene": {"materials": [{"models": "car_*"}]}}, "scene.materials[0]: expected tint, metallic or roughness", ""),
+    ({"scene": {"materials": [{"models": "car_*"}]}}, "scene.materials[0]: expected tint, metallic, roughness, image", ""),
     ({"scene": {"background": {"blur": 0.1}}}, "scene.background: expected image or images beside blur", ""),
     ({"scene": {"background": {"image": "a", "zoom": 2}}}, "scene.background: expected fit: crop beside zoom and pl", ""),
     ({"scene": {"background": {"color": "red", "transparent": True}}}, "scene.background: expected one of color, ", ""),

@@ -14,6 +14,7 @@ from viewsphere.report.choice import chosen_frames
 from viewsphere.report.frames import frame_data
 from viewsphere.report.meshes import mesh_data, simplified
 from viewsphere.report.page import script_json
+from viewsphere.report.paths import without_folders
 from viewsphere.report.pictures import Scale, coordinate_colors, depth_colors, layers, layers_within, normal_colors
 from viewsphere.report.summary import hues, nice_edges, summary
 from viewsphere.report.table import FRAME, OBJECT, FrameTable, read_table
@@ -101,6 +102,37 @@ def test_edges_are_round_and_hold_all_values():
         edges = nice_edges(np.array(values, np.float32))
         assert np.histogram(np.array(values, np.float32).astype(float).round(5), edges)[0].sum() == len(values)
         assert len(edges) < 60
+
+
+@pytest.mark.parametrize("value", [0, 5.0, 2.2, 1234.5, -3])
+def test_a_single_value_is_one_bar_in_the_middle(value):
+    edges = nice_edges(np.full(7, value, np.float32))
+    counts = np.histogram(np.full(7, value), edges)[0]
+    assert counts.tolist() == [0, 7, 0]
+    assert (edges[0] + edges[-1]) / 2 == pytest.approx(value, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("source: /home/ann/models/car.obj", "source: car.obj"),
+        ("C:\\Users\\ann\\car.obj: expected faces", "car.obj: expected faces"),
+        ("source: ../models/car.obj", "source: ../models/car.obj"),
+        ("16/16 frames, 4 frames/s, https://a.org/b/c", "16/16 frames, 4 frames/s, https://a.org/b/c"),
+        ("zoo:car and ~/cars/*.obj", "zoo:car and ~/cars/*.obj"),
+    ],
+)
+def test_absolute_paths_lose_their_folders(text, told):
+    assert without_folders({"a": [text]}) == {"a": [told]}
+
+
+def test_the_page_holds_no_absolute_path(small_dataset, tmp_path):
+    proof = Proof(False, {"boxes": 1}, (f"files: {small_dataset.root}/store/plan.json: expected more",), (f"{tmp_path}/a: b",))
+    write_report(small_dataset, tmp_path / "page.html", proof=proof)
+    text = (tmp_path / "page.html").read_text()
+    assert "plan.json: expected more" in text
+    for place in (small_dataset.root.resolve().parent, tmp_path):
+        assert str(place) not in text
 
 
 def test_hues_belong_to_the_most_frequent_categories_in_order_of_ids():

@@ -20,6 +20,7 @@ def changed(before, after):
 @pytest.mark.slow
 def test_every_toggle_changes_the_picture_and_back(open_page):
     page = open_page()
+    page.click("#layers [data-layer=boxes]")
     plain = pixels(page, ".card .picture")
     for name in LAYERS:
         button = f"#layers [data-layer={name}]"
@@ -30,6 +31,26 @@ def test_every_toggle_changes_the_picture_and_back(open_page):
         page.click(button)
         page.wait_for_timeout(150)
         assert changed(plain, pixels(page, ".card .picture")) < 0.002, name
+
+
+def test_boxes_are_drawn_at_first(open_page):
+    page = open_page()
+    assert page.get_attribute("#layers [data-layer=boxes]", "aria-pressed") == "true"
+    drawn = pixels(page, ".card .picture")
+    page.click("#layers [data-layer=boxes]")
+    page.wait_for_timeout(150)
+    assert changed(drawn, pixels(page, ".card .picture")) > 0.005
+
+
+def test_3d_models_are_drawn_at_two_pixels_for_one(open_page):
+    """Their edges are smooth where the browser does not multisample."""
+    page = open_page()
+    page.locator("#models").scroll_into_view_if_needed()
+    page.wait_for_timeout(500)
+    widths = page.evaluate("[...document.querySelectorAll('#models canvas')].map((c) => [c.width, c.clientWidth])")
+    assert widths
+    for drawn, shown in widths:
+        assert drawn >= 2 * shown > 0
 
 
 @pytest.mark.slow

@@ -81,17 +81,21 @@ assert len(list(vs.render(recipe))) == 1
 """
 WORKER = """
 from pathlib import Path
+from types import SimpleNamespace
 from viewsphere.run import pool
 class Gone:
     def recv(self):
         raise EOFError
-pool._serve(Gone(), Path("nowhere"), None)
+pool._serve(Gone(), Path("nowhere"), SimpleNamespace(plan=SimpleNamespace(recipe=None)))
 """
 COMMAND = """
 from viewsphere import cli
 from viewsphere.cli import commands
-commands.app = lambda: None
-cli.main()
+commands.app = lambda standalone_mode: None
+try:
+    cli.main()
+except SystemExit as end:
+    assert not end.code
 """
 
 

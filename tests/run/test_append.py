@@ -137,7 +137,7 @@ def test_nothing_is_touched_and_all_is_as_if_rendered_at_once(changes, out):
     found = images(out)
     assert {key: found[key] for key in coco} == coco
     for (kind, file, _), entry in found.items():
-        assert kind != "images" or (out / "coco" / file.removeprefix("instances_") / entry["file_name"]).is_file()
+        assert kind != "images" or (out / "coco" / "images" / file.removeprefix("instances_") / entry["file_name"]).is_file()
     channels = [*CHANNELS, *(c for c in changes.get("channels", []) if c not in CHANNELS)]
     fresh = {known_by(s): s for s in vs.render(recipe(**{**changes, "channels": channels}))}
     there = {known_by(s): s for s in dataset}
@@ -383,6 +383,7 @@ REFUSED = {
         {"viewpoints": {**POSES, "elevation": 15}, "channels": ["rgb", "normals"]},
         "channels: .* only 3 of 6 poses",
     ),
+    "empty": ({"empty": 0.5, "models": models(3)}, "empty: expected null, as the data set has; found 0.5"),
     "inside the model": (
         {"viewpoints": {"azimuth": 0, "elevation": 0, "distance": 0.05}, "models": models(3)},
         "camera outside the model",
@@ -390,7 +391,7 @@ REFUSED = {
 }
 
 
-QUICK = {"seed", "camera", "shares", "other size", "a channel for less", "inside the model"}
+QUICK = {"seed", "empty", "camera", "shares", "other size", "a channel for less", "inside the model"}
 
 
 @pytest.mark.parametrize("name", [n if n in QUICK else pytest.param(n, marks=pytest.mark.slow) for n in REFUSED])
@@ -486,10 +487,12 @@ def test_another_version_s_data_are_refused(out):
 
 def test_appending_to_what_is_no_data_set(tmp_path, bigger_file):
     (tmp_path / "thesis.tex").write_text("x")
-    for folder in (tmp_path / "new", tmp_path):
+    missing = "expected a folder that render wrote; found no such folder: check the path"
+    foreign = "expected a data set (store/plan.json), found none: render one first"
+    for folder, problem in ((tmp_path / "new", missing), (tmp_path, foreign)):
         said = viewsphere("render", bigger_file, "-o", folder, "--append")
         assert said.returncode == 2
-        assert said.stderr == f"viewsphere: {folder}: expected a data set (store/plan.json), found none: render one first\n"
+        assert said.stderr == f"viewsphere: {folder}: {problem}\n"
         assert not said.stdout
     assert not (tmp_path / "new").exists()
 
@@ -621,6 +624,34 @@ def test_another_motion_of_the_camera_is_another_sequence(tmp_path):
     assert [round(sample.pose.distance, 6) for sample in dataset] == [1.5, 1.5, 2.5, 2.5]
     generate(orbit, tmp_path / "out", workers=0, append=True)
     assert len(Dataset(tmp_path / "out")) == 4
+    generate(moving_recipe({"azimuth": 30}), tmp_path / "out", workers=0, append=True)
+    assert Dataset(tmp_path / "out").sequences[2:] == ("post_box_000-000002",)
     shaken = moving_recipe({"kind": "orbit", "elevation": 20, "distance": 2.5, "shake": {"degrees": 1}})
     with pytest.raises(RecipeError, match=r"viewpoints\.shake: expected null, as the data set has; found a mapping"):
         generate(shaken, tmp_path / "out", workers=0, append=True)
+
+
+def test_another_motion_of_a_model_needs_another_name(tmp_path):
+    def moves(speed, **entry):
+        return {**BOX, **entry, "motion": {"kind": "constant", "velocity": [speed, 0, 0]}}
+
+    generate(moving_recipe({"azimuth": 30}, models=[moves(0.5)]), tmp_path / "out", workers=0)
+    for other in (moves(0.7), BOX):
+        with pytest.raises(
+            RecipeError, match=r"models\[0\]\.motion: expected the motion of post_box_000 that the data set has"
+        ):
+            generate(moving_recipe({"azimuth": 30}, models=[other]), tmp_path / "out", workers=0, append=True)
+    both = moving_recipe({"azimuth": 30}, models=[moves(0.7, name="fast"), moves(0.5)])
+    generate(both, tmp_path / "out", workers=0, append=True)
+    generate(moving_recipe({"azimuth": [30, 90]}, models=[moves(0.5)]), tmp_path / "out", workers=0, append=True)
+    dataset = Dataset(tmp_path / "out")
+    gone = {name: _way(dataset.sequence(name, "camera")) for name in dataset.sequences}
+    expected = {"post_box_000": 0.05, "fast_000": 0.07, "post_box_000-000001": 0.05}
+    assert gone == pytest.approx(expected)
+    assert check(dataset, sample=None).ok
+
+
+def _way(samples):
+    """Metres along x from the first instant to the second."""
+    first, second = (sample.objects[0].world_from_object[0][3] for sample in samples)
+    return second - first

@@ -61,7 +61,7 @@ def test_the_command_says_it_in_one_line(tmp_path):
     assert lines[0].startswith("dataset: 1 models x 2 poses = 2 frames")
     assert re.fullmatch(r"about \d+ s with 2 workers, \d+ MB on disk", lines[-1])
     printed = json.loads(viewsphere(*arguments, "--json").stdout)["estimate"]
-    assert printed.keys() == {"seconds", "bytes", "workers"} and printed["workers"] == 2
+    assert printed.keys() == {"seconds", "bytes", "workers", "unused"} and printed["workers"] == 2
 
 
 def test_a_plan_without_an_estimate_touches_no_model():

@@ -63,7 +63,7 @@ def test_a_coco_data_set_comes_in_and_goes_out_as_it_was(tmp_path):
     source = coco(tmp_path / "real")
     before = tree_hash(source)
     import_dataset("coco", source, tmp_path / "out")
-    export(tmp_path / "out", ["coco"])
+    export(tmp_path / "out", [{"coco": {"category_ids": "coco"}}])
     was = json.loads((source / "annotations" / "instances_train.json").read_text())
     now = json.loads((tmp_path / "out" / "coco" / "annotations" / "instances_train.json").read_text())
     renewed = {"id", "image_id"}
@@ -78,7 +78,7 @@ def test_a_coco_data_set_comes_in_and_goes_out_as_it_was(tmp_path):
     for a, b in zip(now["annotations"], was["annotations"], strict=True):
         assert pictures[a["image_id"]]["id"] == b["image_id"]
     for image in now["images"]:
-        copy = tmp_path / "out" / "coco" / "train" / image["file_name"]
+        copy = tmp_path / "out" / "coco" / "images" / "train" / image["file_name"]
         assert copy.read_bytes() == (source / "train" / pictures[image["id"]]["file_name"]).read_bytes()
     assert tree_hash(source) == before
 
@@ -109,7 +109,7 @@ def test_rendered_frames_join_a_real_data_set(tmp_path, small_run):
     joined = merge([tmp_path / "opened", small_run], tmp_path / "joined", mixed=True)
     assert {c.id: c.name for c in joined.categories} == {3: "car", 17: "cat", 1: "post box"}
     assert len(joined) == 3 + len(Dataset(small_run))
-    export(tmp_path / "joined", ["coco", "native"])
+    export(tmp_path / "joined", [{"coco": {"category_ids": "coco"}}, "native"])
     report = check(Dataset(tmp_path / "joined"))
     assert report.ok, report.findings
     written = json.loads((tmp_path / "joined" / "coco" / "annotations" / "instances_train.json").read_text())

@@ -11,9 +11,12 @@ from viewsphere import Dataset, generate
 from viewsphere.check import check
 from viewsphere.errors import StoreError, UserError
 from viewsphere.formats.coco.categories import category_ids
+from viewsphere.formats.coco.options import Options
 from viewsphere.run.exporting import export
 from viewsphere.run.merging import merge
 from viewsphere.store.index import numbers
+
+COCOS_OWN = Options(category_ids="coco")
 
 
 def recipe(**changes):
@@ -156,7 +159,7 @@ def test_an_unfinished_data_set_is_refused_unless_asked_for(sources, small_datas
     ]
     assert known == [(s.objects[0].key, s.pose.index) for s in joined][12:]
     assert joined.plan.parts[1].digest == ""  # else its recipe would take it for whole
-    assert category_ids(joined) == category_ids(small_dataset) != {1: 1}
+    assert category_ids(joined, COCOS_OWN) == category_ids(small_dataset, COCOS_OWN) != {1: 1}
 
 
 def test_channels_that_were_not_added_to_the_end_are_an_unfinished_data_set(sources, tmp_path):

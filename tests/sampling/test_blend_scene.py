@@ -10,7 +10,10 @@ import pytest
 
 from viewsphere import Recipe, plan
 from viewsphere.assets.scene_file import SceneFile, SceneObject
+from viewsphere.assets.timeline import Blenders, Timeline
 from viewsphere.errors import RecipeError
+from viewsphere.geometry.box import box_vertices
+from viewsphere.sampling import blend_scene
 from viewsphere.sampling.blend_scene import BlendScenery
 
 
@@ -102,3 +105,56 @@ def test_other_engines_are_refused_before_blender_is_asked():
     recipe = Recipe(models=[{"source": "zoo:chair"}], viewpoints={"distance": 5}, scene={"blend": "none.blend"})
     with pytest.raises(RecipeError, match=r"^scene.blend: expected engine: cycles, eevee or workbench.*raster.*scene.place$"):
         plan(recipe)
+
+
+@pytest.fixture
+def planes(tmp_path, monkeypatch):
+    """Recipes in a file of two planes that are shown in turn, and that moves; what is in the file is told without Blender."""
+    for name in ("a.blend", "walk.fbx"):
+        (tmp_path / name).write_bytes(b"x")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(Blenders, "timeline", lambda *_: Timeline(1, 24, 24.0, True))
+    held = SceneFile(Path("a.blend"), (thing("plane0"), thing("plane1")), 1.0, True, ())
+
+    def told(*_):
+        return replace(held, showing={frame: frozenset({"plane0", "plane1"}) for frame in range(1, 25)})
+
+    monkeypatch.setattr(blend_scene, "scene_file", told)
+
+    def recipe(azimuths, models=("zoo:chair",), blend=None, **fields):
+        views = {"azimuth": list(range(azimuths)), "distance": 5}
+        variants = {"planes": {"one_of": "plane*", "order": "in_turn"}}
+        return Recipe(
+            models=[model if isinstance(model, dict) else {"source": model, "count": 1} for model in models],
+            **{
+                "viewpoints": views,
+                "engine": "cycles",
+                "scene": {"blend": {"file": "a.blend", "variants": variants, **(blend or {})}},
+            },
+            **fields,
+        )
+
+    return recipe
+
+
+def in_turn(recipe):
+    """The number of the plane that each shot shows, in the data set's order."""
+    shots = plan(recipe).shots(lambda spec, step=None: box_vertices((-0.5, -0.5, 0), (0.5, 0.5, 1)))
+    return [("plane1", "plane0").index(name) for shot in shots for name in shot.scene.blend.hidden]
+
+
+@pytest.mark.parametrize("count", [3, 4])
+def test_variants_take_turns_along_poses_that_move(planes, count):
+    """Whether the poses are odd in number or even; the second model goes on where the first ends."""
+    blend = {"frames": list(range(1, count + 1)), "poses": "moving"}
+    turns = in_turn(planes(count, ("zoo:chair", "zoo:car"), blend))
+    assert turns == [k % 2 for k in range(2 * count)]
+
+
+def test_variants_take_turns_over_models_of_other_time_steps(planes):
+    walker = {"source": "walk.fbx", "category": "person", "frames": [1, 5, 9]}
+    assert in_turn(planes(3, (walker, "zoo:car"))) == [k % 2 for k in range(9 + 3)]
+
+
+def test_variants_take_turns_from_sequence_to_sequence(planes):
+    assert in_turn(planes(3, ("zoo:chair", "zoo:car"), time={"frames": 2, "fps": 10})) == [0, 1, 0, 1, 0, 1]

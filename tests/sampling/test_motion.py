@@ -21,7 +21,7 @@ from viewsphere.recipe.file import read
 from viewsphere.recipe.motion import MotionEntry
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.sampling import motion
-from viewsphere.sampling.motion import Lane, Start, check_motion, check_motions, motion_of
+from viewsphere.sampling.motion import Lane, Start, check_motion, check_motions, mover
 from viewsphere.sampling.placing import standing
 from viewsphere.sampling.seeds import generator
 from viewsphere.zoo.places.neighbourhood import neighbourhood
@@ -44,7 +44,7 @@ def start(key="car_000", seed=0, **fields):
 
 
 def moved(*options, times=TIMES, **fields):
-    return motion_of(entries(*options), start(**fields), times)
+    return mover(entries(*options), start(**fields)).at(times)
 
 
 def poses(*options, times=TIMES, **fields):
@@ -74,7 +74,7 @@ def test_the_kinds():
 
 
 def test_without_motions_things_stand_still():
-    assert motion_of(None, start(), TIMES).poses == (PLACED,)
+    assert mover(None, start()).at(TIMES).poses == (PLACED,)
 
 
 def test_constant_is_a_line_and_a_turn_about_one_axis():
@@ -511,7 +511,6 @@ def test_a_recipe_says_motions():
         ({"motion": [{}]}, r"^models\[0\]\.motion\[0\]\.kind: expected a value; found nothing$"),
         ({"motion": {"kind": "random", "enter": 3, "leave": 2}}, r"^models\[0\]\.motion: expected leave after enter; found"),
         ({"motion": {"kind": "clip"}}, "expected a file for the motion clip; found the zoo"),
-        ({"motion": {"kind": "random"}, "clip": "Walk"}, "expected frames or the motion clip, for clip: Walk; found neither"),
     ],
 )
 def test_mistakes_of_recipes(fields, message):
@@ -519,9 +518,16 @@ def test_mistakes_of_recipes(fields, message):
         recipe({"source": "zoo:car", **fields})
 
 
-def test_the_motion_clip_takes_a_clips_name():
-    made = recipe({"source": "walk.fbx", "category": "person", "clip": "Walk", "motion": {"kind": "clip"}})
-    assert made.models[0].clip == "Walk"
+@pytest.mark.parametrize("own", [True, False])
+def test_the_motion_clip_takes_a_clips_name(own):
+    walker = {"source": "walk.fbx", "category": "person", "clip": "Walk"}
+    plays = {"motion": {"kind": "clip"}}
+    made = recipe(
+        {**walker, **(plays if own else {})}, time={"frames": 2}, scene={} if own else {"company": {"count": 1, **plays}}
+    )
+    check_motions(made)
+    with pytest.raises(RecipeError, match=r"models\[0\]\.clip: expected frames, or a motion of kind clip of the model or of"):
+        check_motions(recipe({**walker, "motion": {"kind": "random"}}, time={"frames": 2}))
 
 
 BLOCKS = re.findall(r"```yaml\n(.*?)```", (ROOT / "docs" / "motion.md").read_text("utf-8"), re.DOTALL)

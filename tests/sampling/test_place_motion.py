@@ -10,12 +10,13 @@ from viewsphere.errors import RecipeError
 from viewsphere.geometry.box import box_vertices
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.recipe.recipe import Recipe
-from viewsphere.sampling.composition import compose
-from viewsphere.sampling.motion import Start, check_motions, motion_of
+from viewsphere.sampling.composition import Turns, compose
+from viewsphere.sampling.motion import Start, check_motions, mover
 from viewsphere.sampling.placing import standing
 from viewsphere.sampling.plan import plan
 from viewsphere.sampling.scenery import place_lanes, place_pieces
 from viewsphere.sampling.seeds import generator
+from viewsphere.sampling.sequence_poses import poses_of
 from viewsphere.zoo.street import lanes
 
 BOX = box_vertices((-1.0, -2.0, 0.0), (1.0, 2.0, 1.5))
@@ -51,7 +52,7 @@ def test_a_car_follows_the_lane_of_a_turned_place():
         lanes=place_lanes(made, made.scene.place, ()),
     )
     entry = recipe(models=[{"source": "zoo:car", "motion": {"kind": "path", "lane": "right", "speed": 10}}]).models[0].motion
-    first, last = (np.array(pose) for pose in motion_of(entry, start, [0.0, 2.0]).poses)
+    first, last = (np.array(pose) for pose in mover(entry, start).at([0.0, 2.0]).poses)
     np.testing.assert_allclose(last[:3, 3] - first[:3, 3], [-20, 0, 0], atol=1e-9)  # +Y, turned by 90 degrees
     np.testing.assert_allclose(-last[:3, 1], [-1, 0, 0], atol=1e-9)
     assert last[1, 3] == pytest.approx(lanes()[0].points[0][0]) and last[2, 3] == 0
@@ -72,7 +73,8 @@ def test_pieces_have_the_motion_of_the_first_pattern_that_fits():
 def test_the_composition_moves_pieces_of_a_place():
     made = recipe({"source": "zoo:neighbourhood", "motion": {"wheelie_bin_1": {"kind": "constant"}}}, time={"frames": 2})
     car = ModelSpec(key="car_000", source="zoo:car", seed=1, category="car", category_id=1)
-    composition = compose(made, ("car_000",), (car,), (), ("",), ())
+    turns = Turns(("car_000",), poses_of(made.viewpoints, made.time, made.seed))
+    composition = compose(made, ("car_000",), (car,), (), ("",), turns)
     asked = []
 
     def moved(thing, piece):

@@ -223,7 +223,7 @@ def test_a_fixed_background_is_one_for_all_frames(photos):
 
 def test_missing_backgrounds_are_named(photos):
     with pytest.raises(
-        RecipeError, match=r"scene.background.images: expected a folder with images \(.*\); found none in .*nothing"
+        RecipeError, match=r"images: expected a folder with images \(.*\); found .*nothing, which does not exist"
     ):
         backgrounds(photos, [{"source": "zoo:car"}], images="nothing")
     with pytest.raises(RecipeError, match=r"scene.background.image: expected an image file; found none at .*x.png"):

@@ -1,6 +1,9 @@
 """What would make empty pictures is said when a recipe is planned, and nothing else is."""
 
+import math
+
 import pytest
+from PIL import Image
 
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.sampling.plan import plan
@@ -111,6 +114,43 @@ def test_only_what_lies_beside_the_line_of_sight_counts():
     assert warnings({"jitter": {"target": [0, 1.9, 0]}}, {"azimuth": 180, "elevation": 0}) == ()
     assert warnings({"jitter": {"target": [0, -1.9, 0]}}, {"azimuth": 0, "elevation": 0}) == ()
     assert warnings({"jitter": {"target": [1.9, 0, 0]}}, {"azimuth": 180, "elevation": 0}) != ()
+
+
+@pytest.fixture
+def photos(tmp_path):
+    Image.new("RGB", (40, 30)).save(tmp_path / "a.png")
+    return {"images": str(tmp_path)}
+
+
+HIDING = ["on", "gray", {"color": {"choice": ["gray", "red"]}}, {"choice": ["on", "gray"]}]
+
+
+@pytest.mark.parametrize("ground", HIDING)
+def test_photographs_behind_the_ground_are_said(ground, photos):
+    (said,) = warnings({"background": photos, "ground": ground}, {"elevation": [30, 60]})
+    assert said.startswith("scene.background: the endless ground hides about 100 % of its pictures; set scene.ground: catcher")
+
+
+@pytest.mark.parametrize("ground", ["auto", "off", "catcher", {"catcher": True}, {"choice": ["on", "off"]}])
+def test_photographs_that_are_seen_are_not(ground, photos):
+    assert warnings({"background": photos, "ground": ground}, {"elevation": [30, 60]}) == ()
+
+
+def test_the_horizon_says_how_much_of_photographs_is_hidden(photos):
+    scene = {"background": photos, "ground": "on"}
+    lens = {"size": [400, 400], "fov_deg": 90}  # half the height is the tangent of 45 degrees
+    assert warnings(scene, {"elevation": 15}, camera=lens) == ()
+    (said,) = warnings(scene, {"elevation": math.degrees(math.atan(0.5))}, camera=lens)
+    assert "about 75 %" in said
+    assert warnings({"background": "sky", "ground": "on"}, {"elevation": 60}) == ()
+
+
+@pytest.mark.parametrize(("elevation", "is_said"), [([0, 12], False), ([0, 60], True)])
+def test_few_random_poses_stand_for_all_that_scenes_draw(elevation, is_said, photos):
+    views = {"kind": "sphere", "count": 1, "elevation": elevation, "distance": {"fill": 0.5}, "azimuth": [-180, 180]}
+    for seed in range(5):
+        said = warnings({"background": photos, "ground": "on"}, views, seed=seed, camera={"size": [400, 400], "fov_deg": 90})
+        assert bool(said) is is_said
 
 
 def test_a_target_that_is_not_the_model_is_said():

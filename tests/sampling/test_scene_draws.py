@@ -164,7 +164,7 @@ def test_transparent_pictures_are_kept_as_rgba():
 
 
 MISSING = [
-    ({"sky": "none.exr"}, "scene.sky.hdri: expected daylight, a file or a folder with files (.exr, .hdr); found none in "),
+    ({"sky": "none.exr"}, "scene.sky.hdri: expected daylight, a file or a folder with files (.exr, .hdr); found /"),
     ({"sky": {"choice": ["day.exr", "none.exr"]}}, "scene.sky.hdri: expected daylight, a file"),
     ({"sky": "photos"}, "scene.sky.hdri: expected daylight, a file"),
     ({"ground": {"normal_image": "none.png"}}, "scene.ground.normal_image: expected an image file; found none at "),

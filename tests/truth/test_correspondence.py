@@ -1,6 +1,8 @@
 """Where the points of one picture are in another: against closed forms, and against brute force for any lens and motion."""
 
+import gc
 import math
+import weakref
 
 import numpy as np
 import pytest
@@ -14,6 +16,7 @@ from viewsphere.truth.surface_draws import points_on
 
 AHEAD = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])  # looks along +Y, Z up
 STILL = pose(0, 0, 0)
+ROUNDED = 2.0**-24  # of a float32 that is the nearest one
 
 
 def wall(distance=4.0, size=64.0):
@@ -42,7 +45,8 @@ def test_a_plane_that_moves_and_comes_near(step, far):
     there = ((centers(camera) - half) * 4.0 / f + (step[0], -step[2])) * f / z + half
     np.testing.assert_allclose(match.xy, there, atol=1e-10 if not far else 1e-8)
     np.testing.assert_allclose(match.inverse_depth, 1 / z, rtol=1e-9)
-    np.testing.assert_allclose(match.scene_flow, np.broadcast_to((step[0], -step[2], step[1]), (120, 160, 3)), atol=1e-8)
+    moved = np.broadcast_to((step[0], -step[2], step[1]), (120, 160, 3))
+    np.testing.assert_allclose(match.scene_flow, moved, rtol=ROUNDED, atol=1e-8)
     np.testing.assert_allclose(match.xyz[..., :2], (there - half) / f * z, atol=1e-8)
 
 
@@ -216,7 +220,7 @@ def test_any_motion_between_any_lenses_is_that_of_brute_force(name, other):
         np.testing.assert_allclose(match.xyz[close], axes[close], rtol=1e-9, atol=1e-7)
         _, place, _ = brute_points(here, here)
         flow = axes - (place @ cameras[0].R.T + cameras[0].t)
-        np.testing.assert_allclose(match.scene_flow[close], flow[close], rtol=1e-9, atol=1e-7)
+        np.testing.assert_allclose(match.scene_flow[close], flow[close], rtol=ROUNDED, atol=1e-7)
 
 
 def test_there_is_no_match_of_what_is_gone_or_other():
@@ -281,3 +285,17 @@ def test_flow_is_the_way_from_the_pixels_centers(name):
     way = (match.xy - centers(here.camera)).astype(np.float32)
     assert np.nanmax(np.abs(way)) > 1
     assert match.flow.tobytes() == way.tobytes()
+
+
+def test_a_match_is_gone_with_its_last_user():
+    """Its arrays are as large as several pictures: they are not to wait for a collection of garbage."""
+    here, there = (view([cube(0.5)], [STILL], orbit_camera(lens(64, 48, 1.0), a, 0.2, 5.0), ground=True) for a in (0.0, 0.1))
+    gc.disable()
+    try:
+        match = matched(here, there)
+        assert match.state.shape == match.flow.shape[:2] == match.scene_flow.shape[:2]
+        known = weakref.ref(match)
+        del match
+        assert known() is None
+    finally:
+        gc.enable()

@@ -53,7 +53,7 @@ class Beside:
 def sight_of(own, around=None):
     around = around or {}
     views = {(0, None): own} | around
-    return Sight(own.geometry, own.camera, rasterize(own.geometry, own.camera), (), Beside(views))
+    return Sight(own.geometry, own.camera, own.visibility, (), Beside(views))
 
 
 def observed(sight, *names):

@@ -183,6 +183,26 @@ def test_a_point_just_behind_a_surface_is_hidden_from_a_millionth_on():
 
 
 @pytest.mark.parametrize("name", LENSES)
+def test_where_no_mesh_is_the_ground_hides_what_is_below_and_nothing_what_is_not(name):
+    """A small cube far from all points, which are above the ground and below it, ahead and in the sky."""
+    camera = orbit_camera(lens(64, 48, 2.0 if name == "fisheye" else 1.0, LENSES[name]), 0.0, 0.3, 6.0)
+    rng = np.random.default_rng(5)
+    aside = pose(0, 40, 0)
+    with_ground, without = (view([cube(0.1)], [aside], camera, ground=ground, floor=-1.0) for ground in (True, False))
+    places = rng.uniform((-2, -2, -2.5), (2, 3, 0.5), (3000, 3))
+    low = points_in_world(places)
+    seen = low.in_view(with_ground).state
+    inside = seen <= OCCLUDED
+    assert inside.sum() > 1500
+    assert np.array_equal(seen[inside] == OCCLUDED, places[inside, 2] < -1.0)
+    assert (low.in_view(without).state[inside] == VISIBLE).all()
+    match = matched(without, with_ground)  # the sky of a world without a ground, and the cube
+    on_cube = without.visibility.triangle >= 0
+    shown = with_ground.visibility.triangle >= 0
+    assert np.array_equal((match.state == OCCLUDED)[~on_cube], shown[~on_cube]) and 0 < shown.mean() < 1
+
+
+@pytest.mark.parametrize("name", LENSES)
 def test_states_of_several_at_once_are_those_of_each(name):
     rng = np.random.default_rng(2)
     there = view([sphere(2, 0.6), cube(0.5)], [pose(0, 0, 0), pose(1, 0, 0)], random_camera(rng, name), ground=True)

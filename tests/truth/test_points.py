@@ -133,6 +133,26 @@ def test_joined_points_are_all_of_them_and_chosen_ones_are_some():
     np.testing.assert_array_equal(joined.chosen(index).in_view(here).state, joined.in_view(here).state[index])
 
 
+def test_points_picked_at_several_instants_are_on_the_triangles_of_theirs():
+    """A ball has other triangles from the second instant on, and is gone at the third: points of each instant, joined."""
+    balls = [sphere(2, 0.7), sphere(3, 0.7), None, sphere(3, 0.8), sphere(2, 0.8)]
+    views = [
+        view([ball or sphere(2, 0.7), cube(0.3)], [STILL if ball else None, pose(1.5, 0, 0)], camera(), steps=[i + 1, None])
+        for i, ball in enumerate(balls)
+    ]
+    rng = np.random.default_rng(0)
+    parts = [points_on(one, 50, rng) for one in views]
+    joined = SurfacePoints.joined(parts)
+    assert [body.position for body in joined.bodies] == [0, 1, 0]  # two kinds of ball, and one cube
+    assert np.array_equal(joined.thing, np.concatenate([part.thing for part in parts]))
+    for one in views:
+        alone, seen = [part.in_view(one) for part in parts], joined.in_view(one)
+        np.testing.assert_array_equal(seen.state, np.concatenate([part.state for part in alone]))
+        np.testing.assert_array_equal(seen.world, np.concatenate([part.world for part in alone]))
+    later = joined.in_view(views[3]).state[50:100]
+    assert (later != INVALID).all() and (joined.in_view(views[3]).state[:50] == INVALID).any()
+
+
 def test_draws_are_even_by_area_and_need_a_surface():
     """Of a card twice as wide as another, twice as many; and as many on either side of its middle."""
     wide = mesh_of([[-2, 0, -1], [2, 0, -1], [2, 0, 1], [-2, 0, 1]], [[0, 1, 2], [0, 2, 3]])

@@ -12,7 +12,6 @@ from viewsphere.model.thing import Motion, Thing, TimeStep
 from viewsphere.truth.correspondence import Match
 from viewsphere.truth.geometry import build_geometry, present
 from viewsphere.truth.view import View
-from viewsphere.truth.visibility import rasterize
 
 
 def pose(*position, turn=None):
@@ -38,7 +37,7 @@ def view(meshes, poses, camera, ground=False, sky=True, steps=None, floor=None):
 
 
 def matched(here, there):
-    return Match(here, rasterize(here.geometry, here.camera), there)
+    return Match(here, here.visibility, there)
 
 
 def centers(camera):

@@ -36,7 +36,7 @@ from viewsphere.errors import ModelError
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.thing import TimeStep
 
-SETTINGS = ("up", "forward", "unit", "centring", "scale", "real_size", "confined", "clip", "shown")
+SETTINGS = ("up", "forward", "unit", "centring", "scale", "real_size", "confined", "clip", "fps", "shown")
 ZOO = "zoo:"
 ASIDE = "reading-"
 BATCH = 32
@@ -137,7 +137,9 @@ def kept(path: Path, about: str, ask: Callable[[], tuple[Any, Iterable[Path]]]) 
     with suppress(OSError), _aside(folder) as place:
         names = _names(path, files)
         aside = place / "told.json"
-        aside.write_text(json.dumps({"told": told, "files": names, "state": _second_digest(own, path, names)}), "utf-8")
+        aside.write_text(
+            json.dumps({"told": told, "files": names, "state": _second_digest(own, path, names)}), "utf-8", newline="\n"
+        )
         aside.replace(entry)
     return told
 
@@ -243,7 +245,14 @@ def _stored(folder: Path, first: str, path: Path) -> tuple[Mesh, FileFacts] | No
 def _names(path: Path, files: Iterable[Path]) -> list[str]:
     """Paths of files that a model depends on, from its own folder."""
     root = os.path.realpath(path.parent)
-    return sorted({os.path.relpath(os.path.realpath(file), root).replace(os.sep, "/") for file in files})
+    return sorted({_from(root, os.path.realpath(file)).replace(os.sep, "/") for file in files})
+
+
+def _from(root: str, file: str) -> str:
+    try:
+        return os.path.relpath(file, root)
+    except ValueError:  # on another drive of Windows
+        return file
 
 
 def _store(folder: Path, first: str, path: Path, files: Iterable[Path], mesh: Path) -> None:
@@ -252,5 +261,5 @@ def _store(folder: Path, first: str, path: Path, files: Iterable[Path], mesh: Pa
     aside = mesh.with_name("files.json")
     with suppress(OSError):
         mesh.replace(folder / f"{_second_digest(first, path, names)}.npz")
-        aside.write_text(json.dumps(names), encoding="utf-8")
+        aside.write_text(json.dumps(names), "utf-8", newline="\n")
         aside.replace(folder / f"{first}.json")

@@ -45,6 +45,7 @@ class ModelFolder:
     inside: tuple[str, ...] = ()
     shown: tuple[str, ...] = ()
     clip: str | None = None
+    fps: float | None = None
     files: list[Path] = field(default_factory=list[Path])
     warnings: list[str] = field(default_factory=list[str])
     images: list[Image] = field(default_factory=list[Image])

@@ -9,10 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from viewsphere.assets.cache import load
+from viewsphere.assets.cache import ZOO, load
 from viewsphere.assets.load import PICTURE_SUFFIXES
 from viewsphere.assets.mesh import Material, Mesh
+from viewsphere.assets.normalise import axes
 from viewsphere.assets.primitive import FileFacts
+from viewsphere.assets.timeline import Timeline, animation_of
+from viewsphere.errors import ModelError
 from viewsphere.model.model_spec import Axis, ModelSpec, Size
 
 
@@ -22,7 +25,8 @@ class ModelReport:
 
     `size` (width, height, length) and `bounds` (lowest and highest corner) are metres in object axes;
     `raw_size` is the file's own, along its own x, y and z. `parts` are names and triangle counts; `materials`
-    names and the fields that are not the default; `textures` names and (width, height) in pixels.
+    names and the fields that are not the default; `textures` names and (width, height) in pixels. `animation` is None
+    where nothing moves, or where Blender cannot say when, which is then among the `suggestions`.
     """
 
     source: str
@@ -40,6 +44,7 @@ class ModelReport:
     textures: tuple[tuple[str, tuple[int, int]], ...]
     has_uv: bool
     has_colors: bool
+    animation: Timeline | None
     warnings: tuple[str, ...]
     suggestions: tuple[str, ...]
 
@@ -53,12 +58,13 @@ def describe(source: Path | ModelSpec, build: Callable[[ModelSpec], Mesh] | None
     mesh, facts = load(spec, build)
     low, high = mesh.bounds
     width, length, height = (float(x) for x in high - low)
+    animation, problems = _animation(spec)
     counts = np.bincount(mesh.triangle_part, minlength=len(mesh.parts))
     return ModelReport(
         source=spec.source,
         format=facts.format,
-        up=spec.up or facts.up,
-        forward=spec.forward or facts.forward,
+        up=axes(spec, facts)[0],
+        forward=axes(spec, facts)[1],
         unit=facts.unit if spec.unit is None else spec.unit,
         size=(width, height, length),
         bounds=(
@@ -73,13 +79,24 @@ def describe(source: Path | ModelSpec, build: Callable[[ModelSpec], Mesh] | None
         textures=tuple((image.name, (image.pixels.shape[1], image.pixels.shape[0])) for image in mesh.images),
         has_uv=mesh.uv0 is not None,
         has_colors=mesh.colors is not None,
+        animation=animation,
         warnings=mesh.warnings,
-        suggestions=_suggestions(spec, facts, (width, height, length)),
+        suggestions=(*_suggestions(spec, facts, (width, height, length)), *problems),
     )
 
 
 def _default_spec(path: Path) -> ModelSpec:
     return ModelSpec(key=path.stem, source=str(path.absolute()), category="model", category_id=1)
+
+
+def _animation(spec: ModelSpec) -> tuple[Timeline | None, tuple[str, ...]]:
+    """When the file's animations begin and end, and why that is not known."""
+    if spec.source.startswith(ZOO):
+        return None, ()
+    try:
+        return animation_of(Path(spec.source), spec.confined), ()
+    except ModelError as error:
+        return None, (f"it may move, but its frames are not known: {error}",)
 
 
 def _unusual(material: Material) -> dict[str, Any]:

@@ -73,11 +73,18 @@ def load_model(
 
 
 def load_frames(
-    path: Path, frames: Sequence[int], *, confined: bool = True, shown: tuple[str, ...] = (), clip: str | None = None
+    path: Path,
+    frames: Sequence[int],
+    *,
+    confined: bool = True,
+    shown: tuple[str, ...] = (),
+    clip: str | None = None,
+    fps: float | None = None,
 ) -> Iterator[tuple[Mesh, FileFacts]]:
     """A model file's meshes at its first frame, then at each of the ascending `frames`; Blender opens the file once.
 
-    `clip` names the animation that is played, where the file has several.
+    `clip` names the animation that is played, where the file has several; `fps` is how many frames make a second, None for
+    what the file says.
 
     Otherwise as `load_model`; ModelError for files that cannot move.
     """
@@ -86,7 +93,7 @@ def load_frames(
     from viewsphere.assets.via_blender import read_frames
 
     with np.errstate(all="ignore"):
-        yield from read_frames(ModelFolder(file, confined, inside, shown, clip), frames)
+        yield from read_frames(ModelFolder(file, confined, inside, shown, clip, fps), frames)
 
 
 def check_animated(path: Path) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import cast
 
 import numpy as np
 
@@ -29,7 +30,7 @@ def normalise(mesh: Mesh, facts: FileFacts, spec: ModelSpec, first: tuple[Mesh, 
     file's order. `first`, the mesh and facts of an animation's first frame, sets scale and centre for all frames, so that
     motion is kept. Raises ModelError for parallel axes and for a result smaller or larger than `limits` allows.
     """
-    turn = rotation(spec.up or facts.up, spec.forward or facts.forward, str(facts.path))
+    turn = rotation(*axes(spec, facts), str(facts.path))
     still, origin = (mesh, facts.origin) if first is None else (first[0], first[1].origin)
     factor, center, warnings = _placing(still, turn, facts, spec)
     shift = factor * (np.subtract(facts.origin, origin) @ turn.T) - center
@@ -61,6 +62,22 @@ def _placing(mesh: Mesh, turn: Float, facts: FileFacts, spec: ModelSpec) -> tupl
     if spec.centring == "floor":
         center[2] = low[2]
     return factor, center, warnings
+
+
+def axes(spec: ModelSpec, facts: FileFacts) -> tuple[Axis, Axis]:
+    """Up and forward of a model: its settings', else the file's; where one is set alone, along the file's other one, the file's
+    axes are turned together, so that the other is at right angles.
+    """
+    up, forward = spec.up or facts.up, spec.forward or facts.forward
+    if up[1] != forward[1] or (spec.up and spec.forward):
+        return up, forward
+    if spec.up:
+        return up, _opposite(facts.up) if up == facts.forward else facts.up
+    return _opposite(facts.forward) if forward == facts.up else facts.forward, forward
+
+
+def _opposite(axis: Axis) -> Axis:
+    return cast("Axis", ("-" if axis[0] == "+" else "+") + axis[1])
 
 
 def rotation(up: Axis, forward: Axis, where: str) -> Float:

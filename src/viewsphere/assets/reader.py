@@ -52,7 +52,7 @@ def main() -> None:
     _end_with(job.parent)
     _limit(job)
     outcome = read(job)
-    (Path(job.folder) / OUTCOME).write_text(json.dumps(outcome), encoding="utf-8")
+    (Path(job.folder) / OUTCOME).write_text(json.dumps(outcome), "utf-8", newline="\n")
     sys.stderr.flush()
     os._exit(0)  # at once: a library's cleanup at exit may crash, too
 
@@ -91,7 +91,7 @@ def _read_model(spec: ModelSpec, job: Job) -> Sequence[Path]:
         raw, facts = load_model(source, confined=spec.confined, shown=spec.shown)
         write_mesh(folder / MESH, normalise(raw, facts, spec), facts)
         return facts.files
-    found = load_frames(source, job.frames, confined=spec.confined, shown=spec.shown, clip=spec.clip)
+    found = load_frames(source, job.frames, confined=spec.confined, shown=spec.shown, clip=spec.clip, fps=spec.fps)
     first = next(found)
     files = dict.fromkeys(first[1].files)
     for number, (raw, facts) in enumerate(found):

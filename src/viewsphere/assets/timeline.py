@@ -10,22 +10,32 @@ from typing import Any
 
 from viewsphere.assets.cache import kept
 from viewsphere.assets.folder import ModelFolder
+from viewsphere.assets.gltf.document import Document, ForBlenderError
 from viewsphere.assets.inside import split_source
-from viewsphere.assets.load import check_animated
+from viewsphere.assets.load import ANIMATED_SUFFIXES, check_animated
 from viewsphere.assets.via_blender import asked, read_named, remember_layers, started
 from viewsphere.blender.process import BlenderProcess
 from viewsphere.errors import ModelError
 
 
 @dataclass(frozen=True)
+class Clip:
+    """One of a file's animations: its name, and its first and last frame."""
+
+    name: str
+    first: int
+    last: int
+
+
+@dataclass(frozen=True)
 class Timeline:
-    """First and last frame of a file, its frames a second, whether anything in it moves, and its animations' names."""
+    """First and last frame of a file, its frames a second, whether anything in it moves, and its animations."""
 
     first: int
     last: int
     fps: float
     moves: bool
-    clips: tuple[str, ...] = ()
+    clips: tuple[Clip, ...] = ()
 
     def seconds(self, frame: int) -> float:
         """Seconds from the first frame to this one."""
@@ -63,10 +73,12 @@ class Blenders:
 
         return kept(file, f"{do} {confined} {sorted(about.items())}", ask)
 
-    def timeline(self, path: Path, confined: bool, clip: str | None = None) -> Timeline:
-        """The file's timeline while the animation `clip` plays, by default the first one."""
-        told = self.told(path, confined, "timeline", {"clip": clip})
-        return Timeline(told["first"], told["last"], told["fps"], told["moves"], tuple(told["clips"]))
+    def timeline(self, path: Path, confined: bool, clip: str | None = None, fps: float | None = None) -> Timeline:
+        """The file's timeline while the animation `clip` plays, by default the first one, in frames of which `fps` make a
+        second, by default as many as the file says.
+        """
+        told = self.told(path, confined, "timeline", {"clip": clip, "fps": fps})
+        return Timeline(told["first"], told["last"], told["fps"], told["moves"], tuple(Clip(**clip) for clip in told["clips"]))
 
     def _asked(self, folder: ModelFolder, do: str, about: Mapping[str, Any]) -> dict[str, Any]:
         place = folder.model.parent.resolve(), folder.confined
@@ -81,3 +93,27 @@ class Blenders:
             raise
         remember_layers(folder, process.log, begun)
         return answer
+
+
+def animation_of(path: Path, confined: bool) -> Timeline | None:
+    """The timeline of a file in which something moves, None for any other; Blender is only asked of files that may move.
+
+    Raises ModelError where Blender has no answer, or there is none.
+    """
+    folder = ModelFolder(split_source(path)[0], confined)
+    if not _may_move(folder):
+        return None
+    with Blenders.none_yet() as blenders:
+        line = blenders.timeline(path, confined)
+    return line if line.moves else None
+
+
+def _may_move(folder: ModelFolder) -> bool:
+    """Whether the format has animations and, of glTF, whose JSON is read here, the file has."""
+    kind = folder.model.suffix[1:].lower()
+    if kind not in ("glb", "gltf"):
+        return kind in ANIMATED_SUFFIXES
+    try:
+        return bool(list(Document.read(folder).root.items("animations")))
+    except ForBlenderError:
+        return True

@@ -34,7 +34,7 @@ NAMES = {
     "blend": "Blender",
     "fbx": "FBX",
     **dict.fromkeys(("usd", "usda", "usdc", "usdz"), "USD"),
-    **dict.fromkeys(("glb", "gltf"), "compressed glTF"),
+    **dict.fromkeys(("glb", "gltf"), "animated and compressed glTF"),
 }
 SETUP = "set it up by viewsphere doctor --setup-blender"
 
@@ -75,7 +75,7 @@ def _read(
         for frame in frames:
             told = asked(
                 folder, process, "read", inside=folder.inside, most=limits.MAX_BLENDER_TRIANGLES, folder=str(process.folder),
-                frame=frame, after=after, shown=folder.shown, clip=folder.clip,
+                frame=frame, after=after, shown=folder.shown, clip=folder.clip, fps=folder.fps,
             )  # fmt: skip
             if after is None:
                 unit = float(told["unit"])

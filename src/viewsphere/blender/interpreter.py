@@ -18,6 +18,9 @@ from viewsphere.blender.process import BlenderProcess
 from viewsphere.errors import BlenderDied, BlenderError, MissingExtraError, UserError
 
 VARIABLE = "VIEWSPHERE_BLENDER_PYTHON"
+SCRIPTS = "VIEWSPHERE_ALLOW_SCRIPTS"
+"""The environment variable that lets scripts of recipes run, where it is 1; processes that are started inherit it."""
+
 INSTALL = "pip install 'viewsphere[blender]' in Python 3.11, or run viewsphere doctor --setup-blender"
 GRAPHICS = (
     "it needs OpenGL 4.3 through EGL; on Debian and Ubuntu: apt-get install libegl1 libgl1-mesa-dri, which draw without a "

@@ -12,6 +12,7 @@ from typing import Any
 
 from viewsphere import plugins
 from viewsphere.check.again import Again
+from viewsphere.check.cycles import Compared
 from viewsphere.check.digests import damaged
 from viewsphere.check.failure import failure
 from viewsphere.check.frames import FRAME_PROOFS
@@ -23,8 +24,12 @@ from viewsphere.errors import MissingExtraError, ViewsphereError
 from viewsphere.formats import Remark, Verified
 from viewsphere.labels import channel_labels, labels
 from viewsphere.model.sample import Sample
-from viewsphere.store import Dataset, ModelInfo, Row
-from viewsphere.store.checksums import damaged_files
+from viewsphere.recipe.formats import FormatEntry
+from viewsphere.recipe.sequence import TimeEntry
+from viewsphere.run.exporting import shown_to
+from viewsphere.store import Dataset, ModelInfo, PlanRecord, Row
+from viewsphere.store.checksums import damaged_files, read_least, read_options
+from viewsphere.store.credits import credits_problem
 from viewsphere.store.index import numbers
 
 
@@ -64,17 +69,24 @@ FEWEST = 128
 
 
 def check(
-    dataset: Dataset, *, sample: int | None = 50, rays: bool | None = None, frames: int | None = None, workers: int = 0
+    dataset: Dataset,
+    *,
+    sample: int | None = 50,
+    rays: bool | None = None,
+    frames: int | None = None,
+    workers: int = 0,
+    against_cycles: int = 0,
 ) -> Report:
     """Prove the finished frames of a data set, and all its exports.
 
     Every file is compared with its digest, and every frame is read whole, or with `frames` at most so many, spread evenly; the
     exports are then left to a whole check. On `sample` frames, spread evenly (None: on all), all labels are computed again from
     the exported models; and stored depth is lifted to points and compared with rays that Embree casts at these models: `rays`
-    False leaves that out, None does too (with a note) where embreex is not installed. `workers` 0 proves all in the calling
+    False leaves that out, None does too (with a note) where embreex is not installed. Of `against_cycles` frames, spread
+    evenly, instance maps are compared with Cycles' own pass of object indices. `workers` 0 proves all in the calling
     process. Nothing is changed.
 
-    Raises MissingExtraError for `rays` True without embreex.
+    Raises MissingExtraError for `rays` True without embreex, and for `against_cycles` without Blender.
     """
     files, damage = damaged(dataset)
     findings = [Finding("digests", None, message) for messages in damage.values() for message in messages]
@@ -85,14 +97,19 @@ def check(
         findings.append(Finding("counts", None, f"expected models that can be read, found {error}"))
         return Report({"digests": files}, tuple(findings), ())
     findings += [Finding("models", None, message) for _, message in differing(dataset, notes)]
+    findings += [Finding("credits", None, message) for message in _credits(dataset)]
     positions = _spread(range(len(dataset)), frames)
     sampled = _spread(positions, sample)
     checked = {"digests": files, "models": len(dataset.models)}
+    if owned := sum(info.credit is not None for info in dataset.models):
+        checked["credits"] = owned
     notes += _alone(dataset)
     for found in _frame_reports(dataset, positions, sampled, rays, workers):
         findings += found.findings
         notes += [note for note in found.notes if note not in notes]
         checked |= {name: checked.get(name, 0) + count for name, count in found.checked.items()}
+    if against_cycles:
+        findings += _against_cycles(dataset, _spread(positions, against_cycles), checked, notes)
     names = exports(dataset)
     if len(positions) < len(dataset):
         notes.append(f"{len(positions):,} of {len(dataset):,} frames were read")
@@ -102,6 +119,15 @@ def check(
         checked[name] = len(dataset)
         findings += [Finding(name, frame, message) for frame, message in _export_proof(dataset, name, module, sampled, notes)]
     return Report(checked, tuple(findings), tuple(notes))
+
+
+def _against_cycles(dataset: Dataset, positions: range, checked: dict[str, int], notes: list[str]) -> Iterator[Finding]:
+    compared = Compared(dataset)
+    for _, frame, sample in _frames(dataset, positions):
+        if not isinstance(sample, str):
+            yield from (Finding("cycles", frame, message) for message in compared.differences(sample))
+    checked["cycles"] = compared.frames
+    notes.append(compared.note())
 
 
 def _spread(positions: range, most: int | None) -> range:
@@ -159,7 +185,8 @@ def _export_proof(
         notes.append(f"{name}: only digests are checked, the format has no proof")
         return
     try:
-        yield from module.verify(dataset, folder, sampled)
+        entry = FormatEntry(name=name, options=read_options(folder))
+        yield from module.verify(shown_to(module, dataset, read_least(folder)), folder, sampled, *entry.arguments())
     except Exception as error:
         yield None, failure("an export that can be checked", error)
 
@@ -188,6 +215,13 @@ def lacking_models(dataset: Dataset) -> list[str]:
     return [key for key in dataset.plan.models if key not in skipped and not (folder(key) / "model.json").is_file()]
 
 
+def _credits(dataset: Dataset) -> Iterator[str]:
+    """What is wrong with the file of credits, which is written when a run ends."""
+    problem = credits_problem(dataset)
+    if problem:
+        yield f"{problem}: render again, or mend it with viewsphere check --repair"
+
+
 def _missing_shots(dataset: Dataset) -> Iterator[str]:
     """What is missing of each part, and of the channels that each one added to others."""
     plan, store = dataset.plan, dataset.store
@@ -199,8 +233,7 @@ def _missing_shots(dataset: Dataset) -> Iterator[str]:
         if not missing:
             continue
         expected, lost = (sum(row.count for row in some) for some in (rows, missing))
-        scenes = {name for part in plan.parts if part.is_sampled and not part.is_product for name in part.subjects}
-        what = f"{len(scenes)} scenes x {plan.poses} poses" if scenes else f"{len(plan.models)} models x {plan.poses} poses"
+        what = _factors(plan)
         if len(plan.parts) > 1:
             channels = dict.fromkeys(name for _, names in plan.parts[number].supplies for name in names)
             what = f"{', '.join(channels)} of older frames, " if added else ""
@@ -209,6 +242,17 @@ def _missing_shots(dataset: Dataset) -> Iterator[str]:
             f"expected {expected} frames ({what}), found {expected - lost}: shot {missing[0].key} is the first of "
             f"{len(missing)} missing: render again to go on"
         )
+
+
+def _factors(plan: PlanRecord) -> str:
+    """What a plan's frames are the product of, in words."""
+    time = next((part.recipe["time"] for part in plan.parts if part.recipe.get("time")), None)
+    if time is not None:
+        instants = TimeEntry.model_validate(time).count
+        films = sum(len(block.subjects) * block.size for part in plan.parts for block in part.blocks) // instants
+        return f"{films} sequences x {instants} instants"
+    scenes = {name for part in plan.parts if part.is_sampled and not part.is_product for name in part.subjects}
+    return f"{len(scenes)} scenes x {plan.poses} poses" if scenes else f"{len(plan.models)} models x {plan.poses} poses"
 
 
 def _frames(dataset: Dataset, positions: range) -> Iterator[tuple[int, int, Sample | str]]:

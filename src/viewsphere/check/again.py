@@ -57,7 +57,8 @@ class Again:
             return
         camera, by_id = sample.camera, {o.id: o for o in sample.objects}
         placed = tuple(self._placement(by_id.get(i + 1), sample, shot) for i in range(geometry.object_count))
-        sight = Sight(geometry, camera, rasterize(geometry, camera), placed, self._compared(sample, shot, key))
+        visibility = rasterize(geometry, camera, keeps_exact=True)
+        sight = Sight(geometry, camera, visibility, placed, self._compared(sample, shot, key))
         for name, label in channel_labels().items():
             if name in sample.files:
                 yield from ((name, problem) for problem in self._pixels(sample, name, label.compute(sight)))
@@ -110,16 +111,22 @@ class Again:
         return self._geometry[1]
 
     def _compared(self, sample: Sample, shot: Shot, key: str) -> SampleViews | None:
-        """What labels of motion and stereo compare a sample with; None without one, and where scenery is not what it was."""
+        """What labels of motion and stereo compare a sample with; None without one, and where scenery is not what it was.
+
+        Points are picked here, before any label asks for triangles, which would be written over.
+        """
         known = channel_labels()
-        if not any(known[name].needs.is_some for name in sample.files if name in known):
+        needs = [known[name].needs for name in sample.files if name in known]
+        if not any(need.is_some for need in needs):
             return None
         if self._views[0] != key:
             self._keys.clear()
             self._views = key, self._shot_views(shot, key)
         self._keys.update({o.id: o.track or o.key for o in sample.objects})
-        views = self._views[1]
-        return views and views.around(*self._scenery.taken(sample, shot))
+        views, (instant, sensor) = self._views[1], self._scenery.taken(sample, shot)
+        if views and any(need.tracks for need in needs):
+            views.followed(sensor)
+        return views and views.around(instant, sensor)
 
     def _shot_views(self, shot: Shot, key: str) -> ShotViews | None:
         """The views of a shot whose things stand where the shot says, in the exported models."""

@@ -15,6 +15,7 @@ from viewsphere.run.exporting import export
 from viewsphere.run.mending import Mender
 from viewsphere.run.progress import Listener, unheard
 from viewsphere.store import Dataset
+from viewsphere.store.credits import CREDITS, write_credits
 
 
 @dataclass(frozen=True)
@@ -41,6 +42,7 @@ def repair(root: Path | str, *, workers: int = 0, listener: Listener | None = No
         mending.shots(mending.damaged_shots())
         report = check(Dataset(root), workers=workers, **options)
         mending.shots(_found_shots(dataset, report.findings))
+        mending.credits(report.findings)
         mending.exports(report.findings)
     report = check(Dataset(root), workers=workers, **options) if mending.done else report
     return Repaired(tuple(mending.done), replace(report, findings=(*report.findings, *mending.refused)))
@@ -85,6 +87,12 @@ class _Mending:
         self.done += [f"{what} {key}: {how}" for key in wanted if key not in errors]
         self.refused += [Finding("repair", None, f"{what} {key} cannot be {how}: {why}") for key, why in errors.items()]
         return bool(wanted)
+
+    def credits(self, findings: Iterable[Finding]) -> None:
+        """Write the file of credits again if it is not what the models' records say."""
+        if any(finding.check == "credits" for finding in findings):
+            write_credits(Dataset(self._dataset.root))
+            self.done.append(f"{CREDITS}: written again")
 
     def exports(self, findings: Iterable[Finding]) -> None:
         """Write those again of which something was found: also where their files are links of what was damaged. While frames

@@ -7,22 +7,31 @@ from __future__ import annotations
 
 import os
 import sys
+from io import TextIOWrapper
 
 from viewsphere.errors import CheckFailedError, UserError, ViewsphereError
 
 
 def main() -> None:
     """Run the command line; the user's mistakes are one line and exit status 2, never a traceback."""
+    import typer
+
     from viewsphere.cli import completion
     from viewsphere.cli.commands import app
+    from viewsphere.cli.options import UsageError, explain
     from viewsphere.cli.terminal import complain
     from viewsphere.run.allocator import keep_freed_memory
 
+    _print_anything()
     try:
         if os.environ.get("_VIEWSPHERE_COMPLETE") == completion.BASH:
             completion.in_bash(app, os.environ)
         keep_freed_memory()
-        app()
+        sys.exit(app(standalone_mode=False))
+    except UsageError as error:
+        explain(error)
+    except typer.Abort:
+        sys.exit(130)
     except CheckFailedError as error:
         complain(error, 1)
     except UserError as error:
@@ -31,3 +40,10 @@ def main() -> None:
         complain(error, 3)
     except KeyboardInterrupt:
         sys.exit(130)
+
+
+def _print_anything() -> None:
+    """Print letters that the output's encoding lacks, as that of a Windows pipe often does, by their numbers."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")

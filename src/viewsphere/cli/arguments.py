@@ -10,8 +10,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from viewsphere.cli import completion
+from viewsphere.errors import UserError
 
 if TYPE_CHECKING:
+    from viewsphere.recipe.formats import FormatEntry
     from viewsphere.recipe.recipe import Recipe
 
 RecipeFile = Annotated[Path, typer.Argument(help="Recipe (YAML).", show_default=False)]
@@ -25,24 +27,98 @@ Changes = Annotated[
         autocompletion=completion.changes,
     ),
 ]
+
+
+def _tell_version(asked: bool) -> None:
+    if asked:
+        from importlib.metadata import version
+
+        typer.echo(f"viewsphere {version('viewsphere')}")
+        raise typer.Exit
+
+
+Version = Annotated[
+    bool, typer.Option("--version", help="Print the version.", callback=_tell_version, is_eager=True, show_default=False)
+]
+
+
+def _allow_scripts(allowed: bool) -> bool:
+    """Let scripts of recipes run in this process, and in those that it starts."""
+    from viewsphere.blender.interpreter import SCRIPTS
+
+    if allowed:
+        os.environ[SCRIPTS] = "1"
+    return allowed
+
+
+AllowScripts = Annotated[
+    bool, typer.Option("--allow-scripts", help="Let the recipe's engine.script run: a program.", callback=_allow_scripts)
+]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON for scripts.")]
 Formats = Annotated[
     str | None,
     typer.Option("--format", "-f", help="Formats, with commas; default: the recipe's.", autocompletion=completion.formats),
 ]
 
+FormatOptions = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--format-option",
+        metavar="FORMAT.OPTION=VALUE",
+        help="Set an option of a format: coco.category_ids=coco; several times for several.",
+    ),
+]
+
 
 def load_recipe(file: Path, changes: Sequence[str] | None = None) -> Recipe:
     """The recipe of a file with some fields set; RecipeError names every mistake."""
+    from viewsphere.assets.load import BLENDER_SUFFIXES, SUFFIXES
     from viewsphere.recipe.extends import parse_change
     from viewsphere.recipe.recipe import Recipe
 
+    if file.suffix.lower()[1:] in (*SUFFIXES, *BLENDER_SUFFIXES):
+        raise UserError(
+            f"{file}: expected a recipe (YAML); found a model: look at it (viewsphere inspect {file}), or name it as "
+            "source in a recipe (viewsphere new FOLDER)"
+        )
     return Recipe.load(file, dict(map(parse_change, changes or ())))
 
 
-def split(formats: str | None) -> tuple[str, ...] | None:
+def split(names: str | None) -> tuple[str, ...] | None:
     """The names in a comma-separated list; None for None."""
-    return None if formats is None else tuple(f.strip() for f in formats.split(",") if f.strip())
+    return None if names is None else tuple(name.strip() for name in names.split(",") if name.strip())
+
+
+def asked_formats(formats: str | None) -> tuple[str, ...] | None:
+    """The formats that --format names, None for None; UserError names one that there is not."""
+    from viewsphere import plugins
+    from viewsphere.model.mistakes import one_of
+
+    asked, known = split(formats), plugins.names("formats")
+    for name in asked or ():
+        if name not in known:
+            raise UserError(f"--format: {one_of(name, known)}")
+    return asked
+
+
+def with_options(names: Sequence[str], options: Sequence[str] | None) -> tuple[FormatEntry, ...]:
+    """The formats of these names with the options that are set for them; RecipeError names what cannot be set."""
+    from viewsphere.model.mistakes import one_of
+    from viewsphere.recipe.extends import parse_change
+    from viewsphere.recipe.formats import FormatEntry
+
+    entries = {name: FormatEntry(name=name) for name in names}
+    for text in options or ():
+        field, value = parse_change(text, "--format-option", "coco.category_ids=coco")
+        name, dot, option = field.partition(".")
+        if not dot:
+            met = "no option" if field in entries else f"no format: say {names[0]}.{text}" if names else "no format"
+            raise UserError(f"--format-option {text}: expected format.option=value; found {met}")
+        if name not in entries:
+            raise UserError(f"--format-option {field}: {one_of(name, tuple(entries))}: add it to the formats")
+        entries[name] = FormatEntry(name=name, options={option: value}).over(entries[name].options)
+        entries[name].arguments(f"--format-option {name}")
+    return tuple(entries.values())
 
 
 def cores() -> int:

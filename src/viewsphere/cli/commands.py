@@ -5,16 +5,23 @@ from __future__ import annotations
 import typer
 
 from viewsphere.cli import datasets, doctor, joining, making
+from viewsphere.cli.arguments import Version
 from viewsphere.cli.next_step import Command
 
 app = typer.Typer(
     name="viewsphere",
-    help="3D models in, exactly labelled image data sets out.",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
+
+
+@app.callback()
+def viewsphere(version: Version = False) -> None:
+    """3D models in, exactly labelled image data sets out."""
+
+
 for command in (
     making.new,
     making.schema,

@@ -5,13 +5,13 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, MutableMapping
 from contextlib import redirect_stdout
-from importlib.resources import files
 from io import StringIO
 from pathlib import Path
 
 import typer
 
 from viewsphere import plugins
+from viewsphere.recipe.starts import FIRST, kinds, start
 
 ZOO = "zoo:"
 BASH = "complete_bash"
@@ -38,6 +38,11 @@ def drawings() -> list[str]:
     return [drawing.name for drawing in known()]
 
 
+def starts() -> list[str]:
+    """What `viewsphere new` can start."""
+    return list(kinds())
+
+
 def axes() -> list[str]:
     """Axes with signs, such as +x."""
     return [sign + axis for axis in "xyz" for sign in "+-"]
@@ -51,7 +56,7 @@ def changes(incomplete: str) -> list[str]:
 
 
 def _fields() -> Iterable[str]:
-    text = files("viewsphere").joinpath("model/template.yaml").read_text("utf-8")
+    text = start(FIRST)["recipe.yaml"]
     inside = ""
     for indent, dash, name, value in re.findall(r"^( *)(- )?(?:# )?([a-z_]+):(?: +([^ #])| *#|$)", text, re.MULTILINE):
         if not indent:

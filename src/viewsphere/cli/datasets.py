@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from viewsphere.cli import completion
-from viewsphere.cli.arguments import AsJson, DataFolder, cores, split
+from viewsphere.cli.arguments import AllowScripts, AsJson, DataFolder, FormatOptions, asked_formats, cores, split, with_options
 from viewsphere.cli.terminal import ProgressBar, print_json, print_report
 from viewsphere.errors import UserError
 
@@ -23,6 +23,7 @@ def export(
         str | None,
         typer.Option("--format", "-f", help="Formats, with commas.", show_default=False, autocompletion=completion.formats),
     ] = None,
+    format_option: FormatOptions = None,
     output: Annotated[
         Path | None,
         typer.Option("-o", "--output", help="Folder for the formats' folders; default: the data set's.", show_default=False),
@@ -41,7 +42,7 @@ def export(
     from viewsphere.run.exporting import export as write_formats
     from viewsphere.store import Choice, frame_ranges
 
-    names = split(format_)
+    names = asked_formats(format_)
     if not names:
         from viewsphere import plugins
 
@@ -50,7 +51,7 @@ def export(
     if keys == ():
         raise UserError(f"--models: expected keys or patterns; found {models!r}")
     choice = Choice(keys or (), () if frames is None else frame_ranges(frames))
-    notes = write_formats(folder, names, output=output, choice=choice)
+    notes = write_formats(folder, with_options(names, format_option), output=output, choice=choice)
     if json_:
         print_json({"formats": list(names), "notes": list(notes)})
         return
@@ -71,7 +72,11 @@ def check(
         int | None,
         typer.Option(min=0, help="Processes; default: one a core. 0: this one.", show_default=False),
     ] = None,
+    against_cycles: Annotated[
+        int, typer.Option(min=0, metavar="N", help="Compare N frames with Cycles' own pass of object indices; needs Blender.")
+    ] = 0,
     json_: AsJson = False,
+    allow_scripts: AllowScripts = False,
 ) -> None:
     """Prove a data set: digests of all files, labels computed again from the exported models, rays, exports. Exit status 1 if
     it fails.
@@ -83,10 +88,10 @@ def check(
     asked, crew = None if all_ else sample, cores() if workers is None else workers
     if mend:
         with ProgressBar(quiet=json_) as bar:
-            repaired = repair(folder, workers=crew, listener=bar.show, sample=asked)
+            repaired = repair(folder, workers=crew, listener=bar.show, sample=asked, against_cycles=against_cycles)
         done, report = repaired.done, repaired.report
     else:
-        done, report = (), prove(Dataset(folder), sample=asked, workers=crew)
+        done, report = (), prove(Dataset(folder), sample=asked, workers=crew, against_cycles=against_cycles)
     if json_:
         print_json({**({"repaired": list(done)} if mend else {}), **report.to_json()})
     else:

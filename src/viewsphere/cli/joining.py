@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from viewsphere.cli import completion
-from viewsphere.cli.arguments import AsJson, Formats, split
+from viewsphere.cli.arguments import AsJson, FormatOptions, Formats, asked_formats, with_options
 from viewsphere.cli.terminal import MOST_FINDINGS, ProgressBar, print_json
 from viewsphere.errors import UserError
+
+if TYPE_CHECKING:
+    from viewsphere.recipe.formats import FormatEntry
 
 NewFolder = Annotated[Path | None, typer.Option("-o", "--output", help="Folder of the new data set.", show_default=False)]
 
@@ -21,15 +25,16 @@ def merge(
     mixed: Annotated[bool, typer.Option(help="Join data sets of different cameras or channels.")] = False,
     keep_going: Annotated[bool, typer.Option(help="Take what unfinished data sets hold.")] = False,
     format_: Formats = None,
+    format_option: FormatOptions = None,
     json_: AsJson = False,
 ) -> None:
     """Join data sets into a new one: categories by name, models by content. The pictures are linked, the sources only read."""
     from viewsphere.run.merging import merge as join
 
-    target = _needed(output)
+    target, formats = _needed(output), with_options(asked_formats(format_) or (), format_option)
     with ProgressBar(quiet=json_) as bar:
         dataset = join(folders, target, mixed=mixed, keep_going=keep_going, listener=bar.show)
-    notes = _exported(target, format_)
+    notes = _exported(target, formats)
     counts = {"root": str(target), "frames": len(dataset), "models": len(dataset.plan.models)}
     if json_:
         print_json({**counts, "categories": [c.name for c in dataset.categories], "notes": notes})
@@ -51,15 +56,16 @@ def import_(
     output: NewFolder = None,
     keep_going: Annotated[bool, typer.Option(help="Leave out what is broken.")] = False,
     format_: Formats = None,
+    format_option: FormatOptions = None,
     json_: AsJson = False,
 ) -> None:
     """Open a data set that was made elsewhere, to merge it with others, look at it and export it. The pictures are linked."""
     from viewsphere.run.importing import import_dataset
 
-    target = _needed(output)
+    target, formats = _needed(output), with_options(asked_formats(format_) or (), format_option)
     with ProgressBar(quiet=json_) as bar:
         foreign = import_dataset(kind, source, target, keep_going=keep_going, listener=bar.show)
-    notes = _exported(target, format_)
+    notes = _exported(target, formats)
     if json_:
         print_json({"root": str(target), "frames": foreign.count, "left_out": list(foreign.left_out), "notes": notes})
         return
@@ -78,8 +84,7 @@ def _needed(output: Path | None) -> Path:
     return output
 
 
-def _exported(folder: Path, formats: str | None) -> list[str]:
+def _exported(folder: Path, formats: Sequence[FormatEntry]) -> list[str]:
     from viewsphere.run.exporting import export
 
-    names = split(formats)
-    return list(export(folder, names)) if names else []
+    return list(export(folder, formats)) if formats else []

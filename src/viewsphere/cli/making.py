@@ -9,10 +9,22 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from viewsphere.cli import completion
-from viewsphere.cli.arguments import AsJson, Changes, Formats, RecipeFile, cores, load_recipe, split
+from viewsphere.cli.arguments import (
+    AllowScripts,
+    AsJson,
+    Changes,
+    FormatOptions,
+    Formats,
+    RecipeFile,
+    asked_formats,
+    cores,
+    load_recipe,
+    with_options,
+)
 from viewsphere.cli.next_step import for_command, for_render
 from viewsphere.cli.terminal import ProgressBar, print_estimate, print_json, print_plan, print_summary, write, write_picture
 from viewsphere.errors import StoreError, UserError
+from viewsphere.recipe.starts import FIRST, kinds, start
 
 if TYPE_CHECKING:
     from viewsphere.recipe.recipe import Recipe
@@ -21,15 +33,27 @@ if TYPE_CHECKING:
 
 def new(
     folder: Annotated[Path, typer.Argument(help="Folder to make the recipe in.", show_default=False)],
+    kind: Annotated[
+        str,
+        typer.Option(
+            help="What for: poses (the default), detector, pose6d, in-memory, blender.",
+            autocompletion=completion.starts,
+        ),
+    ] = FIRST,
 ) -> None:
-    """Write a commented recipe to start from."""
-    from viewsphere.recipe.file import template
+    """Write a commented recipe to start from, for some kinds with a script that uses what it makes."""
+    if kind not in kinds():
+        from viewsphere.model.mistakes import one_of
 
+        raise UserError(f"--kind: {one_of(kind, kinds())}")
     file = folder if folder.suffix in {".yaml", ".yml"} else folder / "recipe.yaml"
-    if file.exists():
-        raise UserError(f"{file}: expected a new file, found one that exists: choose another folder")
-    write(file, template().encode())
-    typer.echo(f"wrote {file}; next: viewsphere preview {file}")
+    found = {file if name == "recipe.yaml" else file.parent / name: text for name, text in start(kind).items()}
+    for path in found:
+        if path.exists():
+            raise UserError(f"{path}: expected a new file, found one that exists: choose another folder")
+    for path, text in found.items():
+        write(path, text.encode())
+    typer.echo(f"wrote {' and '.join(map(str, found))}; next: viewsphere preview {file}")
 
 
 def schema() -> None:
@@ -57,7 +81,9 @@ def inspect(
     forward: Annotated[
         str | None, typer.Option(help="Axis the front faces; default: the format's.", autocompletion=completion.axes)
     ] = None,
-    unit: Annotated[float | None, typer.Option(help="Metres in one unit; default: the file's.")] = None,
+    unit: Annotated[
+        str | None, typer.Option(help="Unit of the file: m, cm, mm, in, ft or metres in one; default: the file's.")
+    ] = None,
     seed: Annotated[int, typer.Option(help="Which draw of a zoo family.")] = 0,
     rig: Annotated[
         Path | None,
@@ -67,8 +93,9 @@ def inspect(
     ] = None,
     changes: Changes = None,
     json_: AsJson = False,
+    allow_scripts: AllowScripts = False,
 ) -> None:
-    """Show a model's size, axes, parts, materials, textures and warnings, and a picture from four sides; or a recipe's rig."""
+    """Show a model's size, axes, parts, materials, animations, warnings, and a picture from four sides; or a recipe's rig."""
     from viewsphere.preview import four_sides
     from viewsphere.run.inspection import inspect_model, model_spec, report_lines
 
@@ -84,13 +111,14 @@ def inspect(
     spec = model_spec(model, up=up, forward=forward, unit=unit, seed=seed)
     report = inspect_model(spec)
     picture = output or Path(f"{Path(model.replace(':', '-')).stem}-sides.png")
-    write_picture(picture, four_sides(spec))
+    write_picture(picture, four_sides(spec, (report.up, report.forward)))
     if json_:
         print_json({**asdict(report), "picture": str(picture)})
         return
     for line in report_lines(report):
         typer.echo(line)
-    typer.echo(f"picture from four sides: {picture} (the first view must show the front; if not, set up and forward)")
+    hint = "the first view must show the front; if another does, give --forward as written below that one"
+    typer.echo(f"picture from four sides: {picture} ({hint})")
 
 
 def _inspect_rig(recipe: Path, output: Path | None, changes: list[str] | None, json_: bool) -> None:
@@ -127,6 +155,7 @@ def plan(
         typer.Option(min=0, help="Processes that the estimate is for; default: one a core.", show_default=False),
     ] = None,
     json_: AsJson = False,
+    allow_scripts: AllowScripts = False,
 ) -> None:
     """Say what a recipe would make: models, poses, frames, splits. Without --estimate no model is read."""
     from viewsphere.sampling.plan import check_engine, check_images
@@ -138,6 +167,8 @@ def plan(
     check_images(planned)
     if not json_:
         print_plan(planned)
+        for note in planned.notes:
+            typer.echo(f"note: {note}")
     cost = _estimate(loaded, workers) if estimate else None
     counts = {
         "name": planned.recipe.name,
@@ -153,6 +184,7 @@ def plan(
                 "splits": dict(planned.split_counts),
                 "shots": planned.shot_count,
                 "warnings": list(planned.warnings),
+                "notes": list(planned.notes),
                 **({"estimate": asdict(cost)} if cost else {}),
             }
         )
@@ -167,7 +199,7 @@ def preview(
     draw: Annotated[
         list[str] | None,
         typer.Option(
-            help="Label to draw: boxes, boxes3d, masks, depth, flow, tracks, ...; several times for several.",
+            help="Label to draw: boxes, boxes3d, masks, depth, normals, parts, flow, ...; several times for several.",
             autocompletion=completion.drawings,
         ),
     ] = None,
@@ -180,9 +212,10 @@ def preview(
         str | None, typer.Option(help="Only this sequence, in the video; default: one after another.", show_default=False)
     ] = None,
     changes: Changes = None,
+    allow_scripts: AllowScripts = False,
 ) -> None:
     """Write a contact sheet (of sequences, filmstrips): a recipe's frames rendered small, or a data set's; or a video."""
-    from viewsphere.preview import Earlier, contact_sheet, dataset_samples, films_of, preview_samples
+    from viewsphere.preview import Earlier, contact_sheet, dataset_samples, films_of, preview_samples, small_objects
     from viewsphere.store import Dataset
 
     names = draw or []
@@ -191,6 +224,7 @@ def preview(
         return
     if sequence is not None:
         raise UserError("--sequence: expected --video beside it; found none: say which file to write")
+    recipe = None
     if source.is_dir():
         dataset = Dataset(source)
         films = films_of(dataset)
@@ -203,6 +237,8 @@ def preview(
         before = Earlier(samples, ())
     if not samples:
         raise StoreError(f"{source}: expected finished frames, found none: render first")
+    for warning in small_objects(samples, recipe):
+        typer.echo(f"warning: {warning}", err=True)
     write_picture(output, contact_sheet(samples, names, columns, before=before))
     typer.echo(f"wrote {output} ({len(samples)} frames)")
 
@@ -229,6 +265,7 @@ def render(
     output: Annotated[Path | None, typer.Option("-o", "--output", help="Folder of the data set.", show_default=False)] = None,
     changes: Changes = None,
     format_: Formats = None,
+    format_option: FormatOptions = None,
     workers: Annotated[
         int | None,
         typer.Option(min=0, help="Processes; default: one a core. 0: this one.", show_default=False),
@@ -238,6 +275,7 @@ def render(
         bool, typer.Option("--append", help="Add what a finished data set lacks: models, poses, channels.")
     ] = False,
     json_: AsJson = False,
+    allow_scripts: AllowScripts = False,
 ) -> None:
     """Render a recipe into a data set. Run it again to resume: finished frames are never rendered twice."""
     from viewsphere.run.generate import generate
@@ -248,7 +286,9 @@ def render(
     if recipe is None or output is None:
         raise UserError(for_render(recipe, output))
     loaded = load_recipe(recipe, changes)
+    asked = asked_formats(format_)
     planned = make_plan(loaded)
+    formats = with_options([entry.name for entry in loaded.formats] if asked is None else asked, format_option)
     addition = to_append(planned, Store(output)) if append else None
     if not json_:
         print_plan(planned)
@@ -261,7 +301,7 @@ def render(
                 loaded,
                 output,
                 workers=crew,
-                formats=split(format_),
+                formats=formats,
                 keep_going=keep_going,
                 append=append,
                 listener=bar.show,

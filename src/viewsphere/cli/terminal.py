@@ -40,10 +40,17 @@ def write(file: Path, data: bytes) -> None:
 
 
 def write_picture(file: Path, picture: Any) -> None:
-    """Write (H, W, 3) uint8 as PNG."""
+    """Write (H, W, 3) uint8 as PNG; UserError for a file of another ending."""
+    check_picture(file)
     from viewsphere.codecs.png_tiff import encode_png
 
     write(file, encode_png(picture))
+
+
+def check_picture(file: Path) -> None:
+    """Raise UserError for a file that is not called a PNG."""
+    if file.suffix.lower() != ".png":
+        raise UserError(f"--output: expected a picture that ends in .png; found {file}: {file.with_suffix('.png')}?")
 
 
 def print_json(value: object) -> None:
@@ -65,6 +72,8 @@ def print_estimate(cost: Estimate) -> None:
     """Print the estimated time and size of a whole data set."""
     crew = f"{cost.workers} worker{'s' if cost.workers > 1 else ''}"
     typer.echo(f"about {_duration(cost.seconds)} with {crew}, {_size(cost.bytes)} on disk")
+    if cost.unused:
+        typer.echo(f"note: {cost.unused}")
 
 
 def _duration(seconds: float) -> str:
@@ -109,7 +118,8 @@ def _print_warnings(warnings: Mapping[str, Sequence[str]]) -> None:
             models.setdefault(warning, []).append(key)
     for warning, keys in list(models.items())[:MOST_FINDINGS]:
         more = f" and {len(keys) - 1:,} more" if len(keys) > 1 else ""
-        typer.echo(f"warning: model {keys[0]}{more}: {warning}", err=True)
+        who = "" if warning.startswith(f"{keys[0]}: ") else f"model {keys[0]}{more}: "  # a file's warnings begin with its name
+        typer.echo(f"warning: {who}{warning}", err=True)
     if len(models) > MOST_FINDINGS:
         typer.echo(f"and {len(models) - MOST_FINDINGS:,} warnings more; --json lists all", err=True)
 
@@ -173,8 +183,9 @@ class ProgressBar:
                 self._bars[progress.phase] = self._rich.add_task(progress.phase, total=progress.total, rate="")
             bar = self._bars[progress.phase]
             elapsed = self._rich.tasks[bar].elapsed or 0.0
-            made = progress.done - progress.resumed
+            seen = progress.done + progress.under_way
+            made = seen - progress.resumed
             rate = f"{made / elapsed:.1f} frames/s" if progress.phase == "frames" and made and elapsed else ""
-            self._rich.update(bar, completed=progress.done, rate=rate)
+            self._rich.update(bar, completed=seen, rate=rate)
 
         return listen

@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from viewsphere.assets.deforming import Load, sharing
 from viewsphere.assets.mesh import Mesh
+from viewsphere.assets.repaint import textured
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Floor
 from viewsphere.model.shot import Shot
-from viewsphere.model.thing import Thing, TimeStep
+from viewsphere.model.thing import Repaint, Thing, TimeStep
 from viewsphere.truth.geometry import Geometry, placed_meshes, present
 from viewsphere.truth.moving import Ring, changed, differs_in_shape_only, shot_floor
+
+Paint = tuple[Repaint, ...]
+Look = tuple[ModelSpec, TimeStep, Paint]
+"""What a mesh is of: a model at a time step, painted."""
 
 STEPS = 16
 """Time steps of models whose meshes are kept for the next instants."""
@@ -61,12 +67,15 @@ class Shown:
     """Gives models at their time steps; the last `STEPS` are kept, so that what is shown again is the same object."""
 
     load: Load
-    _held: dict[tuple[ModelSpec, TimeStep], Mesh] = field(default_factory=dict[tuple[ModelSpec, TimeStep], Mesh])
+    _held: dict[tuple[ModelSpec, TimeStep, Paint], Mesh] = field(
+        default_factory=dict[tuple[ModelSpec, TimeStep, "Paint"], Mesh]
+    )
 
-    def mesh(self, spec: ModelSpec, step: TimeStep, resting: Mesh) -> Mesh:
-        """The mesh at a time step, which has in common with the model at rest what is equal."""
-        found = self._held.pop((spec, step), None) or sharing(self.load(spec, step), resting)
-        self._held[spec, step] = found  # the last used comes last
+    def mesh(self, thing: Thing, step: TimeStep, resting: Mesh) -> Mesh:
+        """A thing's mesh at a time step, which has in common with the mesh at rest what is equal."""
+        key = thing.model, step, thing.repaints
+        found = self._held.pop(key, None) or sharing(textured(self.load(thing.model, step), thing.repaints), resting)
+        self._held[key] = found  # the last used comes last
         if len(self._held) > STEPS:
             del self._held[next(iter(self._held))]
         return found
@@ -89,7 +98,7 @@ class Arrangements:
     def build(cls, shot: Shot, load: Load) -> Arrangements:
         """Of a shot, with all its models loaded; `load` gives a model's normalised mesh."""
         ring = Ring(shot.scene.ground is not None, shot.label_alpha)
-        meshes = tuple(placed_meshes(shot.things, load))
+        meshes = _dressed(shot.things, placed_meshes(shot.things, load))
         return cls(shot, Shown(load), meshes, None, ring).of(shot)
 
     def of(self, shot: Shot) -> Arrangements:
@@ -112,7 +121,7 @@ class Arrangements:
         exposure = self.shot.exposures[instant]
         sweeps = exposure.things if exposure else [None] * len(things)
         meshes = tuple(
-            mesh if sweep is None or now.step is None else self._deformed(now.model, sweep.steps(moment), rest, mesh)
+            mesh if sweep is None or now.step is None else self._deformed(now, sweep.steps(moment), rest, mesh)
             for now, sweep, rest, mesh in zip(things, sweeps, self.meshes, known, strict=True)
         )
         return self._arranged(things, meshes, known, self.ring.passing(things, meshes, self.floor))
@@ -124,20 +133,27 @@ class Arrangements:
         moving = tuple(i for i, thing in enumerate(self.shot.things) if i in swept or not thing.motion.is_still)
         return Arranged(things, meshes, geometry, moving, known, bool(self.shot.sequence))
 
-    def _deformed(
-        self, spec: ModelSpec, steps: tuple[TimeStep | None, TimeStep | None, float], rest: Mesh, nearest: Mesh
-    ) -> Mesh:
+    def _deformed(self, thing: Thing, steps: tuple[TimeStep | None, TimeStep | None, float], rest: Mesh, nearest: Mesh) -> Mesh:
         """The mesh between two time steps, or the nearest where these are not made of the same triangles."""
         before, after, share = steps
         if before is None or after is None or before == after:
             return nearest
-        start, end = self.shown.mesh(spec, before, rest), self.shown.mesh(spec, after, rest)
+        start, end = self.shown.mesh(thing, before, rest), self.shown.mesh(thing, after, rest)
         return blended(start, end, share) or nearest
 
     def _meshes(self, things: tuple[Thing, ...]) -> tuple[Mesh, ...]:
         """Of these things, at the time steps that they show."""
         held = zip(things, self.meshes, strict=True)
-        return tuple(mesh if now.step is None else self.shown.mesh(now.model, now.step, mesh) for now, mesh in held)
+        return tuple(mesh if now.step is None else self.shown.mesh(now, now.step, mesh) for now, mesh in held)
+
+
+def _dressed(things: Sequence[Thing], meshes: Sequence[Mesh]) -> tuple[Mesh, ...]:
+    """The meshes with the pictures that things are painted with; things of one mesh and one paint share it."""
+    found: dict[tuple[int, Paint], Mesh] = {}
+    for thing, mesh in zip(things, meshes, strict=True):
+        if (id(mesh), thing.repaints) not in found:
+            found[id(mesh), thing.repaints] = textured(mesh, thing.repaints)
+    return tuple(found[id(mesh), thing.repaints] for thing, mesh in zip(things, meshes, strict=True))
 
 
 def blended(a: Mesh, b: Mesh, share: float) -> Mesh | None:

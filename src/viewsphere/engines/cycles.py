@@ -6,12 +6,12 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from viewsphere.engines import _blender
-from viewsphere.engines._blender import PROGRAMS, save, shows_sky, stage
+from viewsphere.engines._blender import PROGRAMS, indices, save, shows_sky, stage
 
 if TYPE_CHECKING:
     from pydantic import JsonValue
 
-__all__ = ["OPENS_SCENES", "PROGRAMS", "check", "save", "shows_sky", "stage"]
+__all__ = ["OPENS_SCENES", "PROGRAMS", "check", "indices", "save", "shows_sky", "stage"]
 
 OPENS_SCENES = True
 """Cycles renders .blend files that are the scene."""

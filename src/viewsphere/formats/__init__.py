@@ -9,6 +9,7 @@ if TYPE_CHECKING:
     from contextlib import AbstractContextManager
     from pathlib import Path
 
+    from viewsphere.model.frozen import Frozen
     from viewsphere.model.sample import Sample
     from viewsphere.store import Dataset
 
@@ -19,19 +20,23 @@ Remark = tuple[int | None, str]
 class Format(Protocol):
     """A module that writes a data set in one format: `writer`.
 
-    A format may also have: `CHANNELS`, names of channels: a run that does not keep them is refused before it begins;
-    `check()`, which raises a UserError where the format cannot be written; `verify(dataset, folder, sampled)` of `Verified`,
-    with which `viewsphere check` proves an export; `read(path, *, keep_going) -> ForeignDataset` (`viewsphere.store.foreign`),
-    with which data sets of the format are imported.
+    A format may also have: `Options`, a pydantic class of what recipes and the command line may say of it (docs/formats.md has
+    the fields' descriptions), of which `writer` and `verify` are then given one as their last argument; `CHANNELS`, names of
+    all channels that it reads besides pictures that happen to be there: a run that does not keep them is refused before it
+    begins (without it, a format takes whatever is kept); `ANNOTATES = False`, if samples are to have all their
+    objects, those too that the recipe leaves out of annotations; `check()`, which raises a UserError where the format cannot be
+    written; `verify(dataset, folder, sampled)` of `Verified`, with which `viewsphere check` proves an export;
+    `read(path, *, keep_going) -> ForeignDataset` (`viewsphere.store.foreign`), with which data sets of the format are imported.
     """
 
     def writer(
-        self, dataset: Dataset, folder: Path, note: Callable[[str], None]
+        self, dataset: Dataset, folder: Path, note: Callable[[str], None], *options: Frozen
     ) -> AbstractContextManager[Callable[[Sample], None]]:
         """A context manager that writes an export into this empty folder; stored pictures are put there by `dataset.link`.
 
         Entering the context gives a function that is called with the finished samples, one after another in frame order, and
-        keeps none of them. Leaving the context finishes the export. `note` takes lines for the user.
+        keeps none of them. Leaving the context finishes the export. `note` takes lines for the user; `options` is the format's
+        `Options`, of one that has some.
         """
         ...
 
@@ -39,10 +44,11 @@ class Format(Protocol):
 class Verified(Protocol):
     """A format whose exports can be proved."""
 
-    def verify(self, dataset: Dataset, folder: Path, sampled: Collection[int]) -> Iterator[Remark]:
+    def verify(self, dataset: Dataset, folder: Path, sampled: Collection[int], *options: Frozen) -> Iterator[Remark]:
         """All that is not as `writer` makes it, of every field of every frame and every file; a file that cannot be read is no
         exception.
 
-        `sampled`: positions in the data set of the frames for costly proofs, as by another reader of the format.
+        `options`: the format's `Options` as the export was written with, of one that has some. `sampled`: positions in the data
+        set of the frames for costly proofs, as by another reader of the format.
         """
         ...

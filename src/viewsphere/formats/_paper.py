@@ -42,6 +42,7 @@ def _vehicle(info: ModelInfo) -> dict[str, Any]:
         **(_deforming(info) if info.step else {}),
         "bbox3D_model": faces(info.box3d_object),
         "real_size": dict(sizes),
+        **({"credit": info.credit.model_dump(exclude_none=True)} if info.credit else {}),
     }
 
 

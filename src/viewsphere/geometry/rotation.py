@@ -57,6 +57,17 @@ def quaternion_from_matrix(matrix: ArrayLike) -> tuple[float, float, float, floa
     return w, x, y, z
 
 
+def random_rotation(rng: np.random.Generator) -> Float:
+    """A rotation (3, 3), uniform over all: a quaternion of four numbers in the unit ball, by rejection. Sines and logarithms,
+    whose last digits differ between processors, are not asked for.
+    """
+    while True:
+        quaternion = 2 * rng.random(4) - 1
+        square = float((quaternion * quaternion).sum())
+        if 1e-6 < square <= 1:
+            return matrix_from_quaternion(quaternion / math.sqrt(square))
+
+
 def rotation_about(vector: ArrayLike) -> Float:
     """Rotation matrix (3, 3) by |vector| radians about a vector (3,), counterclockwise seen from its tip."""
     return matrix_from_quaternion(quaternion_about(vector))

@@ -23,10 +23,10 @@ def flow(sight: Sight, instants: int) -> NDArray[np.float32]:
     return np.full((*sight.visibility.triangle.shape, 2), np.nan, np.float32) if match is None else match.flow
 
 
-def scene_flow(sight: Sight, instants: int) -> NDArray[np.float64]:
+def scene_flow(sight: Sight, instants: int) -> NDArray[np.float32]:
     """By how much the seen point moves, each in its own instant's camera axes, (H, W, 3) metres; NaN of the sky."""
     match = sight.match(instants)
-    return np.full((*sight.visibility.triangle.shape, 3), np.nan) if match is None else match.scene_flow
+    return np.full((*sight.visibility.triangle.shape, 3), np.nan, np.float32) if match is None else match.scene_flow
 
 
 def flow_proof(name: str, state: str) -> Proof:

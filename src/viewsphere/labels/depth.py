@@ -11,6 +11,9 @@ from viewsphere.labels._label import ChannelLabel, Drawing, Extent, Models, Pict
 from viewsphere.labels._sight import Sight
 from viewsphere.model.sample import Sample
 
+NEAREST = 0.01
+"""Metres that a picture of depth tells apart from less."""
+
 
 def compute(sight: Sight) -> NDArray[np.float32]:
     """z of the seen point, (H, W) metres, infinite where nothing is seen; negative behind the image plane of a fisheye."""
@@ -39,11 +42,15 @@ def extent(depth: NDArray[np.float32]) -> Extent:
 
 
 def picture(depth: NDArray[np.float32], within: Extent | None = None) -> Picture:
-    """Depth as a picture (H, W, 3) uint8: near is light, far is dark, and pixels without depth are black."""
+    """Depth as a picture (H, W, 3) uint8: near is light, far is dark, and pixels without depth are black.
+
+    Twice as far is as much darker everywhere, else a street's horizon would leave its cars one white.
+    """
     seen = np.isfinite(depth)
     grey = np.zeros(depth.shape, np.float64)
-    near, far = within or extent(depth)
-    grey[seen] = 1.0 - 0.85 * np.clip((depth[seen] - near) / max(far - near, 1e-9), 0, 1)
+    near, far = (max(end, NEAREST) for end in within or extent(depth))
+    times = np.log(np.maximum(depth[seen], near) / near)
+    grey[seen] = 1.0 - 0.85 * np.clip(times / max(np.log(far / near), 1e-9), 0, 1)
     return np.repeat((grey * 255).astype(np.uint8)[..., None], 3, axis=2)
 
 

@@ -45,7 +45,15 @@ LABEL = ObjectLabel.derived(
     meaning="where it is and how it is turned",
     fields=(
         Field("world_from_object", "rigid motion", float, (4, 4), "m", "object to world", is_array=True),
-        Field("camera_from_object", "rigid motion", float, (4, 4), "m", "object to camera", is_array=True),
+        Field(
+            "camera_from_object",
+            "6D pose in camera: p_camera = R @ p_object + t",
+            float,
+            (4, 4),
+            "m",
+            "object to camera",
+            is_array=True,
+        ),
         Field("quaternion", "rotation of camera_from_object: (w, x, y, z), w >= 0", float, (4,)),
     ),
     prove=prove,

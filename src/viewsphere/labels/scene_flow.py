@@ -16,7 +16,7 @@ def compute(sight: Sight) -> NDArray[np.float32]:
 
     NaN of the sky, and of what is not there then.
     """
-    return _flow.scene_flow(sight, 1).astype(np.float32)
+    return _flow.scene_flow(sight, 1)
 
 
 LABEL = ChannelLabel(

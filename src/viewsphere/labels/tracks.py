@@ -37,7 +37,7 @@ def compute(sight: Sight) -> NDArray[np.void]:
     now = followed.points.in_view(own)
     out, point = followed.rows.copy(), np.ones((len(followed.query), 4))
     point[:, :3] = now.world
-    sky = np.flatnonzero(followed.points.thing == SKY)
+    sky = np.flatnonzero(followed.points.body == SKY)
     point[sky, :3], point[sky, 3] = followed.points.place[sky], 0.0
     point[np.isnan(point[:, 0])] = np.nan
     out["point"], out["state"] = point, now.state

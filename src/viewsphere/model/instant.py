@@ -27,7 +27,10 @@ class Moment(Frozen):
 
 
 class Viewpoint(Frozen):
-    """Where a camera stands on a sphere around `target` (world metres; None: the box centre of object 1), and when."""
+    """Where a camera stands on a sphere around `target` (world metres; None: the box centre of object 1), and when.
+
+    `fill`, where the distance follows from it: the share of the picture that a model fills, see `sampling.filling`.
+    """
 
     index: int
     azimuth_deg: float
@@ -37,6 +40,15 @@ class Viewpoint(Frozen):
     target: Vector | None = None
     category: str = ""  # named bin: front, front-left, ..., top
     time: Moment | None = None  # where something is animated
+    fill: float | None = None
+
+    @model_serializer(mode="wrap")
+    def _as_ever(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Without `fill` where a distance was given, as records always were."""
+        found: dict[str, Any] = handler(self)
+        if self.fill is None:
+            found.pop("fill", None)
+        return found
 
     def rounded(self) -> Viewpoint:
         """The same to nine decimal places: the last digits of angles that follow from a matrix differ between processors."""

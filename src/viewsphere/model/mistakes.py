@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Generator, Iterable, Mapping, Sequence
+from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from difflib import get_close_matches
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple, TypeVar, cast
 
-from pydantic import ValidationError
+from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails, InitErrorDetails, PydanticCustomError
+
+from viewsphere.errors import RecipeError
+
+Options = TypeVar("Options", bound=BaseModel)
 
 Path = tuple[str | int, ...]
 EXPLAINED = "explained"
@@ -44,10 +48,15 @@ class Marks:
     def located(self, message: str) -> str:
         """A message that begins with a field, `models[0].source: ...`, with file and line before it."""
         field_ = re.match(r"[A-Za-z_]+(?:\[\d+\]|\.\w+)*(?=: )", message)
-        if not self.file or field_ is None:
+        written = [path for path in self.places if path and _begins(message, dotted(path))]
+        if not self.file or not (field_ or written):
             return message
-        steps = re.findall(r"\[(\d+)\]|(\w+)", field_[0])
-        return f"{self.place(tuple(int(i) if i else name for i, name in steps))} {message}"
+        return f"{self.place(max(written, key=len, default=()))} {message}"
+
+
+def _begins(message: str, written: str) -> bool:
+    """Whether a message begins with this field, or with one inside of it."""
+    return message.startswith(written) and re.match(r"(?:[.[][^:]*)?: ", message[len(written) :]) is not None
 
 
 def nearest(name: object, known: Iterable[str]) -> str:
@@ -61,6 +70,25 @@ def nearest(name: object, known: Iterable[str]) -> str:
 def one_of(name: object, known: Sequence[str]) -> str:
     """`expected one of a, b, c; found 'd'; did you mean ...?`."""
     return f"expected one of {', '.join(known)}; found {shown(name)}{nearest(name, known)}"
+
+
+def different(one: Mapping[str, Any], other: Mapping[str, Any], most: int = 5) -> list[str]:
+    """The fields, `most` at most, in which two plain recipes differ, as `viewpoints.azimuth`; further ones as a number."""
+    found = [dotted(steps) for steps in _different(one, other, ())]
+    return found if len(found) <= most else [*found[:most], f"{len(found) - most} more"]
+
+
+def _different(one: Any, other: Any, steps: Path) -> Iterator[Path]:
+    if one == other:
+        return
+    if isinstance(one, Mapping) and isinstance(other, Mapping):
+        for name in dict.fromkeys((*one, *other)):
+            yield from _different(one.get(name), other.get(name), (*steps, name))
+    elif isinstance(one, list) and isinstance(other, list) and len(one) == len(other) and isinstance((*one, None)[0], Mapping):
+        for i, pair in enumerate(zip(one, other, strict=True)):
+            yield from _different(*pair, (*steps, i))
+    else:
+        yield steps
 
 
 def shown(value: object) -> str:
@@ -100,6 +128,11 @@ def at(*steps: str | int) -> Generator[None]:
         raise ValidationError.from_exception_data("", [InitErrorDetails(type=final, loc=steps, input=None)]) from None
 
 
+def first_of(error: ValidationError) -> str:
+    """The first mistake, without its place: `expected ...; found ...`."""
+    return _words(error.errors(include_url=False)[0], ())
+
+
 def _follows(error: ErrorDetails, errors: Sequence[ErrorDetails]) -> bool:
     """Whether an error `too_short` only follows from others: invalid items of a list are not counted."""
     depth = len(error["loc"])
@@ -116,6 +149,20 @@ def report(error: ValidationError, data: object, marks: Marks | None = None) -> 
         where = f"{place} " if marks else ""
         found.append((place, f"{where}{dotted(path)}: {_words(e, ())}"))
     return "\n".join(dict.fromkeys(text for _, text in sorted(found, key=lambda f: f[0])))
+
+
+def read_options(kind: type[Options], given: Mapping[str, Any], field: str) -> Options:
+    """A plug-in's options as its class of them reads them; raises RecipeError, whose mistakes are of `field`."""
+    try:
+        return kind.model_validate(given)
+    except ValidationError as error:
+        lines = report(error, given).splitlines()
+        raise RecipeError("\n".join(_under(field, line) for line in lines)) from None
+
+
+def _under(field: str, line: str) -> str:
+    """A mistake of an option as one of the field's; `recipe` stands for all options."""
+    return f"{field}{line.removeprefix('recipe')}" if line.startswith("recipe: ") else f"{field}.{line}"
 
 
 def dotted(path: Path) -> str:
@@ -159,7 +206,7 @@ def _words(error: ErrorDetails, fields: Sequence[str]) -> str:
         case "value_error":
             return str(context["error"])
         case "extra_forbidden":
-            return one_of(error["loc"][-1], fields)
+            return _no_field(error["loc"][-1], fields)
         case "missing":
             return "expected a value; found nothing"
         case "literal_error":
@@ -172,14 +219,30 @@ def _words(error: ErrorDetails, fields: Sequence[str]) -> str:
         case "model_type" | "dict_type" | "model_attributes_type":
             return f"expected a mapping; found {shown(found)}"
         case "tuple_type" | "list_type":
-            return f"expected a list; found {shown(found)}"
-        case "int_type":
+            return f"expected a list; found {shown(found)}{_listed(found)}"
+        case "int_type" | "int_parsing" | "int_from_float":
             return f"expected a whole number; found {shown(found)}"
         case "greater_than" | "greater_than_equal" | "less_than" | "less_than_equal":
             return f"expected a number {error['msg'].removeprefix('Input should be ')}; found {shown(found)}"
         case _:
             message = error["msg"].removeprefix("Input should be ").removeprefix("expected ").replace("a valid ", "a ")
             return f"expected {message.replace('String should', 'text that should')}; found {shown(found)}"
+
+
+def _no_field(name: str | int, fields: Sequence[str]) -> str:
+    if len(fields) != 1:
+        return one_of(name, fields)
+    return f"expected no field but {fields[0]}; found {shown(name)}{nearest(name, fields)}"
+
+
+def _listed(found: Any) -> str:
+    """How to write a list of a mapping alone, without what is long or nested in the mapping; nothing for other values."""
+    if not isinstance(found, Mapping):
+        return ""
+    value = cast(Mapping[str, Any], found)
+    fields = ((name, inner if isinstance(inner, str) else shown(inner)) for name, inner in value.items())
+    told = (f"{name}: {'...' if isinstance(value[name], (Mapping, list)) or len(text) > 30 else text}" for name, text in fields)
+    return f": for a list of this alone write [{{{', '.join(told)}}}]"
 
 
 def _quoted(text: str) -> list[str]:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, Literal
 
-from pydantic import Field
+from pydantic import Field, SerializerFunctionWrapHandler, model_serializer
 
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.scene import IDENTITY, Matrix4
@@ -47,9 +47,15 @@ class ModelSpec(Frozen):
     real_size: Size | Literal["file"] | None = None  # "file": the size the file has, before any scaling
     confined: bool = True  # texture and buffer paths may not leave the model's folder
     rest: int | None = None  # frame of an animated file, which Blender then reads, where no time step is named
+    fps: float | None = None  # frames of an animated file that make a second, where that is not what the file says
     clip: str | None = None  # name of the animation that is played, where the file has several
     shown: tuple[str, ...] = ()  # objects of a .blend file that are read although renders do not show them
     parts: Parts | None = None  # what is taken of it, when it is read and normalised
+
+    @model_serializer(mode="wrap")
+    def _as_ever(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Without `fps` where it says nothing, as records always were."""
+        return {name: value for name, value in handler(self).items() if name != "fps" or value is not None}
 
     def key_at(self, frame: int | None) -> str:
         """The key of the model as it is at a frame of its file; None: its own."""

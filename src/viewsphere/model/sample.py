@@ -15,6 +15,7 @@ from viewsphere.model.camera import Camera
 from viewsphere.model.channel import picture_of
 from viewsphere.model.instant import Viewpoint
 from viewsphere.model.model_spec import Size
+from viewsphere.model.notebook import Shown
 from viewsphere.model.rig import CAMERA
 from viewsphere.model.shot import Shot
 
@@ -50,6 +51,9 @@ class Rle:
 @dataclass(frozen=True, eq=False)
 class ObjectAnnotation:
     """One placed object in one frame, seen or not.
+
+    Its 6D pose in the camera is `camera_from_object`, (4, 4): `p_camera = R @ p_object + t`, metres, camera axes x right,
+    y down, z forward (OpenCV).
 
     Boxes are half-open pixel corners (x0, y0, x1, y1). `box2d` is tight around the visible pixels, None if
     there are none; `box2d_projected` is the box of the projected model clipped to the image, None where
@@ -107,6 +111,10 @@ class ObjectAnnotation:
         except KeyError:
             raise AttributeError(f"an object has no {name!r}, or its data set does not keep it") from None
 
+    def __dir__(self) -> list[str]:
+        """All attributes, the fields in `more` among them."""
+        return sorted({*object.__dir__(self), *self.more})
+
     @property
     def is_placed(self) -> bool:
         """Whether the object's place in space is known."""
@@ -143,7 +151,7 @@ class Taken:
 
 
 @dataclass(frozen=True, eq=False)
-class Sample:
+class Sample(Shown):
     """One sensor's picture at one instant: camera, pose, objects and channels. `channels` maps names to arrays (loaded
     when asked). Imported pictures may have no known camera and pose; these have an `image_size`.
     """
@@ -162,6 +170,12 @@ class Sample:
     instant: int = 0  # counted from 0 in the sequence, or, for still pictures, in the data set
     time: float = 0.0  # seconds from the sequence's first instant
     taken: Taken | None = None  # None: nobody knows what was there
+
+    def __repr__(self) -> str:
+        size = f"{self.width} x {self.height} pixels"
+        taken = f"{self.sequence}, {self.sensor}, {self.time:g} s, " if self.sequence else ""
+        objects = "1 object" if len(self.objects) == 1 else f"{len(self.objects)} objects"
+        return f"<Sample {self.index} ({self.split}): {taken}{size}, {objects}; {', '.join(self.channels)}>"
 
     @property
     def camera(self) -> Camera:
@@ -201,6 +215,10 @@ class Sample:
     def picture_file(self) -> str | None:
         """Path of the file of `picture`, relative to the data set's root; None without a picture."""
         return self.files.get(picture_of(self.files) or "")
+
+    def __dir__(self) -> list[str]:
+        """All attributes, the channels among them."""
+        return sorted({*object.__dir__(self), *self.channels})
 
     def __getattr__(self, name: str) -> NDArray[Any]:
         """Any channel by name: `sample.rgb`, `sample.depth`, `sample.instances`, ..."""

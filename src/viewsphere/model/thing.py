@@ -9,7 +9,7 @@ from pydantic import Field, SerializerFunctionWrapHandler, model_serializer
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.numbers import Portion
-from viewsphere.model.scene import IDENTITY, Color, Matrix4
+from viewsphere.model.scene import IDENTITY, Color, Matrix4, Picture
 
 
 class Repaint(Frozen):
@@ -19,6 +19,17 @@ class Repaint(Frozen):
     tint: Color | None = Field(default=None, description="multiplies the colour; white changes nothing: linear [r, g, b]")
     metallic: Portion | None = Field(default=None, description="instead of what the model says: 1 is metal")
     roughness: Portion | None = Field(default=None, description="instead of what the model says: 0 a mirror, 1 matt")
+    image: Picture | None = Field(
+        default=None, description="path of a picture: the colour of opaque materials instead of what the model says"
+    )
+
+    @model_serializer(mode="wrap")
+    def _as_ever(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Without `image` where there is none, as records always were."""
+        found: dict[str, Any] = handler(self)
+        if self.image is None:
+            found.pop("image", None)
+        return found
 
 
 class TimeStep(Frozen):

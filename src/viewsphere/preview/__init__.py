@@ -3,6 +3,7 @@
 from viewsphere.preview.frame import INK, PAPER, draw_sample
 from viewsphere.preview.shown import dataset_samples, preview_samples
 from viewsphere.preview.sides import four_sides
+from viewsphere.preview.smallness import small_objects
 from viewsphere.preview.tiles import contact_sheet
 from viewsphere.preview.video import Video, write_video
 from viewsphere.store.films import Earlier, Film, films_of
@@ -19,5 +20,6 @@ __all__ = [
     "films_of",
     "four_sides",
     "preview_samples",
+    "small_objects",
     "write_video",
 ]

@@ -17,6 +17,7 @@ from viewsphere.model.sample import Sample
 from viewsphere.model.shot import Shot
 from viewsphere.model.tracks import Tracks
 from viewsphere.recipe.recipe import Recipe
+from viewsphere.run.framing import Framing
 from viewsphere.run.opening import prepare
 from viewsphere.run.stages import Stages
 from viewsphere.sampling.plan import Plan
@@ -69,7 +70,7 @@ def _each(count: int, films: int, row: int) -> int:
 
 
 def _rendered(stages: Stages, planned: Plan, subject: str, poses: Sequence[int], width: int) -> Iterator[Sample]:
-    shot = planned.take(subject, poses, stages.box)
+    shot = Framing(planned.recipe, stages).shot(lambda tries: planned.take(subject, poses, stages.box, tries=tries))
     channels = tuple(dict.fromkeys((*shot.channels, picture_of(shot.channels) or "rgb", "depth", "instances")))
     return stages.render(shot.model_copy(update=_scaled(shot, width) | {"channels": channels}))
 

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from typing import cast
 
 import numpy as np
 
+from viewsphere.assets.normalise import rotation
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.instant import Viewpoint
-from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.model_spec import Axis, ModelSpec
 from viewsphere.model.rig import Rig
 from viewsphere.model.scene import Ground, Scene
 from viewsphere.model.shot import Shot
@@ -21,8 +23,10 @@ from viewsphere.sampling.camera import looking
 SIDES = (("front", 0.0), ("left side", 90.0), ("back", 180.0), ("right side", 270.0))
 
 
-def four_sides(spec: ModelSpec, size: int = 320) -> Picture:
+def four_sides(spec: ModelSpec, axes: tuple[Axis, Axis] | None = None, size: int = 320) -> Picture:
     """A model from azimuth 0, 90, 180 and 270 at elevation 15, each view with its name; (H, W, 3) uint8 sRGB.
+
+    With the file's axes that are up and forward now, each view also names the `forward` that would make it the front.
 
     The first view shows the front if the model faces -Y, as all labels assume.
     """
@@ -44,5 +48,20 @@ def four_sides(spec: ModelSpec, size: int = 320) -> Picture:
         instants=tuple(looking(side, (x, y, z), index=side.index) for side in sides),
         channels=("rgb", "instances"),
     )
-    tiles = [(s.rgb, f"{s.pose.category} (azimuth {s.pose.azimuth_deg:g})") for s in stages.render(shot)]
+    tiles = [(s.rgb, _words(s.pose.category, s.pose.azimuth_deg, axes)) for s in stages.render(shot)]
     return tiled(tiles, columns=4)
+
+
+def _words(side: str, azimuth_deg: float, axes: tuple[Axis, Axis] | None) -> str:
+    """Which side is seen, and what to write where it is the front."""
+    if axes is None:
+        return f"{side} (azimuth {azimuth_deg:g})"
+    return f"{side} (azimuth {azimuth_deg:g}); the front? forward: {facing(*axes, azimuth_deg)}"
+
+
+def facing(up: Axis, forward: Axis, azimuth_deg: float) -> Axis:
+    """The file's axis that looks at a camera at an azimuth which is a multiple of 90 degrees."""
+    a = math.radians(azimuth_deg)
+    found = np.array([math.sin(a), -math.cos(a), 0.0]) @ rotation(up, forward, "axes")
+    place = int(np.argmax(np.abs(found)))
+    return cast("Axis", ("+" if found[place] > 0 else "-") + "xyz"[place])

@@ -16,6 +16,7 @@ from viewsphere.preview.frame import INK, PAPER, Picture, check_drawn, draw_inst
 from viewsphere.preview.mp4 import Shown, encoder, write_mp4
 from viewsphere.preview.tiles import CAPTION, MARGIN, film_caption, fitting, with_key
 from viewsphere.store.films import Earlier, Film, film_named, films_of
+from viewsphere.store.moving import move
 
 PROBES = 12
 """Instants of a sequence that say which values all of its pictures tell apart."""
@@ -53,6 +54,8 @@ def write_video(
     """
     write = _writer(file)
     films = films_of(samples)
+    if not samples:
+        raise StoreError("--video: expected finished frames, found none: render first")
     if not films:
         raise StoreError("--video: expected sequences, found still pictures: give the recipe a time, or leave out --video")
     films = films if sequence is None else [film_named(films, sequence)]
@@ -80,7 +83,7 @@ class _Atomic:
 
     def __exit__(self, kind: object, *_: object) -> None:
         if kind is None:
-            self._aside.replace(self.file)
+            move(self._aside, self.file)
         else:
             self._aside.unlink(missing_ok=True)
 

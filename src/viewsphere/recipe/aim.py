@@ -9,14 +9,21 @@ from pydantic import AfterValidator, Discriminator, Field, Tag, field_validator
 from viewsphere.geometry.pose_category import pose_category
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.numbers import Number, Positive
-from viewsphere.recipe.values import Point, shape_of
+from viewsphere.recipe.values import Interval, Point, Range, Values, shape_of
 
 AZIMUTH = "0: the camera faces the model's front; 90: it stands on the model's left, +X"
 ELEVATION = "above the horizon, -90 to 90"
 FARTHEST = 1e6
 """Largest distance of a camera from its target, metres: ten times the largest model allowed."""
 
+FULLEST = 4.0
+"""Largest share of the picture that a model may be asked to fill: nearer cameras are inside of the boxes of most models."""
+
 DISTANCE = "from the target to the camera, metres"
+FILL = (
+    "or {fill: 0.6}: so far away that the box around what the camera is for (the frame's model; of random scenes all models) "
+    "is 0.6 of the picture wide or high, whichever is more, parts beyond the picture's edges counted"
+)
 TILT = "roll of the camera about its axis, clockwise seen from behind"
 
 
@@ -32,6 +39,59 @@ def in_reach(low: float, high: float) -> None:
         raise ValueError(f"expected distances above 0 m; found {low:g}")
     if high > FARTHEST:
         raise ValueError(f"expected distances of at most {FARTHEST:,.0f} m; found {high:g}")
+
+
+def in_picture(low: float, high: float) -> None:
+    """Raise ValueError for shares of a picture, to be filled, that are none or too large."""
+    if low <= 0 or high > FULLEST:
+        raise ValueError(f"expected a share above 0 and up to {FULLEST:g}; found {low if low <= 0 else high:g}")
+
+
+class Fill(Frozen):
+    """A distance by how much of the picture is filled at it: one share, or several of a grid."""
+
+    fill: Values = Field(description="larger of box width / picture width and box height / picture height")
+
+    @field_validator("fill")
+    @classmethod
+    def _fill(cls, value: float | tuple[float, ...] | Range) -> float | tuple[float, ...] | Range:
+        in_picture(*ends_of(value))
+        return value
+
+
+class FillBetween(Frozen):
+    """A distance by how much of the picture is filled at it, drawn."""
+
+    fill: Interval = Field(description="a number or [low, high] (uniform): as of a grid")
+
+    @field_validator("fill")
+    @classmethod
+    def _fill(cls, value: tuple[float, float]) -> tuple[float, float]:
+        in_picture(*value)
+        return value
+
+
+def ends_of(values: float | tuple[float, ...] | Range) -> tuple[float, float]:
+    """Least and greatest value of an axis."""
+    if isinstance(values, Range):
+        return values.start, values.value(values.count - 1)
+    return (min(values), max(values)) if isinstance(values, tuple) else (values, values)
+
+
+def _form_of_distance(value: Any) -> str:
+    given = isinstance(value, Fill | FillBetween) or (isinstance(value, dict) and "fill" in value)
+    return "fill" if given else "metres"
+
+
+Distances = Annotated[Annotated[Fill, Tag("fill")] | Annotated[Values, Tag("metres")], Discriminator(_form_of_distance)]
+DistanceBetween = Annotated[
+    Annotated[FillBetween, Tag("fill")] | Annotated[Interval, Tag("metres")], Discriminator(_form_of_distance)
+]
+DistanceAround = Annotated[
+    Annotated[FillBetween, Tag("fill")] | Annotated[Positive, Field(le=FARTHEST), Tag("metres")],
+    Discriminator(_form_of_distance),
+]
+"""What a distance of a grid, of random viewpoints, and of viewpoints around one may be: metres, or a share to be filled."""
 
 
 def _divides_turn(value: float) -> float:

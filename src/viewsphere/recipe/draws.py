@@ -29,7 +29,7 @@ from pydantic_core import CoreSchema, core_schema
 
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.mistakes import at, nearest, shown
-from viewsphere.model.numbers import Metres, Number
+from viewsphere.model.numbers import Count, Metres, Number
 from viewsphere.recipe.values import OrShort
 
 if TYPE_CHECKING:
@@ -366,6 +366,18 @@ def alternatives(value: Any) -> Iterator[Any]:
     else:
         yield value
 
+
+def _range(value: Any) -> Any:
+    """[low, high] as what it is short for."""
+    return {"uniform": value} if isinstance(value, (list, tuple)) else value
+
+
+CountDrawn = Annotated[
+    Drawn[Count],
+    BeforeValidator(_range),
+    OrShort({"type": "array", "items": {"type": "integer", "minimum": 1}, "minItems": 2, "maxItems": 2}),
+]
+"""A whole number above 0; [low, high] is short for a uniform one."""
 
 Coordinate = Drawn[Number]
 PointDrawn = Drawn[tuple[Drawn[Metres], Drawn[Metres], Drawn[Metres]]]

@@ -65,12 +65,12 @@ def assemble(path: Path, changes: Mapping[str, Any] | None = None) -> tuple[dict
     return layer.data, Marks(str(path), layer.places)
 
 
-def parse_change(text: str) -> tuple[str, Any]:
+def parse_change(text: str, option: str = "--set", example: str = "viewpoints.elevation=[10,20]") -> tuple[str, Any]:
     """Field and value of `viewpoints.elevation=[10, 20]`; the value is YAML. Raises RecipeError for anything else."""
     name, equals, value = text.partition("=")
     if not equals:
-        raise RecipeError(f"--set {text}: expected field=value, such as viewpoints.elevation=[10,20]; found no '='")
-    return name.strip(), parse(value, f"--set {name.strip()}")[0]
+        raise RecipeError(f"{option} {text}: expected field=value, such as {example}; found no '='")
+    return name.strip(), parse(value, f"{option} {name.strip()}")[0]
 
 
 def _extended(path: Path, above: tuple[Path, ...]) -> _Layer:
@@ -89,10 +89,18 @@ def _extended(path: Path, above: tuple[Path, ...]) -> _Layer:
         if not base.is_file():
             raise RecipeError(f"{where} extends: expected a recipe file; found none at {base}")
         found = _extended(base, chain)
-        folder = os.path.relpath(base.parent, path.parent)
+        folder = _from(path.parent, base.parent)
         data = found.data if folder == "." else reduce(lambda data, to: _rebased(data, to, folder), PATHS, found.data)
         whole = _merged(whole, _Layer(data, found.places))
     return _merged(whole, layer)
+
+
+def _from(folder: Path, other: Path) -> str:
+    """The way from a folder to another one; all of its path where there is none, as between two drives of Windows."""
+    try:
+        return os.path.relpath(other, folder)
+    except ValueError:
+        return str(other.resolve())
 
 
 def _merged(under: _Layer, over: _Layer) -> _Layer:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Sequence
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +18,13 @@ from viewsphere.model.mistakes import Path as Steps
 LARGEST_FILE = 10_000_000
 MOST_VALUES = 200_000
 """Most values of a recipe: by YAML's aliases a file of a few lines can stand for billions of values."""
+
+UNCLOSED = {
+    "while scanning a quoted scalar": "quoted text",
+    "while parsing a flow sequence": "list",
+    "while parsing a flow mapping": "mapping",
+}
+"""What was being read, in the YAML reader's words, where a quote or a bracket is not closed; and in ours."""
 
 _INT = re.compile(r"[-+]?[0-9]+\Z")
 _FLOAT = re.compile(r"(?:[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?|[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN))\Z")
@@ -96,11 +102,25 @@ def _text(path: Path) -> str:
 
 
 def _syntax(path: str, text: str, error: yaml.MarkedYAMLError) -> str:
-    mark = error.problem_mark or error.context_mark
+    mark, lines = error.problem_mark or error.context_mark, text.splitlines()
     line = mark.line + 1 if mark else 1
-    around = text.splitlines()[mark.line] if mark and mark.line < text.count("\n") + 1 and text else ""
+    around = lines[line - 1] if line <= len(lines) else ""  # a mistake may be met behind the last line
     if "\t" in around[: len(around) - len(around.lstrip())] or "'\\t'" in (error.problem or ""):
         return f"{path}:{line}: expected spaces; found a tab: YAML is indented with spaces"
+    begun = error.context_mark
+    if begun and error.context in UNCLOSED:
+        sign, ended = lines[begun.line][begun.column], line > len(lines) or "end of stream" in (error.problem or "")
+        what = f"the {UNCLOSED[error.context]} that begins with {sign} in column {begun.column + 1}"
+        if ended or mark is None or sign in "'\"":
+            met = "the end of the file" if ended else f"what does not belong there on line {line}"
+            return f"{path}:{begun.line + 1}: expected an end of {what}; found {met}: close it"
+        column = around.rfind(" ", 0, mark.column) + 1 if around[mark.column] == ":" else mark.column  # a name before its colon
+        met = f"{shown(around[column:].strip())} in column {column + 1} of line {line}"
+        kind = UNCLOSED[error.context]
+        return (
+            f"{path}:{begun.line + 1}: expected a comma or the end of {what}; found {met}: set a comma before it, or close the "
+            f"{kind} there"
+        )
     context = f" {error.context}" if error.context else ""
     return f"{path}:{line}: expected YAML; found a mistake{context}: {error.problem}"
 
@@ -202,8 +222,3 @@ def schema(channels: Sequence[str] = ()) -> dict[str, Any]:
         "anyOf": [{"required": ["extends"]}, {"required": whole["required"]}],
         "title": "viewsphere recipe",
     }
-
-
-def template() -> str:
-    """The commented recipe that `viewsphere new` writes; it can be rendered unchanged."""
-    return files("viewsphere.model").joinpath("template.yaml").read_text("utf-8")

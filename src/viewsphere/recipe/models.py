@@ -7,12 +7,14 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
 
+from viewsphere.model.credit import Attribution, Credit, Licence, SourceUrl
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.mistakes import nearest, shown
 from viewsphere.model.model_spec import Axis
-from viewsphere.model.numbers import Count, Positive
+from viewsphere.model.numbers import Positive
+from viewsphere.recipe.draws import CountDrawn, Drawn, is_random
 from viewsphere.recipe.motion import MOTION, MotionField, Movable, has_clip
-from viewsphere.recipe.time import STEPS, Frames, Steps
+from viewsphere.recipe.time import RATE, STEPS, Frames, Rate, Steps
 from viewsphere.recipe.values import OrShort, shape_of
 
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
@@ -58,7 +60,7 @@ class SizeTable(Frozen):
 class Length(Frozen):
     """A length to scale a model to."""
 
-    length: Positive = Field(description="metres from front to back")
+    length: Drawn[Positive] = Field(description="metres from front to back, a number, [low, high] or a distribution")
 
 
 RealSize = Annotated[
@@ -101,8 +103,10 @@ class ModelEntry(Movable):
         description="what the models are; needed for files, for the zoo by default its family",
     )
     supercategory: str = Field(default="", max_length=200, description="a wider name, such as vehicle")
-    count: Count | None = Field(
-        default=None, description="zoo: how many models to draw (default 1); files: how many there have to be"
+    count: CountDrawn | None = Field(
+        default=None,
+        description="zoo: how many models to draw (default 1), a number, [low, high] or a distribution; files: how many there "
+        "have to be",
     )
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$", max_length=100)] | None = Field(
         default=None,
@@ -118,6 +122,7 @@ class ModelEntry(Movable):
         description="with frames or the motion clip: the animation to play, where the file has several (actions, takes); by "
         "default its first",
     )
+    fps: Rate | None = Field(default=None, description=f"with frames or the motion clip: {RATE}")
     poses: Steps = Field(default="each", description=f"with frames: {STEPS}")
     motion: MotionField = Field(default=None, description=MOTION)
     up: Axis | None = Field(default=None, description="the file's axis that points up; by default what its format says")
@@ -137,11 +142,30 @@ class ModelEntry(Movable):
     confined: bool = Field(
         default=True, strict=True, description="whether paths inside model files have to stay in the model's folder"
     )
+    licence: Licence = None
+    attribution: Attribution = None
+    source_url: SourceUrl = None
 
     @property
     def families(self) -> tuple[str, ...]:
         """The zoo families of this entry; empty for an entry of files."""
         return tuple(s.removeprefix(ZOO) for s in self.source if s.startswith(ZOO))
+
+    @property
+    def credit(self) -> Credit | None:
+        """What the entry says of whose its models are; None if nothing."""
+        credit = Credit(licence=self.licence, attribution=self.attribution, source_url=self.source_url)
+        return None if credit == Credit() else credit
+
+    @model_validator(mode="before")
+    @classmethod
+    def _as_fields(cls, value: Any) -> Any:
+        if isinstance(value, str):
+            name, colon, rest = value.partition(":")
+            is_field = colon and name in cls.model_fields
+            hint = f"set a space after the colon, {name}: {rest}" if is_field else f"write {{source: {value}}}"
+            raise ValueError(f"expected a mapping; found {shown(value)}: {hint}")
+        return value
 
     @model_validator(mode="after")
     def _check(self) -> ModelEntry:
@@ -151,6 +175,8 @@ class ModelEntry(Movable):
         for family in families:
             if not re.fullmatch(r"[a-z][a-z0-9_]*", family):
                 raise ValueError(f"expected zoo:<family>, such as zoo:car; found {ZOO + family!r}")
+        if not families and is_random(self.count):
+            raise ValueError("expected one number for count, of how many files there have to be; found a distribution")
         if not families and not self.category:
             raise ValueError("expected a category, such as car; found none (only zoo families have one of their own)")
         if self.up and self.forward and self.up[1] == self.forward[1]:
@@ -161,8 +187,6 @@ class ModelEntry(Movable):
             raise ValueError("expected a file for the motion clip; found the zoo, whose models have no clips")
         if self.frames is None and self.poses != "each":
             raise ValueError(f"expected frames, for poses: {self.poses}; found none")
-        if self.frames is None and self.clip is not None and not has_clip(self.motion):
-            raise ValueError(f"expected frames or the motion clip, for clip: {self.clip}; found neither")
         if self.scale == "real_size" and self.real_size is None and not families:
             raise ValueError("expected real_size to be set, for scale: real_size; found none")
         return self

@@ -66,11 +66,13 @@ MOTION = "under time, how it moves: {kind: constant, velocity: [0, -1, 0]}, or a
 
 
 class Movable(Frozen):
-    """What may have a motion. Without one it is written as before there were motions: digests of such recipes stay."""
+    """What may have a motion. Without one, or a rate of its frames, it is written as before there were these: digests of such
+    recipes stay.
+    """
 
     @model_serializer(mode="wrap")
     def _without_none(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        return {name: value for name, value in handler(self).items() if name != "motion" or value is not None}
+        return {name: value for name, value in handler(self).items() if name not in ("motion", "fps") or value is not None}
 
 
 def listed(motions: Motions | None, field: str) -> Iterator[tuple[str, MotionEntry]]:

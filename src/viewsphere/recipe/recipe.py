@@ -28,10 +28,14 @@ from pydantic import (
 
 from viewsphere.errors import RecipeError
 from viewsphere.model.channel import DEFAULT_CHANNELS
+from viewsphere.model.credit import Credit
+from viewsphere.model.file_names import is_reserved
 from viewsphere.model.files import Files
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.mistakes import Marks, report, shown
+from viewsphere.model.notebook import Shown
 from viewsphere.model.numbers import Count, Natural, Number
+from viewsphere.recipe.formats import FormatEntry, FormatField
 from viewsphere.recipe.models import ModelEntry
 from viewsphere.recipe.rig import RigField
 from viewsphere.recipe.scene import CameraEntry, EngineEntry, SceneEntry, engine_entry
@@ -41,11 +45,20 @@ from viewsphere.recipe.tracks import TracksEntry
 from viewsphere.recipe.values import OrShort, shape_of
 from viewsphere.recipe.viewpoints import Viewpoints
 
-BEFORE_RENDERING = {"name", "formats", "max_frames", "shot_frames"}
-"""Fields of a recipe that change neither a picture nor a label."""
+BEFORE_RENDERING = {"name", "formats", "max_frames", "shot_frames", "keep_annotations_above"}
+"""Fields of a recipe that change neither a picture nor a label, as the credits of its models do not."""
 
-LATER = {"scenes", "time", "rig", "tracks"}
+LATER = {"scenes", "time", "rig", "tracks", "min_visibility", "empty"}
 """Fields that recipes once did not have: without them a recipe has the digest that it had then."""
+
+LATER_FIELDS: dict[tuple[str, ...], Any] = {
+    ("viewpoints", "shake"): None,
+    ("camera", "principal_point"): None,
+    ("scene", "company", "orientation"): "upright",
+    ("scenes", "orientation"): "upright",
+    ("scenes", "balance"): "models",
+}
+"""Likewise fields of their parts, with the defaults that are left out."""
 
 Share = Annotated[
     Annotated[Number, Field(ge=0, le=1), Tag("number")] | Annotated[tuple[str, ...], Tag("list")],
@@ -79,6 +92,12 @@ class Splits(Frozen):
         for name in self.shares:
             if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_-]{0,99}", name):
                 raise ValueError(f"expected names of letters, digits, '-' and '_'; found split {name!r}")
+            if is_reserved(name):
+                raise ValueError(f"expected names for folders, which Windows has not given to devices; found split {name!r}")
+        folded = {name.casefold(): name for name in reversed(self.shares)}
+        for name in self.shares:
+            if (other := folded[name.casefold()]) != name:
+                raise ValueError(f"expected names that differ in more than capitals, for folders; found {other!r} and {name!r}")
         numbers = {name: share for name, share in self.shares.items() if not isinstance(share, tuple)}
         if numbers and abs(sum(numbers.values()) - 1) > 1e-6:
             added = " + ".join(f"{name} {share:g}" for name, share in numbers.items())
@@ -100,7 +119,12 @@ def _distinct(names: tuple[str, ...]) -> tuple[str, ...]:
     return names
 
 
-class Recipe(Frozen):
+def _distinct_formats(entries: tuple[FormatEntry, ...]) -> tuple[FormatEntry, ...]:
+    _distinct(tuple(entry.name for entry in entries))
+    return entries
+
+
+class Recipe(Shown, Frozen):
     """A data set to be made. From a file by `Recipe.load`, or from keyword arguments that are what the file would say.
 
     Any mistake raises RecipeError. Relative paths are relative to the recipe's file, or to the folder that was the
@@ -132,6 +156,19 @@ class Recipe(Frozen):
         description="points that are followed through each sequence: {grid: 16}, {count: 1024, on: objects}, or {points: file}",
     )
     scene: SceneEntry = Field(default=SceneEntry(), description="light, ground, background, effects, what stands around")
+    min_visibility: Annotated[Number, Field(gt=0, le=1)] | None = Field(
+        default=None,
+        description="least visibility of the frame's model (of random scenes: of each model); where it is less, the random "
+        "viewpoint, and company that is drawn per_frame, are drawn again",
+    )
+    keep_annotations_above: Annotated[Number, Field(ge=0, lt=1)] | None = Field(
+        default=None, description="exports leave out annotations of objects whose visibility is not above this; by default none"
+    )
+    empty: Annotated[Number, Field(gt=0, lt=1)] | None = Field(
+        default=None,
+        description="chance of each frame to be empty, without its models, as a negative example; drawn by the frame's name, "
+        "so that no frame changes when others are appended",
+    )
     engine: Annotated[EngineEntry, BeforeValidator(engine_entry), OrShort({"type": "string"})] = Field(
         default=EngineEntry(),
         description="what paints the pictures: a name, or a mapping of name and the engine's options",
@@ -140,8 +177,9 @@ class Recipe(Frozen):
         default=DEFAULT_CHANNELS, min_length=1, validate_default=True, description="what to keep of every frame"
     )
     files: Files = Field(default=Files(), description="how each channel is written: lossless PNG and TIFF by default")
-    formats: Annotated[tuple[str, ...], AfterValidator(_distinct)] = Field(
-        default=("native", "coco"), description="formats to write when all is rendered"
+    formats: Annotated[tuple[FormatField, ...], AfterValidator(_distinct_formats)] = Field(
+        default=(FormatEntry(name="native"), FormatEntry(name="coco")),
+        description="formats to write when all is rendered, by name or with options: {coco: {category_ids: coco}}",
     )
     splits: Splits = Field(
         default=Splits(),
@@ -155,6 +193,7 @@ class Recipe(Frozen):
 
     _folder: Path = PrivateAttr()
     _marks: Marks = PrivateAttr()
+    _lasting_seed: int | None = PrivateAttr(default=None)
 
     @model_validator(mode="before")
     @classmethod
@@ -229,6 +268,26 @@ class Recipe(Frozen):
         data, marks = assemble(Path(path), _plain(changes))
         return cls.model_validate(data, context={"marks": marks, "folder": Path(path).parent})
 
+    @classmethod
+    def of(cls, recipe: Recipe | str | PathLike[str]) -> Recipe:
+        """The recipe itself, or that of a file; raises RecipeError as `load` does, and for anything else."""
+        if isinstance(recipe, Recipe):
+            return recipe
+        if not isinstance(recipe, (str, PathLike)):
+            raise RecipeError(f"expected a Recipe, or the path of its file; found {shown(recipe)}: make it with vs.Recipe(...)")
+        return cls.load(recipe)
+
+    def redrawn(self, seed: int) -> Self:
+        """The recipe whose random choices follow from another seed: all but its models and its splits."""
+        again = self.model_copy(update={"seed": seed})
+        again._lasting_seed = self.lasting_seed
+        return again
+
+    @property
+    def lasting_seed(self) -> int:
+        """What models and splits follow from: the seed as it was written."""
+        return self.seed if self._lasting_seed is None else self._lasting_seed
+
     @property
     def sampler(self) -> str:
         """Name of the sampler that makes shots of the recipe."""
@@ -239,9 +298,11 @@ class Recipe(Frozen):
     @property
     def digest(self) -> str:
         """SHA-256 (hexadecimal) of all that changes a picture or a label; formats, for one, do not."""
-        value = self.model_dump(mode="json", exclude=BEFORE_RENDERING | {name for name in LATER if getattr(self, name) is None})
-        if value["viewpoints"]["shake"] is None:
-            del value["viewpoints"]["shake"]
+        without = BEFORE_RENDERING | {name for name in LATER if getattr(self, name) is None}
+        credit: Any = {"models": {"__all__": set(Credit.model_fields)}}
+        value = self.model_dump(mode="json", exclude=dict.fromkeys(without, True) | credit)
+        for path, default in LATER_FIELDS.items():
+            _leave_out(value, path, default)
         text = json.dumps(value, separators=(",", ":"))
         return hashlib.sha256(text.encode()).hexdigest()
 
@@ -253,6 +314,14 @@ class Recipe(Frozen):
         for name in () if self.time is None else self.scene.flickering:
             plain.setdefault("scene", {}).setdefault(name, {})["draw"] = "per_frame"
         return dump(plain)
+
+
+def _leave_out(value: Any, path: tuple[str, ...], default: object) -> None:
+    """Take a field that has its default out of nested mappings, where it is."""
+    for name in path[:-1]:
+        value = value.get(name) if isinstance(value, dict) else None
+    if isinstance(value, dict) and path[-1] in value and value[path[-1]] == default:
+        del value[path[-1]]
 
 
 def _plain(value: Any) -> Any:

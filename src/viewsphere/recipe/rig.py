@@ -11,13 +11,13 @@ from viewsphere.model.camera import Distortion
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.mistakes import shown
 from viewsphere.model.numbers import Count, Length, Metres, Number, Positive
-from viewsphere.recipe.scene import CameraEntry, CameraMatrix, Pixels, Row
+from viewsphere.recipe.scene import CameraEntry, CameraMatrix, PictureSize, Row
 from viewsphere.recipe.values import OrShort, pair
 
 MOST_SENSORS = 64
 AXES = "OpenCV axes of the first sensor: x right, y down, z forward"
 OWN_LENSES = ("fov_deg", "focal_px", "K")
-LENS_FIELDS = ("size", "fov_deg", "fov_axis", "focal_px", "focal_mm", "sensor_mm", "K", "distortion")
+LENS_FIELDS = ("size", "fov_deg", "fov_axis", "focal_px", "focal_mm", "sensor_mm", "K", "principal_point", "distortion")
 
 SensorName = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$", max_length=64)]
 Place = tuple[Metres, Metres, Metres]
@@ -45,7 +45,7 @@ class SensorEntry(Frozen):
     look: Place | None = Field(
         default=None, description=f"instead of rotation: the point [x, y, z] that it looks at, metres, {AXES}"
     )
-    size: tuple[Pixels, Pixels] | None = Field(default=None, description="[width, height] in pixels; default: the camera's")
+    size: PictureSize | None = Field(default=None, description="[width, height] in pixels; default: the camera's")
     fov_deg: Annotated[Number, Field(gt=0, lt=180)] | None = Field(default=None, description="as in camera")
     fov_axis: Literal["horizontal", "vertical"] | None = Field(default=None, description="as in camera")
     focal_px: Annotated[tuple[Positive, Positive], BeforeValidator(pair), OrShort({"type": "number"})] | None = Field(
@@ -87,6 +87,10 @@ class SensorEntry(Frozen):
         """
         mine = {name: value for name in LENS_FIELDS if (value := getattr(self, name, None)) is not None}
         states = any(name in mine for name in OWN_LENSES)
+        if not states and camera.is_random:
+            raise ValueError(
+                "expected fov_deg, focal_px or K beside size or distortion, as the camera's lens is drawn; found none"
+            )
         if not states and "size" in mine and (camera.focal_px or camera.K or camera.of_viewpoints):
             raise ValueError(
                 "expected fov_deg, focal_px or K beside size, as the camera's lens is in its own pixels; found none"

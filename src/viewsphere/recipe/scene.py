@@ -6,7 +6,17 @@ import math
 from collections.abc import Iterator
 from typing import Annotated, Any, Literal, cast
 
-from pydantic import AfterValidator, BeforeValidator, ConfigDict, Field, JsonValue, field_validator, model_validator
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    ConfigDict,
+    Discriminator,
+    Field,
+    JsonValue,
+    Tag,
+    field_validator,
+    model_validator,
+)
 
 from viewsphere.geometry.camera import focal_from_fov, focal_from_sensor
 from viewsphere.model.camera import Distortion, Intrinsics
@@ -41,6 +51,15 @@ Row = tuple[Number, Number, Number]
 Pixels = Annotated[Count, Field(le=LARGEST_IMAGE)]
 
 
+def _size(value: object) -> object:
+    if not isinstance(value, (list, tuple)):
+        raise ValueError(f"expected [width, height] in pixels, such as [640, 480]; found {shown(value)}")
+    return cast(object, value)
+
+
+PictureSize = Annotated[tuple[Pixels, Pixels], BeforeValidator(_size)]
+
+
 def _of_pinhole(value: tuple[Row, Row, Row]) -> tuple[Row, Row, Row]:
     if value[0][0] <= 0 or value[1][0] != 0 or value[1][1] <= 0 or value[2] != (0, 0, 1):
         raise ValueError("expected [[fx, skew, cx], [0, fy, cy], [0, 0, 1]] with fx and fy above 0")
@@ -50,24 +69,48 @@ def _of_pinhole(value: tuple[Row, Row, Row]) -> tuple[Row, Row, Row]:
 CameraMatrix = Annotated[tuple[Row, Row, Row], AfterValidator(_of_pinhole)]
 
 
+def _focal(value: Any) -> Any:
+    """A number as two equal ones."""
+    return pair(value) if isinstance(value, (int, float)) and not isinstance(value, bool) else value
+
+
+FocalField = Annotated[
+    Annotated[tuple[Positive, Positive], Tag("list")] | Annotated[Drawn[Positive], Tag("mapping")],
+    Discriminator(
+        lambda value: "list" if isinstance(value, (list, tuple)) else "mapping",
+    ),
+    BeforeValidator(_focal),
+    OrShort({"type": "number"}),
+]
+
+
 class CameraEntry(Frozen):
     """Image size, and one description of the lens."""
 
-    size: tuple[Pixels, Pixels] = Field(default=(640, 480), description="[width, height] of the image in pixels")
-    fov_deg: Annotated[Number, Field(gt=0, lt=180)] | None = Field(
-        default=None, description="angle of view in degrees, across the image's width unless fov_axis says otherwise"
+    size: PictureSize = Field(default=(640, 480), description="[width, height] of the image in pixels")
+    fov_deg: Drawn[Annotated[Number, Field(gt=0, lt=180)]] | None = Field(
+        default=None,
+        description="angle of view in degrees, across the image's width unless fov_axis says otherwise; a number, [low, high] "
+        "or a distribution, drawn for each picture, or sequence, as all of the lens",
     )
     fov_axis: Literal["horizontal", "vertical"] = Field(default="horizontal", description="what fov_deg measures")
-    focal_px: Annotated[tuple[Positive, Positive], BeforeValidator(pair), OrShort({"type": "number"})] | None = Field(
-        default=None, description="focal length in pixels: a number or [fx, fy]"
+    focal_px: FocalField | None = Field(
+        default=None, description="focal length in pixels: a number, [fx, fy], or a distribution over numbers"
     )
-    focal_mm: Positive | None = Field(default=None, description="focal length in millimetres; needs sensor_mm")
+    focal_mm: Drawn[Positive] | None = Field(
+        default=None, description="focal length in millimetres, a number, [low, high] or a distribution; needs sensor_mm"
+    )
     sensor_mm: Positive | tuple[Positive, Positive] | None = Field(
         default=None, description="sensor width in millimetres (square pixels), or [width, height]"
     )
     K: CameraMatrix | None = Field(
         default=None,
         description="full 3x3 camera matrix in pixels, origin at the image's corner (centre: width/2, height/2)",
+    )
+    principal_point: Drawn[tuple[Drawn[Number], Drawn[Number]]] | None = Field(
+        default=None,
+        description="[cx, cy] in pixels, origin at the image's corner, each of them a number or a distribution; by default the "
+        "centre, or what K says",
     )
     distortion: Distortion | None = Field(default=None, description="lens distortion with OpenCV's coefficients")
     of_viewpoints: Literal[True] | None = Field(
@@ -98,17 +141,25 @@ class CameraEntry(Frozen):
             raise ValueError("expected no size and no distortion beside of_viewpoints, which says both; found one")
         if (self.focal_mm is None) != (self.sensor_mm is None):
             raise ValueError("expected focal_mm and sensor_mm together; found one of them")
+        if self.principal_point is not None and (self.K or self.of_viewpoints):
+            raise ValueError("expected no principal_point beside K and of_viewpoints, which say it; found one")
         return self
 
     @property
+    def is_random(self) -> bool:
+        """Whether anything of the lens is drawn."""
+        return is_random(self)
+
+    @property
     def intrinsics(self) -> Intrinsics:
-        """The lens as focal lengths and principal point in pixels."""
+        """The lens as focal lengths and principal point in pixels, once it is drawn."""
         width, height = self.size
-        cx, cy, skew = width / 2, height / 2, 0.0
+        cx, cy = self.principal_point or (width / 2, height / 2)
+        skew = 0.0
         if self.K is not None:
             (fx, skew, cx), (_, fy, cy), _ = self.K
         elif self.focal_px is not None:
-            fx, fy = self.focal_px
+            fx, fy = self.focal_px if isinstance(self.focal_px, tuple) else (self.focal_px, self.focal_px)
         elif self.focal_mm is not None and self.sensor_mm is not None:
             sensor = self.sensor_mm if isinstance(self.sensor_mm, tuple) else (self.sensor_mm, None)
             fx = focal_from_sensor(self.focal_mm, sensor[0], width)
@@ -217,9 +268,17 @@ class SceneEntry(Frozen):
     @property
     def has_ground(self) -> bool:
         """Whether there may be a ground that hides what is behind it."""
-        grounds = tuple(alternatives(self.ground))
-        listed = any(not ground.catcher for ground in grounds if isinstance(ground, GroundEntry))
-        return listed or "on" in grounds or ("auto" in grounds and self.automatic_ground == "on")
+        return any(map(self._hides, alternatives(self.ground)))
+
+    @property
+    def always_has_ground(self) -> bool:
+        """Whether there is a ground that hides what is behind it, whatever is drawn."""
+        return all(map(self._hides, alternatives(self.ground)))
+
+    def _hides(self, ground: GroundEntry | Literal["auto", "on", "off"]) -> bool:
+        if isinstance(ground, GroundEntry):
+            return not ground.catcher
+        return (self.automatic_ground if ground == "auto" else ground) == "on"
 
     @property
     def is_composed(self) -> bool:
@@ -276,10 +335,13 @@ class SceneEntry(Frozen):
     def is_new_each_frame(self) -> bool:
         """Whether anything that frames of one shot must share is drawn anew for every frame."""
         lit = (self.sun, self.sky, self.lights, self.ground, self.materials)
-        return self.is_moved_each_frame or (self.draw == "per_frame" and (is_random(lit) or self._has_sky_folder))
+        return self.is_moved_each_frame or (self.draw == "per_frame" and (is_random(lit) or self._has_folder))
 
     @property
-    def _has_sky_folder(self) -> bool:
+    def _has_folder(self) -> bool:
+        """Whether a sky or a material takes its picture from a folder."""
+        if any(material.images is not None for material in self.materials):
+            return True
         skies = [sky for sky in alternatives(self.sky) if isinstance(sky, HdriSky)]
         return any(not path.lower().endswith(SKY_SUFFIXES) for sky in skies for path in alternatives(sky.hdri))
 

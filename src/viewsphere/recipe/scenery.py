@@ -10,8 +10,8 @@ from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.mistakes import shown
 from viewsphere.model.model_spec import Axis
-from viewsphere.model.numbers import FARTHEST, Count, Length, Metres, Number
-from viewsphere.recipe.draws import Drawn, is_random
+from viewsphere.model.numbers import FARTHEST, Length, Metres, Number
+from viewsphere.recipe.draws import CountDrawn, Drawn, is_random, span
 from viewsphere.recipe.models import ZOO, Unit
 from viewsphere.recipe.motion import MOTION, MotionField, MotionsField, Movable
 from viewsphere.recipe.values import Interval, OrShort, Point, shape_of
@@ -22,6 +22,7 @@ Spot = tuple[Metres, Metres, Number]
 
 DRAWS = "one for the whole data set (fixed), one a model (per_model), a sequence (per_sequence) or a frame (per_frame)"
 LABELS = "background, or own: every piece is an object with a category, boxes and a mask"
+ORIENTATION = "upright, or any: turned at random in all directions, uniform over rotations, on the lowest point"
 OF_FILES = ("origin", "up", "forward", "unit", "category")
 
 
@@ -87,14 +88,17 @@ Layout = Annotated[
 class CompanyEntry(Movable):
     """Other models of the recipe, of the same split, beside the one each frame is about."""
 
-    count: Count | None = Field(default=None, description="how many; not needed where layout is a list")
+    count: CountDrawn | None = Field(
+        default=None, description="how many, a number, [low, high] or a distribution; not needed where layout is a list"
+    )
     layout: Layout = Field(
         default="scatter",
         description="scatter: close by, turned at random; row: side by side; another placer's name; or where each stands: "
         "[x, y, azimuth in degrees]",
     )
     gap: Annotated[Number, Field(ge=0)] = Field(default=0.3, description="metres that are free between two of them, at least")
-    draw: Draw = Field(default="per_model", description=f"who and where: {DRAWS}")
+    draw: Draw = Field(default="per_model", description=f"how many, who and where: {DRAWS}")
+    orientation: Literal["upright", "any"] = Field(default="upright", description=ORIENTATION)
     motion: MotionField = Field(default=None, description=f"{MOTION}; of distractors")
 
     @model_validator(mode="after")
@@ -108,8 +112,8 @@ class CompanyEntry(Movable):
 
     @property
     def number(self) -> int:
-        """Number of distractors."""
-        return self.count or len(self.layout)
+        """Number of distractors, the most where it is drawn."""
+        return int(span(self.count)[1]) if self.count is not None else len(self.layout)
 
     @property
     def placer(self) -> str:
@@ -145,7 +149,7 @@ class PlaneEntry(Frozen):
     height: Length = Field(description="metres; the width follows from the picture")
     at: Spot | None = Field(default=None, description="[x, y, azimuth in degrees that the picture faces]")
     around: Around | None = Field(default=None, description="or anywhere around the origin: {distance, azimuth}")
-    count: Count = Field(default=1, description="how many planes")
+    count: CountDrawn = Field(default=1, description="how many planes, a number, [low, high] or a distribution")
     share: Annotated[Number, Field(ge=0, le=1)] = Field(default=1.0, description="chance of each to be there")
     draw: Draw = Field(default="fixed", description=f"which picture, whether and where: {DRAWS}")
     labels: Labels = Field(default="background", description=LABELS)
@@ -157,11 +161,16 @@ class PlaneEntry(Frozen):
             raise ValueError(f"expected one of image, images; found {'none' if self.image is None else 'both'}")
         if (self.at is None) == (self.around is None):
             raise ValueError(f"expected one of at, around; found {'none' if self.at is None else 'both'}")
-        if self.at is not None and self.count > 1:
-            raise ValueError(f"expected around beside count {self.count}: planes cannot all stand at one spot")
+        if self.at is not None and self.most > 1:
+            raise ValueError(f"expected around beside count {self.most}: planes cannot all stand at one spot")
         if (self.labels == "own") != bool(self.category):
             raise ValueError("expected category and labels: own together; found one of them")
         return self
+
+    @property
+    def most(self) -> int:
+        """Most planes there are at once."""
+        return int(span(self.count)[1])
 
 
 def _place(value: Any) -> Any:
@@ -169,7 +178,8 @@ def _place(value: Any) -> Any:
 
 
 def _company(value: Any) -> Any:
-    return {"count": value} if isinstance(value, (int, float)) and not isinstance(value, bool) else value
+    is_count = isinstance(value, (int, float, list, tuple)) and not isinstance(value, bool)
+    return {"count": value} if is_count else value
 
 
 def _planes(value: Any) -> Any:

@@ -8,21 +8,9 @@ from pydantic import BeforeValidator, ConfigDict, Discriminator, Field, JsonValu
 
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.numbers import Count, Number
-from viewsphere.recipe.draws import Distribution, Drawn, span
-from viewsphere.recipe.scenery import Layout, Spot
+from viewsphere.recipe.draws import CountDrawn, Distribution, span
+from viewsphere.recipe.scenery import ORIENTATION, Layout, Spot
 from viewsphere.recipe.values import OrShort
-
-
-def _range(value: Any) -> Any:
-    """[low, high] as what it is short for."""
-    return {"uniform": value} if isinstance(value, (list, tuple)) else value
-
-
-Objects = Annotated[
-    Drawn[Count],
-    BeforeValidator(_range),
-    OrShort({"type": "array", "items": {"type": "integer", "minimum": 1}, "minItems": 2, "maxItems": 2}),
-]
 
 
 class ScenesEntry(Frozen):
@@ -30,7 +18,7 @@ class ScenesEntry(Frozen):
 
     sampler: Literal["scenes"] = Field(default="scenes", description="scenes, or another sampler's name, beside its options")
     count: Count = Field(description="how many scenes")
-    objects: Objects = Field(
+    objects: CountDrawn = Field(
         default=cast(int, Distribution(uniform=(2, 5))),
         description="how many models stand in each: a number, [low, high] or a distribution",
     )
@@ -44,6 +32,12 @@ class ScenesEntry(Frozen):
         "[x, y, azimuth in degrees]",
     )
     gap: Annotated[Number, Field(ge=0)] = Field(default=0.3, description="metres that are free between two of them, at least")
+    balance: Literal["models", "category"] = Field(
+        default="models",
+        description="models: none is drawn more than another; category: each category has as many objects as any other, to "
+        "one, over all scenes (of a split, where splits are by model), as far as it has models enough for a scene",
+    )
+    orientation: Literal["upright", "any"] = Field(default="upright", description=ORIENTATION)
 
     @model_validator(mode="after")
     def _check(self) -> ScenesEntry:

@@ -4,9 +4,17 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
+from pydantic import (
+    BeforeValidator,
+    Discriminator,
+    Field,
+    SerializerFunctionWrapHandler,
+    Tag,
+    model_serializer,
+    model_validator,
+)
 
-from viewsphere.model.scene import Ground
+from viewsphere.model.scene import Ground, Picture
 from viewsphere.model.thing import Repaint
 from viewsphere.recipe.entries import entry_of, is_drawn_color
 from viewsphere.recipe.values import COLOR_FORMS, OrShort, parse_color, shape_of, switch
@@ -43,10 +51,19 @@ class MaterialEntry(entry_of(Repaint, fixed=("material",))):
     """A change to materials of the models; where several fit one, the last counts."""
 
     models: str = Field(default="*", min_length=1, description="keys of the models it is for, a pattern such as car_*")
+    images: Picture | None = Field(default=None, description="or a folder of pictures to draw from")
 
     @model_validator(mode="after")
     def _check(self) -> MaterialEntry:
-        changes = [name for name in Repaint.model_fields if name != "material"]
+        changes = [*(name for name in Repaint.model_fields if name != "material"), "images"]
         if all(getattr(self, name) is None for name in changes):
             raise ValueError(f"expected {', '.join(changes[:-1])} or {changes[-1]}; found none")
+        if self.image is not None and self.images is not None:
+            raise ValueError("expected image or images; found both")
         return self
+
+    @model_serializer(mode="wrap")
+    def _as_ever(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Without pictures where there are none: digests of such recipes are what they were before."""
+        found: dict[str, Any] = handler(self)
+        return {name: value for name, value in found.items() if value is not None or name not in ("image", "images")}

@@ -10,10 +10,18 @@ from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
 
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.mistakes import shown
-from viewsphere.model.numbers import Count
+from viewsphere.model.numbers import Count, Positive
 from viewsphere.recipe.values import shape_of
 
 FrameNumber = Annotated[int, Field(strict=True, ge=-1_000_000, le=1_000_000)]
+
+
+Rate = Annotated[Positive, Field(ge=1, le=1000)]
+
+RATE = (
+    "frames in a second; by default what the file says. Files of times (glTF, Alembic) are cut into such frames, of all others "
+    "the frames last as long"
+)
 
 
 class FrameRange(Frozen):

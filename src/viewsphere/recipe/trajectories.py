@@ -6,7 +6,7 @@ World axes: metres, z up. Headings are counter-clockwise from above: at 0 the ca
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Discriminator, Field, Tag, field_validator, model_validator
 
@@ -89,6 +89,13 @@ class OrbitPath(Moving):
     @classmethod
     def _elevation(cls, value: float | tuple[float, float]) -> float | tuple[float, float]:
         in_elevation(min(ends(value)), max(ends(value)))
+        return value
+
+    @field_validator("distance", mode="before")
+    @classmethod
+    def _in_metres(cls, value: Any) -> Any:
+        if isinstance(value, dict) and "fill" in value:
+            raise ValueError("expected metres, as what moves fills another share of every picture; found fill: give a distance")
         return value
 
     @field_validator("distance")

@@ -6,18 +6,45 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import Discriminator, Field, Tag, field_validator, model_validator
+from pydantic import (
+    Discriminator,
+    Field,
+    SerializerFunctionWrapHandler,
+    Tag,
+    field_validator,
+    model_serializer,
+    model_validator,
+)
 
 from viewsphere.model.frozen import Frozen
+from viewsphere.model.mistakes import at
 from viewsphere.model.model_spec import Axis
 from viewsphere.model.numbers import Count, Number, Positive
-from viewsphere.recipe.aim import AZIMUTH, DISTANCE, ELEVATION, FARTHEST, TILT, Aimed, in_elevation, in_reach
-from viewsphere.recipe.time import Frames
+from viewsphere.recipe.aim import (
+    AZIMUTH,
+    DISTANCE,
+    ELEVATION,
+    FILL,
+    TILT,
+    Aimed,
+    DistanceAround,
+    DistanceBetween,
+    Distances,
+    Fill,
+    FillBetween,
+    ends_of,
+    in_elevation,
+    in_reach,
+)
+from viewsphere.recipe.time import RATE, Frames, Rate
 from viewsphere.recipe.trajectories import DrivePath, MastPost, OrbitPath, SplinePath, WalkPath
 from viewsphere.recipe.values import Interval, Point, Range, Values
 
+AxisValues = float | tuple[float, ...] | Range
+"""One value, a list of them, or evenly spaced ones."""
 
-def axis_count(values: float | tuple[float, ...] | Range, *, turn: bool = False) -> int:
+
+def axis_count(values: AxisValues, *, turn: bool = False) -> int:
     """How many values an axis has; with `turn`, a range's last value is dropped if it is the first after 360 degrees."""
     if isinstance(values, Range):
         repeats = turn and values.count > 1 and abs(values.value(values.count - 1) - values.start - 360) < 1e-6
@@ -25,17 +52,11 @@ def axis_count(values: float | tuple[float, ...] | Range, *, turn: bool = False)
     return len(values) if isinstance(values, tuple) else 1
 
 
-def axis_value(values: float | tuple[float, ...] | Range, index: int) -> float:
+def axis_value(values: AxisValues, index: int) -> float:
     """One value of an axis."""
     if isinstance(values, Range):
         return values.value(index)
     return values[index] if isinstance(values, tuple) else values
-
-
-def _ends(values: float | tuple[float, ...] | Range) -> tuple[float, float]:
-    if isinstance(values, Range):
-        return values.start, values.value(values.count - 1)
-    return (min(values), max(values)) if isinstance(values, tuple) else (values, values)
 
 
 class _Axes(Aimed):
@@ -43,42 +64,49 @@ class _Axes(Aimed):
 
     azimuth: Values = Field(default=Range(start=0, stop=360, step=45), description=f"degrees; {AZIMUTH}; a full turn drops 360")
     elevation: Values = Field(default=20.0, description=f"degrees {ELEVATION}")
-    distance: Values = Field(description=DISTANCE)
+    distance: Distances = Field(description=f"{DISTANCE}; {FILL}")
     tilt: Values = Field(default=0.0, description=f"degrees; {TILT}")
 
     @field_validator("azimuth", "elevation", "distance", "tilt")
     @classmethod
-    def _distinct(cls, values: float | tuple[float, ...] | Range) -> float | tuple[float, ...] | Range:
+    def _distinct(cls, given: AxisValues | Fill) -> AxisValues | Fill:
+        values = given.fill if isinstance(given, Fill) else given
         if isinstance(values, tuple) and len(set(values)) < len(values):
             twice = next(v for i, v in enumerate(values) if v in values[:i])
             raise ValueError(f"expected distinct values; found {twice:g} twice")
-        return values
+        return given
 
     @field_validator("azimuth", "tilt")
     @classmethod
-    def _one_turn(cls, values: float | tuple[float, ...] | Range) -> float | tuple[float, ...] | Range:
+    def _one_turn(cls, values: AxisValues) -> AxisValues:
         if isinstance(values, Range) and values.stop - values.start > 360 + 1e-6:
             raise ValueError(f"expected at most a full turn; found {values.start:g} to {values.stop:g}")
         return values
 
     @field_validator("elevation")
     @classmethod
-    def _elevation(cls, values: float | tuple[float, ...] | Range) -> float | tuple[float, ...] | Range:
-        in_elevation(*_ends(values))
+    def _elevation(cls, values: AxisValues) -> AxisValues:
+        in_elevation(*ends_of(values))
         return values
 
     @field_validator("distance")
     @classmethod
-    def _distance(cls, values: float | tuple[float, ...] | Range) -> float | tuple[float, ...] | Range:
-        in_reach(*_ends(values))
+    def _distance(cls, values: AxisValues | Fill) -> AxisValues | Fill:
+        if not isinstance(values, Fill):
+            in_reach(*ends_of(values))
         return values
+
+    @property
+    def distances(self) -> AxisValues:
+        """The distances, or the shares of the picture that stand for them."""
+        return self.distance.fill if isinstance(self.distance, Fill) else self.distance
 
     @property
     def axis_counts(self) -> dict[str, int]:
         """Number of values of each axis, outermost loop first."""
         return {
             "tilts": axis_count(self.tilt, turn=True),
-            "distances": axis_count(self.distance),
+            "distances": axis_count(self.distances),
             "elevations": axis_count(self.elevation),
             "azimuths": axis_count(self.azimuth, turn=True),
         }
@@ -99,6 +127,15 @@ class Spread(Frozen):
     tilt: Annotated[Number, Field(ge=0)] = Field(default=0.0, description="degrees")
 
 
+def _check_width(width: Spread, field: str, instead: str) -> None:
+    """Raise ValueError for metres added to a distance that is not given in metres."""
+    if width.distance:
+        with at(field, "distance"):
+            raise ValueError(
+                f"expected 0 beside distance: {{fill: ...}}, which is no length; found {width.distance:g}: use {instead}"
+            )
+
+
 class Jitter(_Axes):
     """A grid whose every viewpoint is moved at random, uniformly within plus or minus a width, not beyond the poles."""
 
@@ -108,7 +145,10 @@ class Jitter(_Axes):
 
     @model_validator(mode="after")
     def _in_front(self) -> Jitter:
-        low, high = _ends(self.distance)
+        if isinstance(self.distance, Fill):
+            _check_width(self.plus_minus, "plus_minus", "a grid of shares, or kind: sphere with fill: [low, high]")
+            return self
+        low, high = ends_of(self.distance)
         in_reach(low - self.plus_minus.distance, high)
         return self
 
@@ -120,7 +160,9 @@ class Sphere(Aimed):
     count: Count = Field(description="how many viewpoints")
     azimuth: Interval = Field(default=(0.0, 360.0), description=f"[low, high] in degrees; {AZIMUTH}")
     elevation: Interval = Field(default=(-90.0, 90.0), description=f"[low, high] in degrees {ELEVATION}")
-    distance: Interval = Field(description=f"a number or [low, high] (uniform): {DISTANCE}")
+    distance: DistanceBetween = Field(
+        description=f"a number or [low, high] (uniform): {DISTANCE}; {FILL}; or fill: [low, high]"
+    )
     tilt: Interval = Field(default=(0.0, 0.0), description=f"a number or [low, high] (uniform), degrees; {TILT}")
 
     @field_validator("elevation")
@@ -131,8 +173,9 @@ class Sphere(Aimed):
 
     @field_validator("distance")
     @classmethod
-    def _distance(cls, value: tuple[float, float]) -> tuple[float, float]:
-        in_reach(*value)
+    def _distance(cls, value: tuple[float, float] | FillBetween) -> tuple[float, float] | FillBetween:
+        if not isinstance(value, FillBetween):
+            in_reach(*value)
         return value
 
 
@@ -143,9 +186,15 @@ class Normal(Aimed):
     count: Count = Field(description="how many viewpoints")
     azimuth: Number = Field(default=0.0, description=f"mean, degrees; {AZIMUTH}")
     elevation: Annotated[Number, Field(ge=-90, le=90)] = Field(default=20.0, description=f"mean, degrees {ELEVATION}")
-    distance: Annotated[Positive, Field(le=FARTHEST)] = Field(description=f"mean; {DISTANCE}")
+    distance: DistanceAround = Field(description=f"mean; {DISTANCE}; {FILL}; or fill: [low, high] (uniform)")
     tilt: Number = Field(default=0.0, description=f"mean, degrees; {TILT}")
     sd: Spread = Field(description="standard deviations")
+
+    @model_validator(mode="after")
+    def _in_metres(self) -> Normal:
+        if isinstance(self.distance, FillBetween):
+            _check_width(self.sd, "sd", "fill: [low, high]")
+        return self
 
 
 class PoseList(Aimed):
@@ -170,6 +219,7 @@ class PoseList(Aimed):
     clip: Annotated[str, Field(min_length=1)] | None = Field(
         default=None, description="3D files: the animation to play, where the file has several; by default its first"
     )
+    fps: Rate | None = Field(default=None, description=f"3D files: {RATE}")
     at: Annotated[str, Field(min_length=1)] | None = Field(
         default=None,
         description="3D files: an object whose place and turn (at the first frame) become the world's, as scene.blend.at",
@@ -194,10 +244,15 @@ class PoseList(Aimed):
             raise ValueError(f"expected up and forward at right angles; found up {self.up} and forward {self.forward}")
         return self
 
+    @model_serializer(mode="wrap")
+    def _as_ever(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Without `fps` where it says nothing: digests of such recipes stay."""
+        return {name: value for name, value in handler(self).items() if name != "fps" or value is not None}
+
     @property
     def of_cameras(self) -> dict[str, object]:
         """The given fields that are allowed only for cameras of 3D files."""
-        names = ("camera", "frames", "clip", "at", "size")
+        names = ("camera", "frames", "clip", "fps", "at", "size")
         return {name: value for name in names if (value := getattr(self, name)) is not None}
 
 

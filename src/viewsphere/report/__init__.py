@@ -15,6 +15,7 @@ from viewsphere.report.facts import facts
 from viewsphere.report.frames import frame_data
 from viewsphere.report.meshes import mesh_data, read_small, spread
 from viewsphere.report.page import page, script_json
+from viewsphere.report.paths import without_folders
 from viewsphere.report.pictures import layers_within
 from viewsphere.report.sequences import extents_of, played, sequence_data
 from viewsphere.report.summary import summary
@@ -103,14 +104,14 @@ def report_data(
 ) -> dict[str, Any]:
     """All that the page shows except pictures, as plain data."""
     return {
-        "facts": facts(dataset),
+        "facts": without_folders(facts(dataset)),
         "summary": summary(dataset, table),
         "shown": [{**frame_data(sample), "layers": {}} for sample in map(dataset.__getitem__, positions)],
         "sequences": [],
         "keys": {drawing.name: drawing.key for drawing in drawings() if drawing.key},
         "models": _models(dataset, table, tell),
         "box": {"faces": FACES, "edges": EDGES, "signs": VERTEX_SIGNS},
-        "proof": None if proof is None else asdict(proof),
+        "proof": None if proof is None else without_folders(asdict(proof)),
     }
 
 
@@ -123,7 +124,7 @@ def _models(dataset: Dataset, table: FrameTable, tell: Listener) -> list[dict[st
         try:
             shape = {"mesh": mesh_data(read_small(dataset.path(info.glb), most, info.node)), "problem": None}
         except ViewsphereError as error:
-            shape = {"mesh": None, "problem": str(error)}
+            shape = {"mesh": None, "problem": without_folders(str(error))}
         found.append({"key": info.key, **shape, **_cameras(info, table)})
         tell("models", done, len(chosen))
     return found

@@ -52,12 +52,12 @@ def timing(dataset: Dataset) -> Timing | None:
 
 
 def facts(dataset: Dataset) -> dict[str, Any]:
-    """Recipe (YAML), plan, versions, timing and folder, as plain data."""
+    """Recipe (YAML), plan, versions, timing and the folder's name, as plain data."""
     plan = dataset.plan
     made = timing(dataset)
     return {
         "name": dataset.name,
-        "folder": str(dataset.root.resolve()),
+        "folder": dataset.root.resolve().name,
         "recipe": "\n".join(_recipe(part) for part in plan.parts),
         "digest": plan.digest,
         "madeBy": plan.version,

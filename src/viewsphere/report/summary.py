@@ -145,10 +145,16 @@ def _histogram(values: NDArray[np.float32], edges: NDArray[np.float64]) -> list[
 
 
 def nice_edges(values: NDArray[np.floating], bins: int = BINS) -> NDArray[np.float64]:
-    """Edges of about `bins` equal bins at round numbers that contain all values; empty if there are no values."""
+    """Edges of about `bins` equal bins at round numbers that contain all values; empty if there are no values.
+
+    A single value lies in the middle of three bins: it is drawn as one bar, not as a block from end to end.
+    """
     if not len(values):
         return np.zeros(0)
     low, high = round(float(values.min()), 5), round(float(values.max()), 5)
+    if low == high:
+        step = max(0.1 * abs(high), 1e-3)
+        return np.round(high + step * np.arange(-1.5, 2), 12).astype(np.float64)
     spread = max(high - low, 0.02 * abs(high), 1e-6)
     power = 10.0 ** math.floor(math.log10(spread / bins))
     step = next(power * k for k in (1, 2, 2.5, 5, 10) if power * k >= spread / bins * (1 - 1e-9))

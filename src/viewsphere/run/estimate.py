@@ -18,10 +18,12 @@ from tempfile import TemporaryDirectory
 
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.thing import TimeStep
+from viewsphere.recipe.formats import FormatEntry, options_of
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.run.exporting import write
 from viewsphere.run.opening import prepare, to_render
 from viewsphere.run.tasks import Worker
+from viewsphere.run.unused import Unused, unused
 from viewsphere.run.warm import load_kernels
 from viewsphere.sampling.extension import Portion
 from viewsphere.sampling.plan import Plan
@@ -39,7 +41,7 @@ GOLDEN = 0.6180339887498949
 @dataclass(frozen=True)
 class Rates:
     """Seconds of one process and bytes on disk: for a model (each time step of one that deforms), a scene, a frame, the exports
-    of a frame.
+    of a frame; channels that take much of them, and that no format uses.
     """
 
     model: float
@@ -48,15 +50,19 @@ class Rates:
     export: float
     model_bytes: float
     frame_bytes: float  # exports included
+    unused: Unused | None = None
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """Seconds and bytes that rendering a recipe into an empty folder takes with so many worker processes."""
+    """Seconds and bytes that rendering a recipe into an empty folder takes with so many worker processes, and channels that
+    take much of the bytes, and that no format uses.
+    """
 
     seconds: float
     bytes: float
     workers: int
+    unused: Unused | None = None
 
 
 def estimate(recipe: Recipe, workers: int = 1, clock: Callable[[], float] = time.perf_counter) -> Estimate:
@@ -74,7 +80,7 @@ def extrapolate(planned: Plan, rates: Rates, workers: int) -> Estimate:
     scenes = planned.frames if planned.recipe.scene.is_new_each_frame else max(scenes, min(crew, planned.shot_count))
     shared = models * rates.model + scenes * rates.scene + planned.frames * rates.frame
     seconds = shared / crew + planned.frames * rates.export
-    return Estimate(seconds, models * rates.model_bytes + planned.frames * rates.frame_bytes, crew)
+    return Estimate(seconds, models * rates.model_bytes + planned.frames * rates.frame_bytes, crew, rates.unused)
 
 
 def measure(recipe: Recipe, clock: Callable[[], float] = time.perf_counter) -> Rates:
@@ -98,16 +104,17 @@ def _measure_in(planned: Plan, store: Store, stopwatch: _Stopwatch) -> Rates:
     begun = frame = 0.0
     for row, shot in zip(rows, shots, strict=True):
         begun += stopwatch(lambda shot=shot: next(worker.stages.render(shot)))
-        frame += stopwatch(lambda row=row: worker.make_shot(row))
+        frame += stopwatch(lambda row=row: worker.make_shot(row, lambda _: None))
     frames = sum(len(shot.instants) * len(shot.rig.sensors) for shot in shots)
     frame /= frames
     scenes = len({shot.stage_key for shot in shots})
     scene = max(begun - len(shots) * frame, 0.0) / scenes  # what a first frame takes beyond others
     export = _export(store, planned.recipe.formats, stopwatch)
     model_bytes = disk_bytes([store.folder / "models"])
-    outputs = [store.folder / "models", store.folder / "shots", *(store.root / name for name in planned.recipe.formats)]
+    outputs = [store.folder / "models", store.folder / "shots", *(store.root / entry.name for entry in planned.recipe.formats)]
     frame_bytes = (disk_bytes(outputs) - model_bytes) / frames
-    return Rates(model, scene, frame, export / frames, model_bytes / made, frame_bytes)
+    left = unused(store, options_of(planned.recipe.formats))
+    return Rates(model, scene, frame, export / frames, model_bytes / made, frame_bytes, left)
 
 
 def _shown(planned: Plan, spec: ModelSpec, rows: Sequence[Row]) -> tuple[TimeStep, ...]:
@@ -121,14 +128,14 @@ def _model_work(store: Store, portion: Portion, spec: ModelSpec, steps: Sequence
     return lambda: Worker(store.root, portion).models.make(spec, steps)
 
 
-def _export(store: Store, formats: Sequence[str], stopwatch: _Stopwatch) -> float:
+def _export(store: Store, formats: Sequence[FormatEntry], stopwatch: _Stopwatch) -> float:
     """Write the formats; gives the seconds, less those for looking through the whole plan for frames."""
     dataset = Dataset(store.root)
     assert len(dataset) > 0
-    folders = {name: store.root / name for name in formats}
+    folders = {entry.name: store.root / entry.name for entry in formats}
     for folder in folders.values():
         folder.mkdir()
-    return stopwatch(lambda: write(dataset, folders))
+    return stopwatch(lambda: write(dataset, folders, options_of(formats)))
 
 
 def _spread(planned: Plan) -> Iterator[Row]:

@@ -8,15 +8,16 @@ from collections import Counter
 from collections.abc import Container, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import chain, product
+from os import PathLike
 from pathlib import Path
 
 from viewsphere import plugins
 from viewsphere.errors import ModelError, RecipeError, UserError, ViewsphereError
 from viewsphere.model.channel import missing
-from viewsphere.model.model_spec import ModelSpec
-from viewsphere.model.thing import TimeStep
+from viewsphere.recipe.formats import FormatEntry, Formats, options_of, read_formats
 from viewsphere.recipe.recipe import Recipe
-from viewsphere.run.exporting import export, writable
+from viewsphere.run.exporting import export, keeps_others, writable
+from viewsphere.run.framing import MOST_TRIES, hidden_frames
 from viewsphere.run.opening import commit, prepare, to_append, to_render
 from viewsphere.run.pool import Crew, Job, Listed, Outcome
 from viewsphere.run.progress import Listener, Progress, unheard
@@ -24,11 +25,13 @@ from viewsphere.run.skies import check_skies
 from viewsphere.run.stages import Stages, StoredBoxes
 from viewsphere.run.tasks import KernelTask, Kind, ModelTask
 from viewsphere.run.unpainted import unpainted
+from viewsphere.run.unused import unused
 from viewsphere.run.warm import is_compiled
 from viewsphere.sampling.distances import Distances
 from viewsphere.sampling.extension import Portion
 from viewsphere.sampling.plan import Plan
-from viewsphere.store import Dataset, Row, Store
+from viewsphere.store import Choice, Dataset, Row, Store
+from viewsphere.store.credits import write_credits
 from viewsphere.store.index import Index
 
 MOST_SUBJECTS = 10_000
@@ -38,7 +41,7 @@ MOST_SUBJECTS = 10_000
 @dataclass(frozen=True)
 class Summary:
     """What a run left: frames in the data set, frames it rendered itself, what it skipped, seconds, formats, notes, and
-    warnings about its models by their keys.
+    warnings about its models by their keys, about files of which several are parts by the files' names.
     """
 
     root: Path
@@ -52,16 +55,17 @@ class Summary:
 
 
 def generate(
-    recipe: Recipe,
+    recipe: Recipe | str | PathLike[str],
     out: Path | str,
     *,
     workers: int = 0,
-    formats: Sequence[str] | None = None,
+    formats: Formats | None = None,
     keep_going: bool = False,
     append: bool = False,
     listener: Listener | None = None,
 ) -> Summary:
-    """Render all frames of a recipe that `out` does not hold yet, then write the formats (default: the recipe's).
+    """Render all frames of a recipe (or of the one in this file) that `out` does not hold yet, then write the formats (default:
+    the recipe's), by name or as {name: {option: value}}; options that are not said are the recipe's.
 
     With `append`, `out` is a finished data set, and models, poses and channels of the recipe that it lacks are added to it;
     what was there stays as it was.
@@ -72,15 +76,15 @@ def generate(
     """
     begun = time.monotonic()
     tell = listener or unheard
-    wanted = tuple(formats if formats is not None else recipe.formats)
+    recipe = Recipe.of(recipe)
     planned = prepare(recipe)
+    wanted = _asked(recipe, formats)
     store = Store(Path(out))
     portion = to_append(planned, store) if append else to_render(planned, store)
-    if portion.number:  # what is there would be out of date
-        wanted += tuple(n for n in plugins.names("formats") if n not in wanted and (store.root / n).is_dir())
+    wanted += _out_of_date(portion, wanted, store)
     with recipe.located():
-        for name, sensor in product(wanted, planned.rig.sensors):
-            _check_channels(name, sensor.kept(portion.record.channels), "" if sensor.channels is None else sensor.name)
+        for entry, sensor in product(wanted, planned.rig.sensors):
+            _check_channels(entry.name, sensor.kept(portion.record.channels), "" if sensor.channels is None else sensor.name)
     if portion.number:
         store.make_ready()
     else:
@@ -94,14 +98,75 @@ def generate(
             else:
                 notes = _check_skies(portion, store, tell)
                 rendered, skipped = _render_part(portion, store, crew, keep_going, tell)
+        notes += tuple(_renew_threshold(store, recipe.keep_annotations_above))
+        write_credits(Dataset(store.root))
         notes += export(store.root, wanted, listener=tell)
+    left = unused(store, options_of((*wanted, *_others(wanted, store))))
+    notes += (f"note: {left}",) if left else ()
     if append and not rendered:
         notes += (f"{store.root}: nothing to add, it has all that the recipe asks for",)
     dataset = Dataset(store.root)
-    warnings = {info.key: info.warnings for info in dataset.models if info.warnings}
+    notes += tuple(_hidden(store, portion))
+
+    warnings = _warnings(planned, dataset)
     for key, more in unpainted(recipe, [s for s in planned.model_specs if s.key not in skipped], store).items():
         warnings[key] = warnings.get(key, ()) + more
-    return Summary(store.root, len(dataset), rendered, skipped, time.monotonic() - begun, wanted, notes, warnings)
+    return Summary(
+        store.root, len(dataset), rendered, skipped, time.monotonic() - begun, tuple(options_of(wanted)), notes, warnings
+    )
+
+
+def _asked(recipe: Recipe, formats: Formats | None) -> tuple[FormatEntry, ...]:
+    """The formats to write with all their options: what is asked for, else what the recipe says, else the formats' defaults."""
+    known = options_of(recipe.formats)
+    entries = recipe.formats if formats is None else read_formats(formats)
+    return tuple(entry.over(known.get(entry.name, {})).whole() for entry in entries)
+
+
+def _out_of_date(portion: Portion, wanted: Iterable[FormatEntry], store: Store) -> tuple[FormatEntry, ...]:
+    """The other formats that have to be written anew: all where a part is added, else those that keep other annotations."""
+    least, others = portion.plan.recipe.keep_annotations_above, _others(wanted, store)
+    return tuple(e for e in others if portion.number or keeps_others(e.name, store.root / e.name, least))
+
+
+def _renew_threshold(store: Store, least: float | None) -> Iterator[str]:
+    """Let the whole data set have the recipe's `keep_annotations_above`; a note where older frames had another."""
+    found = store.plan()
+    renewed = found.keeping_above(least)
+    if renewed != found:
+        store.save(renewed)
+        kept = "all annotations" if least is None else f"annotations of what is seen more than {least:g}"
+        yield f"{store.root}: exports keep {kept} now, of all frames"
+
+
+def _others(wanted: Iterable[FormatEntry], store: Store) -> tuple[FormatEntry, ...]:
+    """The formats that lie in the data set beside those; they keep the options that they were written with."""
+    known = options_of(wanted)
+    return tuple(FormatEntry(name=n) for n in plugins.names("formats") if n not in known and (store.root / n).is_dir())
+
+
+def _hidden(store: Store, portion: Portion) -> Iterator[str]:
+    """A warning that counts the recipe's frames in which less of their models is seen than it asks for."""
+    recipe, part = portion.plan.recipe, portion.part
+    least = recipe.min_visibility
+    if least is None:
+        return
+    own = Dataset(store.root, Choice(frames=((part.first, part.first + part.frames),)))
+    if count := hidden_frames(own, least, recipe.scenes is not None):
+        yield (
+            f"warning: min_visibility: {count:,} of {len(own):,} frames show less than {least:g} of their models, the "
+            f"best of {MOST_TRIES} draws each: ask for less, or for less around the models"
+        )
+
+
+def _warnings(planned: Plan, dataset: Dataset) -> dict[str, tuple[str, ...]]:
+    """Warnings about the models by their keys; those about a file of which models are parts by the file's name."""
+    files = {spec.key: Path(spec.source).name for spec in planned.kept_specs if spec.parts is not None}
+    found = dict[str, dict[str, None]]()
+    for info in dataset.models:
+        if info.warnings:
+            found.setdefault(files.get(info.key, info.key), {}).update(dict.fromkeys(info.warnings))
+    return {key: tuple(lines) for key, lines in found.items()}
 
 
 def _check_channels(name: str, channels: Sequence[str], sensor: str) -> None:
@@ -144,7 +209,7 @@ def _render_part(portion: Portion, store: Store, crew: Crew, keep_going: bool, t
 def _prepare_models(portion: Portion, store: Store, crew: Crew, keep_going: bool, tell: Listener) -> dict[str, str]:
     """Normalise and export every model; gives the keys left out, and why."""
     planned = portion.plan
-    jobs = _model_jobs("same model" if portion.number else "model", portion.models)
+    jobs = _model_jobs("same model" if portion.number else "model", portion)
     total = len(jobs.all)
     failed: dict[str, ViewsphereError] = {}
     tell(Progress("models", 0, total))
@@ -161,15 +226,17 @@ def _prepare_models(portion: Portion, store: Store, crew: Crew, keep_going: bool
     return {key: str(error) for key, error in failed.items()}
 
 
-def _model_jobs(kind: Kind, models: Iterable[tuple[ModelSpec, tuple[TimeStep, ...]]]) -> Listed:
-    """A job for each model, with its time steps."""
-    return Listed(tuple(Job(spec.key, spec.key, ModelTask(kind, spec, steps)) for spec, steps in models))
+def _model_jobs(kind: Kind, portion: Portion) -> Listed:
+    """A job for each model, with its time steps and its credit."""
+    credit_of = portion.plan.credits.get
+    tasks = (ModelTask(kind, spec, steps, credit_of(spec.key)) for spec, steps in portion.models)
+    return Listed(tuple(Job(task.spec.key, task.spec.key, task) for task in tasks))
 
 
 def _compare_models(portion: Portion, store: Store, crew: Crew) -> None:
     """Raises StoreError where a model is no longer the one that the data set shows."""
-    jobs = _model_jobs("same model", (model for model in portion.models if store.model_info(model[0].key) is not None))
-    errors = [outcome.error for outcome in crew.run(jobs) if outcome.error]
+    held = (job for job in _model_jobs("same model", portion).all if store.model_info(job.key) is not None)
+    errors = [outcome.error for outcome in crew.run(Listed(tuple(held))) if outcome.error]
     if errors:
         raise _joined(errors)
 
@@ -209,11 +276,15 @@ def _render_shots(portion: Portion, store: Store, crew: Crew, keep_going: bool, 
             for outcome in crew.run(Listed((Job("kernels", first.subject, KernelTask(shot)),))):
                 _accept(outcome, False, skipped)
         tell(Progress("kernels", 1, 1))
-    tell(Progress("frames", resumed, total, resumed))
-    for outcome in crew.run(work):
+
+    def report() -> None:
+        tell(Progress("frames", resumed + rendered, total, resumed, crew.under_way))
+
+    report()
+    for outcome in crew.run(work, report):
         _accept(outcome, keep_going, skipped)
         rendered += outcome.frames
-        tell(Progress("frames", resumed + rendered, total, resumed))
+        report()
     return rendered
 
 

@@ -10,7 +10,8 @@ from pathlib import Path
 from viewsphere import plugins
 from viewsphere.errors import UserError
 from viewsphere.run.progress import Listener, Progress
-from viewsphere.store import Block, Part, PlanRecord, Store
+from viewsphere.store import Block, Dataset, Part, PlanRecord, Store
+from viewsphere.store.credits import write_credits
 from viewsphere.store.foreign import ForeignDataset
 from viewsphere.store.linking import link_model, link_shot
 from viewsphere.store.records import IMPORT
@@ -49,6 +50,7 @@ def import_dataset(
         for model in foreign.models:
             link_model(store, model.info.key, model.info, sorted(f for f in model.folder.iterdir() if f.is_file()))
         _link_frames(foreign, store, record, listener)
+        write_credits(Dataset(out))
     return foreign
 
 

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from pathlib import Path
 from typing import cast, get_args
 
 from viewsphere.assets.inspect import ModelReport, describe
+from viewsphere.assets.timeline import Timeline
 from viewsphere.errors import UserError
+from viewsphere.model.mistakes import nearest
 from viewsphere.model.model_spec import Axis, ModelSpec
+from viewsphere.recipe.models import UNITS, unit_metres
 from viewsphere.zoo import build_zoo_model
 
 
@@ -17,7 +21,7 @@ def model_spec(
     *,
     up: str | None = None,
     forward: str | None = None,
-    unit: float | None = None,
+    unit: str | None = None,
     seed: int = 0,
 ) -> ModelSpec:
     """A model file or `zoo:<family>` with the settings given, the others by default.
@@ -27,8 +31,6 @@ def model_spec(
     for name, axis in (("up", up), ("forward", forward)):
         if axis is not None and axis not in get_args(Axis):
             raise UserError(f"--{name}: expected one of {', '.join(get_args(Axis))}, found {axis!r}")
-    if unit is not None and not unit > 0:
-        raise UserError(f"--unit: expected metres in one unit, more than 0, found {unit:g}")
     zoo = source.startswith("zoo:")
     return ModelSpec(
         key=Path(source.replace(":", "-")).stem or "model",
@@ -38,8 +40,22 @@ def model_spec(
         category_id=1,
         up=cast("Axis | None", up),
         forward=cast("Axis | None", forward),
-        unit=unit,
+        unit=None if unit is None else _metres(unit),
     )
+
+
+def _metres(unit: str) -> float:
+    """Metres in a unit as recipes name it: by name or by number."""
+    try:
+        metres = unit_metres(unit) if unit in UNITS else float(unit)
+    except ValueError:
+        metres = 0.0
+    if not 0 < metres < math.inf:
+        raise UserError(
+            f"--unit: expected one of {', '.join(UNITS)}, or metres in one unit, more than 0; found {unit!r}"
+            f"{nearest(unit, UNITS)}"
+        )
+    return metres
 
 
 def inspect_model(spec: ModelSpec) -> ModelReport:
@@ -68,10 +84,23 @@ def report_lines(report: ModelReport) -> Iterator[str]:
         yield f"    {name or '(unnamed)'}: {_values(values) or 'plain'}"
     for name, (w, h) in report.textures:
         yield f"  texture    {name}: {w} x {h}"
+    yield from _animation(report.animation)
     for warning in report.warnings:
         yield f"  warning    {warning}"
     for suggestion in report.suggestions:
         yield f"  hint       {suggestion}"
+
+
+def _animation(line: Timeline | None) -> Iterator[str]:
+    if line is None:
+        return
+    yield f"  animation  frames {line.first} to {line.last}, {line.fps:g} fps: {line.seconds(line.last):.4g} s"
+    if line.clips:
+        yield f"  clips      {len(line.clips)}{' (choose one by clip)' if len(line.clips) > 1 else ''}"
+    for clip in line.clips[:20]:
+        yield f"    {clip.name}: frames {clip.first} to {clip.last}"
+    if len(line.clips) > 20:
+        yield f"    and {len(line.clips) - 20} more"
 
 
 def _values(values: dict[str, object]) -> str:

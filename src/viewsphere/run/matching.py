@@ -21,7 +21,6 @@ from viewsphere.store import Store
 from viewsphere.truth.correspondence import Match
 from viewsphere.truth.shot_views import views_of
 from viewsphere.truth.view import View
-from viewsphere.truth.visibility import rasterize
 
 SHOTS = 4
 """Shots whose things are kept for the next matches."""
@@ -52,7 +51,7 @@ def matches(a: Sample, b: Sample) -> Matches:
             f"matches: expected two samples of one sequence, or of one subject's stills; found {' and '.join(names)}"
         )
     one, other = (_view(sample, shot) for sample, shot in zip((a, b), shots, strict=True))
-    found = Match(one, rasterize(one.geometry, one.camera), other)
+    found = Match(one, one.visibility, other)
     z = np.where(np.isnan(found.xy[..., 0]), np.nan, found.xyz[..., 2])
     return Matches(found.xy, z, found.state)
 

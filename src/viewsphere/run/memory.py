@@ -2,23 +2,119 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from itertools import count
+from os import PathLike
+from typing import Any
 
+from viewsphere.errors import UserError
+from viewsphere.model.mistakes import shown
+from viewsphere.model.notebook import Shown
 from viewsphere.model.sample import Sample
 from viewsphere.recipe.recipe import Recipe
+from viewsphere.run.framing import Framing
 from viewsphere.run.opening import prepare
+from viewsphere.run.share import Share, known_to_loaders, share_of, share_of_rank, share_of_worker
 from viewsphere.run.stages import Stages
+from viewsphere.sampling.plan import Plan, plan
+from viewsphere.sampling.seeds import generator
+from viewsphere.sampling.turns import Turns
 
 
-def render(recipe: Recipe) -> Iterator[Sample]:
-    """Render a recipe's frames one after another in the calling process; nothing is written.
+class Frames(Shown, Iterable[Sample]):
+    """A recipe's frames, rendered when they are asked for: what `viewsphere.render` gives.
 
-    Raises UserError for the user's mistakes, as soon as they are met.
+    Each loop over it renders its epochs; the next loop begins with the epoch after them. `next` takes frames one by one,
+    and makes it an iterator, which ends once. PyTorch's DataLoader takes it as an IterableDataset.
     """
-    planned = prepare(recipe)
-    stages = Stages()
-    for subject in planned.subjects:
-        stages.read_ahead(planned, planned.cast(subject))
-        stages.check_distances(planned, subject)
-        for row in planned.rows.of(subject):
-            yield from stages.render(planned.shot(row, stages.box))
+
+    def __init__(self, recipe: Recipe, shard: Share | None, shuffle: bool, epochs: int | None, redraw: bool) -> None:
+        self.plan = prepare(recipe)
+        self.epoch = 0
+        self._shard, self._shuffle, self._epochs, self._redraw = shard, shuffle, epochs, redraw
+        self._stages = Stages()
+        self._taken: Iterator[Sample] | None = None
+        known_to_loaders(type(self))
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What workers of data loaders are sent: this process's rank, but nothing that is warm."""
+        return {**self.__dict__, "_shard": self._shard or share_of_rank(), "_stages": Stages(), "_taken": None}
+
+    def __repr__(self) -> str:
+        loops = "endless" if self._epochs is None else f"epochs {self._epochs}"
+        return f"<Frames of {self.plan.recipe.name}: {self.plan.frames:,} frames, {loops}, next epoch {self.epoch}>"
+
+    def __len__(self) -> int:
+        """Frames of a loop, of this shard or rank alone; raises TypeError where loops are endless."""
+        if self._epochs is None:
+            raise TypeError("frames of epochs=None have no end, and no length")
+        turns = Turns(self.plan)
+        share = self._shard or share_of_rank()
+        return self._epochs * (self.plan.frames if share.of == 1 else share.size(len(turns)) * (self.plan.frames // len(turns)))
+
+    def __iter__(self) -> Iterator[Sample]:
+        return self._taken or self._pass()
+
+    def __next__(self) -> Sample:
+        self._taken = self._taken or self._pass()
+        return next(self._taken)
+
+    def set_epoch(self, epoch: int) -> None:
+        """Say which epoch the next loop begins with, counted from 0: for loaders that start their workers anew for each epoch,
+        as for PyTorch's DistributedSampler.
+        """
+        self.epoch = epoch
+
+    def _pass(self) -> Iterator[Sample]:
+        """The frames of one loop that are this process's."""
+        share = (self._shard or share_of_rank()).parted(share_of_worker(self))
+        epochs = count(self.epoch) if self._epochs is None else range(self.epoch, self.epoch + self._epochs)
+        self.epoch += self._epochs or 0
+        for epoch in epochs:
+            yield from self._epoch(epoch, share)
+
+    def _epoch(self, epoch: int, share: Share) -> Iterator[Sample]:
+        planned = self._drawn(epoch)
+        whole = share.of == 1 and not self._shuffle
+        turns, seen = Turns(planned, planned.shot_frames if whole else 1), set[str]()
+        framing, box = Framing(planned.recipe, self._stages), self._stages.box
+        order = turns.shuffled(epoch) if self._shuffle else turns.in_order()
+        for turn in share(order):
+            if turn.subject not in seen:
+                seen.add(turn.subject)
+                self._stages.read_ahead(planned, planned.cast(turn.subject))
+                self._stages.check_distances(planned, turn.subject)
+            for row in turns.rows(turn):
+                yield from self._stages.render(framing.shot(lambda tries, row=row: planned.shot(row, box, tries)))
+
+    def _drawn(self, epoch: int) -> Plan:
+        """The plan, whose random choices are drawn anew for each epoch where that is asked for."""
+        if not (self._redraw and epoch):
+            return self.plan
+        recipe = self.plan.recipe
+        return plan(recipe.redrawn(int(generator(recipe.seed, "epoch", str(epoch)).integers(2**63))))
+
+
+def render(
+    recipe: Recipe | str | PathLike[str],
+    shard: tuple[int, int] | None = None,
+    shuffle: bool = False,
+    epochs: int | None = 1,
+    redraw: bool = False,
+) -> Frames:
+    """The frames of a recipe (or of the one in this file), rendered one after another in the process that loops over them;
+    nothing is written.
+
+    In workers of a PyTorch DataLoader, each renders its share, and all together render every frame once an epoch. `shard`
+    (k, n) renders the k-th of n shares, counted from 0; by default that of this process's rank where `torch.distributed` is
+    initialised, else all. Workers part their rank's or shard's share.
+
+    `shuffle` draws an order for each epoch from the recipe's seed; poses are shuffled one by one (all sensors of one
+    together), sequences as a whole. `epochs` is how often a loop renders all frames, None for endless loops. With `redraw`
+    all but the first epoch draw anew what the recipe leaves to chance; models and splits stay.
+
+    Raises UserError for the user's mistakes: those of the recipe at once, others as soon as they are met.
+    """
+    if epochs is not None and not (isinstance(epochs, int) and epochs > 0):
+        raise UserError(f"epochs: expected a number of 1 or more, or None for endless frames; found {shown(epochs)}")
+    return Frames(Recipe.of(recipe), None if shard is None else share_of(shard), shuffle, epochs, redraw)

@@ -46,7 +46,8 @@ class Mender:
         errors, wanted = _sorted(keys, self._part_of_model)
         for number, found in wanted.items():
             specs = {spec.key: spec for spec, _ in self._portion(number).models}
-            tasks = {key: ModelTask("damaged model", specs[key], self._steps(key)) for key in found}
+            credit_of = self._portion(number).plan.credits.get
+            tasks = {key: ModelTask("damaged model", specs[key], self._steps(key), credit_of(key)) for key in found}
             self._run(number, [Job(key, key, task) for key, task in tasks.items()], errors)
         return errors
 

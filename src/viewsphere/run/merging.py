@@ -17,10 +17,12 @@ import numpy as np
 from viewsphere.errors import StoreError, UserError
 from viewsphere.labels import channels
 from viewsphere.model.camera import Intrinsics
+from viewsphere.model.credit import Credit
 from viewsphere.model.sample import MERGED, ObjectAnnotation, Sample
 from viewsphere.run.progress import Listener, Progress
 from viewsphere.sampling.pose_numbers import kept, names_of
 from viewsphere.store import Block, Category, Dataset, ModelInfo, Part, PlanRecord, Row, Store, encode
+from viewsphere.store.credits import write_credits
 from viewsphere.store.foreign import ForeignFrame
 from viewsphere.store.index import length
 from viewsphere.store.linking import link_model, link_shot
@@ -76,14 +78,16 @@ def merge(
         _check_alike(datasets)
     categories, models, parts = _reconciled(datasets)
     record = _plan_record(parts, categories, models)
+    credits = _credits(parts)
     store = Store(Path(out))
     store.open_for(record)
     with store.occupied():
         for part in parts:
-            _link_models(part, store)
+            _link_models(part, store, credits)
         targets = record.rows
         for part in parts:
             _link_frames(part, targets, store, record, listener)
+        write_credits(Dataset(out))
     return Dataset(out)
 
 
@@ -205,7 +209,8 @@ def _plan_record(sources: Sequence[_Source], categories: tuple[Category, ...], m
     parts = tuple(part for source in sources for part in _parts(source))
     last = sources[-1].dataset
     whole = [[source.dataset.plan.digest, [row.key for row in source.rows]] for source in sources]
-    return PlanRecord(
+    thresholds = [plan.keep_annotations_above for plan in plans if plan.keep_annotations_above is not None]
+    record = PlanRecord(
         version=made,
         digest=hashlib.sha256(json.dumps(whole).encode()).hexdigest(),
         name=name,
@@ -219,6 +224,7 @@ def _plan_record(sources: Sequence[_Source], categories: tuple[Category, ...], m
         max_objects=max(plan.max_objects for plan in plans),
         parts=parts,
     )
+    return record.keeping_above(max(thresholds)) if thresholds else record
 
 
 def _parts(source: _Source) -> Iterator[Part]:
@@ -260,11 +266,22 @@ def _moved(source: _Source, part: Part, block: Block) -> Block:
     return replace(block, subjects=subjects, positions=tuple((a + by, b + by) for a, b in block.positions))
 
 
-def _link_models(source: _Source, store: Store) -> None:
+def _credits(sources: Sequence[_Source]) -> dict[str, Credit]:
+    """The credit of each model, by its new key: of one that several sources have, the first that is known."""
+    found: dict[str, Credit] = {}
+    for source in sources:
+        for info in source.dataset.models:
+            if info.credit and not info.track:
+                found.setdefault(source.model_keys[info.key], info.credit)
+    return found
+
+
+def _link_models(source: _Source, store: Store, credits: Mapping[str, Credit]) -> None:
     for info in source.dataset.models:
         if not info.track:
             key, category = source.model_keys[info.key], _of(source.categories[info.category_id])
-            link_model(store, key, info, sorted(source.dataset.path(info.obj).parent.iterdir()), **category)
+            files = sorted(source.dataset.path(info.obj).parent.iterdir())
+            link_model(store, key, info, files, **category, credit=credits.get(key))
 
 
 def _link_frames(source: _Source, targets: Iterator[Row], store: Store, record: PlanRecord, listener: Listener | None) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, fields, replace
 from itertools import chain
@@ -15,13 +15,18 @@ from viewsphere.assets.export import export_deforming, export_glb, export_obj
 from viewsphere.assets.mesh import Mesh
 from viewsphere.errors import StoreError
 from viewsphere.geometry.box import box_size, box_vertices
+from viewsphere.model.credit import Credit
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.thing import TimeStep
 from viewsphere.run.stages import Stages, model_files
 from viewsphere.store import ModelInfo, Store
+from viewsphere.store.manifest import Manifest
 
 Steps = dict[int, TimeStep]
 """Time steps by the frames of their model's file, ascending."""
+
+Export = Callable[[Path], None]
+"""Writes a model's files into a folder."""
 
 
 @dataclass(frozen=True)
@@ -31,40 +36,50 @@ class Models:
     store: Store
     stages: Stages
 
-    def make(self, spec: ModelSpec, steps: Iterable[TimeStep] = (), trusted: bool = True) -> None:
+    def make(self, spec: ModelSpec, steps: Iterable[TimeStep] = (), credit: Credit | None = None, trusted: bool = True) -> None:
         """Normalise a model, at these time steps if it deforms, and export it into the store, or see that the one there is the
-        same; time steps that it lacks are added.
+        same; time steps that it lacks are added, and a credit takes the place of an earlier one.
 
         `trusted`: the plan's digest and version vouch for models of the zoo that are there. Raises ModelError for a file that
         cannot be used, StoreError for one that changed since its frames were made.
         """
         known, wanted = self.store.model_info(spec.key), _with_rest(spec, steps)
         self._check_key(spec)
-        if known is not None and trusted and spec.source.startswith("zoo:"):
+        credit = credit or (known and known.credit)
+        if known is not None and trusted and spec.source.startswith("zoo:") and credit == known.credit:
             return
         if wanted:
             read_ahead(spec, wanted)
         if known is not None:
             self._compare(spec, known, wanted)
             held = _steps(known)
-            if wanted.keys() <= held.keys():
+            if wanted.keys() <= held.keys() and credit == known.credit:
                 return
             wanted = _with_rest(spec, chain(held.values(), wanted.values()))
-            read_ahead(spec, wanted)
-        if wanted:
-            target = self.store.model_folder(spec.key)
-            self._write_deforming(spec, wanted, self.store.aside(target) if known is None else self.store.replacing(target))
-        else:
-            self._write(spec)
+            if wanted:
+                read_ahead(spec, wanted)
+        target = self.store.model_folder(spec.key)
+        self._write(spec, wanted, credit, self.store.aside(target) if known is None else self.store.replacing(target))
 
-    def mend(self, spec: ModelSpec, steps: Iterable[TimeStep]) -> None:
-        """Put a model in the place of one that is damaged; raises StoreError where that was another."""
+    def mend(self, spec: ModelSpec, steps: Iterable[TimeStep], credit: Credit | None = None) -> None:
+        """Put a model in the place of one that is damaged; raises StoreError where that was another. The `credit` counts where
+        the damaged one's is not known.
+        """
         wanted = _with_rest(spec, steps)
         if wanted:
             read_ahead(spec, wanted)
-            self._write_deforming(spec, wanted, self.store.aside(self.store.model_folder(spec.key), again=True))
-        else:
-            self._write(spec, again=True)
+        place = self.store.aside(self.store.model_folder(spec.key), again=True)
+        self._write(spec, wanted, self._credit_of(spec.key, credit), place)
+
+    def _credit_of(self, key: str, otherwise: Credit | None) -> Credit | None:
+        """What the record of a model says, if its manifest vouches for it."""
+        file = self.store.model_folder(key) / "model.json"
+        try:
+            Manifest.read(file.parent).check(file.name, file.read_bytes(), file)
+            known = self.store.model_info(key)
+        except (StoreError, OSError):
+            return otherwise
+        return otherwise if known is None else known.credit
 
     def _check_key(self, spec: ModelSpec) -> None:
         """Raises StoreError where the key is that of a time step of a model that the store holds."""
@@ -76,22 +91,34 @@ class Models:
                 "give the recipe's entry a name"
             )
 
-    def _write(self, spec: ModelSpec, again: bool = False) -> None:
-        """Export a model that stays as it is."""
+    def _write(self, spec: ModelSpec, steps: Steps, credit: Credit | None, place: AbstractContextManager[Path]) -> None:
+        """Export a model into a folder, with all its time steps if it deforms."""
+        info, export = self._deforming(spec, steps) if steps else self._still(spec)
+        moments = tuple(replace(one, credit=credit) for one in info.steps)
+        with place as folder:
+            export(folder)
+            self.store.write_model_info(folder, replace(info, credit=credit, steps=moments))
+
+    def _still(self, spec: ModelSpec) -> tuple[ModelInfo, Export]:
+        """A model that stays as it is."""
         mesh = self.stages.model(spec)
-        with self.store.aside(self.store.model_folder(spec.key), again) as folder:
+
+        def export(folder: Path) -> None:
             export_obj(mesh, folder, spec.key)
             export_glb(mesh, folder / f"{spec.key}.glb")
-            self.store.write_model_info(folder, self._info(spec, mesh))
 
-    def _write_deforming(self, spec: ModelSpec, steps: Steps, place: AbstractContextManager[Path]) -> None:
-        """Export a model with all its time steps into a folder."""
+        return self._info(spec, mesh), export
+
+    def _deforming(self, spec: ModelSpec, steps: Steps) -> tuple[ModelInfo, Export]:
+        """A model with all its time steps."""
         model = DeformingMesh.of({frame: self.stages.model(spec, step) for frame, step in steps.items()})
         infos = tuple(replace(self._info(spec, model.meshes[f], step), track=spec.key) for f, step in steps.items())
         rest = next(info for info in infos if info.step == steps[_rest(spec)])
-        with place as folder:
+
+        def export(folder: Path) -> None:
             export_deforming(model, folder, spec.key, {frame: step.seconds for frame, step in steps.items()})
-            self.store.write_model_info(folder, replace(rest, key=spec.key, track="", steps=infos))
+
+        return replace(rest, key=spec.key, track="", steps=infos), export
 
     def _info(self, spec: ModelSpec, mesh: Mesh, step: TimeStep | None = None) -> ModelInfo:
         """What there is to know of a model, or of one of its time steps."""

@@ -9,13 +9,13 @@ from __future__ import annotations
 import signal
 import traceback
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from multiprocessing import get_context
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol, cast
 
 from viewsphere.errors import UserError, ViewsphereError
 
@@ -72,6 +72,10 @@ class Outcome:
     error: ViewsphereError | None = None
 
 
+def ignored() -> None:
+    """Nobody wants to know of frames under way."""
+
+
 class Crew:
     """So many workers for a part of a data set, this process itself if none; workers that were started stay until the context
     ends.
@@ -85,6 +89,7 @@ class Crew:
         self._portion = portion
         self._hands: list[_Hand] = []
         self._here: Worker | None = None
+        self._begun: dict[str, int] = {}
 
     def __enter__(self) -> Crew:
         return self
@@ -95,14 +100,19 @@ class Crew:
         self._hands.clear()
         self._here = None
 
-    def run(self, work: Work) -> Iterator[Outcome]:
-        """Do all jobs; outcomes come as they are ready.
+    @property
+    def under_way(self) -> int:
+        """Frames that were made of jobs without an outcome so far; those of a worker that dies no longer count."""
+        return sum(self._begun.values())
+
+    def run(self, work: Work, heard: Callable[[], None] = ignored) -> Iterator[Outcome]:
+        """Do all jobs; outcomes come as they are ready. `heard` is called when another frame is under way.
 
         A UserError is an outcome; anything else a worker raises ends the run with its traceback.
         """
         queue = Queue(work, [hand.line for hand in self._hands])
         if self._workers == 0:
-            yield from self._run_here(queue)
+            yield from self._run_here(queue, heard)
             return
         busy: dict[Connection, _Hand] = {}
         for hand in self._hands:
@@ -115,10 +125,14 @@ class Crew:
             pass
         while busy:
             for pipe in wait(list(busy)):
-                assert isinstance(pipe, Connection)
-                yield from self._hear(busy, pipe, queue)
+                yield from self._hear(busy, cast(Connection, pipe), queue, heard)  # Windows has another class
 
-    def _run_here(self, queue: Queue) -> Iterator[Outcome]:
+    def _note(self, job: Job, frames: int, heard: Callable[[], None]) -> None:
+        """Remember how many frames of a job are made."""
+        self._begun[job.key] = frames
+        heard()
+
+    def _run_here(self, queue: Queue, heard: Callable[[], None]) -> Iterator[Outcome]:
         from viewsphere.run.tasks import Worker
 
         self._here = self._here or Worker(self._root, self._portion)
@@ -126,9 +140,11 @@ class Crew:
         while (job := queue.next(line)) is not None:
             line = job.line
             try:
-                yield Outcome(job.key, self._here.do(job.task))
+                outcome = Outcome(job.key, self._here.do(job.task, lambda frames, job=job: self._note(job, frames, heard)))
             except UserError as error:
-                yield Outcome(job.key, error=error)
+                outcome = Outcome(job.key, error=error)
+            self._begun.pop(job.key, None)
+            yield outcome
 
     def _give(self, hand: _Hand | None, queue: Queue, busy: dict[Connection, _Hand]) -> bool:
         """Hand out the next job, to a new worker if none is given; False if there is none."""
@@ -142,24 +158,36 @@ class Crew:
         hand.give(job)
         return True
 
-    def _hear(self, busy: dict[Connection, _Hand], pipe: Connection, queue: Queue) -> Iterator[Outcome]:
-        """Take one answer, or the news of a death, and hand out the next job."""
-        hand = busy.pop(pipe)
+    def _hear(
+        self, busy: dict[Connection, _Hand], pipe: Connection, queue: Queue, heard: Callable[[], None]
+    ) -> Iterator[Outcome]:
+        """Take the news of a frame; or one answer, or the news of a death, and hand out the next job."""
+        hand = busy[pipe]
         job = hand.job
         assert job is not None
         try:
-            answer: Outcome | str = pipe.recv()
+            answer: Outcome | str | int = pipe.recv()
         except (EOFError, ConnectionResetError):
+            self._end(job, busy, pipe)
             self._hands.remove(hand)
             code = hand.stop()
             if not queue.again(job):
                 yield Outcome(job.key, error=ViewsphereError(f"{job.key}: its worker died {LIVES} times (exit code {code})"))
             self._give(None, queue, busy)
             return
+        if isinstance(answer, int):
+            self._note(job, answer, heard)
+            return
+        self._end(job, busy, pipe)
         if isinstance(answer, str):
             raise ViewsphereError(f"{job.key}: a worker failed\n{answer}")
         self._give(hand, queue, busy)
         yield answer
+
+    def _end(self, job: Job, busy: dict[Connection, _Hand], pipe: Connection) -> None:
+        """Its worker no longer does a job; the frames of one that died are made again, those of an outcome are in it."""
+        self._begun.pop(job.key, None)
+        del busy[pipe]
 
 
 class Queue:
@@ -238,7 +266,7 @@ class _Hand:
 
 
 def _serve(pipe: Connection, root: Path, portion: Portion) -> None:
-    """A worker's life: take a job, answer, until the other side is gone."""
+    """A worker's life: take a job, tell of each of its frames by their number so far, answer, until the other side is gone."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's to handle
     from viewsphere.run.allocator import keep_freed_memory
     from viewsphere.run.tasks import Worker
@@ -249,7 +277,7 @@ def _serve(pipe: Connection, root: Path, portion: Portion) -> None:
         while True:
             job: Job = pipe.recv()
             try:
-                pipe.send(Outcome(job.key, worker.do(job.task)))
+                pipe.send(Outcome(job.key, worker.do(job.task, pipe.send)))
             except UserError as error:
                 pipe.send(Outcome(job.key, error=type(error)(str(error))))
             except Exception:

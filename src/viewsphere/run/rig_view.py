@@ -68,7 +68,7 @@ def recipe_rig(recipe: Recipe) -> Rig:
     with recipe.located():
         asked = recipe.camera.of_viewpoints
         views = poses_of(recipe.viewpoints, recipe.time, recipe.seed, recipe.folder) if asked else None
-        own = recipe.camera.intrinsics if views is None else lens(recipe, views)
+        own = lens(recipe, views)
         return rig_of(recipe, own) or Rig.of(own)
 
 

@@ -140,7 +140,7 @@ class Stages:
             return
         subject = planned.subjects[0]
         there = next(planned.sampler.standing(planned, subject, self.box), None)
-        if there is None:  # the camera moves: where it is, is known with its shot
+        if there is None or not there.views.are_known:  # where the camera is, is known with its shot
             return
         things = planned.composition.things(subject, there.things, None, self.box)
         poses = range(0, planned.poses, -(-planned.poses // MOST_CAMERAS))
@@ -167,7 +167,8 @@ class Stages:
                     x, y = np.array(thing.world_from_object)[:2, 3]
                     raise RecipeError(
                         f"viewpoints: expected the camera outside of all that is placed; found it at "
-                        f"({', '.join(f'{v:.3g}' for v in cameras[i])}) inside {what}, which stands at ({x:.3g}, {y:.3g})"
+                        f"({', '.join(f'{v:.3g}' for v in cameras[i])}) inside {what}, which stands at ({x:.3g}, {y:.3g}): go "
+                        f"farther away, or, where distance is a share to fill, fill less"
                     )
 
     def _check_shot(self, shot: Shot) -> None:
@@ -177,6 +178,14 @@ class Stages:
             together = [instant for instant in instants if shot.poses_at(instant) == poses]
             cameras = [shot.camera(instant, sensor).center for instant in together for sensor in sensors]
             self._check_cameras([thing for thing in shot.things_at(together[0]) if thing.is_there], np.array(cameras))
+
+    def is_free(self, shot: Shot, instant: int) -> bool:
+        """Whether no camera of a shot is inside of something at an instant, counted from 0 in the shot."""
+        try:
+            self._check_shot(shot.model_copy(update={"instants": (shot.instants[instant],), "things": shot.things_at(instant)}))
+        except RecipeError:
+            return False
+        return True
 
     def _roofs(self, thing: Thing, point: Float) -> bool:
         """Whether scenery hides most of the sky from a point in the world."""

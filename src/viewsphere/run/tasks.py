@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
+from viewsphere.model.credit import Credit
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.sample import Sample
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing, TimeStep
+from viewsphere.run.framing import Framing
 from viewsphere.run.models import Models, mesh_digest
 from viewsphere.run.stages import Stages, StoredBoxes
 from viewsphere.run.warm import compile_kernels
@@ -21,13 +25,14 @@ Kind = Literal["model", "same model", "damaged model"]
 
 @dataclass(frozen=True)
 class ModelTask:
-    """A model, with its time steps if it deforms; the "same model" has to be what the store holds, if it is there. What is made
-    of a "damaged model" takes its place.
+    """A model, with its time steps if it deforms, and its credit; the "same model" has to be what the store holds, if it is
+    there. What is made of a "damaged model" takes its place.
     """
 
     kind: Kind
     spec: ModelSpec
     steps: tuple[TimeStep, ...] = ()
+    credit: Credit | None = None
 
 
 @dataclass(frozen=True)
@@ -59,31 +64,35 @@ class Worker:
         self.stages = Stages()
         self.models = Models(self.store, self.stages)
         self._portion = portion
+        self._framing = Framing(portion.plan.recipe, self.stages)
         self._boxes = StoredBoxes(self.store)
         self._digests: dict[str, str] = {}
 
-    def do(self, task: ModelTask | KernelTask | Row | Damaged) -> int:
-        """Make models, kernels, or the shot of a row; gives the number of frames that were made."""
+    def do(self, task: ModelTask | KernelTask | Row | Damaged, tell: Callable[[int], None]) -> int:
+        """Make models, kernels, or the shot of a row; gives the number of frames that were made. `tell` is given their number
+        so far after each of them.
+        """
         if isinstance(task, Row):
-            return self.make_shot(task)
+            return self.make_shot(task, tell)
         if isinstance(task, Damaged):
-            return self.make_shot(task.row, again=True)
+            return self.make_shot(task.row, tell, again=True)
         if isinstance(task, KernelTask):
             compile_kernels(task.shot)
             return 0
         if task.kind == "damaged model":
-            self.models.mend(task.spec, task.steps)
+            self.models.mend(task.spec, task.steps, task.credit)
         else:
-            self.models.make(task.spec, task.steps, trusted=task.kind == "model")
+            self.models.make(task.spec, task.steps, task.credit, trusted=task.kind == "model")
         return 0
 
-    def make_shot(self, row: Row, again: bool = False) -> int:
-        """Make the shot of a row and render it into the store; gives the number of its frames. Errors of one that takes the
-        place of a damaged one (`again`) as for `Store.aside`.
+    def make_shot(self, row: Row, tell: Callable[[int], None], again: bool = False) -> int:
+        """Make the shot of a row and render it into the store; gives the number of its frames, and `tell` so far after each.
+        Errors of one that takes the place of a damaged one (`again`) as for `Store.aside`.
         """
         with self._portion.plan.recipe.located():
-            shot = self._portion.shot(row, self._boxes)
-        return self.store.write_shot(shot.key, self.stages.render(shot), self._scenery(shot), shot.files, shot, again)
+            shot = self._framing.shot(lambda tries: self._portion.shot(row, self._boxes, tries))
+        samples = _counted(self.stages.render(shot), tell)
+        return self.store.write_shot(shot.key, samples, self._scenery(shot), shot.files, shot, again)
 
     def _scenery(self, shot: Shot) -> str:
         """What is background in a shot, and digests of its meshes, as `SceneryRecord` reads it; empty if nothing is."""
@@ -96,3 +105,10 @@ class Worker:
                 self._digests[key] = mesh_digest(self.stages.model(spec, step))
         digests = {key: self._digests[key] for key in shown}
         return SceneryRecord(things=things, digests=digests).model_dump_json() if things else ""
+
+
+def _counted(samples: Iterable[Sample], tell: Callable[[int], None]) -> Iterator[Sample]:
+    """The samples; their number so far is told when the next one is asked for, when the last one is written."""
+    for number, sample in enumerate(samples, 1):
+        yield sample
+        tell(number)

@@ -55,7 +55,7 @@ def compile_kernels(shot: Shot) -> None:
         _render(small)
         with suppress(OSError):  # a folder that others may not write
             kernels = (file.relative_to(mark.parent).as_posix() for file in mark.parent.rglob("*.nbi"))
-            mark.write_text("\n".join(sorted(kernels)), encoding="utf-8")
+            mark.write_text("\n".join(sorted(kernels)), "utf-8", newline="\n")
 
 
 def is_compiled(shot: Shot) -> bool:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
 from heapq import nsmallest
 
 from viewsphere.model.model_spec import ModelSpec
@@ -34,3 +35,25 @@ def mixed(seed: int, models: Sequence[ModelSpec], count: int, names: Names, repe
     return tuple(
         min(models, key=lambda spec: (share(seed, "cast", *names, str(slot), spec.key), spec.key)) for slot in range(count)
     )
+
+
+def balanced(
+    seed: int, sizes: Mapping[str, int], models: Mapping[str, int], repeat: bool
+) -> dict[str, tuple[tuple[str, int], ...]]:
+    """How many objects of which categories stand in each scene: all categories have as many over the scenes up to any one, to
+    one, as far as they have enough models.
+
+    `sizes`: of each scene, in their order, how many objects it has; `models`: of each category how many models there are, which
+    stand in a scene once at most unless they may `repeat`. A scene minds those before it, and none behind it.
+    """
+    had = dict.fromkeys(models, 0)
+    found: dict[str, tuple[tuple[str, int], ...]] = {}
+    for scene, size in sizes.items():
+        own, order = Counter[str](), sorted(models, key=lambda name: share(seed, "category", scene, name))
+        for _ in range(size):
+            free = [name for name in order if repeat or own[name] < models[name]]
+            least = min(free, key=lambda name: (had[name], own[name]))
+            had[least] += 1
+            own[least] += 1
+        found[scene] = tuple(own.items())
+    return found

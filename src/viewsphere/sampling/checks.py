@@ -14,8 +14,23 @@ from viewsphere.recipe.draws import alternatives, span
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.scenes import ScenesEntry
 from viewsphere.recipe.surface import GroundEntry
+from viewsphere.recipe.viewpoints import Jitter, Normal, Sphere
 from viewsphere.sampling.models import count_models
 from viewsphere.sampling.viewpoints import Poses
+
+
+def check_redraws(recipe: Recipe) -> None:
+    """Something can be drawn again where too little is seen of a model; only still pictures may be empty."""
+    for name in ("min_visibility", "empty") if recipe.time is not None else ():
+        if getattr(recipe, name) is not None:
+            raise RecipeError(f"{name}: expected none beside time, as it is about single pictures; found one: leave it out")
+    company = recipe.scene.company
+    is_redrawn = isinstance(recipe.viewpoints, Sphere | Normal | Jitter) or (company and company.draw == "per_frame")
+    if recipe.min_visibility is not None and not is_redrawn:
+        raise RecipeError(
+            "min_visibility: expected something to draw again, viewpoints of kind sphere, normal or jitter or "
+            f"scene.company.draw: per_frame; found viewpoints of kind {recipe.viewpoints.kind} and nothing drawn for each frame"
+        )
 
 
 def check_names(recipe: Recipe) -> None:
@@ -24,9 +39,11 @@ def check_names(recipe: Recipe) -> None:
     if recipe.engine.name not in engines:
         raise RecipeError(f"engine: {one_of(recipe.engine.name, engines)}")
     formats = plugins.names("formats")
-    for i, name in enumerate(recipe.formats):
-        if name not in formats:
-            raise RecipeError(f"formats[{i}]: {one_of(name, formats)}")
+    for i, entry in enumerate(recipe.formats):
+        if entry.name not in formats:
+            raise RecipeError(f"formats[{i}]: {one_of(entry.name, formats)}")
+        if entry.options:
+            entry.arguments(f"formats[{i}].{entry.name}")
     company = recipe.scene.company
     if company is not None and company.placer not in (placers := plugins.names("placers")):
         raise RecipeError(f"scene.company.layout: {one_of(company.placer, placers)}")

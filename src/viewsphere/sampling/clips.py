@@ -10,11 +10,11 @@ from viewsphere.errors import RecipeError
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import IDENTITY
 from viewsphere.model.thing import TimeStep
-from viewsphere.recipe.models import ZOO
+from viewsphere.recipe.models import ZOO, ModelEntry
 from viewsphere.recipe.motion import MotionEntry, Motions, has_clip, listed
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.sequence import TimeEntry
-from viewsphere.sampling.motion import Start, motion_of
+from viewsphere.sampling.motion import Start, mover
 from viewsphere.sampling.seeds import generator
 from viewsphere.sampling.time_steps import animation
 
@@ -31,8 +31,12 @@ def with_clips(
     with Blenders.none_yet() as blenders:
         for spec, number in models:
             played = [field for field, motions in playing(recipe, number) if has_clip(motions)]
-            line = None if not played else _timeline(spec, recipe.models[number].clip, played[0], blenders)
-            moved = {} if line is None else {"rest": line.first, "clip": recipe.models[number].clip}
+            line = None if not played else _timeline(spec, recipe.models[number], played[0], blenders)
+            moved = (
+                {}
+                if line is None
+                else {"rest": line.first, "clip": recipe.models[number].clip, "fps": recipe.models[number].fps}
+            )
             specs.append(spec.model_copy(update=moved))
             lines.append(line)
     return tuple(specs), tuple(lines)
@@ -65,7 +69,7 @@ def _played(clips: tuple[MotionEntry, ...], spec: ModelSpec, line: Timeline, tim
     around = range(-1, time.count + 1) if time.shutter else range(time.count)
     start = Start(IDENTITY, spec, time.at(time.count - 1), lambda *names: generator(0, *names))
     there = tuple(entry.model_copy(update={"enter": None, "leave": None}) for entry in clips)
-    moved = motion_of(there, start.playing(line, field), [time.at(i) for i in around])
+    moved = mover(there, start.playing(line, field)).at([time.at(i) for i in around])
     return [step for step in moved.steps if step is not None]
 
 
@@ -73,7 +77,7 @@ def _is_drawn(entry: MotionEntry) -> bool:
     return any(isinstance(value, (dict, list)) for value in entry.options.values())
 
 
-def _timeline(spec: ModelSpec, clip: str | None, field: str, blenders: Blenders) -> Timeline:
+def _timeline(spec: ModelSpec, entry: ModelEntry, field: str, blenders: Blenders) -> Timeline:
     if spec.source.startswith(ZOO):
         raise RecipeError(f"{field}: expected a file for clip, which plays its animation; found {spec.source}")
-    return animation(Path(spec.source), spec.confined, clip, field, blenders)
+    return animation(Path(spec.source), spec.confined, entry.clip, field, blenders, entry.fps)

@@ -14,10 +14,12 @@ from numpy.typing import NDArray
 from viewsphere import plugins
 from viewsphere.assets.cache import load_normalised
 from viewsphere.errors import RecipeError
-from viewsphere.geometry.rotation import transform
+from viewsphere.geometry.rotation import compose as joined
+from viewsphere.geometry.rotation import random_rotation, rigid, transform
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Matrix4, Vector
 from viewsphere.model.thing import Motion, Thing, TimeStep
+from viewsphere.recipe.draws import drawn
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.scenery import Labels
 from viewsphere.sampling.blend_scene import BlendScenery
@@ -34,9 +36,10 @@ from viewsphere.sampling.scenery import (
     plane_pieces,
     plane_spec,
 )
-from viewsphere.sampling.seeds import Names, generator
+from viewsphere.sampling.seeds import Names, generator, scene_generators
 from viewsphere.sampling.sendable import Sendable
-from viewsphere.sampling.time_steps import TimedPoses
+from viewsphere.sampling.sequence_poses import SequencePoses
+from viewsphere.sampling.time_steps import Schedule, TimedPoses
 from viewsphere.sampling.viewpoints import Poses
 from viewsphere.store import Category
 from viewsphere.zoo import build_zoo_model
@@ -125,7 +128,7 @@ class Composition(Sendable):
     def most_scenery(self) -> int:
         """Most pieces of labelled scenery in one frame."""
         scene = self.recipe.scene
-        count = sum(entry.count for entry in scene.planes if entry.labels == "own")
+        count = sum(entry.most for entry in scene.planes if entry.labels == "own")
         count += 0 if self.blend is None else len(self.blend.labelled)
         if scene.place is not None and scene.place.labels == "own":
             seed, name = self.recipe.seed, scene.place.name
@@ -141,10 +144,15 @@ class Composition(Sendable):
         if entry is None:
             return (spec,)
         names = draw_names(entry.draw, spec.key, pose)
-        return (spec, *companions(self.recipe.seed, spec, self.groups[spec.key], entry.number, names))
+        count = entry.number
+        if entry.count is not None:
+            count = drawn(entry.count, scene_generators(self.recipe.seed, names), ("company", "count"))
+        return (spec, *companions(self.recipe.seed, spec, self.groups[spec.key], count, names))
 
-    def targets(self, spec: ModelSpec, pose: str | None, box_of: BoxOf) -> tuple[Thing, ...]:
-        """The targets where they stand, the frame's model at the origin; raises RecipeError where there is no room."""
+    def targets(self, spec: ModelSpec, pose: str | None, box_of: BoxOf, again: Names = ()) -> tuple[Thing, ...]:
+        """The targets where they stand, the frame's model at the origin; raises RecipeError where there is no room. `again`
+        names another draw of where company stands.
+        """
         own = standing(box_of(spec))
         cast, poses = (spec,), [own]
         entry = self.recipe.scene.company
@@ -152,8 +160,8 @@ class Composition(Sendable):
             cast = self.cast(spec, pose)
             taken = ((shape(spec, box_of), own),)
             room = Room(self.free_floor(spec.key, pose), entry.gap, entry.spots, taken, "scene.company")
-            rng = partial(generator, self.recipe.seed, "layout", *draw_names(entry.draw, spec.key, pose))
-            poses += placed(entry.placer, cast[1:], room, box_of, rng)
+            rng = partial(generator, self.recipe.seed, "layout", *draw_names(entry.draw, spec.key, pose), *again)
+            poses += placed(entry.placer, cast[1:], room, box_of, rng, entry.orientation)
         return still(cast, poses)
 
     def free_floor(self, subject: str, pose: str | None) -> Footprint | None:
@@ -211,15 +219,25 @@ class Composition(Sendable):
 
 @dataclass(frozen=True, eq=False)
 class Turns:
-    """The number of what a draw is for, in the data set's order: of a subject, or of a frame."""
+    """The number of what a draw is for, in the data set's order: of a subject, of a frame, or of a sequence. `schedules` are
+    the subjects' own, none where every subject is taken from all poses.
+    """
 
     subjects: tuple[str, ...]
     views: Poses
+    schedules: tuple[Schedule, ...] = ()
 
     def __call__(self, names: Names) -> int:
-        """The number of a subject's name, or of a subject's and a pose's."""
+        """The number of a subject's name, or of a subject's and a frame's, or a sequence's."""
         subject = self._subjects[names[0]]
-        return subject if len(names) == 1 else subject * len(self.views) + self._poses[names[1]]
+        if len(names) == 1:
+            return subject
+        pose = self._poses[names[1]]
+        if isinstance(self.views, SequencePoses):  # whose subjects are the inner loop
+            return pose * len(self.subjects) + subject
+        if not self.schedules:
+            return subject * len(self.views) + pose
+        return sum(schedule.count for schedule in self.schedules[:subject]) + self.schedules[subject].position(pose)
 
     @cached_property
     def _subjects(self) -> dict[str, int]:
@@ -227,7 +245,8 @@ class Turns:
 
     @cached_property
     def _poses(self) -> dict[str, int]:
-        return {self.views.name(i): i for i in range(len(self.views))}
+        drawn = self.views.base if isinstance(self.views, SequencePoses) else self.views
+        return {drawn.name(i): i for i in range(len(drawn))}
 
 
 def compose(
@@ -236,10 +255,10 @@ def compose(
     specs: tuple[ModelSpec, ...],
     own: tuple[Category, ...],
     splits: Sequence[str],
-    views: Poses,
+    turns: Turns,
 ) -> Composition:
-    """The composition of a recipe with these subjects and poses; `splits[i]` is what keeps `specs[i]` from the others: its
-    split, or one name for all.
+    """The composition of a recipe with these subjects, which take turns; `splits[i]` is what keeps `specs[i]` from the others:
+    its split, or one name for all.
 
     Raises RecipeError for pictures and places that are not there, and where there are too few models for company.
     """
@@ -260,17 +279,33 @@ def compose(
         {spec.key: tuple(members[split]) for spec, split in zip(specs, splits, strict=True)},
         plane_images(recipe),
         own,
-        _blend(recipe, subjects, views),
+        _blend(recipe, turns),
     )
     if place is not None:
         place_pieces(recipe, place, draw_names(place.draw, subjects[0], ""), lambda category, labels: 1)
     return made
 
 
-def placed(placer: str, cast: Sequence[ModelSpec], room: Room, box_of: BoxOf, rng: Draws) -> Sequence[Matrix4]:
-    """Where the placer of this name puts the models; raises RecipeError where there is no room."""
+def placed(
+    placer: str, cast: Sequence[ModelSpec], room: Room, box_of: BoxOf, rng: Draws, orientation: str = "upright"
+) -> Sequence[Matrix4]:
+    """Where the placer of this name puts the models, upright or turned to `any` side before; raises RecipeError where there is
+    no room.
+    """
     module: Placer = plugins.load("placers", placer)
-    return module.place(cast, room, [shape(spec, box_of) for spec in cast], (), rng)
+    shapes = [shape(spec, box_of) for spec in cast]
+    if orientation == "upright":
+        return module.place(cast, room, shapes, (), rng)
+    turns = [random_rotation(rng("orientation", str(slot), spec.key)) for slot, spec in enumerate(cast)]
+    turned = [one.turned(turn) for one, turn in zip(shapes, turns, strict=True)]
+    poses = module.place(cast, room, turned, (), rng)
+    return [_turned_first(pose, turn) for pose, turn in zip(poses, turns, strict=True)]
+
+
+def _turned_first(pose: Matrix4, turn: NDArray[np.float64]) -> Matrix4:
+    """The pose of what was turned in its own axes before."""
+    a, b, c, d = ((x, y, z, w) for x, y, z, w in joined(pose, rigid(turn, (0.0, 0.0, 0.0))).tolist())
+    return a, b, c, d
 
 
 def shape(spec: ModelSpec, box_of: BoxOf) -> Shape:
@@ -301,14 +336,14 @@ def _vertices(spec: ModelSpec) -> NDArray[np.float64]:
     return load_normalised(spec, build_zoo_model).vertices.astype(np.float64)
 
 
-def _blend(recipe: Recipe, subjects: tuple[str, ...], views: Poses) -> BlendScenery | None:
+def _blend(recipe: Recipe, turns: Turns) -> BlendScenery | None:
     """The recipe's .blend file; frames take turns in the data set's order. Raises RecipeError where it does not fit."""
-    entry = recipe.scene.blend
+    entry, views = recipe.scene.blend, turns.views
     if entry is None:
         return None
 
     moments = views.moments if isinstance(views, TimedPoses) and entry.frames is not None else ()
     seconds = {moment.frame: moment.seconds for moment in moments if moment is not None}
-    made = BlendScenery(recipe, entry, Turns(subjects, views), dict(sorted(seconds.items())))
+    made = BlendScenery(recipe, entry, turns, dict(sorted(seconds.items())))
     made.check()
     return made

@@ -45,10 +45,13 @@ class Distances:
     def problem(self, subject: str) -> RecipeError | None:
         """The first pose whose camera would stand inside an object's box, in words; None if there is none.
 
-        What is drawn for each frame is not looked at: that is left to whoever renders the frame.
+        What is drawn for each frame is not looked at, nor what follows from a share of the picture: that is left to whoever
+        renders the frame.
         """
         step = -(-self.plan.poses // max(1, min(MOST_CAMERAS, MOST_PAIRS // len(self.plan.subjects))))
         for there in self.plan.sampler.standing(self.plan, subject, self.box_of):
+            if not there.views.are_known:
+                continue
             poses = there.poses[::step]
             cameras = self.cameras(there.things, poses, there.target, subject, there.views)
             for thing in there.things:

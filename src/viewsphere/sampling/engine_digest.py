@@ -6,7 +6,10 @@ import hashlib
 from functools import cache
 from pathlib import Path
 
+from pydantic import JsonValue
+
 from viewsphere import plugins
+from viewsphere.recipe.recipe import Recipe
 
 SHARED = tuple(Path(__file__).parents[1] / name for name in ("imaging", "surroundings", "model/scene.py"))
 """What every engine paints with: what finishes pictures, what is around the targets, and what a scene is if nobody says."""
@@ -28,3 +31,18 @@ def engine_digest(name: str) -> str:
         for source in sorted(root.rglob("*.py")) if root.is_dir() else [root]:
             digest.update(source.name.encode() + b"\0" + source.read_bytes())
     return digest.hexdigest()[:16]
+
+
+def engine_options(recipe: Recipe) -> dict[str, JsonValue]:
+    """The options of a recipe's engine; the path of a `script` counts from the recipe's folder."""
+    options = recipe.engine.options
+    script = options.get("script")
+    return options | {"script": str(recipe.folder / Path(script).expanduser())} if isinstance(script, str) else options
+
+
+def script_digest(recipe: Recipe) -> str | None:
+    """SHA-256 of the engine's script, on which its pictures depend; None without one, and where it is not there."""
+    script = engine_options(recipe).get("script")
+    if not isinstance(script, str) or not Path(script).is_file():
+        return None
+    return hashlib.sha256(Path(script).read_bytes()).hexdigest()

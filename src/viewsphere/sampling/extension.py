@@ -80,10 +80,10 @@ class Portion(Sendable):
         """The recipe's models in a shot, that of its frames first."""
         return self.plan.cast(row.subject, self._of_recipe(row.positions[0][0]))
 
-    def shot(self, row: Row, box_of: BoxOf) -> Shot:
-        """The shot of a row; `box_of` and errors as for `Plan.shot`."""
+    def shot(self, row: Row, box_of: BoxOf, tries: Sequence[int] = ()) -> Shot:
+        """The shot of a row; `box_of`, `tries` and errors as for `Plan.shot`."""
         poses = tuple(numbers(row.positions))
-        made = self.plan.take(row.subject, [self._of_recipe(pose) for pose in poses], box_of, row.key, row.first)
+        made = self.plan.take(row.subject, [self._of_recipe(pose) for pose in poses], box_of, row.key, row.first, tries)
         number_of = iter(poses)
         instants = (_at_pose(now, next(number_of)) if now.recorded else now for now in made.instants)
         return made.model_copy(

@@ -8,7 +8,7 @@ import json
 from viewsphere.errors import RecipeError
 from viewsphere.model.mistakes import shown
 from viewsphere.recipe.recipe import Splits
-from viewsphere.sampling.engine_digest import engine_digest
+from viewsphere.sampling.engine_digest import engine_digest, script_digest
 from viewsphere.sampling.plan import Plan
 from viewsphere.store import Part, PlanRecord
 
@@ -17,8 +17,15 @@ FITTING = "appended frames have to fit those that are there; choose another outp
 RIG = "rig"
 """Name of the setting that only recipes with several sensors have."""
 
+SHOWN = ("min_visibility", "empty")
+"""Names of the settings that say what pictures show of their models; only recipes that ask for it have them."""
+
 LOOK = "the engine's program"
 """Name of the setting that says how the engine paints."""
+
+
+MOTION = "motion of "
+"""What names of settings begin with that say how a model moves."""
 
 
 def check_fit(planned: Plan, there: PlanRecord) -> None:
@@ -26,6 +33,7 @@ def check_fit(planned: Plan, there: PlanRecord) -> None:
     for part in there.parts:
         _check_sampler(planned, part)
         _check_settings(planned, part)
+        _check_model_motions(planned, part)
         _check_splits(planned, part)
     _check_models(planned, there)
 
@@ -39,16 +47,22 @@ def settings(planned: Plan) -> dict[str, str]:
     value |= {
         "camera": planned.intrinsics.model_dump(mode="json"),
         **({} if planned.own_rig is None else {RIG: planned.own_rig.model_dump(mode="json")}),
-        "viewpoints.target": viewpoints.get("target"),
+        **{name: getattr(recipe, name) for name in SHOWN if getattr(recipe, name) is not None},
+        "viewpoints.target": viewpoints.get("target", recipe.viewpoints.target),
         "viewpoints.bins": viewpoints.get("bins"),
         "scene's images": [file.rpartition("/")[2] for files in (planned.images, *planes) for file in files],
     }
+    script = script_digest(recipe)
+    if script is not None:
+        value["engine.script"] = script
     if recipe.scenes is not None:
         options = recipe.scenes.model_dump(mode="json", exclude={"count"})
         value |= {f"scenes.{name}": options[name] for name in options}
     if recipe.time is not None:
         value["time"] = recipe.time.model_dump(mode="json")
         value["viewpoints.shake"] = viewpoints.get("shake")
+        for spec, number in zip(planned.model_specs, planned.entries, strict=True):
+            value[MOTION + spec.key] = recipe.models[number].model_dump(mode="json", include={"motion", "clip"})
     if recipe.tracks is not None:
         value["tracks"] = recipe.tracks.model_dump(mode="json")
     digests = {name: hashlib.sha256(json.dumps(value[name]).encode()).hexdigest()[:16] for name in value}
@@ -65,15 +79,27 @@ def _check_sampler(planned: Plan, part: Part) -> None:
 
 def _check_settings(planned: Plan, part: Part) -> None:
     own = settings(planned)
-    added = [name for name in own if part.settings and name not in part.settings and name == RIG]
+    added = [name for name in own if part.settings and name not in part.settings and name in (RIG, *SHOWN)]
     for name in (*part.settings, *added):
-        if own.get(name) != part.settings.get(name):
+        if not name.startswith(MOTION) and own.get(name) != part.settings.get(name):
             found = planned.recipe.model_dump(mode="json")
             values = [_value(recipe, name) for recipe in (part.recipe, found)]
             differ = f"{values[0]}, as the data set has; found {values[1]}"
             if values[0] == values[1]:
                 differ = "what the data set has; found another"
             raise RecipeError(f"{name}: expected {differ}: {FITTING}")
+
+
+def _check_model_motions(planned: Plan, part: Part) -> None:
+    """A model moves as it did: its sequences are known by its name and their viewpoints alone."""
+    own = settings(planned)
+    for spec, number in zip(planned.model_specs, planned.entries, strict=True):
+        name = MOTION + spec.key
+        if own.get(name) != part.settings.get(name, own.get(name)):
+            raise RecipeError(
+                f"models[{number}].motion: expected the motion of {spec.key} that the data set has; found another: give the "
+                "model another name, under which it has sequences of its own, or choose another output folder"
+            )
 
 
 def _value(recipe: object, name: str) -> str:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import csv
 import hashlib
 import math
 import os
 import re
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping, Set
 from dataclasses import dataclass, replace
 from functools import cache
 from glob import glob, has_magic
@@ -18,11 +17,15 @@ from typing import Literal
 from viewsphere.assets.inside import split_source
 from viewsphere.assets.load import BLENDER_SUFFIXES
 from viewsphere.errors import RecipeError
-from viewsphere.model.mistakes import nearest
+from viewsphere.model.file_names import is_reserved
+from viewsphere.model.mistakes import nearest, one_of
 from viewsphere.model.model_spec import ModelSpec, Size
+from viewsphere.plugins import families
+from viewsphere.recipe.draws import drawn
 from viewsphere.recipe.models import ZOO, Dimensions, Length, ModelEntry, SizeTable, unit_metres
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.sampling.seeds import generator
+from viewsphere.sampling.tables import Cells, table_rows
 from viewsphere.store import Category
 
 MODEL_SUFFIXES = frozenset({".obj", ".glb", ".gltf", ".ply", ".stl", ".off", ".dae", ".3mf"})
@@ -51,7 +54,7 @@ class _Found:
 def count_models(recipe: Recipe) -> int:
     """How many models there are, without making their specifications; raises RecipeError for files not found."""
     return sum(
-        len(entry.families) * (entry.count or 1) if entry.families else len(_files(recipe, i))
+        len(entry.families) * _count(recipe, entry) if entry.families else len(_files(recipe, i))
         for i, entry in enumerate(recipe.models)
     )
 
@@ -79,7 +82,7 @@ def numbered_specs(recipe: Recipe) -> tuple[tuple[ModelSpec, int], ...]:
         spec = ModelSpec(
             key=found.key,
             source=found.source,
-            seed=int(generator(recipe.seed, found.source, found.key).integers(2**63)) if found.in_zoo else None,
+            seed=int(generator(recipe.lasting_seed, found.source, found.key).integers(2**63)) if found.in_zoo else None,
             category=category,
             supercategory=entry.supercategory,
             category_id=ids[category],
@@ -87,7 +90,7 @@ def numbered_specs(recipe: Recipe) -> tuple[tuple[ModelSpec, int], ...]:
             forward=entry.forward,
             unit=None if entry.unit is None else unit_metres(entry.unit),
             centring=entry.centring,
-            scale=entry.scale.length if isinstance(entry.scale, Length) else entry.scale,
+            scale=_scale(recipe, entry, found.key),
             real_size=_real_size(recipe, found, table),
             confined=entry.confined,
         )
@@ -110,6 +113,19 @@ def categories(recipe: Recipe) -> tuple[Category, ...]:
     return tuple(result.values())
 
 
+def _count(recipe: Recipe, entry: ModelEntry) -> int:
+    """How many models of each of its zoo families an entry means."""
+    names = ("models", "count", entry.name or "", *entry.source)
+    return 1 if entry.count is None else drawn(entry.count, lambda path: generator(recipe.lasting_seed, *names, *path))
+
+
+def _scale(recipe: Recipe, entry: ModelEntry, key: str) -> Literal["as_is", "real_size"] | float:
+    """What a model is scaled to: a length is drawn for each."""
+    if not isinstance(entry.scale, Length):
+        return entry.scale
+    return drawn(entry.scale.length, lambda path: generator(recipe.lasting_seed, "models", "scale", key, *path))
+
+
 def _category(entry: ModelEntry, source: str) -> str:
     return entry.category or source.removeprefix(ZOO).replace("_", " ")
 
@@ -117,17 +133,24 @@ def _category(entry: ModelEntry, source: str) -> str:
 def _found(recipe: Recipe, index: int) -> Iterator[_Found]:
     entry = recipe.models[index]
     for family in entry.families:
-        for number in range(entry.count or 1):
+        if family not in families():
+            raise RecipeError(f"models[{index}].source: zoo: {one_of(family, families())}")
+        for number in range(_count(recipe, entry)):
             yield _Found(index, f"{entry.name or family}_{number:03d}", ZOO + family)
     if not entry.families:
         prefix = f"{entry.name}_" if entry.name else ""
         for file in _files(recipe, index):
-            yield _Found(index, _short(prefix + _as_key(file.stem)), str(file))
+            yield _Found(index, _short(_free(prefix + _as_key(file.stem))), file.as_posix())
 
 
 def _as_key(text: str) -> str:
     """The text as a part of a folder's name: letters, digits, `_`, `-` and inner dots."""
     return re.sub(r"[^\w.-]", "_", text).strip(".") or "model"
+
+
+def _free(key: str) -> str:
+    """The key, with `_` behind it where Windows would take it for a device's name."""
+    return f"{key}_" if is_reserved(key) else key
 
 
 def _short(key: str) -> str:
@@ -147,25 +170,66 @@ def _files(recipe: Recipe, index: int) -> tuple[Path, ...]:
     return tuple(sorted(files, key=lambda f: f.as_posix()))
 
 
+def left_out(recipe: Recipe) -> Iterator[str]:
+    """A warning for each entry whose folders and patterns hold files that only Blender reads, and that no entry names."""
+    taken = cache(lambda: {file for i, entry in enumerate(recipe.models) if not entry.families for file in _files(recipe, i)})
+    for i, entry in enumerate(recipe.models):
+        sources = () if entry.families else entry.source
+        unread = {f for source in sources for f in _unread(recipe.folder, source, f"models[{i}]")}
+        if unread and (unread := unread - taken()):
+            yield f"models[{i}].source: {_naming(recipe.folder, unread)}"
+
+
 def _matching(folder: Path, source: str, where: str) -> list[Path]:
-    path = folder / Path(source).expanduser()
-    if split_source(path)[0].is_file():
-        matches = [path]
-    elif path.is_dir():
-        matches = [f for f in path.rglob("*") if not any(map(_is_hidden, f.relative_to(path).parts))]
-    elif has_magic(source):
-        matches = [folder / f for f in glob(source, root_dir=folder, recursive=True)]  # noqa: PTH207 (Path.glob takes no absolute pattern)
-    else:
-        kinds = "a file, folder, pattern or zoo:<family>"
-        raise RecipeError(f"{where}.source: expected {kinds}; found no {source!r} in {folder}")
-    if matches != [path]:
-        ending = path.suffix.lower()
-        wanted = {ending} if ending[1:] in BLENDER_SUFFIXES else MODEL_SUFFIXES
-        matches = [f for f in matches if f.suffix.lower() in wanted and f.is_file()]
+    path = _path(folder, source)
+    found = _candidates(folder, source, where)
+    matches = found if found == [path] else [f for f in found if f.suffix.lower() in _wanted(path) and f.is_file()]
     if not matches:
-        endings = ", ".join(sorted(MODEL_SUFFIXES))
-        raise RecipeError(f"{where}.source: expected model files ({endings}); {source!r} gives none in {folder}")
+        endings, unread = ", ".join(sorted(MODEL_SUFFIXES)), _unread(folder, source, where)
+        hint = f"; {_naming(folder, unread)}" if unread else ""
+        raise RecipeError(f"{where}.source: expected model files ({endings}); {source!r} gives none in {folder}{hint}")
     return [Path(os.path.normpath(f)) for f in matches]
+
+
+def _unread(folder: Path, source: str, where: str) -> set[Path]:
+    """Files that only Blender reads, which a folder or a pattern means but leaves out."""
+    path = _path(folder, source)
+    found = _candidates(folder, source, where)
+    others = frozenset(f".{suffix}" for suffix in BLENDER_SUFFIXES) - _wanted(path)
+    unread = () if found == [path] else (f for f in found if f.suffix.lower() in others and f.is_file())
+    return {Path(os.path.normpath(f)) for f in unread}
+
+
+def _naming(folder: Path, unread: Collection[Path]) -> str:
+    """How many files are left out, and a pattern that names some of them as a recipe in this folder does."""
+    first = min(unread, key=lambda f: f.as_posix())
+    parent = first.parent.relative_to(folder) if first.is_relative_to(folder) else first.parent
+    many = "1 file that Blender reads" if len(unread) == 1 else f"{len(unread):,} files that Blender reads"
+    it = "it" if len(unread) == 1 else "them"
+    return f"{many} left out: name {it}, e.g. {(parent / f'*{first.suffix}').as_posix()}"
+
+
+def _path(folder: Path, source: str) -> Path:
+    return folder / Path(source).expanduser()
+
+
+def _candidates(folder: Path, source: str, where: str) -> list[Path]:
+    """The file, or all files and folders that a folder or a pattern means; raises RecipeError for a path without anything."""
+    path = _path(folder, source)
+    if split_source(path)[0].is_file():
+        return [path]
+    if path.is_dir():
+        return [f for f in path.rglob("*") if not any(map(_is_hidden, f.relative_to(path).parts))]
+    if has_magic(source):
+        return [folder / f for f in glob(source, root_dir=folder, recursive=True)]  # noqa: PTH207 (Path.glob takes no absolute pattern)
+    kinds = "a file, folder, pattern or zoo:<family>"
+    raise RecipeError(f"{where}.source: expected {kinds}; found no {source!r} in {folder}")
+
+
+def _wanted(path: Path) -> Set[str]:
+    """Endings of the files that a folder or a pattern means."""
+    ending = path.suffix.lower()
+    return {ending} if ending[1:] in BLENDER_SUFFIXES else MODEL_SUFFIXES
 
 
 def _is_hidden(name: str) -> bool:
@@ -229,27 +293,16 @@ def _real_size(recipe: Recipe, found: _Found, table: Callable[[Path], Sizes]) ->
 
 def _read_sizes(path: Path) -> Sizes:
     """Rows of a table of sizes by name; raises RecipeError naming file and line."""
-    try:
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            rows = csv.DictReader(file, skipinitialspace=True)
-            columns = [c.strip().lower() for c in rows.fieldnames or ()]
-            rows.fieldnames = columns
-            if not set(COLUMNS) <= set(columns):
-                found = ", ".join(columns) or "nothing"
-                raise RecipeError(f"{path}:1: expected columns {', '.join(COLUMNS)}; found {found}")
-            sizes: dict[str, tuple[float, float, float]] = {}
-            for row in rows:
-                name = (row["name"] or "").strip()
-                if not name or name in sizes:
-                    raise RecipeError(f"{path}:{rows.line_num}: expected every name once; found {name!r}")
-                sizes[name] = _row_size(row, f"{path}:{rows.line_num}")
-            return sizes
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        problem = error.strerror if isinstance(error, OSError) else error
-        raise RecipeError(f"{path}: expected a readable CSV file of {', '.join(COLUMNS)}; found: {problem}") from None
+    sizes: dict[str, tuple[float, float, float]] = {}
+    for where, row in table_rows(path, COLUMNS):
+        name = (row["name"] or "").strip()
+        if not name or name in sizes:
+            raise RecipeError(f"{where}: expected every name once; found {name!r}")
+        sizes[name] = _row_size(row, where)
+    return sizes
 
 
-def _row_size(row: Mapping[str, str | None], where: str) -> tuple[float, float, float]:
+def _row_size(row: Cells, where: str) -> tuple[float, float, float]:
     values: list[float] = []
     for column in COLUMNS[1:]:
         try:

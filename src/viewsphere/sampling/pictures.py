@@ -26,8 +26,8 @@ if TYPE_CHECKING:
 
 IMAGE_SUFFIXES = (".bmp", ".jpeg", ".jpg", ".png", ".tif", ".tiff", ".webp")
 
-Kind = Literal["image", "images", "hdri"]
-"""A picture, a folder of pictures, or either of a whole sphere."""
+Kind = Literal["image", "images", "textures", "hdri"]
+"""A picture, a folder of pictures, one whose pictures all lie in it, or a picture or folder of the whole sphere."""
 
 Pictures = Mapping[tuple[Kind, str], tuple[str, ...]]
 """Absolute paths of the files that a path of the recipe stands for, sorted."""
@@ -69,26 +69,50 @@ def _paths(recipe: Recipe) -> Iterator[tuple[str, Kind, str]]:
             for path in alternatives(getattr(option, name, None)):
                 if path is not None:
                     yield f"scene.{entry}.{name}", kind, path
+    for i, material in enumerate(recipe.scene.materials):
+        named: tuple[tuple[str, Kind], ...] = (("image", "image"), ("images", "textures"))
+        for name, kind in named:
+            for path in alternatives(getattr(material, name)):
+                if path is not None:
+                    yield f"scene.materials[{i}].{name}", kind, path
 
 
 def _files(recipe: Recipe, field: str, kind: Kind, written: str) -> tuple[str, ...]:
     path = recipe.folder / Path(written).expanduser()
-    if kind != "images" and path.is_file():
-        return (str(path),)
+    if kind in ("image", "hdri") and path.is_file():
+        return (path.as_posix(),)
     if kind == "image":
         raise RecipeError(f"{field}: expected an image file; found none at {path}")
-    suffixes = IMAGE_SUFFIXES if kind == "images" else SKY_SUFFIXES
+    suffixes = SKY_SUFFIXES if kind == "hdri" else IMAGE_SUFFIXES
     found = files_in(path, suffixes)
+    if kind == "textures":
+        _check_folder(path, found, field)
     hint = nearest(written, ("daylight",)) if kind == "hdri" else ""
     if not found:
-        what = "a folder with images" if kind == "images" else "daylight, a file or a folder with files"
-        raise RecipeError(f"{field}: expected {what} ({', '.join(suffixes)}); found none in {path}{hint}")
+        what = "a folder with images" if kind != "hdri" else "daylight, a file or a folder with files"
+        raise RecipeError(f"{field}: expected {what} ({', '.join(suffixes)}); found {_none_in(path)}{hint}")
     return found
+
+
+def _check_folder(folder: Path, found: tuple[str, ...], field: str) -> None:
+    """Raise RecipeError for a folder that is none, and for a link in it to a file elsewhere."""
+    if not folder.is_dir():
+        problem = "is none" if folder.exists() else "does not exist"
+        raise RecipeError(f"{field}: expected a folder with images; {folder} {problem}")
+    for file in found:
+        if not Path(file).resolve().is_relative_to(folder.resolve()):
+            raise RecipeError(
+                f"{field}: expected images inside of {folder}; found a link that leads out: {file}: copy it there"
+            )
+
+
+def _none_in(folder: Path) -> str:
+    return f"none in {folder}" if folder.exists() else f"{folder}, which does not exist"
 
 
 def files_in(folder: Path, suffixes: tuple[str, ...] = IMAGE_SUFFIXES) -> tuple[str, ...]:
     """Absolute paths of the files of a kind in a folder and below, sorted."""
-    return tuple(sorted(str(f) for f in folder.rglob("*") if f.suffix.lower() in suffixes and f.is_file()))
+    return tuple(sorted(f.as_posix() for f in folder.rglob("*") if f.suffix.lower() in suffixes and f.is_file()))
 
 
 @lru_cache(maxsize=4096)

@@ -6,14 +6,17 @@ import hashlib
 import json
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import chain, repeat
+from os import PathLike
 from pathlib import Path
 
 from viewsphere import plugins
 from viewsphere.assets.timeline import Timeline
+from viewsphere.model.credit import Credit
 from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.notebook import Shown
 from viewsphere.model.rig import Rig
 from viewsphere.model.shot import Shot
 from viewsphere.recipe.draws import alternatives, span
@@ -26,18 +29,25 @@ from viewsphere.sampling.checks import (
     check_listed,
     check_materials,
     check_names,
+    check_redraws,
     check_shutter,
     check_splits,
 )
 from viewsphere.sampling.clips import with_clips
-from viewsphere.sampling.composition import BoxOf, compose
-from viewsphere.sampling.models import categories, numbered_specs
+from viewsphere.sampling.composition import BoxOf, Turns, compose
+from viewsphere.sampling.credits import credits_of, unlicensed
+from viewsphere.sampling.emptying import emptied
+from viewsphere.sampling.engine_digest import engine_options, script_digest
+from viewsphere.sampling.filling import filled
+from viewsphere.sampling.models import categories, left_out, numbered_specs
 from viewsphere.sampling.motion import check_motions
 from viewsphere.sampling.pictures import check_pictures, proportions, scene_pictures
-from viewsphere.sampling.recipe_warnings import hidden_by_exposure, no_light, out_of_view
+from viewsphere.sampling.recipe_warnings import hidden_background, hidden_by_exposure, no_light, out_of_view, too_small
 from viewsphere.sampling.rigs import rig_of
 from viewsphere.sampling.samplers import Sampler, Stock, lens
 from viewsphere.sampling.scenes import is_night
+from viewsphere.sampling.seeds import share
+from viewsphere.sampling.sequence_checks import check_sequences
 from viewsphere.sampling.sequence_poses import SequencePoses, poses_of
 from viewsphere.sampling.splits import expected
 from viewsphere.sampling.time_steps import check_keys, timed
@@ -53,11 +63,12 @@ SHOT_FRAMES = 16
 
 
 @dataclass(frozen=True, eq=False)
-class Plan(Stock):
+class Plan(Shown, Stock):
     """What will be rendered: of every subject, in order, its poses. Nothing here grows with the frames."""
 
     categories: tuple[Category, ...] = ()
     shot_frames: int = SHOT_FRAMES
+    credits: Mapping[str, Credit] = field(default_factory=dict[str, Credit])  # known ones, by keys of models that are kept
 
     @cached_property
     def sampler(self) -> Sampler:
@@ -151,9 +162,17 @@ class Plan(Stock):
         if any(is_night(sun) for sun in alternatives(scene.sun)):
             found.append("scene.sun: at this date, time and place the sun is below the horizon: there is none, and no daylight")
         doubts = chain(no_light(scene), hidden_by_exposure(scene), out_of_view(scene, self.pose_list, self.intrinsics))
+        doubts = chain(doubts, hidden_background(scene, self.pose_list, self.intrinsics))
+        doubts = chain(doubts, too_small(self.recipe, self.pose_list, self.intrinsics))
         if self.blend is not None:
             found += self.blend.warnings
+        found += left_out(self.recipe)
         return tuple(map(self.recipe.locate, (*found, *doubts)))
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What is missing for others to use the data set: licences of models."""
+        return tuple(unlicensed((spec.key for spec in self.kept_specs), self.credits))
 
     def split(self, subject: str, pose: int) -> str:
         """The split of a frame."""
@@ -187,21 +206,37 @@ class Plan(Stock):
         """Number of shots."""
         return len(self.rows)
 
-    def shot(self, row: Row | int, box_of: BoxOf) -> Shot:
+    def shot(self, row: Row | int, box_of: BoxOf, tries: Sequence[int] = ()) -> Shot:
         """The shot of a row, or of its number; raises IndexError past the end.
 
+        `tries`: of each pose, how often what is random in it (its viewpoint, company of its own) is drawn again; none: never.
         `box_of` gives the sizes of what stands on the floor and of what the cameras look at. Raises RecipeError where there is
         no room for all that is to stand there, and what `box_of` raises.
         """
         row = self.rows[row] if isinstance(row, int) else row
-        return self.take(row.subject, tuple(numbers(row.positions)), box_of, row.key, row.first)
+        return self.take(row.subject, tuple(numbers(row.positions)), box_of, row.key, row.first, tries)
 
-    def take(self, subject: str, poses: Sequence[int], box_of: BoxOf, key: str = "", first: int = 0) -> Shot:
+    def take(
+        self,
+        subject: str,
+        poses: Sequence[int],
+        box_of: BoxOf,
+        key: str = "",
+        first: int = 0,
+        tries: Sequence[int] = (),
+    ) -> Shot:
         """A shot of some poses (their numbers) of a subject, of one time step: of one pose where the recipe draws scenes for
-        each frame. `first` is the number of its first sample.
+        each frame. `first` is the number of its first sample, `tries` as for `shot`.
         """
+        stock = replace(self, tries=dict(zip(poses, tries, strict=True)), untried=self) if any(tries) else self
         with self.recipe.located():
-            return self.sampler.shot(self, subject, poses, box_of, key or subject, first)
+            shot = filled(
+                self.sampler.shot(stock, subject, poses, box_of, key or subject, first), self.recipe.scenes is not None
+            )
+            if self.recipe.empty is None:
+                return shot
+            shares = (share(self.recipe.seed, "empty", subject, self.pose_list.name(pose)) for pose in poses)
+            return emptied(shot, [one < self.recipe.empty for one in shares], box_of)
 
     def cast(self, subject: str, pose: int | None = None) -> tuple[ModelSpec, ...]:
         """The recipe's models in a frame of a subject, from a pose (its number); without one, those in all of its frames."""
@@ -222,23 +257,27 @@ class Plan(Stock):
         images = [Path(i).name for files in (self.images, *planes) for i in files]
         value = [self.recipe.digest, models, self.pose_list.digest, images, self.shot_frames]
         value += [] if self.blend is None else [self.blend.digest]
+        script = script_digest(self.recipe)
+        value += [] if script is None else [script]
         value += [] if self.own_rig is None else [self.own_rig.model_dump(mode="json")]
         value += [] if self.tracks is None else [tracks_digest(self.tracks)]
         return hashlib.sha256(json.dumps(value, separators=(",", ":")).encode()).hexdigest()
 
 
-def plan(recipe: Recipe, shot_frames: int | None = None) -> Plan:
-    """What a recipe means, frame by frame, without touching a mesh.
+def plan(recipe: Recipe | str | PathLike[str], shot_frames: int | None = None) -> Plan:
+    """What a recipe (or the one in this file) means, frame by frame, without touching a mesh.
 
     `shot_frames`: most frames of a shot, where the recipe does not say.
     Raises RecipeError for files that are not there, unknown engines and formats, more frames than `max_frames`.
     """
+    recipe = Recipe.of(recipe)
     with recipe.located():
         check_names(recipe)
         check_blend(recipe)
         check_catcher(recipe)
         check_splits(recipe)
         check_shutter(recipe)
+        check_redraws(recipe)
         check_motions(recipe)
         views = poses_of(recipe.viewpoints, recipe.time, recipe.seed, recipe.folder)
         rig = rig_of(recipe, lens(recipe, views))
@@ -271,7 +310,17 @@ def plan(recipe: Recipe, shot_frames: int | None = None) -> Plan:
         check_all_frames(recipe, planned.frames, planned.factors)
         if timings or any(lines):
             check_keys(planned.kept_keys)
-        return _composed(planned)
+        planned = _composed(planned)
+        if recipe.time is not None:
+            check_sequences(planned)
+        return replace(planned, credits=_credits(planned))
+
+
+def _credits(planned: Plan) -> dict[str, Credit]:
+    """The credits that are known of the models that a plan keeps."""
+    entries = zip(planned.model_specs, planned.entries, strict=True)
+    said = {spec.key: planned.recipe.models[number].credit for spec, number in entries}
+    return credits_of(planned.kept_specs, {key: credit for key, credit in said.items() if credit is not None})
 
 
 def _composed(planned: Plan) -> Plan:
@@ -279,8 +328,10 @@ def _composed(planned: Plan) -> Plan:
     recipe, specs = planned.recipe, planned.model_specs
     if not recipe.scene.is_composed:
         return planned
-    splits = [planned.dealt_splits.get(spec.key, "") for spec in specs]
-    composition = compose(recipe, planned.subjects, specs, categories(recipe), splits, planned.pose_list)
+    dealt = planned.dealt_splits if recipe.splits.by == "model" else {}
+    splits = [dealt.get(spec.key, "") for spec in specs]
+    turns = Turns(planned.subjects, planned.pose_list, planned.schedules if planned.timings else ())
+    composition = compose(recipe, planned.subjects, specs, categories(recipe), splits, turns)
     return replace(planned, categories=composition.categories, composition=composition)
 
 
@@ -288,7 +339,7 @@ def check_engine(recipe: Recipe) -> None:
     """See that the engine takes its options; raises UserError where it does not, or lacks its extra."""
     engine = plugins.load("engines", recipe.engine.name)
     with recipe.located():
-        engine.check(recipe.engine.options)
+        engine.check(engine_options(recipe))
 
 
 def check_images(planned: Plan) -> None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from itertools import product
+from statistics import fmean
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,8 @@ from viewsphere.model.camera import Intrinsics
 from viewsphere.model.scene import Sun
 from viewsphere.recipe.draws import alternatives, component, span
 from viewsphere.recipe.light import DaylightSky, HdriSky, SunEntry
+from viewsphere.recipe.models import Dimensions, Length, ModelEntry
+from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.scene import SceneEntry
 from viewsphere.sampling.scenes import is_night
 from viewsphere.sampling.viewpoints import Poses
@@ -33,8 +36,19 @@ UNKNOWN = 30.0
 DARK, BRIGHT = 2.0**-10, 16.0
 """Radiance that every view transform shows as black, and as white."""
 
+DRAWS = 20
+"""How often random poses are drawn to tell what is so in their mean."""
+
+MOSTLY = 2 / 3
+"""Share of the picture; a camera that looks ahead has half of it below the horizon."""
+
 BLACKEST = 0.02
 """Reflectance of the darkest paint."""
+
+SMALLEST = 12
+"""Pixels, of the longer side of its box, below which an object is too small for most detectors."""
+
+TOO_SMALL = f"which for most detectors is too small (under {SMALLEST})"
 
 
 def no_light(scene: SceneEntry) -> Iterator[str]:
@@ -68,7 +82,7 @@ def out_of_view(scene: SceneEntry, views: Poses, lens: Intrinsics) -> Iterator[s
     if lens.distortion is not None or not views.are_known:
         return
     widest = math.hypot(max(lens.cx, lens.width - lens.cx) / lens.fx, max(lens.cy, lens.height - lens.cy) / lens.fy)
-    chosen = np.unique(np.linspace(0, len(views) - 1, min(len(views), MOST_POSES)).round().astype(int)).tolist()
+    chosen = _some(views)
     centres = [views.target(i) for i in chosen]
     away = [_offset(views, i) for i in chosen]
     if not scene.is_composed and all(
@@ -90,6 +104,61 @@ def out_of_view(scene: SceneEntry, views: Poses, lens: Intrinsics) -> Iterator[s
             f"scene.jitter.target: up to {farthest:.3g} m move the models' centre out of the picture: pictures may be empty; "
             "ask for less, for a larger viewpoints.distance or for a larger camera.fov_deg"
         )
+
+
+def hidden_background(scene: SceneEntry, views: Poses, lens: Intrinsics) -> Iterator[str]:
+    """A warning if an endless ground hides most of the photographs that are to be the background, in the mean of the poses."""
+    pictures = [entry for entry in scene.backgrounds if entry.image is not None or entry.images is not None]
+    if not pictures or not scene.always_has_ground:
+        return
+    draws = [views.drawn_for(str(n)) for n in range(DRAWS)]  # scenes draw their own poses, few each
+    hidden = fmean(_below_horizon(there.view(i).elevation, lens) for there in draws for i in _some(there, MOST_POSES // DRAWS))
+    if hidden > MOSTLY:
+        yield (
+            f"scene.background: the endless ground hides about {100 * hidden:.0f} % of its pictures; set scene.ground: "
+            "catcher, which shows shadows alone, or off"
+        )
+
+
+def too_small(recipe: Recipe, views: Poses, lens: Intrinsics) -> Iterator[str]:
+    """A warning for each entry of models of which the recipe says how long they are, or how much they fill, and that is less
+    than `SMALLEST` pixels at the farthest viewpoint.
+    """
+    chosen = _some(views)
+    fills = [fill for i in chosen if (fill := views.fill(i)) is not None]
+    pixels = min(fills, default=math.inf) * max(lens.width, lens.height)
+    if pixels < SMALLEST:
+        yield f"viewpoints.distance: a share of {min(fills):g} is {pixels:.2g} pixels, {TOO_SMALL}: ask for more"
+    if fills or not views.are_known:
+        return
+    farthest = max(views.view(i).distance for i in chosen) * (1 + span(recipe.scene.jitter.distance)[1])
+    for i, entry in enumerate(recipe.models):
+        length = _length(entry)
+        pixels = math.inf if length is None else length * max(lens.fx, lens.fy) / farthest
+        if pixels < SMALLEST:
+            yield (
+                f"models[{i}]: {length:g} m seen from {farthest:g} m are about {pixels:.2g} pixels, {TOO_SMALL}: come "
+                "nearer, or ask for larger pictures, a longer lens or distance: {fill: ...}"
+            )
+
+
+def _some(views: Poses, most: int = MOST_POSES) -> list[int]:
+    """Numbers of at most so many poses, evenly over all."""
+    return np.unique(np.linspace(0, len(views) - 1, min(len(views), most)).round().astype(int)).tolist()
+
+
+def _below_horizon(elevation_deg: float, lens: Intrinsics) -> float:
+    """The share of a picture's height that lies below the horizon, for a camera without tilt and distortion."""
+    horizon = lens.cy - lens.fy * math.tan(math.radians(min(max(elevation_deg, -89), 89)))
+    return min(max(1 - horizon / lens.height, 0.0), 1.0)
+
+
+def _length(entry: ModelEntry) -> float | None:
+    """The longest side, metres, that a recipe says models have; of a length that is scaled to, that."""
+    if isinstance(entry.scale, Length):
+        return span(entry.scale.length)[0]
+    size = entry.real_size if entry.scale == "real_size" else None
+    return max(size.width, size.height, size.length) if isinstance(size, Dimensions) else None
 
 
 def _offset(views: Poses, index: int) -> Float:

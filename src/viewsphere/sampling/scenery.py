@@ -35,6 +35,9 @@ from viewsphere.zoo.places import Lane
 TRIES = 200
 """Spots that are tried for one plane."""
 
+SCENERY = "scenery-"
+"""What keys of scenery begin with."""
+
 UPRIGHT: Matrix4 = ((1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1))
 
 
@@ -170,7 +173,7 @@ def _place_file(recipe: Recipe, entry: PlaceEntry, world_from_place: Matrix4, ca
         raise RecipeError(f"scene.place: expected zoo:<place> or a model file; found none at {file}")
     spec = ModelSpec(
         key=scenery_key(path.stem, "/".join((file.name, *inside))),
-        source=str(path),
+        source=path.as_posix(),
         category=entry.category,
         category_id=category_id(entry.category, entry.labels),
         up=entry.up,
@@ -186,7 +189,7 @@ def _place_file(recipe: Recipe, entry: PlaceEntry, world_from_place: Matrix4, ca
 def scenery_key(name: str, rest: str) -> str:
     """A key that says what it is of and differs for other scenery."""
     safe = "".join(c if c.isalnum() or c in "-_" else "_" for c in name)[:60]
-    return f"scenery-{safe}-{hashlib.sha256(f'{name}/{rest}'.encode()).hexdigest()[:10]}"
+    return f"{SCENERY}{safe}-{hashlib.sha256(f'{name}/{rest}'.encode()).hexdigest()[:10]}"
 
 
 def plane_images(recipe: Recipe) -> tuple[tuple[str, ...], ...]:
@@ -195,7 +198,7 @@ def plane_images(recipe: Recipe) -> tuple[tuple[str, ...], ...]:
     for i, entry in enumerate(recipe.scene.planes):
         if entry.image is not None:
             path = recipe.folder / Path(entry.image).expanduser()
-            files = (str(path),) if path.is_file() else ()
+            files = (path.as_posix(),) if path.is_file() else ()
             problem = f"scene.planes[{i}].image: expected an image file; found none at {path}"
         else:
             folder = recipe.folder / Path(entry.images or "").expanduser()
@@ -237,7 +240,8 @@ def plane_pieces(
     standing_there = list(targets)
     for i, entry in enumerate(recipe.scene.planes):
         names = draw_names(entry.draw, model, pose)
-        for j in range(entry.count):
+        count = drawn(entry.count, scene_generators(recipe.seed, names), ("planes", str(i), "count"))
+        for j in range(count):
             purpose = (*names, str(i), str(j))
             if share(recipe.seed, "plane shown", *purpose) >= entry.share:
                 continue

@@ -37,7 +37,7 @@ from viewsphere.recipe.entries import concrete, pictures_of
 from viewsphere.recipe.finish import BackgroundEntry, JitterEntry, PerFrame
 from viewsphere.recipe.light import At, DaylightSky, HdriSky, LampEntry, SunEntry
 from viewsphere.recipe.recipe import Recipe
-from viewsphere.recipe.surface import GroundEntry
+from viewsphere.recipe.surface import GroundEntry, MaterialEntry
 from viewsphere.sampling.pictures import Kind, Pictures
 from viewsphere.sampling.scenery import draw_names
 from viewsphere.sampling.seeds import Names, scene_generators, share
@@ -88,10 +88,15 @@ class Scenes:
         each = entry.draw in ("per_frame", "per_sequence")
         names = (spec.key, model, pose) if each else draw_names(entry.draw, spec.key, None)
         return tuple(
-            concrete(drawn(material, self._rng_of(names), ("materials", str(i))))
+            self._repaint(drawn(material, self._rng_of(names), ("materials", str(i))), i, names)
             for i, material in enumerate(entry.materials)
             if fnmatchcase(spec.key, material.models)
         )
+
+    def _repaint(self, entry: MaterialEntry, number: int, names: Names) -> Repaint:
+        if entry.images is not None:
+            return concrete(entry, image=self._file("textures", entry.images, ("materials", str(number), "images"), names))
+        return concrete(entry, image=None if entry.image is None else self.pictures["image", entry.image][0])
 
     def jittered(self, pose: Viewpoint, model: str, name: str) -> Viewpoint:
         """The pose moved at random; it keeps its index. One without a target of its own keeps to the models' centre."""

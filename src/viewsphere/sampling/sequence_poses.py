@@ -10,6 +10,7 @@ from viewsphere.errors import RecipeError
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.instant import Viewpoint
 from viewsphere.model.scene import Vector
+from viewsphere.recipe.aim import Fill, FillBetween
 from viewsphere.recipe.sequence import TimeEntry
 from viewsphere.recipe.viewpoints import Viewpoints
 from viewsphere.sampling.trajectories import Trajectory, is_still, trajectory
@@ -110,6 +111,10 @@ def poses_of(viewpoints: Viewpoints, time: TimeEntry | None, seed: int, folder: 
 
     Raises RecipeError for files that cannot be read, and for viewpoints that move without a time.
     """
+    if time is not None and isinstance(getattr(viewpoints, "distance", None), Fill | FillBetween):
+        raise RecipeError(
+            "viewpoints.distance: expected metres beside time, as what moves fills another share of every picture; found fill"
+        )
     if time is None:
         if viewpoints.shake is not None:
             raise RecipeError("viewpoints.shake: expected time beside it: still pictures are not shaken; found none: set it")

@@ -86,6 +86,15 @@ class TimedPoses(RepeatedPoses):
         """The pose's."""
         return self.base.view(index % len(self.base))
 
+    def drawn_for(self, name: str) -> TimedPoses:
+        """The same moments of poses, random ones of which are drawn anew for this name."""
+        base = self.base.drawn_for(name)
+        return TimedPoses(base.viewpoints, base.seed, base, self.moments)
+
+    def fill(self, index: int) -> float | None:
+        """The pose's."""
+        return self.base.fill(index % len(self.base))
+
     def _pose(self, index: int) -> Viewpoint:
         number, pose = divmod(index, len(self.base))
         return self.base[pose].model_copy(update={"index": index, "time": self.moments[number]})
@@ -119,7 +128,9 @@ def timed(
         for spec, number in models:
             entry = recipe.models[number]
             own = _model_steps(spec, entry, f"models[{number}]", blenders) if entry.frames is not None else None
-            specs.append(spec if own is None else spec.model_copy(update={"rest": own[0].first, "clip": entry.clip}))
+            specs.append(
+                spec if own is None else spec.model_copy(update={"rest": own[0].first, "clip": entry.clip, "fps": entry.fps})
+            )
             timings.append(_timing(recipe, spec, entry, number, own and own[1], scene))
     for timing, (spec, number) in zip(timings, models, strict=True):
         if timing is not None and timing.moving and len(timing.steps) != len(views):
@@ -165,7 +176,7 @@ def _model_steps(
     spec: ModelSpec, entry: ModelEntry, where: str, blenders: Blenders
 ) -> tuple[Timeline, tuple[tuple[int, Moment], ...]]:
     assert entry.frames is not None
-    return _steps(Path(spec.source), entry.confined, entry.frames, where, blenders, entry.clip)
+    return _steps(Path(spec.source), entry.confined, entry.frames, where, blenders, entry.clip, entry.fps)
 
 
 def _scene_frames(recipe: Recipe) -> Frames | None:
@@ -184,10 +195,16 @@ def _scene_steps(recipe: Recipe, blenders: Blenders) -> Iterator[tuple[int, Mome
 
 
 def _steps(
-    path: Path, confined: bool, frames: Frames, where: str, blenders: Blenders, clip: str | None = None
+    path: Path,
+    confined: bool,
+    frames: Frames,
+    where: str,
+    blenders: Blenders,
+    clip: str | None = None,
+    fps: float | None = None,
 ) -> tuple[Timeline, tuple[tuple[int, Moment], ...]]:
     """When the file begins and ends, and the frames that are meant of it with their moments."""
-    line = animation(path, confined, clip, f"{where}.frames", blenders)
+    line = animation(path, confined, clip, f"{where}.frames", blenders, fps)
     chosen = chosen_frames(frames, line.first, line.last)
     beyond = [frame for frame in chosen if not line.first <= frame <= line.last]
     if beyond or not chosen:
@@ -196,12 +213,14 @@ def _steps(
     return line, tuple((frame, Moment(frame=frame, seconds=line.seconds(frame))) for frame in chosen)
 
 
-def animation(path: Path, confined: bool, clip: str | None, field: str, blenders: Blenders) -> Timeline:
+def animation(
+    path: Path, confined: bool, clip: str | None, field: str, blenders: Blenders, fps: float | None = None
+) -> Timeline:
     """When a file begins and ends while this clip plays, None: its first one. Raises RecipeError, which begins with the field,
     for a file that cannot be read, for a clip that it does not have, and where nothing moves.
     """
     try:
-        line = blenders.timeline(path, confined, clip)
+        line = blenders.timeline(path, confined, clip, fps)
     except ModelError as error:
         raise RecipeError(f"{field}: {error}") from None
     if not line.moves:

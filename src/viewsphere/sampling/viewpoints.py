@@ -22,6 +22,7 @@ from viewsphere.geometry.rotation import rigid, transform
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.instant import Viewpoint, viewpoint_of
 from viewsphere.model.scene import Vector
+from viewsphere.recipe.aim import Fill, FillBetween
 from viewsphere.recipe.values import Range
 from viewsphere.recipe.viewpoints import Grid, Jitter, Normal, PoseList, Sphere, Viewpoints, axis_value
 from viewsphere.sampling.pose_files import Extrinsics, Orbit, PoseFile, read_poses
@@ -62,7 +63,11 @@ class Poses(Sequence[Viewpoint]):
     @property
     def are_known(self) -> bool:
         """Whether the recipe alone says where cameras stand."""
-        return True
+        return not isinstance(getattr(self.viewpoints, "distance", None), Fill | FillBetween)
+
+    def fill(self, index: int) -> float | None:
+        """The share of the picture that a model fills, from which the pose's distance follows; None where that is given."""
+        return None
 
     def target(self, index: int) -> Vector | None:
         """What the camera looks at, world metres; None: the centre of the model's box."""
@@ -117,6 +122,7 @@ class Poses(Sequence[Viewpoint]):
             elevation_deg=view.elevation,
             distance=view.distance,
             tilt_deg=view.tilt,
+            fill=self.fill(index),
             target=self.target(index),
             category=pose_category(view.azimuth, view.elevation, self.viewpoints.bins),
         )
@@ -161,21 +167,31 @@ class GridPoses(Poses):
 
     def name(self, index: int) -> str:
         """The pose's values."""
-        return "pose " + " ".join(repr(v + 0.0) for v in self.view(index))
+        fill = self.fill(index)
+        return "pose " + " ".join(repr(v + 0.0) for v in self.view(index)) + ("" if fill is None else f" fill {fill!r}")
 
     def view(self, index: int) -> Orbit:
-        """The values that this index stands for."""
-        _, distances, elevations, azimuths = self._axis_lengths
-        index, azimuth = divmod(index, azimuths)
-        index, elevation = divmod(index, elevations)
-        tilt, distance = divmod(index, distances)
+        """The values that this index stands for; distance 1 where that follows from a share to be filled."""
+        tilt, distance, elevation, azimuth = self._places(index)
         grid = self.viewpoints
         return Orbit(
             axis_value(grid.azimuth, azimuth),
             axis_value(grid.elevation, elevation),
-            axis_value(grid.distance, distance),
+            1.0 if isinstance(grid.distance, Fill) else axis_value(grid.distance, distance),
             axis_value(grid.tilt, tilt),
         )
+
+    def fill(self, index: int) -> float | None:
+        """The share that this index stands for."""
+        distance = self.viewpoints.distance
+        return axis_value(distance.fill, self._places(index)[1]) if isinstance(distance, Fill) else None
+
+    def _places(self, index: int) -> tuple[int, int, int, int]:
+        """The numbers of the tilt, distance, elevation and azimuth."""
+        _, distances, elevations, azimuths = self._axis_lengths
+        index, azimuth = divmod(index, azimuths)
+        index, elevation = divmod(index, elevations)
+        return *divmod(index, distances), elevation, azimuth
 
     @cached_property
     def _axis_lengths(self) -> tuple[int, ...]:
@@ -210,6 +226,10 @@ class JitteredPoses(Poses):
             around.tilt + (2 * tilt - 1) * by.tilt,
         )
 
+    def fill(self, index: int) -> float | None:
+        """The grid pose's."""
+        return self._grid.fill(index // self.viewpoints.count)
+
     @cached_property
     def _grid(self) -> GridPoses:
         return GridPoses(self.viewpoints, self.seed)
@@ -231,16 +251,25 @@ class SpherePoses(Poses):
         return f"draw {index}"
 
     def view(self, index: int) -> Orbit:
-        """Azimuth, the sine of the elevation, distance and tilt, each uniform."""
+        """Azimuth, the sine of the elevation, distance and tilt, each uniform; distance 1 where a share is to be filled."""
         part = self.viewpoints
-        u = generator(self.seed, "sphere", self.name(index)).random(4)
+        u = self._shares(index)
         low, high = (math.sin(math.radians(e)) for e in part.elevation)
         sine = min(max(low + u[1] * (high - low), -1.0), 1.0)
         elevation = min(max(math.degrees(math.asin(sine)), part.elevation[0]), part.elevation[1])
+        metres = (1.0, 1.0) if isinstance(part.distance, FillBetween) else part.distance
         azimuth, distance, tilt = (
-            lo + x * (hi - lo) for x, (lo, hi) in ((u[0], part.azimuth), (u[2], part.distance), (u[3], part.tilt))
+            lo + x * (hi - lo) for x, (lo, hi) in ((u[0], part.azimuth), (u[2], metres), (u[3], part.tilt))
         )
         return Orbit(azimuth, elevation, distance, tilt)
+
+    def fill(self, index: int) -> float | None:
+        """A uniform share."""
+        distance = self.viewpoints.distance
+        return _between(distance.fill, self._shares(index)[2]) if isinstance(distance, FillBetween) else None
+
+    def _shares(self, index: int) -> Float:
+        return generator(self.seed, "sphere", self.name(index)).random(4)
 
 
 @dataclass(frozen=True)
@@ -261,16 +290,28 @@ class NormalPoses(Poses):
     def view(self, index: int) -> Orbit:
         """A draw; those beyond a pole, or at no distance, are drawn again."""
         mean, sd = self.viewpoints, self.viewpoints.sd
+        metres = 1.0 if isinstance(mean.distance, FillBetween) else mean.distance
         rng = generator(self.seed, "normal", self.name(index))
         while True:
             view = Orbit(
                 rng.normal(mean.azimuth, sd.azimuth),
                 rng.normal(mean.elevation, sd.elevation),
-                rng.normal(mean.distance, sd.distance),
+                rng.normal(metres, sd.distance),
                 rng.normal(mean.tilt, sd.tilt),
             )
             if abs(view.elevation) <= 90 and view.distance > 0:
                 return view
+
+    def fill(self, index: int) -> float | None:
+        """A uniform share."""
+        distance = self.viewpoints.distance
+        if not isinstance(distance, FillBetween):
+            return None
+        return _between(distance.fill, float(generator(self.seed, "fill", self.name(index)).random()))
+
+
+def _between(ends: tuple[float, float], share: float) -> float:
+    return float(ends[0] + share * (ends[1] - ends[0]))
 
 
 @dataclass(frozen=True)

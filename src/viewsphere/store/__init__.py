@@ -14,6 +14,7 @@ a file.
 from viewsphere.store.channel_files import check_codecs, decode, depth_step, encode
 from viewsphere.store.choice import Choice, frame_ranges
 from viewsphere.store.dataset import Dataset
+from viewsphere.store.exported import Exported
 from viewsphere.store.folder import Store, new_folder
 from viewsphere.store.index import Block, Row
 from viewsphere.store.records import Category, ModelInfo, Part, PlanRecord
@@ -23,6 +24,7 @@ __all__ = [
     "Category",
     "Choice",
     "Dataset",
+    "Exported",
     "ModelInfo",
     "Part",
     "PlanRecord",

@@ -1,5 +1,7 @@
 """The digests of an export's files, one line a file, in a file that `xxhsum --check` reads, too, and that proves itself.
 
+    # options {"category_ids":"contiguous"}         of a format that has some: those that the export was written with
+    # keep_annotations_above 0.1                    of an export that leaves annotations out: the visibility it was written with
     6f0c3b...  annotations/instances_train.json
     # 91d2...
 
@@ -8,9 +10,13 @@ No more of it is held in memory than a line. The last line is the digest of all 
 
 from __future__ import annotations
 
+import json
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
+from itertools import takewhile
 from pathlib import Path
+from typing import Any
 
 import xxhash
 
@@ -19,18 +25,47 @@ from viewsphere.store.manifest import seal_of
 CHECKSUMS = "checksums.xxh128"
 """Name of the file in an export's folder."""
 
+OPTIONS = "# options "
+KEPT = "# keep_annotations_above "
 AGAIN = "export again, or mend it with viewsphere check --repair"
 
 
-def write_checksums(folder: Path) -> None:
-    """List all files of a finished folder."""
+def write_checksums(folder: Path, options: Mapping[str, Any] | None = None, least: float | None = None) -> None:
+    """List all files of a finished folder, the options that they were written with, and the visibility above which they keep
+    annotations (None: all).
+    """
     seal = xxhash.xxh3_128()
     with (folder / CHECKSUMS).open("wb") as file:
-        for path in _files(folder):
-            line = f"{seal_of(folder / path)[1]}  {path}\n".encode()
+        for line in _to_write(folder, options or {}, least):
             seal.update(line)
             file.write(line)
         file.write(f"# {seal.hexdigest()}\n".encode())
+
+
+def _to_write(folder: Path, options: Mapping[str, Any], least: float | None) -> Iterator[bytes]:
+    if options:
+        yield f"{OPTIONS}{json.dumps(options, separators=(',', ':'))}\n".encode()
+    if least is not None:
+        yield f"{KEPT}{json.dumps(least)}\n".encode()
+    yield from (f"{seal_of(folder / path)[1]}  {path}\n".encode() for path in _files(folder))
+
+
+def read_options(folder: Path) -> dict[str, Any]:
+    """The options that a folder's files were written with; none where there is no list, or none that can be read."""
+    return _said(folder, OPTIONS) or {}
+
+
+def read_least(folder: Path) -> float | None:
+    """The visibility above which a folder's files keep annotations; None: they keep all."""
+    return _said(folder, KEPT)
+
+
+def _said(folder: Path, mark: str) -> Any:
+    """What a line at the list's head says; None where there is no such line, or no list that can be read."""
+    with suppress(OSError, ValueError), (folder / CHECKSUMS).open(encoding="utf-8") as file:
+        head = takewhile(lambda line: line.startswith("# "), file)
+        return next((json.loads(line.removeprefix(mark)) for line in head if line.startswith(mark)), None)
+    return None
 
 
 def damaged_files(folder: Path) -> Iterator[str]:
@@ -58,7 +93,8 @@ def _lines(folder: Path) -> Iterator[tuple[str, str]]:
             if last:
                 seal.update(last)
                 digest, _, path = last.decode().removesuffix("\n").partition("  ")
-                yield digest, path
+                if not digest.startswith("#"):
+                    yield digest, path
             last = line
     if last != f"# {seal.hexdigest()}\n".encode():
         raise ValueError("a list that was changed since it was written")

@@ -18,6 +18,7 @@ from viewsphere.labels import channels
 from viewsphere.model.files import Files
 from viewsphere.model.mistakes import one_of
 from viewsphere.model.model_spec import step_key
+from viewsphere.model.notebook import Shown
 from viewsphere.model.rig import CAMERA
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.store.channel_files import decode
@@ -31,7 +32,7 @@ from viewsphere.store.records import Category, ModelInfo
 from viewsphere.store.sample_records import ShotRecords, from_whole_sample
 
 
-class Dataset(Sequence[Sample]):
+class Dataset(Shown, Sequence[Sample]):
     """The finished frames of a data set, in frame order; what `viewsphere.open` gives.
 
     `len`, indexing and iteration give samples whose channels are read when asked for. `link` and `path` serve exporters. With
@@ -49,9 +50,12 @@ class Dataset(Sequence[Sample]):
         self._info = lru_cache(maxsize=10_000)(self.store.model_info)
         self._facts = lru_cache(maxsize=10_000)(self._model_facts)
 
+    def __repr__(self) -> str:
+        return f"<Dataset {self.name} in {self.root}: {len(self):,} frames; {', '.join(self.plan.recipe['channels'])}>"
+
     def __reduce__(self) -> tuple[type[Dataset], tuple[Path, Choice]]:
         """A data set travels to other processes (data loaders) as its folder."""
-        return Dataset, (self.root, self.choice)
+        return type(self), (self.root, self.choice)
 
     @property
     def name(self) -> str:
@@ -120,7 +124,7 @@ class Dataset(Sequence[Sample]):
         shots, starts = self._shots
         number = bisect_right(starts, i) - 1
         key, places = shots[number]
-        return self._sample(self._records(key), places[i - starts[number]])
+        return self.shown(self._sample(self._records(key), places[i - starts[number]]))
 
     def __iter__(self) -> Iterator[Sample]:
         for key, places in self._shots[0]:
@@ -134,7 +138,11 @@ class Dataset(Sequence[Sample]):
         """Some of a finished shot's samples."""
         records = self._read_records(key)
         for place in places:
-            yield self._sample(records, place)
+            yield self.shown(self._sample(records, place))
+
+    def shown(self, sample: Sample) -> Sample:
+        """A sample as it is given out: as it is kept."""
+        return sample
 
     @property
     def sequences(self) -> tuple[str, ...]:
@@ -170,7 +178,13 @@ class Dataset(Sequence[Sample]):
         """The points that a sensor followed through a sequence; raises StoreError for a sequence or a sensor that is not there,
         or follows no points.
         """
-        return joined(self.sequence(sequence, sensor))
+        samples = self.sequence(sequence, sensor)
+        if samples and "tracks" not in samples[0].channels and any(part.recipe.get("tracks") for part in self.plan.parts):
+            raise StoreError(
+                f"tracks: expected a sensor that follows points; found {sensor}, whose channels lack tracks: add tracks to "
+                f"rig.sensors.{sensor}.channels"
+            )
+        return joined(samples)
 
     def _places(self, row: Row) -> Sequence[int]:
         """Which of a finished shot's frames are chosen, by the model's key, or by the key of its moment if the model is

@@ -17,12 +17,14 @@ from typing import Any
 from viewsphere.errors import StoreError
 from viewsphere.labels import channels
 from viewsphere.model.files import Files
+from viewsphere.model.mistakes import different
 from viewsphere.model.sample import Sample
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
 from viewsphere.store.channel_files import encode
 from viewsphere.store.index import Row
 from viewsphere.store.manifest import MANIFEST, Manifest, Seal, digest, refuse_another, seal_of
+from viewsphere.store.moving import move
 from viewsphere.store.records import ModelInfo, PlanRecord
 from viewsphere.store.sample_records import short_sample, whole_sample
 
@@ -44,9 +46,18 @@ class Store:
 
     def plan(self) -> PlanRecord:
         """The plan this store was made for; raises StoreError if there is none or it cannot be read."""
+        if self.root.is_file():
+            raise StoreError(
+                f"{self.root}: expected a folder that `render` wrote; found a file: if it is a recipe, render it first "
+                f"(viewsphere render {self.root} -o FOLDER)"
+            )
         try:
             return PlanRecord.from_json(self.plan_file.read_text("utf-8"))
         except FileNotFoundError:
+            if not self.root.exists():
+                raise StoreError(
+                    f"{self.root}: expected a folder that render wrote; found no such folder: check the path"
+                ) from None
             raise StoreError(f"{self.root}: expected a data set (store/plan.json), found none: render one first") from None
         except (KeyError, TypeError, ValueError, OSError) as error:
             raise StoreError(f"{self.plan_file}: expected a readable plan, found {type(error).__name__}: {error}") from None
@@ -130,9 +141,12 @@ class Store:
     def _refuse_other(self, plan: PlanRecord) -> None:
         found = self.plan()
         if found.digest != plan.digest:
+            differing = different(found.recipe, plan.recipe)
+            what = f"another in {', '.join(differing)}" if differing else "one whose files have other names"
             raise StoreError(
                 f"{self.root}: expected data of recipe {plan.name!r} (digest {plan.digest[:12]}), found that of "
-                f"{found.name!r} ({found.digest[:12]}): choose another output folder, add to it with --append, or delete it"
+                f"{found.name!r} ({found.digest[:12]}), {what}: choose another output folder, add to it with --append, or "
+                "delete it"
             )
         if found.version != plan.version:
             raise StoreError(
@@ -151,15 +165,15 @@ class Store:
     def _write_atomically(self, file: Path, text: str) -> None:
         aside = self.folder / "writing" / f"{_writer()}{file.name}"
         with _disk_errors(self.root):
-            aside.write_text(text, "utf-8")
-            aside.replace(file)
+            aside.write_text(text, "utf-8", newline="\n")
+            move(aside, file)
 
     def _sweep(self) -> None:
         """Remove what dead writers of this machine left unfinished; models that they were about to replace come back."""
         for left in (self.folder / "writing").glob(f"*~{OLD_MODEL}*"):
             target = self.model_folder(left.name.partition(f"~{OLD_MODEL}")[2])
             if not target.exists() and _is_of_dead(left):
-                left.rename(target)
+                move(left, target)
         _remove_of_dead((self.folder / "writing").iterdir())
 
     def shot_folder(self, key: str) -> Path:
@@ -217,8 +231,8 @@ class Store:
         old = self.folder / "writing" / f"{_writer()}{OLD_MODEL if is_model else 'old~'}{target.name}"
         shutil.rmtree(old, ignore_errors=True)
         if target.exists():
-            target.rename(old)
-        folder.rename(target)
+            move(target, old)
+        move(folder, target)
         shutil.rmtree(old, ignore_errors=True)
 
     @contextmanager
@@ -245,6 +259,10 @@ class Store:
     def write_file(self, name: str, text: str) -> None:
         """Write a small file of the store in one step."""
         self._write_atomically(self.folder / name, text)
+
+    def write_beside(self, name: str, text: str) -> None:
+        """Write a small file of the data set's root in one step."""
+        self._write_atomically(self.root / name, text)
 
     def skipped(self) -> dict[str, str]:
         """Models and shots that were left out at the user's wish, and why."""
@@ -292,13 +310,13 @@ class Store:
                 records.append(short_sample(sample) if short else whole_sample(replace(sample, files=files)))
             lines = (json.dumps(r, separators=(",", ":"), allow_nan=False) for r in records)
             text = "[\n" + ",\n".join(lines) + "\n]\n"
-            (folder / "frames.json").write_text(text, "utf-8")
+            (folder / "frames.json").write_text(text, "utf-8", newline="\n")
             if scenery:
-                (folder / "scenery.json").write_text(scenery, "utf-8")
+                (folder / "scenery.json").write_text(scenery, "utf-8", newline="\n")
             if shot is not None:
                 # The other things are in scenery.json, and labels are those of the instant, not of what moves around it.
                 labelled = shot.model_copy(update={"things": shot.objects, "shutter": 0.0, "exposures": ()})
-                (folder / "shot.json").write_text(labelled.model_dump_json(), "utf-8")
+                (folder / "shot.json").write_text(labelled.model_dump_json(), "utf-8", newline="\n")
             texts = {path.name: seal_of(path) for path in sorted(folder.glob("*.json"))}
             Manifest(texts | told).write(folder)
         return len(records)
@@ -339,7 +357,7 @@ class Store:
 
     def write_model_info(self, folder: Path, info: ModelInfo) -> None:
         """Write model.json into a model's folder that is being made."""
-        (folder / "model.json").write_text(json.dumps(info.to_plain(), indent=1), "utf-8")
+        (folder / "model.json").write_text(json.dumps(info.to_plain(), indent=1), "utf-8", newline="\n")
 
     def model_info(self, key: str) -> ModelInfo | None:
         """What is known of a finished model; None if it is not there, StoreError if it cannot be read."""
@@ -391,7 +409,7 @@ def new_folder(target: Path) -> Generator[Path]:
             yield aside
             if target.exists():
                 target.rmdir()
-            aside.rename(target)
+            move(aside, target)
     finally:
         shutil.rmtree(aside, ignore_errors=True)
         for parent in missing:
@@ -423,7 +441,7 @@ def _become(folder: Path, target: Path) -> None:
     try:
         if target.is_dir() and not (target / MANIFEST).is_file():
             shutil.rmtree(target)
-        folder.rename(target)
+        move(folder, target)
     except OSError:
         if not target.is_dir():
             raise

@@ -71,7 +71,7 @@ def link_shot(store: Store, key: str, frames: Iterable[ForeignFrame], known: Ite
                 files[name] = f"{prefix}/{inside}"
             record = whole_sample(replace(frame.sample, files=files))
             records.append(json.dumps(record, separators=(",", ":"), allow_nan=False))
-        (folder / "frames.json").write_text("[\n" + ",\n".join(records) + "\n]\n", "utf-8")
+        (folder / "frames.json").write_text("[\n" + ",\n".join(records) + "\n]\n", "utf-8", newline="\n")
         for file in known:
             link_file(file.resolve(), folder / file.name)
     return len(records)

@@ -82,7 +82,9 @@ class Manifest:
 
     def write(self, folder: Path) -> None:
         """Write it into its folder, whose other files are whole."""
-        (folder / MANIFEST).write_text(sealed({"files": {path: list(told) for path, told in self.files.items()}}), "utf-8")
+        (folder / MANIFEST).write_text(
+            sealed({"files": {path: list(told) for path, told in self.files.items()}}), "utf-8", newline="\n"
+        )
 
     def check(self, path: str, data: bytes, file: Path) -> None:
         """Raises StoreError where the bytes of a file, by its path in the folder, are not those that were written."""

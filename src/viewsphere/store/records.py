@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from viewsphere.model.credit import Credit
 from viewsphere.model.model_spec import Size, step_key
 from viewsphere.model.thing import TimeStep
 from viewsphere.store.index import Block, Index, Row
@@ -26,6 +27,9 @@ PRODUCT = "product"
 
 IMPORT = "import"
 """What stands for a sampler where somebody else made the pictures."""
+
+KEEP = "keep_annotations_above"
+"""The field of recipes that says which annotations exports leave out."""
 
 
 @dataclass(frozen=True)
@@ -61,6 +65,7 @@ class ModelInfo:
     step: TimeStep | None = None  # that the files show
     track: str = ""
     steps: tuple[ModelInfo, ...] = ()
+    credit: Credit | None = None
 
     @property
     def node(self) -> str | None:
@@ -88,6 +93,10 @@ class ModelInfo:
             del value["step"], value["steps"], value["track"]
         else:
             value |= {"step": self.step.model_dump(mode="json"), "steps": [one.to_plain() for one in self.steps]}
+        if self.credit is None:
+            del value["credit"]
+        else:
+            value["credit"] = self.credit.model_dump(exclude_none=True)
         return value
 
     @staticmethod
@@ -100,6 +109,8 @@ class ModelInfo:
         if "step" in value:
             plain["step"] = TimeStep.model_validate(value["step"])
             plain["steps"] = tuple(map(ModelInfo.from_plain, value["steps"]))
+        if "credit" in value:
+            plain["credit"] = Credit.model_validate(value["credit"])
         return ModelInfo(**plain)
 
 
@@ -180,6 +191,16 @@ class PlanRecord:
     frames: int
     max_objects: int
     parts: tuple[Part, ...] = ()
+
+    @property
+    def keep_annotations_above(self) -> float | None:
+        """The visibility above which exports keep annotations; None: they keep all."""
+        return self.recipe.get(KEEP)
+
+    def keeping_above(self, least: float | None) -> PlanRecord:
+        """The same frames, with exports that keep annotations of what is seen more than this; None: they keep all."""
+        parts = tuple(replace(p, recipe=_keeping(p.recipe, least)) if p.is_sampled else p for p in self.parts)
+        return replace(self, recipe=_keeping(self.recipe, least), parts=parts)
 
     def part_of(self, frame: int) -> int:
         """Number of the part that a frame belongs to."""
@@ -289,3 +310,7 @@ class PlanRecord:
         for name in ("splits", "channels", "models"):
             value[name] = tuple(value[name])
         return PlanRecord(**value)
+
+
+def _keeping(recipe: dict[str, Any], least: float | None) -> dict[str, Any]:
+    return recipe if recipe.get(KEEP) == least else recipe | {KEEP: least}

@@ -11,10 +11,22 @@ from viewsphere.model.scene import Daylight, Sun
 
 Float = NDArray[np.float64]
 
-_CLEAR = 21.0
-"""kcd/m2 of a clear sky that make a radiance of 1: so it lights a white floor by 0.5 where the sun stands at 60 degrees."""
-_OVERCAST = 7.4
-"""The same for an overcast sky, which lights the floor by 0.8, since a photographer would open the lens."""
+_WHITE = 33.3
+"""kcd/m2 that make a radiance of 1: so the sun's usual strength, 3, is 100 klx, what arrives through clear air (IES RP-21)."""
+_CLEAR = 1.8
+"""How much Preetham's sky is too bright: it sheds 29 klx on level ground at turbidity 3 and with the sun at 45 degrees, where
+clear skies shed 14 klx (IES RP-21: 0.8 + 15.5 sine^0.5 klx). Zotti et al. 2007 find the same.
+"""
+_BALANCED = np.array([0.92, 1.02, 1.09])
+"""Factors of the sky's red, green and blue: a picture balanced for the sun, whose light at noon is yellower than the white of
+sRGB but whose usual colour is nearly white.
+"""
+_PALE, _PALER = 0.3, 0.1
+"""Share by which Preetham's horizon is too dark beside the CIE's clear sky (S 011, type 12); the sine over which that fades."""
+_EXPOSED = 4.2
+"""Light on an exposure meter for which the lens is not changed. Clear noon brings a quarter of that, so the lens is opened by
+one and a half stops: asphalt and grass come out as in photographs of streets, and white walls in the sun just short of white.
+"""
 _OPENED = 0.75  # share of the missing stops by which the lens is opened
 _LOWEST = 0.01  # sine of the lowest elevation whose colour is computed; below, the sky has this colour down to the horizon
 _GROUND_FADE = 0.09  # sine of the depression below the horizon at which the sky begins to fade into ground
@@ -45,10 +57,10 @@ _ZENITH = np.array(
 def opening(elevation_deg: float, daylight: Daylight) -> float:
     """Factor of all daylight, sun and sky alike: how far a photographer opens the lens, so that evenings and clouds are seen.
 
-    A hemisphere measures the light, as an exposure meter does; three quarters of the stops that the light lacks compared with
-    a clear sky and the sun at 60 degrees are made up for. `strength` does not count: a sky that a user makes brighter stays so.
+    A hemisphere measures the light, as an exposure meter does; three quarters of the stops that the light lacks are made up
+    for. `strength` does not count: a sky that a user makes brighter stays so.
     """
-    return (_measured(60.0, Daylight()) / _measured(elevation_deg, daylight)) ** _OPENED
+    return (_EXPOSED / _measured(elevation_deg, daylight)) ** _OPENED
 
 
 def _measured(elevation_deg: float, daylight: Daylight) -> float:
@@ -84,8 +96,9 @@ def daylight_picture(elevation_deg: float, daylight: Daylight, height: int) -> N
     sine = np.maximum(np.sin(row), _LOWEST)[:, None]
     sun = math.radians(elevation_deg)
     toward = np.sqrt(1 - sine**2) * np.cos(column) * math.cos(sun) + sine * math.sin(sun)
-    clear = _clear(sine, np.clip(toward, -1, 1), sun, daylight.turbidity) / _CLEAR
-    overcast = (0.123 + 8.6 * math.sin(sun)) * (1 + 2 * sine) / 3 / _OVERCAST  # Krochmann 1970; CIE S 011
+    clear = _clear(sine, np.clip(toward, -1, 1), sun, daylight.turbidity) * _BALANCED / (_WHITE * _CLEAR)
+    clear *= 1 + _PALE * np.exp(-sine / _PALER)[..., None]
+    overcast = (0.123 + 8.6 * math.sin(sun)) * (1 + 2 * sine) / (3 * _WHITE)  # Krochmann 1970; CIE S 011
     picture = (1 - daylight.clouds) * clear + daylight.clouds * overcast[..., None]
     below = np.clip((-np.sin(row) - _GROUND_FADE) / _GROUND_HAZE, 0, 1)[:, None, None]
     level = picture[height // 2].mean(axis=0)

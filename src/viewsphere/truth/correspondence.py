@@ -7,7 +7,8 @@ ground is a fixed plane, the sky a direction. All is computed in float64.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,16 +23,19 @@ from viewsphere.truth.view import View
 from viewsphere.truth.visibility import Visibility
 
 Float = NDArray[np.float64]
+Real = TypeVar("Real", np.float32, np.float64)
 
 
 @dataclass(frozen=True, eq=False)
 class Deformed:
     """Pixels that show what deforms, by their number in the picture (n,), and their points in either camera's axes (n, 3).
 
+    own (n,): the other view's triangles that they are on.
     is_still (n,): whether neither the camera nor the point's triangle moved.
     """
 
     pixel: NDArray[np.intp]
+    own: NDArray[np.int32]
     here: Float
     there: Float
     is_still: NDArray[np.bool_]
@@ -58,9 +62,10 @@ class Match:
         out = np.empty((*self._inverse.shape, 2), np.float32)
         if self.view.is_pinhole and self.other.is_pinhole and self._deformed is None:
             seen, owners, inverse, _, kinds = self._pixels
-            kernels.flow_on_pinhole(seen, owners, inverse, kinds, self._maps.projected(self.view, self.other), out)
+            maps = self._maps.projected(self.view, self.other)
+            kernels.flow_on_pinhole(seen, owners, inverse, kinds, maps, out.reshape(-1))
         else:
-            kernels.from_centers(self.xy, out)
+            kernels.from_centers(self.xy.reshape(-1), self._inverse.shape[1], out.reshape(-1))
         return out
 
     @cached_property
@@ -68,19 +73,19 @@ class Match:
         """Where the points are then, in the other camera's axes, (H, W, 3) metres; NaN of what is nowhere; of the sky
         (NaN, NaN, inf).
         """
-        out = self._moved(self._maps.turn)
+        out = self._moved(self._maps.turn, np.float64)
         out[(self._inverse == 0.0) & (self.placed.near == 0.0), 2] = np.inf
         if self._deformed is not None:
             out.reshape(-1, 3)[self._deformed.pixel] = self._deformed.there
         return out
 
     @cached_property
-    def scene_flow(self) -> Float:
+    def scene_flow(self) -> NDArray[np.float32]:
         """By how much the points move, each in its own instant's camera axes, (H, W, 3) metres; NaN of the sky, too.
 
         A difference of motions, not of points: exact however far from the camera, or from the origin.
         """
-        out = self._moved(self._maps.turn - np.eye(3))
+        out = self._moved(self._maps.turn - np.eye(3), np.float32)
         if self._deformed is not None:
             out.reshape(-1, 3)[self._deformed.pixel] = self._deformed.there - self._deformed.here
         return out
@@ -102,7 +107,7 @@ class Match:
         xy, near, rays = self._on_pinhole() if self.other.is_pinhole else self._as_rays()
         if self._deformed is not None:
             self._write_deformed(xy, near, rays)
-        return Placed(self.other, xy, near, rays, lambda: self._own)
+        return Placed(self.other, xy, near, rays, partial(_own, self.visibility.triangle, self.view, self.other))
 
     @cached_property
     def _inverse(self) -> Float:
@@ -117,21 +122,22 @@ class Match:
     @property
     def _pixels(self) -> tuple[NDArray[np.int32], NDArray[np.int32], Float, Float, NDArray[np.int32]]:
         """What all kernels are told of the pixels and of their things."""
-        return self.visibility.triangle, self.view.owners, self._inverse, self.view.rays, self._maps.kinds
+        inverse, rays = self._inverse.reshape(-1), self.view.rays.reshape(-1)
+        return self.visibility.triangle, self.view.owners, inverse, rays, self._maps.kinds
 
-    def _moved(self, turn: Float) -> Float:
-        """turn x + shift of the points x in this camera's axes, (H, W, 3)."""
+    def _moved(self, turn: Float, kind: type[Real]) -> NDArray[Real]:
+        """turn x + shift of the points x in this camera's axes, (H, W, 3): computed in float64, rounded to `kind`."""
         from viewsphere.truth import kernels_correspond as kernels
 
-        out = np.empty((*self._inverse.shape, 3))
-        kernels.in_axes(*self._pixels, self._maps.matrices(product(turn, self.view.camera_from_ray)), out)
+        out = np.empty((*self._inverse.shape, 3), kind)
+        kernels.in_axes(*self._pixels, self._maps.matrices(product(turn, self.view.camera_from_ray)), out.reshape(-1))
         return out
 
     def _on_pinhole(self) -> tuple[Float, Float, None]:
         from viewsphere.truth import kernels_correspond as kernels
 
         xy, near = np.empty((*self._inverse.shape, 2)), np.empty(self._inverse.shape)
-        kernels.on_pinhole(*self._pixels, self._maps.projected(self.view, self.other), xy, near)
+        kernels.on_pinhole(*self._pixels, self._maps.projected(self.view, self.other), xy.reshape(-1), near.reshape(-1))
         return xy, near, None
 
     def _as_rays(self) -> tuple[Float, Float, Float]:
@@ -139,7 +145,7 @@ class Match:
 
         rays, near = np.empty((*self._inverse.shape, 3)), np.empty(self._inverse.shape)
         matrices = self._maps.matrices(product(self._maps.turn, self.view.camera_from_ray))
-        kernels.as_rays(*self._pixels, matrices, self.other.is_fisheye, rays, near)
+        kernels.as_rays(*self._pixels, matrices, self.other.is_fisheye, rays.reshape(-1), near.reshape(-1))
         xy, _ = project(self.other.camera.intrinsics, rays)
         still = self._shows(STILL)
         xy[still] = pixel_centers(self._inverse.shape)[still]
@@ -167,27 +173,29 @@ class Match:
             places.append(transform(view.camera.R, world) + view.camera.t)
             corners.append(view.geometry.vertices[view.geometry.triangles[chosen]])
         is_still = (corners[0] == corners[1]).all(axis=(1, 2)) & self.view.has_camera_of(self.other)
-        return Deformed(pixel, places[0], places[1], is_still)
+        return Deformed(pixel, further, places[0], places[1], is_still)
 
     def _write_deformed(self, xy: Float, near: Float, rays: Float | None) -> None:
         assert self._deformed is not None
-        pixel, is_still = self._deformed.pixel, self._deformed.is_still
-        there = placed_at(self.other, self._deformed.there, lambda: self._own.reshape(-1)[pixel])
+        pixel, own, is_still = self._deformed.pixel, self._deformed.own, self._deformed.is_still
+        there = placed_at(self.other, self._deformed.there, lambda: own)
         centers = pixel_centers(near.shape).reshape(-1, 2)[pixel]
         xy.reshape(-1, 2)[pixel] = np.where(is_still[:, None], centers, there.xy)
         near.reshape(-1)[pixel] = there.near
         if rays is not None and there.rays is not None:
             rays.reshape(-1, 3)[pixel] = there.rays
 
-    @cached_property
-    def _own(self) -> NDArray[np.int32]:
-        """The other view's numbers of the triangles that pixels show."""
-        from viewsphere.truth import kernels_correspond as kernels
 
-        own = np.empty(self._inverse.shape, np.int32)
-        last = np.int32(self.other.geometry.triangle_start[-1])
-        kernels.own_triangles(self.visibility.triangle, self.view.owners, shifts(self.view, self.other), last, own)
-        return own
+def _own(seen: NDArray[np.int32], view: View, other: View) -> NDArray[np.int32]:
+    """The other view's numbers of the triangles that are seen in a view, -1 where none is."""
+    from viewsphere.truth import kernels_correspond as kernels
+
+    shift = shifts(view, other)
+    if not shift.any():
+        return seen
+    own = np.empty(seen.shape, np.int32)
+    kernels.own_triangles(seen, view.owners, shift, own)
+    return own
 
 
 def pixel_centers(shape: tuple[int, ...]) -> Float:

@@ -3,6 +3,9 @@
 A pixel's point is p / i in front of its camera: p the pixel (x, y, 1) or its ray, i = 1/s; so a rigid motion, and a projection
 after it, is q = M (p, i) with one matrix (3, 4) for all points of a thing. i = 0 is a direction: so the sky's formula is the
 same.
+
+But for `seen` (H, W) all arrays of pixels are flat, the components of a pixel beside one another: compilers make vectors of a
+loop over pixels only where they know how far apart its numbers are.
 """
 
 from __future__ import annotations
@@ -38,7 +41,7 @@ def _run(seen, owners, y, x, sky):
 
 @njit
 def on_pinhole(seen, owners, inverse, rays, kinds, maps, xy, near):
-    """Pixels xy (H, W, 2) and near (H, W), 1/z, of the points in a pinhole's view; `kinds` and `maps` (n, 3, 4) of the things,
+    """Pixels xy (H W 2,) and near (H W,), 1/z, of the points in a pinhole's view; `kinds` and `maps` (n, 3, 4) of the things,
     then of the ground and of the sky.
 
     Behind the camera xy is NaN and near 0; both are NaN where there is no point.
@@ -46,61 +49,71 @@ def on_pinhole(seen, owners, inverse, rays, kinds, maps, xy, near):
     height, width = seen.shape
     sky, table = np.int32(kinds.shape[0] - 1), rays.shape[0] > 0
     for y in range(height):
-        uy, x = np.uintp(y), 0
+        uy, row, x = np.uintp(y), y * width, 0
         while x < width:
             k, stop = _run(seen, owners, uy, x, sky)
             if kinds[k] == RIGID and table:
-                _row_of_rays(maps[k], rays, inverse, uy, x, stop, xy, near)
+                _row_of_rays(maps[k], rays, inverse, row + x, row + stop, xy, near)
             elif kinds[k] == RIGID:
-                _row(maps[k], inverse, uy, x, stop, xy, near)
+                _row(maps[k], inverse, y, row, x, stop, xy, near)
             elif kinds[k] == STILL:
                 for i in range(x, stop):
-                    ui = np.uintp(i)
-                    xy[uy, ui, A], xy[uy, ui, B], near[uy, ui] = i + 0.5, y + 0.5, inverse[uy, ui]
+                    p = row + i
+                    xy[np.uintp(2 * p)], xy[np.uintp(2 * p + 1)], near[np.uintp(p)] = i + 0.5, y + 0.5, inverse[np.uintp(p)]
             elif kinds[k] == GONE:
-                for i in range(x, stop):
-                    ui = np.uintp(i)
-                    xy[uy, ui, A] = xy[uy, ui, B] = near[uy, ui] = np.nan
+                _fill(np.nan, 2 * (row + x), 2 * (row + stop), xy)
+                _fill(np.nan, row + x, row + stop, near)
             x = stop
 
 
 @inner
-def _row(m, inverse, y, first, stop, xy, near):
+def _fill(value, first, stop, out):
+    for p in range(first, stop):
+        out[np.uintp(p)] = value
+
+
+@inner
+def _row(m, inverse, y, row, first, stop, xy, near):
     py = y + 0.5
     a0, a1, a2, c0, c1, c2 = m[A, A], m[B, A], m[C, A], m[A, D], m[B, D], m[C, D]
     b0, b1, b2 = m[A, B] * py + m[A, C], m[B, B] * py + m[B, C], m[C, B] * py + m[C, C]
     for i in range(first, stop):
-        ui, px = np.uintp(i), i + 0.5
-        s = inverse[y, ui]
+        p, px = row + i, i + 0.5
+        s = inverse[np.uintp(p)]
         w = a2 * px + b2 + c2 * s
         r = 1.0 / w if w > 0.0 else np.nan
-        xy[y, ui, A], xy[y, ui, B] = (a0 * px + b0 + c0 * s) * r, (a1 * px + b1 + c1 * s) * r
-        near[y, ui] = s * r if w > 0.0 else 0.0
+        xy[np.uintp(2 * p)], xy[np.uintp(2 * p + 1)] = (a0 * px + b0 + c0 * s) * r, (a1 * px + b1 + c1 * s) * r
+        near[np.uintp(p)] = s * r if w > 0.0 else 0.0
 
 
 @inner
-def _row_of_rays(m, rays, inverse, y, first, stop, xy, near):
-    for i in range(first, stop):
-        ui = np.uintp(i)
-        s = inverse[y, ui]
-        u, v, w = _moved(m, rays[y, ui, A], rays[y, ui, B], rays[y, ui, C], s)
+def _row_of_rays(m, rays, inverse, first, stop, xy, near):
+    for p in range(first, stop):
+        s = inverse[np.uintp(p)]
+        u, v, w = _moved(m, rays[np.uintp(3 * p)], rays[np.uintp(3 * p + 1)], rays[np.uintp(3 * p + 2)], s)
         r = 1.0 / w if w > 0.0 else np.nan
-        xy[y, ui, A], xy[y, ui, B] = u * r, v * r
-        near[y, ui] = s * r if w > 0.0 else np.nan if math.isnan(w) else 0.0
+        xy[np.uintp(2 * p)], xy[np.uintp(2 * p + 1)] = u * r, v * r
+        near[np.uintp(p)] = s * r if w > 0.0 else np.nan if math.isnan(w) else 0.0
 
 
 @inner
 def _moved(m, px, py, pz, s):
+    u, v, w = _turned(m, px, py, pz)
+    return u + m[A, D] * s, v + m[B, D] * s, w + m[C, D] * s
+
+
+@inner
+def _turned(m, px, py, pz):
     return (
-        m[A, A] * px + m[A, B] * py + m[A, C] * pz + m[A, D] * s,
-        m[B, A] * px + m[B, B] * py + m[B, C] * pz + m[B, D] * s,
-        m[C, A] * px + m[C, B] * py + m[C, C] * pz + m[C, D] * s,
+        m[A, A] * px + m[A, B] * py + m[A, C] * pz,
+        m[B, A] * px + m[B, B] * py + m[B, C] * pz,
+        m[C, A] * px + m[C, B] * py + m[C, C] * pz,
     )
 
 
 @njit
 def as_rays(seen, owners, inverse, rays, kinds, maps, unit, out, near):
-    """Rays (H, W, 3) towards the points in a distorted lens' view, and near (H, W), 1/s: the point is ray / near.
+    """Rays (H W 3,) towards the points in a distorted lens' view, and near (H W,), 1/s: the point is ray / near.
 
     Rays are of length 1 with `unit`, else z = 1, NaN behind the camera; both are NaN where there is no point.
     """
@@ -108,12 +121,12 @@ def as_rays(seen, owners, inverse, rays, kinds, maps, unit, out, near):
     sky, table = np.int32(kinds.shape[0] - 1), rays.shape[0] > 0
     for y in range(height):
         for x in range(width):
-            uy, ux = np.uintp(y), np.uintp(x)
-            k = np.uintp(_thing(seen, owners, uy, ux, sky))
+            k, p = np.uintp(_thing(seen, owners, np.uintp(y), np.uintp(x), sky)), np.uintp(y * width + x)
             if kinds[k] == OTHER:
                 continue
-            s = inverse[uy, ux] if kinds[k] != GONE else np.nan
-            px, py, pz = (rays[uy, ux, A], rays[uy, ux, B], rays[uy, ux, C]) if table else (x + 0.5, y + 0.5, 1.0)
+            i = np.uintp(3) * p
+            s = inverse[p] if kinds[k] != GONE else np.nan
+            px, py, pz = (rays[i], rays[i + B], rays[i + C]) if table else (x + 0.5, y + 0.5, 1.0)
             u, v, w = _moved(maps[k], px, py, pz, s)
             if kinds[k] == STILL:
                 u, v, w = px, py, pz  # both lenses are one: the ray is the pixel's own
@@ -121,93 +134,101 @@ def as_rays(seen, owners, inverse, rays, kinds, maps, unit, out, near):
             r = 1.0 / length if length > 0.0 else np.nan
             if kinds[k] == STILL:
                 r = 1.0
-            out[uy, ux, A], out[uy, ux, B], out[uy, ux, C] = u * r, v * r, w * r
-            near[uy, ux] = s * r if length > 0.0 else np.nan if math.isnan(w) else 0.0
+            out[i], out[i + B], out[i + C] = u * r, v * r, w * r
+            near[p] = s * r if length > 0.0 else np.nan if math.isnan(w) else 0.0
 
 
 @njit
 def in_axes(seen, owners, inverse, rays, kinds, maps, out):
-    """M (p, i) / i (H, W, 3) of each pixel, NaN where there is no point, and of the sky."""
+    """M (p, i) / i (H W 3,) of each pixel, NaN where there is no point, and of the sky."""
     height, width = seen.shape
     sky, table = np.int32(kinds.shape[0] - 1), rays.shape[0] > 0
     for y in range(height):
-        uy, x = np.uintp(y), 0
+        uy, row, x = np.uintp(y), y * width, 0
         while x < width:
             k, stop = _run(seen, owners, uy, x, sky)
-            if kinds[k] == OTHER:
-                x = stop
-                continue
             if kinds[k] == GONE:
-                for i in range(x, stop):
-                    ui = np.uintp(i)
-                    out[uy, ui, A] = out[uy, ui, B] = out[uy, ui, C] = np.nan
-            elif table:
-                for i in range(x, stop):
-                    ui = np.uintp(i)
-                    s = 1.0 / inverse[uy, ui] if inverse[uy, ui] > 0.0 else np.nan
-                    _place(maps[k], rays[uy, ui, A], rays[uy, ui, B], rays[uy, ui, C], s, out, uy, ui)
-            else:
-                for i in range(x, stop):
-                    ui = np.uintp(i)
-                    s = 1.0 / inverse[uy, ui] if inverse[uy, ui] > 0.0 else np.nan
-                    _place(maps[k], i + 0.5, y + 0.5, 1.0, s, out, uy, ui)
+                _fill(np.nan, 3 * (row + x), 3 * (row + stop), out)
+            elif kinds[k] != OTHER and table:
+                _places_of_rays(maps[k], rays, inverse, row + x, row + stop, out)
+            elif kinds[k] != OTHER:
+                _places(maps[k], inverse, y, row, x, stop, out)
             x = stop
 
 
 @inner
-def _place(m, px, py, pz, s, out, y, x):
-    out[y, x, A] = (m[A, A] * px + m[A, B] * py + m[A, C] * pz) * s + m[A, D]
-    out[y, x, B] = (m[B, A] * px + m[B, B] * py + m[B, C] * pz) * s + m[B, D]
-    out[y, x, C] = (m[C, A] * px + m[C, B] * py + m[C, C] * pz) * s + m[C, D]
+def _places(m, inverse, y, row, first, stop, out):
+    py = y + 0.5
+    a0, a1, a2, d0, d1, d2 = m[A, A], m[B, A], m[C, A], m[A, D], m[B, D], m[C, D]
+    b0, b1, b2, c0, c1, c2 = m[A, B] * py, m[B, B] * py, m[C, B] * py, m[A, C], m[B, C], m[C, C]
+    for i in range(first, stop):
+        p, px = row + i, i + 0.5
+        near = inverse[np.uintp(p)]
+        s = 1.0 / near if near > 0.0 else np.nan
+        out[np.uintp(3 * p)] = (a0 * px + b0 + c0) * s + d0
+        out[np.uintp(3 * p + 1)] = (a1 * px + b1 + c1) * s + d1
+        out[np.uintp(3 * p + 2)] = (a2 * px + b2 + c2) * s + d2
+
+
+@inner
+def _places_of_rays(m, rays, inverse, first, stop, out):
+    for p in range(first, stop):
+        near = inverse[np.uintp(p)]
+        s = 1.0 / near if near > 0.0 else np.nan
+        px, py, pz = rays[np.uintp(3 * p)], rays[np.uintp(3 * p + 1)], rays[np.uintp(3 * p + 2)]
+        u, v, w = _turned(m, px, py, pz)
+        out[np.uintp(3 * p)], out[np.uintp(3 * p + 1)], out[np.uintp(3 * p + 2)] = (
+            u * s + m[A, D],
+            v * s + m[B, D],
+            w * s + m[C, D],
+        )
 
 
 @njit
 def flow_on_pinhole(seen, owners, inverse, kinds, maps, out):
-    """From pixels of a pinhole to their points in another one, (H, W, 2) float32: `on_pinhole` less the pixels' centres."""
+    """From pixels of a pinhole to their points in another one, (H W 2,) float32: `on_pinhole` less the pixels' centres."""
     height, width = seen.shape
     sky = np.int32(kinds.shape[0] - 1)
     for y in range(height):
-        uy, x = np.uintp(y), 0
+        uy, row, x = np.uintp(y), y * width, 0
         while x < width:
             k, stop = _run(seen, owners, uy, x, sky)
             if kinds[k] == RIGID:
-                _row_of_flow(maps[k], inverse, uy, x, stop, out)
+                _row_of_flow(maps[k], inverse, y, row, x, stop, out)
             else:
-                nothing = np.float32(0.0 if kinds[k] == STILL else np.nan)
-                for i in range(x, stop):
-                    ui = np.uintp(i)
-                    out[uy, ui, A] = out[uy, ui, B] = nothing
+                _fill(np.float32(0.0 if kinds[k] == STILL else np.nan), 2 * (row + x), 2 * (row + stop), out)
             x = stop
 
 
 @inner
-def _row_of_flow(m, inverse, y, first, stop, out):
+def _row_of_flow(m, inverse, y, row, first, stop, out):
     py = y + 0.5
     a0, a1, a2, c0, c1, c2 = m[A, A], m[B, A], m[C, A], m[A, D], m[B, D], m[C, D]
     b0, b1, b2 = m[A, B] * py + m[A, C], m[B, B] * py + m[B, C], m[C, B] * py + m[C, C]
     for i in range(first, stop):
-        ui, px = np.uintp(i), i + 0.5
-        s = inverse[y, ui]
+        p, px = row + i, i + 0.5
+        s = inverse[np.uintp(p)]
         w = a2 * px + b2 + c2 * s
         r = 1.0 / w if w > 0.0 else np.nan
-        out[y, ui, A], out[y, ui, B] = (a0 * px + b0 + c0 * s) * r - px, (a1 * px + b1 + c1 * s) * r - py
+        out[np.uintp(2 * p)], out[np.uintp(2 * p + 1)] = (a0 * px + b0 + c0 * s) * r - px, (a1 * px + b1 + c1 * s) * r - py
 
 
 @njit
-def from_centers(xy, out):
-    """How far positions xy (H, W, 2) are from the centres of their pixels, (H, W, 2) float32."""
-    for y in range(xy.shape[0]):
-        for x in range(xy.shape[1]):
-            uy, ux = np.uintp(y), np.uintp(x)
-            out[uy, ux, A], out[uy, ux, B] = xy[uy, ux, A] - (x + 0.5), xy[uy, ux, B] - (y + 0.5)
+def from_centers(xy, width, out):
+    """How far positions xy (H W 2,) of a picture of this width are from the centres of their pixels, (H W 2,) float32."""
+    for row in range(0, xy.shape[0] // 2, width):
+        py = row // width + 0.5
+        for i in range(width):
+            p = row + i
+            out[np.uintp(2 * p)], out[np.uintp(2 * p + 1)] = xy[np.uintp(2 * p)] - (i + 0.5), xy[np.uintp(2 * p + 1)] - py
 
 
 @njit
-def own_triangles(seen, owners, shift, ground, own):
-    """The other view's number of each pixel's triangle: `shift` further on by thing, at most `ground`; -1 where none is."""
+def own_triangles(seen, owners, shift, own):
+    """The other view's number of each pixel's triangle: `shift` further on by thing; -1 where none is."""
     height, width = seen.shape
     for y in range(height):
         for x in range(width):
             uy, ux = np.uintp(y), np.uintp(x)
             t = seen[uy, ux]
-            own[uy, ux] = min(t + shift[np.uintp(owners[np.uintp(t)])], ground) if t >= 0 else np.int32(-1)
+            own[uy, ux] = t + shift[np.uintp(owners[np.uintp(t)])] if t >= 0 else np.int32(-1)

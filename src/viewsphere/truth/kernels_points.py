@@ -39,18 +39,38 @@ def boxes(q, endless, width, height, box):
 
 
 @njit
-def sort(xy, near, gap, own, cell, start, order, points, nearest, number, far):
+def cover(box, starts, width, height, covered):
+    """Fill covered (pixels,) with whether a pixel lies in the box of any of the meshes, whose vertices begin at `starts`, the
+    last of which is the ground's; `box` as `boxes` fills it.
+    """
+    covered[:] = False
+    for i in range(starts.shape[0] - 1):
+        xa, ya, xb, yb = np.int32(width), np.int32(height), np.int32(1), np.int32(1)
+        for v in range(starts[i], starts[i + 1]):
+            uv = np.uintp(v)
+            xa, ya, xb, yb = min(xa, box[uv, A]), min(ya, box[uv, B]), min(xb, box[uv, C]), min(yb, box[uv, D])
+        for y in range(max(ya, 0), min(-yb, height - 1) + 1):
+            for p in range(y * width + max(xa, 0), y * width + min(-xb, width - 1) + 1):
+                covered[np.uintp(p)] = True
+
+
+@njit
+def sort(xy, near, gap, own, cell, covered, ground, clear, start, order, points, nearest, number, far):
     """Sort the points xy (N, 2) by their pixels, `cell` (N,), leaving out those of -1; returns how many are left.
 
-    Point order[p] is at points[:, p]; its `own` triangle is in number[p], and `near` times `gap`, the 1/z to be exceeded, in
-    nearest[p]. Pixel i has the points [start[i], start[i + 1]), and far[i] is the least of their `nearest`. start: (pixels +
-    2,). Behind the sorted points are FOUR that meet nothing: `points`, `nearest` and `number` have room for so many more.
+    Those are left out, too, that only a mesh could hide, their `own` triangles from `clear` on, where none is: see `cover`.
+    Point order[p] is at points[:, p]; its `own` triangle is in number[p], `ground` for all of the ground's, and `near` times
+    `gap`, the 1/z to be exceeded, in nearest[p]. Pixel i has the points [start[i], start[i + 1]), and far[i] is the least of
+    their `nearest`. start: (pixels + 2,). Behind the sorted points are FOUR that meet nothing: `points`, `nearest` and `number`
+    have room for so many more.
     """
     start[:] = 0
     for k in range(cell.shape[0]):
         c = cell[np.uintp(k)]
-        if c >= 0:
+        if c >= 0 and (covered[np.uintp(c)] or own[np.uintp(k)] < clear):
             start[np.uintp(c + 2)] += 1
+        else:
+            cell[np.uintp(k)] = -1
     for c in range(far.shape[0] + 1):
         start[np.uintp(c + 1)] += start[np.uintp(c)]
     far[:] = np.inf
@@ -60,7 +80,8 @@ def sort(xy, near, gap, own, cell, start, order, points, nearest, number, far):
             c = np.uintp(cell[uk])
             p = np.uintp(start[c + B])
             start[c + B] += 1
-            order[p], points[A, p], points[B, p], nearest[p], number[p] = k, xy[uk, A], xy[uk, B], near[uk] * gap, own[uk]
+            order[p], points[A, p], points[B, p] = k, xy[uk, A], xy[uk, B]
+            nearest[p], number[p] = near[uk] * gap, min(own[uk], ground)
             far[c] = min(far[c], nearest[p])
     inside = np.int64(start[far.shape[0]])
     for p in range(inside, inside + FOUR):
@@ -158,16 +179,18 @@ def _meet_checked(t, own, q0, q1, q2, area, width, bounds, cutout, cutouts, star
 
 @njit
 def classify(xy, near, width, height, state, cell):
-    """Fill state (N,): 4 where `near` is NaN, else 3 where xy (N, 2) is, 2 outside of the picture, 0 inside; and cell (N,)
+    """Fill state (N,): 4 where `near` is NaN, else 3 where xy (2 N,) is, 2 outside of the picture, 0 inside; and cell (N,)
     int32: the pixel of what is inside, counted row by row, else -1.
+
+    Without branches and with flat arrays, of which compilers make vectors.
     """
-    for i in range(xy.shape[0]):
-        ui = np.uintp(i)
-        x, y = xy[ui, A], xy[ui, B]
-        if x >= 0.0 and y >= 0.0 and x < width and y < height and not math.isnan(near[ui]):
-            state[ui], cell[ui] = 0, np.int32(y) * width + np.int32(x)
-        else:
-            state[ui], cell[ui] = 4 if math.isnan(near[ui]) else 3 if math.isnan(x) or math.isnan(y) else 2, -1
+    for i in range(near.shape[0]):
+        x, y = xy[np.uintp(2 * i)], xy[np.uintp(2 * i + 1)]
+        nowhere = math.isnan(near[np.uintp(i)])
+        inside = (x >= 0.0) & (y >= 0.0) & (x < width) & (y < height) & (not nowhere)
+        seen = np.uint8(0) if inside else np.uint8(3) if math.isnan(x) | math.isnan(y) else np.uint8(2)
+        state[np.uintp(i)] = np.uint8(4) if nowhere else seen
+        cell[np.uintp(i)] = np.int32(y) * np.int32(width) + np.int32(x) if inside else np.int32(-1)
 
 
 @njit

@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -44,7 +43,7 @@ class Placed:
     xy (..., 2) float64 pixels, NaN where the lens has none; near (...) float64: 1/s, s as `truth.visibility.Visibility` has
     it, 0 of what is infinitely far and of what has no pixel, NaN of what is nowhere. rays (..., 3) in camera axes, so that the
     point is ray / near: None for a pinhole, which needs none. `own` gives (...) int32: the view's triangle that the point is
-    on, -1 for none; of the ground's always the first.
+    on, -1 for none; the ground's are one.
     """
 
     view: View
@@ -90,7 +89,7 @@ def _classified(xy: Float, near: Float, size: tuple[int, int]) -> tuple[NDArray[
     from viewsphere.truth import kernels_points as kernels
 
     state, cell = np.empty(len(near), np.uint8), np.empty(len(near), np.int32)
-    kernels.classify(xy, near, *size, state, cell)
+    kernels.classify(np.ascontiguousarray(xy).reshape(-1), near, *size, state, cell)
     return state, cell
 
 
@@ -128,32 +127,33 @@ def _meetings(view: View, xy: Float, near: Float, own: Whole, cell: Whole, rays:
     The points are those whose pixel `cell` is not -1.
     """
     if rays is None:
-        yield _meet(view, view.corners, lambda: view.boxes, (view.camera.width, view.camera.height), xy, near, own, cell)
+        yield _meet(view, view.corners, view.boxes, (view.camera.width, view.camera.height), xy, near, own, cell)
         return
     index = np.flatnonzero(cell >= 0).astype(np.int32)
     for q, size, at, own_xy, own_near in _pinholes(view, rays[index], near[index]):
         _, own_cell = _classified(own_xy, own_near, size)
-        boxes = partial(pixels_of, view.geometry, q, size)
-        order, met = _meet(view, q, boxes, size, own_xy, own_near, own[index[at]], own_cell)
+        order, met = _meet(view, q, pixels_of(view.geometry, q, size), size, own_xy, own_near, own[index[at]], own_cell)
         yield index[at][order], met
 
 
 def _meet(
-    view: View, q: Float, boxes: Callable[[], Whole], size: tuple[int, int], xy: Float, near: Float, own: Whole, cell: Whole
+    view: View, q: Float, box: Whole, size: tuple[int, int], xy: Float, near: Float, own: Whole, cell: Whole
 ) -> tuple[Whole, Whole]:
-    """The same for a pinhole of this size; q: `homogeneous` vertices of that pinhole, `boxes` gives their pixels."""
+    """The same for a pinhole of this size; q: `homogeneous` vertices of that pinhole, box: their pixels (`pixels_of`)."""
     from viewsphere.truth import kernels_points as kernels
 
     geometry, (width, height) = view.geometry, size
-    start, far = np.empty(width * height + 2, np.int32), np.empty((height, width))
+    ground, cut = np.int32(geometry.triangle_start[-1]), (geometry.triangle_cutout, geometry.cutouts.arrays)
+    clear = ground if ground < len(geometry.triangles) else np.int32(-1)
+    start, far, covered = np.empty(width * height + 2, np.int32), np.empty((height, width)), np.empty(width * height, np.bool_)
     order, number = np.empty(len(near), np.int32), np.empty(len(near) + FOUR, np.int32)
     points, nearest = np.empty((2, len(near) + FOUR)), np.empty(len(near) + FOUR)
-    inside = kernels.sort(xy, near, (1.0 + GAP) / NEARER, own, cell, start, order, points, nearest, number, far.reshape(-1))
+    kernels.cover(box, np.array(geometry.vertex_start), width, height, covered)
+    sorted_by = (start, order, points, nearest, number, far.reshape(-1))
+    inside = kernels.sort(xy, near, (1.0 + GAP) / NEARER, own, cell, covered, ground, clear, *sorted_by)
     met = np.full(inside + FOUR, -1, np.int32)
     if inside:
-        cut = (geometry.triangle_cutout, geometry.cutouts.arrays)
-        ground = geometry.triangle_start[-1]
-        kernels.meet(q, boxes(), geometry.triangles, ground, *cut, size, start, points, nearest, met, number, far)
+        kernels.meet(q, box, geometry.triangles, ground, *cut, size, start, points, nearest, met, number, far)
     return order[:inside], met[:inside]
 
 

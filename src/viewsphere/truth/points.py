@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -26,21 +26,35 @@ GROUND, SKY, FREE, NOWHERE = -1, -2, -3, -4
 class SurfacePoints:
     """N points, each on a triangle of a thing, or else fixed in the world.
 
-    thing (N,) int32: position in the view's `things`, else GROUND, SKY, FREE or NOWHERE. triangle (N,) int32 within the thing,
-    -1 without one; weights (N, 3) float64: barycentrics. place (N, 3) float64, without a triangle: a point of the world, of
-    the sky a unit vector towards it. bodies: the things as they were when the points were put on them, by their position;
-    ground_z: the ground's height then.
+    body (N,) int32: position in `bodies`, else GROUND, SKY, FREE or NOWHERE. triangle (N,) int32 within the body, -1 without
+    one; weights (N, 3) float64: barycentrics. place (N, 3) float64, without a triangle: a point of the world, of the sky a unit
+    vector towards it. bodies: the things as they were when points were put on them, one more than once where its triangles had
+    changed; ground_z: the ground's height then.
     """
 
-    thing: Whole
+    body: Whole
     triangle: Whole
     weights: Float
     place: Float
-    bodies: Mapping[int, Body]
+    bodies: Sequence[Body]
     ground_z: float | None
 
+    @staticmethod
+    def of(view: View, thing: Whole, triangle: Whole, weights: Float, place: Float) -> SurfacePoints:
+        """Points on things as a view has them: thing (N,) int32 is the position in its `things`, or as `body` where on none."""
+        bodies = view.bodies(thing)
+        number = np.searchsorted([body.position for body in bodies], thing)
+        body = np.where(thing >= 0, number, thing).astype(np.int32)
+        return SurfacePoints(body, triangle, weights, place, bodies, view.geometry.ground_z)
+
     def __len__(self) -> int:
-        return len(self.thing)
+        return len(self.body)
+
+    @property
+    def thing(self) -> Whole:
+        """The things that they lie on, (N,) int32: positions in the view's `things`, else as `body`."""
+        position = np.array([*(body.position for body in self.bodies), -1], np.int32)
+        return np.where(self.body >= 0, position[np.maximum(self.body, -1)], self.body)
 
     def in_view(self, view: View) -> Tracked:
         """Where they are in a view of the same things, at any instant."""
@@ -48,17 +62,30 @@ class SurfacePoints:
 
     def chosen(self, index: NDArray[np.intp]) -> SurfacePoints:
         """Some of the points, by their numbers."""
-        parts = (self.thing[index], self.triangle[index], self.weights[index], self.place[index])
+        parts = (self.body[index], self.triangle[index], self.weights[index], self.place[index])
         return SurfacePoints(*parts, self.bodies, self.ground_z)
 
     @staticmethod
     def joined(parts: Sequence[SurfacePoints]) -> SurfacePoints:
-        """All points of several, on the same things; a thing's triangles are those of the first of `parts` that has it."""
-        thing, triangle = (np.concatenate([getattr(part, name) for part in parts]) for name in ("thing", "triangle"))
-        weights, place = (np.concatenate([getattr(part, name) for part in parts]) for name in ("weights", "place"))
-        bodies = {i: body for part in reversed(parts) for i, body in part.bodies.items()}
+        """All points of several, on the same things; of bodies that have the same triangles the first is kept."""
+        bodies, numbers = list[Body](), list[Whole]()
+        for part in parts:
+            at = np.array([*(_number(body, bodies) for body in part.bodies), -1], np.int32)
+            numbers.append(np.where(part.body >= 0, at[np.maximum(part.body, -1)], part.body))
+        triangle, weights, place = (
+            np.concatenate([getattr(p, name) for p in parts]) for name in ("triangle", "weights", "place")
+        )
         heights = [part.ground_z for part in parts if part.ground_z is not None]
-        return SurfacePoints(thing, triangle, weights, place, bodies, heights[0] if heights else None)
+        return SurfacePoints(np.concatenate(numbers), triangle, weights, place, bodies, heights[0] if heights else None)
+
+
+def _number(body: Body, known: list[Body]) -> int:
+    """The position of a body of the same triangles among those that are known, to which it is added if there is none."""
+    for number, other in enumerate(known):
+        if other.position == body.position and other.has_triangles_of(body):
+            return number
+    known.append(body)
+    return len(known) - 1
 
 
 def points_seen(view: View, xy: ArrayLike) -> SurfacePoints:
@@ -82,8 +109,7 @@ def points_seen(view: View, xy: ArrayLike) -> SurfacePoints:
     weights[on] = weights_of(view, met[on], rays[on])
     triangle = np.where(on, met - first[np.maximum(thing, 0)], -1).astype(np.int32)
     directions = transform(view.world_from_camera, transform(view.camera_from_ray, rays))
-    place = _fixed(view, thing, directions)
-    return SurfacePoints(thing, triangle, weights, place, view.bodies(thing), view.geometry.ground_z)
+    return SurfacePoints.of(view, thing, triangle, weights, _fixed(view, thing, directions))
 
 
 def _fixed(view: View, thing: Whole, directions: Float) -> Float:
@@ -103,7 +129,7 @@ def points_in_world(places: ArrayLike) -> SurfacePoints:
     """Points (N, 3) of the world, metres, that stick to nothing."""
     place = np.ascontiguousarray(places, np.float64).reshape(-1, 3)
     nothing = np.full(len(place), -1, np.int32)
-    return SurfacePoints(np.full(len(place), FREE, np.int32), nothing, np.zeros((len(place), 3)), place, {}, None)
+    return SurfacePoints(np.full(len(place), FREE, np.int32), nothing, np.zeros((len(place), 3)), place, (), None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,7 +148,7 @@ class Tracked:
     def world(self) -> Float:
         """Where the points are, (N, 3) metres; NaN of the sky, and of what is nowhere."""
         points = self.points
-        fixed = (points.thing == FREE) | ((points.thing == GROUND) & self._has_ground)
+        fixed = (points.body == FREE) | ((points.body == GROUND) & self._has_ground)
         out = np.where(fixed[:, None], points.place, np.nan)
         return stick(self.view.geometry, self._own, points.weights, out)
 
@@ -143,7 +169,7 @@ class Tracked:
         """The points as `truth.point_raster.states` takes them."""
         own = self._own
         ground = self.view.geometry.triangle_start[-1]
-        on = np.where(self.points.thing == GROUND, np.int32(ground), own) if self._has_ground else own
+        on = np.where(self.points.body == GROUND, np.int32(ground), own) if self._has_ground else own
         placed = placed_at(self.view, transform(self.view.camera.R, self.world) + self.view.camera.t, lambda: on)
         sky = np.flatnonzero(self._is_sky)
         if len(sky):
@@ -159,7 +185,7 @@ class Tracked:
 
     @property
     def _is_sky(self) -> NDArray[np.bool_]:
-        return (self.points.thing == SKY) & self.view.is_sky_endless
+        return (self.points.body == SKY) & self.view.is_sky_endless
 
     @property
     def _has_ground(self) -> bool:
@@ -169,10 +195,9 @@ class Tracked:
     @cached_property
     def _own(self) -> Whole:
         """The view's triangle of each point, -1 where it has none."""
-        first = np.full(len(self.view.things), -1, np.int64)
-        for i, body in self.points.bodies.items():
-            if i < len(first) and body.has_triangles_of(self.view.body(i)):
-                first[i] = self.view.geometry.triangle_start[i]
-        thing = self.points.thing
-        start = np.append(first, -1)[np.where(thing < 0, len(first), np.minimum(thing, len(first)))]
-        return np.where(start >= 0, start + self.points.triangle, -1).astype(np.int32)
+        view, start = self.view, np.full(len(self.points.bodies) + 1, -1, np.int32)
+        for number, body in enumerate(self.points.bodies):
+            if body.position < len(view.things) and body.has_triangles_of(view.body(body.position)):
+                start[number] = view.geometry.triangle_start[body.position]
+        first = start[np.maximum(self.points.body, -1)]
+        return np.where(first >= 0, first + self.points.triangle, np.int32(-1))

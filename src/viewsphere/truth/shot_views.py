@@ -72,12 +72,21 @@ class ShotViews:
         view = self._views.pop((instant, sensor), None)
         if view is None or view.geometry is not geometry:
             things = self.shot.things_at(instant)
-            view = View(things, geometry, self.shot.camera(instant, sensor), self._is_sky_endless(instant))
+            is_sky_endless, is_compared = self._is_sky_endless(instant), self._instants * self._sensors > 1
+            view = View(things, geometry, self.shot.camera(instant, sensor), is_sky_endless, is_compared)
         self._views[instant, sensor] = view
-        instants = ROOMS if self.shot.sequence else 1  # still pictures are not compared with others
-        while len(self._views) > instants * len(self.shot.rig.sensors):
+        while len(self._views) > self._instants * self._sensors:
             del self._views[next(iter(self._views))]
         return view
+
+    @property
+    def _instants(self) -> int:
+        """How many instants' views are there at once: still pictures are not compared with those of other instants."""
+        return ROOMS if self.shot.sequence else 1
+
+    @property
+    def _sensors(self) -> int:
+        return len(self.shot.rig.sensors)
 
     def _is_sky_endless(self, instant: int) -> bool:
         background = self.shot.finish(instant).background
@@ -105,7 +114,7 @@ class ShotViews:
             seen = points_seen(view, xy)
             ids = np.array([*(thing.id for thing in view.things), 0], np.int32)
             queries.append(np.column_stack((np.full(len(xy), at, np.float64), xy)))
-            objects.append(np.where(seen.thing >= 0, ids[np.minimum(seen.thing, len(view.things))], 0).astype(np.int32))
+            objects.append(ids[np.maximum(seen.thing, -1)])
             points.append(seen)
         return Followed(np.concatenate(queries), np.concatenate(objects), SurfacePoints.joined(points))
 

@@ -38,7 +38,7 @@ def points_on(view: View, count: int, rng: np.random.Generator, things: Sequence
         )
     thing = view.owners[picked]
     triangle = (picked - np.array(view.geometry.triangle_start)[thing]).astype(np.int32)
-    return SurfacePoints(thing, triangle, weights, np.zeros((count, 3)), view.bodies(thing), view.geometry.ground_z)
+    return SurfacePoints.of(view, thing, triangle, weights, np.zeros((count, 3)))
 
 
 def _surface(view: View, things: Sequence[int]) -> tuple[NDArray[np.int64], Float]:

@@ -23,10 +23,11 @@ Change = Literal["moved", "deformed", "gone"]
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """One thing of a view, as far as points depend on it that stick to it: they are on its triangles (n, 3), whose vertices
-    are counted from `base` on, and lie at `places` (v, 3) in the thing's own axes.
+    """One thing of a view, at this position in its `things`, as far as points depend on it that stick to it: they are on its
+    triangles (n, 3), whose vertices are counted from `base` on, and lie at `places` (v, 3) in the thing's own axes.
     """
 
+    position: int
     thing: Thing
     triangles: NDArray[np.int32]
     base: int
@@ -67,13 +68,14 @@ class View:
     `Shot.things_at` and `Stage.at`. Use a view as long as its geometry is not written to again: see `truth.moving.Ring`.
 
     is_sky_endless: whether a pixel without a triangle shows a direction (sky, surrounding), or a flat picture, which is
-    nowhere.
+    nowhere. is_compared: whether labels may compare this view with others.
     """
 
     things: Sequence[Thing]
     geometry: Geometry
     camera: Camera
     is_sky_endless: bool
+    is_compared: bool = True
 
     @cached_property
     def corners(self) -> Float:
@@ -88,7 +90,7 @@ class View:
     @cached_property
     def visibility(self) -> Visibility:
         """What the camera sees."""
-        return rasterize(self.geometry, self.camera, corners=self.corners)
+        return rasterize(self.geometry, self.camera, corners=self.corners, keeps_exact=self.is_compared)
 
     @cached_property
     def rays(self) -> Float:
@@ -133,12 +135,12 @@ class View:
     def body(self, i: int) -> Body:
         """Thing i."""
         first, stop = self.geometry.triangle_start[i : i + 2]
-        return Body(self.things[i], self.geometry.triangles[first:stop], self.geometry.vertex_start[i], self._own_axes(i))
+        return Body(i, self.things[i], self.geometry.triangles[first:stop], self.geometry.vertex_start[i], self._own_axes(i))
 
-    def bodies(self, things: NDArray[np.int32]) -> dict[int, Body]:
+    def bodies(self, things: NDArray[np.int32]) -> tuple[Body, ...]:
         """Those of the things in a list of their positions, which may hold numbers below 0, too; they outlast the geometry."""
-        found = {i: self.body(i) for i in np.unique(things[things >= 0]).tolist()}
-        return {i: replace(body, places=body.places.copy()) if body.thing.step else body for i, body in found.items()}
+        found = (self.body(i) for i in np.unique(things[things >= 0]).tolist())
+        return tuple(replace(body, places=body.places.copy()) if body.thing.step else body for body in found)
 
     def change(self, i: int, other: View) -> Change:
         """What thing i of this view did until another: moved (or stood still), deformed, or gone, which it is, too, where it is

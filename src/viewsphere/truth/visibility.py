@@ -38,7 +38,7 @@ class Visibility:
     triangle: NDArray[np.int32]
     inverse_depth: NDArray[np.float32]
     corners: NDArray[np.float64] | None = None  # `homogeneous` of all vertices, which labels and the raster engine use again
-    exact: NDArray[np.float64] | None = None  # 1/s before it was rounded, of a whole picture of all triangles
+    exact: NDArray[np.float64] | None = None  # 1/s before it was rounded, where it was asked for
     _instances: dict[Geometry, Instances] = field(default_factory=dict[Geometry, Instances], repr=False)
 
     def instances(self, geometry: Geometry) -> Instances:
@@ -66,6 +66,7 @@ def rasterize(
     object_id: int | None = None,
     window: Window | None = None,
     corners: NDArray[np.float64] | None = None,
+    keeps_exact: bool = False,
 ) -> Visibility:
     """Cast one ray through the centre of each pixel, exactly.
 
@@ -74,16 +75,15 @@ def rasterize(
 
     `subdivision` 2 gives the (2H, 2W) buffer of the centres of a pixel's 2 x 2 quarters (edge anti-aliasing). With an
     `object_id` only that object is drawn, without scenery and ground. `window` replaces the image by another rectangle of
-    pixels, which may lie outside the image. `corners`: `homogeneous` of all vertices, where it is known.
+    pixels, which may lie outside the image. `corners`: `homogeneous` of all vertices, where it is known. `keeps_exact`: keep
+    1/s before it was rounded, too, which labels that compare pictures need; still pictures are spared its memory.
     """
     everything = (0, len(geometry.triangles), 0, len(geometry.vertices))
     part = _range(geometry, object_id) if object_id else everything
     q = homogeneous(geometry, camera, *part[2:]) if corners is None or part != everything else corners
     nearest, seen = _draw(geometry, camera, subdivision, part, window, q)
-    if part != everything:
-        return Visibility(seen, nearest.astype(np.float32))
-    is_picture = subdivision == 1 and window is None
-    return Visibility(seen, nearest.astype(np.float32), q, nearest if is_picture else None)
+    known = q if part == everything else None
+    return Visibility(seen, nearest.astype(np.float32), known, nearest if keeps_exact else None)
 
 
 def with_ground(geometry: Geometry, camera: Camera, visibility: Visibility) -> Visibility:

@@ -200,6 +200,12 @@ def _render(told: dict[str, Any]) -> Any:
     return render(told)
 
 
+def _number(told: dict[str, Any]) -> Any:
+    from .settling import number
+
+    return number(told)
+
+
 def _save(told: dict[str, Any]) -> Any:
     from .saving import save
 
@@ -218,6 +224,7 @@ REQUESTS: dict[str, Callable[[dict[str, Any]], Any]] = {
     "stage": _stage,
     "paint": _paint,
     "render": _render,
+    "number": _number,
     "save": _save,
 }
 

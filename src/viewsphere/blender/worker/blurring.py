@@ -12,7 +12,7 @@ from .posing import camera_matrix
 STEPS = 3
 """Cycles looks at 2 ** STEPS + 1 moments."""
 
-ORDER = "order"
+ORDER = "viewsphere order"
 """Custom property of a placed object: its place among all."""
 
 

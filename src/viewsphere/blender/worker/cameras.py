@@ -15,13 +15,13 @@ OPENCV_FROM_BLENDER = Matrix.Diagonal((1.0, -1.0, -1.0))
 
 def read_cameras(told):
     """The motion and the lens of the file's `camera` (None: the scene's, or the only one) at the `frames` (None: the first) of
-    its animation `clip`.
+    its animation `clip`, of `fps` frames a second (None: the file's own).
 
     A motion is `rotation` (3, 3), world from camera in OpenCV's axes, and `center` in metres, both relative to the position
     and rotation that the object `at`, if any, has at the first frame. The lens is for a picture of `size` (width, height), by
     default the scene's.
     """
-    unit, warnings = open_file(told["file"], told["kind"], told["root"], cameras=True, clip=told["clip"])
+    unit, warnings = open_file(told["file"], told["kind"], told["root"], cameras=True, clip=told["clip"], fps=told["fps"])
     scene = bpy.context.scene
     camera = _camera(scene, told["camera"])
     world_from_at = Matrix() if told["at"] is None else _rigid(_object(scene, told["at"]))

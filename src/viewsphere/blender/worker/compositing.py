@@ -15,18 +15,38 @@ def tree_of(scene):
     return scene.node_tree if scene.use_nodes else None
 
 
+HOW = "pictures are those that the renderer gives; link Render Layers to its output, or switch the compositor off"
+
+
 def fault(scene):
-    """A warning where the compositor has no output, so that Cycles' uncomposited picture is used; else None."""
+    """A warning where the compositor gives no picture, so that the uncomposited one is used; else none."""
     tree = tree_of(scene)
     if tree is None or not len(tree.nodes) or is_used(scene):
         return []
-    return ["the compositor has no output that something leads to: pictures are those that Cycles gives"]
+    lacks = "render layers (or has muted ones)" if _has_output(tree) else "output that something leads to"
+    return [f"the compositor has no {lacks}: {HOW}"]
 
 
 def is_used(scene):
-    """Whether a compositor gives the picture."""
+    """Whether a compositor gives the picture: Blender renders nothing for one that asks for no render layers."""
     tree = tree_of(scene)
-    return tree is not None and any(_is_output(node) and not node.mute and node.inputs[0].is_linked for node in tree.nodes)
+    return tree is not None and _has_output(tree) and _asks_for_layers(tree)
+
+
+def leave_out(scene):
+    """Take the compositor from a scene."""
+    if hasattr(scene, "compositing_node_group"):  # Blender 5.0 and later
+        scene.compositing_node_group = None
+    else:
+        scene.use_nodes = False
+
+
+def _has_output(tree):
+    return any(_is_output(node) and not node.mute and node.inputs[0].is_linked for node in tree.nodes)
+
+
+def _asks_for_layers(tree):
+    return any(node.bl_idname == "CompositorNodeRLayers" and not node.mute for node in tree.nodes)
 
 
 def _is_output(node):

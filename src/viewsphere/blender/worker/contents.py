@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 
 from .compositing import fault
-from .evaluated import LEFT_OUT, listed, part_of, taken
+from .evaluated import LEFT_OUT, STRANDS, listed, part_of, strands, taken
 from .opening import is_within, open_file
 from .playing import go_to
 from .reading import evaluate, prepare
@@ -71,6 +71,7 @@ class _Seeing:
     def __init__(self):
         self.parts, self.matrices, self.lamps, self._left_out = {}, {}, 0, {}
         self.frame, self.showing = None, {}
+        self._displacing = set()
 
     def take(self, depsgraph):
         showing = self.showing.setdefault(self.frame, set())
@@ -79,9 +80,14 @@ class _Seeing:
         for instance in depsgraph.object_instances:
             item = instance.object
             owner = instance.parent if instance.is_instance else item
-            if item.type == "LIGHT" and instance.show_self:
+            if not instance.show_self:
+                continue
+            if strands(item):
+                self._left_out.setdefault(STRANDS, []).append(item.name)
+            self._displacing |= {slot.material.name for slot in item.material_slots if _displaces(slot.material)}
+            if item.type == "LIGHT":
                 self.lamps += 1
-            elif item.type in LEFT_OUT and instance.show_self:
+            elif item.type in LEFT_OUT:
                 self._left_out.setdefault(LEFT_OUT[item.type], []).append(item.name)
             elif taken(instance, item) and _has_area(item, instance.matrix_world):
                 self.parts.setdefault(owner.name, {})[part_of(item, owner)] = None
@@ -89,10 +95,24 @@ class _Seeing:
 
     def warnings(self):
         """Warnings about rendered things that have no triangles, and so no labels."""
-        return [
+        said = [
             f"{what} is rendered, but no label knows of it: {listed(names)}; convert it to a mesh"
             for what, names in self._left_out.items()
         ]
+        if self._displacing:
+            said.append(
+                f"displacement by materials is rendered, but no label knows of it: {listed(self._displacing)}; use the "
+                "modifier Displace, or set them to bump only"
+            )
+        return said
+
+
+def _displaces(material):
+    """Whether a material moves the surface that it is on."""
+    if material is None or material.node_tree is None or material.displacement_method not in ("DISPLACEMENT", "BOTH"):
+        return False
+    outputs = (node for node in material.node_tree.nodes if node.type == "OUTPUT_MATERIAL")
+    return any(node.is_active_output and node.inputs["Displacement"].is_linked for node in outputs)
 
 
 def _has_area(item, matrix):

@@ -13,6 +13,7 @@ SOLID = ("MESH", "META")
 """Objects whose triangles are taken; text, curves and surfaces come as meshes when they are evaluated."""
 
 LEFT_OUT = {"CURVES": "hair", "POINTCLOUD": "points", "VOLUME": "a volume", "GREASEPENCIL": "grease pencil"}
+STRANDS = "particle hair"
 NAMES_SAID = 5
 
 OWN_SLASH = "\u2215"
@@ -45,6 +46,8 @@ class Gathering:
             owner = instance.parent if instance.is_instance else item
             if not instance.show_self or (self._wanted is not None and owner.original.as_pointer() not in self._wanted):
                 continue
+            if strands(item):
+                left_out.setdefault(STRANDS, []).append(item.name)
             if item.type in LEFT_OUT:
                 left_out.setdefault(LEFT_OUT[item.type], []).append(item.name)
             elif taken(instance, item):
@@ -155,6 +158,17 @@ def taken(instance, item):
     if not instance.show_self or item.type not in SOLID:
         return False
     return item.visible_camera and not item.is_shadow_catcher and not item.is_holdout
+
+
+def strands(item):
+    """Whether particles are drawn as strands around the item, which are in pictures and in no mesh."""
+    return item.type == "MESH" and any(
+        modifier.type == "PARTICLE_SYSTEM"
+        and modifier.show_render
+        and modifier.particle_system.settings.type == "HAIR"
+        and modifier.particle_system.settings.render_type == "PATH"
+        for modifier in item.original.modifiers
+    )
 
 
 def part_of(item, owner):

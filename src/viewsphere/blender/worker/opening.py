@@ -9,6 +9,7 @@ import bpy
 
 from .addons import needed
 from .playing import play, set_span
+from .rates import DEFAULT, key_rate, own_rate, set_rate
 
 IMPORTS = {
     "abc": lambda file, _: bpy.ops.wm.alembic_import(filepath=file, as_background_job=False),
@@ -22,20 +23,22 @@ SAME = {"gltf": "glb", "usda": "usd", "usdc": "usd", "usdz": "usd"}
 NAMES_SAID = 8
 
 
-def open_file(file, kind, root, cameras=False, clip=None):
+def open_file(file, kind, root, cameras=False, clip=None, fps=None):
     """Open the file as the scene, at the file's first frame. Returns the metres in one unit of the file, and warnings.
 
-    A USD file's cameras are imported if `cameras` is true. `clip` names the animation that is played.
+    A USD file's cameras are imported if `cameras` is true. `clip` names the animation that is played. `fps` is the number of
+    frames in a second, None for the file's own.
     """
     try:
         if kind == "blend":
             bpy.ops.wm.open_mainfile(filepath=file, load_ui=False, use_scripts=False)
         else:
-            bpy.ops.wm.read_factory_settings(use_empty=True)
-            IMPORTS[SAME.get(kind, kind)](file, cameras)
+            _import(file, SAME.get(kind, kind), cameras, fps)
     except RuntimeError as error:
         raise ValueError(" ".join(str(error).removeprefix("Error: ").split())) from None
     scene = bpy.context.scene
+    if fps is not None:
+        set_rate(scene, fps)
     if clip is not None or kind != "blend":
         play(clip)
     set_span(scene, kind)
@@ -43,6 +46,29 @@ def open_file(file, kind, root, cameras=False, clip=None):
     units = scene.unit_settings
     metres = units.scale_length if kind == "blend" and units.system != "NONE" else 1.0
     return metres, [*_newer(kind), *_libraries(root), *needed()]
+
+
+def _import(file, kind, cameras, fps):
+    """Import a file into an empty scene of `fps` frames a second, None for the file's own. A glTF file says in seconds when
+    its keys are: it is imported again where these are no frames of the first import.
+    """
+    rate = fps or own_rate(file, kind) or DEFAULT
+    _import_at(file, kind, cameras, rate)
+    if kind == "glb" and fps is None:
+        own = key_rate()
+        if own is not None and own != rate:
+            _import_at(file, kind, cameras, own)
+
+
+def _import_at(file, kind, cameras, rate):
+    """Import a file into an empty scene of so many frames a second."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    render = bpy.context.scene.render
+    set_rate(bpy.context.scene, rate)
+    if kind == "glb":  # Blender's reader of glTF multiplies by fps_base where it should divide
+        render.fps_base = 1 / render.fps_base
+    IMPORTS[kind](file, cameras)
+    set_rate(bpy.context.scene, rate)
 
 
 def _newer(kind):

@@ -37,7 +37,20 @@ def play(clip):
 
 def clips():
     """Names of the animations."""
-    return sorted({action.name.rpartition("|")[2] for action in bpy.data.actions})
+    return list(clip_spans())
+
+
+def clip_spans():
+    """First and last frame of each animation, by its name."""
+    found = {}
+    for action in bpy.data.actions:
+        found.setdefault(action.name.rpartition("|")[2], []).append(action.frame_range)
+    return {name: _span(ranges) for name, ranges in sorted(found.items())}
+
+
+def _span(ranges):
+    """The first and the last frame of all ranges."""
+    return round(min(first for first, _ in ranges)), round(max(last for _, last in ranges))
 
 
 def set_span(scene, kind):
@@ -49,20 +62,19 @@ def set_span(scene, kind):
     if bpy.data.cache_files:  # Alembic and USD importers have set the scene's frames
         ranges.append((scene.frame_start, scene.frame_end))
     if ranges:
-        scene.frame_start = round(min(first for first, _ in ranges))
-        scene.frame_end = round(max(last for _, last in ranges))
+        scene.frame_start, scene.frame_end = _span(ranges)
     else:
         scene.frame_end = scene.frame_start
 
 
 def timeline(scene):
-    """First and last frame, frames a second, and whether anything moves."""
+    """First and last frame, frames a second, whether anything moves, and first and last frame of each animation."""
     return {
         "first": scene.frame_start,
         "last": scene.frame_end,
         "fps": scene.render.fps / scene.render.fps_base,
         "moves": scene.frame_end > scene.frame_start and _moves(scene),
-        "clips": clips(),
+        "clips": [{"name": name, "first": first, "last": last} for name, (first, last) in clip_spans().items()],
     }
 
 

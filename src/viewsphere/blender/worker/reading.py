@@ -28,7 +28,7 @@ def read(told):
     Raises ValueError in one line for what cannot be read.
     """
     if told.get("after") is None:
-        unit, warnings = open_file(told["file"], told["kind"], told["root"], clip=told.get("clip"))
+        unit, warnings = open_file(told["file"], told["kind"], told["root"], clip=told.get("clip"), fps=told.get("fps"))
         prepare(bpy.context.scene)
         reveal(bpy.context.scene, told.get("shown", ()))
     else:
@@ -86,7 +86,7 @@ def evaluate(scene, gathering):
 
 def read_timeline(told):
     """The file's first and last frame, rate and animations; the file is opened, but not evaluated."""
-    _, warnings = open_file(told["file"], told["kind"], told["root"], clip=told["clip"])
+    _, warnings = open_file(told["file"], told["kind"], told["root"], clip=told["clip"], fps=told["fps"])
     files = [str(Path(file).resolve()) for file in bpy.utils.blend_paths(absolute=True)]
     return {**timeline(bpy.context.scene), "warnings": warnings, "files": files}
 

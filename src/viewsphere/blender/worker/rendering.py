@@ -144,7 +144,10 @@ def _rendered(names, composed):
     finally:
         cycles.CyclesRender.render = original
     if "Combined" not in found:
-        raise RuntimeError("Cycles gave no picture")
+        raise RuntimeError(
+            f"Cycles gave no picture of the view layer {bpy.context.view_layer.name!r}: see that it is rendered, and that the "
+            "compositor's Render Layers show it"
+        )
     if composed is not None:
         found["Combined"] = compositing.with_alpha(compositing.read_picture(composed), found["Combined"])
         composed.unlink()

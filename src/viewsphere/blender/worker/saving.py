@@ -9,6 +9,8 @@ import bpy
 
 from . import ground
 from .rig import key, make_rig
+from .settling import settle
+from .staging import is_placed
 
 CURVES = {"standard": "Standard", "raw": "Standard", "filmic": "Filmic", "agx": "AgX"}
 """Blender's view transform for each of viewsphere's."""
@@ -27,7 +29,7 @@ def save(told):
     scene = bpy.context.scene
     scene.name = told["name"]
     if told["is_users"]:
-        _hold_still()
+        settle(scene, told["members"])
     off = make_rig(scene, told["poses"])
     _describe(scene, told)
     _show(scene, told)
@@ -40,27 +42,14 @@ def save(told):
     return {"off": off}
 
 
-def _hold_still():
-    """Switch off a user's animation, which keeps its values of the staged moment: frames of the timeline are poses now."""
-    for kind in (p.identifier for p in bpy.data.bl_rna.properties if p.type == "COLLECTION"):
-        for one in getattr(bpy.data, kind):
-            for animated in (one, getattr(one, "node_tree", None)):
-                data = getattr(animated, "animation_data", None)
-                if data is not None:
-                    data.action = None
-                    for track in data.nla_tracks:
-                        track.mute = True
-
-
 def _describe(scene, told):
     """Store what viewsphere knows of the frames and objects as custom properties, and as a text."""
     for name, value in told["properties"].items():
         scene[name] = value
     for one in scene.objects:
-        if "id" not in one:  # an object may have an `id` from the user
-            one.pass_index = told["members"].get(one.name, 0)
         for name, value in told["objects"].get(str(one.pass_index), {}).items():
-            one[name] = value
+            if is_placed(one) or name not in one:  # the user's own properties stay: materials may read them
+                one[name] = value
     bpy.data.texts.new("viewsphere").write(told["text"])
 
 

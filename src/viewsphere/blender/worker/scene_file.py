@@ -23,6 +23,8 @@ def open_scene(told):
     _only_color(scene)
     compositing.stop_writing()
     compositing.set_up(scene)
+    if not compositing.is_used(scene):
+        compositing.leave_out(scene)
     return scene
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 from mathutils import Matrix
 
-from . import ground, lights, materials, meshes, renderers, studio
+from . import ground, lights, materials, meshes, renderers, scripting, studio
 from .blurring import ORDER
 from .scene_file import open_scene
 
@@ -39,6 +39,8 @@ def stage(told):
     camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
     scene.collection.objects.link(camera)
     scene.camera = camera
+    if told["script"]:
+        scripting.run(scene, told["script"], told["order"])
     return {}
 
 
@@ -73,6 +75,11 @@ def _mesh(name, told, known, renderer):
     else:
         made = [materials.build_material(m, images, uv, has_colors, renderer == "cycles") for m in told["materials"]]
     return meshes.build_mesh(name, told, made)
+
+
+def is_placed(one):
+    """Whether an object is viewsphere's own, not one of a user's file."""
+    return ORDER in one
 
 
 def _place(scene, mesh, matrix, index):

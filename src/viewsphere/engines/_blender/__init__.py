@@ -7,6 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
     from pydantic import JsonValue
 
     from viewsphere.assets.deforming import Load
@@ -20,11 +22,16 @@ PROGRAMS = (Path(__file__).parent, Path(__file__).parents[2] / "blender" / "work
 
 
 def check(options: Mapping[str, JsonValue], renderer: str) -> None:
-    """Raise UserError for an option that is not known (with the nearest name), out of range, or without a Blender."""
+    """Raise UserError for an option that is not known (with the nearest name), out of range, without a Blender, or for a script
+    that is not there or not allowed.
+    """
     from viewsphere.blender.interpreter import find_blender
     from viewsphere.engines._blender.options import options_of
+    from viewsphere.engines._blender.scripts import check_script
 
-    find_blender(options_of(renderer, options).python)
+    checked = options_of(renderer, options)
+    check_script(checked.script)
+    find_blender(checked.python)
 
 
 def stage(shot: Shot, load: Load) -> CyclesStage:
@@ -35,6 +42,13 @@ def stage(shot: Shot, load: Load) -> CyclesStage:
     from viewsphere.engines._blender.staging import build_stage
 
     return build_stage(shot, load)
+
+
+def indices(shot: Shot, instant: int, sensor: int, load: Load) -> NDArray[np.int32] | None:
+    """Ids of the objects that Cycles sees in each pixel, (H, W) int32; see `index_pass.indices`."""
+    from viewsphere.engines._blender import index_pass
+
+    return index_pass.indices(shot, instant, sensor, load)
 
 
 def save(shot: Shot, samples: Sequence[Sample], load: Load, file: Path, data: str) -> tuple[str, ...]:

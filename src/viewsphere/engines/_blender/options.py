@@ -21,8 +21,8 @@ class Common:
     """Options of every renderer.
 
     samples: per pixel; threads: of one Blender, 0 for all cores; python: the interpreter that has bpy, None to look for it;
-    replace_after: shots after which Blender is started anew, 0 for never; settings: the renderer's own, by their names in
-    Python.
+    replace_after: shots after which Blender is started anew, 0 for never; script: a Python file that changes the staged
+    scene; settings: the renderer's own, by their names in Python.
     """
 
     renderer: ClassVar[Renderer]
@@ -32,6 +32,7 @@ class Common:
     threads: int = 1
     python: str | None = None
     replace_after: int = 100
+    script: str | None = None
     settings: Mapping[str, JsonValue] = field(default_factory=dict[str, JsonValue])
 
     @property
@@ -88,6 +89,7 @@ WORKBENCH_PRESETS = {"draft": Workbench(samples=5), "good": Workbench(), "final"
 
 WORKBENCH_SAMPLES = (1, 5, 8, 11, 16, 32)
 
+_PATHS = {"python": "a Python that has bpy", "script": "a Python file"}
 _CHOICES = {"denoise": get_args(Denoise), "device": get_args(Device)}
 _RANGES = {"samples": (1, 65536), "bounces": (0, 1024), "threads": (0, 1024), "replace_after": (0, 1_000_000)}
 
@@ -131,9 +133,9 @@ def _checked(name: str, value: JsonValue, default: Common) -> JsonValue:
         low, high = _RANGES[name]
         if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
             raise RecipeError(f"engine.{name}: expected an integer in {low}..{high}, found {value!r}")
-    elif name == "python":
+    elif name in _PATHS:
         if value is not None and not isinstance(value, str):
-            raise RecipeError(f"engine.python: expected the path of a Python that has bpy, found {value!r}")
+            raise RecipeError(f"engine.{name}: expected the path of {_PATHS[name]}, found {value!r}")
     elif name == "raytracing":
         if not isinstance(value, bool):
             raise RecipeError(f"engine.raytracing: expected true or false, found {value!r}")

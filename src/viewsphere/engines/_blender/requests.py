@@ -75,6 +75,7 @@ def scene_request(
     has_scenery = any(p.scenery for p in things)
     return {
         "meshes": request,
+        "order": [number for number, thing in enumerate(things) if is_staged(thing, scene)],
         "objects": objects,
         "ground": None if scene.ground is None else _ground_request(scene.ground, geometry, has_scenery, put),
         "lights": [frame.light(light) for light in _lights_request(scene, middle)],
@@ -133,6 +134,7 @@ def _file_request(blend: BlendScene) -> Request:
 def settings_request(options: AnyOptions) -> Request:
     """The worker's settings of a renderer."""
     request = asdict(options)
+    del request["script"]
     request["own"] = dict(request.pop("settings"))
     return {"renderer": options.renderer, **request}
 

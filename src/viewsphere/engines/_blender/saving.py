@@ -55,7 +55,10 @@ def save(shot: Shot, samples: Sequence[Sample], load: Load, file: Path, data: st
     set's name. Returns a line for everything that the file could not keep. Raises UserError where Blender cannot be used,
     ModelError where Blender dies twice.
     """
+    script: tuple[str, ...] = ()
     kept = shot.engine_options if shot.engine == "cycles" else {"python": shot.engine_options.get("python")}
+    if kept.get("script") is not None:
+        kept, script = {**kept, "script": None}, ("what engine.script changes is not in the file",)
     own = shot.model_copy(update={"engine": "cycles", "engine_options": {**kept, "device": "cpu"}})
     stage = build_stage(own, load).arrangement(0)
     finishes = [shot.finish(instant) for instant in range(len(shot.instants))]
@@ -64,7 +67,7 @@ def save(shot: Shot, samples: Sequence[Sample], load: Load, file: Path, data: st
     for _ in range(2):
         try:
             off = _ask(stage, request, finishes, samples[0].camera, file)
-            return tuple(_lacking(samples, finishes, off / max(pose["distance"] for pose in request["poses"])))
+            return script + tuple(_lacking(samples, finishes, off / max(pose["distance"] for pose in request["poses"])))
         except BlenderDied as error:
             stage.keeper.drop()
             died = error

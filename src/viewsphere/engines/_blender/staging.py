@@ -22,6 +22,7 @@ from viewsphere.engines._blender.file_frame import FileFrame
 from viewsphere.engines._blender.lens import resampled, views_of
 from viewsphere.engines._blender.options import AnyOptions, options_of
 from viewsphere.engines._blender.requests import Request, kinds_of, materials_request, scene_request
+from viewsphere.engines._blender.scripts import script_request
 from viewsphere.engines._blender.sweeping import Sweeping
 from viewsphere.engines._blender.texels import Kind, Levels
 from viewsphere.errors import BlenderDied, BlenderError, ModelError, RecipeError, UserError
@@ -231,7 +232,13 @@ class Arrangement:
             except BlenderDied as error:
                 self.keeper.drop()
                 died = error
-        raise ModelError(f"{', '.join(sorted({p.model.key for p in self.things}))}: {died}")
+        raise ModelError(f"{self._named}: {died}")
+
+    @property
+    def _named(self) -> str:
+        """What errors name: the .blend file that is the scene, else the models."""
+        blend = self.shot.scene.blend
+        return ", ".join(sorted({p.model.key for p in self.things})) if blend is None else blend.file
 
     def _rendered(self, camera: Camera, is_open: bool, clip: Clip, sweeping: Sweeping | None) -> Float32:
         views = views_of(camera)
@@ -248,7 +255,10 @@ class Arrangement:
         out = str(process.folder / "picture.npy")
         request = FileFrame.of(self.shot.scene.blend).camera(camera_request(camera, clip))
         told: Request = {"transparent": is_open, "border": border, "passes": [], "blur": blur}
-        process.ask("render", FRAME_SECONDS, camera=request, out=out, **told)
+        try:
+            process.ask("render", FRAME_SECONDS, camera=request, out=out, **told)
+        except BlenderError as error:
+            raise ModelError(f"{self._named}: {str(error).partition(': ')[2]}") from error
         return np.load(out)
 
     @cached_property
@@ -257,10 +267,10 @@ class Arrangement:
         return kinds_of(self.things, self.meshes, self.shot.scene)
 
     def _levels(self, cameras: Sequence[Camera]) -> AllLevels | None:
-        """Halvings of the models' pictures for these cameras. None (no halving) with OpenGL, which has mip levels, and in a
-        user's .blend scene, whose mirrors, lenses or compositor may magnify a picture.
+        """Halvings of the models' pictures for these cameras. None (no halving) with OpenGL, which has mip levels, in a user's
+        .blend scene, whose mirrors, lenses or compositor may magnify a picture, and with a script, whose materials stay.
         """
-        if self.options.draws or self.shot.scene.blend is not None:
+        if self.options.draws or self.shot.scene.blend is not None or self.options.script is not None:
             return None
         return tuple(kind.levels(cameras) for kind in self.kinds)
 
@@ -274,6 +284,7 @@ class Arrangement:
         """Build the scene in this Blender. Raises UserError for settings or devices that the renderer lacks."""
         shot = self.shot
         request = scene_request(self.things, self.meshes, self.geometry, shot.scene, self.options, process.put, levels)
+        request["script"] = script_request(self.options, shot)
         try:
             process.ask("stage", STAGE_SECONDS, **request)
         except BlenderError as error:

@@ -263,10 +263,12 @@ def occlude(count, occlusion, b):
     With a ground, OPEN is the share of the cosine-weighted upper sky, BOUNCE that of the ground's light; without one both are
     the share of the whole hemisphere above the surface. The occlusion texture (row AO) is in both.
     """
-    is_ground, box = b[GROUND] > f4(0), _bound(count, b)
+    hiders, is_ground = U(occlusion.frame.shape[0]), b[GROUND] > f4(0)
+    # To bound a block costs as much as one volume's share of a still picture saves.
+    box = _bound(count if hiders > U(1) else U(0), b)
     _begin(count, b)
-    for k in range(U(occlusion.frame.shape[0])):
-        if not _is_beyond(box, occlusion.reach[k], is_ground):
+    for k in range(hiders):
+        if hiders == U(1) or not _is_beyond(box, occlusion.reach[k], is_ground):
             _hide(count, occlusion, k, is_ground, b)
             _take(count, b)
     _darken(count, b)

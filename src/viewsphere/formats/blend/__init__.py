@@ -42,6 +42,9 @@ from viewsphere.zoo import build
 ENGINE = "cycles"
 """The engine that builds and saves the scenes."""
 
+ANNOTATES = False  # what is hidden is part of a scene, too
+CHANNELS = ()
+
 
 def check() -> None:
     """Raise UserError where there is no Blender."""
@@ -92,8 +95,7 @@ def _save(dataset: Dataset, folder: Path, groups: Collection[_Group]) -> Iterato
         shots, instants, samples = zip(*_views(dataset, group), strict=True)
         name = group.model if counts[group.model] == 1 else f"{group.model}-{samples[0].index:06d}"
         own = shots[0].model_copy(update={"instants": instants})
-        shown = zip(own.objects, samples[0].objects, strict=False)
-        load = _Models(dataset, {(thing.model, thing.step): (o.track or o.key, o.key) for thing, o in shown})
+        load = StoredModels.of(dataset, own, samples[0])
         yield from plugins.load("engines", ENGINE).save(own, samples, load, folder / f"{name}.blend", dataset.name)
 
 
@@ -170,7 +172,7 @@ def _spec(key: str, source: str) -> ModelSpec:
 
 
 @dataclass(frozen=True, eq=False)
-class _Models:
+class StoredModels:
     """Normalised meshes: of objects, by `keys` of the data set (a model's, and that of what is shown of it), what it keeps of
     them; of scenery, what its source gives.
     """
@@ -178,7 +180,14 @@ class _Models:
     dataset: Dataset
     keys: Mapping[tuple[ModelSpec, TimeStep | None], tuple[str, str]]
 
+    @classmethod
+    def of(cls, dataset: Dataset, shot: Shot, sample: Sample) -> StoredModels:
+        """Those that a sample of a shot shows."""
+        shown = zip(shot.objects, sample.objects, strict=False)
+        return cls(dataset, {(thing.model, thing.step): (o.track or o.key, o.key) for thing, o in shown})
+
     def __call__(self, spec: ModelSpec, step: TimeStep | None = None, /) -> Mesh:
+        """The normalised mesh; raises StoreError for a model that the store has lost, ModelError for a file of scenery."""
         if (spec, step) not in self.keys:
             return load_normalised(spec, _from_zoo, step=step)
         key, own = self.keys[spec, step]

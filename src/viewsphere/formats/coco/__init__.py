@@ -1,12 +1,12 @@
 """COCO instances (https://cocodataset.org/#format-data) with the extra keys of Ruiz et al. 2019.
 
     annotations/instances_<split>.json
-    <split>/<image id>.png, <split>/MASK/<image id>.png     (_<object id> if frames hold several objects)
+    images/<split>/<image id>.png, images/<split>/MASK/<image id>.png     (_<object id> if frames hold several objects)
     MODELS/<key>/<key>.obj, .glb, ...
 
-Large data sets have numbered sub-folders. Image and annotation ids count from 1 and come from the plan:
-they do not depend on what is finished. Segmentations are polygons that pycocotools rasterises to the
-identical mask. Imported annotations are kept unchanged, except for their ids.
+Large data sets have numbered sub-folders. Image and annotation ids count from 1 and come from the plan: they do not depend
+on what is finished. `Options` say how categories are numbered and where pictures lie. Segmentations are polygons that
+pycocotools rasterises to the identical mask. Imported annotations are kept unchanged, except for their ids.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from viewsphere.errors import UserError
 from viewsphere.formats._contents import put
 from viewsphere.formats.coco.entries import files, seen
 from viewsphere.formats.coco.instances import instances
+from viewsphere.formats.coco.options import Options as Options
 from viewsphere.formats.coco.proving import verify as verify
 from viewsphere.formats.coco.reading import read as read
 from viewsphere.model.channel import missing
@@ -29,19 +30,21 @@ CHANNELS = ("rgb",)
 
 
 @contextmanager
-def writer(dataset: Dataset, folder: Path, note: Callable[[str], None]) -> Generator[Callable[[Sample], None]]:
+def writer(
+    dataset: Dataset, folder: Path, note: Callable[[str], None], options: Options
+) -> Generator[Callable[[Sample], None]]:
     """Write the instances JSON of each split, images, masks and models.
 
     Raises UserError if the data set has no picture: channel `rgb`, or else `rgba`.
     """
     if missing(CHANNELS, dataset.plan.channels):
         raise UserError(f"{dataset.root}: format coco: expected channel rgb, found none: add it to the recipe's channels")
-    with instances(dataset, folder / "annotations") as append:
+    with instances(dataset, folder / "annotations", options) as append:
 
         def add(sample: Sample) -> None:
             masks = seen(sample)
             append(sample, masks)
-            for _, name, content in files(dataset, sample, masks):
+            for _, name, content in files(dataset, sample, masks, options):
                 put(dataset, content, folder / name)
 
         yield add

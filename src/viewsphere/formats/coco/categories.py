@@ -1,9 +1,10 @@
-"""Ids of categories: COCO's own for its 80 names."""
+"""Ids of categories: from 1 without gaps, or COCO's own for its 80 names."""
 
 from __future__ import annotations
 
 from itertools import chain
 
+from viewsphere.formats.coco.options import Options
 from viewsphere.store import Category, Dataset
 
 _NAMES = {
@@ -34,10 +35,10 @@ _OTHER_SPELLINGS = {
 _FIRST_FREE_ID = 91
 
 
-def category_ids(dataset: Dataset) -> dict[int, int]:
-    """COCO id of each category of the data set. If the data set has imported pictures, their categories keep their
-    ids and the others get free ones; else COCO's 80 names, in any spelling, have COCO's ids and others free ones above 90.
-    """
+def category_ids(dataset: Dataset, options: Options) -> dict[int, int]:
+    """The exported id of each category of the data set, by its own."""
+    if options.category_ids == "contiguous":
+        return {category.id: number for number, category in enumerate(dataset.categories, 1)}
     if any(part.frames and not part.settings for part in dataset.plan.parts):
         return {category.id: category.id for category in dataset.categories}
     return official_ids(dataset.categories)

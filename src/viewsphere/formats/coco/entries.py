@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from viewsphere.formats._contents import Expected
 from viewsphere.formats._paper import faces, transformation_matrix
+from viewsphere.formats.coco.options import Options
 from viewsphere.geometry.mask import mask_polygons
 from viewsphere.model.sample import Box, ObjectAnnotation, Sample
 from viewsphere.store import Dataset
@@ -26,14 +27,15 @@ def seen(sample: Sample) -> Masks:
     return {o.id: o.mask for o in sample.objects if o.area}
 
 
-def files(dataset: Dataset, sample: Sample, masks: Masks) -> Iterator[Expected]:
+def files(dataset: Dataset, sample: Sample, masks: Masks, options: Options) -> Iterator[Expected]:
     """The files of a sample: picture and masks, with their paths from the export's folder; none without a picture."""
     if sample.picture_file is None:
         return
-    yield sample.index, f"{sample.split}/{_image_file(dataset, sample)}", sample.picture_file
+    folder = options.folder(sample.split)
+    yield sample.index, f"{folder}/{_image_file(dataset, sample)}", sample.picture_file
     for o in sample.objects:
         if o.source is None and o.area:
-            yield sample.index, f"{sample.split}/{_mask_file(dataset, sample, o)}", masks[o.id]
+            yield sample.index, f"{folder}/{_mask_file(dataset, sample, o)}", masks[o.id]
 
 
 def annotations_of(dataset: Dataset, sample: Sample, ids: Mapping[int, int], masks: Masks) -> Iterator[dict[str, Any]]:

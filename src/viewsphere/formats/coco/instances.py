@@ -12,8 +12,10 @@ from typing import Any
 from viewsphere.formats._paper import json_bytes, vehicles
 from viewsphere.formats.coco.categories import category_ids
 from viewsphere.formats.coco.entries import Masks, annotations_of, image
+from viewsphere.formats.coco.options import Options
 from viewsphere.model.sample import Sample
 from viewsphere.store import Dataset
+from viewsphere.store.credits import credited
 
 
 def file_name(split: str) -> str:
@@ -22,10 +24,10 @@ def file_name(split: str) -> str:
 
 
 @contextmanager
-def instances(dataset: Dataset, folder: Path) -> Generator[Callable[[Sample, Masks], None]]:
+def instances(dataset: Dataset, folder: Path, options: Options) -> Generator[Callable[[Sample, Masks], None]]:
     """Write the files of all splits into this folder: gives a function that appends a frame to its split's file."""
     folder.mkdir(exist_ok=True)
-    ids = category_ids(dataset)
+    ids = category_ids(dataset, options)
     head = json_bytes(_head(dataset, ids))[:-1]
     with ExitStack() as stack:
         files = {split: stack.enter_context(_instances(folder / file_name(split), head)) for split in dataset.splits}
@@ -57,9 +59,23 @@ def _instances(file: Path, head: bytes) -> Generator[Callable[[dict[str, Any], I
 
 
 def _head(dataset: Dataset, ids: Mapping[int, int]) -> dict[str, Any]:
+    info = {"description": dataset.name, "version": "1.0", "contributor": f"viewsphere {dataset.plan.version}"}
+    licenses, credits = _terms(dataset)
     return {
-        "info": {"description": dataset.name, "version": "1.0", "contributor": f"viewsphere {dataset.plan.version}"},
-        "licenses": [],
+        "info": {**info, "credits": credits} if credits else info,
+        "licenses": licenses,
         "categories": [{"id": ids[c.id], "name": c.name, "supercategory": c.supercategory} for c in dataset.categories],
         "models": vehicles(dataset.models),
     }
+
+
+def _terms(dataset: Dataset) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
+    """The list of licences, ids from 1; and whose the models are, each with its licence's id."""
+    groups = {credit: keys for credit, keys in credited(dataset.models).items() if credit}
+    names = dict.fromkeys(credit.licence for credit in groups if credit.licence)
+    ids = {name: number for number, name in enumerate(names, 1)}
+    credits = [
+        {"models": keys, **credit.model_dump(exclude_none=True), **({"license": ids[credit.licence]} if credit.licence else {})}
+        for credit, keys in groups.items()
+    ]
+    return [{"id": ids[name], "name": name, "url": name if name.startswith("http") else ""} for name in ids], credits

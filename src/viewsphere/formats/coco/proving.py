@@ -13,6 +13,7 @@ from viewsphere.formats._json_proof import check_json
 from viewsphere.formats._json_rows import Where
 from viewsphere.formats.coco.entries import Masks, files, seen
 from viewsphere.formats.coco.instances import file_name, instances
+from viewsphere.formats.coco.options import Options
 from viewsphere.formats.coco.witness import testify
 from viewsphere.model.sample import Sample
 from viewsphere.store import Dataset
@@ -21,28 +22,32 @@ OPENED: tuple[Where, ...] = ((), ("categories",), ("models",), ("images",), ("an
 """What of an instances file is compared, and read, item by item."""
 
 
-def verify(dataset: Dataset, folder: Path, sampled: Collection[int]) -> Iterator[Remark]:
+def verify(dataset: Dataset, folder: Path, sampled: Collection[int], options: Options) -> Iterator[Remark]:
     """All that is not as it would be exported now. Of the `sampled` frames pycocotools' masks have to be those of the stored
     instance maps, and detections made from the latter have to score AP 1.
     """
     names = [file_name(split) for split in dataset.splits]
     with TemporaryDirectory() as aside:
-        with instances(dataset, Path(aside)) as append:
-            expected, again = _expected(dataset, append), _expected(dataset, lambda sample, masks: None)
+        with instances(dataset, Path(aside), options) as append:
+            expected, again = _expected(dataset, append, options), _expected(dataset, _nowhere, options)
             yield from check_files(dataset, folder, expected, again, [f"annotations/{name}" for name in names])
         for name in names:
             yield from check_json(Path(aside) / name, folder / "annotations" / name, OPENED, _frame)
         for split in dataset.splits:
-            yield from testify(dataset, folder / "annotations" / file_name(split), split, sampled)
+            yield from testify(dataset, folder / "annotations" / file_name(split), split, sampled, options)
 
 
-def _expected(dataset: Dataset, append: Callable[[Sample, Masks], None]) -> Iterator[Expected]:
+def _expected(dataset: Dataset, append: Callable[[Sample, Masks], None], options: Options) -> Iterator[Expected]:
     """All files but the instances, for which every frame is appended elsewhere."""
     for sample in dataset:
         masks = seen(sample)
         append(sample, masks)
-        yield from files(dataset, sample, masks)
+        yield from files(dataset, sample, masks, options)
     yield from models(dataset)
+
+
+def _nowhere(sample: Sample, masks: Masks) -> None:
+    """Where frames are appended whose files alone are wanted."""
 
 
 def _frame(where: Where, value: Any) -> int | None:

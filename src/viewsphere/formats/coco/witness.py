@@ -18,6 +18,7 @@ from viewsphere.errors import ViewsphereError
 from viewsphere.formats import Remark
 from viewsphere.formats._json_rows import rows
 from viewsphere.formats.coco.categories import category_ids
+from viewsphere.formats.coco.options import Options
 from viewsphere.geometry.mask import encode_rle, mask_box
 from viewsphere.model.sample import Sample
 from viewsphere.store import Dataset
@@ -39,14 +40,14 @@ class _Truth:
     box: list[int]  # x, y, width, height
 
 
-def testify(dataset: Dataset, file: Path, split: str, sampled: Collection[int]) -> Iterator[Remark]:
+def testify(dataset: Dataset, file: Path, split: str, sampled: Collection[int], options: Options) -> Iterator[Remark]:
     """Masks, areas and boxes that differ from those of the instance maps, and an AP below 1 of detections made from these.
 
     Imported frames are left out: nobody knows their true masks.
     """
     positions = sorted(sampled)
     samples = (dataset[i] for i in positions[:: max(1, -(-len(positions) // MOST_FRAMES))])
-    ids = category_ids(dataset)
+    ids = category_ids(dataset, options)
     truths = {
         dataset.plan.annotation_id(sample.index, number): truth
         for sample in samples
@@ -91,7 +92,7 @@ def _loaded(file: Path, images: Collection[int]) -> Any:
             value[name].append(row)
     with TemporaryDirectory() as aside, contextlib.redirect_stdout(io.StringIO()):
         part = Path(aside) / file.name
-        part.write_text(json.dumps(value), "utf-8")
+        part.write_text(json.dumps(value), "utf-8", newline="\n")
         return COCO(part)
 
 

@@ -20,6 +20,7 @@ from viewsphere.geometry.box import box_size
 from viewsphere.geometry.mask import mask_box, mask_polygons
 from viewsphere.labels import channels
 from viewsphere.model.camera import Camera, Distortion, Intrinsics
+from viewsphere.model.credit import Credit
 from viewsphere.model.instant import Viewpoint
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.model.thing import TimeStep
@@ -134,7 +135,7 @@ def _vehicles(
         try:
             yield _model(key, file, vehicle, categories[str(vehicle.get("category") or "object")])
         except MISTAKES as error:
-            problems.append(f"{root}: vehicle {key}: expected its bbox3D_model and real_size; found {error}")
+            problems.append(f"{root}: vehicle {key}: expected its bbox3D_model, real_size and credit; found {error}")
 
 
 def _model(key: str, file: Path, vehicle: dict[str, Any], category: Category) -> ForeignModel:
@@ -160,6 +161,7 @@ def _model(key: str, file: Path, vehicle: dict[str, Any], category: Category) ->
         digest=hashlib.sha256(file.read_bytes()).hexdigest(),
         step=TimeStep(frame=int(vehicle["frame"]), seconds=float(vehicle.get("seconds", 0))) if animation else None,
         track=str(vehicle.get("id_track", "")) if animation else "",
+        credit=Credit.model_validate(vehicle["credit"]) if "credit" in vehicle else None,
     )
     return ForeignModel(info, file.parent)
 

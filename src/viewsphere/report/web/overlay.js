@@ -150,15 +150,15 @@ function facePoints(name, points) {
   return corners.every(Boolean) ? corners : null;
 }
 
-/** The front is filled, so that one sees at once which way an object faces. */
+/** The front is filled, so that one sees at once which way an object faces; paler than a mask under it. */
 function drawFace({ pen }, object, name, points) {
   const corners = facePoints(name, points);
   if (!corners || name !== "front") return;
   pen.beginPath();
   corners.forEach((p) => pen.lineTo(...p));
   pen.closePath();
-  pen.globalAlpha = 0.32;
-  pen.fillStyle = color(object);
+  pen.globalAlpha = layers.has("masks") ? 0.22 : 0.32;
+  pen.fillStyle = layers.has("masks") ? paled(color(object)) : color(object);
   pen.fill();
   pen.globalAlpha = 1;
 }
@@ -204,12 +204,13 @@ function paintMask(pixels, object, step) {
   const [rows, columns, code] = object.rle;
   const mask = decodeRle(code, rows, columns);
   const [r, g, b] = rgb(color(object));
+  const fill = layers.has("boxes3d") ? 90 : 150; // the faces and their names are read through it
   const inside = (x, y) => x >= 0 && y >= 0 && x < width && y < height && mask[x * step * rows + y * step];
   for (let x = 0; x < width; x++) {
     for (let y = 0; y < height; y++) {
       if (!inside(x, y)) continue;
       const edge = !(inside(x - 1, y) && inside(x + 1, y) && inside(x, y - 1) && inside(x, y + 1));
-      pixels.data.set([r, g, b, edge ? 255 : 150], 4 * (y * width + x));
+      pixels.data.set([r, g, b, edge ? 255 : fill], 4 * (y * width + x));
     }
   }
 }

@@ -4,6 +4,9 @@ import { el, token } from "report/dom.js";
 
 const { Color, DirectionalLight, HemisphereLight, OrbitControls, PerspectiveCamera, Scene, Vector3, WebGLRenderer } = globalThis.viewsphereVendor;
 
+// Pixels drawn across one of the page, at least: browsers without multisampling show smooth edges, too.
+const SAMPLES = Math.min(Math.max(window.devicePixelRatio || 1, 2), 3);
+
 export const themeColor = (name) => new Color(token(name));
 
 /** World axes as everywhere in viewsphere: Z up, azimuth 0 looks at the front, which faces -Y. */
@@ -49,7 +52,7 @@ export function makeStage(holder, label) {
   new ResizeObserver(() => {
     const { clientWidth: width, clientHeight: height } = holder;
     if (!width || !height) return;
-    renderer.setPixelRatio(Math.min(window.devicePixelRatio || 1, 2));
+    renderer.setPixelRatio(SAMPLES);
     renderer.setSize(width, height, false);
     camera.aspect = width / height;
     camera.updateProjectionMatrix();

@@ -15,7 +15,7 @@ export const LAYERS = [
   { name: "tracks", label: "Tracks", key: "t" },
 ];
 
-export const layers = new Set();
+export const layers = new Set(["boxes"]);
 
 export const EVERYTHING = { category: "", model: "", split: "", pose: "", low: 0, high: 1, cell: null, order: "mixed" };
 

@@ -2,7 +2,7 @@
 another.
 
 What a kind needs stands here: what it is asked (`Start`, `Pose`), where it may go (`Lane`, `curve_through`), and how it
-turns on its way (`headed`). What a recipe says becomes a thing's motion by `motion_of`.
+turns on its way (`headed`). What a recipe says becomes a thing's motion by `mover`.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from viewsphere.model.frozen import Frozen
 from viewsphere.model.numbers import Strength
 from viewsphere.recipe.draws import Drawn
 from viewsphere.sampling.motion._heading import Heading, headed, to_the_right
-from viewsphere.sampling.motion._made import check_motion, check_motions, motion_of
+from viewsphere.sampling.motion._made import Mover, check_motion, check_motions, mover
 from viewsphere.sampling.motion._start import Origin, Pose, Start
 from viewsphere.sampling.motion._way import curve_through
 from viewsphere.zoo.places import Lane
@@ -25,6 +25,7 @@ __all__ = [
     "Lane",
     "Move",
     "Movement",
+    "Mover",
     "Origin",
     "Pose",
     "Start",
@@ -32,7 +33,7 @@ __all__ = [
     "check_motions",
     "curve_through",
     "headed",
-    "motion_of",
+    "mover",
     "to_the_right",
 ]
 

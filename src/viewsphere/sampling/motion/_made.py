@@ -3,22 +3,20 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
-from pydantic import ValidationError
 
 from viewsphere import plugins
 from viewsphere.errors import RecipeError
-from viewsphere.model.frozen import Frozen
-from viewsphere.model.mistakes import one_of, report
+from viewsphere.model.mistakes import one_of, read_options
 from viewsphere.model.scene import Matrix4
 from viewsphere.model.thing import Motion, TimeStep
 from viewsphere.recipe.draws import RngOf, drawn
-from viewsphere.recipe.motion import MotionEntry, Motions, listed
+from viewsphere.recipe.motion import MotionEntry, Motions, has_clip, listed
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.sampling.motion._start import Pose, Start
 
@@ -32,11 +30,31 @@ DIGITS = 10
 
 
 def check_motions(recipe: Recipe) -> None:
-    """Raise RecipeError for the first of a recipe's motions that cannot be: without `time`, or as `check_motion` says."""
+    """Raise RecipeError for the first of a recipe's motions that cannot be: without `time`, or as `check_motion` says; or
+    for a clip that nothing plays.
+    """
     for field, motions in _all_motions(recipe):
         if recipe.time is None:
             raise RecipeError(f"{field}: expected time beside motions; found none: set time, such as time: {{frames: 50}}")
         check_motion(motions, field)
+    _check_clips(recipe)
+
+
+def _check_clips(recipe: Recipe) -> None:
+    """A clip that is named is played: by the model, or by its company."""
+    company = recipe.scene.company
+    for i, entry in enumerate(recipe.models):
+        playing = (entry.motion, None if company is None else company.motion)
+        if entry.clip is not None and entry.frames is None and not any(map(has_clip, playing)):
+            raise RecipeError(
+                f"models[{i}].clip: expected frames, or a motion of kind clip of the model or of scene.company, that plays "
+                f"{entry.clip}; found neither"
+            )
+        if entry.fps is not None and entry.frames is None and not any(map(has_clip, playing)):
+            raise RecipeError(
+                f"models[{i}].fps: expected frames, or a motion of kind clip of the model or of scene.company, of which "
+                f"{entry.fps:g} make a second; found neither"
+            )
 
 
 def _all_motions(recipe: Recipe) -> Iterator[tuple[str, Motions]]:
@@ -57,27 +75,36 @@ def check_motion(motions: Motions | None, field: str) -> None:
         _options(entry, where)
 
 
-def motion_of(motions: Motions | None, start: Start, times: Sequence[float]) -> Motion:
-    """Where a thing is at these times, seconds, and what of its file it shows; one for all times where they are equal.
+@dataclass(frozen=True, eq=False)
+class Mover:
+    """What moves a thing, everything drawn: where it is at any time, whatever other times are asked for."""
 
-    It stands still where it has no motions. Each of several moves the pose that the ones before gave. Where one says that the
-    thing is not there, it is not. Poses are rounded to 1e-10 m; for the same bytes however a sequence is cut, ask for all its
-    times at once. Raises RecipeError where a motion cannot be.
+    start: Start
+    moves: tuple[Move, ...]
+
+    def state(self, time: float) -> tuple[Matrix4 | None, TimeStep | None]:
+        """World from object at a time, seconds, to 1e-10 m, None where it is not there; and what it shows of its file."""
+        pose = self._at(time)
+        return (None, None) if pose is None else (_recorded(pose, self.start.placed), pose.step)
+
+    def at(self, times: Sequence[float]) -> Motion:
+        """Where the thing is at times that follow one another, seconds, and what it shows; one for all where they are equal."""
+        poses, steps = zip(*map(self.state, times), strict=True)
+        return Motion(poses=_one(poses), steps=_one(_lasting(steps)))
+
+    def _at(self, time: float) -> Pose | None:
+        pose: Pose | None = Pose(np.array(self.start.placed, np.float64))
+        for move in self.moves:
+            if pose is not None:
+                pose = move(time, pose)
+        return pose
+
+
+def mover(motions: Motions | None, start: Start) -> Mover:
+    """What these motions are of one thing, which stands still where there are none. Each moves the pose that the ones before
+    gave; where one says that the thing is not there, it is not. Raises RecipeError where a motion cannot be.
     """
-    moves = tuple(_moves(motions, start))
-    poses = [_at(time, start, moves) for time in times]
-    return Motion(
-        poses=_one([None if pose is None else _recorded(pose, start.placed) for pose in poses]),
-        steps=_one(_lasting([None if pose is None else pose.step for pose in poses])),
-    )
-
-
-def _at(time: float, start: Start, moves: Iterable[Move]) -> Pose | None:
-    pose: Pose | None = Pose(np.array(start.placed, np.float64))
-    for move in moves:
-        if pose is not None:
-            pose = move(time, pose)
-    return pose
+    return Mover(start, tuple(_moves(motions, start)))
 
 
 def _moves(motions: Motions | None, start: Start) -> Iterator[Move]:
@@ -118,20 +145,7 @@ def _options(entry: MotionEntry, field: str) -> tuple[Movement, Any]:
     if entry.kind not in known:
         raise RecipeError(f"{field}.kind: {one_of(entry.kind, known)}")
     module: Movement = plugins.load("motions", entry.kind)
-    return module, _read(module.Options, entry.options, field)
-
-
-def _read(kind: type[Frozen], options: dict[str, Any], field: str) -> Frozen:
-    try:
-        return kind.model_validate(options)
-    except ValidationError as error:
-        lines = report(error, options).splitlines()
-        raise RecipeError("\n".join(_below(field, line) for line in lines)) from None
-
-
-def _below(field: str, line: str) -> str:
-    """A mistake of an option as one of the field's; `recipe` stands for all options."""
-    return f"{field}{line.removeprefix('recipe')}" if line.startswith("recipe: ") else f"{field}.{line}"
+    return module, read_options(module.Options, entry.options, field)
 
 
 def _recorded(pose: Pose, placed: Matrix4) -> Matrix4:

@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.errors import MissingExtraError
+from viewsphere.geometry.box import box_vertices
+from viewsphere.geometry.rotation import transform
 
 Float = NDArray[np.float64]
 
@@ -22,6 +24,11 @@ class Shape:
 
     box: Float
     vertices: Callable[[], Float]
+
+    def turned(self, rotation: Float) -> Shape:
+        """The shape turned by a rotation (3, 3) in its own axes; raises ModelError if the model's file cannot be used."""
+        points = transform(rotation, self.vertices())
+        return Shape(box_vertices(points.min(axis=0), points.max(axis=0)), lambda: points)
 
     @cached_property
     def hull(self) -> Float:

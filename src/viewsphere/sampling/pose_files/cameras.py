@@ -28,7 +28,8 @@ def read_cameras(path: Path, entry: PoseList, zooms: bool = False) -> PoseFile:
     with Blenders.none_yet() as blenders:
         try:
             frames = _frames(path, entry, blenders)
-            about = {"camera": entry.camera, "frames": frames, "at": entry.at, "size": entry.size, "clip": entry.clip}
+            about = {"camera": entry.camera, "frames": frames, "at": entry.at, "size": entry.size}
+            about |= {"clip": entry.clip, "fps": entry.fps}
             told = blenders.told(path, entry.confined, "cameras", about)["cameras"]
         except ModelError as error:
             raise RecipeError(f"viewpoints: {error}") from None
@@ -42,7 +43,7 @@ def read_cameras(path: Path, entry: PoseList, zooms: bool = False) -> PoseFile:
 def _frames(path: Path, entry: PoseList, blenders: Blenders) -> tuple[int, ...] | None:
     if entry.frames is None:
         return None
-    line = blenders.timeline(path, entry.confined, entry.clip)
+    line = blenders.timeline(path, entry.confined, entry.clip, entry.fps)
     chosen = chosen_frames(entry.frames, line.first, line.last)
     beyond = [frame for frame in chosen if not line.first <= frame <= line.last]
     if beyond or not chosen:

@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 
 import numpy as np
 
 from viewsphere.errors import RecipeError
+from viewsphere.model.mistakes import nearest
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Vector
 from viewsphere.model.thing import Motion, Thing
 from viewsphere.recipe.motion import Motions
 from viewsphere.recipe.sequence import TimeEntry
 from viewsphere.sampling.composition import BoxOf, center, center_of_all, still
-from viewsphere.sampling.motion import Lane, Start, motion_of
+from viewsphere.sampling.motion import Lane, Start, mover
 from viewsphere.sampling.placing import standing
+from viewsphere.sampling.samplers._moving import Moving
 from viewsphere.sampling.samplers._random import scene_things
 from viewsphere.sampling.samplers._stock import Stock
 from viewsphere.sampling.scenery import SceneryPiece
@@ -27,35 +29,34 @@ from viewsphere.sampling.trajectories import standing as steady
 
 
 @dataclass(frozen=True, eq=False)
-class Mover:
-    """What moves a thing."""
-
-    motions: Motions
-    start: Start
-
-    def at(self, times: Sequence[float]) -> Motion:
-        """Where the thing is at these times."""
-        return motion_of(self.motions, self.start, times)
-
-
-@dataclass(frozen=True, eq=False)
 class Course:
-    """One sequence: its things, moving at all instants, and what moves each; what cameras look at that have no target of their
-    own; and where the rig is at all instants, None where it stands still at its viewpoint.
+    """One sequence: its things as they are placed, and what moves each, None where it stands still; what cameras look at that
+    have no target of their own; and where the rig is at all instants, None where it stands still at its viewpoint.
     """
 
     things: tuple[Thing, ...]
-    movers: tuple[Mover | None, ...]
+    moving: tuple[Moving | None, ...]
     focus: Vector
     rig: tuple[RigPose, ...] | None
 
     def things_during(self, instants: Sequence[int]) -> tuple[Thing, ...]:
-        """The things at some instants. What moves in the sequence is not still where it rests for a while."""
-        return tuple(thing.model_copy(update={"motion": _during(thing.motion, instants)}) for thing in self.things)
+        """The things at some instants."""
+        pairs = zip(self.things, self.moving, strict=True)
+        return tuple(_with(thing, moving and moving.during(instants)) for thing, moving in pairs)
 
     def focus_at(self, instant: int, follows: bool, box_of: BoxOf) -> Vector:
         """What cameras look at that have no target of their own, and may follow the first thing."""
-        return center(self.things[0].at(instant), box_of) if follows else self.focus
+        return center(_at(self.things[0], self.moving[0], instant), box_of) if follows else self.focus
+
+
+def _with(thing: Thing, motion: Motion | None) -> Thing:
+    """The thing with this motion; None: as it is placed."""
+    return thing if motion is None else thing.model_copy(update={"motion": motion})
+
+
+def _at(thing: Thing, moving: Moving | None, instant: int) -> Thing:
+    """The thing as it is at an instant: standing still there, or not there."""
+    return _with(thing, moving and moving.at(instant))
 
 
 def time_of(stock: Stock) -> TimeEntry:
@@ -76,27 +77,18 @@ def course(stock: Stock, subject: str, start: int, box_of: BoxOf) -> Course:
     names = (subject, stock.pose_list.place(start))
     lanes = () if stock.composition is None else stock.composition.lanes(subject, around)
 
-    pieces: list[Mover | None] = []
+    pieces: list[Moving | None] = []
 
     def piece_moved(thing: Thing, piece: SceneryPiece) -> Thing:
-        pieces.append(_mover(stock, thing, piece.motion, piece.field, (*names, piece.name), lanes))
+        pieces.append(piece_moving(stock, thing, piece, names, lanes))
         return thing
 
     things = targets
     if stock.composition is not None:
         things = stock.composition.things(subject, targets, around, box_of, piece_moved)
-    movers = [
-        _mover(stock, thing, *_motions(stock, thing.model, i), (*names, str(i), thing.model.key), lanes)
-        for i, thing in enumerate(targets)
-    ]
-    movers += pieces
-    times = [time_of(stock).at(i) for i in range(time_of(stock).count)]
-    moved = (
-        thing if mover is None else thing.model_copy(update={"motion": mover.at(times)})
-        for thing, mover in zip(things, movers, strict=True)
-    )
-    things = stock.repainted(tuple(moved), subject, start)
-    return Course(things, tuple(movers), focus, _rig(stock, things, focus, subject, start, lanes, box_of))
+    own = [target_moving(stock, thing, i, names, lanes) for i, thing in enumerate(targets)]
+    made = Course(stock.repainted(things, subject, start), (*own, *pieces), focus, None)
+    return replace(made, rig=_rig(stock, made, subject, start, lanes, box_of))
 
 
 def placed_targets(stock: Stock, subject: str, pose: str | None, box_of: BoxOf) -> tuple[Thing, ...]:
@@ -114,9 +106,19 @@ def middle(things: Sequence[Thing], box_of: BoxOf) -> Vector:
     return center(things[0], box_of) if len(things) == 1 else center_of_all(things, box_of)
 
 
-def _mover(
+def target_moving(stock: Stock, thing: Thing, slot: int, names: Names, lanes: tuple[Lane, ...]) -> Moving | None:
+    """What moves a target, the one of this number, in the sequence of these names; None where it stands still."""
+    return _moving(stock, thing, *_motions(stock, thing.model, slot), (*names, str(slot), thing.model.key), lanes)
+
+
+def piece_moving(stock: Stock, thing: Thing, piece: SceneryPiece, names: Names, lanes: tuple[Lane, ...]) -> Moving | None:
+    """What moves a piece of scenery in the sequence of these names; None where it stands still."""
+    return _moving(stock, thing, piece.motion, piece.field, (*names, piece.name), lanes)
+
+
+def _moving(
     stock: Stock, thing: Thing, motions: Motions | None, field: str, names: Names, lanes: tuple[Lane, ...]
-) -> Mover | None:
+) -> Moving | None:
     """What moves a thing, drawn for these names; None where it stands still."""
     if motions is None:
         return None
@@ -124,7 +126,7 @@ def _mover(
     place = stock.position.get(thing.model.key)
     line = None if place is None else stock.timelines[place]
     start = Start(thing.world_from_object, thing.model, time.at(time.count - 1), rng, lanes)
-    return Mover(motions, start.playing(line, field))
+    return Moving(mover(motions, start.playing(line, field)), time)
 
 
 def _motions(stock: Stock, spec: ModelSpec, slot: int) -> tuple[Motions | None, str]:
@@ -136,16 +138,8 @@ def _motions(stock: Stock, spec: ModelSpec, slot: int) -> tuple[Motions | None, 
     return stock.recipe.models[number].motion, f"models[{number}].motion"
 
 
-def _during(motion: Motion, instants: Sequence[int]) -> Motion:
-    if motion.is_still:
-        return motion
-    poses = motion.poses if len(motion.poses) == 1 else tuple(motion.poses[i] for i in instants)
-    steps = motion.steps if len(motion.steps) == 1 else tuple(motion.steps[i] for i in instants)
-    return Motion(poses=poses, steps=steps, moves=True)
-
-
 def _rig(
-    stock: Stock, things: Sequence[Thing], focus: Vector, subject: str, start: int, lanes: tuple[Lane, ...], box_of: BoxOf
+    stock: Stock, course: Course, subject: str, start: int, lanes: tuple[Lane, ...], box_of: BoxOf
 ) -> tuple[RigPose, ...] | None:
     """Where the rig is at all instants, None where it stands still."""
     time, views = time_of(stock), stock.views_of(subject)
@@ -153,8 +147,8 @@ def _rig(
     names = (subject, stock.pose_list.place(start))
     world = World(
         time.fps,
-        focus,
-        lambda thing, instant: np.array(_center(things, thing, instant, box_of)),
+        course.focus,
+        lambda thing, instant: np.array(_center(course, thing, instant, box_of)),
         partial(generator, stock.recipe.seed, "rig", *names),
         lanes,
     )
@@ -166,20 +160,28 @@ def _rig(
     follows = stock.recipe.viewpoints.target == "follow"
     held = []
     for i in range(time.count):
-        at = center(things[0].at(i), box_of) if follows else focus
+        at = course.focus_at(i, follows, box_of)
         held.append(steady(stock.viewpoint(subject, views[start + i], at), at))
     return shaken(held, shake, times, world)
 
 
-def _center(things: Sequence[Thing], wanted: int | str, instant: int, box_of: BoxOf) -> Vector:
+def _center(course: Course, wanted: int | str, instant: int, box_of: BoxOf) -> Vector:
     """The middle of a thing, by its id or its model's key, at an instant."""
-    found = next((thing for thing in things if wanted in (thing.id, thing.model.key)), None)
-    if found is None:
-        known = ", ".join(f"{thing.id} ({thing.model.key})" for thing in things if thing.id)
-        raise RecipeError(f"viewpoints.look: expected a thing's number or key: {known}; found {wanted!r}")
-    now = found.at(instant)
+    pairs = zip(course.things, course.moving, strict=True)
+    thing, moving = next((pair for pair in pairs if wanted in (pair[0].id, pair[0].model.key)), (None, None))
+    if thing is None:
+        raise no_such_thing(wanted, {thing.id: thing.model.key for thing in course.things if thing.id})
+    now = _at(thing, moving, instant)
     if not now.is_there:
         raise RecipeError(
             f"viewpoints.look: expected a thing that is there all the time; found {wanted!r}, which is not at instant {instant}"
         )
     return center(now, box_of)
+
+
+def no_such_thing(wanted: int | str, known: Mapping[int, str]) -> RecipeError:
+    """What says that a camera cannot look at a thing; `known` are the keys of those that are there, by their numbers."""
+    there = ", ".join(f"{number} ({key})" for number, key in known.items())
+    return RecipeError(
+        f"viewpoints.look: expected a thing's number or key: {there}; found {wanted!r}{nearest(wanted, known.values())}"
+    )

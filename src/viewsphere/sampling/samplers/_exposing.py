@@ -12,7 +12,8 @@ from viewsphere.model.exposure import Exposure, Sweep
 from viewsphere.model.scene import Matrix4
 from viewsphere.model.thing import Motion
 from viewsphere.recipe.sequence import TimeEntry
-from viewsphere.sampling.samplers._course import Course, Mover
+from viewsphere.sampling.samplers._course import Course
+from viewsphere.sampling.samplers._moving import Moving
 
 NODES = 5
 """Moments of an open shutter at which a thing's pose is recorded; it goes straight on in between."""
@@ -34,17 +35,15 @@ def exposures(course: Course, instants: Sequence[int | None], time: TimeEntry, r
 
 
 def _exposure(course: Course, at: int, time: TimeEntry, rig_at: RigAt) -> Exposure | None:
-    moving = zip(course.things, course.movers, strict=True)
-    things = tuple(None if mover is None or thing.motion.is_still else _thing(mover, at, time) for thing, mover in moving)
+    things = tuple(None if moving is None or moving.is_still else _thing(moving, at, time) for moving in course.moving)
     rig = _rig(at, time.count, rig_at)
     return None if rig is None and not any(things) else Exposure(things=things, rig=rig)
 
 
-def _thing(mover: Mover, at: int, time: TimeEntry) -> Sweep | None:
+def _thing(moving: Moving, at: int, time: TimeEntry) -> Sweep | None:
     """A thing's poses while the shutter is open; of one whose file plays, those of the instants around, as its time steps."""
-    is_played = mover.start.timeline is not None
-    moments = AROUND if is_played else tuple(np.linspace(-0.5, 0.5, NODES) * time.shutter)
-    motion = mover.at([(at + moment) / time.fps for moment in moments])
+    moments = AROUND if moving.plays_file else tuple(np.linspace(-0.5, 0.5, NODES) * time.shutter)
+    motion = moving.around(at, moments)
     return None if motion.is_still else Sweep(moments=tuple(map(float, moments)), motion=motion)
 
 

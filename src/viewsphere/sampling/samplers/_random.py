@@ -5,9 +5,9 @@ Scene k follows from the seed, its name and the models alone: it is the same how
 
 from __future__ import annotations
 
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Sequence
-from functools import partial
+from functools import lru_cache, partial
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from viewsphere.model.thing import Thing
 from viewsphere.recipe.draws import drawn
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.scenes import ScenesEntry
-from viewsphere.sampling.cast import mixed
+from viewsphere.sampling.cast import balanced, mixed
 from viewsphere.sampling.composition import BoxOf, placed, still
 from viewsphere.sampling.placing import Room
 from viewsphere.sampling.samplers._stock import Stock
@@ -48,27 +48,58 @@ def scene_names(recipe: Recipe) -> tuple[str, ...]:
 def scene_cast(stock: Stock, subject: str) -> tuple[ModelSpec, ...]:
     """The models of a scene, of one split where splits are by model."""
     recipe, entry = stock.recipe, scenes_entry(stock.recipe)
-    count = drawn(entry.objects, lambda path: generator(recipe.seed, *path, subject), ("scenes", "objects"))
-    models = stock.model_specs
-    if recipe.splits.by == "model":
-        own = scene_split(stock, subject)
-        models = tuple(spec for spec in models if stock.dealt_splits[spec.key] == own)
-    return mixed(recipe.seed, models, count, (subject,), entry.repeat)
+    models = _models_for(stock, _group(stock, subject))
+    if entry.balance == "models":
+        return mixed(recipe.seed, models, _size(recipe, subject), (subject,), entry.repeat)
+    cast: list[ModelSpec] = []
+    for category, count in _categories(stock.untried or stock)[subject]:
+        own = tuple(spec for spec in models if spec.category == category)
+        cast += mixed(recipe.seed, own, count, (subject,), entry.repeat)
+    return tuple(sorted(cast, key=lambda spec: share(recipe.seed, "slot", subject, spec.key)))
+
+
+def _size(recipe: Recipe, subject: str) -> int:
+    """How many models stand in a scene."""
+    return drawn(scenes_entry(recipe).objects, lambda path: generator(recipe.seed, *path, subject), ("scenes", "objects"))
+
+
+def _group(stock: Stock, subject: str) -> str:
+    """The split that a scene's models are of, where splits are by model; else the empty name of all."""
+    return scene_split(stock, subject) if stock.recipe.splits.by == "model" else ""
+
+
+def _models_for(stock: Stock, group: str) -> tuple[ModelSpec, ...]:
+    """The models that may meet in scenes of a group."""
+    return tuple(spec for spec in stock.model_specs if not group or stock.dealt_splits[spec.key] == group)
+
+
+@lru_cache(maxsize=2)
+def _categories(stock: Stock) -> dict[str, tuple[tuple[str, int], ...]]:
+    """How many objects of which categories stand in each scene."""
+    recipe, repeat = stock.recipe, scenes_entry(stock.recipe).repeat
+    groups: defaultdict[str, list[str]] = defaultdict(list)
+    for subject in stock.subjects:
+        groups[_group(stock, subject)].append(subject)
+    found: dict[str, tuple[tuple[str, int], ...]] = {}
+    for group, subjects in groups.items():
+        there = Counter(spec.category for spec in _models_for(stock, group))
+        found |= balanced(recipe.seed, {name: _size(recipe, name) for name in subjects}, there, repeat)
+    return found
 
 
 def scene_split(stock: Stock, subject: str) -> str:
     """The split of a scene where splits are by model: it draws its split first, then models of this split; shares follow from
     the numbers of models where some of these are listed.
     """
-    return drawn_split(_shares(stock), stock.recipe.seed, (subject,))
+    return drawn_split(_shares(stock), stock.recipe.lasting_seed, (subject,))
 
 
 def scene_things(stock: Stock, subject: str, pose: str | None, box_of: BoxOf) -> tuple[Thing, ...]:
     """The models of a scene where they stand; raises RecipeError where there is no room."""
     entry, models = scenes_entry(stock.recipe), scene_cast(stock, subject)
     free = None if stock.composition is None else stock.composition.free_floor(subject, pose)
-    room = Room(free, entry.gap, entry.spots, field="scenes")
-    return still(models, placed(entry.placer, models, room, box_of, partial(generator, stock.recipe.seed, "layout", subject)))
+    room, rng = Room(free, entry.gap, entry.spots, field="scenes"), partial(generator, stock.recipe.seed, "layout", subject)
+    return still(models, placed(entry.placer, models, room, box_of, rng, entry.orientation))
 
 
 def scene_views(stock: Stock, subject: str, views: Poses) -> Sequence[int]:

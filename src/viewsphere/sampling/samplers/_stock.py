@@ -17,14 +17,17 @@ from viewsphere.model.scene import Finish, Scene, Vector
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing, TimeStep
 from viewsphere.model.tracks import Tracks
+from viewsphere.recipe.draws import drawn
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.sampling.blend_scene import BlendScenery
 from viewsphere.sampling.camera import looking
 from viewsphere.sampling.clips import shown_steps
 from viewsphere.sampling.composition import Composition
+from viewsphere.sampling.engine_digest import engine_options
 from viewsphere.sampling.pictures import Pictures
 from viewsphere.sampling.scenery import draw_names
 from viewsphere.sampling.scenes import Scenes
+from viewsphere.sampling.seeds import Names, generator
 from viewsphere.sampling.sendable import Sendable
 from viewsphere.sampling.sequence_poses import SequencePoses
 from viewsphere.sampling.splits import dealt, hashed
@@ -51,6 +54,8 @@ class Stock(Sendable):
     entries: tuple[int, ...] = ()  # of each model, the number of its entry in the recipe
     tracks: Tracks | None = None  # what every sequence's sensors follow
     timelines: tuple[Timeline | None, ...] = ()  # of each model, the animation of its file that it plays in sequences
+    tries: Mapping[int, int] = field(default_factory=dict[int, int])  # poses of which something is drawn again: the how manieth
+    untried: Stock | None = None  # the same without these tries
     sequence_numbers: tuple[int, ...] = ()  # of each viewpoint of sequences, a data set's number; none where it has the same
 
     @cached_property
@@ -121,7 +126,7 @@ class Stock(Sendable):
         names: Mapping[str, Sequence[str]] = {"model": tuple(self.position), "scene": self.subjects}
         if by == "sequence":
             names = {by: tuple(chain.from_iterable(self._sequences))}
-        return dealt(self.recipe.splits, self.recipe.seed, names.get(by, ()), self.kept_splits)
+        return dealt(self.recipe.splits, self.recipe.lasting_seed, names.get(by, ()), self.kept_splits)
 
     @property
     def _sequences(self) -> Iterator[Iterator[str]]:
@@ -153,7 +158,7 @@ class Stock(Sendable):
                 names = ("place", *(draw_names(place.draw, subject, self.pose_list.name(pose)) if place else ()))
             case _:
                 names = (subject, self.pose_list.name(pose))
-        return hashed(splits, self.recipe.seed, names)
+        return hashed(splits, self.recipe.lasting_seed, names)
 
     def scene(self, subject: str, pose: str) -> Scene:
         """Light and ground of a subject's frames, and the .blend file around them; `pose` is a pose's name."""
@@ -181,6 +186,17 @@ class Stock(Sendable):
         repaints = () if thing.scenery else self.scenes.repaints(thing.model, subject, pose)
         return thing.model_copy(update={"repaints": repaints}) if repaints else thing
 
+    def view(self, views: Poses, pose: int) -> Viewpoint:
+        """The viewpoint of a pose, random ones as drawn at its try."""
+        again = self.tries.get(pose)
+        return (views.drawn_for(f"try {again}") if again else views)[pose]
+
+    def layout_names(self, pose: int) -> Names:
+        """What the placing of company is drawn for, besides what it is always drawn for: a pose's try."""
+        again = self.tries.get(pose)
+        is_redrawn = again and self.recipe.scene.company is not None and self.recipe.scene.company.draw == "per_frame"
+        return (f"try {again}",) if is_redrawn else ()
+
     def viewpoint(self, subject: str, view: Viewpoint, target: Vector | None) -> Viewpoint:
         """The viewpoint of a subject's frame, jittered; it looks at `target` unless it has a target of its own."""
         if target is not None and view.target is None:
@@ -195,8 +211,14 @@ class Stock(Sendable):
         """The instant of a subject and a viewpoint; the camera looks at `target` unless the viewpoint has its own, and where
         there is neither at `focus`. `number` is the instant's own.
         """
-        finish = self.finish(subject, view.index)
-        return looking(self.viewpoint(subject, view, target), focus, index=number, split=split, finish=finish)
+        seen = {"finish": self.finish(subject, view.index), "intrinsics": self.drawn_lens(subject, view.index)}
+        return looking(self.viewpoint(subject, view, target), focus, index=number, split=split, **seen)
+
+    def drawn_lens(self, subject: str, pose: int) -> Intrinsics | None:
+        """The lens of a subject's frame, or sequence, from a pose; None where the recipe draws none."""
+        if not self.recipe.camera.is_random:
+            return None
+        return _lens(self.recipe, subject, self.scene_name(pose))
 
     def finish(self, subject: str, pose: int) -> Finish | None:
         """The finish of a subject's frame, None where all frames of a shot share one."""
@@ -214,7 +236,7 @@ class Stock(Sendable):
             first=first,
             instants=tuple(instants),
             engine=self.recipe.engine.name,
-            engine_options=self.recipe.engine.options,
+            engine_options=engine_options(self.recipe),
             channels=self.recipe.channels,
             files=self.recipe.files,
             label_alpha=self.recipe.label_alpha,
@@ -222,10 +244,18 @@ class Stock(Sendable):
         )
 
 
-def lens(recipe: Recipe, views: Poses) -> Intrinsics:
-    """The lens that a recipe means with these poses; raises RecipeError where their file names none."""
+def _lens(recipe: Recipe, *names: str) -> Intrinsics:
+    """The lens of the recipe's camera, drawn for these names; without any, one that stands for all."""
+    return drawn(recipe.camera, lambda path: generator(recipe.seed, "camera", ".".join(path), *names)).intrinsics
+
+
+def lens(recipe: Recipe, views: Poses | None) -> Intrinsics:
+    """The lens that a recipe means with these poses (None: no file of them was read), one of them where it draws several.
+
+    Raises RecipeError where their file names none.
+    """
     if not recipe.camera.of_viewpoints:
-        return recipe.camera.intrinsics
-    if views.intrinsics is None:
+        return _lens(recipe)
+    if views is None or views.intrinsics is None:
         raise RecipeError("camera.of_viewpoints: expected a file of poses that names a lens; found none: give fov_deg or K")
     return views.intrinsics

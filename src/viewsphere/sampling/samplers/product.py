@@ -85,7 +85,7 @@ def shot(stock: Stock, subject: str, poses: Sequence[int], box_of: BoxOf, key: s
     spec = stock.spec(subject)
     things, target = (Thing(id=1, model=spec),), None
     if stock.composition is not None:
-        targets = stock.composition.targets(spec, stock.scene_pose(poses[0]), box_of)
+        targets = stock.composition.targets(spec, stock.scene_pose(poses[0]), box_of, stock.layout_names(poses[0]))
         things = stock.composition.things(subject, targets, stock.scene_pose(poses[0]), box_of)
         target = stock.composition.center(targets, box_of)
     things = stock.repainted(things, subject, poses[0])
@@ -94,7 +94,8 @@ def shot(stock: Stock, subject: str, poses: Sequence[int], box_of: BoxOf, key: s
     focus = target or center(placed[0], box_of)
     scene = _scene(stock, subject, stock.pose_list.name(poses[0]), run).model_copy(update=_floor(stock, spec, things, box_of))
     views = (
-        (i, stock.pose_list[pose], split(stock, subject, pose)) for i, pose in enumerate(poses, first // len(stock.rig.sensors))
+        (i, stock.view(stock.pose_list, pose), split(stock, subject, pose))
+        for i, pose in enumerate(poses, first // len(stock.rig.sensors))
     )
     instants = [stock.instant(subject, view, target, focus, part, i) for i, view, part in views]
     return stock.finished(key, first, placed, scene, instants)

@@ -92,7 +92,7 @@ def shot(stock: Stock, subject: str, poses: Sequence[int], box_of: BoxOf, key: s
         things = stock.composition.things(subject, things, pose, box_of)
     views = stock.pose_list.drawn_for(subject)
     instants = [
-        stock.instant(subject, views[pose], middle, middle, split(stock, subject, pose), i)
+        stock.instant(subject, stock.view(views, pose), middle, middle, split(stock, subject, pose), i)
         for i, pose in enumerate(poses, first // len(stock.rig.sensors))
     ]
     scene = stock.scene(subject, stock.pose_list.name(poses[0]))

@@ -138,7 +138,7 @@ def _instant(stock: Stock, own: Course, subject: str, pose: int, box_of: BoxOf) 
         return stock.instant(subject, view, at, at, part, i).model_copy(update={"seconds": time.at(i)})
     finish, now = stock.finish(subject, pose), own.rig[i]
     if not stock.recipe.camera.of_viewpoints:
-        now = replace(now, intrinsics=None)
+        now = replace(now, intrinsics=stock.drawn_lens(subject, pose))
     return instant_of(now, i, time.at(i), pose, stock.recipe.viewpoints.bins, split=part, finish=finish)
 
 

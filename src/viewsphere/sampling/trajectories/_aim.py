@@ -33,8 +33,8 @@ def focuses(entry: Moving, look: object, times: Float, world: World) -> list[Flo
     if look == "center":
         return [np.array(world.target)] * len(times)
     if isinstance(look, (int, str)):
-        instants = range(len(times)) if entry.follow else [0] * len(times)
-        return [np.asarray(world.center(look, instant), np.float64) for instant in instants]
+        found = [np.asarray(world.center(look, i), np.float64) for i in (range(len(times)) if entry.follow else (0,))]
+        return found if entry.follow else found * len(times)
     return [np.array(look, np.float64)] * len(times)
 
 

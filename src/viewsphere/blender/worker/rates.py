@@ -1,0 +1,98 @@
+"""How many frames of a file make a second: what the file itself says, or what its times are multiples of."""
+
+from __future__ import annotations
+
+import struct
+import sys
+from contextlib import suppress
+from itertools import pairwise
+from pathlib import Path
+
+import bpy
+
+DEFAULT = 24.0
+"""What Blender takes of a file that says nothing."""
+
+USUAL = (24.0, 25.0, 30.0, 50.0, 60.0, 24000 / 1001, 30000 / 1001, 60000 / 1001, 48.0, 90.0, 100.0, 120.0)
+"""Rates that animations are sampled at, the likeliest first."""
+
+NEAR = 2e-3
+"""Frames by which a time may miss a frame: files hold their times in single precision."""
+
+LEAST, MOST = 1.0, 1000.0
+
+
+def own_rate(file, kind):
+    """Frames a second of a USD or Alembic file; None of other kinds, and where the file does not say."""
+    if kind in ("usd", "usda", "usdc", "usdz"):
+        return _usd_rate(file)
+    return _alembic_rate(Path(file).read_bytes()) if kind == "abc" else None
+
+
+def set_rate(scene, rate):
+    """Let a second of the scene have so many frames."""
+    scene.render.fps = max(round(rate), 1)
+    scene.render.fps_base = scene.render.fps / rate
+
+
+def _usd_rate(file):
+    """The time codes a second of a USD file, which Blender takes for frames; by the bindings of USD that Blender ships.
+
+    https://openusd.org/release/api/class_usd_stage.html, timeCodesPerSecond.
+    """
+    for place in Path(bpy.utils.resource_path("LOCAL")).glob("python/lib/python*/site-packages"):
+        if str(place) not in sys.path:
+            sys.path.append(str(place))
+    with suppress(ImportError):
+        from pxr import Sdf
+
+        layer = Sdf.Layer.FindOrOpen(file)
+        return None if layer is None else float(layer.timeCodesPerSecond)
+    return None
+
+
+def _alembic_rate(data):
+    """The rate of the first even time sampling of an Alembic file (Ogawa) with more than one sample.
+
+    https://github.com/alembic/alembic, lib/Alembic/AbcCoreOgawa/ReadUtil.cpp, ReadTimeSamplesAndMax: a group is a count and
+    the places of its children; the fifth child of the root has the time samplings, each with its number of samples, the
+    seconds of a cycle and the times in the first one.
+    """
+    with suppress(struct.error, IndexError):
+        (root,) = struct.unpack_from("<Q", data, 8)
+        (count,) = struct.unpack_from("<Q", data, root)
+        place = struct.unpack_from(f"<{min(count, 5)}Q", data, root + 8)[4] & ~(1 << 63)
+        (size,) = struct.unpack_from("<Q", data, place)
+        place, end = place + 8, place + 8 + size
+        while place < end:
+            samples, seconds, times = struct.unpack_from("<IdI", data, place)
+            place += 16 + 8 * times
+            if samples > 1 and times and seconds > 0 and LEAST <= times / seconds <= MOST:
+                return times / seconds
+    return None
+
+
+def key_rate():
+    """The rate of an imported file that holds times alone: the likeliest one of which all keys' times are multiples, else the
+    one of the closest keys if it fits all. None where the keys are at no even times.
+    """
+    scene = bpy.context.scene
+    rate = scene.render.fps / scene.render.fps_base
+    times = sorted(
+        {key.co.x / rate for action in bpy.data.actions for curve in _curves(action) for key in curve.keyframe_points}
+    )
+    steps = [after - before for before, after in pairwise(times) if after - before > 1 / MOST]
+    if not steps:
+        return None
+    return next((one for one in (*USUAL, 1 / min(steps)) if LEAST <= one <= MOST and _fits(times, one)), None)
+
+
+def _fits(times, rate):
+    return all(abs(time * rate - round(time * rate)) < NEAR for time in times)
+
+
+def _curves(action):
+    for layer in action.layers:
+        for strip in layer.strips:
+            for bag in strip.channelbags:
+                yield from bag.fcurves

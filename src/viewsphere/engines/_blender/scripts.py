@@ -1,0 +1,38 @@
+"""A user's own script, which changes what Blender has staged before that is painted: run only where the user allows it."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+from viewsphere.blender.interpreter import SCRIPTS
+from viewsphere.engines._blender.options import AnyOptions
+from viewsphere.errors import RecipeError
+from viewsphere.model.shot import Shot
+
+
+def check_script(script: str | None) -> None:
+    """Raise RecipeError for a script that is not there, or that nobody has allowed to run."""
+    if script is None:
+        return
+    if not Path(script).is_file():
+        raise RecipeError(f"engine.script: expected a Python file; found none at {script}")
+    if os.environ.get(SCRIPTS) != "1":
+        raise RecipeError(
+            f"engine.script: expected --allow-scripts (in Python {SCRIPTS}=1), as a script may do all that you may; found "
+            f"neither: read {script}, then allow it"
+        )
+
+
+def script_request(options: AnyOptions, shot: Shot) -> dict[str, Any] | None:
+    """What the worker is told of the script, its text and what the staged objects are; None without a script."""
+    if options.script is None:
+        return None
+    check_script(options.script)
+    known = [
+        {"id": thing.id, "category": thing.model.category, "model": thing.model.key, "is_scenery": thing.scenery}
+        for thing in shot.things
+    ]
+    text = Path(options.script).read_text("utf-8")
+    return {"file": options.script, "text": text, "things": known, "shot": {"key": shot.key, "frames": shot.first}}

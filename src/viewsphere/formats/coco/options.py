@@ -1,0 +1,27 @@
+"""What recipes and the command line may say of the format."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from viewsphere.model.frozen import Frozen
+
+
+class Options(Frozen):
+    """How categories are numbered, and where pictures lie."""
+
+    category_ids: Literal["contiguous", "coco"] = Field(
+        default="contiguous",
+        description="`contiguous`: 1, 2, 3, ... in the data set's order of categories, as trainers expect; `coco`: COCO's own "
+        "ids of its 80 names, however spelled (`hair_drier`, `hairdryer`), from 91 on for others; imported ones keep theirs",
+    )
+    pictures: Literal["images", "splits"] = Field(
+        default="images",
+        description="`images`: in `images/<split>/`, where datumaro looks; `splits`: in `<split>/`, as the paper's tool does",
+    )
+
+    def folder(self, split: str) -> str:
+        """Where a split's pictures are, from the export's folder."""
+        return f"images/{split}" if self.pictures == "images" else split

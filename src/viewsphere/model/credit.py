@@ -1,0 +1,43 @@
+"""Whose work a model is, and on which terms it may be used."""
+
+from __future__ import annotations
+
+import re
+from typing import Annotated
+
+from pydantic import AfterValidator, Field
+
+from viewsphere.model.frozen import Frozen
+from viewsphere.model.mistakes import shown
+
+LONGEST_CREDIT = 1000
+"""Characters of a licence, of an attribution, or of a URL."""
+
+
+def _one_line(text: str) -> str:
+    if not text.isprintable() or not text.strip():
+        raise ValueError(f"expected one line of printable text; found {shown(text)}")
+    return text
+
+
+def _url(text: str) -> str:
+    """The characters that RFC 3986 has not are refused, so that no URL ends a link or a cell of a table."""
+    if not re.fullmatch(r"https?://[^\s<>\"\\^`{|}]+", text):
+        raise ValueError(f"expected a URL that begins with https:// or http://, without spaces; found {shown(text)}")
+    return text
+
+
+CreditText = Annotated[str, Field(min_length=1, max_length=LONGEST_CREDIT), AfterValidator(_one_line)]
+Licence = Annotated[CreditText | None, Field(description="the licence of the models, best as its SPDX identifier: CC-BY-4.0")]
+Attribution = Annotated[CreditText | None, Field(description="who made the models, in the words that their licence asks for")]
+SourceUrl = Annotated[
+    Annotated[CreditText, AfterValidator(_url)] | None, Field(description="where the models come from: https://...")
+]
+
+
+class Credit(Frozen):
+    """A model's licence, whom to name, and where it comes from; None for what is not known."""
+
+    licence: Licence = None
+    attribution: Attribution = None
+    source_url: SourceUrl = None

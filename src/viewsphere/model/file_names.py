@@ -1,0 +1,16 @@
+"""Names that every file system takes as the name of a file or folder, so that a data set can be carried from one to another."""
+
+from __future__ import annotations
+
+RESERVED = frozenset({"con", "prn", "aux", "nul", "conin$", "conout$"}) | {
+    f"{port}{number}" for port in ("com", "lpt") for number in "0123456789¹²³"
+}
+"""Names that Windows gives to devices, whatever their letters' case and whatever follows a dot.
+
+https://learn.microsoft.com/en-us/windows/win32/fileio/naming-a-file
+"""
+
+
+def is_reserved(name: str) -> bool:
+    """Whether Windows takes a name, with any ending, for a device's."""
+    return name.partition(".")[0].rstrip(" ").lower() in RESERVED

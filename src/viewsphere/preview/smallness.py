@@ -1,0 +1,28 @@
+"""Objects that are too small in the pictures to be of use."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+from viewsphere.model.sample import Sample
+from viewsphere.recipe.recipe import Recipe
+from viewsphere.sampling.plan import plan
+from viewsphere.sampling.recipe_warnings import SMALLEST, TOO_SMALL
+
+
+def small_objects(samples: Iterable[Sample], recipe: Recipe | None = None) -> Iterator[str]:
+    """A warning that counts visible objects whose boxes are less than `SMALLEST` pixels wide and high. Of samples that are a
+    preview of a recipe, in the pixels of the recipe's pictures.
+    """
+    widths = {} if recipe is None else {sensor.name: sensor.intrinsics.width for sensor in plan(recipe).rig.sensors}
+    shown: list[float] = []
+    for sample in samples:
+        scale = widths.get(sample.sensor, sample.width) / sample.width
+        boxes = (o.box2d_unclipped for o in sample.objects if o.area)
+        shown += (scale * max(box[2] - box[0], box[3] - box[1]) for box in boxes if box is not None)
+    small = [size for size in shown if size < SMALLEST]
+    if small:
+        yield (
+            f"{len(small):,} of {len(shown):,} objects shown are at most {max(small):.2g} pixels wide and high, {TOO_SMALL}: "
+            "come nearer, or ask for larger pictures, a longer lens or distance: {fill: ...}"
+        )

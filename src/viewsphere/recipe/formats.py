@@ -1,0 +1,89 @@
+"""How a recipe, a call or a command line names formats, and the options that each is written with."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Annotated, Any
+
+from pydantic import BeforeValidator, Field, JsonValue, TypeAdapter, ValidationError, WithJsonSchema, model_serializer
+
+from viewsphere import plugins
+from viewsphere.errors import RecipeError
+from viewsphere.model.frozen import Frozen
+from viewsphere.model.mistakes import read_options, report, shown
+
+FORM = {
+    "anyOf": [
+        {"type": "string"},
+        {"type": "object", "additionalProperties": {"type": "object"}, "minProperties": 1, "maxProperties": 1},
+    ]
+}
+
+
+class FormatEntry(Frozen):
+    """A format by its name, and options that the format itself checks; written `coco`, or `{coco: {category_ids: coco}}`."""
+
+    name: str = Field(min_length=1)
+    options: dict[str, JsonValue] = Field(default={})
+
+    @model_serializer
+    def _as_written(self) -> Any:
+        return {self.name: self.options} if self.options else self.name
+
+    def over(self, options: Mapping[str, JsonValue]) -> FormatEntry:
+        """This entry with these options where it has no others."""
+        return FormatEntry(name=self.name, options={**options, **self.options})
+
+    def whole(self, field: str | None = None) -> FormatEntry:
+        """This entry with a value for every option that the format has; raises as `arguments` does."""
+        read = self.arguments(field)
+        return FormatEntry(name=self.name, options=read[0].model_dump(mode="json") if read else {})
+
+    def arguments(self, field: str | None = None) -> tuple[Frozen, ...]:
+        """What the format's functions are given behind their other arguments: its `Options`, or nothing where it has none.
+
+        Raises RecipeError for options that it does not have, as mistakes of `field` (default: the format's name), and UserError
+        for a format that is not known.
+        """
+        field = field or self.name
+        kind: type[Frozen] | None = getattr(plugins.load("formats", self.name), "Options", None)
+        if kind is not None:
+            return (read_options(kind, self.options, field),)
+        if self.options:
+            raise RecipeError(f"{field}: expected no options, format {self.name} has none; found {', '.join(self.options)}")
+        return ()
+
+
+def _entry(value: Any) -> Any:
+    if isinstance(value, str):
+        return {"name": value}
+    if isinstance(value, Mapping) and len(value) == 1:
+        ((name, options),) = value.items()
+        if isinstance(name, str) and isinstance(options, Mapping | None):
+            return {"name": name, "options": options or {}}
+    if isinstance(value, FormatEntry):
+        return value
+    raise ValueError(f"expected a format's name, or {{name: {{option: value}}}}; found {shown(value)}")
+
+
+FormatField = Annotated[FormatEntry, BeforeValidator(_entry), WithJsonSchema(FORM)]
+_FIELDS = TypeAdapter(tuple[FormatField, ...])
+
+Formats = str | Sequence[str | Mapping[str, Mapping[str, Any]] | FormatEntry]
+"""Formats as they are asked for: names in a text with commas, or a list of names and of mappings of a name to its options."""
+
+
+def read_formats(formats: Formats) -> tuple[FormatEntry, ...]:
+    """The formats as entries, each name once; raises RecipeError for what is no format's name and options."""
+    names = formats.split(",") if isinstance(formats, str) else formats
+    listed = [name.strip() if isinstance(name, str) else name for name in names if name]
+    try:
+        entries = _FIELDS.validate_python(listed)
+    except ValidationError as error:
+        raise RecipeError(report(error, listed)) from None
+    return tuple({entry.name: entry for entry in entries}.values())
+
+
+def options_of(entries: Iterable[FormatEntry]) -> dict[str, dict[str, JsonValue]]:
+    """The options of each format, by its name."""
+    return {entry.name: entry.options for entry in entries}

@@ -1,0 +1,93 @@
+"""Pictures in which enough is seen of their models: what is random in a frame is drawn again where too little is.
+
+What decides is the label `visibility` itself, of the whole picture. A frame's draws follow from its names and the number of the
+try, and it is judged by itself: neither workers nor the cut of shots change what is taken.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from viewsphere.assets.mesh import Mesh
+from viewsphere.labels import Sight
+from viewsphere.labels.visibility import LABEL as VISIBILITY
+from viewsphere.model.shot import Shot
+from viewsphere.model.thing import Thing
+from viewsphere.recipe.recipe import Recipe
+from viewsphere.run.stages import Stages
+from viewsphere.store import Dataset
+from viewsphere.truth.geometry import Geometry
+from viewsphere.truth.moving import Ring, shot_floor
+from viewsphere.truth.shot_views import ShotViews
+
+MOST_TRIES = 32
+"""Draws of a frame, the first one included, of which the one that shows most is taken where none shows enough."""
+
+Take = Callable[[Sequence[int]], Shot]
+"""Makes a shot, each frame at its try."""
+
+
+@dataclass(frozen=True, eq=False)
+class Framing:
+    """How shots of a recipe come to show enough of their models."""
+
+    recipe: Recipe
+    stages: Stages
+
+    def shot(self, take: Take) -> Shot:
+        """The shot that `take` makes, with the first draw of each frame that shows enough of its models, or the best."""
+        shot, least = take(()), self.recipe.min_visibility
+        if least is None:
+            return shot
+        frames = range(len(shot.instants))
+        ring = Ring(shot.scene.ground is not None, shot.label_alpha)
+        tries, seen = [0] * len(frames), [self._seen(shot, i, ring) for i in frames]
+        for number in range(1, MOST_TRIES):
+            hidden = [i for i in frames if seen[i] < least]
+            if not hidden:
+                break
+            shot = take([number if i in hidden else tries[i] for i in frames])
+            for i in hidden:
+                found = self._seen(shot, i, ring)
+                if found > seen[i]:
+                    seen[i], tries[i] = found, number
+        return take(tries)
+
+    def _seen(self, shot: Shot, instant: int, ring: Ring) -> float:
+        """The least visibility of what has to be seen in a frame; -1 where its camera is inside of something."""
+        wanted = targets(shot, self.recipe.scenes is not None)
+        if not all(thing.at(instant).is_there for thing in wanted):
+            return 1.0
+        if not self.stages.is_free(shot, instant):
+            return -1.0
+        views = ShotViews(shot, lambda i: self._geometry(shot, i, ring))
+        view = views.view(instant, 0)
+        sight = Sight(view.geometry, view.camera, view.visibility)
+        return min(VISIBILITY.compute(sight, thing.id - 1)["visibility"] for thing in wanted)
+
+    def _geometry(self, shot: Shot, instant: int, ring: Ring) -> Geometry:
+        """The triangles that stages of all engines have at an instant."""
+
+        def meshes(at: int) -> tuple[Mesh, ...]:
+            return tuple(self.stages.model(thing.model, thing.step) for thing in shot.things_at(at))
+
+        return ring.at(shot.things_at(instant), meshes(instant), shot_floor(shot, meshes))
+
+
+def targets(shot: Shot, together: bool) -> tuple[Thing, ...]:
+    """What has to be seen in a shot's pictures: the frame's model, or `together` all models of a random scene."""
+    found = tuple(thing for thing in shot.objects if not thing.scenery)
+    return found if together else found[:1]
+
+
+def hidden_frames(dataset: Dataset, least: float, together: bool) -> int:
+    """How many frames of a data set show less than this visibility of what has to be seen; empty ones do not count."""
+    count = 0
+    for key, places in dataset.shots():
+        shot = dataset.store.labelled(key)
+        wanted = {thing.id for thing in targets(shot, together)} if shot else set[int]()
+        for sample in dataset.samples_of(key, places):
+            shown = [o.visibility for o in sample.objects if o.id in wanted]
+            count += bool(shown) and min(shown) < least
+    return count

@@ -1,0 +1,78 @@
+"""Which share of the frames this process is to render, among all ranks and data loaders' workers.
+
+PyTorch is asked only where somebody else has imported it: it is no dependency.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from itertools import islice
+from typing import Any, TypeVar
+
+from viewsphere.errors import UserError
+from viewsphere.model.mistakes import shown
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Share:
+    """Every `of`-th of some things, from the `number`-th on, counted from 0: shares together have each of them once."""
+
+    number: int = 0
+    of: int = 1
+
+    def __call__(self, things: Iterable[T]) -> Iterator[T]:
+        """This share of them, in their order."""
+        return islice(things, self.number, None, self.of)
+
+    def size(self, count: int) -> int:
+        """How many of `count` it has."""
+        return len(range(self.number, count, self.of))
+
+    def parted(self, inner: Share) -> Share:
+        """A share of this share."""
+        return Share(self.number + inner.number * self.of, self.of * inner.of)
+
+
+def share_of(shard: object) -> Share:
+    """The share that the argument `shard` names; raises UserError for anything but (k, n) with 0 <= k < n."""
+    match shard:
+        case (int(number), int(of)) if 0 <= number < of:
+            return Share(number, of)
+        case _:
+            raise UserError(
+                f"shard: expected (k, n), the k-th of n shares counted from 0, such as (0, 4); found {shown(shard)}"
+            )
+
+
+def share_of_rank() -> Share:
+    """The share of this process among the ranks of PyTorch's default process group; all where there is none."""
+    distributed: Any = sys.modules.get("torch.distributed")
+    if distributed is None or not distributed.is_available() or not distributed.is_initialized():
+        return Share()
+    return Share(distributed.get_rank(), distributed.get_world_size())
+
+
+def share_of_worker(frames: object) -> Share:
+    """The share of this process among the workers of a PyTorch DataLoader that iterates over its data set; all where this
+    is none, or where the loader itself says which item each worker makes.
+
+    `frames`: what may be the loader's data set itself.
+    """
+    data: Any = sys.modules.get("torch.utils.data")
+    if data is None:
+        return Share()
+    info = data.get_worker_info()
+    if info is None or not (info.dataset is frames or isinstance(info.dataset, data.IterableDataset)):
+        return Share()
+    return Share(info.id, info.num_workers)
+
+
+def known_to_loaders(kind: type) -> None:
+    """Let PyTorch's DataLoader take objects of a class as data sets to iterate over."""
+    data: Any = sys.modules.get("torch.utils.data")
+    if data is not None:
+        data.IterableDataset.register(kind)

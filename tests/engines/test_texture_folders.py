@@ -1,0 +1,146 @@
+"""Pictures from a folder as the colour of chosen materials."""
+
+import os
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import viewsphere as vs
+from viewsphere.assets.mesh import Material, Mesh, Texture
+from viewsphere.assets.repaint import textured
+from viewsphere.check import check
+from viewsphere.errors import RecipeError
+from viewsphere.model.thing import Repaint
+from viewsphere.recipe.recipe import Recipe
+from viewsphere.sampling.plan import plan
+
+COLORS = {"blue": (20, 20, 230), "green": (20, 230, 20), "red": (230, 20, 20)}
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """Three plain pictures, one of them in a folder of its own."""
+    place = tmp_path / "paints"
+    (place / "warm").mkdir(parents=True)
+    for name, color in COLORS.items():
+        Image.new("RGB", (8, 4), color).save(place / ("warm" if name == "red" else "") / f"{name}.png")
+    return place
+
+
+def recipe_of(folder, material=None, **changes):
+    values = {
+        "models": [{"source": "zoo:chair", "count": 6}],
+        "viewpoints": {"azimuth": 30, "elevation": 20, "distance": {"fill": 0.8}},
+        "camera": {"size": [64, 48], "fov_deg": 35},
+        "scene": {"ground": "off", "materials": [{"images": str(folder), **(material or {})}]},
+        "splits": {"train": 1.0},
+        "channels": ["rgb", "instances", "depth"],
+        "formats": [],
+    }
+    return Recipe(**{**values, **changes})
+
+
+def hue(sample):
+    """The name of the colour that a picture's model has."""
+    mean = sample.rgb[sample.instances > 0].mean(axis=0)
+    return ("red", "green", "blue")[int(mean.argmax())]
+
+
+def painted(recipe):
+    return [hue(sample) for sample in vs.render(recipe)]
+
+
+def test_each_model_takes_a_picture_of_the_folder_which_its_name_decides(folder):
+    found = painted(recipe_of(folder))
+    assert len(set(found)) > 1
+    assert painted(recipe_of(folder)) == found
+    fewer = recipe_of(folder, models=[{"source": "zoo:chair", "count": 3}])
+    assert painted(fewer) == found[:3]
+    assert len({tuple(painted(recipe_of(folder, seed=seed))) for seed in range(3)}) > 1
+
+
+def test_pictures_are_drawn_for_each_frame_where_materials_are(folder):
+    views = {"azimuth": list(range(0, 360, 30)), "elevation": 20, "distance": {"fill": 0.8}}
+    scene = {"ground": "off", "draw": "per_frame", "materials": [{"images": str(folder)}]}
+    recipe = recipe_of(folder, models=[{"source": "zoo:chair"}], scene=scene, viewpoints=views)
+    found = painted(recipe)
+    assert set(found) == {"red", "green", "blue"}
+    assert painted(recipe.model_copy(update={"shot_frames": 5})) == found
+
+
+def test_labels_do_not_know_of_pictures_and_check_proves_the_set(folder, tmp_path):
+    plain = recipe_of(folder, scene={"ground": "off"}, formats=["coco"])
+    painted_, bare = (list(vs.render(recipe)) for recipe in (recipe_of(folder), plain))
+    for one, other in zip(painted_, bare, strict=True):
+        assert np.array_equal(one.depth, other.depth)
+        assert np.array_equal(one.instances, other.instances)
+        assert not np.array_equal(one.rgb, other.rgb)
+    vs.generate(recipe_of(folder, formats=["coco"]), tmp_path / "out", workers=2)
+    dataset = vs.open(tmp_path / "out")
+    assert [hue(sample) for sample in dataset] == [hue(sample) for sample in painted_]
+    assert not check(dataset, sample=None).findings
+
+
+def test_only_chosen_materials_and_models_change_and_one_picture_may_be_named(folder):
+    one = {"images": None, "image": str(folder / "green.png"), "models": "chair_00[0-2]"}
+    found = painted(recipe_of(folder, one))
+    assert found[:3] == ["green"] * 3
+    assert "green" not in found[3:]
+    nothing = recipe_of(folder, {"material": "no such material"})
+    plain = recipe_of(folder, scene={"ground": "off"})
+    assert all(np.array_equal(a.rgb, b.rgb) for a, b in zip(vs.render(nothing), vs.render(plain), strict=True))
+
+
+def mesh_of(**more):
+    card = np.array([[0, 0, 0], [2, 0, 0], [2, 0, 1], [0, 0, 1]], np.float32)
+    return Mesh(
+        vertices=card,
+        triangles=np.array([[0, 1, 2], [0, 2, 3]], np.int32),
+        normals=np.tile(np.array([0, -1, 0], np.float32), (4, 1)),
+        triangle_material=np.array([0, 1], np.int32),
+        triangle_part=np.zeros(2, np.int32),
+        **more,
+    )
+
+
+def test_a_mesh_without_texture_coordinates_gets_those_of_a_box(folder):
+    made = textured(mesh_of(materials=(Material("a"), Material("b"))), (Repaint(image=str(folder / "green.png")),))
+    assert made.uv0.tolist() == [[0, 1], [1, 1], [1, 0.5], [0, 0.5]]  # the longest side is the picture once
+    assert [m.base_color_texture for m in made.materials] == [Texture(0), Texture(1)]
+    assert (made.images[0].pixels == (*COLORS["green"], 255)).all()
+
+
+def test_coordinates_stay_and_what_has_clear_texels_keeps_its_picture(folder):
+    uv = np.linspace(0, 1, 8, dtype=np.float32).reshape(4, 2)
+    mesh = mesh_of(materials=(Material("a", base_color=(0.5, 0, 0, 1)), Material("b", alpha_mode="MASK")), uv0=uv)
+    made = textured(mesh, (Repaint(image=str(folder / "green.png")),))
+    assert made.uv0 is mesh.uv0
+    assert made.materials[0].base_color == (1, 1, 1, 1)
+    assert made.materials[1] is mesh.materials[1]
+    assert textured(mesh, (Repaint(tint=(1, 0, 0)),)) is mesh
+    last = textured(mesh, (Repaint(image=str(folder / "green.png")), Repaint(roughness=0.5)))  # the last that matches counts
+    assert last is mesh
+
+
+def test_mistakes_name_their_field(folder, tmp_path):
+    with pytest.raises(RecipeError, match=r"scene.materials\[0\].images: expected a folder .*nowhere does not exist"):
+        plan(recipe_of(tmp_path / "nowhere"))
+    with pytest.raises(RecipeError, match=r"scene.materials\[0\].images: expected a folder with images; .*green.png is none"):
+        plan(recipe_of(folder / "green.png"))
+    (tmp_path / "bare").mkdir()
+    with pytest.raises(RecipeError, match=r"scene.materials\[0\].images: expected a folder with images .* found none in"):
+        plan(recipe_of(tmp_path / "bare"))
+    with pytest.raises(RecipeError, match=r"scene.materials\[0\].*expected image or images; found both"):
+        recipe_of(folder, {"image": "a.png"})
+    (folder / "broken.png").write_bytes(b"no picture")
+    with pytest.raises(RecipeError, match=r"scene.materials\[0\].images: expected a readable image"):
+        list(vs.render(recipe_of(folder)))
+
+
+@pytest.mark.skipif(not hasattr(os, "symlink"), reason="links")
+def test_links_that_lead_out_of_the_folder_are_refused(folder, tmp_path):
+    Image.new("RGB", (2, 2)).save(tmp_path / "else.png")
+    (folder / "linked.png").symlink_to(tmp_path / "else.png")
+    with pytest.raises(RecipeError, match=r"scene.materials\[0\].images: expected images inside .* leads out: .*linked.png"):
+        plan(recipe_of(folder))

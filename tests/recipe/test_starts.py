@@ -1,0 +1,137 @@
+"""What `viewsphere new` writes: every kind explains itself, renders unchanged, and its script runs."""
+
+import math
+import re
+import subprocess
+import sys
+import time
+
+import jsonschema
+import pytest
+
+import viewsphere as vs
+from command_line import viewsphere
+from shots import unit_box
+from viewsphere.plugins import names
+from viewsphere.recipe.file import read, schema
+from viewsphere.recipe.starts import FIRST, kinds, start
+
+SECONDS = 60
+"""What a kind's data set may take, kernels compiled."""
+
+
+def test_the_kinds():
+    assert kinds() == (FIRST, "blender", "detector", "in-memory", "pose6d")
+
+
+@pytest.mark.parametrize("kind", kinds())
+def test_a_recipe_is_valid_and_explains_itself(kind, tmp_path):
+    text = start(kind)["recipe.yaml"]
+    (tmp_path / "recipe.yaml").write_text(text)
+    data = read(tmp_path / "recipe.yaml")[0]
+    jsonschema.Draft202012Validator(schema()).validate(data)
+    assert data.keys() >= {"name", "seed", "models", "viewpoints", "camera", "scene", "channels", "formats"}
+    assert 2 <= vs.plan(vs.Recipe.load(tmp_path / "recipe.yaml")).frames <= 100
+    commands = re.findall(r"viewsphere (\w[\w-]*)", text.split("\nname:")[0])
+    assert "preview" in commands and max(map(len, text.splitlines())) <= 160
+    assert sum("#" in line for line in text.splitlines()) > len(text.splitlines()) / 4
+
+
+@pytest.mark.parametrize("kind", kinds())
+def test_new_writes_all_files_and_never_over_others(kind, tmp_path):
+    said = viewsphere("new", "mine", "--kind", kind, cwd=tmp_path)
+    assert said.returncode == 0 and "next: viewsphere preview" in said.stdout
+    found = {file.name: file.read_text("utf-8") for file in (tmp_path / "mine").iterdir()}
+    assert found == start(kind)
+    assert all(f"mine/{name}" in said.stdout for name in found)
+    (tmp_path / "mine" / "recipe.yaml").unlink()
+    again = viewsphere("new", "mine", "--kind", kind, cwd=tmp_path)
+    assert again.returncode == (2 if len(found) > 1 else 0)
+    assert again.returncode == 0 or ("expected a new file" in again.stderr and not (tmp_path / "mine" / "recipe.yaml").exists())
+
+
+def test_another_kind_is_a_mistake(tmp_path):
+    said = viewsphere("new", "mine", "--kind", "detecter", cwd=tmp_path)
+    assert said.returncode == 2 and "did you mean 'detector'" in said.stderr
+    assert not (tmp_path / "mine").exists()
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(300)
+@pytest.mark.parametrize("kind", [kind for kind in kinds() if kind not in {"blender", "in-memory"}])
+def test_a_kind_renders_in_a_minute_and_is_true(kind, tmp_path):
+    made = render(kind, tmp_path)
+    assert {"rgb", "instances"} <= set(made[0].channels)
+    if kind == "pose6d":
+        lines = run("poses.py", "dataset", folder=tmp_path / "mine").splitlines()
+        assert len(lines) == 1 + len(made) and lines[0].startswith("frame,object,category,qw")
+        first = made[0].objects[0]
+        assert [float(value) for value in lines[1].split(",")[7:10]] == pytest.approx(first.camera_from_object[:3, 3], abs=1e-6)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(300)
+def test_frames_in_memory_train(tmp_path):
+    viewsphere("new", "mine", "--kind", "in-memory", cwd=tmp_path)
+    begun = time.monotonic()
+    errors = [float(line.split()[-1]) for line in run("train.py", folder=tmp_path / "mine").splitlines()]
+    assert time.monotonic() - begun < SECONDS * 2  # kernels may be compiled first
+    assert len(errors) == 2 and errors[1] < 0.9 * errors[0]
+
+
+@pytest.mark.timeout(300)
+def test_frames_without_a_car_are_skipped(tmp_path):
+    viewsphere("new", "mine", "--kind", "in-memory", cwd=tmp_path)
+    recipe = tmp_path / "mine" / "recipe.yaml"
+    small = {"empty: 0.4\n\ncamera:": "camera:", "count: 5 ": "count: 20", "size: [32, 24]": "size: [224, 224]"}
+    text = recipe.read_text("utf-8")
+    for new, old in small.items():
+        assert text.count(old) == 1
+        text = text.replace(old, new)
+    recipe.write_text(text)
+    shown = sum((sample.instances == 1).any() for sample in vs.render(recipe))
+    assert 0 < shown < 20
+    lines = run("train.py", folder=tmp_path / "mine").splitlines()
+    assert [int(line.split()[2]) for line in lines] == [shown, shown]
+    assert all(math.isfinite(float(line.split()[-1])) for line in lines)
+
+
+@pytest.mark.parametrize("kind", kinds())
+def test_the_formats_that_a_comment_names_exist(kind):
+    comment = re.search(r"^formats: .*# or ([\w, ]+)", start(kind)["recipe.yaml"], re.MULTILINE)
+    named = comment[1].split(", ") if comment else []
+    assert set(named) <= {*names("formats")}
+    assert named or kind != "detector"
+
+
+def test_the_detector_s_floors_are_grey_to_sand(tmp_path):
+    (tmp_path / "recipe.yaml").write_text(start("detector")["recipe.yaml"])
+    planned = vs.plan(vs.Recipe.load(tmp_path / "recipe.yaml"))
+    colors = {shot.scene.ground.color for shot in planned.shots(unit_box)}
+    assert len(colors) == 5
+    for red, green, blue in colors:
+        assert red >= green >= blue > 0.4 * red
+
+
+@pytest.mark.usefixtures("blender")
+@pytest.mark.timeout(300)
+def test_blender_paints(tmp_path):
+    assert render("blender", tmp_path)[0].rgb.std() > 10
+
+
+def render(kind, folder):
+    """The data set of a kind, checked."""
+    viewsphere("new", "mine", "--kind", kind, cwd=folder)
+    begun = time.monotonic()
+    said = viewsphere("render", "recipe.yaml", "-o", "dataset", "--workers", 0, cwd=folder / "mine")
+    assert said.returncode == 0, said.stderr
+    assert time.monotonic() - begun < SECONDS * 2  # in one process; kernels may be compiled first
+    checked = viewsphere("check", "dataset", "--workers", 0, cwd=folder / "mine")
+    assert checked.returncode == 0, checked.stdout
+    return vs.open(folder / "mine" / "dataset")
+
+
+def run(*words, folder):
+    done = subprocess.run([sys.executable, *words], cwd=folder, capture_output=True, text=True, timeout=200)
+    assert done.returncode == 0, done.stderr
+    return done.stdout

@@ -1,0 +1,115 @@
+"""The cookbook is true: each page's files are written, its commands and its Python run in order, in one folder."""
+
+import re
+import shlex
+import sys
+
+import pytest
+from typer.main import get_command
+
+from command_line import viewsphere
+from small import ROOT
+from test_tutorial import blocks, run_outside
+from viewsphere.cli.commands import app
+from viewsphere.plugins import names
+
+PAGES = sorted((ROOT / "docs" / "cookbook").glob("*.md"))
+ONCE = "viewsphere doctor --setup-blender"
+"""What takes a gigabyte; whether Blender is there, the fixture says."""
+
+
+def test_the_pages():
+    assert [page.stem for page in PAGES] == ["blender", "depth", "detector", "in-memory", "pose6d"]
+    for page in PAGES:
+        assert f"cookbook/{page.name}" in (ROOT / "mkdocs.yml").read_text("utf-8")
+
+
+def follow(page, folder):
+    """Do what a page says, its complete recipes and scripts saved; returns what its blocks of Python printed."""
+    said = []
+    for block in blocks((ROOT / "docs" / "cookbook" / f"{page}.md").read_text("utf-8")):
+        if block.file:
+            (folder / block.file).write_text(block.text, "utf-8")
+        elif block.language == "python":
+            status, printed = run_outside([sys.executable, "-c", block.text])
+            assert status == 0, printed
+            said.append(printed)
+        elif block.language == "sh":
+            for line in block.text.splitlines():
+                command(line)
+    return said
+
+
+def command(line):
+    words = shlex.split(line)
+    if line == ONCE:
+        return
+    if words[0] == "viewsphere":
+        more = ["--workers", "0"] if words[1] in {"render", "check"} else []
+        answer = viewsphere(*words[1:], *more)
+        assert answer.returncode == 0, f"{line}\n{answer.stderr}"
+    else:
+        assert words[0] == "python"
+        status, printed = run_outside([sys.executable, *words[1:]])
+        assert status == 0, f"{line}\n{printed}"
+
+
+INLINE = [
+    pytest.param(line, id=f"{page.stem}: {line}")
+    for page in PAGES
+    for line in re.findall(r"`(viewsphere\s[^`]+)`", page.read_text("utf-8"))
+]
+
+
+@pytest.mark.parametrize("line", INLINE)
+def test_commands_within_sentences_have_options_and_formats_that_exist(line):
+    _, name, *words = shlex.split(line)
+    given = get_command(app).commands[name].make_context(name, words).params
+    assert set((given.get("format_") or "").split(",")) <= {"", *names("formats")}
+
+
+def test_there_are_commands_within_sentences():
+    assert any("--format" in param.values[0] for param in INLINE)
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(300)
+def test_the_detector_s_categories(folder):
+    (said,) = follow("detector", folder)
+    found = re.findall(r"^(\d+) (bench|bicycle|post box) (\d+)$", said, re.MULTILINE)  # pycocotools prints, too
+    assert [(number, name) for number, name, _ in found] == [("1", "bench"), ("2", "bicycle"), ("3", "post box")]
+    assert all(int(count) > 0 for *_, count in found)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(300)
+def test_poses_give_depth(folder):
+    (said,) = follow("pose6d", folder)
+    model, difference = said.splitlines()
+    assert model.endswith((".glb", ".obj")) and float(difference) < 1e-4
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(300)
+def test_depth_gives_points(folder):
+    (said,) = follow("depth", folder)
+    found = re.findall(r"^(\d+) (\d+)% of the pixels, ([\d.]+) to ([\d.]+) m$", said, re.MULTILINE)
+    assert len(found) == 6 and all(0 < float(near) < float(far) for *_, near, far in found)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(300)
+def test_frames_in_memory(folder):
+    assert follow("in-memory", folder) == [""]
+
+
+@pytest.mark.usefixtures("blender")
+@pytest.mark.timeout(300)
+def test_blender_s_first_pictures(folder):
+    follow("blender", folder)
