@@ -207,6 +207,7 @@ def rates(blender, tmp_path_factory):
     return folder
 
 
+NTSC = 30 / 1.001
 RATES = """
 import bpy, sys
 for name, fps, base in (("fast", 60, 1.0), ("ntsc", 30, 1.001)):
@@ -219,6 +220,7 @@ for name, fps, base in (("fast", 60, 1.0), ("ntsc", 30, 1.001)):
         bpy.context.object.keyframe_insert("location", frame=frame)
     bpy.ops.wm.alembic_export(filepath=f"{sys.argv[-1]}/{name}.abc", as_background_job=False)
     bpy.ops.export_scene.gltf(filepath=f"{sys.argv[-1]}/{name}.glb")
+    bpy.ops.export_scene.fbx(filepath=f"{sys.argv[-1]}/{name}.fbx")
 """
 
 
@@ -238,7 +240,10 @@ def steps_of(path, **fields):
 
 
 @pytest.mark.usefixtures("own_cache")
-@pytest.mark.parametrize(("name", "fps"), [("fast.usda", 60), ("fast.glb", 60), ("fast.abc", 60), ("ntsc.abc", 30 / 1.001)])
+@pytest.mark.parametrize(
+    ("name", "fps"),
+    [("fast.usda", 60), ("fast.glb", 60), ("fast.abc", 60), ("fast.fbx", 60), ("ntsc.abc", NTSC), ("ntsc.fbx", NTSC)],
+)
 def test_files_keep_their_own_times(rates, name, fps):
     steps = steps_of(rates / name)
     assert len(steps) == 11
@@ -255,7 +260,8 @@ def test_frames_are_as_many_a_second_as_the_recipe_says(rates):
         assert len(steps) == 21
         assert np.allclose(steps[:, 1], np.arange(21) / 120)
         assert np.allclose(steps[::2, 2:], steps_of(rates / name)[:, 2:], atol=1e-4)
-    assert np.allclose(steps_of(rates / "fast.usda", fps=30)[:, 1], np.arange(11) / 30)
+    for name in ("fast.usda", "fast.fbx"):
+        assert np.allclose(steps_of(rates / name, fps=30)[:, 1], np.arange(11) / 30)
     fresh = plan(Recipe(models=[{"source": str(rates / "fast.glb"), "category": "c"}], viewpoints={"distance": 5}, formats=[]))
     assert "fps" not in fresh.model_specs[0].model_dump()
 

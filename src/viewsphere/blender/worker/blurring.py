@@ -7,6 +7,7 @@ from contextlib import contextmanager
 import bpy
 from mathutils import Matrix
 
+from .playing import curves
 from .posing import camera_matrix
 
 STEPS = 3
@@ -65,12 +66,6 @@ def _move(one, matrices, frame):
         one.location, one.rotation_quaternion, one.scale, before = place, turn, scale, turn
         for path in ("location", "rotation_quaternion"):
             one.keyframe_insert(path, frame=frame - 0.5 + k / (len(matrices) - 1))
-    for curve in _curves(one.animation_data):
+    for curve in curves(one.animation_data.action):
         for key in curve.keyframe_points:
             key.interpolation = "LINEAR"
-
-
-def _curves(animation):
-    for layer in animation.action.layers:
-        for strip in layer.strips:
-            yield from strip.channelbag(animation.action_slot).fcurves

@@ -49,8 +49,9 @@ def open_file(file, kind, root, cameras=False, clip=None, fps=None):
 
 
 def _import(file, kind, cameras, fps):
-    """Import a file into an empty scene of `fps` frames a second, None for the file's own. A glTF file says in seconds when
-    its keys are: it is imported again where these are no frames of the first import.
+    """Import a file into an empty scene of `fps` frames a second, None for the file's own, which Blender's reader of FBX sets
+    by itself. A glTF file says in seconds when its keys are: it is imported again where these are no frames of the first
+    import.
     """
     rate = fps or own_rate(file, kind) or DEFAULT
     _import_at(file, kind, cameras, rate)
@@ -61,14 +62,15 @@ def _import(file, kind, cameras, fps):
 
 
 def _import_at(file, kind, cameras, rate):
-    """Import a file into an empty scene of so many frames a second."""
+    """Import a file into an empty scene of so many frames a second; an FBX file says itself how many these are."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     render = bpy.context.scene.render
     set_rate(bpy.context.scene, rate)
     if kind == "glb":  # Blender's reader of glTF multiplies by fps_base where it should divide
         render.fps_base = 1 / render.fps_base
     IMPORTS[kind](file, cameras)
-    set_rate(bpy.context.scene, rate)
+    if kind != "fbx":
+        set_rate(bpy.context.scene, rate)
 
 
 def _newer(kind):

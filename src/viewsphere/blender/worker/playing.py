@@ -78,6 +78,15 @@ def timeline(scene):
     }
 
 
+def curves(action, slot=None):
+    """The animation curves of an action, or of one of its slots."""
+    for layer in action.layers:
+        for strip in layer.strips:
+            for bag in strip.channelbags:
+                if slot is None or bag.slot_handle == slot.handle:
+                    yield from bag.fcurves
+
+
 def go_to(scene, frame, after=None):
     """Go to a frame; simulations are played up to it, from the first frame on, or from the last shown frame, `after`."""
     if is_simulated(scene):

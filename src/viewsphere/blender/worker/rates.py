@@ -10,6 +10,8 @@ from pathlib import Path
 
 import bpy
 
+from .playing import curves
+
 DEFAULT = 24.0
 """What Blender takes of a file that says nothing."""
 
@@ -23,7 +25,9 @@ LEAST, MOST = 1.0, 1000.0
 
 
 def own_rate(file, kind):
-    """Frames a second of a USD or Alembic file; None of other kinds, and where the file does not say."""
+    """Frames a second of a USD or Alembic file; None of other kinds, and where the file does not say. An FBX file's are set by
+    Blender's reader.
+    """
     if kind in ("usd", "usda", "usdc", "usdz"):
         return _usd_rate(file)
     return _alembic_rate(Path(file).read_bytes()) if kind == "abc" else None
@@ -79,7 +83,7 @@ def key_rate():
     scene = bpy.context.scene
     rate = scene.render.fps / scene.render.fps_base
     times = sorted(
-        {key.co.x / rate for action in bpy.data.actions for curve in _curves(action) for key in curve.keyframe_points}
+        {key.co.x / rate for action in bpy.data.actions for curve in curves(action) for key in curve.keyframe_points}
     )
     steps = [after - before for before, after in pairwise(times) if after - before > 1 / MOST]
     if not steps:
@@ -89,10 +93,3 @@ def key_rate():
 
 def _fits(times, rate):
     return all(abs(time * rate - round(time * rate)) < NEAR for time in times)
-
-
-def _curves(action):
-    for layer in action.layers:
-        for strip in layer.strips:
-            for bag in strip.channelbags:
-                yield from bag.fcurves

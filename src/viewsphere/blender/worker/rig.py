@@ -13,6 +13,7 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
+from .playing import curves
 from .rendering import place_camera
 
 STILL = 1e-9
@@ -59,20 +60,13 @@ def key(owner, path, values):
     setattr(owner.path_resolve(holder) if holder else owner, name, rows[0].tolist() if is_array else float(rows[0, 0]))
     for i in np.flatnonzero(np.ptp(rows, axis=0) > STILL).tolist():
         owner.keyframe_insert(path, frame=1, **({"index": i} if is_array else {}))
-        curve = next(c for c in _curves(owner) if c.data_path == path and c.array_index == i)
+        curve = next(c for c in curves(owner.animation_data.action) if c.data_path == path and c.array_index == i)
         points = curve.keyframe_points
         points.add(len(rows) - len(points))
         points.foreach_set("co", np.stack([np.arange(1, len(rows) + 1), rows[:, i]], axis=1).astype(np.float32).ravel())
         for point in points:
             point.interpolation = "CONSTANT"
         curve.update()
-
-
-def _curves(owner):
-    for layer in owner.animation_data.action.layers:
-        for strip in layer.strips:
-            for bag in strip.channelbags:
-                yield from bag.fcurves
 
 
 def _key_lens(scene, views):

@@ -8,7 +8,7 @@ import bpy
 
 from . import compositing
 from .opening import open_file
-from .playing import go_to
+from .playing import curves, go_to
 
 
 def open_scene(told):
@@ -51,21 +51,19 @@ def _fix(one, name, value):
         one.driver_remove(name)
         one.driver_add(name).driver.expression = str(int(value))
     elif one.animation_data is not None:
-        for curve in _curves(one.animation_data):
+        for curve in _all_curves(one.animation_data):
             if curve.data_path == name:
                 curve.mute = True
     setattr(one, name, value)
 
 
-def _curves(animation):
+def _all_curves(animation):
     """All drivers and animation curves of an object's animation data."""
     yield from animation.drivers
     strips = (strip for track in animation.nla_tracks for strip in track.strips)
     for played in (animation, *strips):
-        for layer in played.action.layers if played.action else ():
-            for strip in layer.strips:
-                bag = strip.channelbag(played.action_slot) if played.action_slot else None
-                yield from bag.fcurves if bag else ()
+        if played.action and played.action_slot:
+            yield from curves(played.action, played.action_slot)
 
 
 def _only_color(scene):
