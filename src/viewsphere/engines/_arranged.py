@@ -17,10 +17,6 @@ from viewsphere.model.thing import Repaint, Thing, TimeStep
 from viewsphere.truth.geometry import Geometry, placed_meshes, present
 from viewsphere.truth.moving import Ring, changed, differs_in_shape_only, shot_floor
 
-Paint = tuple[Repaint, ...]
-Look = tuple[ModelSpec, TimeStep, Paint]
-"""What a mesh is of: a model at a time step, painted."""
-
 STEPS = 16
 """Time steps of models whose meshes are kept for the next instants."""
 
@@ -62,20 +58,31 @@ class Arranged:
         return changed(before.things, before.whole, self.things, self.whole)
 
 
+@dataclass(frozen=True)
+class Look:
+    """What a mesh is of: a model at a time step, with its changes to materials."""
+
+    model: ModelSpec
+    step: TimeStep
+    repaints: tuple[Repaint, ...]
+
+    def mesh(self, load: Load) -> Mesh:
+        """The painted mesh of the model that `load` gives."""
+        return textured(load(self.model, self.step), self.repaints)
+
+
 @dataclass(frozen=True, eq=False)
 class Shown:
     """Gives models at their time steps; the last `STEPS` are kept, so that what is shown again is the same object."""
 
     load: Load
-    _held: dict[tuple[ModelSpec, TimeStep, Paint], Mesh] = field(
-        default_factory=dict[tuple[ModelSpec, TimeStep, "Paint"], Mesh]
-    )
+    _held: dict[Look, Mesh] = field(default_factory=dict[Look, Mesh])
 
     def mesh(self, thing: Thing, step: TimeStep, resting: Mesh) -> Mesh:
         """A thing's mesh at a time step, which has in common with the mesh at rest what is equal."""
-        key = thing.model, step, thing.repaints
-        found = self._held.pop(key, None) or sharing(textured(self.load(thing.model, step), thing.repaints), resting)
-        self._held[key] = found  # the last used comes last
+        look = Look(thing.model, step, thing.repaints)
+        found = self._held.pop(look, None) or sharing(look.mesh(self.load), resting)
+        self._held[look] = found  # the last used comes last
         if len(self._held) > STEPS:
             del self._held[next(iter(self._held))]
         return found
@@ -149,7 +156,7 @@ class Arrangements:
 
 def _dressed(things: Sequence[Thing], meshes: Sequence[Mesh]) -> tuple[Mesh, ...]:
     """The meshes with the pictures that things are painted with; things of one mesh and one paint share it."""
-    found: dict[tuple[int, Paint], Mesh] = {}
+    found: dict[tuple[int, tuple[Repaint, ...]], Mesh] = {}
     for thing, mesh in zip(things, meshes, strict=True):
         if (id(mesh), thing.repaints) not in found:
             found[id(mesh), thing.repaints] = textured(mesh, thing.repaints)

@@ -40,7 +40,7 @@ def stage(told):
     scene.collection.objects.link(camera)
     scene.camera = camera
     if told["script"]:
-        scripting.run(scene, told["script"], told["order"])
+        scripting.run(scene, told["script"])
     return {}
 
 

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from functools import partial
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.assets.deforming import Load
 from viewsphere.engines._blender.file_frame import FileFrame
-from viewsphere.engines._blender.staging import FRAME_SECONDS, STAGE_SECONDS, build_stage, camera_request
+from viewsphere.engines._blender.requests import members_of
+from viewsphere.engines._blender.staging import FRAME_SECONDS, STAGE_SECONDS, Arrangement, build_stage, camera_request
 from viewsphere.errors import BlenderError, UserError
 from viewsphere.model.shot import Shot
 
@@ -19,7 +23,8 @@ def indices(shot: Shot, instant: int, sensor: int, load: Load) -> NDArray[np.int
     """Ids of the objects that Cycles sees through the middles of a sensor's pixels at an instant, (H, W) int32, 0 for none;
     None for a lens that Blender has not.
 
-    Raises UserError where Blender cannot be used, or cannot build the scene.
+    A Blender that dies or hangs is started again, once. Raises ModelError when it dies again, UserError where Blender cannot be
+    used, or cannot build the scene.
     """
     camera = shot.camera(instant, sensor)
     if camera.distortion is not None or camera.intrinsics.skew:
@@ -27,15 +32,19 @@ def indices(shot: Shot, instant: int, sensor: int, load: Load) -> NDArray[np.int
     python = shot.engine_options.get("python") if shot.engine == "cycles" else None
     options = {"python": python, "samples": 1, "bounces": 0, "denoise": "off", "settings": SHARP}
     stage = build_stage(shot.model_copy(update={"engine": "cycles", "engine_options": options}), load).arrangement(instant)
-    process = stage.keeper.process_for(stage)
-    members = {name: thing.id for thing in shot.objects for name in (thing.model.parts and thing.model.parts.only) or ()}
     view = FileFrame.of(shot.scene.blend).camera(camera_request(camera))
-    out = process.folder / "seen.npy"
     try:
-        process.ask("number", STAGE_SECONDS, members=members, alpha=shot.label_alpha)
-        process.ask("render", FRAME_SECONDS, camera=view, out=str(out), transparent=True, border=None, passes=["index"])
-        return np.rint(np.load(out.with_suffix(".index.npy"))[..., 0]).astype(np.int32)
+        return stage.keeper.insist(partial(_rendered, stage, view), stage.named)
     except BlenderError as error:
-        raise UserError(str(error)) from error
+        raise UserError(f"{stage.named}: {str(error).partition(': ')[2]}") from error
     finally:
-        stage.keeper.drop()  # the numbers are not those of the file
+        stage.keeper.forget()  # the numbers are not those of the file
+
+
+def _rendered(stage: Arrangement, view: dict[str, Any]) -> NDArray[np.int32]:
+    """The ids that Blender's pass has, seen by a camera."""
+    process = stage.keeper.process_for(stage)
+    out = process.folder / "seen.npy"
+    process.ask("number", STAGE_SECONDS, members=members_of(stage.shot), alpha=stage.shot.label_alpha)
+    process.ask("render", FRAME_SECONDS, camera=view, out=str(out), transparent=True, border=None, passes=["index"])
+    return np.rint(np.load(out.with_suffix(".index.npy"))[..., 0]).astype(np.int32)

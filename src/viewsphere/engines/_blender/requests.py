@@ -17,6 +17,7 @@ from viewsphere.engines._blender.file_frame import FileFrame
 from viewsphere.engines._blender.options import AnyOptions
 from viewsphere.engines._blender.texels import Kind, Levels
 from viewsphere.model.scene import AnyLight, BlendScene, Ground, HemisphereLight, Scene
+from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Repaint, Thing
 from viewsphere.surroundings.ground import ground_frame, ground_material, only_scatters
 from viewsphere.surroundings.sky import SURROUNDINGS, SkyPictures, sky_pictures
@@ -57,16 +58,15 @@ def scene_request(
     frame, blend = FileFrame.of(scene.blend), scene.blend
     kinds = kinds_of(things, meshes, scene)
     shared: dict[int, Request] = {}
-    request: list[Request] = []
+    meshes_told: list[Request] = []
     for kind, look in zip(kinds, materials_request(kinds, put, levels), strict=True):
         if id(kind.mesh) not in shared:
             shared[id(kind.mesh)] = _mesh_request(kind.mesh, put)
-        request.append({**shared[id(kind.mesh)], **look, "name": kind.things[0].model.key})
+        meshes_told.append({**shared[id(kind.mesh)], **look, "name": kind.things[0].model.key})
     numbers = {id(thing): number for number, kind in enumerate(kinds) for thing in kind.things}
     objects = [
         {"mesh": numbers[id(p)], "matrix": frame.placed(p.world_from_object), "index": p.id}
-        for p in things
-        if is_staged(p, scene)
+        for p in (things[i] for i in staged(things, scene))
     ]
     pictures = None
     if blend is None or not blend.is_lit:
@@ -74,8 +74,7 @@ def scene_request(
     middle = middle_of(geometry, sum(not p.scenery for p in things))
     has_scenery = any(p.scenery for p in things)
     return {
-        "meshes": request,
-        "order": [number for number, thing in enumerate(things) if is_staged(thing, scene)],
+        "meshes": meshes_told,
         "objects": objects,
         "ground": None if scene.ground is None else _ground_request(scene.ground, geometry, has_scenery, put),
         "lights": [frame.light(light) for light in _lights_request(scene, middle)],
@@ -86,19 +85,24 @@ def scene_request(
     }
 
 
-def is_staged(thing: Thing, scene: Scene) -> bool:
-    """Whether a thing is put into the scene: it is there, and a .blend scene does not contain it already."""
-    return thing.is_there and (scene.blend is None or thing.model.parts is None)
+def staged(things: Sequence[Thing], scene: Scene) -> list[int]:
+    """Positions of the things that are put into the scene, in the worker's order: those that are there, and that a .blend scene
+    does not contain already.
+    """
+    return [i for i, thing in enumerate(things) if thing.is_there and (scene.blend is None or thing.model.parts is None)]
+
+
+def members_of(shot: Shot) -> dict[str, int]:
+    """Ids of a shot's objects by the names of the objects of a user's .blend scene that they are made of."""
+    return {name: thing.id for thing in shot.objects for name in (thing.model.parts and thing.model.parts.only) or ()}
 
 
 def kinds_of(things: Sequence[Thing], meshes: Sequence[Mesh], scene: Scene) -> tuple[Kind, ...]:
-    """The models that are put into the scene, each with its changes to materials; without absent things, and without things
-    that a .blend scene contains already.
-    """
+    """The models that are put into the scene, each with its changes to materials."""
     found: dict[tuple[int, tuple[Repaint, ...]], tuple[Mesh, list[Thing]]] = {}
-    for thing, mesh in zip(things, meshes, strict=True):
-        if is_staged(thing, scene):
-            found.setdefault((id(mesh), thing.repaints), (mesh, []))[1].append(thing)
+    for i in staged(things, scene):
+        thing, mesh = things[i], meshes[i]
+        found.setdefault((id(mesh), thing.repaints), (mesh, []))[1].append(thing)
     return tuple(Kind(mesh, repaints, tuple(own)) for (_, repaints), (mesh, own) in found.items())
 
 

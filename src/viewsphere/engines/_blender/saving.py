@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import shutil
 from collections.abc import Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +15,8 @@ from viewsphere.assets.deforming import Load
 from viewsphere.assets.srgb import encoded
 from viewsphere.codecs.png_tiff import encode_png
 from viewsphere.engines._blender.file_frame import FileFrame
+from viewsphere.engines._blender.requests import members_of
 from viewsphere.engines._blender.staging import STAGE_SECONDS, Arrangement, build_stage, camera_request
-from viewsphere.errors import BlenderDied, ModelError
 from viewsphere.geometry.camera import orbit_angles
 from viewsphere.imaging.background import display_background
 from viewsphere.imaging.effects import has_effects
@@ -63,15 +64,8 @@ def save(shot: Shot, samples: Sequence[Sample], load: Load, file: Path, data: st
     stage = build_stage(own, load).arrangement(0)
     finishes = [shot.finish(instant) for instant in range(len(shot.instants))]
     request = _request(shot, samples, finishes, file.stem, data)
-    died: BlenderDied | None = None
-    for _ in range(2):
-        try:
-            off = _ask(stage, request, finishes, samples[0].camera, file)
-            return script + tuple(_lacking(samples, finishes, off / max(pose["distance"] for pose in request["poses"])))
-        except BlenderDied as error:
-            stage.keeper.drop()
-            died = error
-    raise ModelError(f"{file.name}: {died}")
+    off = stage.keeper.insist(partial(_ask, stage, request, finishes, samples[0].camera, file), file.name)
+    return script + tuple(_lacking(samples, finishes, off / max(pose["distance"] for pose in request["poses"])))
 
 
 def is_clear(shot: Shot) -> bool:
@@ -114,7 +108,7 @@ def _request(shot: Shot, samples: Sequence[Sample], finishes: Sequence[Finish], 
         "text": TEXT.format(name=name, data=data),
         "poses": _poses_request(samples, FileFrame.of(shot.scene.blend)),
         "objects": _objects_request(samples),
-        "members": {name: p.id for p in shot.objects for name in (p.model.parts and p.model.parts.only) or ()},
+        "members": members_of(shot),
         "properties": {"data set": data, "frames": [sample.index for sample in samples]},
         "is_users": shot.scene.blend is not None,
         "is_open": not shows_sky(shot, finishes[0]),

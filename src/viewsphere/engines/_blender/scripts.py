@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ from viewsphere.blender.interpreter import SCRIPTS
 from viewsphere.engines._blender.options import AnyOptions
 from viewsphere.errors import RecipeError
 from viewsphere.model.shot import Shot
+from viewsphere.model.thing import Thing
 
 
 def check_script(script: str | None) -> None:
@@ -25,14 +27,16 @@ def check_script(script: str | None) -> None:
         )
 
 
-def script_request(options: AnyOptions, shot: Shot) -> dict[str, Any] | None:
-    """What the worker is told of the script, its text and what the staged objects are; None without a script."""
+def script_request(options: AnyOptions, shot: Shot, things: Sequence[Thing]) -> dict[str, Any] | None:
+    """What the worker is told of the script: its text, what the shot is, and what each of the staged things is, in the order of
+    the objects in the request of the scene; None without a script.
+    """
     if options.script is None:
         return None
     check_script(options.script)
     known = [
         {"id": thing.id, "category": thing.model.category, "model": thing.model.key, "is_scenery": thing.scenery}
-        for thing in shot.things
+        for thing in things
     ]
     text = Path(options.script).read_text("utf-8")
     return {"file": options.script, "text": text, "things": known, "shot": {"key": shot.key, "frames": shot.first}}

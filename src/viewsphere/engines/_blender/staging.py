@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property, partial
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +21,7 @@ from viewsphere.engines._blender.backdrop import Backdrop
 from viewsphere.engines._blender.file_frame import FileFrame
 from viewsphere.engines._blender.lens import resampled, views_of
 from viewsphere.engines._blender.options import AnyOptions, options_of
-from viewsphere.engines._blender.requests import Request, kinds_of, materials_request, scene_request
+from viewsphere.engines._blender.requests import Request, kinds_of, materials_request, scene_request, staged
 from viewsphere.engines._blender.scripts import script_request
 from viewsphere.engines._blender.sweeping import Sweeping
 from viewsphere.engines._blender.texels import Kind, Levels
@@ -61,6 +61,8 @@ Clip = tuple[float, float]
 
 AllLevels = tuple[Levels, ...]
 """Halvings of the pictures of each kind of model."""
+
+Answer = TypeVar("Answer")
 
 Bounds = tuple[Path, ...] | None
 """The folders that Blender may read if it opens a user's .blend file; None (no restriction) if it opens none."""
@@ -109,6 +111,23 @@ class Keeper:
             how = str(error).partition("; its log")[0]
             raise UserError(f"engine: {options.title} cannot draw on this machine ({how}): {GRAPHICS}, or use cycles") from None
         self._drawing.add(options.renderer)
+
+    def insist(self, ask: Callable[[], Answer], named: str) -> Answer:
+        """The answer of `ask`; a Blender that dies meanwhile is started again, once. Raises ModelError, which names what is
+        `named`, when Blender dies again.
+        """
+        died: BlenderDied | None = None
+        for _ in range(2):
+            try:
+                return ask()
+            except BlenderDied as error:
+                self.drop()
+                died = error
+        raise ModelError(f"{named}: {died}")
+
+    def forget(self) -> None:
+        """Take the scene that Blender holds for no stage's; the next picture has Blender build its scene."""
+        self._stage = None
 
     def drop(self) -> None:
         """End Blender; the next picture starts a new one."""
@@ -225,17 +244,10 @@ class Arrangement:
         self, camera: Camera, is_open: bool, clip: Clip = (NEAREST, FARTHEST), sweeping: Sweeping | None = None
     ) -> Float32:
         """Scene-linear, premultiplied, (H, W, 4) float32; a Blender that dies is started again, once."""
-        died: BlenderDied | None = None
-        for _ in range(2):
-            try:
-                return self._rendered(camera, is_open, clip, sweeping)
-            except BlenderDied as error:
-                self.keeper.drop()
-                died = error
-        raise ModelError(f"{self._named}: {died}")
+        return self.keeper.insist(partial(self._rendered, camera, is_open, clip, sweeping), self.named)
 
     @property
-    def _named(self) -> str:
+    def named(self) -> str:
         """What errors name: the .blend file that is the scene, else the models."""
         blend = self.shot.scene.blend
         return ", ".join(sorted({p.model.key for p in self.things})) if blend is None else blend.file
@@ -258,7 +270,7 @@ class Arrangement:
         try:
             process.ask("render", FRAME_SECONDS, camera=request, out=out, **told)
         except BlenderError as error:
-            raise ModelError(f"{self._named}: {str(error).partition(': ')[2]}") from error
+            raise ModelError(f"{self.named}: {str(error).partition(': ')[2]}") from error
         return np.load(out)
 
     @cached_property
@@ -284,9 +296,9 @@ class Arrangement:
         """Build the scene in this Blender. Raises UserError for settings or devices that the renderer lacks."""
         shot = self.shot
         request = scene_request(self.things, self.meshes, self.geometry, shot.scene, self.options, process.put, levels)
-        request["script"] = script_request(self.options, shot)
+        script = script_request(self.options, shot, [self.things[i] for i in staged(self.things, shot.scene)])
         try:
-            process.ask("stage", STAGE_SECONDS, **request)
+            process.ask("stage", STAGE_SECONDS, **request, script=script)
         except BlenderError as error:
             raise UserError(str(error).removeprefix("ValueError: ")) from error
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from viewsphere.engines._blender.file_frame import FileFrame
 from viewsphere.engines._blender.lens import views_of
-from viewsphere.engines._blender.requests import is_staged
+from viewsphere.engines._blender.requests import staged
 from viewsphere.model.shot import Shot
 
 MOMENTS = 9
@@ -33,10 +33,10 @@ class Sweeping:
             return None
         moments = (np.linspace(-0.5, 0.5, MOMENTS) * self.shot.shutter).tolist()
         frame = FileFrame.of(self.shot.scene.blend)
-        staged = [i for i, thing in enumerate(self.shot.things_at(self.instant)) if is_staged(thing, self.shot.scene)]
+        sweeps = [exposure.things[i] for i in staged(self.shot.things_at(self.instant), self.shot.scene)]
         objects = [
             {"object": place, "matrices": [frame.placed(pose) for pose in map(sweep.pose, moments) if pose is not None]}
-            for place, sweep in enumerate(exposure.things[i] for i in staged)
+            for place, sweep in enumerate(sweeps)
             if sweep is not None and None not in sweep.motion.poses
         ]
         camera = None if exposure.rig is None else [self._camera(frame, view, moment) for moment in moments]
