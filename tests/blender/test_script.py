@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 
+import numpy as np
 import pytest
 
 from command_line import viewsphere
@@ -23,10 +24,43 @@ def shade(scene, objects, shot):
                 out = next(node for node in material.node_tree.nodes if node.type == "OUTPUT_MATERIAL")
                 material.node_tree.links.new(shader.outputs[0], out.inputs["Surface"])
 """
-MOVES = """
-def shade(scene, objects, shot):
-    next(iter(objects)).location.x += 1
-"""
+OF = "import bpy\n\ndef shade(scene, objects, shot):\n    one, told = next(iter(objects.items()))\n    "
+"""How a script of one line about the first object begins."""
+
+LABELLED = {
+    "moved": "one.location.x += 1",
+    "carried by the camera": "one.parent = scene.camera",
+    "reshaped": "one.data.vertices[0].co.x += 0.5",
+    "with other triangles": "one.data.flip_normals()",
+    "modified": "one.modifiers.new('thick', 'SOLIDIFY').thickness = 0.1",
+    "hidden": "one.hide_render = True",
+    "not seen by cameras": "one.visible_camera = False",
+    "a holdout": "one.is_holdout = True",
+    "a catcher": "one.is_shadow_catcher = True",
+    "of another number": "one.pass_index = 7",
+    "unknown": "del one['viewsphere order']",
+    "left out": "bpy.data.objects.remove(one)",
+    "excluded": "scene.collection.objects.unlink(one)",
+    "added": "scene.collection.objects.link(bpy.data.objects.new('more', one.data))",
+    "displaced": (
+        "m = one.data.materials[0]; m.displacement_method = 'DISPLACEMENT'; t = m.node_tree; "
+        "t.links.new(t.nodes.new('ShaderNodeDisplacement').outputs[0], "
+        "next(n for n in t.nodes if n.type == 'OUTPUT_MATERIAL').inputs['Displacement'])"
+    ),
+    "another lens": "scene.camera.data.type = 'PANO'",
+}
+"""Lines that change what labels depend on, by what is changed then."""
+
+LOOKS = {
+    "materials": "one.data.materials.clear()",
+    "lights": (
+        "lamp = bpy.data.objects.new('lamp', bpy.data.lights.new('lamp', 'POINT')); lamp.data.energy = 500; "
+        "lamp.location = (0, -2, 2); scene.collection.objects.link(lamp)"
+    ),
+    "the world": "scene.world.node_tree.nodes.clear()",
+    "shadows": "one.visible_diffuse = False",
+}
+"""Lines that change how things look."""
 
 
 @pytest.fixture
@@ -62,15 +96,35 @@ def test_a_script_paints_what_it_is_given(recipe, monkeypatch):
 
 
 @pytest.mark.usefixtures("blender")
+@pytest.mark.parametrize("line", LABELLED.values(), ids=LABELLED)
+def test_a_script_that_changes_what_labels_depend_on_is_refused(recipe, monkeypatch, line):
+    monkeypatch.setenv(SCRIPTS, "1")
+    with pytest.raises(
+        UserError, match=r"mine.py: expected objects that stand where they stood.* (changed|gone|added): change"
+    ):
+        list(render(recipe(OF + line)))
+
+
+@pytest.mark.usefixtures("blender")
+@pytest.mark.parametrize("line", LOOKS.values(), ids=LOOKS)
+def test_a_script_may_change_looks(recipe, monkeypatch, line):
+    monkeypatch.setenv(SCRIPTS, "1")
+    changed, plain = (next(iter(render(recipe(OF + text)))).channels for text in (line, "pass"))
+    assert not np.array_equal(changed["rgb"], plain["rgb"])
+    assert np.array_equal(changed["instances"], plain["instances"])
+
+
+@pytest.mark.usefixtures("blender")
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        (MOVES, ["mine.py: expected objects that stand where they stood", "changed"]),
         ("def shade(scene, objects, shot):\n    nothing()\n", ["mine.py, line 2: NameError"]),
+        ("import sys\n\ndef shade(scene, objects, shot):\n    sys.exit('enough')\n", ["mine.py, line 4: SystemExit: enough"]),
+        ("def shade(scene, objects, shot):\n    raise KeyboardInterrupt\n", ["mine.py, line 2: KeyboardInterrupt"]),
         ("x = 1\n", ["expected a function shade(scene, objects, shot)"]),
     ],
 )
-def test_a_script_that_fails_or_moves_things_is_one_line(recipe, monkeypatch, text, words):
+def test_a_script_that_fails_is_one_line(recipe, monkeypatch, text, words):
     monkeypatch.setenv(SCRIPTS, "1")
     with pytest.raises(UserError) as caught:
         list(render(recipe(text)))

@@ -84,7 +84,7 @@ class _Seeing:
                 continue
             if strands(item):
                 self._left_out.setdefault(STRANDS, []).append(item.name)
-            self._displacing |= {slot.material.name for slot in item.material_slots if _displaces(slot.material)}
+            self._displacing |= {slot.material.name for slot in item.material_slots if displaces(slot.material)}
             if item.type == "LIGHT":
                 self.lamps += 1
             elif item.type in LEFT_OUT:
@@ -107,7 +107,7 @@ class _Seeing:
         return said
 
 
-def _displaces(material):
+def displaces(material):
     """Whether a material moves the surface that it is on."""
     if material is None or material.node_tree is None or material.displacement_method not in ("DISPLACEMENT", "BOTH"):
         return False

@@ -63,7 +63,7 @@ def _choices(told):
 
 
 def evaluate(scene, gathering):
-    """Give the scene as it is rendered to `gathering`."""
+    """Give the scene as it is rendered to `gathering`, whose `take` is called with the depsgraph."""
     failed = []
 
     class Taker(bpy.types.RenderEngine):
@@ -76,10 +76,15 @@ def evaluate(scene, gathering):
             except Exception as error:
                 failed.append(error)
 
+    render = scene.render
+    engine, is_composited = render.engine, render.use_compositing
     bpy.utils.register_class(Taker)
-    scene.render.engine = Taker.bl_idname
-    bpy.ops.render.render(layer=bpy.context.view_layer.name)
-    bpy.utils.unregister_class(Taker)
+    render.engine, render.use_compositing = Taker.bl_idname, False
+    try:
+        bpy.ops.render.render(layer=bpy.context.view_layer.name)
+    finally:
+        render.engine, render.use_compositing = engine, is_composited
+        bpy.utils.unregister_class(Taker)
     if failed:
         raise failed[0]
 

@@ -2,46 +2,125 @@
 
 from __future__ import annotations
 
+import hashlib
 import traceback
 
-import bpy
+import numpy as np
+from mathutils import Matrix
 
 from .blurring import ORDER
+from .contents import displaces
+from .evaluated import SOLID
+from .reading import evaluate
 
 ENTRY = "shade"
 """The function that a script defines: `shade(scene, objects, shot)`."""
 
+ELSEWHERE = Matrix.Translation((1.0, 2.0, 3.0))
+"""Where the camera is when the scene is compared, and never while the script runs: so what goes with it is found, too."""
 
-def run(scene, told, order):
+
+def run(scene, told):
     """Call the script's `shade(scene, objects, shot)`: the scene, a dict of what is known of each of viewsphere's objects, and
-    of the shot. `order` are the places among all things of what was staged.
+    of the shot.
 
-    Raises ValueError with the script's line where it fails, and where it moves or hides an object, which no label would know.
+    Raises ValueError with the script's line where it fails or leaves Python, and where what a camera sees of meshes, or how, is
+    not what it was: labels would not know.
     """
     placed = {one[ORDER]: one for one in scene.objects if ORDER in one}
-    objects = {placed[place]: told["things"][number] for place, number in enumerate(order)}
-    bpy.context.view_layer.update()
-    before = {one: _standing(one) for one in objects}
+    objects = {placed[order]: known for order, known in enumerate(told["things"])}
+    before = _Standing.of(scene)
     space = {"__name__": "viewsphere_script", "__file__": told["file"]}
     try:
         exec(compile(told["text"], told["file"], "exec"), space)
         if not callable(space.get(ENTRY)):
             raise ValueError(f"expected a function {ENTRY}(scene, objects, shot), found none")
         space[ENTRY](scene, objects, told["shot"])
-    except Exception as error:
+        after = _Standing.of(scene)
+    except BaseException as error:  # whatever a script raises is about the script, sys.exit, too
         lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == told["file"]]
         where = f", line {lines[-1]}" if lines else ""
-        raise ValueError(f"engine.script: {told['file']}{where}: {type(error).__name__}: {error}") from None
-    bpy.context.view_layer.update()
-    for one, standing in before.items():
-        if _standing(one) != standing:
-            raise ValueError(
-                f"engine.script: {told['file']}: expected objects that stand where they stood, with their meshes, as labels "
-                f"know of nothing else; found {one.name!r} changed: change materials, lights and the world"
-            )
+        said = f"{type(error).__name__}: {error}".removesuffix(": ")
+        raise ValueError(f"engine.script: {told['file']}{where}: {said}") from None
+    difference = before.difference(after)
+    if difference is not None:
+        raise ValueError(
+            f"engine.script: {told['file']}: expected objects that stand where they stood, with their meshes, as labels "
+            f"know of nothing else; found {difference}: change materials, lights and the world"
+        )
 
 
-def _standing(one):
-    """What labels depend on: place, shape and whether it is shown."""
-    modifiers = tuple(modifier.name for modifier in one.modifiers)
-    return one.matrix_world.copy().freeze(), one.data.as_pointer(), len(one.data.vertices), one.hide_render, modifiers
+class _Standing:
+    """What labels depend on: of every instance of a mesh that a render shows, its place, its shape and how a camera sees it;
+    and what the camera is.
+    """
+
+    @classmethod
+    def of(cls, scene):
+        """How the scene stands now, as a render would show it whose camera is at `ELSEWHERE`."""
+        made, resting = cls(scene), scene.camera.matrix_world.copy()
+        scene.camera.matrix_world = ELSEWHERE
+        evaluate(scene, made)
+        scene.camera.matrix_world = resting
+        return made
+
+    def __init__(self, scene):
+        camera = scene.camera
+        known = camera.data.as_pointer(), camera.data.type, camera.parent, len(camera.constraints)
+        self._known, self._names = {camera.session_uid: known}, {camera.session_uid: camera.name}
+
+    def take(self, depsgraph):
+        """Note all meshes that have vertices."""
+        shapes = {}
+        for instance in depsgraph.object_instances:
+            item = instance.object
+            owner = instance.parent if instance.is_instance else item
+            if not instance.show_self or item.type not in SOLID:
+                continue
+            shape = _shape(item, shapes)
+            if shape is None:
+                continue
+            key = owner.original.session_uid, item.original.session_uid, tuple(instance.persistent_id)
+            self._names[key] = item.name
+            self._known[key] = shape, tuple(map(tuple, instance.matrix_world)), *_seen(item.original, depsgraph.view_layer)
+
+    def difference(self, after):
+        """The first difference in words, None if there is none."""
+        for key in {**self._known, **after._known}:
+            if key not in after._known:
+                return f"{self._names[key]!r} gone"
+            if key not in self._known:
+                return f"{after._names[key]!r} added"
+            if self._known[key] != after._known[key]:
+                return f"{self._names[key]!r} changed"
+        return None
+
+
+def _seen(one, layer):
+    """How a camera and the pass of indices see an object, and what viewsphere knows it by."""
+    is_displaced = any(displaces(slot.material) for slot in one.material_slots)
+    hidden = one.is_shadow_catcher, one.is_holdout, one.holdout_get(view_layer=layer), one.indirect_only_get(view_layer=layer)
+    return one.visible_camera, *hidden, one.pass_index, one.get(ORDER), is_displaced
+
+
+def _shape(item, known):
+    """A digest of an evaluated object's triangles, None without vertices; of meshes that are placed more than once, once."""
+    if item.type == "META":
+        try:
+            return _digest(item.to_mesh())
+        finally:
+            item.to_mesh_clear()
+    pointer = item.data.as_pointer()
+    if pointer not in known:
+        known[pointer] = _digest(item.data)
+    return known[pointer]
+
+
+def _digest(mesh):
+    if mesh is None or not len(mesh.vertices):
+        return None
+    vertices = np.empty(3 * len(mesh.vertices), np.float32)
+    mesh.vertices.foreach_get("co", vertices)
+    triangles = np.empty(3 * len(mesh.loop_triangles), np.int32)
+    mesh.loop_triangles.foreach_get("vertices", triangles)
+    return hashlib.blake2b(vertices.tobytes() + triangles.tobytes()).digest()

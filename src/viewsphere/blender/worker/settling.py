@@ -42,12 +42,7 @@ def number(told):
 
 def _number(scene, members):
     numbering = _Numbering(members)
-    engine, composited = scene.render.engine, scene.render.use_compositing
-    scene.render.use_compositing = False
-    try:
-        evaluate(scene, numbering)
-    finally:
-        scene.render.engine, scene.render.use_compositing = engine, composited
+    evaluate(scene, numbering)
     numbering.apply(scene)
 
 
