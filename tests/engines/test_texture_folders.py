@@ -92,6 +92,33 @@ def test_only_chosen_materials_and_models_change_and_one_picture_may_be_named(fo
     assert all(np.array_equal(a.rgb, b.rgb) for a, b in zip(vs.render(nothing), vs.render(plain), strict=True))
 
 
+def test_a_picture_that_changes_on_disk_is_read_again(folder):
+    """Between runs, and within one between two shots that share a stage."""
+    named = {"images": None, "image": str(folder / "green.png")}
+    views = {"azimuth": [30, 60, 90], "elevation": 20, "distance": {"fill": 0.8}}
+    recipe = recipe_of(folder, named, models=[{"source": "zoo:chair"}], viewpoints=views, shot_frames=1)
+    frames = vs.render(recipe)
+    found = [hue(next(iter(vs.render(recipe)))), hue(next(iter(frames)))]
+    Image.new("RGB", (8, 4), COLORS["red"]).save(folder / "green.png")
+    found += [hue(next(iter(vs.render(recipe)))), hue(next(iter(frames)))]
+    assert found == ["green", "green", "red", "red"]
+
+
+def test_a_picture_of_another_size_or_time_is_another(folder):
+    file, repaint = folder / "green.png", (Repaint(image=str(folder / "green.png")),)
+
+    def shown():
+        return textured(mesh_of(materials=(Material("a"), Material("b"))), repaint).images[0]
+
+    first, changed = shown(), file.stat().st_mtime_ns
+    assert shown() is first
+    Image.new("RGB", (80, 40), COLORS["red"]).save(file)
+    os.utime(file, ns=(changed, changed))
+    assert tuple(shown().pixels[0, 0, :3]) == COLORS["red"]
+    os.utime(file, ns=(1, 1))
+    assert shown() is not first
+
+
 def mesh_of(**more):
     card = np.array([[0, 0, 0], [2, 0, 0], [2, 0, 1], [0, 0, 1]], np.float32)
     return Mesh(
@@ -136,6 +163,11 @@ def test_mistakes_name_their_field(folder, tmp_path):
     (folder / "broken.png").write_bytes(b"no picture")
     with pytest.raises(RecipeError, match=r"scene.materials\[0\].images: expected a readable image"):
         list(vs.render(recipe_of(folder)))
+    bare = mesh_of(materials=(Material("a"), Material("b")))
+    with pytest.raises(RecipeError, match=r"^scene.materials: expected a readable image; \S*broken.png is not an image"):
+        textured(bare, (Repaint(image=str(folder / "broken.png")),))
+    with pytest.raises(RecipeError, match=r"^scene.materials: expected an image file, found No such file.*: \S*gone.png$"):
+        textured(bare, (Repaint(image=str(folder / "gone.png")),))
 
 
 @pytest.mark.skipif(not hasattr(os, "symlink"), reason="links")

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from pictures import bricks, write
+from viewsphere.assets.folder import SHARPEST
 from viewsphere.assets.srgb import linear
 from viewsphere.errors import UserError
 from viewsphere.model.scene import Ground
-from viewsphere.surroundings.ground import SHARPEST, ground_albedo, ground_frame, ground_material
+from viewsphere.surroundings.ground import ground_albedo, ground_frame, ground_material
 
 
 def test_plain_ground_has_its_colour_in_linear_light():
@@ -41,8 +42,9 @@ def test_one_ground_keeps_its_images_until_a_file_changes(tmp_path):
     ground = Ground(**bricks(32).save(tmp_path))
     first = ground_material(ground)[1]
     assert all(a is b for a, b in zip(first, ground_material(ground)[1], strict=True))
+    changed = (tmp_path / "color.png").stat().st_mtime_ns
     write(tmp_path / "color.png", np.zeros((8, 8, 3), np.uint8))
-    os.utime(tmp_path / "color.png", ns=(1, 1))
+    os.utime(tmp_path / "color.png", ns=(changed, changed))  # of another size at least
     assert ground_material(ground)[1][0].pixels.shape == (8, 8, 4)
 
 

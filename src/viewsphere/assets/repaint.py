@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from fnmatch import fnmatchcase
 from functools import lru_cache
@@ -11,10 +11,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.assets.folder import SHARPEST, UnreadableError, decode_image, reduced
 from viewsphere.assets.mesh import Image, Material, Mesh, Texture
-from viewsphere.errors import RecipeError
+from viewsphere.assets.opaque import Stamp, opaque_picture, stamp_of
 from viewsphere.model.thing import Repaint
+
+FIELD = "scene.materials"
+"""The recipe's field that names repaints' pictures."""
 
 
 def repainted(material: Material, repaints: Sequence[Repaint]) -> tuple[Material, Repaint | None]:
@@ -41,22 +43,22 @@ def textured(mesh: Mesh, repaints: Sequence[Repaint]) -> Mesh:
             texcoord = 0 if material.base_color_texture is None else material.base_color_texture.texcoord
             texture = Texture(len(images), texcoord=texcoord)
             materials[i] = replace(material, base_color=(1.0, 1.0, 1.0, material.base_color[3]), base_color_texture=texture)
-            images.append(_picture(found.image))
+            images.append(_picture(found.image, stamp_of(found.image, FIELD)))
     if len(images) == len(mesh.images):
         return mesh
     uv0 = _box_coordinates(mesh) if mesh.uv0 is None else mesh.uv0
     return replace(mesh, images=tuple(images), materials=tuple(materials), uv0=uv0)
 
 
+def repaint_stamps(repaints: Iterable[Repaint]) -> tuple[Stamp, ...]:
+    """The stamps of the files that repaints name; raises RecipeError where one is missing."""
+    return tuple(stamp_of(path, FIELD) for path in dict.fromkeys(repaint.image for repaint in repaints) if path is not None)
+
+
 @lru_cache(maxsize=16)
-def _picture(path: str) -> Image:
-    """A picture that hides all that is behind it; the last ones are kept."""
-    try:
-        pixels = reduced(decode_image(Path(path).read_bytes(), path, upright=True), SHARPEST).copy()
-    except (OSError, UnreadableError) as error:
-        raise RecipeError(f"scene.materials: expected a readable image; found: {error}") from None
-    pixels[..., 3] = 255
-    return Image(Path(path).name, pixels)
+def _picture(path: str, stamp: Stamp) -> Image:
+    """The picture in a file while the file stays as it is; the last ones are kept."""
+    return Image(Path(path).name, opaque_picture(path, FIELD, upright=True))
 
 
 def _box_coordinates(mesh: Mesh) -> NDArray[np.float32]:

@@ -11,7 +11,9 @@ import numpy as np
 from viewsphere import plugins
 from viewsphere.assets.cache import frame_of, load_normalised, read_ahead
 from viewsphere.assets.mesh import Mesh
+from viewsphere.assets.opaque import Stamp
 from viewsphere.assets.parts import taken
+from viewsphere.assets.repaint import repaint_stamps
 from viewsphere.errors import ModelError, RecipeError
 from viewsphere.geometry.box import box_size, box_vertices
 from viewsphere.geometry.rotation import transform
@@ -23,6 +25,7 @@ from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing, TimeStep
 from viewsphere.sampling.camera import inside_box
 from viewsphere.store import ModelInfo, Store
+from viewsphere.surroundings.ground import ground_stamps
 from viewsphere.truth.enclosure import sky_hidden
 from viewsphere.truth.shot_views import ShotViews
 from viewsphere.truth.visibility import with_ground
@@ -72,7 +75,7 @@ class Stages:
     """Renders shots; keeps the last shot's stage, and the models used last, warm."""
 
     _stage: Stage | None = None
-    _stage_key: str = ""
+    _stage_key: tuple[str, tuple[Stamp, ...]] = ("", ())
     _models: dict[str, Mesh] = field(default_factory=dict[str, Mesh])
     _boxes: dict[str, Float] = field(default_factory=dict[str, Float])
     _sizes: dict[str, Size] = field(default_factory=dict[str, Size])
@@ -194,11 +197,12 @@ class Stages:
         return sky_hidden(mesh.vertices.astype(np.float64), mesh.triangles, inside) > MOST_SKY
 
     def stage(self, shot: Shot) -> Stage:
-        """The engine's stage for this shot, built anew only when the scene is another one."""
-        if self._stage is None or self._stage_key != shot.stage_key:
+        """The engine's stage for this shot, built anew only when the scene is another one, or a picture in it has changed."""
+        key = shot.stage_key, _stamps(shot)
+        if self._stage is None or self._stage_key != key:
             engine: Engine = plugins.load("engines", shot.engine)
             self._stage = engine.stage(shot, self.model)
-            self._stage_key = shot.stage_key
+            self._stage_key = key
         else:
             self._stage = self._stage.of(shot)
         return self._stage
@@ -223,6 +227,12 @@ class Stages:
 def _name(spec: ModelSpec, step: TimeStep | None) -> str:
     """Equal for equal models."""
     return spec.model_dump_json() + (step.model_dump_json() if step else "")
+
+
+def _stamps(shot: Shot) -> tuple[Stamp, ...]:
+    """Of the files that the surfaces of a shot show."""
+    ground = () if shot.scene.ground is None else ground_stamps(shot.scene.ground)
+    return ground + repaint_stamps(repaint for thing in shot.things for repaint in thing.repaints)
 
 
 def _size(mesh: Mesh) -> int:

@@ -7,19 +7,14 @@ from __future__ import annotations
 
 import math
 from functools import lru_cache
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from viewsphere.assets.folder import UnreadableError, decode_image
 from viewsphere.assets.mesh import Image, Material, Texture
+from viewsphere.assets.opaque import Stamp, opaque_picture, stamp_of
 from viewsphere.assets.srgb import linear
-from viewsphere.errors import RecipeError
 from viewsphere.model.scene import Ground
-
-SHARPEST = 4096
-"""Longest side, in texels, at which a picture is kept."""
 
 IMAGES = ("image", "roughness_image", "normal_image")
 """Fields of `Ground` that name pictures."""
@@ -32,7 +27,12 @@ def ground_material(ground: Ground) -> tuple[Material, tuple[Image, ...]]:
     named. Where `image` is clear the ground's colour alone is seen; of `roughness_image` green counts, as in glTF. Raises
     RecipeError, naming the field, for a picture that cannot be read.
     """
-    return _material(ground.model_dump_json(), tuple(_stamp(ground, name) for name in IMAGES))
+    return _material(ground.model_dump_json(), ground_stamps(ground))
+
+
+def ground_stamps(ground: Ground) -> tuple[Stamp, ...]:
+    """The stamps of the files that a ground names; raises RecipeError where one is missing."""
+    return tuple(stamp_of(path, f"scene.ground.{name}") for name in IMAGES if (path := getattr(ground, name)))
 
 
 def only_scatters(ground: Ground) -> bool:
@@ -64,7 +64,7 @@ def ground_albedo(material: Material, images: tuple[Image, ...]) -> NDArray[np.f
 
 
 @lru_cache(maxsize=2)
-def _material(described: str, stamps: tuple[int, ...]) -> tuple[Material, tuple[Image, ...]]:
+def _material(described: str, stamps: tuple[Stamp, ...]) -> tuple[Material, tuple[Image, ...]]:
     ground = Ground.model_validate_json(described)
     images = [_image(name, path) for name in IMAGES if (path := getattr(ground, name))]
     uses: dict[str, Texture] = {}
@@ -85,31 +85,8 @@ def _material(described: str, stamps: tuple[int, ...]) -> tuple[Material, tuple[
 
 
 def _image(name: str, path: str) -> Image:
-    """The picture that a field names, as glTF wants it for that field's use, opaque, at most `SHARPEST` texels a side."""
-    from PIL import Image as Pillow
-
-    try:
-        pixels = decode_image(Path(path).read_bytes(), f"scene.ground.{name}: {path}")
-    except UnreadableError as error:
-        raise RecipeError(f"{error}: mend or replace it") from None
-    except OSError as error:
-        raise RecipeError(f"scene.ground.{name}: expected a readable image, found {error.strerror}: {path}") from None
-    factor = -(-max(pixels.shape[:2]) // SHARPEST)
-    if factor > 1:
-        pixels = np.array(Pillow.fromarray(pixels).reduce(factor))
-    if name == "image" and pixels[..., 3].min() < 255:
-        alpha = pixels[..., 3:].astype(np.uint16)
-        pixels[..., :3] = (pixels[..., :3] * alpha + 255 * (255 - alpha) + 127) // 255
+    """The picture that a field names, as glTF wants it for that field's use."""
+    pixels = opaque_picture(path, f"scene.ground.{name}", on_white=name == "image")
     if name == "roughness_image":
         pixels[..., 2] = 255
-    pixels[..., 3] = 255
     return Image(name, pixels)
-
-
-def _stamp(ground: Ground, name: str) -> int:
-    """Time of change of the file that a field names, so that a changed file is read again."""
-    path = getattr(ground, name)
-    try:
-        return Path(path).stat().st_mtime_ns if path else 0
-    except OSError as error:
-        raise RecipeError(f"scene.ground.{name}: expected an image file, found {error.strerror}: {path}") from None
