@@ -1,15 +1,11 @@
 from __future__ import annotations
 
-import base64
 import io
-import zlib
 
 import numpy as np
 import pytest
-from isal import isal_zlib
 from PIL import Image
 
-from viewsphere.codecs.deflate import level_for
 from viewsphere.codecs.png_tiff import decode_png, decode_tiff, encode_png, encode_tiff
 from viewsphere.errors import UserError
 
@@ -140,27 +136,3 @@ def test_another_programs_files_are_refused():
         decode_png(png.getvalue())
     with pytest.raises(UserError, match="another program"):
         decode_tiff(tiff.getvalue())
-
-
-SMALL_MASK = (
-    "eNrN0b0NwyAQhuHPckHJCKyRjtHs0TwKI6SkQCb+QeFFJEUkW8pVPMXB3YckmbxV0lmO8MTUIRbYS2E6PG/BuCNciqVg6DAT+oaVSET8CGGd40/CG56wdZrjhlloAlyuZ5mV"
-    "SMAY/wqGsA24gkMGWzyBWBgI0ESVmU4Dz3dsExUhzqaHfqgX42XY1Q=="
-)
-"""Lines of a mask that ISA-L's level 1 deflates in two ways, one time in some 3,000, by where in memory its state lies."""
-
-
-def deflated(count, level):
-    """All that becomes of it where the states lie in `count` places."""
-    lines, kept, found = zlib.decompress(base64.b64decode(SMALL_MASK)), [], set()
-    for i in range(count):
-        deflator = isal_zlib.compressobj(level)
-        found.add(deflator.compress(lines) + deflator.flush())
-        kept += [deflator, bytes(600 + 16 * (i * 97 % 275))]
-    assert len({id(deflator) for deflator in kept[::2]}) == count
-    return found
-
-
-def test_a_small_mask_is_deflated_to_the_same_bytes_wherever_that_is_done():
-    """At level 1 each of six processes found at least two results in so many places."""
-    lines = zlib.decompress(base64.b64decode(SMALL_MASK))
-    assert len(deflated(8000, level_for(len(lines)))) == 1

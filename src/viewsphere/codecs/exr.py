@@ -12,7 +12,7 @@ import numpy as np
 from isal import isal_zlib
 from numpy.typing import NDArray
 
-from viewsphere.codecs.deflate import FAST
+from viewsphere.codecs.deflate import compressed
 from viewsphere.errors import UserError
 
 _MAGIC = struct.pack("<II", 20000630, 2)
@@ -39,7 +39,7 @@ def encode_exr(array: NDArray[Any]) -> bytes:
     blocks: list[bytes] = []
     for y in range(0, height, _LINES):
         raw = rows[y : y + _LINES].reshape(-1)
-        packed = isal_zlib.compress(_mixed(raw), FAST)
+        packed = compressed(_mixed(raw))
         body = packed if len(packed) < raw.size else raw.tobytes()
         blocks.append(struct.pack("<iI", y, len(body)) + body)
     places = np.cumsum([len(head) + 8 * len(blocks), *map(len, blocks[:-1])]).astype("<u8")

@@ -16,7 +16,7 @@ import numpy as np
 from isal import isal_zlib
 from numpy.typing import NDArray
 
-from viewsphere.codecs.deflate import deflate, level_for
+from viewsphere.codecs.deflate import compressed, deflate
 from viewsphere.errors import UserError
 
 _SIGNATURE = b"\x89PNG\r\n\x1a\n"
@@ -50,8 +50,7 @@ def encode_png(array: NDArray[Any], *, palette: NDArray[np.uint8] | None = None,
     more = b"" if palette is None else _chunk(b"PLTE", palette.tobytes())
     if unit is not None:
         more += _chunk(b"pCAL", struct.pack(">6siiBB2s", b"depth", 0, 65535, 0, 2, b"m") + f"0\0{65535 * unit!r}".encode())
-    lines = _filtered(array, components)
-    body = isal_zlib.compress(lines, level_for(lines.nbytes))
+    body = compressed(_filtered(array, components))
     return b"".join((_SIGNATURE, _chunk(b"IHDR", header), more, _chunk(b"IDAT", body), _chunk(b"IEND", b"")))
 
 
