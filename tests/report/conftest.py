@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from deadline import DEADLINE
 from small import small_recipe
 
 ARGUMENTS = (
@@ -17,6 +18,18 @@ ARGUMENTS = (
     "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader",
 )
+
+SETTLED = """async () => {
+    for (let i = 0; i < 4; i++) await new Promise(requestAnimationFrame);  // layout, then what waits for its sizes
+    return [...document.querySelectorAll("canvas")].every((canvas) => canvas.drawing === canvas.drawn)
+        && [...document.images].every((image) => image.complete || image.loading === "lazy");
+}"""
+
+
+@pytest.fixture(scope="session")
+def settle():
+    """A function that waits until a page has drawn everything that it was asked for."""
+    return lambda page: page.wait_for_function(SETTLED)
 
 
 @pytest.fixture(scope="session")
@@ -51,13 +64,13 @@ def browser():
         path = shutil.which("chromium") or shutil.which("chromium-browser") or playwright.chromium.executable_path
         if not os.path.exists(path):  # noqa: PTH110
             pytest.skip("no Chromium: apt-get install chromium, or playwright install chromium")
-        browser = playwright.chromium.launch(executable_path=path, args=list(ARGUMENTS))
+        browser = playwright.chromium.launch(executable_path=path, args=list(ARGUMENTS), timeout=1000 * DEADLINE)
         yield browser
         browser.close()
 
 
 @pytest.fixture
-def open_page(browser, page_file):
+def open_page(browser, page_file, settle):
     """A function that opens the report; at the end no error, warning or request may have come up."""
     contexts, troubles = [], []
 
@@ -68,9 +81,10 @@ def open_page(browser, page_file):
         page.on("console", lambda m: troubles.append(m.text) if m.type == "error" else None)
         page.on("pageerror", lambda e: troubles.append(str(e)))
         page.on("request", lambda r: None if r.url.startswith(("file:", "data:", "blob:")) else troubles.append(r.url))
+        page.set_default_timeout(1000 * DEADLINE)
         page.goto(file.as_uri())
         page.wait_for_selector("html[data-ready=true]")
-        page.wait_for_timeout(300)
+        settle(page)
         return page
 
     yield open_

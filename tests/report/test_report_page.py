@@ -1,56 +1,46 @@
 """The page in headless Chromium: toggles, filters, pages, keyboard, 3D, themes, narrow and wide."""
 
-import io
-
 import numpy as np
 import pytest
-from PIL import Image
+from seen import differs, equals, looks, pixels
+
+from deadline import until
 
 LAYERS = ("boxes", "boxes3d", "masks", "depth", "normals", "coordinates", "parts")
 
 
-def pixels(page, selector):
-    return np.asarray(Image.open(io.BytesIO(page.locator(selector).first.screenshot())).convert("RGB")).astype(int)
-
-
-def changed(before, after):
-    return float((np.abs(before - after).max(axis=-1) > 12).mean())
-
-
 @pytest.mark.slow
-def test_every_toggle_changes_the_picture_and_back(open_page):
+def test_every_toggle_changes_the_picture_and_back(open_page, settle):
     page = open_page()
+    picture = page.locator(".card .picture").first
     page.click("#layers [data-layer=boxes]")
-    plain = pixels(page, ".card .picture")
+    settle(page)
+    plain = pixels(picture)
     for name in LAYERS:
         button = f"#layers [data-layer={name}]"
         page.click(button)
-        page.wait_for_timeout(150)
         assert page.get_attribute(button, "aria-pressed") == "true"
-        assert changed(plain, pixels(page, ".card .picture")) > 0.005, name
+        assert differs(picture, plain, 0.005), name
         page.click(button)
-        page.wait_for_timeout(150)
-        assert changed(plain, pixels(page, ".card .picture")) < 0.002, name
+        assert equals(picture, plain, 0.002), name
 
 
 def test_boxes_are_drawn_at_first(open_page):
     page = open_page()
     assert page.get_attribute("#layers [data-layer=boxes]", "aria-pressed") == "true"
-    drawn = pixels(page, ".card .picture")
+    picture = page.locator(".card .picture").first
+    drawn = pixels(picture)
     page.click("#layers [data-layer=boxes]")
-    page.wait_for_timeout(150)
-    assert changed(drawn, pixels(page, ".card .picture")) > 0.005
+    assert differs(picture, drawn, 0.005)
 
 
 def test_3d_models_are_drawn_at_two_pixels_for_one(open_page):
     """Their edges are smooth where the browser does not multisample."""
     page = open_page()
     page.locator("#models").scroll_into_view_if_needed()
-    page.wait_for_timeout(500)
-    widths = page.evaluate("[...document.querySelectorAll('#models canvas')].map((c) => [c.width, c.clientWidth])")
-    assert widths
-    for drawn, shown in widths:
-        assert drawn >= 2 * shown > 0
+    widths = "[...document.querySelectorAll('#models canvas')].map((c) => [c.width, c.clientWidth])"
+    assert page.evaluate(widths)
+    assert until(lambda: all(drawn >= 2 * shown > 0 for drawn, shown in page.evaluate(widths)))
 
 
 @pytest.mark.slow
@@ -135,7 +125,7 @@ def test_pages_turn(browser, small_dataset, tmp_path, open_page):
 
 
 @pytest.mark.slow
-def test_keyboard_and_enlarged_view(open_page):
+def test_keyboard_and_enlarged_view(open_page, settle):
     page = open_page()
     page.locator(".card").first.focus()
     page.keyboard.press("ArrowRight")
@@ -146,10 +136,11 @@ def test_keyboard_and_enlarged_view(open_page):
     assert page.inner_text("#lightbox-title") != title
     page.keyboard.press("ArrowLeft")
     assert page.inner_text("#lightbox-title") == title
-    plain = pixels(page, "#lightbox .picture")
+    settle(page)
+    picture = page.locator("#lightbox .picture").first
+    plain = pixels(picture)
     page.keyboard.press("d")
-    page.wait_for_timeout(200)
-    assert changed(plain, pixels(page, "#lightbox .picture")) > 0.05
+    assert differs(picture, plain, 0.05)
     assert "m" in page.inner_text("#lightbox .ramp")
     for word in ("Azimuth", "Camera matrix K", "Visible share", "2D box"):
         assert word in page.inner_text("#lightbox aside")
@@ -158,22 +149,19 @@ def test_keyboard_and_enlarged_view(open_page):
 
 
 @pytest.mark.slow
-def test_three_canvases_show_something_and_turn(open_page):
+def test_three_canvases_show_something_and_turn(open_page, settle):
     page = open_page()
     page.locator("#models").scroll_into_view_if_needed()
-    page.wait_for_timeout(500)
     for i in range(3):
         stage = page.locator(".stage").nth(i)
         stage.scroll_into_view_if_needed()
-        page.wait_for_timeout(200)
-        before = np.asarray(Image.open(io.BytesIO(stage.screenshot())).convert("RGB")).astype(int)
-        assert len(np.unique(before.reshape(-1, 3), axis=0)) > 20
+        settle(page)
+        assert looks(stage, lambda seen: len(np.unique(seen.reshape(-1, 3), axis=0)) > 20)
+        before = pixels(stage)
         page.locator(".stage canvas").nth(i).focus()
         for _ in range(4):
             page.keyboard.press("ArrowRight")
-        page.wait_for_timeout(300)
-        after = np.asarray(Image.open(io.BytesIO(stage.screenshot())).convert("RGB")).astype(int)
-        assert changed(before, after) > 0.002
+        assert differs(stage, before, 0.002)
     name = page.inner_text("#model-facts")
     page.click("[aria-label='Next model']")
     assert page.inner_text("#model-facts") != name

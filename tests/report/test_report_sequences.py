@@ -5,6 +5,7 @@ import re
 
 import numpy as np
 import pytest
+from seen import differs, equals, looks, pixels
 
 from moving import moving_recipe
 from viewsphere.labels.tracks import positions
@@ -118,51 +119,62 @@ def test_still_pictures_have_no_player(open_page):
 
 
 @pytest.mark.slow
-def test_the_player_plays_steps_and_draws(open_page, page_of_sequences):
-    from test_report_page import changed, pixels
-
+def test_the_player_steps_and_draws(open_page, page_of_sequences, settle):
     page = open_page(file=page_of_sequences)
+    player = page.locator("#player canvas").first
     assert page.locator("#player canvas").count() == 2
     assert page.locator("#filmstrip button").count() == 6
-    first = pixels(page, "#player canvas")
+    first = pixels(player)
     page.locator("#filmstrip button").nth(4).click()
-    page.wait_for_timeout(200)
     assert page.inner_text("#player output").startswith("instant 4, 0.32 s")
     assert page.locator("#filmstrip button").nth(4).get_attribute("aria-current") == "true"
-    later = pixels(page, "#player canvas")
-    assert changed(first, later) > 0.01
+    settle(page)
+    assert differs(player, first, 0.01)
+    later = pixels(player)
     for name in ("tracks", "flow", "flow_state", "disparity", "motion_boundaries"):
         page.click(f"#sequence-layers [data-layer={name}]")
-        page.wait_for_timeout(200)
-        assert changed(later, pixels(page, "#player canvas")) > 0.005, name
+        assert differs(player, later, 0.005), name
         page.click(f"#sequence-layers [data-layer={name}]")
-        page.wait_for_timeout(200)
+        assert equals(player, later, 0.002), name
     page.focus("#player button.card")
     page.keyboard.press("ArrowLeft")
     assert page.inner_text("#player output").startswith("instant 3,")
-    page.click("#player .controls button")
-    page.wait_for_timeout(260)
-    page.click("#player .controls button")
-    assert not page.inner_text("#player output").startswith("instant 3,")
-    page.wait_for_timeout(100)
-    stopped = page.inner_text("#player output")
-    page.wait_for_timeout(300)
-    assert page.inner_text("#player output") == stopped
     page.select_option("select[name=sequence]", "post_box_001")
     assert page.inner_text("#player output").startswith("instant 0,")
 
 
 @pytest.mark.slow
-def test_the_rig_is_drawn_in_3d_and_moves_with_the_instant(open_page, page_of_sequences):
-    from test_report_page import changed, pixels
-
+def test_the_player_plays_in_the_time_of_the_sequence_until_it_is_stopped(open_page, page_of_sequences):
+    """The page's clock goes only where the test moves it; an instant takes 80 ms."""
     page = open_page(file=page_of_sequences)
-    page.locator("#rig-stage").scroll_into_view_if_needed()
-    page.wait_for_timeout(300)
-    first = pixels(page, "#rig-stage")
-    assert (np.abs(first - first[2, 2]).max(axis=-1) > 40).mean() > 0.001
+    page.clock.install(time=0)
+    page.clock.pause_at(1000)
+
+    def instant():
+        return int(re.match(r"instant (\d),", page.inner_text("#player output"))[1])
+
+    page.click("#player .controls button")
+    seen = []
+    page.clock.run_for(40)
+    for _ in range(8):
+        seen.append(instant())
+        page.clock.run_for(80)
+    assert seen == [0, 1, 2, 3, 4, 5, 0, 1]
+    page.click("#player .controls button")
+    stopped = instant()
+    page.clock.run_for(60_000)
+    assert instant() == stopped
+
+
+@pytest.mark.slow
+def test_the_rig_is_drawn_in_3d_and_moves_with_the_instant(open_page, page_of_sequences, settle):
+    page = open_page(file=page_of_sequences)
+    stage = page.locator("#rig-stage").first
+    stage.scroll_into_view_if_needed()
+    settle(page)
+    assert looks(stage, lambda seen: (np.abs(seen - seen[2, 2]).max(axis=-1) > 40).mean() > 0.001)
+    first = pixels(stage)
     page.locator("#filmstrip button").nth(5).click()
-    page.locator("#rig-stage").scroll_into_view_if_needed()
-    page.wait_for_timeout(300)
-    assert changed(first, pixels(page, "#rig-stage")) > 0.0005
+    stage.scroll_into_view_if_needed()
+    assert differs(stage, first, 0.0005)
     assert page.inner_text("#rig-caption").startswith("The rig's 2 sensors")

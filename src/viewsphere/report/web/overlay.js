@@ -44,6 +44,7 @@ export async function draw(canvas, frame, large, base = false, trail = []) {
   if (layers.has("boxes3d")) for (const object of frame.objects) drawBox3d(view, object);
   if (layers.has("boxes")) for (const object of frame.objects) drawBox(view, object);
   if (layers.has("tracks") && frame.points) drawTracks(view, frame, trail);
+  canvas.drawn = turn;
 }
 
 /** The picture itself, pale where a layer covers it. */
