@@ -54,3 +54,14 @@ def blender():
         return find_blender()
     except MissingExtraError as error:
         pytest.skip(str(error))
+
+
+@pytest.fixture(scope="session")
+def drawing(blender):
+    """A Python that has a Blender that draws here."""
+    from viewsphere.blender.interpreter import probe
+
+    graphics = probe(blender).graphics
+    if graphics is None or graphics.problem:
+        pytest.skip(f"{blender}: {graphics and graphics.problem}")
+    return blender

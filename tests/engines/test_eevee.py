@@ -40,15 +40,6 @@ LENSES = {
 }
 
 
-@pytest.fixture(scope="module")
-def drawing(blender):
-    """A Python that has a Blender that draws here."""
-    graphics = probe(blender).graphics
-    if graphics is None or graphics.problem:
-        pytest.skip(f"{blender}: {graphics and graphics.problem}")
-    return blender
-
-
 def pictures(channel="rgb", **given):
     return [sample.channels[channel] for sample in render(recipe_of(**given))]
 

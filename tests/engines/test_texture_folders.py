@@ -92,6 +92,45 @@ def test_only_chosen_materials_and_models_change_and_one_picture_may_be_named(fo
     assert all(np.array_equal(a.rgb, b.rgb) for a, b in zip(vs.render(nothing), vs.render(plain), strict=True))
 
 
+BOX = """\
+v 0 0 0\nv 0 0 1\nv 0 1 0\nv 0 1 1\nv 1 0 0\nv 1 0 1\nv 1 1 0\nv 1 1 1
+f 1 2 4 3\nf 5 7 8 6\nf 1 5 6 2\nf 3 4 8 7\nf 1 3 7 5\nf 2 6 8 4
+"""
+
+
+def seen_in_blocks(sample):
+    """Mean colours (N, 3) of the blocks of 4 x 4 pixels that lie on the object."""
+    height, width = sample.instances.shape
+    colors = sample.rgb.reshape(height // 4, 4, width // 4, 4, 3).mean(axis=(1, 3))
+    return colors[(sample.instances > 0).reshape(height // 4, 4, width // 4, 4).all(axis=(1, 3))]
+
+
+@pytest.mark.parametrize(
+    ("engine", "ready"),
+    [
+        ({"name": "cycles", "samples": 8, "denoise": "off"}, "blender"),
+        pytest.param({"name": "eevee", "quality": "draft"}, "drawing", marks=pytest.mark.slow),
+    ],
+    ids=["cycles", "eevee"],
+)
+def test_blenders_engines_show_the_picture_where_raster_does(folder, tmp_path, request, engine, ready):
+    """A picture of four colours, on a box: as bright within what EEVEE's sky differs by; another picture is off by 100."""
+    request.getfixturevalue(ready)
+    colors = np.array([[COLORS["red"], (230, 160, 20)], [COLORS["blue"], (20, 160, 230)]], np.uint8)
+    Image.fromarray(colors.repeat(32, axis=0).repeat(32, axis=1)).save(folder / "four.png")
+    (tmp_path / "box.obj").write_text(BOX)
+    only = {"images": None, "image": str(folder / "four.png")}
+    models = [{"source": str(tmp_path / "box.obj"), "category": "box"}]
+    by_blender, by_raster = (
+        seen_in_blocks(next(iter(vs.render(recipe_of(folder, only, models=models, engine=name)))))
+        for name in (engine, {"name": "raster"})
+    )
+    assert len(by_raster) > 40
+    assert by_raster.std(axis=0).min() > 20  # more than one colour is seen
+    assert np.abs(by_blender - by_raster).mean() < 8
+    assert np.abs(by_blender.mean(axis=0) - by_raster.mean(axis=0)).max() < 8
+
+
 def test_a_picture_that_changes_on_disk_is_read_again(folder):
     """Between runs, and within one between two shots that share a stage."""
     named = {"images": None, "image": str(folder / "green.png")}

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from viewsphere.labels._label import ChannelLabel, Drawing, Extent, Models, Needs, Picture, channel_of
 from viewsphere.labels._sight import Sight
 from viewsphere.model.sample import Sample
+from viewsphere.truth.point_raster import in_lens
 
 
 def compute(sight: Sight) -> NDArray[np.float32]:
@@ -23,7 +24,7 @@ def compute(sight: Sight) -> NDArray[np.float32]:
         return out
     now, then = sight.camera.intrinsics.fx, match.other.camera.intrinsics.fx
     out[...] = baseline * (then * match.inverse_depth - now * sight.inverse_depth)
-    out[np.isnan(match.xy[..., 0]) & (sight.visibility.triangle >= 0)] = np.nan
+    out[~in_lens(match.xy) & (sight.visibility.triangle >= 0)] = np.nan
     return out
 
 

@@ -17,7 +17,7 @@ from viewsphere.geometry.camera import project
 from viewsphere.geometry.rotation import product, transform
 from viewsphere.truth.kernel_constants import OTHER, STILL
 from viewsphere.truth.maps import Maps, maps_between
-from viewsphere.truth.point_raster import Placed, placed_at, states
+from viewsphere.truth.point_raster import Placed, in_lens, pixels_at, states
 from viewsphere.truth.stuck import shifts, stick, weights_of
 from viewsphere.truth.view import View
 from viewsphere.truth.visibility import Visibility
@@ -30,12 +30,10 @@ Real = TypeVar("Real", np.float32, np.float64)
 class Deformed:
     """Pixels that show what deforms, by their number in the picture (n,), and their points in either camera's axes (n, 3).
 
-    own (n,): the other view's triangles that they are on.
     is_still (n,): whether neither the camera nor the point's triangle moved.
     """
 
     pixel: NDArray[np.intp]
-    own: NDArray[np.int32]
     here: Float
     there: Float
     is_still: NDArray[np.bool_]
@@ -149,7 +147,7 @@ class Match:
         xy, _ = project(self.other.camera.intrinsics, rays)
         still = self._shows(STILL)
         xy[still] = pixel_centers(self._inverse.shape)[still]
-        near[np.isnan(xy[..., 0]) & ~np.isnan(near)] = 0.0
+        near[~in_lens(xy) & ~np.isnan(near)] = 0.0
         return xy, near, rays
 
     def _shows(self, kind: int) -> NDArray[np.bool_]:
@@ -173,17 +171,17 @@ class Match:
             places.append(transform(view.camera.R, world) + view.camera.t)
             corners.append(view.geometry.vertices[view.geometry.triangles[chosen]])
         is_still = (corners[0] == corners[1]).all(axis=(1, 2)) & self.view.has_camera_of(self.other)
-        return Deformed(pixel, further, places[0], places[1], is_still)
+        return Deformed(pixel, places[0], places[1], is_still)
 
     def _write_deformed(self, xy: Float, near: Float, rays: Float | None) -> None:
         assert self._deformed is not None
-        pixel, own, is_still = self._deformed.pixel, self._deformed.own, self._deformed.is_still
-        there = placed_at(self.other, self._deformed.there, lambda: own)
+        pixel, is_still = self._deformed.pixel, self._deformed.is_still
+        there_xy, there_near, there_rays = pixels_at(self.other, self._deformed.there)
         centers = pixel_centers(near.shape).reshape(-1, 2)[pixel]
-        xy.reshape(-1, 2)[pixel] = np.where(is_still[:, None], centers, there.xy)
-        near.reshape(-1)[pixel] = there.near
-        if rays is not None and there.rays is not None:
-            rays.reshape(-1, 3)[pixel] = there.rays
+        xy.reshape(-1, 2)[pixel] = np.where(is_still[:, None], centers, there_xy)
+        near.reshape(-1)[pixel] = there_near
+        if rays is not None and there_rays is not None:
+            rays.reshape(-1, 3)[pixel] = there_rays
 
 
 def _own(seen: NDArray[np.int32], view: View, other: View) -> NDArray[np.int32]:

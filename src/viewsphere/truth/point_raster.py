@@ -53,17 +53,26 @@ class Placed:
     own: Callable[[], Whole]
 
 
+def in_lens(xy: Float) -> NDArray[np.bool_]:
+    """Whether the lens has pixels for points: their pixels (..., 2) as `Placed` has them."""
+    return ~np.isnan(xy[..., 0])
+
+
 def placed_at(view: View, points: Float, own: Callable[[], Whole]) -> Placed:
     """Points (N, 3) in a view's camera axes, none of which is at infinity."""
+    return Placed(view, *pixels_at(view, points), own)
+
+
+def pixels_at(view: View, points: Float) -> tuple[Float, Float, Float | None]:
+    """Where the same points are in the view's picture: xy, near and rays as `Placed` has them."""
     xy, _ = project(view.camera.intrinsics, points)
     if view.is_fisheye:
         x, y, z = points.T
         s = np.sqrt(x * x + y * y + z * z)
     else:
         s = points[:, 2]
-    has_pixel = ~np.isnan(xy[:, 0])
-    near = np.divide(1.0, s, out=np.where(np.isnan(s), np.nan, 0.0), where=has_pixel)
-    return Placed(view, xy, near, None if view.is_pinhole else points * near[:, None], own)
+    near = np.divide(1.0, s, out=np.where(np.isnan(s), np.nan, 0.0), where=in_lens(xy))
+    return xy, near, None if view.is_pinhole else points * near[:, None]
 
 
 def states(placed: Sequence[Placed]) -> list[NDArray[np.uint8]]:

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from viewsphere.geometry.camera import project
 from viewsphere.geometry.rotation import transform
-from viewsphere.truth.point_raster import Placed, first_met, placed_at, states
+from viewsphere.truth.point_raster import Placed, first_met, in_lens, placed_at, states
 from viewsphere.truth.stuck import rays_through, stick, weights_of
 from viewsphere.truth.view import Body, View
 
@@ -156,7 +156,7 @@ class Tracked:
     def xyz(self) -> Float:
         """The same in the camera's axes, (N, 3); of the sky (NaN, NaN, inf)."""
         out = transform(self.view.camera.R, self.world) + self.view.camera.t
-        out[self._is_sky & ~np.isnan(self.xy[:, 0]), 2] = np.inf
+        out[self._is_sky & in_lens(self.xy), 2] = np.inf
         return out
 
     @cached_property
