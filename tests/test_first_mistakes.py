@@ -41,6 +41,35 @@ def test_what_is_not_closed_is_told_where_it_begins(text, line, sign, column, tm
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.parametrize("sign", "[{'\"")
+@pytest.mark.parametrize("end", ["", "\n", " ", "\n# the end\n"])
+@pytest.mark.parametrize("before", ["", "seed: 1\nname: ", "seed: 1\nscene: {sky: [a, ", "seed: 1\nscene: [{sky: "])
+def test_what_is_opened_last_of_all_is_told_where_it_begins(sign, end, before, tmp_path):
+    file = tmp_path / "recipe.yaml"
+    file.write_text(before + sign + end)
+    with pytest.raises(RecipeError) as caught:
+        Recipe.load(file)
+    kind = {"[": "list", "{": "mapping"}.get(sign, "quoted text")
+    line, column = before.count("\n") + 1, len(before.rpartition("\n")[2]) + 1
+    what = f"the {kind} that begins with {sign} in column {column}"
+    assert str(caught.value) == f"{file}:{line}: expected an end of {what}; found the end of the file: close it"
+
+
+@pytest.mark.parametrize(
+    "text", ["name: [a", "name: [a, b", "name: {a: 1", "name: {a: 1'", "name: [a]\nscene: [{b: [c], d: 1}, {e: [", "a: [b:"]
+)
+@pytest.mark.parametrize("end", ["", "\n"])
+def test_what_is_not_closed_before_the_end_is_one_line(text, end, tmp_path):
+    file = tmp_path / "recipe.yaml"
+    file.write_text(text + end)
+    with pytest.raises(RecipeError) as caught:
+        Recipe.load(file)
+    sign = max(text.rfind("["), text.rfind("{"))
+    line, column = text.count("\n", 0, sign) + 1, sign - text.rfind("\n", 0, sign)
+    assert str(caught.value).startswith(f"{file}:{line}: expected an end of the ")
+    assert f"that begins with {text[sign]} in column {column}; found the end of the file: close it" in str(caught.value)
+
+
 def test_zoo_families_are_known_to_plans():
     with pytest.raises(RecipeError, match=r"models\[0\]\.source: zoo: expected one of .*found 'cars'; did you mean 'car'"):
         plan(small_recipe(models=[{"source": "zoo:cars", "category": "car"}]))

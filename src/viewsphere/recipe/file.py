@@ -10,6 +10,7 @@ from typing import Any
 
 import yaml
 from yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
+from yaml.tokens import FlowMappingEndToken, FlowMappingStartToken, FlowSequenceEndToken, FlowSequenceStartToken
 
 from viewsphere.errors import RecipeError
 from viewsphere.model.mistakes import Marks, Place, dotted, shown
@@ -19,12 +20,14 @@ LARGEST_FILE = 10_000_000
 MOST_VALUES = 200_000
 """Most values of a recipe: by YAML's aliases a file of a few lines can stand for billions of values."""
 
-UNCLOSED = {
-    "while scanning a quoted scalar": "quoted text",
-    "while parsing a flow sequence": "list",
-    "while parsing a flow mapping": "mapping",
-}
-"""What was being read, in the YAML reader's words, where a quote or a bracket is not closed; and in ours."""
+UNCLOSED = ("while scanning a quoted scalar", "while parsing a flow sequence", "while parsing a flow mapping")
+"""What was being read, in the YAML reader's words, where a quote or a bracket is not closed, and the reader knows its place."""
+
+OPENING = {"'": "quoted text", '"': "quoted text", "[": "list", "{": "mapping"}
+"""What begins with each sign that has to be closed."""
+
+ENDS = ("end of stream", "<stream end>")
+"""The YAML reader's words for the end of a file."""
 
 _INT = re.compile(r"[-+]?[0-9]+\Z")
 _FLOAT = re.compile(r"(?:[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?|[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN))\Z")
@@ -102,27 +105,37 @@ def _text(path: Path) -> str:
 
 
 def _syntax(path: str, text: str, error: yaml.MarkedYAMLError) -> str:
-    mark, lines = error.problem_mark or error.context_mark, text.splitlines()
+    mark, lines, problem = error.problem_mark or error.context_mark, text.splitlines(), error.problem or ""
     line = mark.line + 1 if mark else 1
     around = lines[line - 1] if line <= len(lines) else ""  # a mistake may be met behind the last line
-    if "\t" in around[: len(around) - len(around.lstrip())] or "'\\t'" in (error.problem or ""):
+    if "\t" in around[: len(around) - len(around.lstrip())] or "'\\t'" in problem:
         return f"{path}:{line}: expected spaces; found a tab: YAML is indented with spaces"
-    begun = error.context_mark
-    if begun and error.context in UNCLOSED:
-        sign, ended = lines[begun.line][begun.column], line > len(lines) or "end of stream" in (error.problem or "")
-        what = f"the {UNCLOSED[error.context]} that begins with {sign} in column {begun.column + 1}"
-        if ended or mark is None or sign in "'\"":
-            met = "the end of the file" if ended else f"what does not belong there on line {line}"
-            return f"{path}:{begun.line + 1}: expected an end of {what}; found {met}: close it"
-        column = around.rfind(" ", 0, mark.column) + 1 if around[mark.column] == ":" else mark.column  # a name before its colon
-        met = f"{shown(around[column:].strip())} in column {column + 1} of line {line}"
-        kind = UNCLOSED[error.context]
-        return (
-            f"{path}:{begun.line + 1}: expected a comma or the end of {what}; found {met}: set a comma before it, or close the "
-            f"{kind} there"
-        )
-    context = f" {error.context}" if error.context else ""
-    return f"{path}:{line}: expected YAML; found a mistake{context}: {error.problem}"
+    is_ended = any(end in problem for end in ENDS)
+    begun = error.context_mark if error.context in UNCLOSED else _innermost_open(text) if is_ended else None
+    if begun is None:
+        context = f" {error.context}" if error.context else ""
+        return f"{path}:{line}: expected YAML; found a mistake{context}: {problem}"
+    sign = lines[begun.line][begun.column]
+    kind, where = OPENING[sign], f"{path}:{begun.line + 1}"
+    what = f"the {kind} that begins with {sign} in column {begun.column + 1}"
+    if is_ended or mark is None or sign in "'\"":
+        met = "the end of the file" if is_ended else f"what does not belong there on line {line}"
+        return f"{where}: expected an end of {what}; found {met}: close it"
+    is_name = around[mark.column : mark.column + 1] == ":"  # a name begins before its colon
+    column = around.rfind(" ", 0, mark.column) + 1 if is_name else mark.column
+    met = f"{shown(around[column:].strip())} in column {column + 1} of line {line}"
+    return f"{where}: expected a comma or the end of {what}; found {met}: set a comma before it, or close the {kind} there"
+
+
+def _innermost_open(text: str) -> yaml.Mark | None:
+    """Where the last bracket stands that is not closed; the YAML reader has come to the end of the text."""
+    opened: list[yaml.Mark] = []
+    for token in yaml.scan(text, Loader=_Loader):
+        if isinstance(token, (FlowSequenceStartToken, FlowMappingStartToken)):
+            opened.append(token.start_mark)
+        elif isinstance(token, (FlowSequenceEndToken, FlowMappingEndToken)):
+            opened.pop()
+    return opened[-1] if opened else None
 
 
 class _Reader:
