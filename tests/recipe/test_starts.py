@@ -12,6 +12,8 @@ import pytest
 import viewsphere as vs
 from command_line import viewsphere
 from shots import unit_box
+from viewsphere.engines._blender.options import PRESETS
+from viewsphere.errors import RecipeError
 from viewsphere.plugins import names
 from viewsphere.recipe.file import read, schema
 from viewsphere.recipe.starts import FIRST, kinds, start
@@ -102,6 +104,28 @@ def test_the_formats_that_a_comment_names_exist(kind):
     named = comment[1].split(", ") if comment else []
     assert set(named) <= {*names("formats")}
     assert named or kind != "detector"
+
+
+@pytest.mark.parametrize("kind", kinds())
+def test_the_qualities_that_a_comment_names_are_the_engine_s(kind):
+    comment = re.search(r"quality: (\w+).*# (\w+(?:, \w+)* or \w+)", start(kind)["recipe.yaml"])
+    if comment:
+        named = re.split(", | or ", comment[2])
+        assert comment[1] in named and named == [*PRESETS]
+    assert comment or kind != "blender"
+
+
+@pytest.mark.parametrize(("kind", "count", "enough"), [("poses", 4, 8), ("pose6d", 1, 3)])
+def test_company_needs_the_models_that_its_comment_says(kind, count, enough, tmp_path):
+    text = start(kind)["recipe.yaml"].replace("# company:", "company:")
+    assert f"count: {enough}" in re.search(r"^  company: .*# (.*)", text, re.MULTILINE)[1]
+    file = tmp_path / "recipe.yaml"
+    file.write_text(text)
+    with pytest.raises(RecipeError, match=r"scene\.company\.count"):
+        vs.plan(file)
+    file.write_text(text.replace(f"count: {count}", f"count: {enough}", 1))
+    planned = vs.plan(file)
+    assert {len(planned.cast(subject, 0)) for subject in planned.subjects} == {planned.recipe.scene.company.number + 1}
 
 
 def test_the_detector_s_floors_are_grey_to_sand(tmp_path):
