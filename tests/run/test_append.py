@@ -18,6 +18,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import viewsphere as vs
+from animated import let_walk
 from command_line import viewsphere
 from shots import unit_box
 from small import small_recipe, tree_hash
@@ -25,7 +26,10 @@ from viewsphere import Dataset, generate
 from viewsphere.check import check
 from viewsphere.errors import ModelError, RecipeError, StoreError, UserError
 from viewsphere.model.sample import ObjectAnnotation
+from viewsphere.sampling import fitting
 from viewsphere.sampling.extension import extend, whole
+from viewsphere.sampling.fitting import settings
+from viewsphere.sampling.plan import plan
 from viewsphere.sampling.pose_numbers import kept, names_of
 from viewsphere.store import PlanRecord, Store
 from viewsphere.store.manifest import sealed, unsealed
@@ -649,6 +653,55 @@ def test_another_motion_of_a_model_needs_another_name(tmp_path):
     expected = {"post_box_000": 0.05, "fast_000": 0.07, "post_box_000-000001": 0.05}
     assert gone == pytest.approx(expected)
     assert check(dataset, sample=None).ok
+
+
+PLAYED = {"clip": "Run", "fps": 12}
+
+
+@pytest.mark.parametrize("field", PLAYED)
+@pytest.mark.parametrize("time", [None, {"frames": 2, "fps": 10}])
+def test_what_an_animated_model_plays_is_what_it_played(field, time, tmp_path, monkeypatch):
+    let_walk(monkeypatch, tmp_path)
+    plays = {"frames": [1, 13]} if time is None else {"motion": {"kind": "clip"}}
+    person = {"source": str(tmp_path / "walker.fbx"), "category": "person", **plays}
+    views = {
+        "viewpoints": {"azimuth": 30, "elevation": 10, "distance": 4},
+        "time": time,
+        "formats": [],
+        "channels": ["instances"],
+    }
+    first = recipe(**views, models=[BOX, person])
+    generate(first, tmp_path / "out", workers=0)
+    changed = recipe(**views, models=[BOX, {**person, field: PLAYED[field]}])
+    with pytest.raises(
+        RecipeError, match=rf"models\[1\]\.{field}: expected the {field} of walker that the data set has; found"
+    ):
+        generate(changed, tmp_path / "out", workers=0, append=True)
+    renamed = recipe(**views, models=[BOX, person, {**person, "name": "fast", field: PLAYED[field]}])
+    added = generate(renamed, tmp_path / "out", workers=0, append=True)
+    assert added.rendered == 2
+    assert {o.key for s in vs.open(tmp_path / "out") for o in s.objects} >= {"post_box_000"}
+
+
+def test_drawn_lenses_are_compared_as_what_may_be_drawn(tmp_path):
+    def lens(*degrees):
+        camera = {"size": [96, 72], "fov_deg": {"choice": degrees}}
+        return recipe(models=models(1), camera=camera, formats=[], channels=["instances"])
+
+    first, others = lens(30, 50), (lens(30, 90), lens(90, 50))
+    assert any(plan(first).intrinsics == plan(other).intrinsics for other in others)  # the one that stands for all
+    generate(first, tmp_path / "out", workers=0)
+    for other in others:
+        with pytest.raises(RecipeError, match=r"^camera: expected .*the data set has; found .*: appended frames have to fit"):
+            generate(other, tmp_path / "out", workers=0, append=True)
+    assert generate(first, tmp_path / "out", workers=0, append=True).rendered == 0
+
+
+def test_settings_are_computed_once_a_check(out, monkeypatch):
+    there, calls = Store(out).plan(), []
+    monkeypatch.setattr(fitting, "settings", lambda planned: calls.append(planned) or settings(planned))
+    fitting.check_fit(plan(recipe(models=models(3))), replace(there, parts=there.parts * 3))
+    assert len(calls) == 1
 
 
 def _way(samples):

@@ -404,7 +404,7 @@ POINTS = [[0, 0, 0], [1, 0, 0]]
             {"kind": "path", "points": POINTS, "speed": 1, "offset": 2},
             f"{WHERE}.offset: expected at most 1 m, the length of the way; found 2",
         ),
-        ({"kind": "clip"}, f"{WHERE}: expected a file in which something moves; found walk.fbx"),
+        ({"kind": "clip"}, f"{WHERE}: expected a file in which something moves; found no animation in walk.fbx"),
         (
             {"kind": "random", "position": [-1, 0, 0]},
             f"{WHERE}.position[0]: expected a number greater than or equal to 0; found -1",

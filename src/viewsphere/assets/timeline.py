@@ -42,6 +42,11 @@ class Timeline:
         return (frame - self.first) / self.fps
 
 
+def no_animation(file: object) -> str:
+    """What is wrong with a file that is to play an animation, and in which nothing moves; it follows the recipe's field."""
+    return f"expected a file in which something moves; found no animation in {file}"
+
+
 @dataclass(eq=False)
 class Blenders:
     """Answers requests about files by running Blenders, one for all files of a folder. A context manager, which ends them."""

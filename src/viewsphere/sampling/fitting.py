@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Iterator
+
+from pydantic import JsonValue
 
 from viewsphere.errors import RecipeError
 from viewsphere.model.mistakes import shown
@@ -24,28 +27,38 @@ LOOK = "the engine's program"
 """Name of the setting that says how the engine paints."""
 
 
-MOTION = "motion of "
-"""What names of settings begin with that say how a model moves."""
+OF = " of "
+"""What stands in names of settings between a model's field and its key, and in no other name."""
+
+MOVES = ("motion", "clip", "fps")
+"""Fields of a model that say how it moves in sequences, and what an animated one plays of its file."""
+
+Settings = dict[str, str]
+"""Names of settings, and digests of what they are."""
 
 
 def check_fit(planned: Plan, there: PlanRecord) -> None:
     """Raises RecipeError where the recipe's pictures, splits or models would not fit those that are there."""
+    own = settings(planned)
     for part in there.parts:
         _check_sampler(planned, part)
-        _check_settings(planned, part)
-        _check_model_motions(planned, part)
+        _check_settings(planned, own, part)
+        _check_movements(planned, own, part)
         _check_splits(planned, part)
     _check_models(planned, there)
 
 
-def settings(planned: Plan) -> dict[str, str]:
-    """Digests of what the frames of a data set have in common, by the names of the recipe's fields."""
+def settings(planned: Plan) -> Settings:
+    """Digests of what the frames of a data set have in common, by the names of the recipe's fields: of what is drawn, all that
+    may be.
+    """
     recipe = planned.recipe
     value = recipe.model_dump(mode="json", include={"seed", "scene", "engine", "label_alpha", "viewpoints"})
     viewpoints = value.pop("viewpoints")
     planes = () if planned.composition is None else planned.composition.images
+    lens = recipe.camera if recipe.camera.is_random else planned.intrinsics
     value |= {
-        "camera": planned.intrinsics.model_dump(mode="json"),
+        "camera": lens.model_dump(mode="json"),
         **({} if planned.own_rig is None else {RIG: planned.own_rig.model_dump(mode="json")}),
         **{name: getattr(recipe, name) for name in SHOWN if getattr(recipe, name) is not None},
         "viewpoints.target": viewpoints.get("target", recipe.viewpoints.target),
@@ -61,12 +74,19 @@ def settings(planned: Plan) -> dict[str, str]:
     if recipe.time is not None:
         value["time"] = recipe.time.model_dump(mode="json")
         value["viewpoints.shake"] = viewpoints.get("shake")
-        for spec, number in zip(planned.model_specs, planned.entries, strict=True):
-            value[MOTION + spec.key] = recipe.models[number].model_dump(mode="json", include={"motion", "clip"})
     if recipe.tracks is not None:
         value["tracks"] = recipe.tracks.model_dump(mode="json")
+    value |= _movements(planned)
     digests = {name: hashlib.sha256(json.dumps(value[name]).encode()).hexdigest()[:16] for name in value}
     return digests | {LOOK: engine_digest(recipe.engine.name)}
+
+
+def _movements(planned: Plan) -> Iterator[tuple[str, JsonValue]]:
+    """How each model moves in sequences, and what of its file an animated one plays, by names of settings."""
+    entries = [entry.model_dump(mode="json", include=set(MOVES)) for entry in planned.recipe.models]
+    for spec, number in zip(planned.model_specs, planned.entries, strict=True):
+        is_meant = {"motion": planned.recipe.time is not None, "clip": spec.rest is not None, "fps": spec.rest is not None}
+        yield from ((f"{field}{OF}{spec.key}", entries[number].get(field)) for field in MOVES if is_meant[field])
 
 
 def _check_sampler(planned: Plan, part: Part) -> None:
@@ -77,11 +97,10 @@ def _check_sampler(planned: Plan, part: Part) -> None:
         )
 
 
-def _check_settings(planned: Plan, part: Part) -> None:
-    own = settings(planned)
+def _check_settings(planned: Plan, own: Settings, part: Part) -> None:
     added = [name for name in own if part.settings and name not in part.settings and name in (RIG, *SHOWN)]
     for name in (*part.settings, *added):
-        if not name.startswith(MOTION) and own.get(name) != part.settings.get(name):
+        if OF not in name and own.get(name) != part.settings.get(name):
             found = planned.recipe.model_dump(mode="json")
             values = [_value(recipe, name) for recipe in (part.recipe, found)]
             differ = f"{values[0]}, as the data set has; found {values[1]}"
@@ -90,16 +109,16 @@ def _check_settings(planned: Plan, part: Part) -> None:
             raise RecipeError(f"{name}: expected {differ}: {FITTING}")
 
 
-def _check_model_motions(planned: Plan, part: Part) -> None:
+def _check_movements(planned: Plan, own: Settings, part: Part) -> None:
     """A model moves as it did: its sequences are known by its name and their viewpoints alone."""
-    own = settings(planned)
     for spec, number in zip(planned.model_specs, planned.entries, strict=True):
-        name = MOTION + spec.key
-        if own.get(name) != part.settings.get(name, own.get(name)):
-            raise RecipeError(
-                f"models[{number}].motion: expected the motion of {spec.key} that the data set has; found another: give the "
-                "model another name, under which it has sequences of its own, or choose another output folder"
-            )
+        for field in MOVES:
+            name = f"{field}{OF}{spec.key}"
+            if own.get(name) != part.settings.get(name, own.get(name)):
+                raise RecipeError(
+                    f"models[{number}].{field}: expected the {name} that the data set has; found another: give the model "
+                    "another name, under which it has frames of its own, or choose another output folder"
+                )
 
 
 def _value(recipe: object, name: str) -> str:

@@ -10,7 +10,7 @@ from functools import cached_property
 from itertools import accumulate, chain, groupby, pairwise
 from pathlib import Path
 
-from viewsphere.assets.timeline import Blenders, Timeline
+from viewsphere.assets.timeline import Blenders, Timeline, no_animation
 from viewsphere.errors import ModelError, RecipeError
 from viewsphere.model.instant import Moment, Viewpoint
 from viewsphere.model.model_spec import ModelSpec
@@ -224,7 +224,7 @@ def animation(
     except ModelError as error:
         raise RecipeError(f"{field}: {error}") from None
     if not line.moves:
-        raise RecipeError(f"{field}: expected a file in which something moves; found no animation in {path}")
+        raise RecipeError(f"{field}: {no_animation(path)}")
     return line
 
 

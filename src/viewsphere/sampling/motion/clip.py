@@ -9,6 +9,7 @@ from typing import Literal
 
 from pydantic import Field
 
+from viewsphere.assets.timeline import no_animation
 from viewsphere.errors import RecipeError
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.numbers import Strength
@@ -34,7 +35,7 @@ def moves(options: Options, start: Start) -> Move:
     """The file's frame nearest to each time; poses stay."""
     line = start.timeline
     if line is None or not line.moves:
-        raise RecipeError(f"{start.field}: expected a file in which something moves; found {start.spec.source}")
+        raise RecipeError(f"{start.field}: {no_animation(start.spec.source)}")
     length = line.seconds(line.last)
     if options.offset > length:
         raise RecipeError(
