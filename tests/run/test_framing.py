@@ -2,6 +2,7 @@
 
 import json
 import re
+from functools import partial
 
 import numpy as np
 import pytest
@@ -11,10 +12,12 @@ from small import tree_hash
 from viewsphere.check import check
 from viewsphere.errors import RecipeError
 from viewsphere.recipe.recipe import Recipe
-from viewsphere.run.framing import MOST_TRIES
+from viewsphere.run.framing import MOST_TRIES, Framing
 from viewsphere.run.merging import merge
 from viewsphere.run.stages import Stages
 from viewsphere.sampling.plan import plan
+from viewsphere.sampling.samplers import _stock
+from viewsphere.sampling.scenes import Scenes
 from viewsphere.store.checksums import read_least, read_options, write_checksums
 
 CROWD = {"company": {"count": 2, "draw": "per_frame", "gap": 0.05}, "ground": "off"}
@@ -88,6 +91,40 @@ def test_what_cannot_be_met_is_the_best_found_and_counted(tmp_path):
     for sample, subject in zip(samples, planned.subjects, strict=True):
         tries = [next(stages.render(planned.take(subject, [0], stages.box, tries=[k]))) for k in range(MOST_TRIES)]
         assert sample.objects[0].visibility == max(own(tries))
+
+
+@pytest.mark.parametrize("least", [0.1, 0.8, 0.99])
+@pytest.mark.parametrize("frames", [1, 6])
+def test_no_shot_is_made_twice(frames, least):
+    views = {"kind": "jitter", "azimuth": 0, "elevation": 0, "distance": 2.5, "count": frames, "plus_minus": {"azimuth": 30}}
+    row = {"company": {"layout": [[0, -0.6, 0], [0.6, 0.6, 0]], "gap": 0}, "ground": "off"}
+    recipe = recipe_of(viewpoints=views, scene=row, min_visibility=least)
+    planned, stages, taken = plan(recipe), Stages(), []
+
+    def take(row, tries):
+        taken.append((tuple(tries) or (0,) * frames, planned.shot(row, stages.box, tries)))
+        return taken[-1][1]
+
+    for row in planned.rows:
+        taken.clear()
+        made = Framing(recipe, stages).shot(partial(take, row))
+        assert len({tries for tries, _ in taken}) == len(taken) <= MOST_TRIES
+        drawn = [own(stages.render(shot)) for _, shot in taken]
+        assert own(stages.render(made)) == [
+            next((seen for seen in found if seen >= least), max(found)) for found in zip(*drawn, strict=True)
+        ]
+        if len(taken) == MOST_TRIES and frames == 1:
+            assert made == max(taken, key=lambda one: own(stages.render(one[1])))[1]
+
+
+def test_tries_share_what_is_computed_of_a_plan(monkeypatch):
+    made = []
+    monkeypatch.setattr(_stock, "Scenes", lambda *args: made.append(args) or Scenes(*args))
+    planned, stages = plan(recipe_of()), Stages()
+    shots = [planned.shot(0, stages.box, [number] * 6) for number in range(4)]
+    assert len({shot.instants[0].viewpoint for shot in shots}) == 4
+    assert len(made) == 1
+    assert planned.trying({0: 1}).schedules is planned.schedules
 
 
 @pytest.mark.parametrize("name", ["min_visibility", "empty"])

@@ -192,6 +192,7 @@ def test_the_search_finds_closed_forms_in_few_steps():
         asked.clear()
         assert distance_of(fill, pinhole, 1.0) == pytest.approx(0.5 + 0.8 / fill, rel=1e-8)
         assert len(asked) < 60
+        assert len(set(asked)) == len(asked)
     assert distance_of(0.5, lambda distance: 0.3 if distance > 1 else math.inf, 1.0) is None
     assert distance_of(0.5, lambda distance: 0.3, 1.0) is None
     assert distance_of(0.5, lambda distance: 0.7, 1.0) is None

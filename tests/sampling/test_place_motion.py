@@ -10,7 +10,7 @@ from viewsphere.errors import RecipeError
 from viewsphere.geometry.box import box_vertices
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.recipe.recipe import Recipe
-from viewsphere.sampling.composition import Turns, compose
+from viewsphere.sampling.composition import Numbering, compose
 from viewsphere.sampling.motion import Start, check_motions, mover
 from viewsphere.sampling.placing import standing
 from viewsphere.sampling.plan import plan
@@ -73,8 +73,8 @@ def test_pieces_have_the_motion_of_the_first_pattern_that_fits():
 def test_the_composition_moves_pieces_of_a_place():
     made = recipe({"source": "zoo:neighbourhood", "motion": {"wheelie_bin_1": {"kind": "constant"}}}, time={"frames": 2})
     car = ModelSpec(key="car_000", source="zoo:car", seed=1, category="car", category_id=1)
-    turns = Turns(("car_000",), poses_of(made.viewpoints, made.time, made.seed))
-    composition = compose(made, ("car_000",), (car,), (), ("",), turns)
+    numbering = Numbering(("car_000",), poses_of(made.viewpoints, made.time, made.seed))
+    composition = compose(made, ("car_000",), (car,), (), ("",), numbering)
     asked = []
 
     def moved(thing, piece):

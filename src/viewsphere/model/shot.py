@@ -93,6 +93,11 @@ class Shot(Frozen):
         """What is labelled, in the order of the ids."""
         return tuple(thing for thing in self.things if thing.id)
 
+    def targets(self, together: bool) -> tuple[Thing, ...]:
+        """What its pictures are about: the frame's model, or `together` all models of a random scene."""
+        found = tuple(thing for thing in self.things if thing.is_target)
+        return found if together else found[:1]
+
     @property
     def samples(self) -> Iterator[tuple[int, int, int]]:
         """Number in the data set, instant and sensor (both counted from 0 here) of every sample, in order."""

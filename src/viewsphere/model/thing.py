@@ -102,6 +102,11 @@ class Thing(Frozen):
     repaints: tuple[Repaint, ...] = ()  # the last that matches a material counts
 
     @property
+    def is_target(self) -> bool:
+        """Whether it is an object that pictures are about, no scenery."""
+        return bool(self.id) and not self.scenery
+
+    @property
     def is_there(self) -> bool:
         """Whether a still thing is there at all; of a moving one, whether it is at first."""
         return self.motion.poses[0] is not None

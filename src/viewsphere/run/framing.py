@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from operator import itemgetter
 
 from viewsphere.assets.mesh import Mesh
 from viewsphere.labels import Sight
 from viewsphere.labels.visibility import LABEL as VISIBILITY
 from viewsphere.model.shot import Shot
-from viewsphere.model.thing import Thing
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.run.stages import Stages
 from viewsphere.store import Dataset
@@ -36,27 +36,28 @@ class Framing:
     stages: Stages
 
     def shot(self, take: Take) -> Shot:
-        """The shot that `take` makes, with the first draw of each frame that shows enough of its models, or the best."""
+        """The shot that `take` makes, with the first draw of each frame that shows enough of its models, or the best.
+
+        Shots of several frames differ by their instants alone, whatever these's tries: the best of each are put together.
+        """
         shot, least = take(()), self.recipe.min_visibility
         if least is None:
             return shot
-        frames = range(len(shot.instants))
         ring = Ring(shot.scene.ground is not None, shot.label_alpha)
-        tries, seen = [0] * len(frames), [self._seen(shot, i, ring) for i in frames]
+        best = [(self._seen(shot, i, ring), shot) for i in range(len(shot.instants))]
         for number in range(1, MOST_TRIES):
-            hidden = [i for i in frames if seen[i] < least]
+            hidden = [i for i, (seen, _) in enumerate(best) if seen < least]
             if not hidden:
                 break
-            shot = take([number if i in hidden else tries[i] for i in frames])
+            shot = take([number if i in hidden else 0 for i in range(len(best))])
             for i in hidden:
-                found = self._seen(shot, i, ring)
-                if found > seen[i]:
-                    seen[i], tries[i] = found, number
-        return take(tries)
+                best[i] = max(best[i], (self._seen(shot, i, ring), shot), key=itemgetter(0))
+        instants = tuple(shot.instants[i] for i, (_, shot) in enumerate(best))
+        return best[0][1].model_copy(update={"instants": instants})
 
     def _seen(self, shot: Shot, instant: int, ring: Ring) -> float:
         """The least visibility of what has to be seen in a frame; -1 where its camera is inside of something."""
-        wanted = targets(shot, self.recipe.scenes is not None)
+        wanted = shot.targets(self.recipe.scenes is not None)
         if not all(thing.at(instant).is_there for thing in wanted):
             return 1.0
         if not self.stages.is_free(shot, instant):
@@ -75,18 +76,12 @@ class Framing:
         return ring.at(shot.things_at(instant), meshes(instant), shot_floor(shot, meshes))
 
 
-def targets(shot: Shot, together: bool) -> tuple[Thing, ...]:
-    """What has to be seen in a shot's pictures: the frame's model, or `together` all models of a random scene."""
-    found = tuple(thing for thing in shot.objects if not thing.scenery)
-    return found if together else found[:1]
-
-
 def hidden_frames(dataset: Dataset, least: float, together: bool) -> int:
     """How many frames of a data set show less than this visibility of what has to be seen; empty ones do not count."""
     count = 0
     for key, places in dataset.shots():
         shot = dataset.store.labelled(key)
-        wanted = {thing.id for thing in targets(shot, together)} if shot else set[int]()
+        wanted = {thing.id for thing in shot.targets(together)} if shot else set[int]()
         for sample in dataset.samples_of(key, places):
             shown = [o.visibility for o in sample.objects if o.id in wanted]
             count += bool(shown) and min(shown) < least

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from viewsphere import plugins
 from viewsphere.assets.cache import load_normalised
 from viewsphere.errors import RecipeError
-from viewsphere.geometry.rotation import compose as joined
 from viewsphere.geometry.rotation import random_rotation, rigid, transform
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Matrix4, Vector
@@ -27,6 +26,7 @@ from viewsphere.sampling.cast import companions
 from viewsphere.sampling.placing import Draws, Footprint, Placer, Room, Shape, footprint, standing
 from viewsphere.sampling.scenery import (
     SceneryPiece,
+    composed,
     draw_names,
     draw_place,
     free_floor,
@@ -218,7 +218,7 @@ class Composition(Sendable):
 
 
 @dataclass(frozen=True, eq=False)
-class Turns:
+class Numbering:
     """The number of what a draw is for, in the data set's order: of a subject, of a frame, or of a sequence. `schedules` are
     the subjects' own, none where every subject is taken from all poses.
     """
@@ -255,9 +255,9 @@ def compose(
     specs: tuple[ModelSpec, ...],
     own: tuple[Category, ...],
     splits: Sequence[str],
-    turns: Turns,
+    numbering: Numbering,
 ) -> Composition:
-    """The composition of a recipe with these subjects, which take turns; `splits[i]` is what keeps `specs[i]` from the others:
+    """The composition of a recipe with these subjects, numbered so; `splits[i]` is what keeps `specs[i]` from the others:
     its split, or one name for all.
 
     Raises RecipeError for pictures and places that are not there, and where there are too few models for company.
@@ -279,7 +279,7 @@ def compose(
         {spec.key: tuple(members[split]) for spec, split in zip(specs, splits, strict=True)},
         plane_images(recipe),
         own,
-        _blend(recipe, turns),
+        _blend(recipe, numbering),
     )
     if place is not None:
         place_pieces(recipe, place, draw_names(place.draw, subjects[0], ""), lambda category, labels: 1)
@@ -299,13 +299,7 @@ def placed(
     turns = [random_rotation(rng("orientation", str(slot), spec.key)) for slot, spec in enumerate(cast)]
     turned = [one.turned(turn) for one, turn in zip(shapes, turns, strict=True)]
     poses = module.place(cast, room, turned, (), rng)
-    return [_turned_first(pose, turn) for pose, turn in zip(poses, turns, strict=True)]
-
-
-def _turned_first(pose: Matrix4, turn: NDArray[np.float64]) -> Matrix4:
-    """The pose of what was turned in its own axes before."""
-    a, b, c, d = ((x, y, z, w) for x, y, z, w in joined(pose, rigid(turn, (0.0, 0.0, 0.0))).tolist())
-    return a, b, c, d
+    return [composed(pose, rigid(turn, (0.0, 0.0, 0.0))) for pose, turn in zip(poses, turns, strict=True)]
 
 
 def shape(spec: ModelSpec, box_of: BoxOf) -> Shape:
@@ -336,14 +330,14 @@ def _vertices(spec: ModelSpec) -> NDArray[np.float64]:
     return load_normalised(spec, build_zoo_model).vertices.astype(np.float64)
 
 
-def _blend(recipe: Recipe, turns: Turns) -> BlendScenery | None:
-    """The recipe's .blend file; frames take turns in the data set's order. Raises RecipeError where it does not fit."""
-    entry, views = recipe.scene.blend, turns.views
+def _blend(recipe: Recipe, numbering: Numbering) -> BlendScenery | None:
+    """The recipe's .blend file; frames take turns in the order of their numbers. Raises RecipeError where it does not fit."""
+    entry, views = recipe.scene.blend, numbering.views
     if entry is None:
         return None
 
     moments = views.moments if isinstance(views, TimedPoses) and entry.frames is not None else ()
     seconds = {moment.frame: moment.seconds for moment in moments if moment is not None}
-    made = BlendScenery(recipe, entry, turns, dict(sorted(seconds.items())))
+    made = BlendScenery(recipe, entry, numbering, dict(sorted(seconds.items())))
     made.check()
     return made

@@ -86,7 +86,7 @@ class Distances:
 
     def _middle(self, things: Sequence[Thing]) -> Float:
         """The middle (3,) of the targets."""
-        targets = [thing for thing in things if thing.id and not thing.scenery]
+        targets = [thing for thing in things if thing.is_target]
         corners = np.concatenate([transform(t.world_from_object, self.box_of(t.model, t.step)) for t in targets])
         return corners.mean(axis=0) if len(targets) == 1 else (corners.min(axis=0) + corners.max(axis=0)) / 2
 

@@ -16,7 +16,7 @@ def emptied(shot: Shot, empty: Sequence[bool], box_of: BoxOf) -> Shot:
     All shots of a recipe come through here, those without an empty picture too: what is painted of a thing may not depend on
     which pictures share its shot.
     """
-    things = tuple(thing if thing.scenery or not thing.id else _absent(thing, empty) for thing in shot.things)
+    things = tuple(_absent(thing, empty) if thing.is_target else thing for thing in shot.things)
     scene = shot.scene
     if scene.ground is not None:
         height = _lowest(shot, box_of) if scene.floor is None else scene.floor.height

@@ -69,10 +69,10 @@ def filled(shot: Shot, together: bool) -> Shot:
 def _filled(shot: Shot, i: int, together: bool) -> Instant:
     now = shot.instants[i]
     view = now.viewpoint
-    targets = [thing for thing in shot.things_at(i) if thing.id and not thing.scenery and thing.is_there]
+    targets = [there for thing in shot.targets(together) if (there := thing.at(i)).is_there]
     if view is None or view.fill is None or not targets:
         return now
-    placed = [_placed(thing) for thing in (targets if together else targets[:1])]
+    placed = [_placed(thing) for thing in targets]
 
     def fill_at(distance: float) -> float:
         at = _moved(now, view, distance)
@@ -127,15 +127,17 @@ def distance_of(fill: float, fill_at: Callable[[float], float], reach: float) ->
     which shares are nearly proportional; the ends are halved while all that is known of the near one is that it is too near.
     """
     near = far = 1 / reach
-    while fill_at(1 / far) > fill:
+    above = below = fill_at(1 / near) - fill
+    while below > 0:
         far /= 2
         if far * FARTHEST < 1:
             return None
-    while fill_at(1 / near) < fill:
+        below = fill_at(1 / far) - fill
+    while above < 0:
         near *= 2
         if near * reach > NEAREST:
             return None
-    above, below = fill_at(1 / near) - fill, fill_at(1 / far) - fill
+        above = fill_at(1 / near) - fill
     last = 0.0
     for _ in range(MOST_STEPS):
         if above == 0 or below == 0:

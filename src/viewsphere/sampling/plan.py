@@ -34,7 +34,7 @@ from viewsphere.sampling.checks import (
     check_splits,
 )
 from viewsphere.sampling.clips import with_clips
-from viewsphere.sampling.composition import BoxOf, Turns, compose
+from viewsphere.sampling.composition import BoxOf, Numbering, compose
 from viewsphere.sampling.credits import credits_of, unlicensed
 from viewsphere.sampling.emptying import emptied
 from viewsphere.sampling.engine_digest import engine_options, script_digest
@@ -228,7 +228,7 @@ class Plan(Shown, Stock):
         """A shot of some poses (their numbers) of a subject, of one time step: of one pose where the recipe draws scenes for
         each frame. `first` is the number of its first sample, `tries` as for `shot`.
         """
-        stock = replace(self, tries=dict(zip(poses, tries, strict=True)), untried=self) if any(tries) else self
+        stock = self.trying(dict(zip(poses, tries, strict=True))) if any(tries) else self
         with self.recipe.located():
             shot = filled(
                 self.sampler.shot(stock, subject, poses, box_of, key or subject, first), self.recipe.scenes is not None
@@ -330,8 +330,8 @@ def _composed(planned: Plan) -> Plan:
         return planned
     dealt = planned.dealt_splits if recipe.splits.by == "model" else {}
     splits = [dealt.get(spec.key, "") for spec in specs]
-    turns = Turns(planned.subjects, planned.pose_list, planned.schedules if planned.timings else ())
-    composition = compose(recipe, planned.subjects, specs, categories(recipe), splits, turns)
+    numbering = Numbering(planned.subjects, planned.pose_list, planned.schedules if planned.timings else ())
+    composition = compose(recipe, planned.subjects, specs, categories(recipe), splits, numbering)
     return replace(planned, categories=composition.categories, composition=composition)
 
 

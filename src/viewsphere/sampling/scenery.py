@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from viewsphere import plugins
 from viewsphere.assets.inside import split_source
@@ -96,7 +96,7 @@ def _laid_pieces(
             category_id=category_id(piece.category, entry.labels),
             centring="as_is",
         )
-        pieces.append(SceneryPiece(spec, _composed(world_from_place, piece.world_from_piece), entry.labels, piece.name))
+        pieces.append(SceneryPiece(spec, composed(world_from_place, piece.world_from_piece), entry.labels, piece.name))
     return tuple(pieces)
 
 
@@ -158,7 +158,8 @@ def _turned(recipe: Recipe, entry: PlaceEntry, names: Names) -> Matrix4:
     return standing(np.zeros((8, 3)), azimuth_deg=turn)
 
 
-def _composed(a: Matrix4, b: Matrix4) -> Matrix4:
+def composed(a: ArrayLike, b: ArrayLike) -> Matrix4:
+    """The rigid motion (4, 4) that does `b`, then `a`, as things keep it."""
     rows: Any = tuple(tuple(row) for row in compose(np.array(a), np.array(b)).tolist())
     return rows
 
@@ -183,7 +184,7 @@ def _place_file(recipe: Recipe, entry: PlaceEntry, world_from_place: Matrix4, ca
     )
     x, y, z = entry.origin
     moved = ((1.0, 0.0, 0.0, -x), (0.0, 1.0, 0.0, -y), (0.0, 0.0, 1.0, -z), (0.0, 0.0, 0.0, 1.0))
-    return SceneryPiece(spec, _composed(world_from_place, moved), entry.labels, path.stem)
+    return SceneryPiece(spec, composed(world_from_place, moved), entry.labels, path.stem)
 
 
 def scenery_key(name: str, rest: str) -> str:

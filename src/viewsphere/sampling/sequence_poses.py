@@ -33,29 +33,16 @@ class SequencePoses(RepeatedPoses):
         """Those of the poses, then the number of instants."""
         return {**self.base.counts, "instants": self.instants}
 
-    def target(self, index: int) -> Vector | None:
-        """The pose's."""
-        return self.base.target(index // self.instants)
-
-    def place(self, index: int) -> str:
-        """Name of the pose, which is the sequence's among those of its subject."""
-        return self.base.place(index // self.instants)
+    def taken(self, index: int) -> int:
+        """The pose of the sequence; its name is the sequence's among those of its subject."""
+        return index // self.instants
 
     def name(self, index: int) -> str:
         """The pose's and the instant's."""
         return f"{self.place(index)} at instant {index % self.instants}"
 
-    def view(self, index: int) -> Orbit:
-        """The pose's."""
-        return self.base.view(index // self.instants)
-
-    def drawn_for(self, name: str) -> SequencePoses:
-        """The same instants of poses, random ones of which are drawn anew for this name."""
-        base = self.base.drawn_for(name)
-        return SequencePoses(base.viewpoints, base.seed, base, self.instants)
-
     def _pose(self, index: int) -> Viewpoint:
-        return self.base[index // self.instants].model_copy(update={"index": index})
+        return self.base[self.taken(index)].model_copy(update={"index": index})
 
 
 @dataclass(frozen=True)

@@ -14,12 +14,11 @@ from viewsphere.assets.timeline import Blenders, Timeline, no_animation
 from viewsphere.errors import ModelError, RecipeError
 from viewsphere.model.instant import Moment, Viewpoint
 from viewsphere.model.model_spec import ModelSpec
-from viewsphere.model.scene import Vector
 from viewsphere.model.thing import TimeStep
 from viewsphere.recipe.models import ModelEntry
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.time import Frames, Steps, chosen_frames
-from viewsphere.sampling.viewpoints import Orbit, Poses, RepeatedPoses
+from viewsphere.sampling.viewpoints import Poses, RepeatedPoses
 
 
 @dataclass(frozen=True)
@@ -67,37 +66,21 @@ class TimedPoses(RepeatedPoses):
         """Number of moments, then those of the poses."""
         return {"time steps": len(self.moments), **self.base.counts}
 
-    def target(self, index: int) -> Vector | None:
-        """The pose's."""
-        return self.base.target(index % len(self.base))
-
-    def place(self, index: int) -> str:
-        """Name of the pose, whenever it is taken."""
-        return self.base.place(index % len(self.base))
+    def taken(self, index: int) -> int:
+        """The pose, whenever it is taken."""
+        return index % len(self.base)
 
     def name(self, index: int) -> str:
         """The pose's and the moment's."""
-        number, pose = divmod(index, len(self.base))
-        moment = self.moments[number]
-        name = self.base.name(pose)
+        moment = self._moment(index)
+        name = self.base.name(self.taken(index))
         return name if moment is None else f"{name} at frame {moment.frame}, {moment.seconds!r} s"
 
-    def view(self, index: int) -> Orbit:
-        """The pose's."""
-        return self.base.view(index % len(self.base))
-
-    def drawn_for(self, name: str) -> TimedPoses:
-        """The same moments of poses, random ones of which are drawn anew for this name."""
-        base = self.base.drawn_for(name)
-        return TimedPoses(base.viewpoints, base.seed, base, self.moments)
-
-    def fill(self, index: int) -> float | None:
-        """The pose's."""
-        return self.base.fill(index % len(self.base))
-
     def _pose(self, index: int) -> Viewpoint:
-        number, pose = divmod(index, len(self.base))
-        return self.base[pose].model_copy(update={"index": index, "time": self.moments[number]})
+        return self.base[self.taken(index)].model_copy(update={"index": index, "time": self._moment(index)})
+
+    def _moment(self, index: int) -> Moment | None:
+        return self.moments[index // len(self.base)]
 
     @cached_property
     def numbers(self) -> dict[Moment | None, int]:

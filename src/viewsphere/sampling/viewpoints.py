@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import overload
+from typing import Self, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -130,9 +130,34 @@ class Poses(Sequence[Viewpoint]):
 
 @dataclass(frozen=True)
 class RepeatedPoses(Poses):
-    """Poses that are each taken several times."""
+    """Poses that are each taken several times; all but the times of a pose is the pose's."""
 
     base: Poses
+
+    @abstractmethod
+    def taken(self, index: int) -> int:
+        """The number, among the poses, of the one that is taken."""
+
+    def drawn_for(self, name: str) -> Self:
+        """The same poses as often, random ones drawn anew for this name."""
+        base = self.base.drawn_for(name)
+        return replace(self, viewpoints=base.viewpoints, seed=base.seed, base=base)
+
+    def target(self, index: int) -> Vector | None:
+        """The pose's."""
+        return self.base.target(self.taken(index))
+
+    def place(self, index: int) -> str:
+        """The pose's."""
+        return self.base.place(self.taken(index))
+
+    def view(self, index: int) -> Orbit:
+        """The pose's."""
+        return self.base.view(self.taken(index))
+
+    def fill(self, index: int) -> float | None:
+        """The pose's."""
+        return self.base.fill(self.taken(index))
 
     @property
     def intrinsics(self) -> Intrinsics | None:

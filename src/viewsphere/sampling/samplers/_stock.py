@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from itertools import chain
+from typing import Self
 
 from viewsphere.assets.timeline import Timeline
 from viewsphere.errors import RecipeError
@@ -57,6 +58,13 @@ class Stock(Sendable):
     tries: Mapping[int, int] = field(default_factory=dict[int, int])  # poses of which something is drawn again: the how manieth
     untried: Stock | None = None  # the same without these tries
     sequence_numbers: tuple[int, ...] = ()  # of each viewpoint of sequences, a data set's number; none where it has the same
+
+    def trying(self, tries: Mapping[int, int]) -> Self:
+        """The same stock with poses at these tries; it shares what was computed, none of which follows from tries."""
+        made = replace(self, tries=tries, untried=self)
+        known = {field.name for field in fields(self)}
+        vars(made).update({name: value for name, value in vars(self).items() if name not in known})
+        return made
 
     @cached_property
     def rig(self) -> Rig:
