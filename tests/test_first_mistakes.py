@@ -1,5 +1,6 @@
 """What a new user mistypes is one line that says where, what was expected, what was found and what to do."""
 
+import json
 import re
 
 import pytest
@@ -7,7 +8,7 @@ import pytest
 import viewsphere as vs
 from command_line import viewsphere
 from small import small_recipe
-from viewsphere.errors import RecipeError, StoreError, UserError
+from viewsphere.errors import MOST_TOLD, RecipeError, StoreError, UserError
 from viewsphere.preview.sides import facing
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.run.generate import generate
@@ -73,6 +74,89 @@ def test_what_is_not_closed_before_the_end_is_one_line(text, end, tmp_path):
 def test_zoo_families_are_known_to_plans():
     with pytest.raises(RecipeError, match=r"models\[0\]\.source: zoo: expected one of .*found 'cars'; did you mean 'car'"):
         plan(small_recipe(models=[{"source": "zoo:cars", "category": "car"}]))
+
+
+BAD_MODELS = """name: x
+models:
+  - {source: zoo:cars, category: car}
+  - {source: zoo:chair, category: chair}
+  - {source: nowhere.glb, category: thing}
+  - {source: empty/*.glb, category: thing}
+viewpoints: {azimuth: 0, distance: 3}
+camera: {size: [32, 24], fov_deg: 40}
+"""
+
+
+@pytest.mark.parametrize("more", ["", "scenes: {count: 2, objects: 1}\n"])
+@pytest.mark.parametrize("command", ["plan", "preview"])
+def test_the_mistakes_of_all_models_are_told_together(command, more, tmp_path):
+    file = tmp_path / "recipe.yaml"
+    file.write_text(BAD_MODELS + more)
+    answer = viewsphere(command, file, *(["-o", tmp_path / "p.png"] if command == "preview" else []))
+    assert answer.returncode == 2
+    wanted = [(3, "models[0].source: zoo: expected one of"), (5, "models[2].source: "), (6, "models[3].source: ")]
+    lines = answer.stderr.splitlines()
+    assert len(lines) == len(wanted)
+    for line, (number, begun) in zip(lines, wanted, strict=True):
+        assert line.startswith(f"viewsphere: {file}:{number}: {begun}")
+
+
+def test_sizes_and_categories_of_all_models_are_told_together(tmp_path):
+    (tmp_path / "sizes.csv").write_text("name,width,height,length\nc,1,1,1\n")
+    entries = [{"source": f"{name}.obj", "category": "thing", "real_size": "sizes.csv"} for name in "abcd"]
+    for name in "abcd":
+        (tmp_path / f"{name}.obj").touch()
+    values = small_recipe().model_dump(mode="json") | {"models": entries, "splits": {"train": 1}}
+    with pytest.raises(RecipeError) as caught:
+        plan(Recipe.model_validate(values, context={"folder": tmp_path}))
+    assert [line.partition(":")[0] for line in str(caught.value).splitlines()] == [f"models[{i}].real_size" for i in (0, 1, 3)]
+    for i in (1, 3):
+        entries[i]["supercategory"] = "other"
+    with pytest.raises(RecipeError) as caught:
+        plan(Recipe.model_validate(values, context={"folder": tmp_path}))
+    assert [line.partition(":")[0] for line in str(caught.value).splitlines()] == [f"models[{i}].supercategory" for i in (1, 3)]
+
+
+def test_of_very_many_mistakes_the_last_are_counted():
+    models = [{"source": f"zoo:car{i}", "category": "car"} for i in range(MOST_TOLD + 5)]
+    with pytest.raises(RecipeError) as caught:
+        plan(small_recipe(models=models))
+    lines = str(caught.value).splitlines()
+    assert len(lines) == MOST_TOLD + 1
+    assert lines[-1] == "and 5 more mistakes"
+
+
+def test_a_preview_tells_all_models_that_cannot_be_used(tmp_path):
+    (tmp_path / "a.obj").write_text("v 0 0 0\n")
+    (tmp_path / "b.glb").write_text("no model")
+    file = tmp_path / "recipe.yaml"
+    models = "models: [{source: zoo:chair, category: chair}, {source: [a.obj, b.glb], category: thing}]"
+    file.write_text(f"name: x\n{models}\nviewpoints: {{azimuth: 0, distance: 3}}\ncamera: {{size: [32, 24], fov_deg: 40}}\n")
+    answer = viewsphere("preview", file, "-o", tmp_path / "p.png")
+    assert answer.returncode == 2
+    told = [line for line in answer.stderr.splitlines() if not line.startswith("compiling")]
+    assert [line.split(":")[1].strip() for line in told] == [str(tmp_path / name) for name in ("a.obj", "b.glb")]
+    near = file.read_text().replace("distance: 3", "distance: 0.01").replace("{source: [a.obj, b.glb]", "{source: zoo:car")
+    file.write_text(near)
+    answer = viewsphere("preview", file, "-o", tmp_path / "p.png")
+    assert answer.returncode == 2
+    assert len(re.findall(r"expected the camera outside the model; .* \(model (?:chair|car)_000\)", answer.stderr)) == 2
+
+
+def test_categories_that_coco_does_not_have_are_told(tmp_path):
+    models = [{"source": "zoo:post_box", "category": name, "name": name} for name in ("bicycle", "post_box", "bike")]
+    coco = [{"coco": {"category_ids": "coco"}}]
+    recipe = small_recipe(models=models, formats=coco, splits={"train": 1}, viewpoints={"azimuth": 0, "distance": 3})
+    notes = (
+        "coco.category_ids: 'post_box', which COCO does not have, gets id 92",
+        "coco.category_ids: 'bike', which COCO has once, for another category here, gets id 93",
+    )
+    assert tuple(note for note in plan(recipe).notes if "coco" in note) == notes
+    assert not [note for note in plan(small_recipe(models=models, splits={"train": 1})).notes if "coco" in note]
+    told = [note for note in generate(recipe, tmp_path / "out").notes if "coco.category_ids" in note]
+    assert told == [f"note: {note}" for note in notes]
+    written = json.loads((tmp_path / "out/coco/annotations/instances_train.json").read_text())
+    assert {c["name"]: c["id"] for c in written["categories"]} == {"bicycle": 2, "post_box": 92, "bike": 93}
 
 
 def test_missing_folders_of_photographs_do_not_exist():

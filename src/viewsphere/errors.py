@@ -10,10 +10,20 @@
     ├── BlenderError              Blender answered that it cannot; it lives, and can be asked again
     └── BlenderDied               Blender crashed, or hung and was ended; only another one can be asked
 
-A message says where, what was expected, what was found and what to do, in one line.
+A message says where, what was expected, what was found and what to do, in one line; mistakes that are told together have a
+line each.
 """
 
 from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from typing import TypeVar
+
+Item = TypeVar("Item")
+Made = TypeVar("Made")
+
+MOST_TOLD = 20
+"""Mistakes that are told together; of further ones the number is."""
 
 
 class ViewsphereError(Exception):
@@ -57,3 +67,25 @@ class BlenderDied(ViewsphereError):
     def __init__(self, message: str, signal: str | None = None) -> None:
         super().__init__(message)
         self.signal = signal
+
+
+def joined(errors: Sequence[ViewsphereError]) -> ViewsphereError:
+    """All of them, each line once; of their common type if they have one."""
+    kinds = {type(error) for error in errors}
+    kind = kinds.pop() if len(kinds) == 1 else UserError
+    lines = list(dict.fromkeys(line for error in errors for line in str(error).splitlines()))
+    left = lines[MOST_TOLD:]
+    return kind("\n".join([*lines[:MOST_TOLD], *([f"and {len(left):,} more mistakes"] if left else [])]))
+
+
+def each(work: Callable[[Item], Made], items: Iterable[Item]) -> list[Made]:
+    """What `work` makes of each item, in order; raises the user's mistakes in all of them together, as `joined` does."""
+    made, errors = list[Made](), list[UserError]()
+    for item in items:
+        try:
+            made.append(work(item))
+        except UserError as error:
+            errors.append(error)
+    if errors:
+        raise joined(errors) from None
+    return made

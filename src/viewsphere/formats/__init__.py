@@ -25,7 +25,8 @@ class Format(Protocol):
     all channels that it reads besides pictures that happen to be there: a run that does not keep them is refused before it
     begins (without it, a format takes whatever is kept); `ANNOTATES = False`, if samples are to have all their
     objects, those too that the recipe leaves out of annotations; `check()`, which raises a UserError where the format cannot be
-    written; `verify(dataset, folder, sampled)` of `Verified`, with which `viewsphere check` proves an export;
+    written; `notes(categories, *options)`, with lines for the user of what these options mean for a data set's categories;
+    `verify(dataset, folder, sampled)` of `Verified`, with which `viewsphere check` proves an export;
     `read(path, *, keep_going) -> ForeignDataset` (`viewsphere.store.foreign`), with which data sets of the format are imported.
     """
 

@@ -9,9 +9,11 @@ from typing import Any
 
 import numpy as np
 
+from viewsphere.errors import each
 from viewsphere.labels import ChannelLabel, labels
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.channel import picture_of
+from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.rig import Rig
 from viewsphere.model.sample import Sample
 from viewsphere.model.shot import Shot
@@ -35,16 +37,15 @@ def preview_samples(
     """Render `count` frames spread over all models (or scenes) and poses, `width` pixels wide, in memory.
 
     With a time: `row` evenly spaced instants of each of some sequences, by all sensors; of one sequence alone `count` instants.
-    What is named in `draw` they have, too.
+    What is named in `draw` they have, too. Raises UserError for all models that cannot be shown together.
     """
     if recipe.time is not None:
         yield from _instants(recipe, count, width, draw, row)
         return
     planned = prepare(_with_channels(recipe, recipe.channels, draw))
-    stages = Stages()
-    for subject, groups in _spread(planned, count):
-        stages.read_ahead(planned, planned.cast(subject))
-        stages.check_distances(planned, subject)
+    stages, chosen = Stages(), _spread(planned, count)
+    _check(stages, planned, [subject for subject, _ in chosen])
+    for subject, groups in chosen:
         for poses in [[pose] for group in groups for pose in group] if recipe.scene.is_new_each_frame else groups:
             yield from _rendered(stages, planned, subject, poses, width)
 
@@ -57,10 +58,22 @@ def _instants(recipe: Recipe, count: int, width: int, draw: Sequence[str], row: 
     starts = [(subject, first) for block in planned.blocks for subject in block.subjects for first, _ in block.positions]
     films = min(len(starts), max(1, count // row))
     taken = np.linspace(0, instants - 1, min(instants, _each(count, films, row))).round().astype(int)
-    for i in np.linspace(0, len(starts) - 1, films).round().astype(int):
-        subject, first = starts[i]
-        stages.check_distances(planned, subject)
+    chosen = [starts[i] for i in np.linspace(0, len(starts) - 1, films).round().astype(int)]
+    _check(stages, planned, [subject for subject, _ in chosen])
+    for subject, first in chosen:
         yield from _rendered(stages, planned, subject, (first + taken).tolist(), width)
+
+
+def _check(stages: Stages, planned: Plan, subjects: Sequence[str]) -> None:
+    """Read the models of what is shown, and see that no camera stands in them; raises the mistakes in all of them together."""
+    specs = {spec.key: spec for subject in subjects for spec in planned.cast(subject)}
+
+    def read(spec: ModelSpec) -> None:
+        stages.read_ahead(planned, [spec])
+        stages.box(spec)
+
+    each(read, specs.values())
+    each(lambda subject: stages.check_distances(planned, subject), dict.fromkeys(subjects))
 
 
 def _each(count: int, films: int, row: int) -> int:

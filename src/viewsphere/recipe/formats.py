@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field, JsonValue, TypeAdapter, ValidationError, WithJsonSchema, model_serializer
@@ -52,6 +52,12 @@ class FormatEntry(Frozen):
         if self.options:
             raise RecipeError(f"{field}: expected no options, format {self.name} has none; found {', '.join(self.options)}")
         return ()
+
+    def notes(self, categories: Sequence[Any]) -> Iterator[str]:
+        """What the format has to say of these options and a data set's categories; raises as `arguments` does."""
+        said = getattr(plugins.load("formats", self.name), "notes", None) if self.options else None
+        if said is not None:
+            yield from said(categories, *self.arguments())
 
 
 def _entry(value: Any) -> Any:

@@ -12,7 +12,7 @@ from os import PathLike
 from pathlib import Path
 
 from viewsphere import plugins
-from viewsphere.errors import ModelError, RecipeError, UserError, ViewsphereError
+from viewsphere.errors import ModelError, RecipeError, ViewsphereError, joined
 from viewsphere.model.channel import missing
 from viewsphere.recipe.formats import FormatEntry, Formats, options_of, read_formats
 from viewsphere.recipe.recipe import Recipe
@@ -222,7 +222,7 @@ def _prepare_models(portion: Portion, store: Store, crew: Crew, keep_going: bool
     own = {m.key for m in planned.model_specs} | set(planned.subjects)
     stops = [e for k, e in failed.items() if not (keep_going and k in own and isinstance(e, (ModelError, RecipeError)))]
     if stops or own <= failed.keys():
-        raise _joined(stops or list(failed.values()))
+        raise joined(stops or list(failed.values()))
     return {key: str(error) for key, error in failed.items()}
 
 
@@ -238,7 +238,7 @@ def _compare_models(portion: Portion, store: Store, crew: Crew) -> None:
     held = (job for job in _model_jobs("same model", portion).all if store.model_info(job.key) is not None)
     errors = [outcome.error for outcome in crew.run(Listed(tuple(held))) if outcome.error]
     if errors:
-        raise _joined(errors)
+        raise joined(errors)
 
 
 def _distance_problems(planned: Plan, store: Store, failed: Container[str]) -> Iterator[tuple[str, ViewsphereError]]:
@@ -253,13 +253,6 @@ def _distance_problems(planned: Plan, store: Store, failed: Container[str]) -> I
             problem = error
         if problem:
             yield subject, problem
-
-
-def _joined(errors: Sequence[ViewsphereError]) -> ViewsphereError:
-    """All of them, a line each; of their common type if they have one."""
-    kinds = {type(e) for e in errors}
-    kind = kinds.pop() if len(kinds) == 1 else UserError
-    return kind("\n".join(dict.fromkeys(str(e) for e in errors)))
 
 
 def _render_shots(portion: Portion, store: Store, crew: Crew, keep_going: bool, skipped: dict[str, str], tell: Listener) -> int:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from viewsphere.assets.timeline import Blenders, Timeline
-from viewsphere.errors import RecipeError
+from viewsphere.errors import RecipeError, each
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import IDENTITY
 from viewsphere.model.thing import TimeStep
@@ -16,7 +16,7 @@ from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.sequence import TimeEntry
 from viewsphere.sampling.motion import Start, mover
 from viewsphere.sampling.seeds import generator
-from viewsphere.sampling.time_steps import animation
+from viewsphere.sampling.time_steps import animation, resting
 
 
 def with_clips(
@@ -25,21 +25,18 @@ def with_clips(
     """The models as at the first frame of the animation that each plays, and when that is; None of those that play none.
     `models` are specifications with the number of their entry.
 
-    Raises RecipeError for files that cannot be read, and for those in which nothing moves.
+    Raises RecipeError for files that cannot be read, and for those in which nothing moves, all together.
     """
-    specs, lines = list[ModelSpec](), list[Timeline | None]()
     with Blenders.none_yet() as blenders:
-        for spec, number in models:
+
+        def line_of(one: tuple[ModelSpec, int]) -> Timeline | None:
+            spec, number = one
             played = [field for field, motions in playing(recipe, number) if has_clip(motions)]
-            line = None if not played else _timeline(spec, recipe.models[number], played[0], blenders)
-            moved = (
-                {}
-                if line is None
-                else {"rest": line.first, "clip": recipe.models[number].clip, "fps": recipe.models[number].fps}
-            )
-            specs.append(spec.model_copy(update=moved))
-            lines.append(line)
-    return tuple(specs), tuple(lines)
+            return _timeline(spec, recipe.models[number], played[0], blenders) if played else None
+
+        lines = tuple(each(line_of, models))
+    pairs = zip(models, lines, strict=True)
+    return tuple(spec if line is None else resting(spec, recipe.models[number], line) for (spec, number), line in pairs), lines
 
 
 def playing(recipe: Recipe, number: int) -> tuple[tuple[str, Motions | None], ...]:

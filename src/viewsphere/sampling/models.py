@@ -11,12 +11,13 @@ from collections.abc import Callable, Collection, Iterator, Mapping, Set
 from dataclasses import dataclass, replace
 from functools import cache
 from glob import glob, has_magic
+from itertools import chain
 from pathlib import Path
 from typing import Literal
 
 from viewsphere.assets.inside import split_source
 from viewsphere.assets.load import BLENDER_SUFFIXES
-from viewsphere.errors import RecipeError
+from viewsphere.errors import RecipeError, each
 from viewsphere.model.file_names import is_reserved
 from viewsphere.model.mistakes import nearest, one_of
 from viewsphere.model.model_spec import ModelSpec, Size
@@ -52,11 +53,15 @@ class _Found:
 
 
 def count_models(recipe: Recipe) -> int:
-    """How many models there are, without making their specifications; raises RecipeError for files not found."""
-    return sum(
-        len(entry.families) * _count(recipe, entry) if entry.families else len(_files(recipe, i))
-        for i, entry in enumerate(recipe.models)
-    )
+    """How many models there are, without making their specifications; raises RecipeError for files and families of the zoo that
+    are not there, of all entries together.
+    """
+
+    def count(index: int) -> int:
+        families = _families(recipe, index)
+        return len(families) * _count(recipe, recipe.models[index]) if families else len(_files(recipe, index))
+
+    return sum(each(count, range(len(recipe.models))))
 
 
 def model_specs(recipe: Recipe) -> tuple[ModelSpec, ...]:
@@ -70,13 +75,14 @@ def model_specs(recipe: Recipe) -> tuple[ModelSpec, ...]:
 def numbered_specs(recipe: Recipe) -> tuple[tuple[ModelSpec, int], ...]:
     """The same, each with the number of its entry.
 
-    Raises RecipeError for files not found, two models of one key, a model that a table of sizes lacks, and a category
-    with two supercategories.
+    Raises RecipeError for files not found, models that a table of sizes lacks, and categories with two supercategories, each
+    kind of all models together; and for two models of one key.
     """
+    found = each(lambda i: tuple(_found(recipe, i)), range(len(recipe.models)))
     ids = {c.name: c.id for c in categories(recipe)}
     table = cache(_read_sizes)
-    specs: list[tuple[ModelSpec, int]] = []
-    for found in _with_unique_keys([f for i in range(len(recipe.models)) for f in _found(recipe, i)]):
+
+    def numbered(found: _Found) -> tuple[ModelSpec, int]:
         entry = recipe.models[found.entry]
         category = _category(entry, found.source)
         spec = ModelSpec(
@@ -94,14 +100,17 @@ def numbered_specs(recipe: Recipe) -> tuple[tuple[ModelSpec, int], ...]:
             real_size=_real_size(recipe, found, table),
             confined=entry.confined,
         )
-        specs.append((spec, found.entry))
-    return tuple(specs)
+        return spec, found.entry
+
+    return tuple(each(numbered, _with_unique_keys([*chain.from_iterable(found)])))
 
 
 def categories(recipe: Recipe) -> tuple[Category, ...]:
-    """The categories in order of appearance, ids from 1; raises RecipeError for one with two supercategories."""
+    """The categories in order of appearance, ids from 1; raises RecipeError for all with two supercategories."""
     result: dict[str, Category] = {}
-    for i, entry in enumerate(recipe.models):
+
+    def add(i: int) -> None:
+        entry = recipe.models[i]
         for source in entry.source:
             name = _category(entry, source)
             category = result.setdefault(name, Category(len(result) + 1, name, entry.supercategory))
@@ -110,7 +119,17 @@ def categories(recipe: Recipe) -> tuple[Category, ...]:
                     f"models[{i}].supercategory: expected {category.supercategory!r}, as category {name!r} has before; "
                     f"found {entry.supercategory!r}"
                 )
+
+    each(add, range(len(recipe.models)))
     return tuple(result.values())
+
+
+def _families(recipe: Recipe, index: int) -> tuple[str, ...]:
+    """The zoo families of an entry, none for one of files; raises RecipeError for one that is not there."""
+    for family in recipe.models[index].families:
+        if family not in families():
+            raise RecipeError(f"models[{index}].source: zoo: {one_of(family, families())}")
+    return recipe.models[index].families
 
 
 def _count(recipe: Recipe, entry: ModelEntry) -> int:
@@ -132,9 +151,7 @@ def _category(entry: ModelEntry, source: str) -> str:
 
 def _found(recipe: Recipe, index: int) -> Iterator[_Found]:
     entry = recipe.models[index]
-    for family in entry.families:
-        if family not in families():
-            raise RecipeError(f"models[{index}].source: zoo: {one_of(family, families())}")
+    for family in _families(recipe, index):
         for number in range(_count(recipe, entry)):
             yield _Found(index, f"{entry.name or family}_{number:03d}", ZOO + family)
     if not entry.families:

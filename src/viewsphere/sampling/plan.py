@@ -171,8 +171,9 @@ class Plan(Shown, Stock):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What is missing for others to use the data set: licences of models."""
-        return tuple(unlicensed((spec.key for spec in self.kept_specs), self.credits))
+        """What is missing for others to use the data set, licences of models; and what options of formats mean for it."""
+        options = chain.from_iterable(entry.notes(self.categories) for entry in self.recipe.formats)
+        return (*unlicensed((spec.key for spec in self.kept_specs), self.credits), *options)
 
     def split(self, subject: str, pose: int) -> str:
         """The split of a frame."""

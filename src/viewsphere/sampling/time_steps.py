@@ -11,7 +11,7 @@ from itertools import accumulate, chain, groupby, pairwise
 from pathlib import Path
 
 from viewsphere.assets.timeline import Blenders, Timeline, no_animation
-from viewsphere.errors import ModelError, RecipeError
+from viewsphere.errors import ModelError, RecipeError, each
 from viewsphere.model.instant import Moment, Viewpoint
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.thing import TimeStep
@@ -99,22 +99,24 @@ def timed(
     """The models as at the first frame, their time steps, and the poses at all moments; `models` are specifications with the
     number of their entry.
 
-    Raises RecipeError for frames that a file does not have, for files in which nothing moves, and for other numbers of poses
-    or of the scene's time steps where they have to be equal.
+    Raises RecipeError for frames that files do not have and for files in which nothing moves, of all models together, and for
+    other numbers of poses or of the scene's time steps where they have to be equal.
     """
     if not is_animated(recipe):
         return tuple(spec for spec, _ in models), (None,) * len(models), views
     with Blenders.none_yet() as blenders:
         scene = tuple(_scene_steps(recipe, blenders))
-        specs: list[ModelSpec] = []
-        timings: list[Timing | None] = []
-        for spec, number in models:
+
+        def moving(one: tuple[ModelSpec, int]) -> tuple[ModelSpec, Timing | None]:
+            spec, number = one
             entry = recipe.models[number]
-            own = _model_steps(spec, entry, f"models[{number}]", blenders) if entry.frames is not None else None
-            specs.append(
-                spec if own is None else spec.model_copy(update={"rest": own[0].first, "clip": entry.clip, "fps": entry.fps})
-            )
-            timings.append(_timing(recipe, spec, entry, number, own and own[1], scene))
+            if entry.frames is None:
+                return spec, _timing(recipe, spec, entry, number, None, scene)
+            line, steps = _model_steps(spec, entry, f"models[{number}]", blenders)
+            return resting(spec, entry, line), _timing(recipe, spec, entry, number, steps, scene)
+
+        made = each(moving, models)
+    specs, timings = (spec for spec, _ in made), [timing for _, timing in made]
     for timing, (spec, number) in zip(timings, models, strict=True):
         if timing is not None and timing.moving and len(timing.steps) != len(views):
             where = f"models[{number}]" if recipe.models[number].frames is not None else "scene.blend"
@@ -149,6 +151,11 @@ def _timing(
         )
     pairs = zip(own, scene, strict=True)
     return Timing(tuple(Step(moment, _shown(shown), at) for (_, shown), (at, moment) in pairs), moving)
+
+
+def resting(spec: ModelSpec, entry: ModelEntry, line: Timeline) -> ModelSpec:
+    """An animated model as at the first frame of what its entry says that it plays."""
+    return spec.model_copy(update={"rest": line.first, "clip": entry.clip, "fps": entry.fps})
 
 
 def _shown(moment: Moment) -> TimeStep:

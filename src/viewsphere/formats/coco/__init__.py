@@ -17,6 +17,8 @@ from pathlib import Path
 
 from viewsphere.errors import UserError
 from viewsphere.formats._contents import put
+from viewsphere.formats.coco.categories import keeps_ids
+from viewsphere.formats.coco.categories import notes as notes
 from viewsphere.formats.coco.entries import files, seen
 from viewsphere.formats.coco.instances import instances
 from viewsphere.formats.coco.options import Options as Options
@@ -39,6 +41,8 @@ def writer(
     """
     if missing(CHANNELS, dataset.plan.channels):
         raise UserError(f"{dataset.root}: format coco: expected channel rgb, found none: add it to the recipe's channels")
+    for line in () if keeps_ids(dataset) else notes(dataset.categories, options):
+        note(f"note: {line}")
     with instances(dataset, folder / "annotations", options) as append:
 
         def add(sample: Sample) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+from functools import cache
 from itertools import chain
 
 from viewsphere.formats.coco.options import Options
@@ -39,9 +41,14 @@ def category_ids(dataset: Dataset, options: Options) -> dict[int, int]:
     """The exported id of each category of the data set, by its own."""
     if options.category_ids == "contiguous":
         return {category.id: number for number, category in enumerate(dataset.categories, 1)}
-    if any(part.frames and not part.settings for part in dataset.plan.parts):
+    if keeps_ids(dataset):
         return {category.id: category.id for category in dataset.categories}
     return official_ids(dataset.categories)
+
+
+def keeps_ids(dataset: Dataset) -> bool:
+    """Whether any of it was imported, so that categories keep their ids."""
+    return any(part.frames and not part.settings for part in dataset.plan.parts)
 
 
 def official_ids(categories: tuple[Category, ...]) -> dict[int, int]:
@@ -49,14 +56,29 @@ def official_ids(categories: tuple[Category, ...]) -> dict[int, int]:
 
     Of two categories with one name of COCO's, the first has it. Free ids follow the recipe's order.
     """
-    known = {_plain(name): number for name, number in CATEGORY_IDS.items()}
-    known |= {other: CATEGORY_IDS[name] for other, name in _OTHER_SPELLINGS.items()}
     ids: dict[int, int] = {}
     for category in categories:
-        own = known.get(_plain(category.name))
+        own = _known().get(_plain(category.name))
         ids[category.id] = own if own and own not in ids.values() else _FIRST_FREE_ID - 1 + category.id
     return ids
 
 
+def notes(categories: Sequence[Category], options: Options) -> Iterator[str]:
+    """What a user may not expect of the ids: categories that COCO does not have, or has once."""
+    if options.category_ids == "contiguous":
+        return
+    for category, number in zip(categories, official_ids(tuple(categories)).values(), strict=True):
+        if number >= _FIRST_FREE_ID:
+            why = "COCO does not have" if _plain(category.name) not in _known() else "COCO has once, for another category here"
+            yield f"coco.category_ids: {category.name!r}, which {why}, gets id {number}"
+
+
 def _plain(name: str) -> str:
     return "".join(c for c in name.lower() if c.isalnum())
+
+
+@cache
+def _known() -> dict[str, int]:
+    """COCO's id of each spelling, plain."""
+    ids = {_plain(name): number for name, number in CATEGORY_IDS.items()}
+    return ids | {other: CATEGORY_IDS[name] for other, name in _OTHER_SPELLINGS.items()}
