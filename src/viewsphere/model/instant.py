@@ -11,6 +11,7 @@ from pydantic import Field, SerializerFunctionWrapHandler, model_serializer
 
 from viewsphere.geometry.camera import orbit_angles
 from viewsphere.geometry.pose_category import pose_category
+from viewsphere.model.brief import Brief
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.scene import Finish, Matrix4, Vector
@@ -26,11 +27,13 @@ class Moment(Frozen):
     seconds: float
 
 
-class Viewpoint(Frozen):
+class Viewpoint(Brief):
     """Where a camera stands on a sphere around `target` (world metres; None: the box centre of object 1), and when.
 
     `fill`, where the distance follows from it: the share of the picture that a model fills, see `sampling.filling`.
     """
+
+    UNSAID = ("fill",)
 
     index: int
     azimuth_deg: float
@@ -41,14 +44,6 @@ class Viewpoint(Frozen):
     category: str = ""  # named bin: front, front-left, ..., top
     time: Moment | None = None  # where something is animated
     fill: float | None = None
-
-    @model_serializer(mode="wrap")
-    def _as_ever(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Without `fill` where a distance was given, as records always were."""
-        found: dict[str, Any] = handler(self)
-        if self.fill is None:
-            found.pop("fill", None)
-        return found
 
     def rounded(self) -> Viewpoint:
         """The same to nine decimal places: the last digits of angles that follow from a matrix differ between processors."""

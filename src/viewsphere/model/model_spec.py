@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Literal
 
-from pydantic import Field, SerializerFunctionWrapHandler, model_serializer
+from pydantic import Field
 
+from viewsphere.model.brief import Brief
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.scene import IDENTITY, Matrix4
 
@@ -25,13 +26,15 @@ class Parts(Frozen):
     file_from_axes: Matrix4 = IDENTITY
 
 
-class ModelSpec(Frozen):
+class ModelSpec(Brief):
     """Which model, and how its file is turned into an object that faces -Y with +Z up, in metres.
 
     `source` is a file's absolute path, or `zoo:<family>` with `seed` naming the draw. None for `up`, `forward` or
     `unit` means what the file (or its format's specification) says. An animated model is turned, scaled and centred as it is at
     its file's first frame; which time step it shows, and when, its thing's motion says.
     """
+
+    UNSAID = ("fps",)
 
     key: str  # unique and stable in the data set: also the name of its folder
     source: str
@@ -51,11 +54,6 @@ class ModelSpec(Frozen):
     clip: str | None = None  # name of the animation that is played, where the file has several
     shown: tuple[str, ...] = ()  # objects of a .blend file that are read although renders do not show them
     parts: Parts | None = None  # what is taken of it, when it is read and normalised
-
-    @model_serializer(mode="wrap")
-    def _as_ever(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Without `fps` where it says nothing, as records always were."""
-        return {name: value for name, value in handler(self).items() if name != "fps" or value is not None}
 
     def key_at(self, frame: int | None) -> str:
         """The key of the model as it is at a frame of its file; None: its own."""

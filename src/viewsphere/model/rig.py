@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from itertools import permutations
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
+from pydantic import Field, model_validator
 
 from viewsphere.geometry.rotation import transform
+from viewsphere.model.brief import Brief
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.scene import IDENTITY, Matrix4
@@ -17,23 +18,17 @@ CAMERA = "camera"
 """Default name of a rig's only sensor."""
 
 
-class Sensor(Frozen):
+class Sensor(Brief):
     """A camera of a rig: its lens, and where it is mounted. `rig_from_sensor` is rigid, OpenCV axes on both sides, metres.
     `channels` are those of the shot's that it keeps, None: all.
     """
+
+    UNSAID = ("channels",)
 
     intrinsics: Intrinsics
     name: str = Field(default=CAMERA, pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$", max_length=64)
     rig_from_sensor: Matrix4 = IDENTITY
     channels: tuple[str, ...] | None = None
-
-    @model_serializer(mode="wrap")
-    def _as_ever(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Without `channels` where a sensor keeps all, so that records of one camera are what they were before rigs."""
-        found: dict[str, Any] = handler(self)
-        if self.channels is None:
-            found.pop("channels", None)
-        return found
 
     def kept(self, channels: tuple[str, ...]) -> tuple[str, ...]:
         """Those of a shot's channels that the sensor keeps, in the shot's order."""

@@ -6,14 +6,17 @@ from typing import Any
 
 from pydantic import Field, SerializerFunctionWrapHandler, model_serializer
 
+from viewsphere.model.brief import Brief
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.numbers import Portion
 from viewsphere.model.scene import IDENTITY, Color, Matrix4, Picture
 
 
-class Repaint(Frozen):
+class Repaint(Brief):
     """A change to the materials whose names match `material`, a pattern of fnmatch. What is None stays as the file says."""
+
+    UNSAID = ("image",)
 
     material: str = Field(default="*", min_length=1, description="names of the materials, a pattern such as paint*")
     tint: Color | None = Field(default=None, description="multiplies the colour; white changes nothing: linear [r, g, b]")
@@ -22,14 +25,6 @@ class Repaint(Frozen):
     image: Picture | None = Field(
         default=None, description="path of a picture: the colour of opaque materials instead of what the model says"
     )
-
-    @model_serializer(mode="wrap")
-    def _as_ever(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Without `image` where there is none, as records always were."""
-        found: dict[str, Any] = handler(self)
-        if self.image is None:
-            found.pop("image", None)
-        return found
 
 
 class TimeStep(Frozen):

@@ -19,14 +19,13 @@ from pydantic import (
     Field,
     GetCoreSchemaHandler,
     PrivateAttr,
-    SerializerFunctionWrapHandler,
     TypeAdapter,
     ValidatorFunctionWrapHandler,
-    model_serializer,
     model_validator,
 )
 from pydantic_core import CoreSchema, core_schema
 
+from viewsphere.model.brief import Brief
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.mistakes import at, nearest, shown
 from viewsphere.model.numbers import Count, Metres, Number
@@ -50,16 +49,10 @@ Of = Literal["number", "whole number", "vector", "word", "entry"]
 T = TypeVar("T")
 
 
-class _AsWritten(Frozen):
-    """Is written without the fields that were not given."""
-
-    @model_serializer(mode="wrap")
-    def _given(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        return {name: value for name, value in handler(self).items() if value is not None}
-
-
-class Gaussian(_AsWritten):
+class Gaussian(Brief):
     """A normal distribution. What lies beyond `min`, `max` or the field's own limits is never drawn."""
+
+    UNSAID = ("mean", "deviation", "min", "max")
 
     mean: Any = Field(description="mean")
     deviation: Any = Field(description="standard deviation")
@@ -76,8 +69,10 @@ def _gaussian(value: Any) -> Any:
     return value
 
 
-class Distribution(_AsWritten):
+class Distribution(Brief):
     """One of uniform, log_uniform, normal and choice. Their arguments may be distributions themselves."""
+
+    UNSAID = (*KINDS, "weights")
 
     uniform: tuple[Any, Any] | None = Field(default=None, description="[low, high]; of vectors, each component by itself")
     log_uniform: tuple[Any, Any] | None = Field(

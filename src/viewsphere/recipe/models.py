@@ -7,13 +7,14 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
 
+from viewsphere.model.brief import Brief
 from viewsphere.model.credit import Attribution, Credit, Licence, SourceUrl
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.mistakes import nearest, shown
 from viewsphere.model.model_spec import Axis
 from viewsphere.model.numbers import Positive
 from viewsphere.recipe.draws import CountDrawn, Drawn, is_random
-from viewsphere.recipe.motion import MOTION, MotionField, Movable, has_clip
+from viewsphere.recipe.motion import MOTION, MotionField, has_clip
 from viewsphere.recipe.time import RATE, STEPS, Frames, Rate, Steps
 from viewsphere.recipe.values import OrShort, shape_of
 
@@ -84,8 +85,10 @@ Scale = Annotated[
 ]
 
 
-class ModelEntry(Movable):
+class ModelEntry(Brief):
     """Some models of one category, treated alike."""
+
+    UNSAID = ("motion", "fps")
 
     source: Annotated[
         tuple[Annotated[str, Field(min_length=1)], ...],

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Annotated, Any
+from typing import Annotated
 
 from pydantic import (
     ConfigDict,
     Discriminator,
     Field,
     JsonValue,
-    SerializerFunctionWrapHandler,
     Tag,
-    model_serializer,
     model_validator,
 )
 
@@ -63,16 +61,6 @@ MotionsField = Annotated[
 MotionField = MotionsField | None
 
 MOTION = "under time, how it moves: {kind: constant, velocity: [0, -1, 0]}, or a list of motions, one upon another"
-
-
-class Movable(Frozen):
-    """What may have a motion. Without one, or a rate of its frames, it is written as before there were these: digests of such
-    recipes stay.
-    """
-
-    @model_serializer(mode="wrap")
-    def _without_none(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        return {name: value for name, value in handler(self).items() if name not in ("motion", "fps") or value is not None}
 
 
 def listed(motions: Motions | None, field: str) -> Iterator[tuple[str, MotionEntry]]:

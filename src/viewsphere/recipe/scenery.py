@@ -7,13 +7,14 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
 
+from viewsphere.model.brief import Brief
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.mistakes import shown
 from viewsphere.model.model_spec import Axis
 from viewsphere.model.numbers import FARTHEST, Length, Metres, Number
 from viewsphere.recipe.draws import CountDrawn, Drawn, is_random, span
 from viewsphere.recipe.models import ZOO, Unit
-from viewsphere.recipe.motion import MOTION, MotionField, MotionsField, Movable
+from viewsphere.recipe.motion import MOTION, MotionField, MotionsField
 from viewsphere.recipe.values import Interval, OrShort, Point, shape_of
 
 Draw = Literal["fixed", "per_model", "per_sequence", "per_frame"]
@@ -26,8 +27,10 @@ ORIENTATION = "upright, or any: turned at random in all directions, uniform over
 OF_FILES = ("origin", "up", "forward", "unit", "category")
 
 
-class PlaceEntry(Movable):
+class PlaceEntry(Brief):
     """Where the targets stand."""
+
+    UNSAID = ("motion",)
 
     source: str = Field(min_length=1, description="zoo:<place>, such as zoo:neighbourhood, or a model file")
     draw: Draw = Field(default="fixed", description=f"of a zoo's place and of the turn: {DRAWS}")
@@ -85,8 +88,10 @@ Layout = Annotated[
 ]
 
 
-class CompanyEntry(Movable):
+class CompanyEntry(Brief):
     """Other models of the recipe, of the same split, beside the one each frame is about."""
+
+    UNSAID = ("motion",)
 
     count: CountDrawn | None = Field(
         default=None, description="how many, a number, [low, high] or a distribution; not needed where layout is a list"

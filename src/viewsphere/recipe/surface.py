@@ -8,12 +8,11 @@ from pydantic import (
     BeforeValidator,
     Discriminator,
     Field,
-    SerializerFunctionWrapHandler,
     Tag,
-    model_serializer,
     model_validator,
 )
 
+from viewsphere.model.brief import Brief
 from viewsphere.model.scene import Ground, Picture
 from viewsphere.model.thing import Repaint
 from viewsphere.recipe.entries import entry_of, is_drawn_color
@@ -47,8 +46,10 @@ GroundField = Annotated[
 ]
 
 
-class MaterialEntry(entry_of(Repaint, fixed=("material",))):
+class MaterialEntry(entry_of(Repaint, fixed=("material",)), Brief):
     """A change to materials of the models; where several fit one, the last counts."""
+
+    UNSAID = ("image", "images")
 
     models: str = Field(default="*", min_length=1, description="keys of the models it is for, a pattern such as car_*")
     images: Picture | None = Field(default=None, description="or a folder of pictures to draw from")
@@ -61,9 +62,3 @@ class MaterialEntry(entry_of(Repaint, fixed=("material",))):
         if self.image is not None and self.images is not None:
             raise ValueError("expected image or images; found both")
         return self
-
-    @model_serializer(mode="wrap")
-    def _as_ever(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Without pictures where there are none: digests of such recipes are what they were before."""
-        found: dict[str, Any] = handler(self)
-        return {name: value for name, value in found.items() if value is not None or name not in ("image", "images")}

@@ -9,13 +9,12 @@ from typing import Annotated, Any, Literal
 from pydantic import (
     Discriminator,
     Field,
-    SerializerFunctionWrapHandler,
     Tag,
     field_validator,
-    model_serializer,
     model_validator,
 )
 
+from viewsphere.model.brief import Brief
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.mistakes import at
 from viewsphere.model.model_spec import Axis
@@ -197,12 +196,14 @@ class Normal(Aimed):
         return self
 
 
-class PoseList(Aimed):
+class PoseList(Aimed, Brief):
     """Viewpoints from a file: orbits around the target, or a camera's motion through the file's own world.
 
     A motion is turned so that the file's `up` is +Z and its `forward` is -Y, moved so that `origin` lies where the models
     stand, and scaled; its cameras look where they looked, whatever the target.
     """
+
+    UNSAID = ("fps",)
 
     kind: Literal["file"] = Field(description="from a file")
     path: Annotated[str, Field(min_length=1)] = Field(description="the file, or COLMAP's folder")
@@ -243,11 +244,6 @@ class PoseList(Aimed):
         if self.up and self.forward and self.up[1] == self.forward[1]:
             raise ValueError(f"expected up and forward at right angles; found up {self.up} and forward {self.forward}")
         return self
-
-    @model_serializer(mode="wrap")
-    def _as_ever(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Without `fps` where it says nothing: digests of such recipes stay."""
-        return {name: value for name, value in handler(self).items() if name != "fps" or value is not None}
 
     @property
     def of_cameras(self) -> dict[str, object]:
