@@ -21,6 +21,7 @@ from viewsphere.model.thing import Thing
 from viewsphere.run.tasks import SceneryRecord
 from viewsphere.store import Dataset, depth_step
 from viewsphere.store.channel_files import MOST_STEPS
+from viewsphere.truth.visibility import EDGE_ON
 
 Float = NDArray[np.float64]
 
@@ -108,7 +109,8 @@ class RayCaster:
             there = (np.abs(found - s) <= slack) & (np.append(self._owner, -1)[owner] == ids)
             height = (eye + s[:, None] * directions)[:, 2]
             off = np.abs(height - self._lowest)
-            there |= (ids == 0) & np.isfinite(s) & (off <= slack * np.maximum(1.0, np.abs(directions[:, 2])))
+            on_ground = np.isfinite(s) & (off <= slack * np.maximum(1.0, np.abs(directions[:, 2])))
+        there |= (ids == 0) & on_ground & (not self._is_in_ground(eye))
         there |= np.isinf(s) & (ids == 0) & ~self._meets_ground(eye, directions, rays[rows, columns, 2] > 0)
         wrong = ~there | (first < np.where(np.isfinite(s), s - slack, np.inf))
         if wrong.sum() > max(2, OUTLIERS * len(s)):
@@ -118,6 +120,10 @@ class RayCaster:
                 f"{wrong.sum()} of {len(s)} {what}: at pixel ({columns[i]}, {rows[i]}) object {ids[i]} is "
                 f"stored at {s[i]:.6g} m along the ray, Embree finds {np.append(self._owner, 0)[owner[i]]} at {nearest:.6g} m"
             )
+
+    def _is_in_ground(self, eye: Float) -> bool:
+        """Whether the camera stands in the plane of the ground, of which it then sees nothing."""
+        return abs(eye[2] - self._lowest) <= EDGE_ON * (1.0 + float(np.linalg.norm(eye + self._middle)))
 
     def _meets_ground(self, eye: Float, directions: Float, ahead: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Which rays meet the ground beyond doubt; depth of rays that look back is not kept by all files."""

@@ -15,6 +15,9 @@ from viewsphere.truth.geometry import Geometry
 
 LARGEST_AROUND = 4_000_000  # pixels of a ray table that reaches beyond the image (100 MB)
 
+EDGE_ON = 1e-9
+"""A camera's height above the ground, as a share of its distance from the origin and a metre, that is nothing but rounding."""
+
 
 @dataclass(frozen=True, eq=False)
 class Instances:
@@ -73,12 +76,14 @@ def rasterize(
     A later triangle is seen instead of an earlier one only if it is nearer by more than 2^-22 (2.4e-7) of its depth: of
     surfaces in one place the first one is seen everywhere, so an object before the ground in which it lies.
 
+    A camera in the ground's plane sees none of it (see `is_edge_on`).
+
     `subdivision` 2 gives the (2H, 2W) buffer of the centres of a pixel's 2 x 2 quarters (edge anti-aliasing). With an
     `object_id` only that object is drawn, without scenery and ground. `window` replaces the image by another rectangle of
     pixels, which may lie outside the image. `corners`: `homogeneous` of all vertices, where it is known. `keeps_exact`: keep
     1/s before it was rounded, too, which labels that compare pictures need; still pictures are spared its memory.
     """
-    everything = (0, len(geometry.triangles), 0, len(geometry.vertices))
+    everything = (0, _last_drawn(geometry, camera), 0, len(geometry.vertices))
     part = _range(geometry, object_id) if object_id else everything
     q = homogeneous(geometry, camera, *part[2:]) if corners is None or part != everything else corners
     nearest, seen = _draw(geometry, camera, subdivision, part, window, q)
@@ -88,10 +93,25 @@ def rasterize(
 
 def with_ground(geometry: Geometry, camera: Camera, visibility: Visibility) -> Visibility:
     """A new buffer: `visibility`, which shows everything else, with the ground of this geometry drawn into it."""
-    ground = geometry.triangle_start[-1], len(geometry.triangles), geometry.vertex_start[-1], len(geometry.vertices)
+    ground = geometry.triangle_start[-1], _last_drawn(geometry, camera), geometry.vertex_start[-1], len(geometry.vertices)
     shown = visibility.inverse_depth.astype(np.float64), visibility.triangle.copy()
     nearest, seen = _draw(geometry, camera, 1, ground, None, homogeneous(geometry, camera, *ground[2:]), shown)
     return Visibility(seen, nearest.astype(np.float32))
+
+
+def is_edge_on(geometry: Geometry, camera: Camera) -> bool:
+    """Whether the camera stands in the plane of the ground, as far as rounding can tell: what rays meet of the ground, if
+    anything, is then the camera's own centre.
+    """
+    center = camera.center
+    if geometry.ground_z is None:
+        return False
+    return abs(float(center[2]) - geometry.ground_z) <= EDGE_ON * (1.0 + float(np.linalg.norm(center)))
+
+
+def _last_drawn(geometry: Geometry, camera: Camera) -> int:
+    """The end of the triangles that are drawn: the ground, which comes last, is not where it is seen edge-on."""
+    return geometry.triangle_start[-1] if is_edge_on(geometry, camera) else len(geometry.triangles)
 
 
 def silhouette(geometry: Geometry, camera: Camera, object_id: int, window: Window) -> NDArray[np.bool_]:
