@@ -244,8 +244,9 @@ def test_warnings_of_a_file_name_the_file(made, tmp_path):
         made / "apart" / "foreign.blend", blend={"labels": labels, "confined": False}, viewpoints={"distance": 6}
     )
     warnings = generate(recipe, tmp_path / "out").warnings
-    assert list(warnings) == ["foreign.blend"]
-    assert len(warnings["foreign.blend"]) == len(set(warnings["foreign.blend"])) > 0
+    assert list(warnings.files) == ["foreign.blend"] and warnings.models == {}
+    said = warnings.files["foreign.blend"]
+    assert len(said) == len(set(said)) > 0
 
 
 def test_the_compositor_has_the_passes_that_it_asks_for(made):

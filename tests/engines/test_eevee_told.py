@@ -105,9 +105,20 @@ def test_a_catcher_is_a_mistake_of_the_plan(name, scene):
     plan(recipe_of({"name": "cycles"}, scene=scene))
 
 
-@pytest.mark.parametrize("scene", [{"background": "environment", "ground": "off"}, {"ground": {"choice": ["grey", "off"]}}])
-def test_other_grounds_are_none(scene):
-    plan(recipe_of({"name": "eevee"}, scene=scene))
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize(
+    ("scene", "grounds"),
+    [
+        ({"background": "environment", "ground": "off"}, {None}),
+        ({"background": "environment", "ground": "on"}, {False}),
+        ({"ground": {"choice": ["grey", "white"]}}, {False}),
+    ],
+)
+def test_other_grounds_are_planned_as_they_are_said(name, scene, grounds):
+    """No ground, or one that is no catcher."""
+    planned = plan(recipe_of({"name": name}, scene=scene))
+    made = {shot.scene.ground and shot.scene.ground.catcher for shot in planned.shots(stages().box)}
+    assert made == grounds
 
 
 def test_plan_refuses_a_catcher_by_the_recipe_s_line(tmp_path):

@@ -13,6 +13,7 @@ from viewsphere.errors import UserError
 from viewsphere.formats.coco.categories import CATEGORY_IDS, category_ids, official_ids
 from viewsphere.formats.coco.options import Options
 from viewsphere.geometry.mask import encode_rle
+from viewsphere.recipe.formats import FormatEntry
 from viewsphere.run.exporting import write
 from viewsphere.store import Category
 
@@ -24,7 +25,7 @@ def exported(request, tmp_path_factory):
     root = tmp_path_factory.mktemp("coco")
     dataset = make(root / "out", request.param)
     (root / "coco").mkdir()
-    write(dataset, {"coco": root / "coco"}, {"coco": COCOS_OWN})
+    write(dataset, [(FormatEntry(name="coco", options=COCOS_OWN), root / "coco")])
     return dataset, root / "coco"
 
 
@@ -169,7 +170,7 @@ def test_models_and_categories(exported):
 def test_ids_do_not_depend_on_what_is_finished(tmp_path):
     for name, left_out in (("whole", ()), ("part", (0,))):
         (tmp_path / name).mkdir()
-        write(make(tmp_path / f"{name}-store", leave_out=left_out), {"coco": tmp_path / name})
+        write(make(tmp_path / f"{name}-store", leave_out=left_out), [(FormatEntry(name="coco"), tmp_path / name)])
     whole, part = load(tmp_path / "whole", "train"), load(tmp_path / "part", "train")
     assert sorted(part.imgs) == sorted(whole.imgs)[4:]
     for number, annotation in part.anns.items():
@@ -178,7 +179,7 @@ def test_ids_do_not_depend_on_what_is_finished(tmp_path):
 
 def test_equal_bytes(exported, tmp_path):
     dataset, folder = exported
-    write(dataset, {"coco": tmp_path}, {"coco": COCOS_OWN})
+    write(dataset, [(FormatEntry(name="coco", options=COCOS_OWN), tmp_path)])
     names = sorted(p.relative_to(folder) for p in folder.rglob("*") if p.is_file())
     assert names == sorted(p.relative_to(tmp_path) for p in tmp_path.rglob("*") if p.is_file())
     for name in names:
@@ -188,7 +189,7 @@ def test_equal_bytes(exported, tmp_path):
 def test_large_data_sets_have_numbered_folders(exported, monkeypatch, tmp_path):
     dataset, _ = exported
     monkeypatch.setattr("viewsphere.formats.coco.entries.FOLDER_SIZE", 3)
-    write(dataset, {"coco": tmp_path})
+    write(dataset, [(FormatEntry(name="coco"), tmp_path)])
     for folder in [
         p for s in dataset.splits for p in [tmp_path / "images" / s, *(tmp_path / "images" / s).rglob("*")] if p.is_dir()
     ]:
@@ -201,13 +202,13 @@ def test_large_data_sets_have_numbered_folders(exported, monkeypatch, tmp_path):
 
 def test_a_data_set_without_pictures_is_refused(tmp_path):
     with pytest.raises(UserError, match="expected channel rgb"):
-        write(make(tmp_path / "out", channels=("instances",)), {"coco": tmp_path})
+        write(make(tmp_path / "out", channels=("instances",)), [(FormatEntry(name="coco"), tmp_path)])
 
 
 def test_categories_count_from_one_without_gaps_unless_cocos_own_are_asked_for(exported, tmp_path):
     """Trainings that make a classifier of so many outputs fail at ids like 89 and 92."""
     dataset, folder = exported
-    write(dataset, {"coco": tmp_path})
+    write(dataset, [(FormatEntry(name="coco"), tmp_path)])
     for split in dataset.splits:
         ours, cocos = load(tmp_path, split), load(folder, split)
         assert [ours.cats[i]["name"] for i in (1, 2, 3)] == [c.name for c in dataset.categories]
@@ -220,7 +221,7 @@ def test_categories_count_from_one_without_gaps_unless_cocos_own_are_asked_for(e
 
 def test_the_papers_tree_has_the_same_files_a_folder_higher(exported, tmp_path):
     dataset, folder = exported
-    write(dataset, {"coco": tmp_path}, {"coco": {**COCOS_OWN, "pictures": "splits"}})
+    write(dataset, [(FormatEntry(name="coco", options={**COCOS_OWN, "pictures": "splits"}), tmp_path)])
     for split in dataset.splits:
         for one, other in ((tmp_path / split, folder / "images" / split), (tmp_path / "annotations",) * 2):
             names = sorted(p.relative_to(one) for p in one.rglob("*") if p.is_file())

@@ -8,6 +8,7 @@ from PIL import Image
 
 from cube_dataset import make
 from viewsphere.formats.csv import HEAD, verify
+from viewsphere.recipe.formats import FormatEntry
 from viewsphere.run.exporting import write
 
 
@@ -16,7 +17,7 @@ def exported(request, tmp_path_factory):
     root = tmp_path_factory.mktemp("csv")
     dataset = make(root / "out", request.param, ground=True)
     (root / "csv").mkdir()
-    write(dataset, {"csv": root / "csv"})
+    write(dataset, [(FormatEntry(name="csv"), root / "csv")])
     with (root / "csv" / "objects.csv").open(newline="", encoding="utf-8") as file:
         return dataset, root / "csv", list(csv.DictReader(file))
 

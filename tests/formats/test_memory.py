@@ -10,6 +10,7 @@ import pytest
 
 from small import small_recipe
 from viewsphere import Dataset, generate
+from viewsphere.recipe.formats import FormatEntry
 from viewsphere.run.exporting import write
 
 MOST_GROWTH = 400
@@ -40,12 +41,12 @@ def held(root: Path, folder: Path) -> int:
             kept = tracemalloc.take_snapshot().filter_traces([tracemalloc.Filter(False, pathlib.__file__)])
             found.append(sum(trace.size for trace in kept.traces))
 
-    folders = {name: folder / name for name in ("coco", "native")}
-    for target in folders.values():
+    formats = [(FormatEntry(name=name), folder / name) for name in ("coco", "native")]
+    for _, target in formats:
         target.mkdir(parents=True)
     tracemalloc.start()
     try:
-        write(dataset, folders, tell=tell)
+        write(dataset, formats, tell)
     finally:
         tracemalloc.stop()
     return found[0]

@@ -6,6 +6,7 @@ from PIL import Image
 
 from cube_dataset import MESHES, POSES, make
 from viewsphere.model.camera import Intrinsics
+from viewsphere.recipe.formats import FormatEntry
 from viewsphere.run.exporting import write
 
 TOP = ["vehicles", "poses"]
@@ -19,7 +20,7 @@ FACES = {
 
 def export(dataset, folder):
     folder.mkdir(exist_ok=True)
-    write(dataset, {"native": folder})
+    write(dataset, [(FormatEntry(name="native"), folder)])
     return json.loads((folder / "dataset1.json").read_text())
 
 

@@ -13,6 +13,7 @@ from viewsphere.errors import UserError
 from viewsphere.labels import channels
 from viewsphere.model.channel import missing, picture_of
 from viewsphere.preview import PAPER, draw_sample
+from viewsphere.recipe.formats import FormatEntry
 from viewsphere.report.frames import frame_data
 from viewsphere.report.pictures import SCALES, layers
 from viewsphere.run.exporting import write
@@ -41,7 +42,7 @@ def test_the_store_gives_back_what_it_got(dataset):
 
 
 def test_coco_links_it(dataset, tmp_path):
-    write(dataset, {"coco": tmp_path})
+    write(dataset, [(FormatEntry(name="coco"), tmp_path)])
     for sample in dataset:
         (image,) = (
             i
@@ -56,11 +57,11 @@ def test_coco_links_it(dataset, tmp_path):
 
 def test_coco_needs_one(tmp_path):
     with pytest.raises(UserError, match="expected channel rgb, found none"):
-        write(make(tmp_path / "out", channels=("instances",)), {"coco": tmp_path})
+        write(make(tmp_path / "out", channels=("instances",)), [(FormatEntry(name="coco"), tmp_path)])
 
 
 def test_native_links_it(dataset, tmp_path):
-    write(dataset, {"native": tmp_path})
+    write(dataset, [(FormatEntry(name="native"), tmp_path)])
     poses = json.loads((tmp_path / "dataset1.json").read_text())["poses"]
     for sample in dataset:
         pose = poses[str(sample.pose.index)]

@@ -6,9 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import yaml
 
 from viewsphere.errors import StoreError, UserError
-from viewsphere.report import Proof, write_report
+from viewsphere.report import Proof, report_data, write_report
 from viewsphere.report.cells import sphere_cells
 from viewsphere.report.choice import chosen_frames
 from viewsphere.report.frames import frame_data
@@ -124,6 +125,32 @@ def test_a_single_value_is_one_bar_in_the_middle(value):
 )
 def test_absolute_paths_lose_their_folders(text, told):
     assert without_folders({"a": [text]}) == {"a": [told]}
+
+
+PLACES = {
+    "/home/ann smith/my models/car.obj": "car.obj",
+    "/home/ann/3d (old), new/it's/*.glb": "*.glb",
+    "C:\\Users\\ann smith\\my models\\van.obj": "van.obj",
+    "D:/ann smith/models/bus.obj": "bus.obj",
+    "\\\\server\\ann smith\\models\\tram.obj": "tram.obj",
+    "../ann smith/models/bike.obj": "../ann smith/models/bike.obj",
+    "zoo:car": "zoo:car",
+}
+
+
+def test_the_shown_recipe_holds_no_absolute_path(small_dataset):
+    """Folders with spaces and quotes neither, which YAML quotes, escapes and breaks; the kept recipe stays."""
+    dataset = Dataset(small_dataset.root)
+    (part,) = dataset.plan.parts
+    sources = [f"{place[:-4]}{'-long' * 30}{place[-4:]}" if place.startswith("/home/ann s") else place for place in PLACES]
+    recipe = {**part.recipe, "models": [{"source": sources, "category": "car"}], "engine": {"script": "C:\\ann smith\\a b.py"}}
+    dataset.plan = replace(dataset.plan, parts=(replace(part, recipe=recipe),))
+    shown = yaml.safe_load(report_data(dataset, read_table(dataset), [], None, lambda *_: None)["facts"]["recipe"])
+    assert shown["models"][0]["source"] == ["car" + "-long" * 30 + ".obj", *list(PLACES.values())[1:]]
+    assert shown["engine"] == {"script": "a b.py"}
+    assert dataset.plan.parts[0].recipe["models"][0]["source"] == sources
+    others = part.recipe.keys() - {"models", "engine"}
+    assert {name: shown[name] for name in others} == json.loads(json.dumps({name: part.recipe[name] for name in others}))
 
 
 def test_the_page_holds_no_absolute_path(small_dataset, tmp_path):

@@ -12,6 +12,7 @@ from small import small_recipe, tree_hash
 from viewsphere import Dataset, Recipe, generate, plugins
 from viewsphere.check import check
 from viewsphere.check.repair import repair
+from viewsphere.cli.arguments import asked_formats
 from viewsphere.errors import RecipeError, UserError
 from viewsphere.run.exporting import export
 from viewsphere.sampling.plan import plan
@@ -107,6 +108,27 @@ def test_changed_options_are_damage(small_dataset):
     found = {finding.message for finding in check(small_dataset, rays=False, sample=0).findings}
     assert any("a list that was changed" in message for message in found)
     assert any("expected 91, found 1" in message for message in found)
+
+
+def test_a_format_that_is_only_read_cannot_be_asked_for(plugin, monkeypatch, small_run):
+    assert asked_formats("hello, coco") == ("hello", "coco")
+    monkeypatch.delattr("my_hello.writer")
+    known = r"expected one of blend, coco, csv, native; found 'hello'"
+    with pytest.raises(UserError, match=f"^--format: {known}"):
+        asked_formats("coco,hello")
+    with pytest.raises(UserError, match=f"^format: {known}"):
+        export(small_run, "hello")
+    with pytest.raises(UserError, match=r"^--format: expected one of .*; found 'coc'; did you mean 'coco'\?"):
+        asked_formats("coc")
+
+
+def test_a_format_that_does_not_work_here_is_told_before_any_work(plugin, monkeypatch):
+    def check():
+        raise UserError("hello: expected somebody, found none")
+
+    monkeypatch.setattr("my_hello.check", check, raising=False)
+    with pytest.raises(UserError, match="expected somebody"):
+        asked_formats("hello")
 
 
 def test_the_command_line_sets_options(small_dataset):

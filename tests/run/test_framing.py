@@ -18,7 +18,8 @@ from viewsphere.run.stages import Stages
 from viewsphere.sampling.plan import plan
 from viewsphere.sampling.samplers import _stock
 from viewsphere.sampling.scenes import Scenes
-from viewsphere.store.checksums import read_least, read_options, write_checksums
+from viewsphere.store import Exported
+from viewsphere.store.checksums import write_checksums, written_least, written_options
 
 CROWD = {"company": {"count": 2, "draw": "per_frame", "gap": 0.05}, "ground": "off"}
 LOW = {"kind": "sphere", "count": 6, "elevation": [0, 8], "distance": [2.5, 3]}
@@ -225,9 +226,21 @@ def test_an_export_is_proved_by_the_threshold_that_it_was_made_with(tmp_path):
     assert not check(vs.open(out)).findings
     vs.generate(recipe_of(**LEFT_OUT, keep_annotations_above=0.9), out, formats=[])  # goes on where that run ended
     assert coco_annotations(out) == seen_more_than(0.9, vs.open(out))
-    assert read_least(out / "csv") == 0.9
-    write_checksums(out / "coco", read_options(out / "coco"), 0.5)
+    assert written_least(out / "csv") == 0.9
+    write_checksums(out / "coco", written_options(out / "coco"), 0.5)
     assert {finding.check for finding in check(vs.open(out)).findings} == {"coco"}
+
+
+def test_the_data_set_is_read_once_for_all_formats_that_leave_annotations_out(tmp_path, monkeypatch):
+    vs.generate(recipe_of(**LEFT_OUT, keep_annotations_above=0.5), tmp_path / "out", formats=[])
+    made, begin = [], Exported.__init__
+    monkeypatch.setattr(Exported, "__init__", lambda self, *given: (made.append(given), begin(self, *given))[1])
+    vs.export(tmp_path / "out", "coco,csv,native")
+    assert len(made) == 1
+    assert not check(vs.open(tmp_path / "out")).findings
+    assert len(made) == 2
+    written = coco_annotations(tmp_path / "out")
+    assert written == seen_more_than(0.5, vs.open(tmp_path / "out"))
 
 
 def test_a_merged_data_set_has_the_highest_threshold(tmp_path):

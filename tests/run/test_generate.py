@@ -177,8 +177,8 @@ def test_warnings_of_models_are_told(tmp_path):
     (tmp_path / "card.obj").write_text("mtllib none.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3\n")
     models = [{"source": str(tmp_path / "card.obj"), "category": "card"}]
     summary = generate(small_recipe(models=models, formats=[]), tmp_path / "out")
-    assert list(summary.warnings) == ["card"]
-    assert "none.mtl" in summary.warnings["card"][0]
+    assert list(summary.warnings.models) == ["card"] and summary.warnings.files == {}
+    assert "none.mtl" in summary.warnings.models["card"][0]
 
 
 def test_camera_inside_the_model_is_refused_in_memory():

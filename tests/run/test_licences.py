@@ -96,6 +96,36 @@ def test_a_credit_said_later_is_written_without_rendering(folder, licensed, tmp_
     assert credits_of(tmp_path / "out") == {"0": MAKER, "1": MAKER}
 
 
+def test_other_credits_renew_all_exports_that_name_them_and_no_other(folder, tmp_path):
+    out, formats = tmp_path / "out", ["coco", "native", "csv"]
+    generate(recipe(folder, credit=Credit(licence="CC0-1.0")), out, formats=formats)
+    kept = ("store/shots", "csv")
+    before = [tree_hash(out / part) for part in kept], (out / "csv").stat().st_ino
+    again = generate(recipe(folder, credit=MAKER), out, formats=["coco"])
+    assert again.rendered == 0 and again.formats == ("coco", "native")
+    assert ([tree_hash(out / part) for part in kept], (out / "csv").stat().st_ino) == before
+    assert cells((out / CREDITS).read_text("utf-8"))[0][0] == MAKER.licence
+    for file in ("coco/annotations/instances_train.json", "native/dataset1.json"):
+        said = json.loads((out / file).read_text("utf-8"))
+        found = said["models"] if "models" in said else said["vehicles"]
+        assert [vehicle["credit"] for vehicle in found.values()] == [MAKER.model_dump()] * 2
+    assert check(Dataset(out), rays=False).ok
+    assert generate(recipe(folder, credit=MAKER), out, formats=["coco"]).formats == ("coco",)
+
+
+def test_a_run_that_ends_before_its_exports_leaves_other_credits_to_the_next(folder, tmp_path, monkeypatch):
+    out = tmp_path / "out"
+    generate(recipe(folder), out, formats=["native"])
+    with monkeypatch.context() as changed:
+        changed.setattr("viewsphere.run.generate.export", lambda *args, **more: 1 / 0)
+        with pytest.raises(ZeroDivisionError):
+            generate(recipe(folder, credit=MAKER), out, formats=["coco"])
+    assert "credit" not in (out / "native" / "dataset1.json").read_text("utf-8")
+    generate(recipe(folder, credit=MAKER), out, formats=["coco"])
+    assert MAKER.licence in (out / "native" / "dataset1.json").read_text("utf-8")
+    assert check(Dataset(out), rays=False).ok
+
+
 def test_appended_and_merged_models_keep_their_credits(folder, tmp_path):
     other = Credit(licence="CC0-1.0")
     generate(recipe(folder, "0.glb"), tmp_path / "a")

@@ -20,7 +20,9 @@ def said(out, *materials, models=BOXES):
     recipe = small_recipe(
         models=models, scene={"materials": materials}, channels=["rgb"], viewpoints={"azimuth": 0, "distance": 1}
     )
-    return generate(recipe, out, formats=[]).warnings
+    warnings = generate(recipe, out, formats=[]).warnings
+    assert warnings.files == {}
+    return warnings.models
 
 
 def test_a_change_that_fits_no_material_is_said(tmp_path):

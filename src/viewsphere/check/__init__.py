@@ -8,6 +8,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 from viewsphere import plugins
@@ -26,9 +27,9 @@ from viewsphere.labels import channel_labels, labels
 from viewsphere.model.sample import Sample
 from viewsphere.recipe.formats import FormatEntry
 from viewsphere.recipe.sequence import TimeEntry
-from viewsphere.run.exporting import shown_to
+from viewsphere.run.exporting import Views
 from viewsphere.store import Dataset, ModelInfo, PlanRecord, Row
-from viewsphere.store.checksums import damaged_files, read_least, read_options
+from viewsphere.store.checksums import damaged_files, written_least, written_options
 from viewsphere.store.credits import credits_problem
 from viewsphere.store.index import numbers
 
@@ -86,8 +87,9 @@ def check(
     evenly, instance maps are compared with Cycles' own pass of object indices. `workers` 0 proves all in the calling
     process. Nothing is changed.
 
-    Raises MissingExtraError for `rays` True without embreex, and for `against_cycles` without Blender.
+    Raises MissingExtraError for `rays` True without embreex, and, before any work, for `against_cycles` without Blender.
     """
+    compared = Compared(dataset) if against_cycles else None
     files, damage = damaged(dataset)
     findings = [Finding("digests", None, message) for messages in damage.values() for message in messages]
     notes: list[str] = []
@@ -108,26 +110,28 @@ def check(
         findings += found.findings
         notes += [note for note in found.notes if note not in notes]
         checked |= {name: checked.get(name, 0) + count for name, count in found.checked.items()}
-    if against_cycles:
-        findings += _against_cycles(dataset, _spread(positions, against_cycles), checked, notes)
+    if compared is not None:
+        findings += _differing(compared, dataset, _spread(positions, against_cycles))
+        checked["cycles"] = compared.frames
+        notes.append(compared.note())
     names = exports(dataset)
     if len(positions) < len(dataset):
         notes.append(f"{len(positions):,} of {len(dataset):,} frames were read")
         notes += [f"{name}: not checked, that needs all frames" for name in names]
         return Report(checked, tuple(findings), tuple(notes))
+    views = Views(dataset)
     for name, module in names.items():
         checked[name] = len(dataset)
-        findings += [Finding(name, frame, message) for frame, message in _export_proof(dataset, name, module, sampled, notes)]
+        proof = _export_proof(views, dataset.root / name, module, sampled, notes)
+        findings += [Finding(name, frame, message) for frame, message in proof]
     return Report(checked, tuple(findings), tuple(notes))
 
 
-def _against_cycles(dataset: Dataset, positions: range, checked: dict[str, int], notes: list[str]) -> Iterator[Finding]:
-    compared = Compared(dataset)
+def _differing(compared: Compared, dataset: Dataset, positions: range) -> Iterator[Finding]:
+    """What Cycles sees otherwise; records that cannot be read are found by others."""
     for _, frame, sample in _frames(dataset, positions):
         if not isinstance(sample, str):
             yield from (Finding("cycles", frame, message) for message in compared.differences(sample))
-    checked["cycles"] = compared.frames
-    notes.append(compared.note())
 
 
 def _spread(positions: range, most: int | None) -> range:
@@ -175,18 +179,15 @@ def exports(dataset: Dataset) -> dict[str, Any]:
     return {name: plugins.load("formats", name) for name in plugins.names("formats") if (dataset.root / name).is_dir()}
 
 
-def _export_proof(
-    dataset: Dataset, name: str, module: Verified, sampled: Collection[int], notes: list[str]
-) -> Iterator[Remark]:
+def _export_proof(views: Views, folder: Path, module: Verified, sampled: Collection[int], notes: list[str]) -> Iterator[Remark]:
     """What digests and its format find in an export; a proof that cannot be carried out counts as failed."""
-    folder = dataset.root / name
     yield from ((None, message) for message in damaged_files(folder))
     if not hasattr(module, "verify"):
-        notes.append(f"{name}: only digests are checked, the format has no proof")
+        notes.append(f"{folder.name}: only digests are checked, the format has no proof")
         return
     try:
-        entry = FormatEntry(name=name, options=read_options(folder))
-        yield from module.verify(shown_to(module, dataset, read_least(folder)), folder, sampled, *entry.arguments())
+        entry = FormatEntry(name=folder.name, options=written_options(folder))
+        yield from module.verify(views.of(module, written_least(folder)), folder, sampled, *entry.arguments())
     except Exception as error:
         yield None, failure("an export that can be checked", error)
 
@@ -302,22 +303,21 @@ def _as_shot(dataset: Dataset, scenery: Scenery, sample: Sample) -> Iterator[str
         wanted = poses[place * len(poses) // row.count]
         if sample.pose.index != wanted:
             yield f"expected pose {wanted} of the plan, found {sample.pose.index}"
-    dealt = _dealt_splits(dataset, row)
-    subject = sample.sequence if sample.sequence in dealt else row.subject
-    split = dealt.get(subject)
+    name, split = _dealt_split(dataset, row, sample.sequence)
     if split is not None and sample.split != split:
-        yield f"expected split {split!r}, which the plan dealt to {subject}, found {sample.split!r}"
+        yield f"expected split {split!r}, which the plan dealt to {name}, found {sample.split!r}"
     if shot:
         yield from contradictions(sample, shot, place)
 
 
-def _dealt_splits(dataset: Dataset, row: Row) -> dict[str, str]:
-    """The splits that the plan dealt to models, scenes or sequences by the time of a row, none where splits are drawn
-    otherwise. A merged part knows its own alone.
+def _dealt_split(dataset: Dataset, row: Row, sequence: str) -> tuple[str, str | None]:
+    """Whether a row is dealt its split with its sequence or with its model or scene, and that split: None where splits are
+    drawn otherwise. What an earlier part dealt stays; a merged part knows its own alone.
     """
     part = dataset.plan.parts[row.part]
-    parts = (part,) if part.merged else dataset.plan.parts[: row.part + 1]
-    return {name: split for one in reversed(parts) for name, split in one.dealt_splits.items()}
+    deals = [one.dealt_splits for one in ((part,) if part.merged else dataset.plan.parts[: row.part + 1])]
+    found = ((name, deal[name]) for name in (sequence, row.subject) for deal in deals if name in deal)
+    return next(found, (row.subject, None))
 
 
 def _proofs_by_models(sample: Sample, again: Again, caster: RayCaster | None) -> Iterator[tuple[str, list[str]]]:

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere import plugins
+from viewsphere.assets.deforming import Load
+from viewsphere.check.failure import failure
 from viewsphere.check.scenery import Scenery
 from viewsphere.formats.blend import StoredModels
 from viewsphere.model.sample import Sample
+from viewsphere.model.shot import Shot
+from viewsphere.recipe.scene import engine_entry
 from viewsphere.store import Dataset
 
 
@@ -22,24 +28,33 @@ class Compared:
     """
 
     def __init__(self, dataset: Dataset) -> None:
+        """Raises UserError where one of the recipes' Blenders, or the default one, cannot be used."""
         self._dataset, self._scenery = dataset, Scenery(dataset)
+        self._engine = plugins.load("engines", "cycles")
         self.frames, self.pixels, self.edges = 0, 0, 0
-        self.left_out = 0
+        self._left_out: Counter[str] = Counter()
+        for python in {_own_python(part.recipe) for part in dataset.plan.parts}:
+            self._engine.check({"python": python} if python else {})
 
     def differences(self, sample: Sample) -> Iterator[str]:
-        """What Cycles sees otherwise than the sample's instance map, beyond edges; UserError where there is no Blender."""
-        shot = self._dataset.store.shot(self._scenery.key_of(sample.index))
-        if shot is None or "instances" not in sample.files:
-            self.left_out += 1
+        """What Cycles sees otherwise than the sample's instance map, beyond edges, or which file cannot be read. Raises
+        UserError where Blender does not answer.
+        """
+        try:
+            asked = self._asked(sample)
+        except Exception as error:
+            yield failure("an instance map, models and a shot that can be read", error)
             return
-        instant, sensor = self._scenery.taken(sample, shot)
-        now = shot.model_copy(update={"things": shot.things_at(instant)})
-        engine = plugins.load("engines", "cycles")
-        seen = engine.indices(now, instant, sensor, StoredModels.of(self._dataset, now, sample))
+        if asked is None:
+            return
+        kept, shot, instant, sensor, load = asked
+        seen = self._engine.indices(shot, instant, sensor, load)
         if seen is None:
-            self.left_out += 1
+            self._left_out["whose lens Blender has not"] += 1
             return
-        kept = kept_map(sample)
+        if seen.shape != kept.shape:
+            yield f"expected an instance map of shape {seen.shape}, found {kept.shape}"
+            return
         differ = seen != kept
         beyond = differ & ~near(kept, seen)
         self.frames, self.pixels = self.frames + 1, self.pixels + int(differ.sum())
@@ -51,10 +66,37 @@ class Compared:
                 f"object {seen[y, x]}, found {kept[y, x]}"
             )
 
+    def _asked(self, sample: Sample) -> tuple[NDArray[np.int32], Shot, int, int, Load] | None:
+        """The instance map that is kept, and what Cycles is asked for: shot, instant, sensor and models; None where that is not
+        known, or not what it was.
+        """
+        key = self._scenery.key_of(sample.index)
+        shot = self._dataset.store.shot(key)
+        if shot is None or "instances" not in sample.files:
+            self._left_out["of which no shot or no instance map is known"] += 1
+            return None
+        instant, sensor = self._scenery.taken(sample, shot)
+        now, around = shot.model_copy(update={"things": shot.things_at(instant)}), self._scenery.around(key)
+        changed = [thing.key for thing in now.things if not thing.id and self._scenery.mesh(around, thing) is None]
+        if changed:
+            self._left_out[f"whose scenery is not what it was ({changed[0]})"] += 1
+            return None
+        kept, load = kept_map(sample), StoredModels.of(self._dataset, now, sample)
+        for thing in now.objects:
+            if thing.is_there:
+                load(thing.model, thing.step)  # here damage is told from a Blender that does not answer
+        return kept, now, instant, sensor, load
+
     def note(self) -> str:
         """What was compared, in a line."""
-        left = f"; {self.left_out} left out, of which no shot is known or whose lens Blender has not" if self.left_out else ""
+        left = "".join(f"; {count} left out {why}" for why, count in self._left_out.items())
         return f"Cycles' object indices: {self.frames} frames, {self.pixels} pixels differ, {self.edges} of them on edges{left}"
+
+
+def _own_python(recipe: Mapping[str, Any]) -> str | None:
+    """The interpreter whose Blender a recipe names for Cycles, None: the default one."""
+    engine = engine_entry(recipe.get("engine", {}))
+    return engine.get("python") if engine.get("name") == "cycles" else None
 
 
 def kept_map(sample: Sample) -> NDArray[np.int32]:

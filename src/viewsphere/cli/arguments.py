@@ -90,14 +90,12 @@ def split(names: str | None) -> tuple[str, ...] | None:
 
 
 def asked_formats(formats: str | None) -> tuple[str, ...] | None:
-    """The formats that --format names, None for None; UserError names one that there is not."""
-    from viewsphere import plugins
-    from viewsphere.model.mistakes import one_of
+    """The formats that --format names, None for None; UserError names one that cannot be written."""
+    from viewsphere.run.exporting import writable
 
-    asked, known = split(formats), plugins.names("formats")
+    asked = split(formats)
     for name in asked or ():
-        if name not in known:
-            raise UserError(f"--format: {one_of(name, known)}")
+        writable(name, "--format")
     return asked
 
 

@@ -40,13 +40,12 @@ def export(
 ) -> None:
     """Write a finished or half-finished data set, or some of its frames, in other formats, without rendering."""
     from viewsphere.run.exporting import export as write_formats
+    from viewsphere.run.exporting import writable_formats
     from viewsphere.store import Choice, frame_ranges
 
     names = asked_formats(format_)
     if not names:
-        from viewsphere import plugins
-
-        raise UserError(f"--format: expected one or more of {', '.join(plugins.names('formats'))}; found none")
+        raise UserError(f"--format: expected one or more of {', '.join(writable_formats())}; found none")
     keys = split(models)
     if keys == ():
         raise UserError(f"--models: expected keys or patterns; found {models!r}")

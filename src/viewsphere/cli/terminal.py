@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 import sys
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +17,7 @@ from viewsphere.errors import UserError, ViewsphereError
 if TYPE_CHECKING:
     from viewsphere.check import Report
     from viewsphere.run.estimate import Estimate
-    from viewsphere.run.generate import Summary
+    from viewsphere.run.generate import Summary, Warnings
     from viewsphere.run.progress import Listener, Progress
     from viewsphere.sampling.plan import Plan
 
@@ -110,24 +111,30 @@ def print_report(report: Report, repaired: Sequence[str] = ()) -> None:
     typer.echo("all proofs hold" if report.ok else f"{len(report.findings):,} findings")
 
 
-def _print_warnings(warnings: Mapping[str, Sequence[str]]) -> None:
-    """Print warnings, by the models' keys; a warning shared by several models, as by all parts of a file, is printed once."""
-    models: dict[str, list[str]] = {}
+def _print_warnings(warnings: Warnings) -> None:
+    """Print warnings; one that several models or files share is printed once."""
+    lines = [*_shared("file", warnings.files), *_shared("model", warnings.models)]
+    for line in lines[:MOST_FINDINGS]:
+        typer.echo(f"warning: {line}", err=True)
+    if len(lines) > MOST_FINDINGS:
+        typer.echo(f"and {len(lines) - MOST_FINDINGS:,} warnings more; --json lists all", err=True)
+
+
+def _shared(what: str, warnings: Mapping[str, Sequence[str]]) -> Iterator[str]:
+    """Each warning once, behind who it is about."""
+    keys_of: dict[str, list[str]] = {}
     for key, said in warnings.items():
         for warning in said:
-            models.setdefault(warning, []).append(key)
-    for warning, keys in list(models.items())[:MOST_FINDINGS]:
-        more = f" and {len(keys) - 1:,} more" if len(keys) > 1 else ""
-        who = "" if warning.startswith(f"{keys[0]}: ") else f"model {keys[0]}{more}: "  # a file's warnings begin with its name
-        typer.echo(f"warning: {who}{warning}", err=True)
-    if len(models) > MOST_FINDINGS:
-        typer.echo(f"and {len(models) - MOST_FINDINGS:,} warnings more; --json lists all", err=True)
+            keys_of.setdefault(warning, []).append(key)
+    for warning, (key, *others) in keys_of.items():
+        more = f" and {len(others):,} more" if others else ""
+        yield f"{what} {key}{more}: {warning.removeprefix(f'{key}: ')}"
 
 
 def print_summary(summary: Summary, as_json: bool) -> None:
     """Print the summary of a run."""
     if as_json:
-        print_json({**summary.__dict__, "root": str(summary.root)})
+        print_json({**asdict(summary), "root": str(summary.root)})
         return
     for key, why in summary.skipped.items():
         typer.echo(f"left out {key}: {why}", err=True)

@@ -23,6 +23,7 @@ from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.store import Dataset
 
 CHANNELS = ()  # pictures are taken where there are any
+CREDITS = False
 TABLE = "objects.csv"
 BOXES = ("box2d", "box2d_projected", "box2d_unclipped")  # x0, y0, x1, y1 in pixels
 OF_SAMPLE = ("image", "index", "split", "width", "height", "sequence", "sensor", "instant", "time")

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 
 from viewsphere.model.sample import Sample
 from viewsphere.recipe.recipe import Recipe
-from viewsphere.sampling.plan import plan
+from viewsphere.run.rig_view import recipe_rig
 from viewsphere.sampling.recipe_warnings import SMALLEST, TOO_SMALL
 
 
@@ -14,7 +14,7 @@ def small_objects(samples: Iterable[Sample], recipe: Recipe | None = None) -> It
     """A warning that counts visible objects whose boxes are less than `SMALLEST` pixels wide and high. Of samples that are a
     preview of a recipe, in the pixels of the recipe's pictures.
     """
-    widths = {} if recipe is None else {sensor.name: sensor.intrinsics.width for sensor in plan(recipe).rig.sensors}
+    widths = {} if recipe is None else {sensor.name: sensor.intrinsics.width for sensor in recipe_rig(recipe).sensors}
     shown: list[float] = []
     for sample in samples:
         scale = widths.get(sample.sensor, sample.width) / sample.width

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from viewsphere.report.paths import only_names
 from viewsphere.store import Dataset, Part
 
 PAUSE = 600.0
@@ -78,7 +79,7 @@ def _recipe(part: Part) -> str:
     import yaml
 
     frames = f"{part.frames:,} frames from {part.first:,}" if part.frames else "no frames of its own"
-    text = yaml.safe_dump(part.recipe, sort_keys=False, allow_unicode=True, width=100)
+    text = yaml.safe_dump(only_names(part.recipe), sort_keys=False, allow_unicode=True, width=100)
     return f"# {part.name}: {frames}, made by viewsphere {part.version}\n{text}"
 
 

@@ -132,10 +132,10 @@ def _export(store: Store, formats: Sequence[FormatEntry], stopwatch: _Stopwatch)
     """Write the formats; gives the seconds, less those for looking through the whole plan for frames."""
     dataset = Dataset(store.root)
     assert len(dataset) > 0
-    folders = {entry.name: store.root / entry.name for entry in formats}
-    for folder in folders.values():
+    written = [(entry, store.root / entry.name) for entry in formats]
+    for _, folder in written:
         folder.mkdir()
-    return stopwatch(lambda: write(dataset, folders, options_of(formats)))
+    return stopwatch(lambda: write(dataset, written))
 
 
 def _spread(planned: Plan) -> Iterator[Row]:

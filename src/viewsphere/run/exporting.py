@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack
+from functools import cache, partial
 from pathlib import Path
 
 from pydantic import JsonValue
@@ -12,12 +13,14 @@ from viewsphere import plugins
 from viewsphere.errors import UserError
 from viewsphere.formats import Format
 from viewsphere.model.channel import missing
+from viewsphere.model.mistakes import one_of
 from viewsphere.model.rig import CAMERA
 from viewsphere.model.sample import Sample
 from viewsphere.recipe.formats import FormatEntry, Formats, options_of, read_formats
 from viewsphere.run.progress import Listener, Progress, unheard
 from viewsphere.store import Choice, Dataset, Exported, new_folder
-from viewsphere.store.checksums import read_least, read_options, write_checksums
+from viewsphere.store.checksums import write_checksums, written_credits, written_least, written_options
+from viewsphere.store.credits import credits_digest
 
 
 def export(
@@ -47,8 +50,8 @@ def export(
         writable(entry.name)
         entry.arguments()
     with ExitStack() as whole:
-        folders = {name: whole.enter_context(_folder(dataset, place / name, is_own)) for name in options_of(entries)}
-        notes = write(dataset, folders, options_of(entries), listener or unheard)
+        written = [(entry, whole.enter_context(_folder(dataset, place / entry.name, is_own))) for entry in entries]
+        notes = write(dataset, written, listener or unheard)
     kinds = dataset.link_kinds - {"hard link"}
     return tuple(dict.fromkeys(notes)) + tuple(
         f"{dataset.root}: files of the exports are made as a {kind}, hard links do not work here" for kind in sorted(kinds)
@@ -62,63 +65,74 @@ def _folder(dataset: Dataset, target: Path, is_own: bool) -> AbstractContextMana
 def _known_options(dataset: Dataset, name: str) -> Mapping[str, JsonValue]:
     """The options that a data set's export was written with, or that its recipe says."""
     said: Formats = dataset.recipe.get("formats", ())
-    return read_options(dataset.root / name) or options_of(read_formats(said)).get(name, {})
+    return written_options(dataset.root / name) or options_of(read_formats(said)).get(name, {})
 
 
-def write(
-    dataset: Dataset,
-    folders: Mapping[str, Path],
-    options: Mapping[str, Mapping[str, JsonValue]] | None = None,
-    tell: Listener = unheard,
-) -> tuple[str, ...]:
-    """Write the data set in formats, by their names, into these empty folders; gives notes for the user.
+def write(dataset: Dataset, formats: Sequence[tuple[FormatEntry, Path]], tell: Listener = unheard) -> tuple[str, ...]:
+    """Write the data set in formats, each once, into these empty folders; gives notes for the user.
 
-    `options`: of formats, by their names. Every sample is read once, and so is each of its channels. At last the digests of all
-    files are listed, with the options.
+    Every sample is read once, and so is each of its channels. At last the digests of all files are listed, with the options.
     """
-    if not folders:
+    if not formats:
         return ()
     notes: list[str] = []
-    total = len(dataset)
+    total, views = len(dataset), Views(dataset)
+    least = dataset.plan.keep_annotations_above
     with ExitStack() as stack:
-        formats = {name: _format(name) for name in folders}
-        least = dataset.plan.keep_annotations_above
-        given = {name: shown_to(module, dataset, least) for name, module in formats.items()}
-        entries = {name: FormatEntry(name=name, options=dict((options or {}).get(name, {}))) for name in folders}
-        adds = {
-            name: stack.enter_context(formats[name].writer(given[name], at, notes.append, *entries[name].arguments()))
-            for name, at in folders.items()
-        }
+        adds: list[tuple[str, Format, Dataset, Callable[[Sample], None]]] = []
+        for entry, folder in formats:
+            module = _format(entry.name)
+            view = views.of(module, least)
+            add = stack.enter_context(module.writer(view, folder, notes.append, *entry.arguments()))
+            adds.append((entry.name, module, view, add))
         for done, sample in enumerate(dataset):
             tell(Progress("exports", done, total))
-            for name, add in adds.items():
-                _check_sensor(dataset, name, formats[name], sample)
-                add(given[name].shown(sample))
-    for name, folder in folders.items():
-        write_checksums(folder, entries[name].whole().options, least if _leaves_out(formats[name]) else None)
+            for name, module, view, add in adds:
+                _check_sensor(dataset, name, module, sample)
+                add(view.shown(sample))
+    for entry, folder in formats:
+        own = least if _leaves_out(_format(entry.name)) else None
+        credited = credits_digest(dataset.models) if _names_credits(_format(entry.name)) else None
+        write_checksums(folder, entry.whole().options, own, credited)
     tell(Progress("exports", total, total))
     return tuple(notes)
 
 
-def shown_to(module: object, dataset: Dataset, least: float | None) -> Dataset:
-    """The data set as a format sees it: without annotations of what is seen no more than `least`, but for one that writes
-    scenes.
-    """
-    if least is None or not _leaves_out(module):
-        return dataset
+class Views:
+    """A data set as formats see it: read once for all that leave the same annotations out."""
+
+    def __init__(self, dataset: Dataset) -> None:
+        self._dataset = dataset
+        self._above = cache(partial(_above, dataset))
+
+    def of(self, module: object, least: float | None) -> Dataset:
+        """The data set without annotations of what is seen no more than `least`, but for a format that writes scenes."""
+        return self._dataset if least is None or not _leaves_out(module) else self._above(least)
+
+
+def _above(dataset: Dataset, least: float) -> Exported:
     shown = Exported(dataset.root, dataset.choice, least)
     shown.link_kinds = dataset.link_kinds
     return shown
 
 
-def keeps_others(name: str, folder: Path, least: float | None) -> bool:
-    """Whether a format's export in a folder keeps other annotations than those of what is seen more than `least`."""
-    return _leaves_out(_format(name)) and read_least(folder) != least
+def is_out_of_date(name: str, dataset: Dataset, least: float | None) -> bool:
+    """Whether a format's export in a data set's folder keeps other annotations than those of what is seen more than `least`, or
+    names other credits than those that are known now.
+    """
+    module, folder = _format(name), dataset.root / name
+    keeps_others = _leaves_out(module) and written_least(folder) != least
+    return keeps_others or (_names_credits(module) and written_credits(folder) != credits_digest(dataset.models))
 
 
 def _leaves_out(module: object) -> bool:
     """Whether a format leaves annotations out; one that writes scenes says `ANNOTATES = False`."""
     return getattr(module, "ANNOTATES", True)
+
+
+def _names_credits(module: object) -> bool:
+    """Whether a format may name the models' credits; one that does not says `CREDITS = False`."""
+    return getattr(module, "CREDITS", True)
 
 
 def _check_sensor(dataset: Dataset, name: str, module: Format, sample: Sample) -> None:
@@ -131,8 +145,17 @@ def _check_sensor(dataset: Dataset, name: str, module: Format, sample: Sample) -
         )
 
 
-def writable(name: str) -> Format:
-    """The format of this name; raises UserError for one that is not known or does not work here."""
+def writable_formats() -> tuple[str, ...]:
+    """Names of the formats that data sets can be written in; others are only read."""
+    return tuple(name for name in plugins.names("formats") if hasattr(_format(name), "writer"))
+
+
+def writable(name: str, field: str = "format") -> Format:
+    """The format of this name; raises UserError for one that does not work here, and, as a mistake of `field`, for one that is
+    not known or only read.
+    """
+    if name not in plugins.names("formats") or not hasattr(_format(name), "writer"):
+        raise UserError(f"{field}: {one_of(name, writable_formats())}")
     module = _format(name)
     getattr(module, "check", lambda: None)()
     return module

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import json
 import time
-from collections import Counter
-from collections.abc import Container, Iterable, Iterator, Sequence
+from collections import Counter, defaultdict
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import chain, product
 from os import PathLike
@@ -16,7 +16,7 @@ from viewsphere.errors import ModelError, RecipeError, ViewsphereError, joined
 from viewsphere.model.channel import missing
 from viewsphere.recipe.formats import FormatEntry, Formats, options_of, read_formats
 from viewsphere.recipe.recipe import Recipe
-from viewsphere.run.exporting import export, keeps_others, writable
+from viewsphere.run.exporting import export, is_out_of_date, writable
 from viewsphere.run.framing import MOST_TRIES, hidden_frames
 from viewsphere.run.opening import commit, prepare, to_append, to_render
 from viewsphere.run.pool import Crew, Job, Listed, Outcome
@@ -39,9 +39,17 @@ MOST_SUBJECTS = 10_000
 
 
 @dataclass(frozen=True)
+class Warnings:
+    """What a run warns of: lines about `models` by their keys, and about `files`, of which models are parts, by their names."""
+
+    models: dict[str, tuple[str, ...]] = field(default_factory=dict[str, tuple[str, ...]])
+    files: dict[str, tuple[str, ...]] = field(default_factory=dict[str, tuple[str, ...]])
+
+
+@dataclass(frozen=True)
 class Summary:
     """What a run left: frames in the data set, frames it rendered itself, what it skipped, seconds, formats, notes, and
-    warnings about its models by their keys, about files of which several are parts by the files' names.
+    warnings.
     """
 
     root: Path
@@ -51,7 +59,7 @@ class Summary:
     seconds: float
     formats: tuple[str, ...]
     notes: tuple[str, ...] = field(default=())
-    warnings: dict[str, tuple[str, ...]] = field(default_factory=dict[str, tuple[str, ...]])
+    warnings: Warnings = field(default_factory=Warnings)
 
 
 def generate(
@@ -81,7 +89,7 @@ def generate(
     wanted = _asked(recipe, formats)
     store = Store(Path(out))
     portion = to_append(planned, store) if append else to_render(planned, store)
-    wanted += _out_of_date(portion, wanted, store)
+    wanted += _others(wanted, store) if portion.number else ()
     with recipe.located():
         for entry, sensor in product(wanted, planned.rig.sensors):
             _check_channels(entry.name, sensor.kept(portion.record.channels), "" if sensor.channels is None else sensor.name)
@@ -99,18 +107,17 @@ def generate(
                 notes = _check_skies(portion, store, tell)
                 rendered, skipped = _render_part(portion, store, crew, keep_going, tell)
         notes += tuple(_renew_threshold(store, recipe.keep_annotations_above))
-        write_credits(Dataset(store.root))
+        dataset = Dataset(store.root)
+        write_credits(dataset)
+        wanted += tuple(e for e in _others(wanted, store) if is_out_of_date(e.name, dataset, recipe.keep_annotations_above))
         notes += export(store.root, wanted, listener=tell)
     left = unused(store, options_of((*wanted, *_others(wanted, store))))
     notes += (f"note: {left}",) if left else ()
     if append and not rendered:
         notes += (f"{store.root}: nothing to add, it has all that the recipe asks for",)
-    dataset = Dataset(store.root)
     notes += tuple(_hidden(store, portion))
-
-    warnings = _warnings(planned, dataset)
-    for key, more in unpainted(recipe, [s for s in planned.model_specs if s.key not in skipped], store).items():
-        warnings[key] = warnings.get(key, ()) + more
+    misses = unpainted(recipe, [s for s in planned.model_specs if s.key not in skipped], store)
+    warnings = _warnings(planned, dataset, misses)
     return Summary(
         store.root, len(dataset), rendered, skipped, time.monotonic() - begun, tuple(options_of(wanted)), notes, warnings
     )
@@ -121,12 +128,6 @@ def _asked(recipe: Recipe, formats: Formats | None) -> tuple[FormatEntry, ...]:
     known = options_of(recipe.formats)
     entries = recipe.formats if formats is None else read_formats(formats)
     return tuple(entry.over(known.get(entry.name, {})).whole() for entry in entries)
-
-
-def _out_of_date(portion: Portion, wanted: Iterable[FormatEntry], store: Store) -> tuple[FormatEntry, ...]:
-    """The other formats that have to be written anew: all where a part is added, else those that keep other annotations."""
-    least, others = portion.plan.recipe.keep_annotations_above, _others(wanted, store)
-    return tuple(e for e in others if portion.number or keeps_others(e.name, store.root / e.name, least))
 
 
 def _renew_threshold(store: Store, least: float | None) -> Iterator[str]:
@@ -159,14 +160,20 @@ def _hidden(store: Store, portion: Portion) -> Iterator[str]:
         )
 
 
-def _warnings(planned: Plan, dataset: Dataset) -> dict[str, tuple[str, ...]]:
-    """Warnings about the models by their keys; those about a file of which models are parts by the file's name."""
-    files = {spec.key: Path(spec.source).name for spec in planned.kept_specs if spec.parts is not None}
-    found = dict[str, dict[str, None]]()
+def _warnings(planned: Plan, dataset: Dataset, misses: Mapping[str, tuple[str, ...]]) -> Warnings:
+    """Warnings about models and files, each once; `misses` are others about models, by their keys."""
+    source_of = {spec.key: Path(spec.source).name for spec in planned.kept_specs if spec.parts is not None}
+    models, files = defaultdict[str, list[str]](list), defaultdict[str, list[str]](list)
     for info in dataset.models:
-        if info.warnings:
-            found.setdefault(files.get(info.key, info.key), {}).update(dict.fromkeys(info.warnings))
-    return {key: tuple(lines) for key, lines in found.items()}
+        named = files[source_of[info.key]] if info.key in source_of else models[info.key]
+        named += info.warnings
+    for key, lines in misses.items():
+        models[key] += lines
+    return Warnings(_said(models), _said(files))
+
+
+def _said(lines: Mapping[str, list[str]]) -> dict[str, tuple[str, ...]]:
+    return {key: tuple(dict.fromkeys(some)) for key, some in lines.items() if some}
 
 
 def _check_channels(name: str, channels: Sequence[str], sensor: str) -> None:

@@ -2,6 +2,7 @@
 
     # options {"category_ids":"contiguous"}         of a format that has some: those that the export was written with
     # keep_annotations_above 0.1                    of an export that leaves annotations out: the visibility it was written with
+    # credits "0c94a3..."                           of an export that names them: the digest of what CREDITS.md said then
     6f0c3b...  annotations/instances_train.json
     # 91d2...
 
@@ -27,37 +28,47 @@ CHECKSUMS = "checksums.xxh128"
 
 OPTIONS = "# options "
 KEPT = "# keep_annotations_above "
+CREDITED = "# credits "
 AGAIN = "export again, or mend it with viewsphere check --repair"
 
 
-def write_checksums(folder: Path, options: Mapping[str, Any] | None = None, least: float | None = None) -> None:
-    """List all files of a finished folder, the options that they were written with, and the visibility above which they keep
-    annotations (None: all).
+def write_checksums(
+    folder: Path, options: Mapping[str, Any] | None = None, least: float | None = None, credited: str | None = None
+) -> None:
+    """List all files of a finished folder, the options that they were written with, the visibility above which they keep
+    annotations (None: all), and the digest of the credits that they name (None: of none).
     """
     seal = xxhash.xxh3_128()
     with (folder / CHECKSUMS).open("wb") as file:
-        for line in _to_write(folder, options or {}, least):
+        for line in _to_write(folder, options or {}, least, credited):
             seal.update(line)
             file.write(line)
         file.write(f"# {seal.hexdigest()}\n".encode())
 
 
-def _to_write(folder: Path, options: Mapping[str, Any], least: float | None) -> Iterator[bytes]:
+def _to_write(folder: Path, options: Mapping[str, Any], least: float | None, credited: str | None) -> Iterator[bytes]:
     if options:
         yield f"{OPTIONS}{json.dumps(options, separators=(',', ':'))}\n".encode()
     if least is not None:
         yield f"{KEPT}{json.dumps(least)}\n".encode()
+    if credited is not None:
+        yield f"{CREDITED}{json.dumps(credited)}\n".encode()
     yield from (f"{seal_of(folder / path)[1]}  {path}\n".encode() for path in _files(folder))
 
 
-def read_options(folder: Path) -> dict[str, Any]:
+def written_options(folder: Path) -> dict[str, Any]:
     """The options that a folder's files were written with; none where there is no list, or none that can be read."""
     return _said(folder, OPTIONS) or {}
 
 
-def read_least(folder: Path) -> float | None:
-    """The visibility above which a folder's files keep annotations; None: they keep all."""
+def written_least(folder: Path) -> float | None:
+    """The visibility above which a folder's files were written with annotations; None: they have all."""
     return _said(folder, KEPT)
+
+
+def written_credits(folder: Path) -> str | None:
+    """The digest of the credits that a folder's files were written with; None: they name none."""
+    return _said(folder, CREDITED)
 
 
 def _said(folder: Path, mark: str) -> Any:

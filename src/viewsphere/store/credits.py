@@ -7,6 +7,8 @@ from collections import defaultdict
 from collections.abc import Iterable
 from contextlib import suppress
 
+import xxhash
+
 from viewsphere.model.credit import Credit
 from viewsphere.store.dataset import Dataset
 from viewsphere.store.records import ModelInfo
@@ -48,6 +50,12 @@ def escaped(text: str) -> str:
     """The text as Markdown that shows it as it is, in a table too: no markup, HTML, formula or end of a cell."""
     printable = "".join(c if c.isprintable() else " " for c in text)
     return re.sub(r"([\\`*_\[\]<>|~&!$@:])", r"\\\1", printable)
+
+
+def credits_digest(models: Iterable[ModelInfo]) -> str | None:
+    """Digest of the file's text (xxh128, hexadecimal); None where no credit is known."""
+    text = credits_text(models)
+    return xxhash.xxh3_128(text.encode()).hexdigest() if text else None
 
 
 def write_credits(dataset: Dataset) -> None:

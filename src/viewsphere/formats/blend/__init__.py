@@ -43,6 +43,7 @@ ENGINE = "cycles"
 """The engine that builds and saves the scenes."""
 
 ANNOTATES = False  # what is hidden is part of a scene, too
+CREDITS = False
 CHANNELS = ()
 
 
@@ -183,7 +184,8 @@ class StoredModels:
     @classmethod
     def of(cls, dataset: Dataset, shot: Shot, sample: Sample) -> StoredModels:
         """Those that a sample of a shot shows."""
-        shown = zip(shot.objects, sample.objects, strict=False)
+        there = {o.id: o for o in sample.objects}  # a sample of a sequence lacks what is not there
+        shown = ((thing, there[thing.id]) for thing in shot.objects if thing.id in there)
         return cls(dataset, {(thing.model, thing.step): (o.track or o.key, o.key) for thing, o in shown})
 
     def __call__(self, spec: ModelSpec, step: TimeStep | None = None, /) -> Mesh:
