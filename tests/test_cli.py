@@ -3,13 +3,13 @@
 import json
 import subprocess
 import sys
-import time
 
 import numpy as np
 import pytest
 from PIL import Image
 
 from command_line import viewsphere
+from deadline import DEADLINE, until
 from small import ROOT, small_recipe
 from viewsphere import plugins
 
@@ -68,7 +68,7 @@ def test_render_export_check_preview(tmp_path):
     recipe.write_text(small_recipe(viewpoints={"azimuth": [0, 90], "elevation": [20], "distance": 1.0}).to_yaml())
     out = tmp_path / "out"
     command = [sys.executable, "-m", "viewsphere", "render", str(recipe), "-o", str(out), "--workers", "0", "--json"]
-    run = subprocess.run(command, capture_output=True, text=True, timeout=110)
+    run = subprocess.run(command, capture_output=True, text=True, timeout=DEADLINE)
     assert run.returncode == 0, run.stderr
     summary = json.loads(run.stdout)
     assert (summary["frames"], summary["rendered"], summary["skipped"]) == (4, 4, {})
@@ -154,12 +154,9 @@ def test_ctrl_c_keeps_what_is_finished(tmp_path):
         # a job in the background inherits an ignored SIGINT
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # noqa: PLW1509
     )
-    deadline = time.monotonic() + 60
-    while not any((out / "store" / "shots").glob("*/*")):
-        assert time.monotonic() < deadline
-        time.sleep(0.1)
+    assert until(lambda: any((out / "store" / "shots").glob("*/*")))
     os.killpg(run.pid, signal.SIGINT)
-    _, err = run.communicate(timeout=30)
+    _, err = run.communicate(timeout=DEADLINE)
     assert run.returncode == 130
     assert "are kept" in err
     assert "Traceback" not in err

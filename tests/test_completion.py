@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from deadline import DEADLINE
 from viewsphere import cli, plugins
 from viewsphere.cli import completion
 
@@ -21,7 +22,7 @@ def viewsphere(*words, **variables):
         capture_output=True,
         text=True,
         env={**os.environ, **variables},
-        timeout=60,
+        timeout=DEADLINE,
     )
 
 
@@ -112,7 +113,9 @@ def test_bash_itself(tmp_path):
         printf '%s\\n' "${COMPREPLY[@]}"
     """
     path = os.pathsep.join([str(tmp_path), os.environ["PATH"]])
-    run = subprocess.run(["bash", "-c", script], capture_output=True, text=True, env={**os.environ, "PATH": path}, timeout=60)
+    run = subprocess.run(
+        ["bash", "-c", script], capture_output=True, text=True, env={**os.environ, "PATH": path}, timeout=DEADLINE
+    )
     assert run.stdout.splitlines() == ["complete -o default -F _viewsphere_completion viewsphere", "boat"]
 
 

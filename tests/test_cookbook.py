@@ -79,7 +79,6 @@ def folder(tmp_path, monkeypatch):
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(300)
 def test_the_detector_s_categories(folder):
     (said,) = follow("detector", folder)
     found = re.findall(r"^(\d+) (bench|bicycle|post box) (\d+)$", said, re.MULTILINE)  # pycocotools prints, too
@@ -88,7 +87,6 @@ def test_the_detector_s_categories(folder):
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(300)
 def test_poses_give_depth(folder):
     (said,) = follow("pose6d", folder)
     model, difference = said.splitlines()
@@ -96,7 +94,6 @@ def test_poses_give_depth(folder):
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(300)
 def test_depth_gives_points(folder):
     (said,) = follow("depth", folder)
     found = re.findall(r"^(\d+) (\d+)% of the pixels, ([\d.]+) to ([\d.]+) m$", said, re.MULTILINE)
@@ -104,12 +101,10 @@ def test_depth_gives_points(folder):
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(300)
 def test_frames_in_memory(folder):
     assert follow("in-memory", folder) == [""]
 
 
 @pytest.mark.usefixtures("blender")
-@pytest.mark.timeout(300)
 def test_blender_s_first_pictures(folder):
     follow("blender", folder)

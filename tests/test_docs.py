@@ -7,6 +7,7 @@ import sys
 
 import pytest
 
+from deadline import DEADLINE
 from small import ROOT
 
 README = (ROOT / "README.md").read_text("utf-8")
@@ -30,18 +31,17 @@ def test_readme_s_scripts_exist():
         assert os.access(ROOT / name, os.X_OK)
 
 
-@pytest.mark.timeout(300)
 @pytest.mark.slow
 def test_readme_s_commands_and_code_run(tmp_path):
     commands = re.findall(r"^(viewsphere [^#\n]+)", README, re.MULTILINE)
     assert len(commands) >= 5
     for line in commands:
         words = [sys.executable, "-m", *line.split()]
-        run = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, timeout=250)
+        run = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, timeout=DEADLINE)
         assert run.returncode == 0, f"{line}\n{run.stdout}{run.stderr}"
     code = re.search(r"```python\n(.*?)```", README, re.DOTALL)
     assert code is not None
-    subprocess.run([sys.executable, "-c", code[1]], cwd=tmp_path, check=True, timeout=120)
+    subprocess.run([sys.executable, "-c", code[1]], cwd=tmp_path, check=True, timeout=DEADLINE)
 
 
 def test_readme_s_recipe_is_valid(tmp_path):

@@ -167,7 +167,6 @@ def framing(dataset):
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(400)
 def test_hairdryer_poses_whole(tmp_path):
     recipe = vs.Recipe.load(ROOT / "recipes" / "hairdryer_poses.yaml")
     summary = vs.generate(recipe, tmp_path / "out")
@@ -182,7 +181,6 @@ def test_hairdryer_poses_whole(tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(400)
 def test_two_hundred_frames_of_car_poses(tmp_path):
     data, _ = read(ROOT / "recipes" / "car_poses.yaml")
     data["models"][0]["count"] = 10

@@ -9,6 +9,7 @@ import textwrap
 import pytest
 
 from command_line import viewsphere
+from deadline import DEADLINE
 from small import ROOT, small_recipe
 from viewsphere import Dataset, generate, plan
 from viewsphere.assets import cache
@@ -76,7 +77,7 @@ def test_a_data_set_is_made_the_same_without_what_only_posix_has(tmp_path):
         "    generate(small_recipe(), 'bare', workers=1)\n"
     )
     own = {**os.environ, "PYTHONPATH": str(tmp_path)}
-    run = subprocess.run([sys.executable, "make.py"], cwd=tmp_path, env=own, capture_output=True, text=True, timeout=110)
+    run = subprocess.run([sys.executable, "make.py"], cwd=tmp_path, env=own, capture_output=True, text=True, timeout=DEADLINE)
     assert run.returncode == 0, run.stderr
     generate(small_recipe(), tmp_path / "usual")
     assert contents(tmp_path / "bare") == contents(tmp_path / "usual")

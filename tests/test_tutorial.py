@@ -11,6 +11,7 @@ from typing import NamedTuple
 import pytest
 
 from command_line import viewsphere
+from deadline import DEADLINE
 from small import ROOT
 
 PAGE = (ROOT / "docs" / "tutorial.md").read_text("utf-8")
@@ -53,7 +54,7 @@ def blocks(page=PAGE):
 
 
 def run_outside(words):
-    run = subprocess.run(words, capture_output=True, text=True, timeout=200)
+    run = subprocess.run(words, capture_output=True, text=True, timeout=DEADLINE)
     return run.returncode, run.stdout + run.stderr
 
 
@@ -114,7 +115,6 @@ def test_from_top_to_bottom(empty_folder, monkeypatch):
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(400)
 def test_from_top_to_bottom_in_a_shell(empty_folder, monkeypatch):
     monkeypatch.setenv("PATH", os.pathsep.join([os.path.dirname(sys.executable), os.environ["PATH"]]))  # noqa: PTH120
     for block in blocks():

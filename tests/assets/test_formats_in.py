@@ -6,13 +6,13 @@
 import os
 import re
 import sys
-import time
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
 
+from deadline import DEADLINE
 from viewsphere.assets import limits
 from viewsphere.assets.cache import load
 from viewsphere.assets.isolated import READ_HERE
@@ -41,16 +41,15 @@ def table(header):
 
 
 def read_apart(path, folder):
-    """What becomes of a file in a process of its own, in words, and the seconds it took."""
-    start = time.monotonic()
+    """What becomes of a file in a process of its own, in words."""
     spec = ModelSpec(key="a", source=str(path), category="thing", category_id=1)
     try:
         mesh, _ = load(spec, folder=folder)
     except ModelError as error:
-        return str(error), time.monotonic() - start
+        return str(error)
     count = len(mesh.warnings)
     words = f"{len(mesh.triangles):,} triangle{'s' * (len(mesh.triangles) != 1)}"
-    return words + (f", {count} warning{'s' * (count != 1)}" if count else ""), time.monotonic() - start
+    return words + (f", {count} warning{'s' * (count != 1)}" if count else "")
 
 
 def awkward_rows():
@@ -58,7 +57,7 @@ def awkward_rows():
     rows = []
     for path in sorted((MODELS / "awkward").iterdir()):
         if path.suffix != ".mtl":
-            said, _ = read_apart(path, Path(os.environ["VIEWSPHERE_CACHE"]))
+            said = read_apart(path, Path(os.environ["VIEWSPHERE_CACHE"]))
             rows.append((path.name, "refused" if said.startswith(str(path)) else said, said))
     return rows
 
@@ -139,20 +138,19 @@ def test_awkward_files_become_what_the_page_says(monkeypatch, tmp_path):
 
 @corpus
 @pytest.mark.slow
-@pytest.mark.timeout(180)
 def test_no_broken_file_does_harm(monkeypatch, tmp_path):
     """Each in a process of its own: loaded, or one line that names the file; quick, small, and nothing written elsewhere."""
     import resource
 
     monkeypatch.delenv(READ_HERE)
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(limits, "MAX_READ_SECONDS", 30.0)
+    monkeypatch.setattr(limits, "MAX_READ_SECONDS", float(DEADLINE))
     files = broken_files()
     assert len(files) > 250
     with ThreadPoolExecutor(min(4, os.cpu_count() or 1)) as crew:
         outcomes = list(crew.map(lambda path: read_apart(path, tmp_path / "cache"), files))
-    for path, (said, seconds) in zip(files, outcomes, strict=True):
-        assert seconds < 30
+    for path, said in zip(files, outcomes, strict=True):
+        assert "MAX_READ_SECONDS" not in said
         assert "\n" not in said
         assert said.startswith(f"{path}: ") or said.startswith(f"{path}.") or re.match(r"[\d,]+ triangle", said), said
         assert "crashed" not in said
@@ -173,6 +171,6 @@ if __name__ == "__main__":
         for name, outcome, error in awkward_rows():
             print(f"| `{name}` | {outcome} | {error if outcome == 'refused' else ''} |")
         with ThreadPoolExecutor(2) as pool:
-            found = list(pool.map(lambda path: (path, read_apart(path, Path(place))[0]), broken_files()))
+            found = list(pool.map(lambda path: (path, read_apart(path, Path(place))), broken_files()))
         for row in broken_rows(found):
             print(f"| {' | '.join(row)} |")

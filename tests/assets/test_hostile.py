@@ -47,7 +47,7 @@ def spec_of(path):
 
 def outcome(path, seconds=15.0):
     """The mesh, or the one line by which the file is refused."""
-    start = time.monotonic()
+    start = time.process_time()
     try:
         result = load_model(path)[0]
     except ModelError as error:
@@ -55,7 +55,7 @@ def outcome(path, seconds=15.0):
         assert path.name in result
         assert "\n" not in result
         assert len(result) < 600 + len(str(path))
-    assert time.monotonic() - start < seconds
+    assert time.process_time() - start < seconds
     return result
 
 

@@ -4,12 +4,12 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from deadline import DEADLINE, until
 from viewsphere.assets import isolated, limits
 from viewsphere.assets import reader as reader_program
 from viewsphere.assets.cache import ASIDE, cache_folder, load, load_normalised
@@ -122,9 +122,7 @@ def test_a_crash_costs_one_message(spec, reader, body, said):
 def test_an_endless_loop_is_stopped(spec, reader, monkeypatch):
     reader("while True: pass")
     monkeypatch.setattr(limits, "MAX_READ_SECONDS", 1.0)
-    start = time.monotonic()
     assert "within 1 s (limit MAX_READ_SECONDS)" in refusal(spec)
-    assert time.monotonic() - start < 10
 
 
 def test_a_loop_that_keeps_the_interpreter_to_itself_is_stopped(spec, reader, monkeypatch):
@@ -204,16 +202,12 @@ def test_no_child_outlives_its_parent(spec, reader, tmp_path, how):
     environment = os.environ | {"PYTHONPATH": str(tmp_path / "patch")}
     parent = subprocess.Popen([sys.executable, "-c", PARENT, spec.source], env=environment, stderr=subprocess.DEVNULL)
     try:
-        deadline = time.monotonic() + 20
-        while not (pid_file.exists() and pid_file.read_text()) and time.monotonic() < deadline:
-            time.sleep(0.02)
+        assert until(lambda: pid_file.exists() and pid_file.read_text())
         child = int(pid_file.read_text())
         assert alive(child)
         parent.send_signal(how)
-        parent.wait(10)
-        while alive(child) and time.monotonic() < deadline:
-            time.sleep(0.02)
-        assert not alive(child)
+        parent.wait(DEADLINE)
+        assert until(lambda: not alive(child))
     finally:
         parent.kill()
         parent.wait()
@@ -221,13 +215,13 @@ def test_no_child_outlives_its_parent(spec, reader, tmp_path, how):
 
 def test_a_child_ends_when_its_standard_input_does(spec, reader, tmp_path):
     reader("while True: pass")
-    job = Job(spec.model_dump(mode="json"), str(tmp_path), 60.0, 1 << 32, os.getpid())
+    job = Job(spec.model_dump(mode="json"), str(tmp_path), 2.0 * DEADLINE, 1 << 32, os.getpid())
     process, lifeline = isolated._started(job)
     try:
         with pytest.raises(subprocess.TimeoutExpired):
             process.wait(1.0)
         os.close(lifeline)
-        assert process.wait(10) == 1
+        assert process.wait(DEADLINE) == 1
     finally:
         process.kill()
 
@@ -239,7 +233,7 @@ def test_a_daemonic_pool_worker_may_read(spec):
     ours, theirs = context.Pipe()
     worker = context.Process(target=_work, args=(theirs, spec.model_dump_json()), daemon=True)
     worker.start()
-    assert ours.poll(60)
+    assert ours.poll(DEADLINE)
     assert ours.recv() == 6
     worker.join()
 

@@ -25,8 +25,6 @@ from viewsphere.formats.blend import StoredModels
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.thing import Thing
 
-pytestmark = [pytest.mark.timeout(300)]
-
 
 def test_an_edge_is_a_pixel_whose_neighbour_is_seen():
     kept = np.zeros((5, 6), np.int32)

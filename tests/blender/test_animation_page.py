@@ -41,7 +41,6 @@ def test_the_tables_have_every_field():
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(300)
 def test_commands_run(blender, tmp_path):
     subprocess.run([blender, Path(__file__).with_name("make_moving.py"), tmp_path], capture_output=True, check=True)
     shutil.copy(tmp_path / "jump.fbx", tmp_path / "walker.fbx")

@@ -5,15 +5,12 @@ from __future__ import annotations
 import json
 import sys
 
-import pytest
 from fake_blender import LACKING, blind_blender, fake_blender, with_modules, without_blender
 from typer.testing import CliRunner
 
 from viewsphere.blender import environment
 from viewsphere.blender.interpreter import VARIABLE
 from viewsphere.cli.commands import app
-
-pytestmark = pytest.mark.timeout(60)
 
 
 def doctor(*words):

@@ -12,8 +12,6 @@ from viewsphere.blender import environment
 from viewsphere.blender.interpreter import VARIABLE, Device, Library, find_blender, missing_libraries, probe
 from viewsphere.errors import MissingExtraError, UserError
 
-pytestmark = pytest.mark.timeout(60)
-
 LDD = """\
 \tlinux-vdso.so.1 (0x00007eff2b926000)
 \tlibXi.so.6 => not found

@@ -17,7 +17,7 @@ from viewsphere.errors import ModelError
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.thing import TimeStep
 
-pytestmark = [pytest.mark.timeout(60), pytest.mark.skipif(sys.platform == "win32", reason="signals")]
+pytestmark = [pytest.mark.skipif(sys.platform == "win32", reason="signals")]
 
 SAID = "Blender, which reads it, ended unexpectedly: it was killed (SIG{how}), perhaps because memory ran out; "
 

@@ -41,7 +41,6 @@ def test_the_table_has_every_option_and_preset():
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(300)
 @pytest.mark.usefixtures("blender")
 def test_commands_run(tmp_path):
     (tmp_path / "drier.yaml").write_text(RECIPE, "utf-8")

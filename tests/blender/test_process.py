@@ -14,10 +14,9 @@ import numpy as np
 import pytest
 from fake_blender import fake_blender, interpreter
 
+from deadline import until
 from viewsphere.blender.process import BlenderProcess
 from viewsphere.errors import BlenderDied, BlenderError
-
-pytestmark = pytest.mark.timeout(120)
 
 HOLDER = """
 import sys
@@ -46,13 +45,6 @@ def is_alive(pid):
         os.kill(pid, 0)
         return True
     return False
-
-
-def wait_until(true, seconds=20.0):
-    end = time.monotonic() + seconds
-    while not true() and time.monotonic() < end:
-        time.sleep(0.02)
-    return true()
 
 
 def test_hello(python):
@@ -112,10 +104,8 @@ def test_death_is_told_and_another_can_be_started(python, how, tmp_path):
 def test_a_hang_is_ended(fake):
     with BlenderProcess(fake) as process:
         process.ask("hello")
-        begun = time.monotonic()
         with pytest.raises(BlenderDied, match=r"hung \(no answer in 0.5 s\) of `stage`"):
             process.ask("stage", 0.5)
-        assert time.monotonic() - begun < 10
         assert not is_alive(process.pid)
 
 
@@ -128,7 +118,7 @@ def test_a_script_that_starts_an_interpreter_ends_with_it(fake):
         (child,) = map(int, children.read_text().split())
         with pytest.raises(BlenderDied, match="hung"):
             process.ask("stage", 0.5)
-    assert wait_until(lambda: not is_alive(child))
+    assert until(lambda: not is_alive(child))
 
 
 def test_one_that_does_not_even_listen_is_ended(fake):
@@ -190,7 +180,7 @@ def test_it_does_not_outlive_the_one_who_started_it(fake, state):
             time.sleep(0.3)  # the request is under way
         assert folder.is_dir()
         holder.kill()
-    assert wait_until(lambda: not is_alive(int(pid)) and not folder.exists())
+    assert until(lambda: not is_alive(int(pid)) and not folder.exists())
 
 
 def test_arrays_last_until_they_are_read(fake):

@@ -7,10 +7,11 @@ from pathlib import Path
 
 import pytest
 
+from deadline import DEADLINE
 from viewsphere import blender as package
 from viewsphere.blender.process import BlenderProcess
 
-pytestmark = [pytest.mark.slow, pytest.mark.timeout(120)]
+pytestmark = [pytest.mark.slow]
 
 MAKE = """
 import os, sys
@@ -64,7 +65,7 @@ os._exit(0)  # Blender 4.5 hangs in its own way out
 def test_files_do_not_run_and_sockets_do_not_open(blender, tmp_path):
     def run(code):
         worker = Path(package.__file__).parent
-        return subprocess.run([blender, "-c", code + LEAVE, tmp_path, worker], capture_output=True, text=True, timeout=100)
+        return subprocess.run([blender, "-c", code + LEAVE, tmp_path, worker], capture_output=True, text=True, timeout=DEADLINE)
 
     made, opened = run(MAKE), run(OPEN)
     assert made.returncode == 0, made.stderr
@@ -74,7 +75,7 @@ def test_files_do_not_run_and_sockets_do_not_open(blender, tmp_path):
 
 
 def test_a_model_that_is_read_does_not_run(blender, tmp_path):
-    run = subprocess.run([blender, "-c", MAKE + LEAVE, tmp_path], capture_output=True, text=True, timeout=100)
+    run = subprocess.run([blender, "-c", MAKE + LEAVE, tmp_path], capture_output=True, text=True, timeout=DEADLINE)
     assert run.returncode == 0, run.stderr
     with BlenderProcess(blender) as process:  # not confined, so that what ran could be seen
         told = {"kind": "blend", "inside": [], "root": None, "most": 1000, "folder": str(process.folder)}

@@ -17,7 +17,7 @@ from viewsphere.run.exporting import export
 from viewsphere.run.merging import merge
 from viewsphere.store import Choice
 
-pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]
+pytestmark = [pytest.mark.slow]
 
 DRIERS = {"source": "zoo:hair_drier", "category": "hair drier", "supercategory": "appliance", "count": 2}
 FRAMES = [1, 4, 6]

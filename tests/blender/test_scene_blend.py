@@ -19,7 +19,7 @@ from viewsphere.model.model_spec import ModelSpec
 from viewsphere.run.stages import Stages
 from viewsphere.truth.visibility import rasterize
 
-pytestmark = [pytest.mark.timeout(300), pytest.mark.usefixtures("blender")]
+pytestmark = [pytest.mark.usefixtures("blender")]
 
 LABELS = [
     {"name": "Car*", "category": "car"},

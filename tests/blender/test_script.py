@@ -12,8 +12,6 @@ from viewsphere import Recipe, generate, plan, render
 from viewsphere.blender.interpreter import SCRIPTS
 from viewsphere.errors import RecipeError, UserError
 
-pytestmark = pytest.mark.timeout(300)
-
 RED = """
 def shade(scene, objects, shot):
     for one, told in objects.items():

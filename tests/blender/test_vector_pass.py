@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 
 import viewsphere as vs
+from deadline import DEADLINE
 
 FRAMES = 5
 WORKER = Path(__file__).with_name("render_vectors.py")
 
 
 def ask(blender, *words):
-    done = subprocess.run([blender, str(WORKER), *map(str, words)], capture_output=True, text=True, timeout=300)
+    done = subprocess.run([blender, str(WORKER), *map(str, words)], capture_output=True, text=True, timeout=DEADLINE)
     assert done.returncode == 0, done.stderr[-4000:]
 
 
@@ -64,7 +65,6 @@ def within_one_triangle(sample):
     return same
 
 
-@pytest.mark.timeout(600)
 @pytest.mark.parametrize("name", ["turn", "bend", "wave"])
 def test_cycles_finds_the_same_vectors(name, files, blender, tmp_path):
     samples = sequence(files, name)

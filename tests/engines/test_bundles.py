@@ -15,7 +15,6 @@ from viewsphere.engines.raster import bundles
 from viewsphere.engines.raster.bundles import BundlePacker
 from viewsphere.engines.raster.kernels_filter import PLANES
 
-pytestmark = pytest.mark.timeout(120)
 SET = ("base_color_texture", "normal_texture", "metallic_roughness_texture")
 
 

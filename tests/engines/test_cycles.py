@@ -18,7 +18,7 @@ from viewsphere.engines._blender.staging import border_of, keeper_of
 from viewsphere.errors import UserError
 from viewsphere.truth.visibility import rasterize
 
-pytestmark = [pytest.mark.slow, pytest.mark.timeout(600), pytest.mark.usefixtures("blender")]
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("blender")]
 
 LABELS = ["depth", "instances", "parts", "normals"]
 LENSES = {

@@ -192,7 +192,7 @@ def test_pictures_are_shared_and_others_are_left_out():
 # Cycles.
 
 TEXELS, FAR, NEAR = 1024, 6.0, 1.9
-BLENDER = [pytest.mark.slow, pytest.mark.timeout(600), pytest.mark.usefixtures("blender")]
+BLENDER = [pytest.mark.slow, pytest.mark.usefixtures("blender")]
 
 
 def hammered(size=TEXELS) -> Mesh:

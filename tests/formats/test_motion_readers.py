@@ -21,7 +21,7 @@ import viewsphere as vs
 from sequence_recipe import eventful_recipe
 from viewsphere.run.stages import Stages
 
-pytestmark = [pytest.mark.slow, pytest.mark.timeout(600), pytest.mark.filterwarnings("ignore")]
+pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("ignore")]
 FRAMES = 12
 UNKNOWN = np.float32(1e10)
 """Flow that is not known, as files of Middlebury say."""

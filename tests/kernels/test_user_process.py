@@ -29,8 +29,15 @@ print(numba.config.CACHE_DIR, tripled.stats.cache_path, sep="|")
 """
 
 
-@pytest.mark.parametrize("stock", ["0", "1"])
-@pytest.mark.parametrize("said", ["", "elsewhere"])
+@pytest.mark.parametrize(
+    ("said", "stock"),
+    [
+        ("", "0"),
+        ("elsewhere", "1"),
+        pytest.param("", "1", marks=pytest.mark.slow),
+        pytest.param("elsewhere", "0", marks=pytest.mark.slow),
+    ],
+)
 def test_own_functions_are_cached_where_they_were(tmp_path, stock, said):
     (tmp_path / "theirs.py").write_text(THEIRS)
     ours, own = tmp_path / "ours", str(tmp_path / said) if said else ""

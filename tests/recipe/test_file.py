@@ -2,7 +2,6 @@
 
 import json
 import re
-import time
 from pathlib import Path
 
 import jsonschema
@@ -111,9 +110,7 @@ def test_what_is_no_yaml_is_reported_at_its_line(write, text, message):
 def test_aliases_cannot_explode(write):
     lines = ["a0: &a0 [x, x, x, x, x, x, x, x, x, x]"]
     lines += [f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 10)}]" for i in range(1, 10)]
-    started = time.perf_counter()
     assert "expected at most 200,000 values; found more: write fewer aliases" in load_error(write("\n".join(lines)))
-    assert time.perf_counter() - started < 10
 
 
 def test_aliases_mean_what_they_stand_for(write):

@@ -12,6 +12,7 @@ from collections import Counter
 import pytest
 
 import viewsphere as vs
+from deadline import DEADLINE
 from sequence_recipe import CHANNELS, eventful_recipe
 from small import tree_hash
 from viewsphere.check import check
@@ -62,7 +63,6 @@ def command(recipe_file, out, workers):
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(600)
 @pytest.mark.parametrize(("most", "workers"), RUNS)
 def test_any_cut_by_any_number_of_workers_killed_on_its_way(most, workers, whole, tmp_path):
     file, out, rng = tmp_path / "recipe.yaml", tmp_path / "out", random.Random(100 * most + workers)
@@ -74,13 +74,14 @@ def test_any_cut_by_any_number_of_workers_killed_on_its_way(most, workers, whole
         time.sleep(rng.uniform(4, 12))
         assert run.poll() is None, "it was done before it was killed"
         os.killpg(run.pid, signal.SIGKILL)
-        run.wait(timeout=30)
-    subprocess.run(command(file, out, workers), check=True, timeout=400, capture_output=True)
+        run.wait(timeout=DEADLINE)
+    subprocess.run(command(file, out, workers), check=True, timeout=DEADLINE, capture_output=True)
     shots = len(list((out / "store/shots").rglob("shot.json")))
     assert shots == 2 * -(-100 // most)
     assert contents(out) == whole
 
 
+@pytest.mark.slow
 def test_a_short_sequence_is_the_same_in_pieces(tmp_path):
     """The same in little, and all its proofs."""
     found = []

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import viewsphere as vs
+from deadline import DEADLINE
 from sequence_recipe import eventful_recipe
 from small import ROOT, small_recipe
 from viewsphere.errors import RecipeError, UserError
@@ -151,7 +152,7 @@ def test_samples_and_objects_list_what_they_have(in_order):
 
 
 def test_the_version_is_told():
-    told = subprocess.run([sys.executable, "-m", "viewsphere", "--version"], capture_output=True, text=True, timeout=60)
+    told = subprocess.run([sys.executable, "-m", "viewsphere", "--version"], capture_output=True, text=True, timeout=DEADLINE)
     assert told.stdout == f"viewsphere {vs.__version__}\n"
     assert re.match(r"\d+\.\d+", vs.__version__)
 
@@ -254,5 +255,5 @@ def test_the_pages_training_runs(tmp_path):
     (script,) = (code for code in re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL) if "DataLoader" in code)
     (tmp_path / "train.py").write_text(script)
     (tmp_path / "recipe.yaml").write_text(quick_recipe(channels=["rgb"]).to_yaml())
-    run = subprocess.run([sys.executable, "train.py"], cwd=tmp_path, capture_output=True, text=True, timeout=100)
+    run = subprocess.run([sys.executable, "train.py"], cwd=tmp_path, capture_output=True, text=True, timeout=DEADLINE)
     assert run.stdout.split("\n")[:3] == [f"{epoch} 12 (3, 24, 32)" for epoch in range(3)], run.stderr

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import viewsphere as vs
+from deadline import DEADLINE
 from small import small_recipe, tree_hash
 from viewsphere.errors import ModelError, RecipeError, StoreError, UserError
 from viewsphere.run.exporting import export
@@ -42,11 +43,11 @@ def recipe_file(tmp_path):
 
 @pytest.mark.parametrize("workers", [2, pytest.param(4, marks=pytest.mark.slow)])
 def test_any_number_of_workers_gives_the_same_bytes(workers, recipe_file, small_run, tmp_path):
-    subprocess.run(command(recipe_file, tmp_path / "out", workers), check=True, timeout=110, capture_output=True)
+    subprocess.run(command(recipe_file, tmp_path / "out", workers), check=True, timeout=DEADLINE, capture_output=True)
     assert tree_hash(tmp_path / "out") == tree_hash(small_run)
 
 
-@pytest.mark.parametrize("kills", [1, pytest.param(10, marks=[pytest.mark.slow, pytest.mark.timeout(600)])])
+@pytest.mark.parametrize("kills", [1, pytest.param(10, marks=[pytest.mark.slow])])
 def test_a_killed_run_goes_on_to_the_same_bytes(kills, recipe_file, small_run, tmp_path):
     out, rng = tmp_path / "out", random.Random(kills)
     for _ in range(kills):
@@ -58,8 +59,8 @@ def test_a_killed_run_goes_on_to_the_same_bytes(kills, recipe_file, small_run, t
         )
         time.sleep(rng.uniform(0.5, 5.0))
         os.killpg(run.pid, signal.SIGKILL)
-        run.wait(timeout=30)
-    subprocess.run(command(recipe_file, out, 2), check=True, timeout=110, capture_output=True)
+        run.wait(timeout=DEADLINE)
+    subprocess.run(command(recipe_file, out, 2), check=True, timeout=DEADLINE, capture_output=True)
     assert tree_hash(out) == tree_hash(small_run)
 
 

@@ -10,6 +10,7 @@ import sys
 import numpy as np
 import pytest
 
+from deadline import DEADLINE
 from pictures import photograph, write
 from small import small_recipe, tree_hash
 from viewsphere.run.generate import generate
@@ -97,7 +98,7 @@ def test_any_number_of_workers_makes_the_same_pictures(workers, pictures, whole,
     file = tmp_path / "recipe.yaml"
     file.write_text(recipe(pictures).to_yaml())
     command = [sys.executable, "-m", "viewsphere", "render", str(file), "-o", str(tmp_path / "out"), "--workers", str(workers)]
-    subprocess.run(command, check=True, timeout=110, capture_output=True)
+    subprocess.run(command, check=True, timeout=DEADLINE, capture_output=True)
     assert tree_hash(tmp_path / "out") == tree_hash(whole)
 
 

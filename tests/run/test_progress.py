@@ -28,6 +28,7 @@ def test_every_frame_is_told_before_its_shot_is_finished(tmp_path, workers):
     assert frames_told(seen) == expected
 
 
+@pytest.mark.slow
 def test_frames_of_several_workers_add_up(tmp_path):
     seen: list[Progress] = []
     generate(small_recipe(**WHOLE), tmp_path / "out", workers=2, listener=seen.append)

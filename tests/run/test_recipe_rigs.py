@@ -116,6 +116,7 @@ def test_a_data_set_of_one_camera_takes_no_rig(tmp_path):
         generate(Recipe(**BASE, rig={"kind": "stereo", "baseline": 0.1}), tmp_path / "out", append=True)
 
 
+@pytest.mark.slow
 def test_workers_and_scenes(tmp_path):
     """Random scenes by two processes: the same samples as in this one."""
     recipe = Recipe(**BASE, scenes={"count": 2, "objects": 1}, splits={"by": "scene"}, rig={"kind": "surround", "count": 3})

@@ -1,7 +1,6 @@
 """A sequence has the same labels, byte for byte, whichever engine painted its pictures."""
 
 import numpy as np
-import pytest
 
 import viewsphere as vs
 from sequence_recipe import CHANNELS, eventful_recipe
@@ -9,7 +8,6 @@ from sequence_recipe import CHANNELS, eventful_recipe
 ENGINES = {"raster": {"name": "raster"}, "cycles": {"name": "cycles", "samples": 1, "denoise": "off"}}
 
 
-@pytest.mark.timeout(600)
 def test_labels_of_a_sequence_are_the_same_on_raster_and_in_cycles(blender, tmp_path):
     made = {}
     for name, engine in ENGINES.items():

@@ -1,7 +1,6 @@
 """The plan: counts, shots, splits, backgrounds, and what it refuses."""
 
 import re
-import time
 import tracemalloc
 from pathlib import Path
 
@@ -95,12 +94,10 @@ def test_shots_of_one_model_share_a_stage():
 
 def test_a_billion_frames_by_a_typing_mistake_are_refused_at_once():
     tracemalloc.start()
-    started = time.perf_counter()
     message = error(
         models=[{"source": "zoo:car", "count": 10_000}],
         viewpoints={"azimuth": {"start": 0, "stop": 360, "step": 0.0036}, "distance": 5},
     )
-    assert time.perf_counter() - started < 0.2
     assert tracemalloc.get_traced_memory()[1] < 5_000_000
     tracemalloc.stop()
     assert message == (
@@ -110,12 +107,10 @@ def test_a_billion_frames_by_a_typing_mistake_are_refused_at_once():
 
 
 def test_a_million_frames_can_be_meant():
-    started = time.perf_counter()
     planned = plan(recipe(models=[{"source": "zoo:car"}], viewpoints={"kind": "sphere", "count": 1_000_000, "distance": 5}))
     assert planned.frames == 1_000_000
     assert planned.shot(planned.shot_count - 1, unit_box).instants[-1].index == 999_999
     assert planned.split_counts in ({"train": 1_000_000, "val": 0}, {"train": 0, "val": 1_000_000})
-    assert time.perf_counter() - started < 1
     assert plan(recipe(max_frames=10**9, viewpoints={"kind": "sphere", "count": 10**7, "distance": 5})).frames == 3 * 10**7
 
 

@@ -178,7 +178,6 @@ def real_models(count):
 
 @pytest.mark.slow
 @pytest.mark.skipif(not MODELS.exists(), reason="no folder of real models beside the project")
-@pytest.mark.timeout(300)
 def test_ids_and_depth_on_real_models():
     meshes = list(real_models(12).values())
     assert len(meshes) >= 10

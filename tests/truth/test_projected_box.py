@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from truth_scenes import LENSES, cube, lens, mesh_of, orbit_camera, placed, random_soup, sphere
 
@@ -20,7 +20,6 @@ STRONG = {
     "folding fisheye": Distortion(model="fisheye", coefficients=(-0.12, 0.03, -0.02, 0.003)),
 }
 ROUNDING = 1e-5
-MANY = settings(max_examples=60, derandomize=True, deadline=None, database=None)
 
 
 def torus():
@@ -40,7 +39,6 @@ MODELS = {
 
 
 @pytest.mark.parametrize("name", STRONG)
-@MANY
 @given(seed=st.integers(0, 10**6), model=st.sampled_from(sorted(MODELS)))
 def test_no_pixel_of_a_model_lies_outside_its_box(name, seed, model):
     """Nor is the box larger than its pixels by more than gaps between pixel centres allow, for a ball that fills some."""

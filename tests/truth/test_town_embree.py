@@ -18,7 +18,7 @@ from viewsphere.truth.surface_draws import points_on
 from viewsphere.truth.visibility import rasterize
 
 pytest.importorskip("embreex")
-pytestmark = [pytest.mark.slow, pytest.mark.timeout(600)]
+pytestmark = [pytest.mark.slow]
 POINTS = 100_000
 
 
