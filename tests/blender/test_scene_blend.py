@@ -10,11 +10,12 @@ import pytest
 
 from viewsphere import Dataset, Recipe, generate, plan, render
 from viewsphere.assets.cache import load_normalised
+from viewsphere.blender.interpreter import SCRIPTS
 from viewsphere.check import check
 from viewsphere.engines import cycles
 from viewsphere.engines._blender.file_frame import FileFrame
 from viewsphere.engines._blender.staging import camera_request
-from viewsphere.errors import RecipeError
+from viewsphere.errors import RecipeError, UserError
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.run.stages import Stages
 from viewsphere.truth.visibility import rasterize
@@ -102,6 +103,25 @@ def test_labelled_objects_move(made):
     for car in cars:
         assert np.allclose(np.ptp(stages.box(car.model, car.step), axis=0), [1, 2, 1.3], atol=1e-5)
         assert car.id == cars[0].id
+
+
+@pytest.mark.parametrize("name", ["street", "feet", "moving", "grown"])
+def test_a_script_may_change_the_looks_of_a_files_own_objects_alone(made, tmp_path, monkeypatch, name):
+    monkeypatch.setenv(SCRIPTS, "1")
+
+    def pictured(line):
+        script = tmp_path / "mine.py"
+        solid = "solid = [one for one in scene.objects if one.type == 'MESH']"
+        script.write_text(f"def shade(scene, objects, shot):\n    {solid}\n    {line}\n")
+        recipe = recipe_of(made / f"{name}.blend", ENGINE | {"script": str(script)}, viewpoints={"azimuth": [0], "distance": 7})
+        return next(iter(render(recipe))).channels["rgb"]
+
+    lights = (
+        "import bpy; sun = bpy.data.lights.new('sun', 'SUN'); scene.collection.objects.link(bpy.data.objects.new('sun', sun))"
+    )
+    assert not np.array_equal(pictured(lights), pictured("pass"))
+    with pytest.raises(UserError, match=r"expected objects that stand where they stood.* '.*' changed"):
+        pictured("[setattr(one, 'scale', (2, 2, 2)) for one in solid]")
 
 
 @pytest.mark.parametrize("name", ["appearing", "linking"])
