@@ -51,6 +51,7 @@ def test_modules_of_posix_are_imported_only_where_they_are_needed():
         assert not POSIX_ONLY & set(names), f"{file}:{node.lineno}"
 
 
+@pytest.mark.slow
 def test_a_data_set_is_made_the_same_without_what_only_posix_has(tmp_path):
     """Other modules and functions are absent in this process and in its workers; the files are equal."""
     (tmp_path / "sitecustomize.py").write_text(

@@ -51,6 +51,7 @@ def test_whole_data_sets_are_left_alone(spoilt):
     assert times(spoilt) == before
 
 
+@pytest.mark.slow
 def test_every_kind_of_file_is_made_again(small_run, spoilt):
     files = kinds(spoilt)
     assert len(files) >= 16

@@ -5,7 +5,7 @@ import time
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image
 
@@ -243,7 +243,6 @@ def test_an_even_height_map_is_none(write):
     assert images == ()
 
 
-@settings(max_examples=60, deadline=None)
 @given(
     st.lists(st.floats(0.2, 1.0), min_size=4, max_size=40),
     st.floats(0, 6.28),

@@ -104,6 +104,7 @@ def shown(stage, i):
     return stage.color(i, 0, rasterize(stage.at(i), stage.shot.camera(i)), False)
 
 
+@pytest.mark.slow
 def test_however_a_sequence_is_cut_its_pictures_are_the_same():
     shot = drive(5)
     stage = raster.stage(shot, load(STILL))

@@ -2,7 +2,7 @@ import itertools
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 from pycocotools import mask as coco
@@ -113,7 +113,6 @@ def test_polygons_of_200_random_masks_with_holes():
     assert holes > 1000
 
 
-@settings(max_examples=50, deadline=None)
 @given(arrays(np.bool_, array_shapes(min_dims=2, max_dims=2, max_side=12)))
 def test_polygons_of_any_mask(mask):
     assert_exact(mask)
@@ -143,7 +142,6 @@ def test_a_large_round_mask():
     assert shoelace(polygons[0]) == mask.sum()
 
 
-@settings(max_examples=100, deadline=None)
 @given(arrays(np.bool_, array_shapes(min_dims=2, max_dims=2, max_side=9)))
 def test_run_lengths_are_pycocotools_own(mask):
     code = encode_rle(mask)
@@ -163,7 +161,6 @@ def test_run_lengths_that_do_not_fill_the_image_are_refused(code):
         decode_rle(4, 5, code)
 
 
-@settings(max_examples=50, deadline=None)
 @given(st.integers(1, 300), st.integers(1, 300), st.floats(0, 1), st.integers(0, 2**32))
 def test_decoding_is_pycocotools_own(height, width, share, seed):
     mask = np.random.default_rng(seed).random((height, width)) < share

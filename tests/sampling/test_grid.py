@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from test_placing import box, distance, place, polygon
 
@@ -16,7 +16,6 @@ things = st.lists(st.tuples(sizes, sizes, st.floats(-1, 1), st.floats(-1, 1)), m
 
 
 @given(things, st.floats(0, 1))
-@settings(max_examples=60, deadline=None)
 def test_cells_are_a_grid_and_keep_the_gap(parts, gap):
     boxes = [box(width, length, x=x, y=y) for width, length, x, y in parts]
     poses = place("grid", boxes, [f"m{i}" for i in range(len(boxes))], gap=gap)

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from viewsphere.errors import RecipeError
@@ -67,7 +67,6 @@ def test_a_rotation_turns_right_then_up_then_clockwise(rotation, ahead, right):
     np.testing.assert_allclose(pose(rig, 1)[:3, 0], right, atol=1e-11)
 
 
-@settings(max_examples=60, deadline=None)
 @given(st.tuples(st.floats(-89, 89), st.floats(-179, 179), st.floats(-179, 179)))
 def test_matrix_and_angles_say_the_same(rotation):
     by_angles = sensors(a={}, b={"rotation": rotation, "position": [1, 2, 3]})
@@ -76,7 +75,6 @@ def test_matrix_and_angles_say_the_same(rotation):
     np.testing.assert_allclose(sensor_facts(by_angles)[1].rotation, rotation, atol=2e-6)
 
 
-@settings(max_examples=60, deadline=None)
 @given(st.tuples(*[st.floats(-3, 3)] * 3), st.tuples(st.floats(-5, 5), st.floats(-5, 5), st.floats(0.1, 9)))
 def test_what_a_sensor_looks_at_is_in_its_middle(place, off):
     look = [a + b for a, b in zip(place, off, strict=True)]

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from viewsphere.errors import RecipeError
@@ -292,7 +292,6 @@ def test_a_camera_that_zooms_has_a_lens_each_instant():
         Shot.model_validate(shot.model_dump() | {"instants": [bigger.model_dump()]})
 
 
-@settings(max_examples=100, deadline=None)
 @given(st.tuples(*[st.floats(-50, 50)] * 3), st.tuples(*[st.floats(-50, 50)] * 3).filter(lambda p: math.hypot(*p) > 0.01))
 def test_the_viewpoint_says_where_the_camera_is(place, off):
     """`sample.pose` leads back to the camera, for any place and anything looked at."""
