@@ -126,16 +126,24 @@ class Ground(Frozen):
     """
 
     color: Srgb = Field(
-        default=(0.56, 0.55, 0.53), description="multiplies the image, beside which the default is white: sRGB [r, g, b]"
+        default=(0.62, 0.61, 0.59), description="multiplies the image, beside which the default is white: sRGB [r, g, b]"
+    )
+    pattern: Literal["slabs", "plain"] = Field(
+        default="slabs", description="slabs of concrete, or plain: what ground without pictures looks like"
     )
     image: Picture | None = Field(default=None, description="path of a picture that repeats every `tile` metres")
     roughness: Portion = Field(default=1.0, description="0 a mirror, 1 matt")
     roughness_image: Picture | None = Field(default=None, description="path of a grey picture: 0 smooth, white rough")
     normal_image: Picture | None = Field(default=None, description="path of a normal map (green up)")
     metallic: Portion = Field(default=0.0, description="1: metal")
-    tile: Length = Field(default=2.0, description="metres after which images repeat")
+    tile: Length = Field(default=2.0, description="metres after which images repeat; a slab is half as wide")
     catcher: bool = Field(default=False, description="true: only the shadows on it are seen, over the background")
     labels: bool = Field(default=False, description="whether a catcher has depth and normals; other ground always has")
+
+    @property
+    def has_slabs(self) -> bool:
+        """Whether slabs are seen."""
+        return self.pattern == "slabs" and not (self.image or self.roughness_image or self.normal_image or self.catcher)
 
     @property
     def is_labelled(self) -> bool:

@@ -16,8 +16,9 @@ def fade(material, middle, fading, sky):
     """Let the camera see the sky instead of the ground where the ground has faded; light and mirrors meet the whole ground.
 
     A transparent shader would be sampled at random, with noise; a holdout, or emission of the sky's light where the film is not
-    transparent, has none. `fading`: metres behind the `middle` at which fading begins and ends, and sines of the angle between
-    view and ground at which it begins and ends for flat views. `sky`: the visible sky's picture, and its turn in degrees.
+    transparent, has none. `fading`: metres behind the `middle` at which fading begins and ends, and the sine of the angle
+    between view and ground at which it begins for flat views, which have faded altogether at the horizon. `sky`: the visible
+    sky's picture, and its turn in degrees.
     """
     graph = Graph(material.node_tree)
     output = next(node for node in material.node_tree.nodes if node.type == "OUTPUT_MATERIAL").inputs["Surface"]
@@ -48,7 +49,7 @@ def _gone(graph, middle, fading):
     left = _smooth(graph, graph.math("MULTIPLY", near, near), 0.0, 1.0)
     incoming = graph.node("ShaderNodeNewGeometry").outputs["Incoming"]
     sine = graph.math("ABSOLUTE", graph.node("ShaderNodeSeparateXYZ", {0: incoming}).outputs["Z"])
-    left = graph.math("MULTIPLY", left, _smooth(graph, sine, fading["flattest"], fading["flat"]))
+    left = graph.math("MULTIPLY", left, _smooth(graph, sine, 0.0, fading["flat"]))
     return graph.product(graph.node("ShaderNodeLightPath").outputs["Is Camera Ray"], graph.complement(left))
 
 

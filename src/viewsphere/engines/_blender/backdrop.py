@@ -7,10 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.engines._blender.requests import BEGIN, FLAT, FLATTER, OVER, extent
+from viewsphere.engines._blender.requests import extent
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.model.camera import Camera
 from viewsphere.model.shot import Shot
+from viewsphere.surroundings.horizon import BEGIN, FLAT, OVER
 from viewsphere.surroundings.sky import SkyPictures, sky_pictures
 from viewsphere.truth.geometry import Geometry
 from viewsphere.truth.visibility import Visibility
@@ -63,7 +64,7 @@ class Backdrop:
         """
         behind = np.where(np.isfinite(away), away, 0) - np.linalg.norm(self.middle - camera.center)
         near = np.clip(1 - (behind / self.unit - BEGIN) / OVER, 0, 1)
-        left = _smooth(near * near) * _smooth(np.clip((np.abs(rise) - FLAT + FLATTER) / FLATTER, 0, 1))
+        left = _smooth(near * near) * _smooth(np.clip(np.abs(rise) / FLAT, 0, 1))
         left[triangle < 0] = 0
         left[_widened((triangle >= 0) & (triangle < self.ground)) & (triangle < self.ground)] = 1
         return left.astype(np.float32)

@@ -19,7 +19,8 @@ from viewsphere.engines._blender.texels import Kind, Levels
 from viewsphere.model.scene import AnyLight, BlendScene, Ground, HemisphereLight, Scene
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Repaint, Thing
-from viewsphere.surroundings.ground import ground_frame, ground_material, only_scatters
+from viewsphere.surroundings.ground import ground_frame, ground_material, laid_with_slabs, only_scatters
+from viewsphere.surroundings.horizon import BEGIN, FLAT, OVER
 from viewsphere.surroundings.sky import SURROUNDINGS, SkyPictures, sky_pictures
 from viewsphere.surroundings.sun import sun_light
 from viewsphere.truth.geometry import Geometry
@@ -28,16 +29,6 @@ Put = Callable[[NDArray[Any]], str]
 """Writes an array to a file that the worker can read, and returns the file's path."""
 
 Request = dict[str, Any]
-
-BEGIN, OVER = 4.0, 26.0
-"""Distances behind the middle of all placed things, in halves of their extent: where the ground begins to fade into the sky,
-and how much farther it has faded altogether.
-"""
-
-FLAT, FLATTER = 0.09, 1 / 12
-"""Sine of the angle between view and ground below which the ground fades at any distance, and the decrease of this sine over
-which it fades altogether.
-"""
 
 ARRAYS = ("vertices", "triangles", "normals", "triangle_material", "uv0", "uv1", "colors")
 
@@ -166,6 +157,8 @@ def _ground_request(ground: Ground, geometry: Geometry, has_scenery: bool, put: 
     vertices = geometry.vertices[geometry.vertex_start[-1] :]
     triangles = geometry.triangles[geometry.triangle_start[-1] :] - geometry.vertex_start[-1]
     material, images = ground_material(ground)
+    if ground.has_slabs:
+        material, images = laid_with_slabs(material)
     per_length, u, v = ground_frame(ground, material, (0, 0, 0), 1.0)
     uv = np.stack([u + per_length * vertices[:, 0], v - per_length * vertices[:, 1]], axis=1)
     mesh = {
@@ -180,7 +173,7 @@ def _ground_request(ground: Ground, geometry: Geometry, has_scenery: bool, put: 
         "materials": [_material_request(replace(material, specular=0.0) if only_scatters(ground) else material, ())],
     }
     middle, unit = extent(geometry, has_scenery)
-    fading = {"begin": unit * BEGIN, "end": unit * (BEGIN + OVER), "flat": FLAT, "flattest": FLAT - FLATTER}
+    fading = {"begin": unit * BEGIN, "end": unit * (BEGIN + OVER), "flat": FLAT}
     return {"mesh": mesh, "catcher": ground.catcher, "middle": middle.tolist(), "fading": fading}
 
 

@@ -24,7 +24,7 @@ from viewsphere.engines.raster.still_maps import StillMaps
 from viewsphere.engines.raster.surface import Lengths, Materials, made_of, move_surfaces, pack_materials, pack_surfaces
 from viewsphere.engines.raster.thing_occlusion import TargetShades
 from viewsphere.model.scene import Ground, Scene
-from viewsphere.surroundings.ground import ground_albedo, ground_frame, ground_material, only_scatters
+from viewsphere.surroundings.ground import SLABS, ground_albedo, ground_frame, ground_material, only_scatters
 from viewsphere.surroundings.sky import even_light
 from viewsphere.truth.geometry import Geometry, with_blended_colors
 
@@ -176,11 +176,12 @@ def _floor(
 ) -> tuple[Float32, NDArray[np.float64] | None]:
     """`Baked.floor`, and the ground's mean colour; zeros and None where there is none. around: the extent of all there is."""
     if ground is None:
-        return np.zeros(12, np.float32), None
+        return np.zeros(13, np.float32), None
     made, images = ground_material(ground)
     how = 2.0 if ground.catcher else float(only_scatters(ground))
     color = linear(ground.color).tolist()
     frame = ground_frame(ground, made, lengths.origin, lengths.unit)
     middle = (np.array(around.origin) - lengths.origin) / lengths.unit
-    floor = np.array([*frame, material, how, *color, *middle, lengths.unit / around.unit], np.float32)
+    slabs = SLABS * ground.has_slabs
+    floor = np.array([*frame, material, how, *color, *middle, lengths.unit / around.unit, slabs], np.float32)
     return floor, ground_albedo(made, images)

@@ -16,14 +16,14 @@ import numba as nb
 from viewsphere.engines.raster.kernels_block import (
     BARY1, BLOCK, GX, GY, GZ, IB, IG, IR, LX, LY, LZ, NX, NY, NZ, PIXEL, PX, PY, PZ, SHARE, T0, U0, U1, V0, V1, WIDTH,
 )  # fmt: skip
-from viewsphere.engines.raster.kernels_lanes import clamp, cross, dot, lanewise, least, most, root, size, where
+from viewsphere.kernels.lanes import clamp, cross, dot, lanewise, least, most, root, size, where
 from viewsphere.engines.raster.kernels_penumbra import (
     DU, DV, FACING, NEAR, Q_, RADIUS, SOFT, STATE, U_, V_, power, search, span,
 )  # fmt: skip
 from viewsphere.engines.raster.kernels_shadow import (
     ACROSS, BIAS_FAR, BIAS_NEAR, BOUNDS_AT, CELLS, DOWN, HIGH, LOW, MIDDLE, NEAREST, READ, SHARPEST, STEP, TEXELS,
 )  # fmt: skip
-from viewsphere.engines.raster.kernels_texture import FAST
+from viewsphere.kernels.lanes import FAST
 from viewsphere.kernels.jit import inner, njit
 
 f4 = nb.float32

@@ -9,7 +9,7 @@ from numba.core import cgutils
 from numba.extending import intrinsic
 
 from viewsphere.engines.raster.kernels_block import BLOCK
-from viewsphere.engines.raster.kernels_lanes import load, scatter, spread
+from viewsphere.kernels.lanes import load, scatter, spread
 
 
 def blend(columns: int) -> Any:

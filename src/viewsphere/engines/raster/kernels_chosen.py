@@ -14,8 +14,8 @@ import numba as nb
 import numpy as np
 from llvmlite import ir
 
-from viewsphere.engines.raster.kernels_lanes import LANES, Lanes, Rows, lanewise, size, store
 from viewsphere.kernels.jit import inner, njit
+from viewsphere.kernels.lanes import LANES, Lanes, Rows, lanewise, size, store
 
 f4 = nb.float32
 U = nb.uintp

@@ -11,9 +11,8 @@ import math
 import numba as nb
 import numpy as np
 
-from viewsphere.engines.raster.kernels_lanes import clamp, dot, lanewise, least, most, root, size, where
-from viewsphere.engines.raster.kernels_texture import FAST
 from viewsphere.kernels.jit import inner, njit
+from viewsphere.kernels.lanes import FAST, clamp, dot, lanewise, least, most, root, size, where
 
 f4 = nb.float32
 i4 = nb.int32

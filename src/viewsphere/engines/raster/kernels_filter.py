@@ -14,7 +14,9 @@ from llvmlite import ir
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from viewsphere.engines.raster.kernels_lanes import (
+from viewsphere.kernels.jit import inner
+from viewsphere.kernels.lanes import (
+    FAST,
     REAL,
     Lanes,
     clamp,
@@ -29,13 +31,13 @@ from viewsphere.engines.raster.kernels_lanes import (
     store,
     where,
 )
-from viewsphere.engines.raster.kernels_texture import CLAMP, FAST, MIRROR, REPEAT
-from viewsphere.kernels.jit import inner
 
 f4 = nb.float32
 i4 = nb.int32
 u4 = nb.uint32
 U = nb.uintp
+
+REPEAT, CLAMP, MIRROR = 0, 1, 2  # what lies beyond a picture's edge
 
 CHUNK = 32
 PROBES = 8  # most probes along a footprint's longer axis

@@ -46,7 +46,10 @@ from viewsphere.engines.raster.kernels_block import (
     VY,
     VZ,
 )  # fmt: skip
-from viewsphere.engines.raster.kernels_lanes import (
+from viewsphere.engines.raster.kernels_material import L_SCENERY
+from viewsphere.kernels.jit import inner
+from viewsphere.kernels.lanes import (
+    FAST,
     clamp,
     dot,
     lanewise,
@@ -60,9 +63,8 @@ from viewsphere.engines.raster.kernels_lanes import (
     spread,
     where,
 )
-from viewsphere.engines.raster.kernels_material import L_SCENERY
-from viewsphere.engines.raster.kernels_texture import FAST
-from viewsphere.kernels.jit import inner
+from viewsphere.surroundings.horizon import BEGIN, FLAT, OVER
+from viewsphere.surroundings.kernels_slabs import shade
 
 f4 = nb.float32
 U = nb.uintp
@@ -225,6 +227,8 @@ def gather_ground(view, floor, count, b, material):
     for i in range(U(count)):
         material[i] = own
     _stand(count, view.eye, floor, b)
+    if floor[12] > f4(0):
+        _lay_slabs(count, floor, b)
 
 
 @lanewise
@@ -240,7 +244,17 @@ def _stand(eye, floor, b):
     b[U0], b[V0] = place[0] * per + floor.one(1), floor.one(2) - place[1] * per
     way = tuple(place[k] - origin[k] for k in range(3))
     middle = tuple(origin[k] - floor.one(8 + k) for k in range(3))
-    far = 1 - clamp(((root(dot(way, way)) - root(dot(middle, middle))) * floor.one(11) - 4) * (1 / 26))
+    behind = (root(dot(way, way)) - root(dot(middle, middle))) * floor.one(11)
+    far = 1 - clamp((behind - BEGIN) * (1 / OVER))
     far = 1 - far * far
-    low = least(most(0.09 - size(b[VZ]), 0) * 12, 1)
+    low = clamp((FLAT - size(b[VZ])) * (1 / FLAT))
     b[FADE] = 1 - (1 - far * far * (3 - far - far)) * (1 - low * low * (3 - low - low))
+
+
+@lanewise
+def _lay_slabs(floor, b):
+    """The slabs' shade, filtered over the mean of both axes of the ellipse that a pixel covers."""
+    slabs = floor.one(12)
+    pixel = b[PIXEL] * floor.one(0) * slabs / root(most(size(b[VZ]), 1e-4))
+    tone = shade(b[U0] * slabs, b[V0] * slabs, pixel)
+    b.put((RED, GREEN, BLUE), (tone, tone, tone))

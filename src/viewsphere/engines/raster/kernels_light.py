@@ -22,8 +22,8 @@ from viewsphere.engines.raster.kernels_block import (
     RIM, ROUGH, SHARE, SR, T0, T1, T2, T3, T4, T5, T6, T7, TAKEN, THROUGH, TRANSMISSION, UNLIT, VX, VY, VZ, WIDTH,
 )  # fmt: skip
 from viewsphere.engines.raster.kernels_environment import ABOVE, BELOW, LAMPS, SCALE, TURN
-from viewsphere.engines.raster.kernels_lanes import clamp, cross, dot, lanewise, least, most, root, size, where
-from viewsphere.engines.raster.kernels_texture import FAST
+from viewsphere.kernels.lanes import clamp, cross, dot, lanewise, least, most, root, size, where
+from viewsphere.kernels.lanes import FAST
 from viewsphere.kernels.jit import inner
 from viewsphere.imaging.view import EXPOSURE
 

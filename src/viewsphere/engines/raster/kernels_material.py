@@ -75,9 +75,8 @@ from viewsphere.engines.raster.kernels_filter import (
 from viewsphere.engines.raster.kernels_filter import ROWS as FOOTPRINT_ROWS
 from viewsphere.engines.raster.kernels_filter import VX as VXX
 from viewsphere.engines.raster.kernels_filter import VY as VYY
-from viewsphere.engines.raster.kernels_lanes import clamp, cross, dot, lanewise, least, most, root, sign, where
-from viewsphere.engines.raster.kernels_texture import FAST
 from viewsphere.kernels.jit import inner
+from viewsphere.kernels.lanes import FAST, clamp, cross, dot, lanewise, least, most, root, sign, where
 
 f4 = nb.float32
 U = nb.uintp

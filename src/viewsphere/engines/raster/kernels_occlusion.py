@@ -50,8 +50,8 @@ from viewsphere.engines.raster.kernels_block import (
     T6,
     T7,
 )  # fmt: skip
-from viewsphere.engines.raster.kernels_lanes import clamp, dot, lanewise, least, most, size, where
 from viewsphere.kernels.jit import inner, njit
+from viewsphere.kernels.lanes import clamp, dot, lanewise, least, most, size, where
 
 f4 = nb.float32
 i4 = nb.int32

@@ -35,7 +35,6 @@ from viewsphere.engines.raster.kernels_block import (
     SHARE,
 )  # isort: skip  # fmt: skip
 from viewsphere.engines.raster.kernels_gather import gather, gather_ground, locate
-from viewsphere.engines.raster.kernels_lanes import lanewise
 from viewsphere.engines.raster.kernels_light import (
     add_light,
     add_light_matte,
@@ -47,8 +46,8 @@ from viewsphere.engines.raster.kernels_light import (
 )
 from viewsphere.engines.raster.kernels_material import material
 from viewsphere.engines.raster.kernels_occlusion import occlude
-from viewsphere.engines.raster.kernels_texture import FAST
 from viewsphere.kernels.jit import inner, njit
+from viewsphere.kernels.lanes import FAST, lanewise
 
 f4 = nb.float32
 U = nb.uintp
@@ -140,8 +139,9 @@ def _finish_matte(b):
 
 @lanewise
 def _start_matte(floor, b):
+    """Ground that only scatters: its colour, and its slabs' shade, which is the same in RED, GREEN and BLUE."""
     for k, row in enumerate((BASE_R, BASE_G, BASE_B)):
-        b[row] = floor.one(5 + k)
+        b[row] = b[RED] * floor.one(5 + k)
     for row in (DR, DG, DB):
         b[row] = 0
     b[GROUND], b[AO] = 1, 1

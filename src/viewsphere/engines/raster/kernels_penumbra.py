@@ -24,13 +24,13 @@ from numba.extending import intrinsic
 from viewsphere.engines.raster.kernels_block import (
     BARY2, IB, IG, IR, OPENX, OPENY, OPENZ, T1, T2, T3, T4, T5, T6, T7, U0, U1, V0, V1,
 )  # fmt: skip
-from viewsphere.engines.raster.kernels_lanes import (
+from viewsphere.kernels.lanes import (
     LANES, REAL, WHOLE, Lanes, Rows, clamp, lanewise, least, load, most, root, size, spread, where,
 )  # fmt: skip
 from viewsphere.engines.raster.kernels_shadow import (
     BIAS_NEAR, COARSEST, DARKER, DEPTH_AT, FINE, GAP, MIDDLE, MORE, ROUND, SIDES, SIZE, SPAN_U, SPAN_V, TILT,
 )  # fmt: skip
-from viewsphere.engines.raster.kernels_texture import FAST
+from viewsphere.kernels.lanes import FAST
 from viewsphere.kernels.jit import inner
 
 f4 = nb.float32

@@ -9,8 +9,8 @@ import numpy as np
 
 from viewsphere.engines.raster.kernels_filter import opacity
 from viewsphere.engines.raster.kernels_material import L_ALPHA, L_CASTS_FROM
-from viewsphere.engines.raster.kernels_texture import FAST
 from viewsphere.kernels.jit import inner, njit
+from viewsphere.kernels.lanes import FAST
 
 f4 = nb.float32
 U = nb.uintp

@@ -27,8 +27,9 @@ _AROUND = np.array([[-1, -1, -1, 0, 0, 1, 1, 1], [-1, 0, 1, -1, 1, -1, 0, 1]], n
 class Baked:
     """All that a picture is painted from; lengths are in `unit`s from `origin`.
 
-    floor (12,): the ground's texture repeats per length, its texture coordinates at the origin, its material, 1 if the ground
-    only scatters or 2 if it is a shadow catcher, its colour; the middle of all things, and one over half their size. kind
+    floor (13,): the ground's texture repeats per length, its texture coordinates at the origin, its material, 1 if the ground
+    only scatters or 2 if it is a shadow catcher, its colour; the middle of all things, and one over
+    half their size; its slabs in a repeat, 0 for none. kind
     (T + 1,) uint8: of each triangle, see `kernels_paint`; owner (T,) int32: equal where neighbouring triangles look alike;
     see_through (T + 1,). blended: `with_blended_colors`.
     """

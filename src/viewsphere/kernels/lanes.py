@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any
 
 import numba as nb
@@ -15,7 +16,8 @@ from llvmlite import ir
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from viewsphere.engines.raster.kernels_texture import FAST
+FAST = {"contract", "arcp", "nsz", "afn", "reassoc"}
+"""The compiler's liberties with colours."""
 
 LANES = 8
 WHOLE, REAL, FLAG = ir.IntType(32), ir.FloatType(), ir.IntType(1)
@@ -135,7 +137,8 @@ class Lanes:
         """Two to the power (int32 - 127), as float32: the integers become its exponents."""
         return Lanes(self.builder, self.builder.bitcast((self * (1 << 23)).value, self._as(REAL)))
 
-    def _call(self, name: str) -> Lanes:
+    def call(self, name: str) -> Lanes:
+        """LLVM's intrinsic function of one float32, lane by lane."""
         suffix = f"v{self.value.type.count}f32"
         kind = ir.FunctionType(self.value.type, [self.value.type])
         function = cgutils.get_or_insert_function(self.builder.module, kind, f"llvm.{name}.{suffix}")
@@ -160,12 +163,17 @@ def most(a: Lanes, b: Any) -> Lanes:
 
 def root(a: Lanes) -> Lanes:
     """The square root."""
-    return a._call("sqrt")
+    return a.call("sqrt")
 
 
 def size(a: Lanes) -> Lanes:
     """The absolute value."""
-    return a._call("fabs")
+    return a.call("fabs")
+
+
+def floor(a: Lanes) -> Lanes:
+    """The greatest integer that is not greater, as float32."""
+    return a.call("floor")
 
 
 def sign(a: Lanes) -> Lanes:
@@ -231,7 +239,7 @@ class Rows:
         self.kept = kept
 
     def _at(self, row: Any) -> Any:
-        at = self.i
+        at: Any = self.i
         for part in row if isinstance(row, tuple) else (row,):
             at = self.builder.add(at, at.type(part) if isinstance(part, int) else part)
         return at
@@ -268,7 +276,7 @@ def lanewise(function: Callable[..., None] | None = None, *, exact: bool = False
     beyond the count.
     """
     if function is None:
-        return lambda f: lanewise(f, exact=exact)
+        return partial(lanewise, exact=exact)
 
     def typed(typing: Any, count: Any, *arguments: Any) -> Any:
         return nb.void(nb.intp, *arguments), code

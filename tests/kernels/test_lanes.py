@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from viewsphere.engines.raster.kernels_lanes import clamp, lanewise, least, most, root, sign, size, where
 from viewsphere.kernels.jit import njit
+from viewsphere.kernels.lanes import clamp, lanewise, least, most, root, sign, size, where
 
 ROW = 32
 A = np.random.default_rng(1).normal(0, 3, ROW).astype(np.float32)
