@@ -159,12 +159,12 @@ def test_the_ground_fades_where_blender_is_told_to():
         away, rise = np.broadcast_arrays(before + np.atleast_2d(behind), np.atleast_2d(rise))
         return backdrop._left(away, rise, camera, np.full(away.shape, backdrop.ground, np.int32))[0]
 
-    begin, end, flat, flattest = (fading[name] for name in ("begin", "end", "flat", "flattest"))
+    begin, end, flat = (fading[name] for name in ("begin", "end", "flat"))
     assert 0 < begin < end
-    assert 0 < flattest < flat < 1
+    assert 0 < flat < 1
     np.testing.assert_allclose(left([0, begin, end, 2 * end], 1.0), [1, 1, 0, 0], atol=1e-6)
-    np.testing.assert_allclose(left(0.0, [1, flat, flattest, 0]), [1, 1, 0, 0], atol=1e-6)
-    for steps in (left(np.linspace(begin, end, 9), 1.0), left(0.0, np.linspace(flat, flattest, 9))):
+    np.testing.assert_allclose(left(0.0, [1, flat, 0]), [1, 1, 0], atol=1e-6)
+    for steps in (left(np.linspace(begin, end, 9), 1.0), left(0.0, np.linspace(flat, 0, 9))):
         assert (np.diff(steps) < 0).all()
 
 

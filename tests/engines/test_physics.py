@@ -151,7 +151,7 @@ def test_lambert(elevation, what):
     expected = np.array(color) * np.array(sun.color) * sun.strength * math.sin(math.radians(elevation)) / math.pi
     if what == "ground":
         srgb = tuple(float(c) for c in encoded(np.array(color)))
-        scene = Scene(sun=sun, sky=DARK, ground=Ground(color=srgb))
+        scene = Scene(sun=sun, sky=DARK, ground=Ground(pattern="plain", color=srgb))
         light, _ = light_of(flat(cuboid((0, 0, 0), (0.5, 0.5, 0.5))), scene, camera(16, 16, 80, 0, 50, 3, (1.0, 1.0, 0)))
     else:
         # No reflectance at normal incidence: what Fresnel leaves at the grazing sun is below the tolerance seen from above.
@@ -245,7 +245,7 @@ def test_shadow_of_a_pole(azimuth, elevation):
     away = -toward_sun(sun)[:2] / np.linalg.norm(toward_sun(sun)[:2])
     middle = (*(away * reach / 2), 0.0)
     view = camera(200, 200, 200 / (reach + 0.6) * 20, 0, 90, 20, middle)
-    light, seen = light_of(pole, Scene(sun=sun, sky=DARK, ground=Ground()), view)
+    light, seen = light_of(pole, Scene(sun=sun, sky=DARK, ground=Ground(pattern="plain")), view)
     lit = light.sum(axis=-1)
     ground = seen >= len(pole.triangles)
     p = places(view, 0.0)[..., :2]
@@ -288,7 +288,7 @@ def test_whole_pictures_are_lit_where_rays_reach_the_sun(kind, azimuth, elevatio
     size = float(np.linalg.norm(mesh.bounds[1] - mesh.bounds[0]))
     sun = Sun(azimuth_deg=azimuth, elevation_deg=elevation, angle_deg=0.53)
     view = camera(320, 240, 300, azimuth - 60, 28, 1.5 * size, mesh.bounds.mean(axis=0))
-    stage = stage_of([mesh], Scene(sun=sun, sky=DARK, ground=Ground(color=(0.05, 0.05, 0.05))))  # hardly lights what is shaded
+    stage = stage_of([mesh], Scene(sun=sun, sky=DARK, ground=Ground(pattern="plain", color=(0.05, 0.05, 0.05))))  # hardly lights what is shaded
     visible = rasterize(stage.at(0), view)
     light = np.empty((320 * 240, 4), np.float32)
     paint(stage.baked(0), view, visible, False, True, light)
@@ -337,7 +337,7 @@ def test_lamps_fall_off_with_the_square_of_the_distance(kind, height):
         "spot": SpotLight(position=at, strength=3.0, radius=0.01, toward=down, angle_deg=30, blend=0.2),
         "area": AreaLight(position=at, strength=3.0, size=(0.02, 0.02), toward=down),
     }[kind]
-    scene = Scene(sun=None, sky=DARK, lights=(lamp,), ground=Ground(color=(1, 1, 1)))
+    scene = Scene(sun=None, sky=DARK, lights=(lamp,), ground=Ground(pattern="plain", color=(1, 1, 1)))
     light, _ = light_of(crumb, scene, camera(3, 3, 3000, 180, 60, 8, (0, 2.5, 0)))
     below = height + 0.5
     assert light[1, 1] == pytest.approx(3.0 / math.pi / below**2, rel=0.01)
@@ -347,7 +347,7 @@ def test_a_large_area_lamp_follows_its_form_factor():
     """A square of 2 m at 1 m: four times the closed form of a corner (Lambert 1760), per the lamp's own radiance."""
     crumb = flat(cuboid((-0.5, -0.5, 0), (0.5, 0.5, 1)))
     lamp = AreaLight(position=(0.0, 2.5, 0.5), strength=2.0, size=(2.0, 2.0), toward=(0.0, 2.5, -0.5))
-    scene = Scene(sun=None, sky=DARK, lights=(lamp,), ground=Ground(color=(1, 1, 1)))
+    scene = Scene(sun=None, sky=DARK, lights=(lamp,), ground=Ground(pattern="plain", color=(1, 1, 1)))
     light, _ = light_of(crumb, scene, camera(3, 3, 3000, 180, 60, 8, (0, 2.5, 0)))
     corner = (math.sqrt(2) * math.atan(1 / math.sqrt(2))) / (2 * math.pi)
     assert light[1, 1] == pytest.approx(4 * corner * lamp.strength / 4.0, rel=0.03)  # strength over its area is its radiance
@@ -425,7 +425,7 @@ def test_a_catcher_darkens_as_the_ground_does(lit):
         "sky": Scene(sun=None, sky=even),
     }[lit]
     view = camera(120, 90, 250, 20, 40, 4, (0, 0, 0.3))
-    ground = Ground(color=(0.5, 0.5, 0.5))
+    ground = Ground(pattern="plain", color=(0.5, 0.5, 0.5))
     plain = picture(box, scene.model_copy(update={"ground": ground, "finish": Finish(view=AS_IT_IS)}), view)
     irradiance = scene.sun.strength * math.sin(math.radians(scene.sun.elevation_deg)) if scene.sun else 0.0
     colour = encoded(linear(np.full(3, 0.5)) * (0.5 + irradiance / math.pi))
@@ -464,7 +464,7 @@ def test_the_ground_throws_back_the_light_of_lamps(kind):
         "spot": SpotLight(position=at, strength=2.0, radius=0.0, toward=down, angle_deg=160, blend=0.0),
         "area": AreaLight(position=at, strength=2.0, size=(1e-3, 1e-3), toward=down),
     }[kind]
-    ground = Ground(color=tuple(encoded(np.full(3, 0.5)).tolist()))
+    ground = Ground(pattern="plain", color=tuple(encoded(np.full(3, 0.5)).tolist()))
     stage = stage_of([plate, post], Scene(sun=None, sky=DARK, lights=(lamp,), ground=ground), ambient_occlusion="off")
     x = (np.arange(400) + 0.5) / 200 - 1
     square = (0.41 * x[:, None]) ** 2 + (0.41 * x) ** 2

@@ -255,7 +255,7 @@ BOX = box((-0.5, -0.5, 0.0), (0.5, 0.5, 1.0))
 GROUND_SCENE = Scene(
     sun=Sun(azimuth_deg=90, elevation_deg=45, strength=3.0),
     sky=DARK,
-    ground=Ground(color=(0.8, 0.8, 0.8)),
+    ground=Ground(pattern="plain", color=(0.8, 0.8, 0.8)),
     finish=Finish(background=BLACK),
 )
 
@@ -346,7 +346,7 @@ def test_size_does_not_change_the_picture(size):
     plain, scaled = (
         picture(
             mesh_of(BOX * s, material, uv0=uv, images=(image,)),
-            Scene(ground=Ground()),
+            Scene(ground=Ground(pattern="plain")),
             camera(48, 48, 40.0, 30, 25, 4 * s),
             antialias=1,
         )
@@ -358,7 +358,7 @@ def test_size_does_not_change_the_picture(size):
 
 
 def test_ground_without_objects_and_nothing_at_all():
-    shot = still_shot((), scene=Scene(ground=Ground(), finish=Finish(background=Background(color=(0, 0, 1)))))
+    shot = still_shot((), scene=Scene(ground=Ground(pattern="plain"), finish=Finish(background=Background(color=(0, 0, 1)))))
     view = camera(16, 16, 16.0, elevation=45, distance=3.0)
     for scene, expected in ((shot.scene, False), (shot.scene.model_copy(update={"ground": None}), True)):
         stage = raster.stage(shot.model_copy(update={"scene": scene}), lambda _: pytest.fail("nothing to load"))
@@ -369,7 +369,7 @@ def test_ground_without_objects_and_nothing_at_all():
 
 def test_two_runs_are_equal_byte_for_byte():
     mesh = mesh_of(BOX, Material(metallic=0.5, roughness=0.3, clearcoat=1.0))
-    scene = Scene(ground=Ground())
+    scene = Scene(ground=Ground(pattern="plain"))
     view = camera(64, 48, 60.0, 30, 20, 4.0)
     assert picture(mesh, scene, view).tobytes() == picture(mesh, scene, view).tobytes()
 
