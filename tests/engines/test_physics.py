@@ -288,7 +288,9 @@ def test_whole_pictures_are_lit_where_rays_reach_the_sun(kind, azimuth, elevatio
     size = float(np.linalg.norm(mesh.bounds[1] - mesh.bounds[0]))
     sun = Sun(azimuth_deg=azimuth, elevation_deg=elevation, angle_deg=0.53)
     view = camera(320, 240, 300, azimuth - 60, 28, 1.5 * size, mesh.bounds.mean(axis=0))
-    stage = stage_of([mesh], Scene(sun=sun, sky=DARK, ground=Ground(pattern="plain", color=(0.05, 0.05, 0.05))))  # hardly lights what is shaded
+    stage = stage_of(
+        [mesh], Scene(sun=sun, sky=DARK, ground=Ground(pattern="plain", color=(0.05, 0.05, 0.05)))
+    )  # hardly lights what is shaded
     visible = rasterize(stage.at(0), view)
     light = np.empty((320 * 240, 4), np.float32)
     paint(stage.baked(0), view, visible, False, True, light)
