@@ -138,7 +138,7 @@ def test_circles_are_refused(write):
         ("[0]=3", r"--set \[0\]: expected a field"),
         ("models[7].count=3", r"--set models\[7\].count: expected an index below 2; found 7"),
         ("name.x=3", r"--set name.x: expected a mapping to set x in; found 'base'"),
-        ("viewpoints.elevation=[1,", r"--set viewpoints.elevation:1: expected YAML"),
+        ("viewpoints.elevation=[1,", r"--set viewpoints.elevation:1: expected an end of the list"),
         ("viewpoints.elevation=[100]", r"--set viewpoints.elevation: expected elevations of -90 to 90"),
         ("viewpoints.elevatoin=3", r"--set viewpoints.elevatoin: .*did you mean 'elevation'"),
     ],
