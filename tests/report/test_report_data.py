@@ -202,6 +202,8 @@ def test_colours_of_depth_normals_and_coordinates(small_dataset):
     assert picture[0, 0].tolist() == [253, 231, 37, 255]
     assert picture[0, 1].tolist() == [68, 1, 84, 255]
     assert picture[0, 2, 3] == 0
+    street = np.array([[1.0, 10.0, *([100.0] * 98)]], np.float32)
+    assert depth_colors(street)[2][0, 1].tolist() == [33, 144, 141, 255], "halfway by factors of distance"
     towards = normal_colors(np.array([[[0, 0, -1], [0, 0, 0]]], np.float32))
     assert towards[0, 0].tolist() == [128, 128, 255, 255]
     assert towards[0, 1, 3] == 0

@@ -19,6 +19,8 @@ from viewsphere.labels import Extent
 from viewsphere.labels._state import picture as state_colors
 from viewsphere.labels._wheel import longest_of
 from viewsphere.labels._wheel import picture as flow_colors
+from viewsphere.labels.depth import extent as depth_extent
+from viewsphere.labels.depth import nearness
 from viewsphere.labels.disparity import extent as disparity_extent
 from viewsphere.labels.motion_boundaries import COLOR as BOUNDARY
 from viewsphere.model.channel import picture_of
@@ -187,14 +189,9 @@ def webp(picture: Picture, quality: int) -> str:
 
 
 def depth_colors(depth: NDArray[np.float32]) -> tuple[float, float, Picture]:
-    """Near and far metres, and the depth between them in viridis, near light, (H, W, 4); clear where nothing is hit.
-
-    Far is the 98th percentile, so that a ground plane up to the horizon leaves colours for the objects.
-    """
-    hit = np.isfinite(depth)
-    near, far = (float(v) for v in np.percentile(depth[hit], (0, 98))) if hit.any() else (0.0, 0.0)
-    share = np.clip((np.where(hit, depth, far) - near) / max(far - near, 1e-9), 0, 1)
-    return near, far, _rgba(viridis(1 - share), hit)
+    """Near and far metres, and the depth between them in viridis, near light, (H, W, 4); clear where nothing is hit."""
+    near, far = depth_extent(depth)
+    return near, far, _rgba(viridis(nearness(depth, (near, far))), np.isfinite(depth))
 
 
 def viridis(share: NDArray[np.floating]) -> Picture:

@@ -76,7 +76,8 @@ export function legend(frame) {
   const layer = surfaceLayer(frame)?.name;
   if (layer === "depth") {
     const [near, far] = frame.layers.depthRange;
-    return [`${decimal(near)} m`, el("i", { class: "viridis" }), `${decimal(far)} m and farther`];
+    const middle = Math.sqrt(Math.max(near, 0.01) * far);  // equal factors of distance are equal steps of colour
+    return [`${decimal(near)} m`, el("i", { class: "viridis" }), `${decimal(far)} m and farther, the middle is ${decimal(middle)} m`];
   }
   if (layer === "disparity") {
     const [near, far] = frame.layers.disparityRange;
