@@ -27,7 +27,6 @@ from PIL import Image
 from viewsphere import plugins
 from viewsphere.assets.export import export_glb
 from viewsphere.assets.mesh import Material, Mesh
-from viewsphere.assets.srgb import linear
 from viewsphere.blender.interpreter import find_blender
 from viewsphere.engines import Engine
 from viewsphere.errors import ViewsphereError
@@ -41,6 +40,7 @@ from viewsphere.model.scene import AreaLight, Environment, Ground, PointLight, S
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Motion, Thing
 from viewsphere.sampling.camera import looking
+from viewsphere.surroundings.ground import ground_material, laid_with_slabs
 from viewsphere.truth.visibility import rasterize
 from viewsphere.zoo import build
 
@@ -133,6 +133,15 @@ def shot_of(case: Case) -> tuple[Shot, dict[str, Mesh]]:
     return shot, meshes
 
 
+def floor(ground: Ground, folder: Path) -> dict[str, Any]:
+    """The slabs as a picture that repeats, which Cycles needs: the file, the linear colour that multiplies it, and metres."""
+    material, (picture,) = laid_with_slabs(ground_material(ground)[0])
+    assert material.base_color_texture is not None
+    file = folder / "slabs.png"
+    Image.fromarray(picture.pixels).save(file)
+    return {"image": str(file), "color": material.base_color[:3], "repeat": ground.tile / material.base_color_texture.scale[0]}
+
+
 def describe(case: Case, folder: Path) -> None:
     """Write the scene for compare_cycles.py."""
     shot, meshes = shot_of(case)
@@ -148,7 +157,7 @@ def describe(case: Case, folder: Path) -> None:
     told = {
         "camera": {**lens, "R": camera.R.tolist(), "center": camera.center.tolist()},
         "models": models,
-        "ground": scene.ground and {"z": float(low), "color": linear(scene.ground.color).tolist()},
+        "ground": scene.ground and {"z": float(low), **floor(scene.ground, folder)},
         "lights": sun + [light.model_dump() for light in scene.lights],
         "centre": shot.instants[0].focus,
         "sky": scene.sky.model_dump(),

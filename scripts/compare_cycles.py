@@ -48,7 +48,7 @@ def add_model(scene, file, matrix):
             node.matrix_world = Matrix(matrix) @ node.matrix_world
 
 
-def add_ground(scene, z, color, size=2000.0):
+def add_ground(scene, z, image, color, repeat, size=2000.0):
     mesh = bpy.data.meshes.new("ground")
     mesh.from_pydata([(-size, -size, z), (size, -size, z), (size, size, z), (-size, size, z)], [], [(0, 1, 2, 3)])
     material = bpy.data.materials.new("ground")
@@ -56,7 +56,15 @@ def add_ground(scene, z, color, size=2000.0):
     tree = material.node_tree
     tree.nodes.clear()
     diffuse, output = tree.nodes.new("ShaderNodeBsdfDiffuse"), tree.nodes.new("ShaderNodeOutputMaterial")
-    diffuse.inputs["Color"].default_value = (*color, 1)
+    place, picture = tree.nodes.new("ShaderNodeNewGeometry"), tree.nodes.new("ShaderNodeTexImage")
+    picture.image = bpy.data.images.load(image, check_existing=True)
+    in_repeats, tinted = tree.nodes.new("ShaderNodeVectorMath"), tree.nodes.new("ShaderNodeVectorMath")
+    in_repeats.operation = tinted.operation = "MULTIPLY"
+    in_repeats.inputs[1].default_value, tinted.inputs[1].default_value = (1 / repeat,) * 3, color
+    tree.links.new(place.outputs["Position"], in_repeats.inputs[0])
+    tree.links.new(in_repeats.outputs[0], picture.inputs["Vector"])
+    tree.links.new(picture.outputs["Color"], tinted.inputs[0])
+    tree.links.new(tinted.outputs[0], diffuse.inputs["Color"])
     tree.links.new(diffuse.outputs[0], output.inputs["Surface"])
     mesh.materials.append(material)
     scene.collection.objects.link(bpy.data.objects.new("ground", mesh))
@@ -118,7 +126,7 @@ def main():
         for model in told["models"]:
             add_model(scene, model["file"], model["matrix"])
         if told["ground"]:
-            add_ground(scene, told["ground"]["z"], told["ground"]["color"])
+            add_ground(scene, **told["ground"])
         for light in told["lights"]:
             add_light(scene, light, told["centre"])
         add_world(scene, told["sky"])

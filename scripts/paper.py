@@ -1,4 +1,4 @@
-"""The pictures of docs/paper.md and two sheets of docs/gallery.md, made anew from the recipes."""
+"""The pictures of docs/paper.md, made anew from the recipes, and those of docs/gallery.md that sheets.py does not make."""
 
 from __future__ import annotations
 
@@ -6,13 +6,14 @@ import colorsys
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-from viewsphere import Recipe
+from viewsphere import Recipe, render
 from viewsphere.geometry.box import EDGES, FACES
 from viewsphere.labels._paint import PALETTE
 from viewsphere.model.camera import Camera, Intrinsics
@@ -70,13 +71,13 @@ def frames(made_of: Recipe, picks: Sequence[Pick]) -> list[Sample]:
         pose = int(np.abs(table - wanted).sum(axis=1).argmin())
         if tuple(table[pose]) != wanted:
             raise SystemExit(f"{made_of.name}: expected a pose at {wanted}; the nearest is {tuple(table[pose])}")
-        samples += stages.render(planned.take(pick.model, [pose], stages.box))
+        samples += stages.render(planned.take(planned.model_specs[pick.model].key, [pose], stages.box))
     return samples
 
 
-def save(name: str, picture: Picture) -> None:
+def save(name: str, picture: Picture, quality: int = 85) -> None:
     file = IMAGES / name
-    Image.fromarray(np.asarray(picture)).save(file, quality=85, optimize=True)
+    Image.fromarray(np.asarray(picture)).save(file, quality=quality, optimize=True)
     height, width = picture.shape[:2]
     print(f"{file.relative_to(ROOT)}: {width} x {height}, {file.stat().st_size // 1000} kB")
 
@@ -370,7 +371,7 @@ def fig3() -> None:
         tiles += [crop(s.rgb, s.objects[0], size) for s in samples]
         masks = [np.repeat(np.where(s.objects[0].mask, 255, 0).astype(np.uint8)[..., None], 3, axis=2) for s in samples]
         tiles += [crop(m, s.objects[0], size) for m, s in zip(masks, samples, strict=True)]
-    save("paper_fig3.jpg", grid(tiles, 3, 3 * size[0] + 2 * GAP))
+    save("paper_fig3.jpg", grid(tiles, 3, 3 * size[0] + 2 * GAP), quality=80)
 
 
 # Places, distractors (company), billboards (planes)
@@ -416,7 +417,7 @@ def labelled(sample: Sample) -> Picture:
 
 def chairs() -> None:
     """Two or three chairs in one picture, and chairs before billboards."""
-    plane = {"image": str(IMAGES / "zoo_neighbourhood.png"), "height": 1.3, "at": [0.1, 1.0, 10]}
+    plane = {"image": str(IMAGES / "zoo_neighbourhood.jpg"), "height": 1.3, "at": [0.1, 1.0, 10]}
     samples = []
     for pick, changes in (
         (Pick(0, 30, 20, 4), {"scene.company": 1}),
@@ -428,33 +429,49 @@ def chairs() -> None:
     save("paper_chairs.jpg", grid([s.rgb for s in samples] + [labelled(s) for s in samples], 4))
 
 
-# The gallery's families that have no other sheet
+# The gallery
 
 
-def sheet(family: str, azimuth: float, distance: float) -> None:
+def family(name: str, azimuth: float = 35, fill: float = 0.85) -> None:
     """Twenty draws of a family."""
     made_of = Recipe(
-        name=family,
-        models=[{"source": f"zoo:{family}", "count": 20}],
-        viewpoints={"azimuth": azimuth, "elevation": 15, "distance": distance},
+        name=name,
+        models=[{"source": f"zoo:{name}", "count": 20}],
+        viewpoints={"azimuth": azimuth, "elevation": 15, "distance": {"fill": fill}},
         camera={"size": [320, 240], "fov_deg": 30},
         scene={"ground": "on"},
     )
-    tiles = [s.rgb for s in frames(made_of, [Pick(m, azimuth, 15, distance) for m in range(20)])]
-    save(f"zoo_{family}.jpg", grid(tiles, 5))
+    save(f"zoo_{name}.jpg", grid([s.rgb for s in render(made_of)], 5))
 
 
-def cars() -> None:
-    sheet("car", 35, 10)
+def neighbourhood() -> None:
+    """Cars on six streets."""
+    picks = [Pick(17, 40, 8, 9), Pick(61, 280, 8, 9), Pick(39, 190, 15, 12),
+             Pick(8, 330, 40, 16), Pick(50, 60, 8, 9), Pick(84, 140, 40, 9)]  # fmt: skip
+    samples = frames(recipe("car", {**STREET, "scene": {"place": "zoo:neighbourhood"}}), picks)
+    save("zoo_neighbourhood.jpg", grid([s.rgb for s in samples], 3, 1276))
 
 
-def hair_driers() -> None:
-    sheet("hair_drier", 50, 0.95)
+def engines() -> None:
+    """Five chairs by the raster engine and by Cycles, whose Python VIEWSPHERE_BLENDER_PYTHON names; one row an engine."""
+    picks = [Pick(0, 30, 20, 4), Pick(1, 60, 10, 4), Pick(2, 140, 30, 4), Pick(3, 20, 40, 4), Pick(4, 110, 20, 4)]
+    camera = {"size": [128, 128], "fov_deg": 19}
+    tiles = []
+    for engine in ("raster", {"name": "cycles", "quality": "draft"}, {"name": "cycles", "quality": "final"}):
+        samples = frames(recipe("chair", {"camera": camera, "engine": engine}), picks)
+        tiles.append(np.concatenate([s.rgb for s in samples], axis=1))
+    save("cycles_chairs.jpg", np.concatenate(tiles).repeat(2, axis=0).repeat(2, axis=1))
 
 
 PICTURES: dict[str, Callable[[], None]] = {
-    f.__name__: f for f in (car, bike, chair, boat, hairdryer, fig1, fig2, fig3, street, chairs, cars, hair_driers)
+    **{f.__name__: f for f in (neighbourhood, car, bike, chair, boat, hairdryer, fig1, fig2, fig3, street, chairs, engines)},
+    "zoo_car": partial(family, "car"),
+    "zoo_bicycle": partial(family, "bicycle", 50),
+    "zoo_chair": partial(family, "chair"),
+    "zoo_boat": partial(family, "boat", fill=0.65),
+    "zoo_hair_drier": partial(family, "hair_drier", 50),
 }
+"""What makes each picture; the pictures on the chairs' billboards are made first."""
 
 
 def main() -> None:

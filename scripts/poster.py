@@ -27,8 +27,8 @@ PANELS = {
 }
 COLUMNS, WIDTH, GAP = 3, 462, 7
 """Panels in a row, and pixels: of a panel, and between two."""
-WORDS = 26
-"""Height of the letters: they are read at a third of the size, too."""
+WORDS = 38
+"""Height of the letters, which are read on a phone, too, at a third of the size."""
 
 
 def panel(sample: Sample, name: str) -> Image.Image:
@@ -37,9 +37,10 @@ def panel(sample: Sample, name: str) -> Image.Image:
     picture = Image.fromarray(np.ascontiguousarray(drawn[:, -WIDTH:]))  # what is drawn beside a picture is at its right
     font = ImageFont.load_default(size=WORDS)
     pen = ImageDraw.Draw(picture, "RGBA")
-    left, top, right, bottom = pen.textbbox((14, 8), name, font=font)
+    at = (12, 3)
+    left, top, right, bottom = pen.textbbox(at, name, font=font)
     pen.rounded_rectangle((left - 9, top - 7, right + 9, bottom + 8), radius=8, fill=(20, 22, 26, 190))
-    pen.text((14, 8), name, font=font, fill="white")
+    pen.text(at, name, font=font, fill="white")
     return picture
 
 
