@@ -2,10 +2,12 @@
 its numbers are those of the plans, its fields are in the exports, its pictures are there.
 """
 
+import importlib
 import json
 import os
 import re
 import shlex
+import sys
 from itertools import pairwise
 
 import numpy as np
@@ -19,6 +21,9 @@ from viewsphere.check import check
 from viewsphere.cli.arguments import load_recipe
 from viewsphere.model.sample import ObjectAnnotation
 from viewsphere.recipe.file import read
+
+sys.path.insert(0, str(ROOT / "scripts"))
+paper = importlib.import_module("paper")
 
 PAGE = (ROOT / "docs" / "paper.md").read_text("utf-8")
 SETS = ("car_poses", "bike_poses", "chair_poses", "boat_poses", "hairdryer_poses")
@@ -153,6 +158,16 @@ def test_the_page_s_pictures_are_there_and_not_too_large():
     known = re.findall(r"^def (\w+)\(\) -> None:", (ROOT / "scripts" / "paper.py").read_text("utf-8"), re.MULTILINE)
     made = {name.removeprefix("images/paper_").removesuffix(".jpg") for name in re.findall(r"images/paper_\w+\.jpg", PAGE)}
     assert made and made <= set(known)
+
+
+def test_the_page_s_script_picks_frames_by_model_and_viewpoint():
+    made_of = paper.recipe("hairdryer", {"camera.size": [64, 48]})
+    (sample,) = paper.frames(made_of, [paper.Pick(3, 20, 10, 4)])
+    (o,) = sample.objects
+    assert o.key == "hair_drier_003"
+    assert (o.view.azimuth_deg, o.view.elevation_deg, o.view.distance) == pytest.approx((20, 10, 4))
+    with pytest.raises(SystemExit, match="expected a pose"):
+        paper.frames(made_of, [paper.Pick(3, 21, 10, 4)])
 
 
 def framing(dataset):
