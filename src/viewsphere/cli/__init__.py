@@ -5,6 +5,7 @@ Worker processes import the main program again: so commands are imported only wh
 
 from __future__ import annotations
 
+import errno
 import os
 import sys
 from io import TextIOWrapper
@@ -38,6 +39,11 @@ def main() -> None:
         complain(error, 2)
     except ViewsphereError as error:
         complain(error, 3)
+    except OSError as error:
+        if error.errno not in {errno.ENAMETOOLONG, errno.ELOOP}:
+            raise
+        problem = f"expected a path that the file system takes, found: {error.strerror}: choose another"
+        complain(UserError(f"{error.filename}: {problem}"), 2)
     except KeyboardInterrupt:
         sys.exit(130)
 

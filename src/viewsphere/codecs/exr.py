@@ -13,6 +13,7 @@ from isal import isal_zlib
 from numpy.typing import NDArray
 
 from viewsphere.codecs.deflate import compressed
+from viewsphere.codecs.size import check_size
 from viewsphere.errors import UserError
 
 _MAGIC = struct.pack("<II", 20000630, 2)
@@ -85,6 +86,7 @@ def decode_exr(data: bytes) -> NDArray[Any]:
     Raises UserError when the file is damaged or was written by another program.
     """
     width, height, components, dtype, position = _layout(data)
+    check_size(width, height)
     blocks = -(-height // _LINES)
     table, position = position, position + 8 * blocks
     places: list[int] = []

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from viewsphere.codecs.size import opened
 from viewsphere.errors import MissingExtraError
 
 Picture = NDArray[np.uint8]
@@ -54,7 +55,8 @@ def _by_pillow(array: Picture, kind: str, **options: Any) -> bytes:
 def decode_picture(data: bytes, components: int) -> Picture:
     """The picture in a file of any kind, (H, W, components) with 3 or 4 of them.
 
-    Raises OSError, ValueError or SyntaxError for a damaged file, MissingExtraError where its codec is not installed.
+    Raises OSError, ValueError or SyntaxError for a damaged file, UserError for one beyond MAX_STORED_PIXELS, MissingExtraError
+    where its codec is not installed.
     """
     from PIL import Image
 
@@ -64,7 +66,7 @@ def decode_picture(data: bytes, components: int) -> Picture:
         return _decoded("QOI", "qoi_decode", data, components)
     if data[:2] == b"\xff\x0a" or data[:12] == b"\0\0\0\x0cJXL \r\n\x87\n":
         return _decoded("JPEG XL", "jpegxl_decode", data, components)
-    with Image.open(io.BytesIO(data)) as image:
+    with opened(io.BytesIO(data)) as image:
         if image.mode.startswith("I"):  # 16 bits of grey, which Pillow would cut off above 255
             grey = Image.fromarray((np.asarray(image) >> 8).astype(np.uint8))
             return np.asarray(grey.convert("RGBA" if components == 4 else "RGB"))

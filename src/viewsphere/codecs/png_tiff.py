@@ -17,6 +17,7 @@ from isal import isal_zlib
 from numpy.typing import NDArray
 
 from viewsphere.codecs.deflate import compressed, deflate
+from viewsphere.codecs.size import check_size
 from viewsphere.errors import UserError
 
 _SIGNATURE = b"\x89PNG\r\n\x1a\n"
@@ -140,6 +141,7 @@ def _png_pixels(header: bytes, body: bytes) -> NDArray[Any]:
     stride = (width * depth * components + 7) // 8
     if not components or depth not in (1, 8, 16):
         raise UserError(_FOREIGN_PNG)
+    check_size(width, height)
     lines = np.frombuffer(_inflated(body, height * (1 + stride), "PNG"), np.uint8).reshape(height, -1)
     sub = depth == 8
     if np.any(lines[:, 0] != (_SUB if sub else 0)):
@@ -154,7 +156,7 @@ def _png_pixels(header: bytes, body: bytes) -> NDArray[Any]:
 
 def _inflated(body: bytes, expected: int, kind: str) -> bytes:
     try:
-        pixels = isal_zlib.decompress(body)
+        pixels = isal_zlib.decompressobj().decompress(body, max_length=expected + 1)
     except isal_zlib.error as error:  # pyright: ignore[reportGeneralTypeIssues]
         raise UserError(f"{kind}: expected deflated pixels, found damage ({error})") from error
     if len(pixels) != expected:
@@ -235,6 +237,7 @@ def decode_tiff(data: bytes) -> NDArray[Any]:
         raise UserError(_FOREIGN_TIFF) from error
     if data[:offset] != head:
         raise UserError(_FOREIGN_TIFF)
+    check_size(width, height)
     pixels = _inflated(data[offset:], 4 * height * width * components, "TIFF")
     shape = (height, width) if components == 1 else (height, width, components)
     return np.frombuffer(pixels, dtype.newbyteorder("<")).reshape(shape).astype(dtype)

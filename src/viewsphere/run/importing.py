@@ -48,7 +48,7 @@ def import_dataset(
     store.open_for(record)
     with store.occupied():
         for model in foreign.models:
-            link_model(store, model.info.key, model.info, sorted(f for f in model.folder.iterdir() if f.is_file()))
+            link_model(store, model.info.key, model.info, model.files)
         _link_frames(foreign, store, record, listener)
         write_credits(Dataset(out))
     return foreign

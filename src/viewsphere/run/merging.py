@@ -26,6 +26,7 @@ from viewsphere.store.credits import write_credits
 from viewsphere.store.foreign import ForeignFrame
 from viewsphere.store.index import length
 from viewsphere.store.linking import link_model, link_shot
+from viewsphere.store.paths import files_inside
 
 
 @dataclass(frozen=True, eq=False)
@@ -280,7 +281,7 @@ def _link_models(source: _Source, store: Store, credits: Mapping[str, Credit]) -
     for info in source.dataset.models:
         if not info.track:
             key, category = source.model_keys[info.key], _of(source.categories[info.category_id])
-            files = sorted(source.dataset.path(info.obj).parent.iterdir())
+            files = files_inside(source.dataset.root, source.dataset.path(info.obj).parent)
             link_model(store, key, info, files, **category, credit=credits.get(key))
 
 

@@ -273,7 +273,7 @@ def _serve(pipe: Connection, root: Path, portion: Portion) -> None:
 
     keep_freed_memory()
     worker = Worker(root, portion)
-    with suppress(EOFError, BrokenPipeError):
+    with suppress(EOFError, ConnectionError):  # the parent is gone, with or without unread answers
         while True:
             job: Job = pipe.recv()
             try:

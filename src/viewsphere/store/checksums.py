@@ -21,7 +21,10 @@ from typing import Any
 
 import xxhash
 
+from viewsphere.errors import StoreError
 from viewsphere.store.manifest import seal_of
+from viewsphere.store.paths import file_inside
+from viewsphere.store.texts import parsed
 
 CHECKSUMS = "checksums.xxh128"
 """Name of the file in an export's folder."""
@@ -75,7 +78,7 @@ def _said(folder: Path, mark: str) -> Any:
     """What a line at the list's head says; None where there is no such line, or no list that can be read."""
     with suppress(OSError, ValueError), (folder / CHECKSUMS).open(encoding="utf-8") as file:
         head = takewhile(lambda line: line.startswith("# "), file)
-        return next((json.loads(line.removeprefix(mark)) for line in head if line.startswith(mark)), None)
+        return next((parsed(line.removeprefix(mark)) for line in head if line.startswith(mark)), None)
     return None
 
 
@@ -84,10 +87,10 @@ def damaged_files(folder: Path) -> Iterator[str]:
     try:
         listed = sum(1 for _ in _lines(folder))  # the list itself is proved first
         for digest, path in _lines(folder):
-            found = _digest(folder / path)
+            found = _digest(file_inside(folder, path))
             if found != digest:
                 yield f"{path}: expected digest {digest[:12]}, found {(found and found[:12]) or 'no such file'}: {AGAIN}"
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, StoreError) as error:
         yield f"{CHECKSUMS}: expected the digests of all files, found {error}: {AGAIN}"
         return
     there = sum(1 for _ in _files(folder))

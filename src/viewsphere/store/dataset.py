@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import json
 import os
 from bisect import bisect_right
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache, partial
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any, overload
 
 from numpy.typing import NDArray
@@ -27,9 +26,11 @@ from viewsphere.store.folder import Store
 from viewsphere.store.index import Row
 from viewsphere.store.linking import link_file
 from viewsphere.store.manifest import MANIFEST, Manifest
+from viewsphere.store.paths import file_inside, files_inside, names
 from viewsphere.store.point_tracks import PointTracks, joined
 from viewsphere.store.records import Category, ModelInfo
 from viewsphere.store.sample_records import ShotRecords, from_whole_sample
+from viewsphere.store.texts import parsed
 
 
 class Dataset(Shown, Sequence[Sample]):
@@ -218,8 +219,10 @@ class Dataset(Shown, Sequence[Sample]):
     def _read_records(self, key: str) -> _Records:
         file = self.store.shot_folder(key) / "frames.json"
         try:
-            records: list[dict[str, Any]] = json.loads(file.read_text("utf-8"))
+            records: list[dict[str, Any]] = parsed(file.read_bytes())
             row = self.plan.find(key)
+            if not isinstance(records, list) or not all(isinstance(record, dict) for record in records):
+                raise ValueError("no list of records")
             if row is None or len(records) != row.count:
                 raise ValueError(f"{len(records)} frames instead of {row and row.count}")
             is_short = any("camera" not in record for record in records)
@@ -228,8 +231,11 @@ class Dataset(Shown, Sequence[Sample]):
         shot = self.store.labelled(key) if is_short else None
         if shot is None:
             return _Records(file, records)
-        kept = ShotRecords(shot, self._facts, str(file), str(self.root))
-        return _Records(file, records, kept, self.store.channel_files(key, shot))
+        try:
+            files = self.store.channel_files(key, shot)
+        except LookupError as error:
+            raise _damaged(file.with_name("shot.json"), error) from None
+        return _Records(file, records, ShotRecords(shot, self._facts, str(file), str(self.root)), files)
 
     def _model_facts(self, key: str, frame: int | None) -> ModelInfo:
         info = self._info(key)
@@ -242,14 +248,22 @@ class Dataset(Shown, Sequence[Sample]):
         try:
             if "camera" in record or records.shot is None:
                 files: dict[str, str] = record["files"] | self._supplied(record)
-                return from_whole_sample(record, _ChannelFiles(self.root, files, self._manifests), files)
+                return self._named(from_whole_sample(record, _ChannelFiles(self.root, files, self._manifests), files))
             kept, number = records.shot.kept(place), f"{record['index']:08d}"
             files = {name: head + number + tail for name, head, tail in records.files if name in kept}
             supplied = self._supplied(record)
             files |= {name: file for name, file in supplied.items() if records.shot.keeps(place, name)}
-            return records.shot.sample(place, record, _ChannelFiles(self.root, files, self._manifests), files)
+            return self._named(records.shot.sample(place, record, _ChannelFiles(self.root, files, self._manifests), files))
         except (LookupError, TypeError, ValueError, AttributeError) as error:
             raise _damaged(records.file, error) from None
+
+    def _named(self, sample: Sample) -> Sample:
+        """A sample whose names may stand in an export's paths; raises ValueError for any other."""
+        if sample.split not in self.splits:
+            raise ValueError(f"split {sample.split!r:.100} where one of the plan's is expected")
+        names([*sample.files], "channel")
+        names([name for o in sample.objects for name in (o.key, o.track) if name], "the key")
+        return sample
 
     def _supplied(self, record: dict[str, Any]) -> dict[str, str]:
         """Files of channels that were added to a frame later."""
@@ -269,20 +283,22 @@ class Dataset(Shown, Sequence[Sample]):
         return tuple(Files.model_validate(part.recipe.get("files", {})) for part in self.plan.parts)
 
     def path(self, relative: str) -> Path:
-        """A file of the data set."""
-        return self.root / relative
+        """A file of the data set; raises StoreError for a path that leads out of it."""
+        return file_inside(self.root, relative)
 
     def link(self, relative: str, destination: Path) -> None:
-        """Put a stored file at `destination`: a hard link, else a reflink, else a copy; `link_kinds` says which."""
+        """Put a stored file at `destination`: a hard link, else a reflink, else a copy; `link_kinds` says which. Raises
+        StoreError for a path that leads out of the data set.
+        """
         destination.parent.mkdir(parents=True, exist_ok=True)
-        self.link_kinds.add(link_file(self.root / relative, destination))
+        self.link_kinds.add(link_file(self.path(relative).resolve(), destination))
 
     def model_files(self) -> Iterator[tuple[str, str]]:
         """Every finished model's OBJ, GLB, materials and textures: `<key>/<name>`, and the path from the data set's root. A
         model that deforms comes with all its time steps.
         """
         for key, folder in {info.track or info.key: self.path(info.obj).parent for info in self.models}.items():
-            for file in sorted(folder.iterdir()):
+            for file in files_inside(self.root, folder):
                 if file.name not in {"model.json", MANIFEST}:
                     yield f"{key}/{file.name}", file.relative_to(self.root).as_posix()
 
@@ -324,7 +340,7 @@ class _ChannelFiles(Mapping[str, NDArray[Any]]):
 
     def __getitem__(self, name: str) -> NDArray[Any]:
         if name not in self._arrays:
-            file = self._root / self._files[name]
+            file = file_inside(self._root, self._files[name])
             if name not in channels():
                 raise StoreError(f"{file}: expected a label that is installed, found {name!r}: install the package that has it")
             folder, inside = _parted(self._files[name])
@@ -349,8 +365,8 @@ def _manifest_of(root: Path, folder: str) -> Manifest:
 
 def _parted(file: str) -> tuple[str, str]:
     """A channel's file by its shot's folder, and by its path there."""
-    folder, channel, name = file.rsplit("/", 2)
-    return folder, f"{channel}/{name}"
+    path = PurePosixPath(file)
+    return path.parent.parent.as_posix(), f"{path.parent.name}/{path.name}"
 
 
 def _damaged(file: Path, error: Exception) -> StoreError:

@@ -14,10 +14,12 @@ from itertools import chain
 from pathlib import Path
 from typing import Any
 
+from pydantic import ValidationError
+
 from viewsphere.errors import StoreError
 from viewsphere.labels import channels
 from viewsphere.model.files import Files
-from viewsphere.model.mistakes import different
+from viewsphere.model.mistakes import different, first_of
 from viewsphere.model.sample import Sample
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
@@ -25,8 +27,10 @@ from viewsphere.store.channel_files import encode
 from viewsphere.store.index import Row
 from viewsphere.store.manifest import MANIFEST, Manifest, Seal, digest, refuse_another, seal_of
 from viewsphere.store.moving import move
+from viewsphere.store.paths import file_inside
 from viewsphere.store.records import ModelInfo, PlanRecord
 from viewsphere.store.sample_records import short_sample, whole_sample
+from viewsphere.store.texts import parsed
 
 OLD_MODEL = "old model~"
 """Begins the name of a model's folder that another takes the place of."""
@@ -265,11 +269,19 @@ class Store:
         self._write_atomically(self.root / name, text)
 
     def skipped(self) -> dict[str, str]:
-        """Models and shots that were left out at the user's wish, and why."""
+        """Models and shots that were left out at the user's wish, and why; raises StoreError if that cannot be read."""
+        file = self.folder / "skipped.json"
         try:
-            return json.loads((self.folder / "skipped.json").read_text("utf-8"))
+            found: dict[Any, Any] = parsed(file.read_bytes())
+            if not isinstance(found, dict) or not all(isinstance(text, str) for text in found.values()):
+                raise ValueError("no object of texts")
+            return found
         except FileNotFoundError:
             return {}
+        except (OSError, ValueError) as error:
+            raise StoreError(
+                f"{file}: expected what was left out and why, found {error}: delete it, and render again"
+            ) from None
 
     def write_shot(
         self,
@@ -337,7 +349,7 @@ class Store:
         """A finished shot as it was rendered, otherwise as `labelled`."""
         shot, file = self.labelled(key), self.shot_folder(key) / "scenery.json"
         try:
-            scenery = json.loads(self.scenery(key) or '{"things": []}')["things"]
+            scenery = parsed(self.scenery(key) or '{"things": []}')["things"]
             around = tuple(Thing.model_validate(thing) for thing in scenery)
         except (OSError, LookupError, TypeError, ValueError) as error:
             raise _no_scene(file, error) from None
@@ -345,7 +357,8 @@ class Store:
 
     def known_of(self, key: str) -> list[Path]:
         """The files that say what a finished shot's scene was."""
-        files = (self.shot_folder(key) / name for name in ("scenery.json", "shot.json"))
+        folder = self.shot_folder(key).relative_to(self.root).as_posix()
+        files = (file_inside(self.root, f"{folder}/{name}") for name in ("scenery.json", "shot.json"))
         return [file for file in files if file.is_file()]
 
     def scenery(self, key: str) -> str:
@@ -363,7 +376,10 @@ class Store:
         """What is known of a finished model; None if it is not there, StoreError if it cannot be read."""
         file = self.model_folder(key) / "model.json"
         try:
-            return ModelInfo.from_plain(json.loads(file.read_text("utf-8")))
+            info = ModelInfo.from_plain(parsed(file.read_bytes()))
+            if info.key != key:
+                raise ValueError(f"model {info.key!r:.100}")
+            return info
         except FileNotFoundError:
             return None
         except (OSError, LookupError, TypeError, ValueError) as error:
@@ -374,8 +390,9 @@ class Store:
 
 
 def _no_scene(file: Path, error: Exception) -> StoreError:
+    problem = first_of(error) if isinstance(error, ValidationError) else error
     return StoreError(
-        f"{file}: expected the scene of a shot, found {type(error).__name__}: {error}: delete {file.parent} and render again"
+        f"{file}: expected the scene of a shot, found {type(error).__name__}: {problem}: delete {file.parent} and render again"
     )
 
 

@@ -30,10 +30,10 @@ class ForeignFrame:
 
 @dataclass(frozen=True)
 class ForeignModel:
-    """A model whose files, of the names that `info` gives its OBJ and GLB, lie in a folder of another data set."""
+    """A model whose files, of the names that `info` gives its OBJ and GLB, are among these of another data set."""
 
     info: ModelInfo
-    folder: Path
+    files: Sequence[Path]
 
 
 @dataclass(frozen=True)

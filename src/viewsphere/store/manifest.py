@@ -17,6 +17,8 @@ from typing import Any
 import xxhash
 
 from viewsphere.errors import StoreError
+from viewsphere.store.paths import file_inside, is_inside
+from viewsphere.store.texts import parsed
 
 MANIFEST = "manifest.json"
 """Name of the file in a finished folder."""
@@ -44,7 +46,7 @@ def unsealed(text: str) -> dict[str, Any]:
     start, comma, _ = text.rpartition(',"digest":"')
     if not comma or f'{start},"digest":"{digest((start + "}").encode())}"}}' != text:
         raise ValueError("a text that was changed since it was written: its digest is another")
-    return json.loads(start + "}")
+    return parsed(start + "}")
 
 
 def seal_of(file: Path) -> Seal:
@@ -75,6 +77,9 @@ class Manifest:
         file = folder / MANIFEST
         try:
             value: dict[str, list[Any]] = unsealed(file.read_text("utf-8"))["files"]
+            outside = next((path for path in value if not is_inside(path)), None)
+            if outside is not None:
+                raise ValueError(f"a path that leads out of it, {outside!r:.200}")
             return Manifest({path: (int(size), str(found)) for path, (size, found) in value.items()})
         except (OSError, LookupError, TypeError, ValueError, AttributeError) as error:
             problem = (error.strerror if isinstance(error, OSError) else None) or error
@@ -96,7 +101,10 @@ class Manifest:
         """What is not as it was written: files that are missing, changed, or too many."""
         for path, told in self.files.items():
             try:
-                found = seal_of(folder / path)
+                found = seal_of(file_inside(folder, path))
+            except StoreError as error:
+                yield str(error)
+                continue
             except OSError as error:
                 yield f"{folder / path}: expected {said(told)}, found {error.strerror or error}"
                 continue
@@ -135,7 +143,7 @@ def refuse_another(damaged: Path, again: Path) -> None:
 
 def _is_json(file: Path) -> bool:
     try:
-        json.loads(file.read_bytes())
+        parsed(file.read_bytes())
     except (OSError, ValueError):
         return False
     return True

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from bisect import bisect_right
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, field, fields, replace
@@ -19,6 +18,8 @@ from viewsphere.model.model_spec import Size, step_key
 from viewsphere.model.thing import TimeStep
 from viewsphere.store.index import Block, Index, Row
 from viewsphere.store.manifest import sealed, unsealed
+from viewsphere.store.paths import names
+from viewsphere.store.texts import parsed
 
 STORE_VERSION = 2
 
@@ -106,7 +107,9 @@ class ModelInfo:
         plain["box3d_object"] = np.array(value["box3d_object"])
         for name in ("size", "real_size", "parts", "warnings"):
             plain[name] = None if value[name] is None else tuple(value[name])
+        names([plain["key"]], "the key")
         if "step" in value:
+            names([plain["track"]] if plain["track"] else [], "the key")
             plain["step"] = TimeStep.model_validate(value["step"])
             plain["steps"] = tuple(map(ModelInfo.from_plain, value["steps"]))
         if "credit" in value:
@@ -165,8 +168,8 @@ class Part:
         """The part whose fields are these, as JSON gives them back."""
         plain = dict(value)
         plain["channels"] = tuple(value["channels"])
-        blocks = ((b["subjects"], b["positions"], b["each"]) for b in value["blocks"])
-        plain["blocks"] = tuple(Block(tuple(s), tuple((int(a), int(z)) for a, z in p), int(e)) for s, p, e in blocks)
+        blocks = ((names(b["subjects"], "the name"), b["positions"], b["each"]) for b in value["blocks"])
+        plain["blocks"] = tuple(Block(s, tuple((int(a), int(z)) for a, z in p), int(e)) for s, p, e in blocks)
         plain["supplies"] = tuple((int(part), tuple(channels)) for part, channels in value["supplies"])
         return Part(**plain)
 
@@ -300,15 +303,15 @@ class PlanRecord:
     @staticmethod
     def from_json(text: str) -> PlanRecord:
         """The record in plan.json's text; raises KeyError, TypeError or ValueError for any other text."""
-        found = json.loads(text)["store"]
+        found = parsed(text)["store"]
         if found != STORE_VERSION:
             raise ValueError(f"a store of version {found}, where this viewsphere reads {STORE_VERSION}: render the recipe anew")
         value = unsealed(text)
         del value["store"]
         value["categories"] = tuple(Category(**c) for c in value["categories"])
         value["parts"] = tuple(Part.from_plain(part) for part in value.get("parts", ()))
-        for name in ("splits", "channels", "models"):
-            value[name] = tuple(value[name])
+        value["channels"] = tuple(value["channels"])
+        value |= {name: names(value[name], "the name") for name in ("splits", "models")}
         return PlanRecord(**value)
 
 

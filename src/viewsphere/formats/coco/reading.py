@@ -15,11 +15,14 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.errors import StoreError
+from viewsphere.codecs.size import opened
+from viewsphere.errors import StoreError, UserError
 from viewsphere.geometry.mask import decode_rle
 from viewsphere.model.sample import Box, Sample
 from viewsphere.store import Category
 from viewsphere.store.foreign import ForeignDataset, ForeignFrame, foreign_object, refuse_broken
+from viewsphere.store.paths import file_inside, is_inside
+from viewsphere.store.texts import parsed
 
 LARGEST_ID = 2**63
 LARGEST_CATEGORY = 2**31
@@ -99,8 +102,8 @@ def _instances_files(path: Path) -> list[Path]:
 
 def _read_split(file: Path, root: Path) -> _Split:
     try:
-        data = json.loads(file.read_text("utf-8-sig"))
-    except (OSError, ValueError, RecursionError) as error:
+        data = parsed(file.read_bytes())
+    except (OSError, ValueError) as error:
         raise StoreError(f"{file}: expected COCO's JSON; found: {error}") from None
     if not isinstance(data, dict) or not all(isinstance(data.get(k), list) for k in ("images", "annotations", "categories")):
         raise StoreError(f"{file}: expected lists of images, annotations and categories; found something else")
@@ -114,8 +117,11 @@ def _read_split(file: Path, root: Path) -> _Split:
     }
     images: list[tuple[dict[str, Any], Path]] = []
     for image in _with_ids(lists["images"], "image", file, problems):
-        place = _image_file(image, root, split, file.parent)
-        problem = _image_problem(image, place)
+        try:
+            place = _image_file(image, root, split, file.parent)
+            problem = _image_problem(image, place)
+        except StoreError as error:
+            place, problem = None, str(error)
         if problem or place is None:
             problems.append(f"{file}: image {image['id']}: {problem}")
         else:
@@ -154,25 +160,23 @@ def _with_ids(
 
 def _image_file(image: dict[str, Any], root: Path, split: str, beside: Path) -> Path | None:
     name = image.get("file_name")
-    if not isinstance(name, str) or not name or Path(name).is_absolute() or ".." in Path(name).parts:
+    if not isinstance(name, str) or not name or not is_inside(name):
         return None
-    for folder in (root / split, root / "images" / split, root / "images", root, beside):
-        place = folder / name
+    below = (f"{split}/{name}", f"images/{split}/{name}", f"images/{name}", name)
+    for folder, path in (*((root, path) for path in below), (beside, name)):
         with suppress(OSError):  # the name may be too long for the file system
-            if place.is_file():
-                return place
+            if (folder / path).is_file():
+                return file_inside(folder, path)
     return None
 
 
 def _image_problem(image: dict[str, Any], place: Path | None) -> str | None:
-    from PIL import Image
-
     if place is None:
         return f"expected its file below the folder; found no {image.get('file_name')!r}"
     try:
-        with Image.open(place) as picture:
+        with opened(place) as picture:
             size = picture.size
-    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
+    except (OSError, ValueError, SyntaxError, UserError) as error:
         return f"expected a readable image; found: {error}"
     said = image.get("width"), image.get("height")
     try:

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import math
 from collections import defaultdict
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
+from viewsphere.codecs.size import opened
 from viewsphere.errors import StoreError, UserError
 from viewsphere.geometry.box import box_size
 from viewsphere.geometry.mask import mask_box, mask_polygons
@@ -26,6 +26,8 @@ from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.model.thing import TimeStep
 from viewsphere.store import Category, ModelInfo, decode
 from viewsphere.store.foreign import ForeignDataset, ForeignFrame, ForeignModel, foreign_object, refuse_broken
+from viewsphere.store.paths import file_inside, files_inside, is_name
+from viewsphere.store.texts import parsed
 
 RIGHT_ANGLES = 1e-3
 LONGEST_NAME = 150
@@ -81,8 +83,8 @@ class _Frame:
 def _load(file: Path) -> tuple[dict[str, Any], dict[str, Any], str]:
     try:
         text = file.read_bytes()
-        data = json.loads(text, parse_constant=lambda _: None)  # NaN stands for unknown values
-    except (OSError, ValueError, RecursionError) as error:
+        data = parsed(text, lambda _: None)  # NaN stands for unknown values
+    except (OSError, ValueError) as error:
         raise StoreError(f"{file}: expected the native format's JSON; found: {error}") from None
     if not isinstance(data, dict) or not all(isinstance(data.get(k), dict) for k in ("vehicles", "poses")):
         raise StoreError(f"{file}: expected mappings of vehicles and poses; found something else")
@@ -94,8 +96,8 @@ def _load(file: Path) -> tuple[dict[str, Any], dict[str, Any], str]:
 
 
 def _is_name(text: str) -> bool:
-    """Whether a text is the name of one folder, without separators or `..`."""
-    return bool(text.strip(". ")) and not set(text) & set("/\\\0") and len(text.encode()) <= LONGEST_NAME
+    """Whether a text is the name of one folder, which gets a longer one while it is written."""
+    return is_name(text) and len(text.encode()) <= LONGEST_NAME
 
 
 def _categories(vehicles: Mapping[str, Any]) -> dict[str, Category]:
@@ -129,16 +131,18 @@ def _vehicles(
 ) -> Iterator[ForeignModel]:
     """The models, and time steps of those that deform, whose files are there."""
     for key, vehicle in vehicles.items():
-        file = root / str(vehicle.get("model_file"))
-        if not file.is_file() or not file.resolve().is_relative_to(root.resolve()):
-            continue
         try:
-            yield _model(key, file, vehicle, categories[str(vehicle.get("category") or "object")])
+            file = file_inside(root, str(vehicle.get("model_file")))
+            if file.is_file():
+                files = files_inside(root, file.parent)
+                yield ForeignModel(_model(key, file, vehicle, categories[str(vehicle.get("category") or "object")]), files)
+        except StoreError as error:
+            problems.append(f"{root}: vehicle {key}: {error}")
         except MISTAKES as error:
             problems.append(f"{root}: vehicle {key}: expected its bbox3D_model, real_size and credit; found {error}")
 
 
-def _model(key: str, file: Path, vehicle: dict[str, Any], category: Category) -> ForeignModel:
+def _model(key: str, file: Path, vehicle: dict[str, Any], category: Category) -> ModelInfo:
     box = _vertices(vehicle["bbox3D_model"], 3)
     if np.isnan(box).any():
         raise ValueError("a box that lacks vertices")
@@ -146,7 +150,7 @@ def _model(key: str, file: Path, vehicle: dict[str, Any], category: Category) ->
     glb = file.with_name(animation) if _is_name(animation) else file.with_suffix(".glb")
     real = vehicle.get("real_size") or {}
     width, height, length = (real.get(side) for side in ("width", "height", "length"))
-    info = ModelInfo(
+    return ModelInfo(
         key=key,
         category=category.name,
         supercategory=category.supercategory,
@@ -163,7 +167,6 @@ def _model(key: str, file: Path, vehicle: dict[str, Any], category: Category) ->
         track=str(vehicle.get("id_track", "")) if animation else "",
         credit=Credit.model_validate(vehicle["credit"]) if "credit" in vehicle else None,
     )
-    return ForeignModel(info, file.parent)
 
 
 def _frames(root: Path, vehicles: dict[str, Any], poses: dict[str, Any], problems: list[str]) -> Iterator[_Frame]:
@@ -179,6 +182,8 @@ def _frames(root: Path, vehicles: dict[str, Any], poses: dict[str, Any], problem
         for entries in pictures.values():
             try:
                 yield _frame(root, number, pose, entries, vehicles)
+            except UserError as error:
+                problems.append(f"{root}: pose {number}, {entries[0][0]}: {error}")
             except MISTAKES as error:
                 problem = f"found no {error}" if isinstance(error, KeyError) else error
                 problems.append(f"{root}: pose {number}, {entries[0][0]}: expected a frame that can be read; {problem}")
@@ -188,7 +193,7 @@ def _frame(
     root: Path, number: str, pose: dict[str, Any], entries: list[tuple[str, dict[str, Any]]], vehicles: dict[str, Any]
 ) -> _Frame:
     first = entries[0][1]
-    folder = root / pose.get("folder", f"Pose-{number}")
+    folder = PurePosixPath(pose.get("folder", f"Pose-{number}"))
     matrix = first.get("transformation_matrix") or pose["transformation_matrix"]
     camera = _camera(matrix, first["render_resolution"], first.get("distortion"))
     split = str(first.get("split") or "train")
@@ -200,7 +205,7 @@ def _frame(
         category = str(vehicles[key].get("category") or "object")
         objects.append((key, category, _picture(root, folder / "MASK" / entry["path_mask"], camera), entry))
         _known(entry)
-    depth = folder / "DEPTH" / str(first.get("path_depth"))
+    depth = file_inside(root, str(folder / "DEPTH" / str(first.get("path_depth"))))
     return _Frame(
         split=split,
         pose=Viewpoint(
@@ -213,22 +218,17 @@ def _frame(
         ),
         camera=camera,
         rgb=_picture(root, folder / "RGB" / first["path_rgb"], camera),
-        depth=depth if _is_below(depth, root) and _is_depth(depth, camera) else None,
+        depth=depth if _is_depth(depth, camera) else None,
         objects=tuple(objects),
     )
 
 
-def _is_below(file: Path, root: Path) -> bool:
-    return file.resolve().is_relative_to(root.resolve())
-
-
-def _picture(root: Path, file: Path, camera: Camera) -> Path:
-    """The file, if it is an image of the camera's size below `root`."""
-    from PIL import Image
-
-    if not file.is_file() or not _is_below(file, root):
+def _picture(root: Path, relative: PurePosixPath, camera: Camera) -> Path:
+    """The file of this path below `root`, if it is an image of the camera's size."""
+    file = file_inside(root, str(relative))
+    if not file.is_file():
         raise FileNotFoundError(f"found no {file}")
-    with Image.open(file) as image:
+    with opened(file) as image:
         if image.size != (camera.width, camera.height):
             raise ValueError(f"found {file} of {image.size[0]} x {image.size[1]} pixels, not {camera.width} x {camera.height}")
     return file
@@ -306,12 +306,10 @@ def _known(entry: dict[str, Any]) -> tuple[NDArray[np.float64], float | None, fl
 
 
 def _mask(file: Path, size: tuple[int, int]) -> NDArray[np.bool_]:
-    from PIL import Image
-
     try:
-        with Image.open(file) as image:
+        with opened(file) as image:
             mask = np.asarray(image.convert("L")) > 127
-    except (OSError, ValueError, SyntaxError) as error:
+    except (OSError, ValueError, SyntaxError, UserError) as error:
         raise StoreError(f"{file}: expected a mask; found: {error}") from None
     if mask.shape != (size[1], size[0]):
         raise StoreError(f"{file}: expected {size[0]} x {size[1]} pixels; found {mask.shape[1]} x {mask.shape[0]}")

@@ -1,0 +1,60 @@
+"""Paths and names that a data set holds, which a stranger may have written: they mean its own files, and nothing else.
+
+Whoever turns a stored path into a file does it here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path, PurePosixPath, PureWindowsPath
+
+from viewsphere.errors import StoreError
+
+
+def file_inside(root: Path, relative: str) -> Path:
+    """The file of this stored path below the data set's folder `root`; it need not be there.
+
+    Raises StoreError for a path that is absolute or holds `..`, and for one that leaves the folder by a link.
+    """
+    if not is_inside(relative):
+        raise StoreError(
+            f"{root}: expected relative paths without '..', found {relative!r:.200}: correct it, or ask its maker for a whole "
+            "data set"
+        )
+    file = root / relative
+    try:
+        leads_to = file.resolve()
+        is_below = leads_to.is_relative_to(root.resolve())
+    except (OSError, RuntimeError, ValueError) as error:  # links in a circle, names that no file system takes
+        raise StoreError(f"{file!s:.300}: expected a path that can be followed, found: {error!s:.300}") from None
+    if not is_below:
+        raise StoreError(
+            f"{file}: expected a file inside of {root}, found a link that leads out of it, to {leads_to}: put the file in the "
+            "place of the link"
+        )
+    return file
+
+
+def files_inside(root: Path, folder: Path) -> Sequence[Path]:
+    """The files that lie in a folder of the data set, sorted; raises StoreError as `file_inside` does."""
+    found = (file_inside(root, (folder / path.name).relative_to(root).as_posix()) for path in sorted(folder.iterdir()))
+    return tuple(file for file in found if file.is_file())
+
+
+def is_inside(relative: str) -> bool:
+    """Whether a path is relative on every system, and goes up nowhere."""
+    path, on_windows = PurePosixPath(relative), PureWindowsPath(relative)
+    return not (path.is_absolute() or on_windows.anchor or ".." in on_windows.parts or "\0" in relative)
+
+
+def is_name(text: object) -> bool:
+    """Whether this is the name of one file or folder: a text without separators that is neither `.` nor `..`."""
+    return isinstance(text, str) and bool(text.strip(". ")) and not set(text) & set("/\\\0")
+
+
+def names(texts: Sequence[str], what: str) -> tuple[str, ...]:
+    """The texts, which stand in paths; raises ValueError for one that is no name."""
+    wrong = next((text for text in texts if not is_name(text)), None)
+    if wrong is not None:
+        raise ValueError(f"{what} {wrong!r:.100} where a name without / is expected")
+    return tuple(texts)
