@@ -3,7 +3,9 @@
 import pytest
 
 from viewsphere.errors import RecipeError
+from viewsphere.recipe import extends
 from viewsphere.recipe.extends import parse_change
+from viewsphere.recipe.file import read
 from viewsphere.recipe.recipe import Recipe
 
 BASE = """\
@@ -146,3 +148,11 @@ def test_circles_are_refused(write):
 def test_a_change_that_is_wrong_says_so(write, change, message):
     with pytest.raises(RecipeError, match=message):
         Recipe.load(write(base=BASE), dict([parse_change(change)]))
+
+
+def test_each_file_is_read_once(write, monkeypatch):
+    files = {"r0": BASE} | {f"r{i}": f"extends: [r{i - 1}.yaml, ./r{i - 1}.yaml]\n" for i in range(1, 26)}
+    found = []
+    monkeypatch.setattr(extends, "read", lambda path: found.append(path.name) or read(path))
+    assert extends.assemble(write(**files))[0]["name"] == "base"
+    assert sorted(found) == sorted(f"{name}.yaml" for name in files)

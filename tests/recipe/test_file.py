@@ -3,13 +3,14 @@
 import json
 import re
 from pathlib import Path
+from unittest.mock import patch
 
 import jsonschema
 import pytest
 import yaml
 
 from viewsphere.errors import RecipeError
-from viewsphere.recipe.file import read, schema
+from viewsphere.recipe.file import _Loader, read, schema
 from viewsphere.recipe.recipe import Recipe
 
 ROOT = Path(__file__).parents[2]
@@ -110,7 +111,9 @@ def test_what_is_no_yaml_is_reported_at_its_line(write, text, message):
 def test_aliases_cannot_explode(write):
     lines = ["a0: &a0 [x, x, x, x, x, x, x, x, x, x]"]
     lines += [f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 10)}]" for i in range(1, 10)]
-    assert "expected at most 200,000 values; found more: write fewer aliases" in load_error(write("\n".join(lines)))
+    assert "expected at most 200,000 values (limit MOST_VALUES); found more: write fewer aliases" in load_error(
+        write("\n".join(lines))
+    )
 
 
 def test_aliases_mean_what_they_stand_for(write):
@@ -244,3 +247,18 @@ def test_the_documentation_names_every_field():
     for name, definition in {"recipe": schema(), **schema()["$defs"]}.items():
         for field in definition.get("properties", {}):
             assert re.search(rf"\b{field}\b", text), f"docs/recipe.md does not mention {name}.{field}"
+
+
+def test_values_beyond_the_limit_are_not_read(tmp_path, monkeypatch):
+    monkeypatch.setenv("VIEWSPHERE_MOST_VALUES", "100")
+    file = tmp_path / "r.yaml"
+    file.write_text("name: x\nmodels:\n" + "- 1\n" * 5000)
+    with patch.object(_Loader, "compose_scalar_node", autospec=True, side_effect=_Loader.compose_scalar_node) as made:
+        with pytest.raises(RecipeError, match=r"r.yaml:100: expected at most 100 values \(limit MOST_VALUES\)"):
+            read(file)
+        assert made.call_count < 110
+    file.write_text("name: x\nmodels:\n" + "- 1\n" * 97)
+    assert len(read(file)[0]["models"]) == 97
+    monkeypatch.setenv("VIEWSPHERE_MOST_VALUES", "many")
+    with pytest.raises(RecipeError, match="VIEWSPHERE_MOST_VALUES: expected a whole number above 0; found 'many'"):
+        read(file)

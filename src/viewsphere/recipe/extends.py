@@ -59,7 +59,7 @@ def assemble(path: Path, changes: Mapping[str, Any] | None = None) -> tuple[dict
     mapping, as all other values do. null removes a field. Raises RecipeError as `read` does, and for files that extend one
     another in a circle.
     """
-    layer = _extended(path, ())
+    layer = _extended(path, (), {})
     for name, value in (changes or {}).items():
         layer = _set(layer, name, value)
     return layer.data, Marks(str(path), layer.places)
@@ -73,7 +73,15 @@ def parse_change(text: str, option: str = "--set", example: str = "viewpoints.el
     return name.strip(), parse(value, f"{option} {name.strip()}")[0]
 
 
-def _extended(path: Path, above: tuple[Path, ...]) -> _Layer:
+def _extended(path: Path, above: tuple[Path, ...], known: dict[str, _Layer]) -> _Layer:
+    """A file merged over those that it extends; each is read once, however many others extend it."""
+    place = os.path.abspath(path)  # noqa: PTH100, links are kept: paths in a file are relative to where it was found
+    if place not in known:
+        known[place] = _joined(path, above, known)
+    return known[place]
+
+
+def _joined(path: Path, above: tuple[Path, ...], known: dict[str, _Layer]) -> _Layer:
     data, marks = read(path)
     layer = _Layer(cast(dict[str, Any], data), dict(marks.places))
     names = layer.data.pop("extends", ())
@@ -88,7 +96,7 @@ def _extended(path: Path, above: tuple[Path, ...]) -> _Layer:
             raise RecipeError(f"{where} extends: expected recipes that do not extend one another; found {name} again")
         if not base.is_file():
             raise RecipeError(f"{where} extends: expected a recipe file; found none at {base}")
-        found = _extended(base, chain)
+        found = _extended(base, chain, known)
         folder = _from(path.parent, base.parent)
         data = found.data if folder == "." else reduce(lambda data, to: _rebased(data, to, folder), PATHS, found.data)
         whole = _merged(whole, _Layer(data, found.places))

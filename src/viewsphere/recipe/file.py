@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
+import os
 import re
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import yaml
 from yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
@@ -18,7 +19,9 @@ from viewsphere.model.mistakes import Path as Steps
 
 LARGEST_FILE = 10_000_000
 MOST_VALUES = 200_000
-"""Most values of a recipe: by YAML's aliases a file of a few lines can stand for billions of values."""
+"""Most values of a recipe: by YAML's aliases a file of a few lines can stand for billions of values.
+`$VIEWSPHERE_MOST_VALUES` overrides it.
+"""
 
 UNCLOSED = ("while scanning a quoted scalar", "while parsing a flow sequence", "while parsing a flow mapping")
 """What was being read, in the YAML reader's words, where a quote or a bracket is not closed, and the reader knows its place."""
@@ -44,7 +47,32 @@ def _use_yaml_12(rules: type[yaml.SafeLoader] | type[yaml.SafeDumper]) -> None:
 
 
 class _Loader(yaml.SafeLoader):
-    """A loader that follows the rules of YAML 1.2."""
+    """A loader that follows the rules of YAML 1.2, and ends at the first value beyond the limit, before the rest is read."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__(text)
+        self.most = most_values()
+        self._left = self.most
+
+    def compose_node(self, parent: Node | None, index: Any) -> Node | None:
+        """The next node; raises _TooMany where it is a value beyond the limit. The keys of mappings are no values."""
+        if parent is None or index is not None:
+            self._left -= 1
+            if self._left < 0:
+                raise _TooMany(self.peek_event().start_mark.line + 1)
+        return super().compose_node(parent, cast(Any, index))
+
+
+class _TooMany(Exception):
+    """More values than a recipe may have; the argument is the line of the first of them."""
+
+
+def most_values() -> int:
+    """The limit of values that holds here; RecipeError where the variable is no whole number above 0."""
+    text = os.environ.get("VIEWSPHERE_MOST_VALUES", "") or str(MOST_VALUES)
+    if not re.fullmatch("[0-9]{1,18}", text) or not int(text):
+        raise RecipeError(f"VIEWSPHERE_MOST_VALUES: expected a whole number above 0; found {shown(text)}")
+    return int(text)
 
 
 class _Dumper(yaml.SafeDumper):
@@ -72,10 +100,13 @@ def parse(text: str, source: str) -> tuple[Any, Marks]:
     loader = _Loader(text)
     try:
         root = loader.get_single_node()
-        reader = _Reader(source)
+        reader = _Reader(source, loader.most)
         data = reader.value(root, ()) if root is not None else None
     except yaml.MarkedYAMLError as error:
         raise RecipeError(_syntax(source, text, error)) from None
+    except _TooMany as error:
+        found = f"expected at most {loader.most:,} values (limit MOST_VALUES); found more"
+        raise RecipeError(f"{source}:{error}: {found}: write fewer, or set VIEWSPHERE_MOST_VALUES higher") from None
     except RecursionError:
         raise RecipeError(f"{source}: expected a recipe, found lists or mappings nested too deeply") from None
     return data, Marks(source, {steps: Place(source, line) for steps, line in reader.lines.items()})
@@ -141,8 +172,9 @@ def _innermost_open(text: str) -> yaml.Mark | None:
 class _Reader:
     """Turns YAML nodes into plain data and keeps their lines."""
 
-    def __init__(self, file: str) -> None:
+    def __init__(self, file: str, most: int) -> None:
         self.file = file
+        self.most = most
         self.lines: dict[Steps, int] = {}
         self._count = 0
         self._open: set[int] = set()
@@ -152,8 +184,9 @@ class _Reader:
         line = node.start_mark.line + 1
         self.lines.setdefault(place, line)
         self._count += 1
-        if self._count > MOST_VALUES:
-            raise self._error(line, place, f"expected at most {MOST_VALUES:,} values; found more: write fewer aliases")
+        if self._count > self.most:
+            found = f"expected at most {self.most:,} values (limit MOST_VALUES); found more: write fewer aliases"
+            raise self._error(line, place, found)
         if id(node) in self._open:
             raise self._error(line, place, "expected a value; found an alias for the value it stands in")
         self._open.add(id(node))
