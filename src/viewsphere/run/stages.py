@@ -171,7 +171,8 @@ class Stages:
                     raise RecipeError(
                         f"viewpoints: expected the camera outside of all that is placed; found it at "
                         f"({', '.join(f'{v:.3g}' for v in cameras[i])}) inside {what}, which stands at ({x:.3g}, {y:.3g}): go "
-                        f"farther away, or, where distance is a share to fill, fill less"
+                        f"farther away, or, where distance is a share to fill, fill less; with min_visibility, frames that are "
+                        f"drawn at random are drawn again"
                     )
 
     def _check_shot(self, shot: Shot) -> None:
