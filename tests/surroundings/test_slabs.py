@@ -5,7 +5,7 @@ import pytest
 
 from viewsphere.assets.srgb import linear
 from viewsphere.model.scene import Ground
-from viewsphere.surroundings.ground import TEXELS, ground_frame, ground_material, laid_with_slabs
+from viewsphere.surroundings.ground import SLABS, TEXELS, ground_frame, ground_material, laid_with_slabs
 from viewsphere.surroundings.kernels_slabs import JOINT, PERIOD, shades
 
 
@@ -69,7 +69,13 @@ def test_a_floor_stays_where_it_is_when_the_origin_moves():
         per, u, v = ground_frame(ground, material, (x, y, 0), 1.0)
         place = np.array([[0.4, 1.7], [-3.2, 0.9], [2.0, 2.0], [0.1, -0.3]] * 2)
         here = tones(2 * (u + per * (place[:, 0] - x)), 2 * (v - per * (place[:, 1] - y)), 0.01)
-        assert np.allclose(here, tones(place[:, 0], -place[:, 1], 0.01), atol=1e-2)
+        assert np.allclose(here, tones(place[:, 0] + 0.5, 0.5 - place[:, 1], 0.01), atol=1e-2)
+
+
+def test_the_origin_is_in_the_middle_of_a_slab():
+    ground = Ground()
+    _, u, v = ground_frame(ground, ground_material(ground)[0], (0, 0, 0), 1.0)
+    assert (SLABS * u % 1, SLABS * v % 1) == (0.5, 0.5)
 
 
 @pytest.mark.parametrize("given", [{"image": "a.png"}, {"normal_image": "a.png"}, {"catcher": True}, {"pattern": "plain"}])

@@ -60,7 +60,9 @@ def ground_frame(ground: Ground, material: Material, origin: ArrayLike, unit: fl
     x, y, _ = np.asarray(origin, np.float64)
     used = material.base_color_texture or material.normal_texture or material.metallic_roughness_texture
     across, down = used.scale if used else (SLABS / PERIOD,) * 2
-    return unit / ground.tile, math.fmod(x / ground.tile, 1.0 / across), math.fmod(-y / ground.tile, 1.0 / down)
+    middle = 0.5 / SLABS if ground.has_slabs else 0.0  # what stands at the world's origin stands on a slab, not on a joint
+    u, v = x / ground.tile + middle, middle - y / ground.tile
+    return unit / ground.tile, math.fmod(u, 1.0 / across), math.fmod(v, 1.0 / down)
 
 
 def laid_with_slabs(material: Material) -> tuple[Material, tuple[Image, ...]]:
