@@ -110,7 +110,7 @@ def axes() -> str:
         meaning = {"x": "x right", "y": "y down", "z": "z forward"}[name]
         parts += [arrow(start, tip, color), words(tip, meaning, color, shift=(0, 18 if name == "y" else -10))]
     parts += [dot(on([camera])[0]), words(on([camera])[0], "camera", shift=(38, 4))]
-    return svg(640, 400, parts)
+    return svg(640, 330, parts)
 
 
 def curve(points: Points, name: str, shift: Sequence[float]) -> list[str]:

@@ -9,6 +9,7 @@ import pytest
 import yaml
 
 from small import ROOT
+from viewsphere import errors
 
 sys.path.insert(0, str(ROOT / "scripts"))
 figures, site_links = importlib.import_module("figures"), importlib.import_module("site_links")
@@ -32,6 +33,12 @@ def test_the_site_takes_nothing_from_the_network():
     assert PLAN["theme"]["font"] is False
     for page in (ROOT / "docs").rglob("*.md"):
         assert not re.search(r"!\[[^]]*\]\(https?:", page.read_text("utf-8")), page
+
+
+def test_the_reference_tells_all_errors_and_nothing_else_of_their_module():
+    told = yaml.safe_load((ROOT / "docs" / "reference.md").read_text("utf-8").split("::: viewsphere.errors\n")[1])["options"]
+    raised = [name for name, kind in vars(errors).items() if isinstance(kind, type) and issubclass(kind, Exception)]
+    assert told["members"] == raised
 
 
 def test_6d_pose_in_camera_is_found_in_the_reference():

@@ -338,5 +338,10 @@ def test_the_first_run_says_why_it_takes_longer(monkeypatch, tmp_path, capsys):
     from viewsphere.cli.making import _announce_compilation
 
     monkeypatch.setenv("VIEWSPHERE_CACHE", str(tmp_path))
+    folder = tmp_path / "kernels" / "imported"
+    folder.mkdir(parents=True)
     _announce_compilation()
     assert_shown("compiling kernels", capsys.readouterr().err)
+    (folder / "compiled.nbi").touch()
+    _announce_compilation()
+    assert capsys.readouterr().err == ""

@@ -160,11 +160,13 @@ def test_a_bad_image_is_a_warning(folder, write, data):
         ("a.step", "STEP .CAD. files are not read; convert it to GLB .with its program"),
         ("a.xyz", "glb, gltf, obj"),
         ("a", "found 'none'"),
+        ("e", "e: expected a model file, found a folder: name a file in it"),
         ("a.obj", "no such file"),
         ("d.obj", "a file"),
     ],
 )
 def test_paths_that_are_no_models(tmp_path, name, message):
     (tmp_path / "d.obj").mkdir()
+    (tmp_path / "e").mkdir()
     with pytest.raises(ModelError, match=message):
         load_model(tmp_path / name)

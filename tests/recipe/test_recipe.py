@@ -113,6 +113,7 @@ MISTAKES = [
     ({"name": "a\nb"}, "name: expected one line of printable text; found 'a\\nb'", ""),
     ({"models": []}, "models: expected at least 1 of them; found 0", ""),
     ({"models": [{"source": "a.obj"}]}, "models[0]: expected a category", ""),
+    ({"models": [{"source": "car"}]}, "models[0]: expected a category, such as car; found none", "; did you mean 'zoo:car'?"),
     ({"models": [{"source": ["zoo:car", "a.obj"], "category": "car"}]}, "models[0]: expected either files or zoo", ""),
     ({"models": [{"source": "zoo:"}]}, "models[0]: expected zoo:<family>, such as zoo:car; found 'zoo:'", ""),
     ({"models": [{**MODELS[0], "unit": "mmm"}]}, "models[0].unit: expected one of m, cm", "; did you mean 'mm'?"),
@@ -265,6 +266,17 @@ def test_a_mistake_is_one_line_that_says_where_and_what(fields, start, end):
     assert message.startswith(start)
     assert message.endswith(end)
     assert "\n" not in message
+
+
+def test_a_misspelt_field_that_is_needed_is_one_mistake():
+    with pytest.raises(RecipeError) as caught:
+        Recipe(models=MODELS, viewpoint=VIEWS)
+    assert str(caught.value).startswith("viewpoint: expected one of name, ")
+    assert str(caught.value).endswith("; found 'viewpoint'; did you mean 'viewpoints'?")
+    assert "\n" not in str(caught.value)
+    with pytest.raises(RecipeError) as caught:
+        Recipe(models=MODELS, shots=VIEWS, camara={})
+    assert [line.split(":")[0] for line in str(caught.value).splitlines()] == ["viewpoints", "shots", "camara"]
 
 
 def test_every_mistake_is_told_on_a_line_of_its_own():

@@ -55,6 +55,13 @@ def test_another_kind_is_a_mistake(tmp_path):
     assert not (tmp_path / "mine").exists()
 
 
+def test_the_script_of_poses_asks_for_a_data_set(tmp_path):
+    viewsphere("new", "mine", "--kind", "pose6d", cwd=tmp_path)
+    said = subprocess.run([sys.executable, "poses.py"], cwd=tmp_path / "mine", capture_output=True, text=True, timeout=DEADLINE)
+    assert (said.returncode, said.stdout) == (2, "")
+    assert said.stderr == "expected a data set; found none: python poses.py DATASET > poses.csv\n"
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", [kind for kind in kinds() if kind not in {"blender", "in-memory"}])
 def test_a_kind_renders_and_is_true(kind, tmp_path):

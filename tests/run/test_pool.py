@@ -130,3 +130,24 @@ def test_workers_stay_for_the_next_list_and_one_that_died_meanwhile_is_replaced(
 def test_those_who_have_something_warm_count_before_they_ask():
     queue = Queue(jobs(a=2, b=2), ["a"])
     assert queue.next("").line == "b"
+
+
+class Impatient:
+    """Shared by all jobs: a portion that is sent to a worker when Ctrl-C reaches it, before it has done anything."""
+
+    def __reduce__(self):
+        return _interrupted, ()
+
+
+def _interrupted():
+    os.kill(os.getpid(), signal.SIGINT)
+    return PORTION
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals are masked on POSIX alone")
+def test_ctrl_c_while_a_worker_starts_is_the_parents_to_hear(tmp_path, capfd):
+    with Crew(tmp_path, 1, Impatient()) as crew:
+        outcomes = list(crew.run(Listed((Job("chair", "chair", LOOK_AT_CHAIR),))))
+    assert [outcome.error for outcome in outcomes] == [None]
+    assert "Traceback" not in capfd.readouterr().err
+    assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, ())

@@ -83,6 +83,7 @@ def test_sources_that_give_nothing_are_named(build, tmp_path):
     assert error(build([entry("x.obj")])) == (
         f"models[0].source: expected a file, folder, pattern or zoo:<family>; found no 'x.obj' in {tmp_path}"
     )
+    assert error(build([entry("bicycle")])).endswith(f"found no 'bicycle' in {tmp_path}; did you mean 'zoo:bicycle'?")
     assert error(build([{"source": "zoo:car"}, entry("x/*.obj")])).startswith("models[1].source: expected model files (.3mf")
     (tmp_path / "empty").mkdir()
     assert "'empty' gives none in" in error(build([entry("empty")]))

@@ -112,6 +112,8 @@ def check_source(path: Path) -> str:
     if suffix in KNOWN:
         how = "in Blender: File > Open or Import, then File > Export > glTF 2.0" if suffix in IN_BLENDER else "with its program"
         raise ModelError(f"{path}: {KNOWN[suffix]} files are not read; convert it to GLB ({how}) and use that")
+    if path.is_dir():
+        raise ModelError(f"{path}: expected a model file, found a folder: name a file in it")
     expected = f"{', '.join((*SUFFIXES, *BLENDER_SUFFIXES))} or a picture ({', '.join(PICTURE_SUFFIXES)})"
     raise ModelError(f"{path}: expected a model file with suffix {expected}, found {path.suffix or 'none'!r}")
 

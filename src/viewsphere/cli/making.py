@@ -324,5 +324,5 @@ def _announce_compilation() -> None:
     """Say why the first picture on a machine takes longer."""
     from viewsphere.kernels.kernel_cache import kernel_folder
 
-    if not kernel_folder().is_dir():
+    if not any(kernel_folder().rglob("*.nbi")):  # imports alone make its folders
         typer.echo("compiling kernels, once on this machine: about 20 seconds", err=True)

@@ -61,10 +61,15 @@ def _begins(message: str, written: str) -> bool:
 
 def nearest(name: object, known: Iterable[str]) -> str:
     """`; did you mean 'x'?` with the known name most similar to `name`, or beginning with it; empty if none is similar."""
+    meant = _meant(name, known)
+    return f"; did you mean {meant!r}?" if meant else ""
+
+
+def _meant(name: object, known: Iterable[str]) -> str | None:
     by_lower, lower = {k.lower(): k for k in known}, str(name).lower()
     begun = [k for k in by_lower if len(lower) > 2 and k.startswith(lower)]
     close = get_close_matches(lower, by_lower, 1, 0.6) or begun[:1]
-    return f"; did you mean {by_lower[close[0]]!r}?" if close else ""
+    return by_lower[close[0]] if close else None
 
 
 def one_of(name: object, known: Sequence[str]) -> str:
@@ -111,7 +116,7 @@ def explained(error: ValidationError, fields: Sequence[str], steps: Path = ()) -
             input=e["input"],
         )
         for e in errors
-        if not _follows(e, errors)
+        if not _follows(e, errors, fields)
     ]
     return ValidationError.from_exception_data(error.title, details)
 
@@ -133,11 +138,17 @@ def first_of(error: ValidationError) -> str:
     return _words(error.errors(include_url=False)[0], ())
 
 
-def _follows(error: ErrorDetails, errors: Sequence[ErrorDetails]) -> bool:
-    """Whether an error `too_short` only follows from others: invalid items of a list are not counted."""
-    depth = len(error["loc"])
-    inside = (e for e in errors if len(e["loc"]) > depth and e["loc"][:depth] == error["loc"])
-    return error["type"] == "too_short" and any(inside)
+def _follows(error: ErrorDetails, errors: Sequence[ErrorDetails], fields: Sequence[str]) -> bool:
+    """Whether an error only follows from others: invalid items of a list are not counted, and a misspelt field is missing."""
+    place, depth = error["loc"], len(error["loc"])
+    match error["type"]:
+        case "too_short":
+            return any(len(e["loc"]) > depth and e["loc"][:depth] == place for e in errors)
+        case "missing":
+            strange = [e["loc"] for e in errors if e["type"] == "extra_forbidden"]
+            return any(loc[:-1] == place[:-1] and _meant(loc[-1], fields) == place[-1] for loc in strange)
+        case _:
+            return False
 
 
 def report(error: ValidationError, data: object, marks: Marks | None = None) -> str:

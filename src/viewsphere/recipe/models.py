@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
 
+from viewsphere import plugins
 from viewsphere.model.brief import Brief
 from viewsphere.model.credit import Attribution, Credit, Licence, SourceUrl
 from viewsphere.model.frozen import Frozen
@@ -181,7 +182,8 @@ class ModelEntry(Brief):
         if not families and is_random(self.count):
             raise ValueError("expected one number for count, of how many files there have to be; found a distribution")
         if not families and not self.category:
-            raise ValueError("expected a category, such as car; found none (only zoo families have one of their own)")
+            zoo = f"; did you mean {ZOO + self.source[0]!r}?" if self.source[0] in plugins.families() else ""
+            raise ValueError(f"expected a category, such as car; found none (only zoo families have one of their own){zoo}")
         if self.up and self.forward and self.up[1] == self.forward[1]:
             raise ValueError(f"expected up and forward along different axes; found {self.up} and {self.forward}")
         if families and self.frames is not None:

@@ -7,12 +7,13 @@ warm, hence our own: one pipe a worker, spawn rather than fork.
 from __future__ import annotations
 
 import signal
+import sys
 import traceback
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import suppress
+from collections.abc import Callable, Generator, Iterable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from multiprocessing import get_context
+from multiprocessing import get_context, resource_tracker
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, cast
@@ -247,7 +248,8 @@ class _Hand:
         context = get_context("spawn")
         self.pipe, theirs = context.Pipe()
         self.process = context.Process(target=_serve, args=(theirs, root, portion), daemon=True)
-        self.process.start()
+        with _deaf():
+            self.process.start()
         theirs.close()
         self.line = ""
         self.job: Job | None = None
@@ -263,6 +265,20 @@ class _Hand:
         self.process.join()
         self.pipe.close()
         return self.process.exitcode
+
+
+@contextmanager
+def _deaf() -> Generator[None]:
+    """A process started meanwhile does not hear Ctrl-C, not even before `_serve` begins; this one hears it afterwards."""
+    if sys.platform == "win32":  # has no masks to inherit
+        yield
+        return
+    resource_tracker.ensure_running()  # the start of the tracker would unblock the signal again
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _serve(pipe: Connection, root: Path, portion: Portion) -> None:

@@ -240,7 +240,8 @@ def _candidates(folder: Path, source: str, where: str) -> list[Path]:
     if has_magic(source):
         return [folder / f for f in glob(source, root_dir=folder, recursive=True)]  # noqa: PTH207 (Path.glob takes no absolute pattern)
     kinds = "a file, folder, pattern or zoo:<family>"
-    raise RecipeError(f"{where}.source: expected {kinds}; found no {source!r} in {folder}")
+    meant = f"; did you mean {ZOO + source!r}?" if source in families() else ""
+    raise RecipeError(f"{where}.source: expected {kinds}; found no {source!r} in {folder}{meant}")
 
 
 def _wanted(path: Path) -> Set[str]:

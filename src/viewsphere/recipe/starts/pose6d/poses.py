@@ -6,6 +6,10 @@ import numpy as np
 
 import viewsphere as vs
 
+if len(sys.argv) != 2:
+    print("expected a data set; found none: python poses.py DATASET > poses.csv", file=sys.stderr)
+    sys.exit(2)
+
 print("frame,object,category,qw,qx,qy,qz,tx,ty,tz,visibility")
 for sample in vs.open(sys.argv[1]):
     for thing in sample.objects:
