@@ -9,7 +9,7 @@ import pytest
 
 from small import small_recipe, tree_hash
 from viewsphere import generate
-from viewsphere.cli.terminal import ProgressBar
+from viewsphere.cli.terminal import ProgressBar, _rate
 from viewsphere.run.progress import Progress
 
 WHOLE = {"shot_frames": 6, "channels": ["rgb", "instances"], "formats": []}
@@ -63,3 +63,7 @@ def test_the_bar_moves_within_a_shot_but_keeps_only_what_is_finished():
         (task,) = bar._rich.tasks
         assert (task.completed, task.total) == (130, 400)
         assert bar.kept == "100 of 400 frames are kept"
+
+
+def test_slow_frames_are_not_told_as_none():
+    assert (_rate(30, 10), _rate(2, 90)) == ("3.0 frames/s", "0.022 frames/s")

@@ -141,9 +141,15 @@ def print_summary(summary: Summary, as_json: bool) -> None:
     _print_warnings(summary.warnings)
     for note in summary.notes:
         typer.echo(note)
-    rate = f", {summary.rendered / summary.seconds:.1f} frames/s" if summary.rendered else ""
+    rate = f", {_rate(summary.rendered, summary.seconds)}" if summary.rendered else ""
     formats = ", ".join(summary.formats) or "no format asked for"
     typer.echo(f"{summary.root}: {summary.frames:,} frames ({summary.rendered:,} new{rate}); {formats}")
+
+
+def _rate(frames: int, seconds: float) -> str:
+    """Frames a second, to two figures where they are slower than one."""
+    rate = frames / seconds
+    return f"{rate:.1f} frames/s" if rate >= 1 else f"{rate:.2g} frames/s"
 
 
 class ProgressBar:
@@ -192,7 +198,7 @@ class ProgressBar:
             elapsed = self._rich.tasks[bar].elapsed or 0.0
             seen = progress.done + progress.under_way
             made = seen - progress.resumed
-            rate = f"{made / elapsed:.1f} frames/s" if progress.phase == "frames" and made and elapsed else ""
+            rate = _rate(made, elapsed) if progress.phase == "frames" and made and elapsed else ""
             self._rich.update(bar, completed=seen, rate=rate)
 
         return listen
