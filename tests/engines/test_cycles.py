@@ -176,7 +176,8 @@ def test_a_border_changes_no_pixel():
 
 
 def test_pictures_do_not_depend_on_those_before_them():
-    recipe = recipe_of(DRAFT | {"samples": 1, "denoise": "off"}, scene={"ground": True})
+    above_horizon = {"azimuth": [20, 140], "elevation": [15], "distance": 0.9}
+    recipe = recipe_of(DRAFT | {"samples": 1, "denoise": "off"}, scene={"ground": True}, viewpoints=above_horizon)
     stage = stage_of(recipe)
     cameras = [stage.shot.camera(i) for i in range(2)]
     asks = [(0, True, None), (1, False, None), (1, True, None), (0, False, (20, 10, 60, 50))]

@@ -26,6 +26,11 @@ if __name__ == "__main__":
 """
 
 
+def test_what_starts_workers_imports_no_numba():
+    words = [sys.executable, "-c", "import sys, viewsphere.run.generate; print('numba' in sys.modules)"]
+    assert subprocess.run(words, capture_output=True, text=True, check=True).stdout == "False\n"
+
+
 @pytest.mark.slow
 def test_the_parent_of_workers_loads_no_kernels(tmp_path):
     (tmp_path / "run.py").write_text(RUN)

@@ -5,8 +5,9 @@ import pytest
 
 from viewsphere.assets.srgb import linear
 from viewsphere.model.scene import Ground
-from viewsphere.surroundings.ground import SLABS, TEXELS, ground_frame, ground_material, laid_with_slabs
-from viewsphere.surroundings.kernels_slabs import JOINT, PERIOD, shades
+from viewsphere.surroundings.ground import PERIOD, SLABS, ground_frame, ground_material
+from viewsphere.surroundings.kernels_slabs import JOINT, shades
+from viewsphere.surroundings.slab_picture import TEXELS, laid_with_slabs
 
 
 def tones(x, y, pixel):

@@ -6,7 +6,6 @@ Distance needs no special rule: a far pixel covers many repeats, and the last mi
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -14,18 +13,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from viewsphere.assets.mesh import Image, Material, Texture
 from viewsphere.assets.opaque import Stamp, opaque_picture, stamp_of
-from viewsphere.assets.srgb import encoded, linear
+from viewsphere.assets.srgb import linear
 from viewsphere.model.scene import Ground
-from viewsphere.surroundings.kernels_slabs import PERIOD, shades
 
 SLABS = 2
 """Slabs in one `tile` of the ground, across and down."""
 
-TEXELS = 1024
-"""Side of the slabs' picture; it shows `PERIOD` slabs a side."""
-
-_BRIGHTEST = 1.44
-"""No shade of the slabs is greater."""
+PERIOD = 4
+"""Slabs, across and down, after which the floor repeats."""
 
 IMAGES = ("image", "roughness_image", "normal_image")
 """Fields of `Ground` that name pictures."""
@@ -65,18 +60,6 @@ def ground_frame(ground: Ground, material: Material, origin: ArrayLike, unit: fl
     return unit / ground.tile, math.fmod(u, 1.0 / across), math.fmod(v, 1.0 / down)
 
 
-def laid_with_slabs(material: Material) -> tuple[Material, tuple[Image, ...]]:
-    """The ground's material with a picture of its slabs, for renderers that do not know their formula (`kernels_slabs`)."""
-    r, g, b, a = material.base_color
-    picture = _slab_picture()
-    used = replace(
-        material,
-        base_color=(r * _BRIGHTEST, g * _BRIGHTEST, b * _BRIGHTEST, a),
-        base_color_texture=Texture(0, scale=(SLABS / PERIOD, SLABS / PERIOD)),
-    )
-    return used, (picture,)
-
-
 def ground_albedo(material: Material, images: tuple[Image, ...]) -> NDArray[np.float64]:
     """Mean linear colour (3,): the share of the light that the ground reflects."""
     color = np.array(material.base_color[:3])
@@ -86,19 +69,6 @@ def ground_albedo(material: Material, images: tuple[Image, ...]) -> NDArray[np.f
     table = linear(np.arange(256) / 255)
     means = [table @ np.bincount(pixels[..., c].reshape(-1), minlength=256) for c in range(3)]
     return color * np.array(means) / pixels[..., 0].size
-
-
-@lru_cache(maxsize=1)
-def _slab_picture() -> Image:
-    """One period of the slabs, as a share of `_BRIGHTEST`."""
-    at = ((np.arange(TEXELS) + 0.5) * (PERIOD / TEXELS)).astype(np.float32)
-    x, y = (np.ascontiguousarray(v).reshape(-1) for v in np.broadcast_arrays(at, at[:, None]))
-    tone = np.empty(TEXELS * TEXELS, np.float32)
-    shades(x, y, np.float32(PERIOD / TEXELS), tone)
-    pixels = np.full((TEXELS, TEXELS, 4), 255, np.uint8)
-    grey = np.rint(encoded(tone.reshape(TEXELS, TEXELS) / _BRIGHTEST) * 255).astype(np.uint8)
-    pixels[..., :3] = grey[..., None]
-    return Image("slabs", pixels)
 
 
 @lru_cache(maxsize=2)

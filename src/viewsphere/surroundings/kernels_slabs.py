@@ -8,9 +8,7 @@ from __future__ import annotations
 
 from viewsphere.kernels.jit import njit
 from viewsphere.kernels.lanes import FAST, Lanes, clamp, floor, lanewise, least, most, size
-
-PERIOD = 4
-"""Slabs, across and down, after which the floor repeats."""
+from viewsphere.surroundings.ground import PERIOD
 
 JOINT = 0.01
 """Width of a joint, in slabs."""

@@ -112,6 +112,7 @@ def _choose_device(cycles, name):
 def _set_up_eevee(scene, settings):
     """EEVEE's settings: lamps light at any distance, as in the other renderers; reflections use screen space."""
     compositing.set_up(scene)
+    _filter_evenly()
     eevee = scene.eevee
     eevee.taa_render_samples = settings["samples"]
     eevee.use_raytracing = settings["raytracing"]
@@ -123,12 +124,20 @@ def _set_up_eevee(scene, settings):
 def _set_up_workbench(scene, settings):
     """Workbench's settings: textures in the light of the studio (`studio`)."""
     compositing.set_up(scene)
+    _filter_evenly()
     display = scene.display
     display.render_aa = "OFF" if settings["samples"] == 1 else str(settings["samples"])
     shading = display.shading
     shading.light, shading.color_type = "STUDIO", "TEXTURE"
     shading.show_specular_highlight = False
     return shading, display
+
+
+def _filter_evenly():
+    """Filter textures without regard to direction: with anisotropic filters, Mesa's software OpenGL does not come to an end for
+    a texture that repeats up to a horizon.
+    """
+    bpy.context.preferences.system.anisotropic_filter = "FILTER_0"
 
 
 _SET_UP = {"cycles": _set_up_cycles, "eevee": _set_up_eevee, "workbench": _set_up_workbench}

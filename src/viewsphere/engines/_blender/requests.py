@@ -19,9 +19,10 @@ from viewsphere.engines._blender.texels import Kind, Levels
 from viewsphere.model.scene import AnyLight, BlendScene, Ground, HemisphereLight, Scene
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Repaint, Thing
-from viewsphere.surroundings.ground import ground_frame, ground_material, laid_with_slabs, only_scatters
+from viewsphere.surroundings.ground import ground_frame, ground_material, only_scatters
 from viewsphere.surroundings.horizon import BEGIN, FLAT, OVER
 from viewsphere.surroundings.sky import SURROUNDINGS, SkyPictures, sky_pictures
+from viewsphere.surroundings.slab_picture import laid_with_slabs
 from viewsphere.surroundings.sun import sun_light
 from viewsphere.truth.geometry import Geometry
 
