@@ -23,13 +23,14 @@ if TYPE_CHECKING:
     from viewsphere.run.generate import generate
     from viewsphere.run.matching import matches
     from viewsphere.run.memory import render
+    from viewsphere.run.status import status
     from viewsphere.sampling.plan import plan
     from viewsphere.store import Dataset
     from viewsphere.store import Dataset as open
 
     __version__: str
 
-__all__ = ["Dataset", "Recipe", "__version__", "export", "generate", "matches", "open", "plan", "render"]
+__all__ = ["Dataset", "Recipe", "__version__", "export", "generate", "matches", "open", "plan", "render", "status"]
 
 _HOMES = {
     "Dataset": "store.Dataset",
@@ -40,6 +41,7 @@ _HOMES = {
     "open": "store.Dataset",
     "plan": "sampling.plan.plan",
     "render": "run.memory.render",
+    "status": "run.status.status",
 }
 
 

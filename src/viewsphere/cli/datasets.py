@@ -9,7 +9,7 @@ import typer
 
 from viewsphere.cli import completion
 from viewsphere.cli.arguments import AllowScripts, AsJson, DataFolder, FormatOptions, asked_formats, cores, split, with_options
-from viewsphere.cli.terminal import ProgressBar, print_json, print_report
+from viewsphere.cli.terminal import ProgressBar, print_json, print_report, print_status
 from viewsphere.errors import UserError
 
 if TYPE_CHECKING:
@@ -41,7 +41,7 @@ def export(
     """Write a finished or half-finished data set, or some of its frames, in other formats, without rendering."""
     from viewsphere.run.exporting import export as write_formats
     from viewsphere.run.exporting import writable_formats
-    from viewsphere.store import Choice, frame_ranges
+    from viewsphere.store import Choice, Dataset, frame_ranges
 
     names = asked_formats(format_)
     if not names:
@@ -52,12 +52,28 @@ def export(
     choice = Choice(keys or (), () if frames is None else frame_ranges(frames))
     notes = write_formats(folder, with_options(names, format_option), output=output, choice=choice)
     if json_:
-        print_json({"formats": list(names), "notes": list(notes)})
+        dataset = Dataset(folder, choice)
+        print_json({"formats": list(names), "frames": len(dataset), "of": dataset.plan.frames, "notes": list(notes)})
         return
     for note in notes:
         typer.echo(note)
     for name in names:
         typer.echo(f"wrote {(output or folder) / name}")
+
+
+def status(folder: DataFolder, json_: AsJson = False) -> None:
+    """Say how far a data set is: frames finished, under way, left out and missing, the runs at work, those that failed, and the
+    time left. Exit status 0 if nothing is missing, 3 otherwise.
+    """
+    from viewsphere.run.status import status as found_in
+
+    found = found_in(folder)
+    if json_:
+        print_json(found.to_json())
+    else:
+        print_status(found)
+    if not found.complete:
+        raise typer.Exit(3)
 
 
 def check(

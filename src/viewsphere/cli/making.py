@@ -22,7 +22,16 @@ from viewsphere.cli.arguments import (
     with_options,
 )
 from viewsphere.cli.next_step import for_command, for_render
-from viewsphere.cli.terminal import ProgressBar, print_estimate, print_json, print_plan, print_summary, write, write_picture
+from viewsphere.cli.terminal import (
+    ProgressBar,
+    print_estimate,
+    print_json,
+    print_plan,
+    print_summary,
+    stop_when_terminated,
+    write,
+    write_picture,
+)
 from viewsphere.errors import StoreError, UserError
 from viewsphere.recipe.starts import FIRST, kinds, start
 
@@ -274,12 +283,21 @@ def render(
     append: Annotated[
         bool, typer.Option("--append", help="Add what a finished data set lacks: models, poses, channels.")
     ] = False,
+    shard: Annotated[
+        str | None,
+        typer.Option(
+            metavar="K/N",
+            help="Render only the K-th of N fixed shares of the shots, K from 0: for job arrays.",
+            show_default=False,
+        ),
+    ] = None,
     json_: AsJson = False,
     allow_scripts: AllowScripts = False,
 ) -> None:
     """Render a recipe into a data set. Run it again to resume: finished frames are never rendered twice."""
     from viewsphere.run.generate import generate
     from viewsphere.run.opening import to_append
+    from viewsphere.run.share import shard_named
     from viewsphere.sampling.plan import plan as make_plan
     from viewsphere.store import Store
 
@@ -295,6 +313,7 @@ def render(
         if addition is not None and Store(output).missing(addition.record):
             typer.echo(f"{output}: {addition}")
     crew = cores() if workers is None else workers
+    stop_when_terminated()
     with ProgressBar(quiet=json_) as bar:
         try:
             summary = generate(
@@ -304,6 +323,7 @@ def render(
                 formats=formats,
                 keep_going=keep_going,
                 append=append,
+                shard=None if shard is None else shard_named(shard),
                 listener=bar.show,
             )
         except KeyboardInterrupt:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import signal
 import sys
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
@@ -19,7 +20,9 @@ if TYPE_CHECKING:
     from viewsphere.run.estimate import Estimate
     from viewsphere.run.generate import Summary, Warnings
     from viewsphere.run.progress import Listener, Progress
+    from viewsphere.run.status import Status
     from viewsphere.sampling.plan import Plan
+    from viewsphere.store.heartbeat import Heartbeat
 
 MOST_FINDINGS = 20
 
@@ -29,6 +32,15 @@ def complain(error: ViewsphereError, status: int) -> None:
     for line in str(error).splitlines():
         typer.echo(f"viewsphere: {line}", err=True)
     sys.exit(status)
+
+
+def stop_when_terminated() -> None:
+    """Let SIGTERM, which batch systems send before they kill, stop this process as Ctrl-C does: the unfinished is removed."""
+
+    def stop(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    signal.signal(signal.SIGTERM, stop)
 
 
 def write(file: Path, data: bytes) -> None:
@@ -144,6 +156,36 @@ def print_summary(summary: Summary, as_json: bool) -> None:
     rate = f", {_rate(summary.rendered, summary.seconds)}" if summary.rendered else ""
     formats = ", ".join(summary.formats) or "no format asked for"
     typer.echo(f"{summary.root}: {summary.frames:,} frames ({summary.rendered:,} new{rate}); {formats}")
+
+
+def print_status(found: Status) -> None:
+    """Print how far a data set is, and the runs at work on it."""
+    counts = f"{found.finished:,} finished, {found.under_way:,} under way, {found.left_out:,} left out"
+    waiting = found.missing - found.under_way
+    typer.echo(f"{found.root}: {found.frames:,} frames: {counts}, {waiting:,} missing{_share_done(found)}")
+    if found.models:
+        typer.echo(f"models to be made: {len(found.models):,} ({', '.join(found.models[:MOST_FINDINGS])})")
+    for run in found.runs:
+        what = f"{run.told.phase} {run.told.done + run.told.under_way:,} of {run.told.total:,}"
+        rate = f", {_rate(1, 1 / run.told.rate)}" if run.told.rate and run.state == "running" else ""
+        shots = f"; {', '.join(run.told.working_on[:MOST_FINDINGS])}" if run.told.working_on else ""
+        gone = "" if run.state == "running" else ": run it again"
+        heard = f"heard of {_duration(run.seconds_ago)} ago"
+        typer.echo(f"{run.state}: {_who(run.told)}: {what}{rate}, {heard}{shots}{gone}")
+    for told in found.failed:
+        typer.echo(f"failed: {_who(told)}: {told.error}")
+    if found.seconds_left is not None:
+        typer.echo(f"{_rate(1, 1 / found.rate)}, about {_duration(found.seconds_left)} left")
+
+
+def _share_done(found: Status) -> str:
+    return f" ({found.finished / found.frames:.1%} done)" if found.frames else ""
+
+
+def _who(told: Heartbeat) -> str:
+    """A run by its machine and process, and by its shard if it has one."""
+    number, of = told.shard
+    return f"{told.host} (pid {told.pid})" + (f", shard {number}/{of}" if of > 1 else "")
 
 
 def _rate(frames: int, seconds: float) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack
 from functools import cache, partial
 from pathlib import Path
@@ -19,7 +19,7 @@ from viewsphere.model.sample import Sample
 from viewsphere.recipe.formats import FormatEntry, Formats, options_of, read_formats
 from viewsphere.run.progress import Listener, Progress, unheard
 from viewsphere.store import Choice, Dataset, Exported, new_folder
-from viewsphere.store.checksums import write_checksums, written_credits, written_least, written_options
+from viewsphere.store.checksums import write_checksums, written_credits, written_frames, written_least, written_options
 from viewsphere.store.credits import credits_digest
 
 
@@ -51,11 +51,21 @@ def export(
         entry.arguments()
     with ExitStack() as whole:
         written = [(entry, whole.enter_context(_folder(dataset, place / entry.name, is_own))) for entry in entries]
-        notes = write(dataset, written, listener or unheard)
+        notes = (*write(dataset, written, listener or unheard), *_lacks(dataset))
     kinds = dataset.link_kinds - {"hard link"}
     return tuple(dict.fromkeys(notes)) + tuple(
         f"{dataset.root}: files of the exports are made as a {kind}, hard links do not work here" for kind in sorted(kinds)
     )
+
+
+def _lacks(dataset: Dataset) -> Iterator[str]:
+    """How many frames there are, where that is not all that its plan asks for."""
+    there = len(Dataset(dataset.root)) if dataset.choice.is_some else len(dataset)
+    if there < dataset.plan.frames:
+        yield (
+            f"{dataset.root}: {there:,} of {dataset.plan.frames:,} frames are there to export; viewsphere status says what "
+            "became of the others"
+        )
 
 
 def _folder(dataset: Dataset, target: Path, is_own: bool) -> AbstractContextManager[Path]:
@@ -93,7 +103,7 @@ def write(dataset: Dataset, formats: Sequence[tuple[FormatEntry, Path]], tell: L
     for entry, folder in formats:
         own = least if _leaves_out(_format(entry.name)) else None
         credited = credits_digest(dataset.models) if _names_credits(_format(entry.name)) else None
-        write_checksums(folder, entry.whole().options, own, credited)
+        write_checksums(folder, entry.whole().options, own, credited, total)
     tell(Progress("exports", total, total))
     return tuple(notes)
 
@@ -116,13 +126,21 @@ def _above(dataset: Dataset, least: float) -> Exported:
     return shown
 
 
+def is_written(entry: FormatEntry, dataset: Dataset, least: float | None) -> bool:
+    """Whether a format's export in a data set's folder is what would be written now, as far as its list of files says."""
+    folder = dataset.root / entry.name
+    is_whole = written_frames(folder) == len(dataset) and written_options(folder) == entry.whole().options
+    return is_whole and not is_out_of_date(entry.name, dataset, least)
+
+
 def is_out_of_date(name: str, dataset: Dataset, least: float | None) -> bool:
-    """Whether a format's export in a data set's folder keeps other annotations than those of what is seen more than `least`, or
-    names other credits than those that are known now.
+    """Whether a format's export in a data set's folder lacks frames that are there, keeps other annotations than those of what
+    is seen more than `least`, or names other credits than those that are known now.
     """
     module, folder = _format(name), dataset.root / name
-    keeps_others = _leaves_out(module) and written_least(folder) != least
-    return keeps_others or (_names_credits(module) and written_credits(folder) != credits_digest(dataset.models))
+    if written_frames(folder) not in (None, len(dataset)) or (_leaves_out(module) and written_least(folder) != least):
+        return True
+    return _names_credits(module) and written_credits(folder) != credits_digest(dataset.models)
 
 
 def _leaves_out(module: object) -> bool:

@@ -6,7 +6,8 @@ import json
 import time
 from collections import Counter, defaultdict
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, field, replace
 from itertools import chain, product
 from os import PathLike
 from pathlib import Path
@@ -16,13 +17,16 @@ from viewsphere.errors import ModelError, RecipeError, ViewsphereError, joined
 from viewsphere.model.channel import missing
 from viewsphere.recipe.formats import FormatEntry, Formats, options_of, read_formats
 from viewsphere.recipe.recipe import Recipe
-from viewsphere.run.exporting import export, is_out_of_date, writable
+from viewsphere.run.exporting import export, is_out_of_date, is_written, writable
 from viewsphere.run.framing import MOST_TRIES, hidden_frames
 from viewsphere.run.opening import commit, prepare, to_append, to_render
 from viewsphere.run.pool import Crew, Job, Listed, Outcome
 from viewsphere.run.progress import Listener, Progress, unheard
+from viewsphere.run.pulse import heard, watched
+from viewsphere.run.share import share_of
 from viewsphere.run.skies import check_skies
 from viewsphere.run.stages import Stages, StoredBoxes
+from viewsphere.run.status import Status, status
 from viewsphere.run.tasks import KernelTask, Kind, ModelTask
 from viewsphere.run.unpainted import unpainted
 from viewsphere.run.unused import unused
@@ -30,12 +34,17 @@ from viewsphere.run.warm import is_compiled
 from viewsphere.sampling.distances import Distances
 from viewsphere.sampling.extension import Portion
 from viewsphere.sampling.plan import Plan
+from viewsphere.sampling.share import ALL
 from viewsphere.store import Choice, Dataset, Row, Store
 from viewsphere.store.credits import write_credits
+from viewsphere.store.heartbeat import Pulse
 from viewsphere.store.index import Index
 
 MOST_SUBJECTS = 10_000
 """Models or scenes whose cameras are looked at before rendering, evenly over all; the others are when their turn comes."""
+
+
+NONE: Mapping[str, tuple[str, ...]] = {}
 
 
 @dataclass(frozen=True)
@@ -48,8 +57,8 @@ class Warnings:
 
 @dataclass(frozen=True)
 class Summary:
-    """What a run left: frames in the data set, frames it rendered itself, what it skipped, seconds, formats, notes, and
-    warnings.
+    """What a run left: frames in the data set, frames it rendered itself, what it skipped, seconds, formats that it wrote,
+    notes, warnings, and how many frames are left to other shards.
     """
 
     root: Path
@@ -60,6 +69,7 @@ class Summary:
     formats: tuple[str, ...]
     notes: tuple[str, ...] = field(default=())
     warnings: Warnings = field(default_factory=Warnings)
+    missing: int = 0
 
 
 def generate(
@@ -70,6 +80,7 @@ def generate(
     formats: Formats | None = None,
     keep_going: bool = False,
     append: bool = False,
+    shard: tuple[int, int] | None = None,
     listener: Listener | None = None,
 ) -> Summary:
     """Render all frames of a recipe (or of the one in this file) that `out` does not hold yet, then write the formats (default:
@@ -78,26 +89,27 @@ def generate(
     With `append`, `out` is a finished data set, and models, poses and channels of the recipe that it lacks are added to it;
     what was there stays as it was.
 
+    `shard` (k, n) renders the k-th of n fixed shares of the shots, counted from 0: runs of all shards, on any machines that see
+    `out`, in any order, several at once, together render everything. The run after which nothing is missing writes the
+    formats; others write none.
+
     `workers` 0 renders in the calling process; more need a `__main__` guard in the calling script. A model that cannot be
     used is an error before rendering starts, or with `keep_going` left out and reported. Raises UserError for the user's
     mistakes; whatever was finished stays, and the same call goes on from there.
     """
     begun = time.monotonic()
-    tell = listener or unheard
+    share = ALL if shard is None else share_of(shard)
     recipe = Recipe.of(recipe)
     planned = prepare(recipe)
     wanted = _asked(recipe, formats)
     store = Store(Path(out))
-    portion = to_append(planned, store) if append else to_render(planned, store)
+    portion = replace(to_append(planned, store) if append else to_render(planned, store), share=share)
     wanted += _others(wanted, store) if portion.number else ()
     with recipe.located():
         for entry, sensor in product(wanted, planned.rig.sensors):
             _check_channels(entry.name, sensor.kept(portion.record.channels), "" if sensor.channels is None else sensor.name)
-    if portion.number:
-        store.make_ready()
-    else:
-        store.open_for(portion.record)
-    with recipe.located(), store.occupied():
+    with recipe.located(), _at_work(portion, store) as pulse:
+        tell = heard(pulse, listener or unheard)
         notes: tuple[str, ...] = ()
         rendered, skipped = 0, dict[str, str]()
         with Crew(store.root, workers, portion) as crew:
@@ -105,21 +117,59 @@ def generate(
                 _compare_models(portion, store, crew)
             else:
                 notes = _check_skies(portion, store, tell)
-                rendered, skipped = _render_part(portion, store, crew, keep_going, tell)
-        notes += tuple(_renew_threshold(store, recipe.keep_annotations_above))
-        dataset = Dataset(store.root)
-        write_credits(dataset)
-        wanted += tuple(e for e in _others(wanted, store) if is_out_of_date(e.name, dataset, recipe.keep_annotations_above))
-        notes += export(store.root, wanted, listener=tell)
+                rendered, skipped = _render_part(portion, store, crew, keep_going, tell, pulse)
+        with store.locked():
+            notes += tuple(_renew_threshold(store, recipe.keep_annotations_above))
+            dataset = Dataset(store.root)
+            write_credits(dataset)
+        far = status(store.root)
+        is_last = share.is_all or far.complete
+        if is_last:
+            wanted = tuple(_due(wanted, portion, rendered > 0, store))
+            notes += export(store.root, wanted, listener=tell)
+            store.forget_failures()
+    if not is_last:
+        warnings, notes = _warnings(planned, dataset), (*notes, _left_to_others(portion, far))
+        seconds = time.monotonic() - begun
+        return Summary(store.root, len(dataset), rendered, skipped, seconds, (), notes, warnings, far.missing)
     left = unused(store, options_of((*wanted, *_others(wanted, store))))
     notes += (f"note: {left}",) if left else ()
-    if append and not rendered:
+    if append and not rendered and share.is_all:
         notes += (f"{store.root}: nothing to add, it has all that the recipe asks for",)
     notes += tuple(_hidden(store, portion))
     misses = unpainted(recipe, [s for s in planned.model_specs if s.key not in skipped], store)
     warnings = _warnings(planned, dataset, misses)
     return Summary(
         store.root, len(dataset), rendered, skipped, time.monotonic() - begun, tuple(options_of(wanted)), notes, warnings
+    )
+
+
+def _at_work(portion: Portion, store: Store) -> AbstractContextManager[Pulse]:
+    """Open the store for a run's portion, and show others that it is at work."""
+    shard = (portion.share.number, portion.share.of)
+    if portion.number:
+        store.make_ready()
+        return store.occupied(shard)
+    return store.opened_for(portion.record, shard)
+
+
+def _due(wanted: Sequence[FormatEntry], portion: Portion, has_rendered: bool, store: Store) -> Iterator[FormatEntry]:
+    """The formats that a run writes when nothing is missing: those asked for, and those that lie there and are out of date.
+
+    A run of a shard that had nothing to render leaves alone what another has written.
+    """
+    dataset, least = Dataset(store.root), portion.plan.recipe.keep_annotations_above
+    anew = portion.share.is_all or has_rendered or portion.part.supplies
+    yield from (entry for entry in wanted if anew or not is_written(entry, dataset, least))
+    yield from (entry for entry in _others(wanted, store) if is_out_of_date(entry.name, dataset, least))
+
+
+def _left_to_others(portion: Portion, far: Status) -> str:
+    """What is left to do when a shard is done."""
+    what = f"{far.missing:,} of {far.frames:,} frames are" if far.missing else "models are"
+    return (
+        f"{far.root}: shard {portion.share} is done, {what} left to other shards: the run that makes the last of them writes "
+        "the formats"
     )
 
 
@@ -131,7 +181,9 @@ def _asked(recipe: Recipe, formats: Formats | None) -> tuple[FormatEntry, ...]:
 
 
 def _renew_threshold(store: Store, least: float | None) -> Iterator[str]:
-    """Let the whole data set have the recipe's `keep_annotations_above`; a note where older frames had another."""
+    """Let the whole data set have the recipe's `keep_annotations_above`; a note where older frames had another. The store is
+    locked.
+    """
     found = store.plan()
     renewed = found.keeping_above(least)
     if renewed != found:
@@ -160,7 +212,7 @@ def _hidden(store: Store, portion: Portion) -> Iterator[str]:
         )
 
 
-def _warnings(planned: Plan, dataset: Dataset, misses: Mapping[str, tuple[str, ...]]) -> Warnings:
+def _warnings(planned: Plan, dataset: Dataset, misses: Mapping[str, tuple[str, ...]] = NONE) -> Warnings:
     """Warnings about models and files, each once; `misses` are others about models, by their keys."""
     source_of = {spec.key: Path(spec.source).name for spec in planned.kept_specs if spec.parts is not None}
     models, files = defaultdict[str, list[str]](list), defaultdict[str, list[str]](list)
@@ -197,7 +249,9 @@ def _check_skies(portion: Portion, store: Store, tell: Listener) -> tuple[str, .
     return check_skies(portion.plan, lambda done, total: tell(Progress("skies", done, total)))
 
 
-def _render_part(portion: Portion, store: Store, crew: Crew, keep_going: bool, tell: Listener) -> tuple[int, dict[str, str]]:
+def _render_part(
+    portion: Portion, store: Store, crew: Crew, keep_going: bool, tell: Listener, pulse: Pulse
+) -> tuple[int, dict[str, str]]:
     """Make the part's models, take it into the data set, render its shots; gives the frames made and what was left out."""
     if portion.number:
         store.drop_unnamed_models()  # of appending that ended before it began
@@ -208,7 +262,7 @@ def _render_part(portion: Portion, store: Store, crew: Crew, keep_going: bool, t
         if portion.number:
             store.drop_unnamed_models()
         raise
-    rendered = _render_shots(portion, store, crew, keep_going, skipped, tell)
+    rendered = _render_shots(portion, store, crew, keep_going, skipped, tell, pulse)
     _note_skipped(portion, store, skipped)
     return rendered, skipped
 
@@ -224,11 +278,12 @@ def _prepare_models(portion: Portion, store: Store, crew: Crew, keep_going: bool
         if outcome.error is not None:
             failed[outcome.key] = outcome.error
         tell(Progress("models", done, total))
-    for key, problem in _distance_problems(planned, store, failed):
+    for key, problem in _distance_problems(portion, store, failed):
         failed.setdefault(key, problem)
     own = {m.key for m in planned.model_specs} | set(planned.subjects)
     stops = [e for k, e in failed.items() if not (keep_going and k in own and isinstance(e, (ModelError, RecipeError)))]
-    if stops or own <= failed.keys():
+    elsewhere = {} if portion.share.is_all else store.skipped()
+    if stops or (failed and own <= failed.keys() | elsewhere.keys()):
         raise joined(stops or list(failed.values()))
     return {key: str(error) for key, error in failed.items()}
 
@@ -248,11 +303,11 @@ def _compare_models(portion: Portion, store: Store, crew: Crew) -> None:
         raise joined(errors)
 
 
-def _distance_problems(planned: Plan, store: Store, failed: Container[str]) -> Iterator[tuple[str, ViewsphereError]]:
+def _distance_problems(portion: Portion, store: Store, failed: Container[str]) -> Iterator[tuple[str, ViewsphereError]]:
     """Models or scenes that some pose's camera would stand inside of, or that have no room; each is named once."""
-    distances = Distances(planned, StoredBoxes(store))
-    for subject in planned.subjects[:: -(-len(planned.subjects) // MOST_SUBJECTS)]:
-        if any(member.key in failed for member in planned.cast(subject)):
+    distances, subjects = Distances(portion.plan, StoredBoxes(store)), portion.subjects
+    for subject in subjects[:: -(-len(subjects) // MOST_SUBJECTS) or 1]:
+        if any(member.key in failed for member in portion.plan.cast(subject)):
             continue
         try:
             problem = distances.problem(subject)
@@ -262,7 +317,9 @@ def _distance_problems(planned: Plan, store: Store, failed: Container[str]) -> I
             yield subject, problem
 
 
-def _render_shots(portion: Portion, store: Store, crew: Crew, keep_going: bool, skipped: dict[str, str], tell: Listener) -> int:
+def _render_shots(
+    portion: Portion, store: Store, crew: Crew, keep_going: bool, skipped: dict[str, str], tell: Listener, pulse: Pulse
+) -> int:
     """Render the shots that the store lacks; gives the number of frames made. Failed shots land in `skipped`."""
     work = Missing(portion, store, skipped)
     total, resumed, rendered = work.total, work.resumed, 0
@@ -281,7 +338,7 @@ def _render_shots(portion: Portion, store: Store, crew: Crew, keep_going: bool, 
         tell(Progress("frames", resumed + rendered, total, resumed, crew.under_way))
 
     report()
-    for outcome in crew.run(work, report):
+    for outcome in watched(crew, work, pulse, report):
         _accept(outcome, keep_going, skipped)
         rendered += outcome.frames
         report()
@@ -298,7 +355,9 @@ class Missing:
 
     @property
     def total(self) -> int:
-        """Frames that the part has, without those that are left out."""
+        """Frames that the portion has, without those that are left out."""
+        if not self.portion.share.is_all:
+            return sum(row.count for row in self._wanted())
         indices = [self.portion.record.indices[self.portion.number], *self._added]
         if not self.skipped:
             return sum(index.samples for index in indices)
@@ -311,12 +370,16 @@ class Missing:
 
     @property
     def resumed(self) -> int:
-        """Frames of the part that are there."""
+        """Frames of the portion that are there."""
+        if not self.portion.share.is_all:
+            return sum(row.count for row in self.portion.rows if self.store.has_shot(row.key))
         found = (self.portion.record.find(key) for key in self.store.finished())
         return sum(row.count for row in found if row is not None and row.part == self.portion.number)
 
     def lines(self) -> Iterable[tuple[str, int]]:
         """The models, and how many shots each has."""
+        if not self.portion.share.is_all:
+            return Counter(row.subject for row in self.portion.rows).items()
         indices = (self.portion.record.indices[self.portion.number], *self._added)
         counts: Counter[str] = Counter()
         for index in indices:
@@ -328,7 +391,8 @@ class Missing:
         """The shots of a model that are to be rendered."""
         indices = (self.portion.record.indices[self.portion.number], *self._added)
         rows = chain.from_iterable(index.of(line) for index in indices)
-        return (Job(row.key, line, row) for row in self._lacking(rows))
+        own = (row for row in rows if self.portion.share.has(row.number))
+        return (Job(row.key, line, row) for row in self._lacking(own))
 
     def rows(self) -> Iterator[Row]:
         """All shots that are to be rendered."""
@@ -366,13 +430,14 @@ def _accept(outcome: Outcome, keep_going: bool, skipped: dict[str, str]) -> None
 
 
 def _note_skipped(portion: Portion, store: Store, skipped: dict[str, str]) -> None:
-    """Keep what was left out, of other parts too."""
-    own = {spec.key for spec, _ in portion.models} | set(portion.plan.subjects)
-    others = {key: why for key, why in store.skipped().items() if key not in own and not _is_of(portion, key)}
-    others = others if portion.number else {}
-    store.write_file("skipped.json", json.dumps(others | skipped, indent=1, sort_keys=True))
+    """Keep what was left out, of other parts and shares too."""
+    own = {spec.key for spec, _ in portion.models} | set(portion.subjects)
+    with store.locked():
+        others = {key: why for key, why in store.skipped().items() if key not in own and not _is_of(portion, key)}
+        others = others if portion.number or not portion.share.is_all else {}
+        store.write_file("skipped.json", json.dumps(others | skipped, indent=1, sort_keys=True))
 
 
 def _is_of(portion: Portion, key: str) -> bool:
     row = portion.record.find(key)
-    return row is not None and row.part == portion.number
+    return row is not None and row.part == portion.number and portion.share.has(row.number)

@@ -45,8 +45,7 @@ def import_dataset(
     foreign: ForeignDataset = plugins.load("formats", kind).read(Path(source), keep_going=keep_going)
     store = Store(Path(out))
     record = _plan_record(foreign)
-    store.open_for(record)
-    with store.occupied():
+    with store.opened_for(record):
         for model in foreign.models:
             link_model(store, model.info.key, model.info, model.files)
         _link_frames(foreign, store, record, listener)

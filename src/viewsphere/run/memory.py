@@ -14,10 +14,11 @@ from viewsphere.model.sample import Sample
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.run.framing import Framing
 from viewsphere.run.opening import prepare
-from viewsphere.run.share import Share, known_to_loaders, share_of, share_of_rank, share_of_worker
+from viewsphere.run.share import known_to_loaders, share_of, share_of_rank, share_of_worker
 from viewsphere.run.stages import Stages
 from viewsphere.sampling.plan import Plan, plan
 from viewsphere.sampling.seeds import generator
+from viewsphere.sampling.share import Share
 from viewsphere.sampling.turns import Turns
 
 

@@ -81,8 +81,7 @@ def merge(
     record = _plan_record(parts, categories, models)
     credits = _credits(parts)
     store = Store(Path(out))
-    store.open_for(record)
-    with store.occupied():
+    with store.opened_for(record):
         for part in parts:
             _link_models(part, store, credits)
         targets = record.rows

@@ -68,12 +68,16 @@ def to_append(planned: Plan, store: Store) -> Portion:
 
 def commit(portion: Portion, store: Store) -> None:
     """Make the portion a part of the data set; raises StoreError if another run appended something else meanwhile."""
-    parts, there = portion.record.parts, store.plan().parts
-    if there == parts:
-        return
-    if there != parts[:-1]:
-        raise StoreError(f"{store.root}: expected nobody else to append meanwhile, found a part of another run: run this again")
-    store.save(portion.record)
+    parts = portion.record.parts
+    with store.locked():
+        there = store.plan().parts
+        if there == parts:
+            return
+        if there != parts[:-1]:
+            raise StoreError(
+                f"{store.root}: expected nobody else to append meanwhile, found a part of another run: run this again"
+            )
+        store.save(portion.record)
 
 
 def _resumed(planned: Plan, store: Store, found: PlanRecord, number: int) -> Portion:

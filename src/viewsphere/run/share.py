@@ -1,4 +1,4 @@
-"""Which share of the frames this process is to render, among all ranks and data loaders' workers.
+"""Which share of the frames this process is to render: one of a job array, a rank, or a data loader's worker.
 
 PyTorch is asked only where somebody else has imported it: it is no dependency.
 """
@@ -6,35 +6,11 @@ PyTorch is asked only where somebody else has imported it: it is no dependency.
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
-from itertools import islice
-from typing import Any, TypeVar
+from typing import Any
 
 from viewsphere.errors import UserError
 from viewsphere.model.mistakes import shown
-
-T = TypeVar("T")
-
-
-@dataclass(frozen=True)
-class Share:
-    """Every `of`-th of some things, from the `number`-th on, counted from 0: shares together have each of them once."""
-
-    number: int = 0
-    of: int = 1
-
-    def __call__(self, things: Iterable[T]) -> Iterator[T]:
-        """This share of them, in their order."""
-        return islice(things, self.number, None, self.of)
-
-    def size(self, count: int) -> int:
-        """How many of `count` it has."""
-        return len(range(self.number, count, self.of))
-
-    def parted(self, inner: Share) -> Share:
-        """A share of this share."""
-        return Share(self.number + inner.number * self.of, self.of * inner.of)
+from viewsphere.sampling.share import Share
 
 
 def share_of(shard: object) -> Share:
@@ -46,6 +22,14 @@ def share_of(shard: object) -> Share:
             raise UserError(
                 f"shard: expected (k, n), the k-th of n shares counted from 0, such as (0, 4); found {shown(shard)}"
             )
+
+
+def shard_named(text: str) -> tuple[int, int]:
+    """The shard that the command line names k/n, k from 0; raises UserError for anything else."""
+    number, _, of = text.partition("/")
+    if not (number.isdecimal() and of.isdecimal() and int(number) < int(of)):
+        raise UserError(f"--shard: expected k/n, the k-th of n shares counted from 0, such as 0/16; found {text}")
+    return int(number), int(of)
 
 
 def share_of_rank() -> Share:

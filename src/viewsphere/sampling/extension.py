@@ -34,17 +34,22 @@ from viewsphere.sampling.pose_numbers import (
     numbered,
 )
 from viewsphere.sampling.sendable import Sendable
+from viewsphere.sampling.share import ALL, Share
 from viewsphere.store import Block, Category, Part, PlanRecord, Row
 from viewsphere.store.index import Ranges, numbers
 
 
 @dataclass(frozen=True, eq=False)
 class Portion(Sendable):
-    """A part of a data set, and the plan of its recipe, which renders it. `record` is the whole data set's."""
+    """A part of a data set, and the plan of its recipe, which renders it. `record` is the whole data set's.
+
+    A run may have a `share` of it: every n-th shot of each index, whatever is there already.
+    """
 
     plan: Plan
     record: PlanRecord
     number: int
+    share: Share = ALL
 
     @property
     def part(self) -> Part:
@@ -68,13 +73,29 @@ class Portion(Sendable):
 
     @cached_property
     def models(self) -> tuple[tuple[ModelSpec, tuple[TimeStep, ...]], ...]:
-        """All models that the recipe keeps, with the data set's numbers of their categories, and their time steps."""
-        return tuple((self._numbered(spec), self.plan.steps_of(spec)) for spec in self.plan.kept_specs)
+        """The models that the recipe keeps, with the data set's numbers of their categories, and their time steps; of a share
+        those that its shots need, and its share of all, so that shares together have every model.
+        """
+        kept = enumerate(self.plan.kept_specs)
+        own = (spec for i, spec in kept if self.share.is_all or self.share.has(i) or spec.key in self._needed)
+        return tuple((self._numbered(spec), self.plan.steps_of(spec)) for spec in own)
+
+    @cached_property
+    def _needed(self) -> frozenset[str]:
+        """Keys of the models that may be in the shots."""
+        around = () if self.plan.composition is None else self.plan.composition.models
+        rows = self.rows if self.plan.recipe.scene.is_moved_each_frame else {row.subject: row for row in self.rows}.values()
+        return frozenset(spec.key for spec in chain(around, *map(self.cast, rows)))
 
     @property
     def rows(self) -> Iterator[Row]:
-        """Every shot: its own ones, then those with channels of older frames."""
-        return self.record.rows_of(self.number)
+        """The shots: its own ones, then those with channels of older frames."""
+        return (row for row in self.record.rows_of(self.number) if self.share.has(row.number))
+
+    @cached_property
+    def subjects(self) -> tuple[str, ...]:
+        """What the shots show, each once."""
+        return self.plan.subjects if self.share.is_all else tuple(dict.fromkeys(row.subject for row in self.rows))
 
     def cast(self, row: Row) -> tuple[ModelSpec, ...]:
         """The recipe's models in a shot, that of its frames first."""

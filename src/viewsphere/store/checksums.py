@@ -3,6 +3,7 @@
     # options {"category_ids":"contiguous"}         of a format that has some: those that the export was written with
     # keep_annotations_above 0.1                    of an export that leaves annotations out: the visibility it was written with
     # credits "0c94a3..."                           of an export that names them: the digest of what CREDITS.md said then
+    # frames 12                                     how many frames it has: those that were finished then
     6f0c3b...  annotations/instances_train.json
     # 91d2...
 
@@ -32,30 +33,39 @@ CHECKSUMS = "checksums.xxh128"
 OPTIONS = "# options "
 KEPT = "# keep_annotations_above "
 CREDITED = "# credits "
+FRAMES = "# frames "
 AGAIN = "export again, or mend it with viewsphere check --repair"
 
 
 def write_checksums(
-    folder: Path, options: Mapping[str, Any] | None = None, least: float | None = None, credited: str | None = None
+    folder: Path,
+    options: Mapping[str, Any] | None = None,
+    least: float | None = None,
+    credited: str | None = None,
+    frames: int | None = None,
 ) -> None:
     """List all files of a finished folder, the options that they were written with, the visibility above which they keep
-    annotations (None: all), and the digest of the credits that they name (None: of none).
+    annotations (None: all), the digest of the credits that they name (None: of none), and how many frames they are of.
     """
     seal = xxhash.xxh3_128()
     with (folder / CHECKSUMS).open("wb") as file:
-        for line in _to_write(folder, options or {}, least, credited):
+        for line in _to_write(folder, options or {}, least, credited, frames):
             seal.update(line)
             file.write(line)
         file.write(f"# {seal.hexdigest()}\n".encode())
 
 
-def _to_write(folder: Path, options: Mapping[str, Any], least: float | None, credited: str | None) -> Iterator[bytes]:
+def _to_write(
+    folder: Path, options: Mapping[str, Any], least: float | None, credited: str | None, frames: int | None
+) -> Iterator[bytes]:
     if options:
         yield f"{OPTIONS}{json.dumps(options, separators=(',', ':'))}\n".encode()
     if least is not None:
         yield f"{KEPT}{json.dumps(least)}\n".encode()
     if credited is not None:
         yield f"{CREDITED}{json.dumps(credited)}\n".encode()
+    if frames is not None:
+        yield f"{FRAMES}{frames}\n".encode()
     yield from (f"{seal_of(folder / path)[1]}  {path}\n".encode() for path in _files(folder))
 
 
@@ -72,6 +82,11 @@ def written_least(folder: Path) -> float | None:
 def written_credits(folder: Path) -> str | None:
     """The digest of the credits that a folder's files were written with; None: they name none."""
     return _said(folder, CREDITED)
+
+
+def written_frames(folder: Path) -> int | None:
+    """How many frames a folder's files were written of; None where that is not known."""
+    return _said(folder, FRAMES)
 
 
 def _said(folder: Path, mark: str) -> Any:

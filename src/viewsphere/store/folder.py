@@ -7,8 +7,9 @@ import json
 import os
 import shutil
 import socket
+import time
 from collections.abc import Generator, Iterable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import replace
 from itertools import chain
 from pathlib import Path
@@ -24,6 +25,7 @@ from viewsphere.model.sample import Sample
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
 from viewsphere.store.channel_files import encode
+from viewsphere.store.heartbeat import GONE_S, Heartbeat, Pulse
 from viewsphere.store.index import Row
 from viewsphere.store.manifest import MANIFEST, Manifest, Seal, digest, refuse_another, seal_of
 from viewsphere.store.moving import move
@@ -34,6 +36,12 @@ from viewsphere.store.texts import parsed
 
 OLD_MODEL = "old model~"
 """Begins the name of a model's folder that another takes the place of."""
+
+FAILED = "_failed~"
+"""Begins the name of what a run that failed leaves: as no machine's name begins."""
+
+LOCK_S = 600
+"""Seconds that a run waits for others who change what runs have in common, which takes them moments."""
 
 
 class Store:
@@ -73,30 +81,89 @@ class Store:
         can be mended and tried again. Raises StoreError if the folder cannot be written, holds another recipe's data, or
         files that viewsphere did not make.
         """
-        writing = self.folder / "writing"
-        known = self.plan_file.exists()
-        if not known and self.root.is_dir() and any(self.root.iterdir()) and not writing.is_dir():
-            raise StoreError(f"{self.root}: expected an empty or new folder, found other files: choose another output folder")
+        self._refuse_strangers()
         self.make_ready()
-        if known:
-            if any(writing.iterdir()) or any((self.folder / "shots").glob("*/*")):
-                self._refuse_other(plan)
-                return
-            if not self._is_of(plan):
-                shutil.rmtree(self.folder / "models", ignore_errors=True)
-        self._write_atomically(self.plan_file, plan.to_json())
+        with self.locked():
+            if self.plan_file.exists():
+                if self._is_busy() or any((self.folder / "shots").glob("*/*")):
+                    self._refuse_other(plan)
+                    return
+                if not self._is_of(plan):
+                    shutil.rmtree(self.folder / "models", ignore_errors=True)
+                    self.forget_failures()
+            self._write_atomically(self.plan_file, plan.to_json())
 
     @contextmanager
-    def occupied(self) -> Generator[None]:
-        """Show other runs that this one is at work, as long as the block lasts."""
-        sign = self.folder / "writing" / f"{_writer()}run"
+    def opened_for(self, plan: PlanRecord, shard: tuple[int, int] = (0, 1)) -> Generator[Pulse]:
+        """`open_for`, then `occupied`, with nobody else in between."""
+        self._refuse_strangers()
+        self._make(self.folder / "writing")
+        with ExitStack() as stack:
+            with self.locked():
+                self.open_for(plan)
+                pulse = stack.enter_context(self.occupied(shard))
+            yield pulse
+
+    @contextmanager
+    def occupied(self, shard: tuple[int, int] = (0, 1)) -> Generator[Pulse]:
+        """Show other runs that this one is at work, and how far it is, as long as the block lasts.
+
+        One that fails leaves a note that says why, until its shard is rendered again, or all is finished.
+        """
+        writing = self.folder / "writing"
+        sign, note = writing / f"{_writer()}run", writing / f"{FAILED}{shard[0]}~{shard[1]}"
+        try:
+            with Pulse(lambda text: self._write_atomically(sign, text), shard) as pulse:
+                note.unlink(missing_ok=True)
+                try:
+                    yield pulse
+                except Exception as error:
+                    with suppress(StoreError):
+                        self._write_atomically(note, pulse.told(str(error) or type(error).__name__))
+                    raise
+        finally:
+            with suppress(OSError, StoreError):
+                sign.unlink(missing_ok=True)
+                self._sweep()
+
+    @contextmanager
+    def locked(self) -> Generator[None]:
+        """Nobody else changes what runs have in common (the plan, what was left out, credits, which model or export is in
+        place) as long as the block lasts. Blocks may be nested; a lock ends with its process.
+        """
+        from filelock import FileLock, Timeout
+
+        lock = FileLock(self.folder.absolute() / "lock", timeout=LOCK_S, is_singleton=True)
         with _disk_errors(self.root):
-            sign.touch()
+            try:
+                lock.acquire()
+            except Timeout:
+                raise StoreError(
+                    f"{lock.lock_file}: expected other runs to be done with it within {LOCK_S} s, found one that is not: "
+                    "end it if it hangs, or try again"
+                ) from None
         try:
             yield
         finally:
-            with suppress(OSError):
-                sign.unlink(missing_ok=True)
+            lock.release()
+
+    def heartbeats(self) -> tuple[Heartbeat, ...]:
+        """What the runs at work told last; also those that died, as long as nothing removed what they left."""
+        signs = sorted(path for path in (self.folder / "writing").glob("*~run") if path.name.count("~") == 2)
+        return tuple(filter(None, map(Heartbeat.read, signs)))
+
+    def failures(self) -> tuple[Heartbeat, ...]:
+        """What the runs told last that failed, and were not tried again since."""
+        return tuple(filter(None, map(Heartbeat.read, sorted((self.folder / "writing").glob(f"{FAILED}*")))))
+
+    def forget_failures(self) -> None:
+        """Remove the notes of runs that failed."""
+        for note in (self.folder / "writing").glob(f"{FAILED}*"):
+            note.unlink(missing_ok=True)
+
+    def _is_busy(self) -> bool:
+        """Whether anybody is at work here."""
+        return any(not path.name.startswith(FAILED) for path in (self.folder / "writing").iterdir())
 
     def save(self, plan: PlanRecord) -> None:
         """Put a plan in the place of the one that it continues."""
@@ -122,18 +189,25 @@ class Store:
 
     def drop_unnamed_models(self) -> None:
         """Remove the models that the plan does not name, unless another run is at work on them."""
-        own = _writer()
-        if any(not path.name.startswith(own) for path in (self.folder / "writing").iterdir()):
-            return
-        named = set(self.plan().models)
-        for folder in (self.folder / "models").glob("*"):
-            if folder.name not in named:
-                shutil.rmtree(folder, ignore_errors=True)
+        own = (_writer(), FAILED)
+        with self.locked():
+            if any(not path.name.startswith(own) for path in (self.folder / "writing").iterdir()):
+                return
+            named = set(self.plan().models)
+            for folder in (self.folder / "models").glob("*"):
+                if folder.name not in named:
+                    shutil.rmtree(folder, ignore_errors=True)
 
     def make_ready(self) -> None:
         """See that the folder can be written, and clear what dead runs left; raises StoreError if it cannot."""
         self._make(self.folder / "writing")
         self._sweep()
+
+    def _refuse_strangers(self) -> None:
+        """Raise StoreError for a folder with files that viewsphere did not make."""
+        is_ours = self.plan_file.exists() or (self.folder / "writing").is_dir()
+        if not is_ours and self.root.is_dir() and any(self.root.iterdir()):
+            raise StoreError(f"{self.root}: expected an empty or new folder, found other files: choose another output folder")
 
     def _is_of(self, plan: PlanRecord) -> bool:
         try:
@@ -173,12 +247,15 @@ class Store:
             move(aside, file)
 
     def _sweep(self) -> None:
-        """Remove what dead writers of this machine left unfinished; models that they were about to replace come back."""
-        for left in (self.folder / "writing").glob(f"*~{OLD_MODEL}*"):
-            target = self.model_folder(left.name.partition(f"~{OLD_MODEL}")[2])
-            if not target.exists() and _is_of_dead(left):
-                move(left, target)
-        _remove_of_dead((self.folder / "writing").iterdir())
+        """Remove what dead writers left unfinished; models that they were about to replace come back."""
+        with self.locked():
+            told, now = self.heartbeats(), time.time()
+            left = [p for p in (self.folder / "writing").iterdir() if _is_of_dead(p) or _is_of_gone(p, told, now)]
+            for path in left:
+                _, is_model, key = path.name.partition(f"~{OLD_MODEL}")
+                if is_model and not self.model_folder(key).exists():
+                    move(path, self.model_folder(key))
+            _remove(left)
 
     def shot_folder(self, key: str) -> Path:
         """Where a finished shot lies."""
@@ -234,9 +311,10 @@ class Store:
         is_model = target.parent == self.folder / "models"
         old = self.folder / "writing" / f"{_writer()}{OLD_MODEL if is_model else 'old~'}{target.name}"
         shutil.rmtree(old, ignore_errors=True)
-        if target.exists():
-            move(target, old)
-        move(folder, target)
+        with self.locked():
+            if target.exists():
+                move(target, old)
+            move(folder, target)
         shutil.rmtree(old, ignore_errors=True)
 
     @contextmanager
@@ -396,9 +474,9 @@ def _no_scene(file: Path, error: Exception) -> StoreError:
     )
 
 
-def _remove_of_dead(paths: Iterable[Path]) -> None:
-    """Remove those that were written by processes of this machine that are no more."""
-    for path in filter(_is_of_dead, paths):
+def _remove(paths: Iterable[Path]) -> None:
+    """Remove files and folders that nobody writes any more."""
+    for path in paths:
         shutil.rmtree(path, ignore_errors=True)
         path.unlink(missing_ok=True)
 
@@ -407,7 +485,20 @@ def _is_of_dead(path: Path) -> bool:
     """Whether its name says that a process of this machine wrote it that is no more."""
     host, _, rest = path.name.partition("~")
     pid = rest.partition("~")[0]
-    return host == socket.gethostname() and pid.isdigit() and not _alive(int(pid))
+    return host == socket.gethostname() and pid.isdigit() and not is_alive(int(pid))
+
+
+def _is_of_gone(path: Path, told: Iterable[Heartbeat], now: float) -> bool:
+    """Whether another machine wrote it, and for long nobody has: neither it changed, nor did a run tell that it works on it."""
+    host, _, rest = path.name.partition("~")
+    pid, _, target = rest.partition("~")
+    if host == socket.gethostname() or not pid.isdigit():
+        return False
+    with suppress(OSError):  # it may be gone by now
+        if now - path.stat().st_mtime < GONE_S:
+            return False
+    heard = (beat for beat in told if now - beat.beat < GONE_S)
+    return not any((beat.host, f"{beat.pid}") == (host, pid) or target in beat.working_on for beat in heard)
 
 
 @contextmanager
@@ -420,7 +511,7 @@ def new_folder(target: Path) -> Generator[Path]:
             raise StoreError(f"{target}: expected an empty or new folder, found other files: choose another, or delete it")
         shutil.rmtree(aside, ignore_errors=True)
         aside.mkdir(parents=True)
-        _remove_of_dead(path for path in aside.parent.iterdir() if path.name.endswith(f"~{target.name}"))
+        _remove(filter(_is_of_dead, [path for path in aside.parent.iterdir() if path.name.endswith(f"~{target.name}")]))
     try:
         with _disk_errors(target):
             yield aside
@@ -464,7 +555,8 @@ def _become(folder: Path, target: Path) -> None:
             raise
 
 
-def _alive(pid: int) -> bool:
+def is_alive(pid: int) -> bool:
+    """Whether a process of this machine is there."""
     if pid == os.getpid():
         return True
     if os.name == "nt":  # where os.kill would end the process

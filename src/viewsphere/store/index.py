@@ -20,7 +20,8 @@ Ranges = tuple[tuple[int, int], ...]
 @dataclass(frozen=True, slots=True)
 class Row:
     """One shot: its key (stable, unique, fit for a folder's name), what it shows, its first sample and number of samples, the
-    number of the part that renders it, and at which positions its subject is taken: numbers of poses, or of scenes.
+    number of the part that renders it, at which positions its subject is taken (numbers of poses, or of scenes), and its own
+    number in its index.
     """
 
     key: str
@@ -29,6 +30,7 @@ class Row:
     count: int
     part: int
     positions: Ranges
+    number: int
 
 
 @dataclass(frozen=True)
@@ -152,7 +154,8 @@ class Index(Sequence[Row]):
         name = block.subjects[subject]
         first = self._samples[number] + (subject * block.size + begin) * block.each
         key = f"{name}-{positions[0][0]:06d}{self.suffix}"
-        return Row(key, name, first, (end - begin) * block.each, self.part, positions)
+        place = self._rows[number] + subject * self._chunks(number) + chunk
+        return Row(key, name, first, (end - begin) * block.each, self.part, positions, place)
 
     def _chunks(self, number: int) -> int:
         return -(-self.blocks[number].size // self.most)

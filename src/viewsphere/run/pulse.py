@@ -1,0 +1,47 @@
+"""What a run is doing, passed on to its listener and to its heartbeat in the store."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, replace
+
+from viewsphere.run.pool import Crew, Job, Outcome, Work
+from viewsphere.run.progress import Listener, Progress
+from viewsphere.store.heartbeat import Pulse
+
+
+def heard(pulse: Pulse, listener: Listener) -> Listener:
+    """A listener that passes on what it hears, to the heartbeat first."""
+
+    def listen(progress: Progress) -> None:
+        pulse.enters(progress.phase)
+        counts = {"done": progress.done, "total": progress.total, "resumed": progress.resumed}
+        pulse.now = replace(pulse.now, **counts, under_way=progress.under_way)
+        listener(progress)
+
+    return listen
+
+
+def watched(crew: Crew, work: Work, pulse: Pulse, heard: Callable[[], None]) -> Iterator[Outcome]:
+    """What `crew.run` gives; the heartbeat tells which jobs are handed out and not done."""
+    for outcome in crew.run(_Told(work, pulse.working_on), heard):
+        pulse.working_on.pop(outcome.key, None)
+        yield outcome
+
+
+@dataclass(frozen=True)
+class _Told:
+    """Work whose jobs are noted when they are handed out."""
+
+    work: Work
+    working_on: dict[str, None]
+
+    def lines(self) -> Iterable[tuple[str, int]]:
+        """Those of the work."""
+        return self.work.lines()
+
+    def jobs(self, line: str) -> Iterator[Job]:
+        """Those of the work."""
+        for job in self.work.jobs(line):
+            self.working_on[job.key] = None
+            yield job

@@ -1,0 +1,46 @@
+"""Shares of what there is to do: which each has follows from their numbers alone."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from itertools import islice
+from typing import TypeVar
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Share:
+    """Every `of`-th of some things, from the `number`-th on, counted from 0: shares together have each of them once."""
+
+    number: int = 0
+    of: int = 1
+
+    def __str__(self) -> str:
+        return f"{self.number}/{self.of}"
+
+    @property
+    def is_all(self) -> bool:
+        """Whether it has all of them."""
+        return self.of == 1
+
+    def __call__(self, things: Iterable[T]) -> Iterator[T]:
+        """This share of them, in their order."""
+        return islice(things, self.number, None, self.of)
+
+    def has(self, number: int) -> bool:
+        """Whether the thing of this number, counted from 0, is in it."""
+        return number % self.of == self.number
+
+    def size(self, count: int) -> int:
+        """How many of `count` it has."""
+        return len(range(self.number, count, self.of))
+
+    def parted(self, inner: Share) -> Share:
+        """A share of this share."""
+        return Share(self.number + inner.number * self.of, self.of * inner.of)
+
+
+ALL = Share()
+"""The one share that has everything."""

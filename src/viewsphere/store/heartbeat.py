@@ -1,0 +1,117 @@
+"""How far runs are, told by each in a small file of the store that it writes anew every few seconds: for whoever asks, from any
+machine that sees the store.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import socket
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from threading import Event, Thread
+from typing import Any
+
+from viewsphere.errors import StoreError
+from viewsphere.store.texts import parsed
+
+BEAT_S = 5.0
+"""Seconds from one heartbeat to the next."""
+
+SILENT_S = 120.0
+"""Seconds without a heartbeat after which a run of another machine is told as silent: clocks differ, and network file systems
+show changes late.
+"""
+
+GONE_S = 3600.0
+"""Seconds without a heartbeat after which what a run of another machine left unfinished may be removed."""
+
+
+@dataclass(frozen=True)
+class Heartbeat:
+    """What a run tells of itself.
+
+    `shard` (k, n): it renders the k-th of n shares. `done` of `total` count frames in the phase "frames", else what that phase
+    counts; `resumed` of them were there before, `under_way` are in shots that are not finished: those of the keys `working_on`.
+    `begun` and `beat` are when the phase began and when this was told, in seconds since 1970. `error`: why the run ended.
+    """
+
+    host: str
+    pid: int
+    shard: tuple[int, int] = (0, 1)
+    phase: str = "start"
+    done: int = 0
+    total: int = 0
+    resumed: int = 0
+    under_way: int = 0
+    begun: float = 0.0
+    beat: float = 0.0
+    working_on: tuple[str, ...] = ()
+    error: str = ""
+
+    @property
+    def rate(self) -> float:
+        """Frames a second that it makes now; 0 where it makes none, or it cannot be known yet."""
+        made, seconds = self.done + self.under_way - self.resumed, self.beat - self.begun
+        return made / seconds if self.phase == "frames" and made > 0 and seconds > 0 else 0.0
+
+    def to_json(self) -> str:
+        """The text of its file."""
+        return json.dumps(asdict(self), separators=(",", ":"))
+
+    @staticmethod
+    def read(file: Path) -> Heartbeat | None:
+        """The one in a file; None where there is none, or none that can be read: it may be gone by now."""
+        try:
+            value: dict[str, Any] = parsed(file.read_bytes())
+            number, of = value["shard"]
+            shown = tuple(map(str, value["working_on"]))
+            begun, beat = float(value["begun"]), float(value["beat"])
+            counts = {name: int(value[name]) for name in ("done", "total", "resumed", "under_way")}
+            told = Heartbeat(str(value["host"]), int(value["pid"]), (int(number), int(of)), begun=begun, beat=beat)
+            return replace(told, **counts, phase=str(value["phase"]), working_on=shown, error=str(value["error"]))
+        except (OSError, LookupError, TypeError, ValueError):
+            return None
+
+
+class Pulse:
+    """Tells of a run, every few seconds by a thread of its own, however long a frame takes. `now` is what it tells next; a shot
+    that is handed out or done changes `working_on`.
+    """
+
+    def __init__(self, write: Callable[[str], None], shard: tuple[int, int] = (0, 1)) -> None:
+        begun = time.time()
+        self.now = Heartbeat(socket.gethostname(), os.getpid(), shard, begun=begun, beat=begun)
+        self.working_on: dict[str, None] = {}
+        self._write = write
+        self._ended = Event()
+        self._thread = Thread(target=self._beats, name="heartbeat", daemon=True)
+
+    def __enter__(self) -> Pulse:
+        self._write(self.told())
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._ended.set()
+        self._thread.join()
+
+    def enters(self, phase: str) -> None:
+        """Begin a phase; one that has begun goes on."""
+        if phase != self.now.phase:
+            self.now = replace(self.now, phase=phase, begun=time.time())
+
+    def told(self, error: str = "") -> str:
+        """What there is to tell now: how far the run is, or how it ended."""
+        return replace(self.now, beat=time.time(), working_on=tuple(self.working_on.copy()), error=error).to_json()
+
+    def _beats(self) -> None:
+        if hasattr(signal, "pthread_sigmask"):
+            signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})  # are the main thread's
+        while not self._ended.wait(BEAT_S):
+            with suppress(OSError, StoreError):  # a full disk ends the run elsewhere, if it has to
+                self._write(self.told())

@@ -1,0 +1,177 @@
+"""`status` says how far a data set is, and who is at work on it."""
+
+import json
+import os
+import socket
+import time
+from dataclasses import replace
+
+import pytest
+
+import viewsphere as vs
+from command_line import viewsphere
+from deadline import until
+from small import small_recipe
+from viewsphere.errors import StoreError
+from viewsphere.run.exporting import export
+from viewsphere.run.generate import generate
+from viewsphere.run.status import status
+from viewsphere.store import Store
+from viewsphere.store.heartbeat import GONE_S, SILENT_S, Heartbeat, Pulse
+
+
+@pytest.fixture
+def half(tmp_path):
+    """A data set of which half is rendered."""
+    generate(small_recipe(), tmp_path / "out", shard=(0, 2))
+    return tmp_path / "out"
+
+
+def leave(store, told, name=None):
+    """What a run has left of its heartbeat."""
+    file = store.folder / "writing" / (name or f"{told.host}~{told.pid}~run")
+    file.write_text(told.to_json())
+    return file
+
+
+def test_a_finished_data_set(small_run):
+    found = vs.status(small_run)
+    assert (found.frames, found.finished, found.missing, found.left_out, found.models) == (12, 12, 0, 0, ())
+    assert found.complete and found.runs == () and found.failed == () and found.seconds_left is None
+    answer = viewsphere("status", small_run)
+    assert answer.returncode == 0
+    assert "12 frames: 12 finished, 0 under way, 0 left out, 0 missing (100.0% done)" in answer.stdout
+
+
+def test_a_half_finished_data_set(half):
+    found = status(half)
+    assert (found.frames, found.finished, found.missing, found.complete) == (12, 6, 6, False)
+    answer = viewsphere("status", half, "--json")
+    assert answer.returncode == 3
+    told = json.loads(answer.stdout)
+    assert (told["missing"], told["complete"], told["runs"]) == (6, False, [])
+
+
+def test_no_data_set(tmp_path):
+    with pytest.raises(StoreError, match="no such folder"):
+        status(tmp_path / "none")
+    assert viewsphere("status", tmp_path / "none").returncode == 2
+
+
+def test_only_the_index_and_names_are_read(half):
+    for file in (half / "store" / "shots").rglob("*.json"):
+        file.write_text("")
+    assert status(half).finished == 6
+
+
+def test_a_run_is_seen_at_work(tmp_path):
+    seen = []
+
+    def look(progress):
+        if progress.phase == "frames":
+            time.sleep(0.01)
+            seen.append(Store(tmp_path / "out").heartbeats())
+
+    generate(small_recipe(), tmp_path / "out", shard=(1, 2), listener=look)
+    ((told,),) = {one for one in seen}
+    assert (told.host, told.pid, told.shard) == (socket.gethostname(), os.getpid(), (1, 2))
+    assert status(tmp_path / "out").runs == ()
+
+
+def test_the_pulse_tells_what_is_under_way():
+    written = []
+    with Pulse(written.append, (1, 2)) as pulse:
+        pulse.enters("frames")
+        pulse.now = replace(pulse.now, done=6, total=40, resumed=4, under_way=3)
+        pulse.working_on["m-000000"] = None
+        told = json.loads(pulse.told())
+    assert len(written) == 1  # the first at once
+    assert (told["phase"], told["done"], told["under_way"], told["working_on"]) == ("frames", 6, 3, ["m-000000"])
+
+
+def test_the_pulse_goes_on_by_itself(tmp_path, monkeypatch):
+    monkeypatch.setattr("viewsphere.store.heartbeat.BEAT_S", 0.02)
+    written = []
+    with Pulse(written.append):
+        assert until(lambda: len(written) > 3)
+    beats = [json.loads(text)["beat"] for text in written]
+    assert beats == sorted(beats) and beats[0] < beats[-1]
+    ended = len(written)
+    time.sleep(0.1)
+    assert len(written) == ended
+
+
+def test_runs_that_work_died_or_fell_silent(half):
+    now, store = time.time(), Store(half)
+    here = Heartbeat(socket.gethostname(), os.getppid(), (0, 3), "frames", 2, 4, 0, 1, now - 30, now, ("box-000000",))
+    leave(store, here)
+    leave(store, replace(here, pid=999_999_999))
+    leave(store, replace(here, host="far", pid=7))
+    leave(store, replace(here, host="far", pid=8, beat=now - SILENT_S - 1))
+    found = status(half)
+    assert {(r.told.host, r.told.pid): r.state for r in found.runs} == {
+        (here.host, here.pid): "running",
+        (here.host, 999_999_999): "dead",
+        ("far", 7): "running",
+        ("far", 8): "silent",
+    }
+    assert found.under_way == 2 and found.rate == pytest.approx(2 * 3 / 30)
+    assert found.seconds_left == pytest.approx((6 - 2) / found.rate)
+    said = viewsphere("status", half).stdout
+    assert "silent: far (pid 8), shard 0/3: frames 3 of 4" in said and "box-000000" in said and "about 20 s left" in said
+
+
+def test_what_failed_is_told(half):
+    told = Heartbeat("far", 7, (1, 2), error="models/a.obj: expected faces, found none")
+    leave(Store(half), told, "_failed~1~2")
+    assert status(half).failed == (told,)
+    assert "failed: far (pid 7), shard 1/2: models/a.obj: expected faces, found none" in viewsphere("status", half).stdout
+    assert generate(small_recipe(), half, shard=(1, 2)).missing == 0
+    assert status(half).failed == ()
+
+
+def test_what_cannot_be_read_is_left_out(half):
+    writing = half / "store" / "writing"
+    for i, text in enumerate(("", "null", "{", '{"shard": 3}')):
+        (writing / f"far~{i}~run").write_text(text)
+    assert status(half).runs == ()
+
+
+def test_what_others_left_goes_when_nobody_has_told_of_it_for_long(half):
+    store, now = Store(half), time.time()
+    writing, long_ago = store.folder / "writing", (now - GONE_S - 1,) * 2
+    for name in ("far~7~box-000001", "far~7~run", "far~8~box-000002", "near~9~box-000003", "near~9~box-000004"):
+        (writing / name).mkdir()
+        os.utime(writing / name, long_ago)
+    (writing / "far~7~run").rmdir()
+    dead = leave(store, Heartbeat("far", 7, beat=now - GONE_S - 1))
+    os.utime(dead, long_ago)
+    leave(store, Heartbeat("head", 1, beat=now, working_on=("box-000003",)))  # whose workers are on other machines
+    os.utime(writing / "near~9~box-000004")
+    store.make_ready()
+    assert {path.name for path in writing.iterdir()} == {"head~1~run", "near~9~box-000003", "near~9~box-000004"}
+
+
+def test_what_was_left_out_is_not_missing(tmp_path):
+    (tmp_path / "models").mkdir()
+    good = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+    for name, text in {"a": "no model\n", "b": good}.items():
+        (tmp_path / "models" / f"{name}.obj").write_text(text)
+    recipe = small_recipe(
+        models=[{"source": str(tmp_path / "models"), "category": "thing"}],
+        viewpoints={"azimuth": [0, 90], "elevation": [15], "distance": 4.0},
+    )
+    generate(recipe, tmp_path / "out", keep_going=True)
+    found = status(tmp_path / "out")
+    assert (found.frames, found.finished, found.left_out, found.complete) == (4, 2, 2, True)
+
+
+def test_an_export_of_what_is_there_says_how_much_it_is(half):
+    (note,) = export(half, ["coco"])
+    assert "6 of 12 frames are there to export" in note
+    answer = viewsphere("export", half, "-f", "csv")
+    assert "6 of 12 frames are there to export" in answer.stdout
+    told = json.loads(viewsphere("export", half, "-f", "csv", "--json").stdout)
+    assert (told["frames"], told["of"]) == (6, 12)
+    generate(small_recipe(), half, shard=(1, 2))
+    assert "# frames 12" in (half / "csv" / "checksums.xxh128").read_text()
