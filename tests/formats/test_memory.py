@@ -10,7 +10,6 @@ import pytest
 
 from small import small_recipe
 from viewsphere import Dataset, generate
-from viewsphere.formats.huggingface import shards
 from viewsphere.recipe.formats import FormatEntry
 from viewsphere.run.exporting import write
 
@@ -42,7 +41,7 @@ def held(root: Path, folder: Path) -> int:
             kept = tracemalloc.take_snapshot().filter_traces([tracemalloc.Filter(False, pathlib.__file__)])
             found.append(sum(trace.size for trace in kept.traces))
 
-    formats = [(FormatEntry(name=name), folder / name) for name in ("coco", "native", "webdataset", "huggingface")]
+    formats = [(FormatEntry(name=name), folder / name) for name in ("coco", "native")]
     for _, target in formats:
         target.mkdir(parents=True)
     tracemalloc.start()
@@ -54,9 +53,7 @@ def held(root: Path, folder: Path) -> int:
 
 
 @pytest.mark.slow
-def test_memory_does_not_grow_with_the_frames(datasets, tmp_path, monkeypatch):
-    pytest.importorskip("pyarrow")
-    monkeypatch.setattr(shards, "ROWS", 10)  # that are held at once
+def test_memory_does_not_grow_with_the_frames(datasets, tmp_path):
     few, many = datasets
     held(few, tmp_path / "first")  # what is imported then stays
     assert held(many, tmp_path / "many") - held(few, tmp_path / "few") < MOST_GROWTH * 480
