@@ -30,6 +30,7 @@ from viewsphere.store.paths import file_inside, files_inside, names
 from viewsphere.store.point_tracks import PointTracks, joined
 from viewsphere.store.records import Category, ModelInfo
 from viewsphere.store.sample_records import ShotRecords, from_whole_sample
+from viewsphere.store.selection import Selection
 from viewsphere.store.texts import parsed
 
 
@@ -130,6 +131,23 @@ class Dataset(Shown, Sequence[Sample]):
     def __iter__(self) -> Iterator[Sample]:
         for key, places in self._shots[0]:
             yield from self.samples_of(key, places)
+
+    def select(self, *fields: str, split: str | None = None) -> Selection:
+        """Some fields of the frames, of one split or of all: a map-style data set for PyTorch's DataLoader. Only what is named
+        is decoded.
+
+        `fields`: names of channels (`rgb`), of values of samples (`index`, `split`, `sensor`, `time`, `camera.K`,
+        `pose.azimuth_deg`, ...), and of objects (`objects.box2d`, `objects.category_id`, `objects.mask`, ...), which become
+        arrays (N, ...), float64, int64 or bool, NaN where there is no value, or lists of texts; `objects.view` is (N, 4):
+        azimuth, elevation (degrees), distance (metres), tilt (degrees). Raises UserError for others.
+        """
+        return Selection(self, fields, split)
+
+    def of_split(self, split: str) -> Iterator[int]:
+        """Positions of the frames of a split in the data set; reads all records."""
+        for (key, places), first in zip(*self._shots, strict=False):
+            splits = self._read_records(key).splits
+            yield from (first + i for i, place in enumerate(places) if splits[place] == split)
 
     def shots(self) -> Iterator[tuple[str, Sequence[int]]]:
         """Key of every finished shot, in frame order, and which of its frames are chosen, counted from 0."""
@@ -325,6 +343,14 @@ class _Records:
         if self.shot is None:
             return [record.get("sequence", "") for record in self.records]
         return [self.shot.shot.sequence] * len(self.records)
+
+    @property
+    def splits(self) -> list[str]:
+        """The split of each sample."""
+        if self.shot is None:
+            return [record["split"] for record in self.records]
+        shot = self.shot.shot
+        return [shot.instants[instant].split for _, instant, _ in shot.samples]
 
 
 class _ChannelFiles(Mapping[str, NDArray[Any]]):
