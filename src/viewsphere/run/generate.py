@@ -318,11 +318,7 @@ class Missing:
     def lines(self) -> Iterable[tuple[str, int]]:
         """The models, and how many shots each has."""
         indices = (self.portion.record.indices[self.portion.number], *self._added)
-        counts: Counter[str] = Counter()
-        for index in indices:
-            for subject in index.subjects:
-                counts[subject] += index.count_of(subject)
-        return counts.items()
+        return sum((index.counts for index in indices), Counter[str]()).items()
 
     def jobs(self, line: str) -> Iterator[Job]:
         """The shots of a model that are to be rendered."""

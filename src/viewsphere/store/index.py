@@ -6,7 +6,7 @@ Nothing here grows with the number of samples: rows are counted out when somebod
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -107,6 +107,16 @@ class Index(Sequence[Row]):
     def count_of(self, subject: str) -> int:
         """Number of the rows of a subject."""
         return sum(self._chunks(number) for number, _ in self._places.get(subject, ()))
+
+    @property
+    def counts(self) -> Counter[str]:
+        """Number of the rows of each subject, in order."""
+        found: Counter[str] = Counter()
+        for number, block in enumerate(self.blocks):
+            each = self._chunks(number)
+            for subject in block.subjects:
+                found[subject] += each
+        return found
 
     def samples_of(self, subject: str) -> int:
         """Number of the samples of a subject."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from itertools import accumulate, chain
 from pathlib import PurePosixPath
@@ -296,7 +296,7 @@ class PlanRecord:
         value |= {
             "store": STORE_VERSION,
             "categories": [c.__dict__ for c in self.categories],
-            "parts": [asdict(part) for part in self.parts],
+            "parts": [vars(part) | {"blocks": [vars(block) for block in part.blocks]} for part in self.parts],
         }
         return sealed(value)
 
