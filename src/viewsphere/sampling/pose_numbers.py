@@ -101,7 +101,7 @@ def as_ranges(numbers: Indices) -> Ranges:
     if not len(numbers):
         return ()
     gaps = np.flatnonzero(numbers[1:] - numbers[:-1] > 1)
-    firsts, lasts = numbers[[0, *(gaps + 1)]], numbers[[*gaps, -1]]
+    firsts, lasts = np.append(numbers[:1], numbers[gaps + 1]), np.append(numbers[gaps], numbers[-1:])
     return tuple(zip(firsts.tolist(), (lasts + 1).tolist(), strict=True))
 
 
