@@ -308,7 +308,7 @@ def test_a_hundred_million_frames_are_planned_in_little_memory(models, poses, by
     vs.plan(small_recipe())  # what is loaded once does not count
     tracemalloc.start()
     portion = whole(vs.plan(big))
-    first = next(Missing(portion, Store(tmp_path), {}).rows())
+    first = next(Missing(portion, Store(tmp_path)).rows())
     assert sum(portion.plan.split_counts.values()) == portion.plan.frames == 10**8
     assert next(iter(portion.rows)) == first and len(portion.record.to_json()) < 500_000
     assert tracemalloc.get_traced_memory()[1] < 20_000_000

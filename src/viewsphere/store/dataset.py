@@ -296,7 +296,8 @@ class Dataset(Shown, Sequence[Sample]):
         StoreError for a path that leads out of the data set.
         """
         destination.parent.mkdir(parents=True, exist_ok=True)
-        self.link_kinds.add(link_file(self.path(relative).resolve(), destination))
+        file = self.path(relative)
+        self.link_kinds.add(link_file(file.resolve() if file.is_symlink() else file, destination))
 
     def model_files(self) -> Iterator[tuple[str, str]]:
         """Every finished model's OBJ, GLB, materials and textures: `<key>/<name>`, and the path from the data set's root. A
