@@ -43,7 +43,7 @@ class Watch:
         self.every, self.moments, self._begun = every, list[Moment](), time.monotonic()
 
     def __call__(self, told: Progress) -> None:
-        if told.phase != "frames" or told.done < self.every * len(self.moments):
+        if told.phase != "frames" or (self.moments and told.done < self.moments[-1].frames + self.every):
             return
         status = Path("/proc/self/status").read_text("ascii")
         memory = next(int(text.split()[1]) for text in status.splitlines() if text.startswith("VmRSS"))
