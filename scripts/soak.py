@@ -16,6 +16,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 from figures import BLUE, GREEN, INK, RED, line, svg, words
 
@@ -53,16 +54,17 @@ class Watch:
 
 def recipe(frames: int) -> Recipe:
     """So many frames of 32 x 24 pixels, of four post boxes."""
-    return Recipe(
-        name="soak",
-        models=[{"source": "zoo:post_box", "category": "post box", "count": MODELS, "scale": {"length": 0.18}}],
-        viewpoints={"kind": "sphere", "count": frames // MODELS, "distance": 1.0},
-        camera={"size": [32, 24], "fov_deg": 35},
-        scene={"ground": True},
-        channels=["rgb", "depth", "instances"],
-        max_frames=frames,
-        formats=[],
-    )
+    value: dict[str, Any] = {
+        "name": "soak",
+        "models": [{"source": "zoo:post_box", "category": "post box", "count": MODELS, "scale": {"length": 0.18}}],
+        "viewpoints": {"kind": "sphere", "count": frames // MODELS, "distance": 1.0},
+        "camera": {"size": [32, 24], "fov_deg": 35},
+        "scene": {"ground": True},
+        "channels": ["rgb", "depth", "instances"],
+        "max_frames": frames,
+        "formats": [],
+    }
+    return Recipe.model_validate(value)
 
 
 def rates(moments: Sequence[Moment]) -> list[float]:
@@ -99,7 +101,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         generate(recipe(asked.frames), Path(folder) / "out", listener=watch)
     moments = watch.moments
-    curves = {"MB in memory": [m.memory for m in moments], "open files": [m.files for m in moments]}
+    curves: dict[str, Sequence[float]] = {"MB in memory": [m.memory for m in moments], "open files": [m.files for m in moments]}
     curves["frames a second"] = rates(moments)
     asked.out.mkdir(parents=True, exist_ok=True)
     (asked.out / "chart.svg").write_text(chart(curves, asked.frames), "utf-8")
