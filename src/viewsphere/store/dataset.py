@@ -95,13 +95,18 @@ class Dataset(Shown, Sequence[Sample]):
         return found
 
     @cached_property
+    def rows(self) -> tuple[Row, ...]:
+        """The rows of all finished shots, chosen or not, in frame order; without those that add channels to others."""
+        found = (self.plan.find(key) for key in self.store.finished())
+        own = (row for row in found if row is not None and row.part == self.plan.part_of(row.first))
+        return tuple(sorted(own, key=lambda row: row.first))
+
+    @cached_property
     def _shots(self) -> tuple[list[tuple[str, Sequence[int]]], list[int]]:
         """Key and chosen places of each finished shot, in frame order; and the number of frames before each shot."""
         shots: list[tuple[str, Sequence[int]]] = []
         starts, total = [0], 0
-        found = (self.plan.find(key) for key in self.store.finished())
-        own = (row for row in found if row is not None and row.part == self.plan.part_of(row.first))
-        for row in sorted(own, key=lambda row: row.first):
+        for row in self.rows:
             places = self._places(row)
             if places:
                 shots.append((row.key, places))
@@ -309,7 +314,8 @@ class Dataset(Shown, Sequence[Sample]):
         StoreError for a path that leads out of the data set.
         """
         destination.parent.mkdir(parents=True, exist_ok=True)
-        self.link_kinds.add(link_file(self.path(relative).resolve(), destination))
+        file = self.path(relative)
+        self.link_kinds.add(link_file(file.resolve() if file.is_symlink() else file, destination))
 
     def model_files(self) -> Iterator[tuple[str, str]]:
         """Every finished model's OBJ, GLB, materials and textures: `<key>/<name>`, and the path from the data set's root. A

@@ -9,7 +9,7 @@ import shutil
 import socket
 from collections.abc import Generator, Iterable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -24,7 +24,7 @@ from viewsphere.model.sample import Sample
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
 from viewsphere.store.channel_files import encode
-from viewsphere.store.index import Row
+from viewsphere.store.index import Index, Row
 from viewsphere.store.manifest import MANIFEST, Manifest, Seal, digest, refuse_another, seal_of
 from viewsphere.store.moving import move
 from viewsphere.store.paths import file_inside
@@ -34,6 +34,17 @@ from viewsphere.store.texts import parsed
 
 OLD_MODEL = "old model~"
 """Begins the name of a model's folder that another takes the place of."""
+
+
+@dataclass(frozen=True)
+class Gap:
+    """What is missing of an index: its first missing row, how many shots and frames these are, and of how many frames."""
+
+    index: Index
+    first: Row
+    shots: int
+    frames: int
+    of: int
 
 
 class Store:
@@ -102,9 +113,21 @@ class Store:
         """Put a plan in the place of the one that it continues."""
         self._write_atomically(self.plan_file, plan.to_json())
 
-    def missing(self, plan: PlanRecord) -> list[Row]:
-        """The shots of a plan that are neither finished nor left out at the user's wish."""
-        return [row for row in self.wanted(plan) if not self.has_shot(row.key)]
+    def gaps(self, plan: PlanRecord) -> Iterator[Gap]:
+        """What is missing of each index of a plan, but for what was left out at the user's wish.
+
+        Takes as long as shots are finished, however many are planned.
+        """
+        skipped, finished = self.skipped().keys(), tuple(self.finished())
+        for index in plan.all_indices:
+            left_out = [row for row in map(index.find, skipped) if row is not None and row.subject not in skipped]
+            there = [row for row in map(index.find, finished) if row is not None and not {row.key, row.subject} & skipped]
+            shots = len(index) - len(left_out) - sum(map(index.count_of, skipped))
+            frames = index.samples - sum(row.count for row in left_out) - sum(map(index.samples_of, skipped))
+            if len(there) < shots:
+                known = {row.key for row in chain(left_out, there)}
+                first = next(row for row in index.without(skipped) if row.key not in known)
+                yield Gap(index, first, shots - len(there), frames - sum(row.count for row in there), frames)
 
     def finished(self) -> Iterator[str]:
         """Keys of all shots that are there, in no order."""
@@ -116,9 +139,8 @@ class Store:
     def wanted(self, plan: PlanRecord) -> Iterator[Row]:
         """The shots of a plan, those with channels that were added later last, but for what was left out at the user's wish."""
         skipped = self.skipped().keys()
-        for row in chain(plan.rows, *(index for index, _ in plan.supplements)):
-            if not {row.key, row.subject} & skipped:
-                yield row
+        rows = chain.from_iterable(index.without(skipped) for index in plan.all_indices)
+        return (row for row in rows if row.key not in skipped)
 
     def drop_unnamed_models(self) -> None:
         """Remove the models that the plan does not name, unless another run is at work on them."""

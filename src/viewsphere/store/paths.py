@@ -5,14 +5,16 @@ Whoever turns a stored path into a file does it here.
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Sequence
 from pathlib import Path, PurePosixPath, PureWindowsPath
+from stat import S_ISLNK
 
 from viewsphere.errors import StoreError
 
-_PLAIN = re.compile(r"[A-Za-z0-9_-][\w.-]*(?:/[A-Za-z0-9_-][\w.-]*)*", re.ASCII)
-"""Paths of no more than letters, digits and a few signs, which lie inside on every system; nearly all do."""
+_PLAIN = re.compile(r"[\w+-][\w+.-]*(?:/[\w+-][\w+.-]*)*", re.ASCII)
+"""Relative paths that mean the same on every system; other ones are looked at more closely."""
 
 
 def file_inside(root: Path, relative: str) -> Path:
@@ -26,6 +28,8 @@ def file_inside(root: Path, relative: str) -> Path:
             "data set"
         )
     file = root / relative
+    if _is_straight(root, relative):
+        return file
     try:
         leads_to = file.resolve()
         is_below = leads_to.is_relative_to(root.resolve())
@@ -37,6 +41,23 @@ def file_inside(root: Path, relative: str) -> Path:
             "place of the link"
         )
     return file
+
+
+def _is_straight(root: Path, relative: str) -> bool:
+    """Whether nothing on the way from a folder to what lies below it is a link; False, too, where that is not plain to see."""
+    if os.name == "nt" or not _PLAIN.fullmatch(relative):
+        return False
+    place = str(root)
+    for name in relative.split("/"):
+        place = f"{place}/{name}"
+        try:
+            if S_ISLNK(os.lstat(place).st_mode):
+                return False
+        except FileNotFoundError:
+            return True
+        except (OSError, ValueError):
+            return False
+    return True
 
 
 def files_inside(root: Path, folder: Path) -> Sequence[Path]:
