@@ -225,7 +225,7 @@ def _credits(dataset: Dataset) -> Iterator[str]:
 
 
 def _missing_shots(dataset: Dataset) -> Iterator[str]:
-    """What is missing of each part, and of the channels that each one added to others."""
+    """What is missing of each part, and of the channels that one added to another."""
     plan, store = dataset.plan, dataset.store
     for gap in store.gaps(plan):
         number, added = gap.index.part, gap.index not in plan.indices
