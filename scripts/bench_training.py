@@ -13,6 +13,7 @@ import os
 import time
 from collections.abc import Callable, Iterable
 from functools import partial
+from importlib.util import find_spec
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
@@ -110,6 +111,8 @@ def compare(frames: int, runs: dict[str, Callable[[int], None]]) -> None:
 
 def training(folder: Path) -> None:
     """Measure reading and rendering for a training loop."""
+    if find_spec("torch") is None:
+        raise SystemExit("bench: --training: expected PyTorch, found none: pip install torch")
     recipe, out = reference_recipe(FRAMES["reading"], 4, folder), folder / "out"
     vs.generate(recipe, out)
     frames = vs.open(out).select(*PICTURES, "objects.box2d")

@@ -170,7 +170,7 @@ def field_type(field: Field) -> str:
 def limits_page() -> str:
     """All limits and their defaults."""
     text = NOTE + (
-        "# Limits\n\nNo file makes a program run out of memory or time: what it may ask for has limits. A message gives the "
+        "# Limits\n\nWhat files may ask for has limits, in memory, time and number. A message gives the "
         "limit's name, its value and what was found. The variable `VIEWSPHERE_<name>` of the environment sets a limit anew, "
         "such as `VIEWSPHERE_MAX_TRIANGLES=50000000`; a recipe says itself how many frames it may have (`max_frames`).\n\n"
         "| Limit | Default | Of what |\n|---|---|---|\n"

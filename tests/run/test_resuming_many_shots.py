@@ -4,23 +4,12 @@ import os
 from itertools import islice
 
 import viewsphere as vs
+from counting import counted
 from small import small_recipe
 from viewsphere.run.generate import Missing
 from viewsphere.sampling.extension import whole
 from viewsphere.store import Store
 from viewsphere.store.manifest import MANIFEST
-
-
-def counted(monkeypatch, owner, name):
-    """What a function was called with since."""
-    calls, own = [], getattr(owner, name)
-
-    def told(*args, **options):
-        calls.append(args)
-        return own(*args, **options)
-
-    monkeypatch.setattr(owner, name, told)
-    return calls
 
 
 def test_each_finished_shot_is_looked_at_once(tmp_path, monkeypatch):

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import viewsphere as vs
+from counting import counted
 from small import ROOT, small_recipe, tree_hash
 from viewsphere import plugins
 from viewsphere.check import check
@@ -313,18 +314,6 @@ def test_a_hundred_million_frames_are_planned_in_little_memory(models, poses, by
     assert next(iter(portion.rows)) == first and len(portion.record.to_json()) < 500_000
     assert tracemalloc.get_traced_memory()[1] < 20_000_000
     tracemalloc.stop()
-
-
-def counted(monkeypatch, owner, name):
-    """How often a function was called since."""
-    calls, own = [], getattr(owner, name)
-
-    def told(*args, **options):
-        calls.append(args)
-        return own(*args, **options)
-
-    monkeypatch.setattr(owner, name, told)
-    return calls
 
 
 @pytest.mark.parametrize("views", [None, 2])

@@ -225,15 +225,14 @@ def _credits(dataset: Dataset) -> Iterator[str]:
 
 
 def _missing_shots(dataset: Dataset) -> Iterator[str]:
-    """What is missing of each part, and of the channels that one added to another."""
+    """What is missing of each part, and of the channels that each one added to others."""
     plan, store = dataset.plan, dataset.store
     for gap in store.gaps(plan):
-        number, added = gap.index.part, gap.index not in plan.indices
         what = _factors(plan)
         if len(plan.parts) > 1:
-            channels = dict.fromkeys(name for _, names in plan.parts[number].supplies for name in names)
-            what = f"{', '.join(channels)} of older frames, " if added else ""
-            what += f"part {number + 1}, recipe {plan.parts[number].name!r}"
+            channels = dict.fromkeys(name for _, names in plan.parts[gap.part].supplies for name in names)
+            what = f"{', '.join(channels)} of older frames, " if gap.is_added else ""
+            what += f"part {gap.part + 1}, recipe {plan.parts[gap.part].name!r}"
         yield (
             f"expected {gap.of} frames ({what}), found {gap.of - gap.frames}: shot {gap.first.key} is the first of "
             f"{gap.shots} missing: render again to go on"

@@ -7,6 +7,7 @@ import json
 import os
 import shutil
 import socket
+from collections import defaultdict
 from collections.abc import Generator, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
@@ -38,9 +39,12 @@ OLD_MODEL = "old model~"
 
 @dataclass(frozen=True)
 class Gap:
-    """What is missing of an index: its first missing row, how many shots and frames these are, and of how many frames."""
+    """What is missing of a part, or of the channels that it adds to other parts: its first missing row, how many shots and
+    frames these are, and of how many frames.
+    """
 
-    index: Index
+    part: int
+    is_added: bool
     first: Row
     shots: int
     frames: int
@@ -114,20 +118,26 @@ class Store:
         self._write_atomically(self.plan_file, plan.to_json())
 
     def gaps(self, plan: PlanRecord) -> Iterator[Gap]:
-        """What is missing of each index of a plan, but for what was left out at the user's wish.
+        """What is missing of each part and of the channels that it adds, but for what was left out at the user's wish.
 
         Takes as long as shots are finished, however many are planned.
         """
         skipped, finished = self.skipped().keys(), tuple(self.finished())
-        for index in plan.all_indices:
-            left_out = [row for row in map(index.find, skipped) if row is not None and row.subject not in skipped]
-            there = [row for row in map(index.find, finished) if row is not None and not {row.key, row.subject} & skipped]
-            shots = len(index) - len(left_out) - sum(map(index.count_of, skipped))
-            frames = index.samples - sum(row.count for row in left_out) - sum(map(index.samples_of, skipped))
+        alike: defaultdict[tuple[int, bool], list[Index]] = defaultdict(list)
+        for number, index in enumerate(plan.all_indices):
+            alike[index.part, number >= len(plan.indices)].append(index)
+        for (part, is_added), indices in alike.items():
+            left_out = [row for row in _found(indices, skipped) if row.subject not in skipped]
+            there = [row for row in _found(indices, finished) if not {row.key, row.subject} & skipped]
+            shots = sum(len(index) - sum(map(index.count_of, skipped)) for index in indices) - len(left_out)
+            frames = sum(index.samples - sum(map(index.samples_of, skipped)) for index in indices)
+            frames -= sum(row.count for row in left_out)
             if len(there) < shots:
                 known = {row.key for row in chain(left_out, there)}
-                first = next(row for row in index.without(skipped) if row.key not in known)
-                yield Gap(index, first, shots - len(there), frames - sum(row.count for row in there), frames)
+                rows = chain.from_iterable(index.without(skipped) for index in indices)
+                first = next(row for row in rows if row.key not in known)
+                lost = frames - sum(row.count for row in there)
+                yield Gap(part, is_added, first, shots - len(there), lost, frames)
 
     def finished(self) -> Iterator[str]:
         """Keys of all shots that are there, in no order."""
@@ -523,3 +533,8 @@ def _disk_errors(root: Path) -> Generator[None]:
         yield
     except OSError as error:
         raise StoreError(f"{root}: expected to write, found: {error.strerror or error}; what is finished is kept") from error
+
+
+def _found(indices: Iterable[Index], keys: Iterable[str]) -> list[Row]:
+    """The rows of these keys in some indices."""
+    return [row for index in indices for row in map(index.find, keys) if row is not None]
