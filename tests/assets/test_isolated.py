@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from deadline import DEADLINE, until
+from viewsphere.aside import aside, of_this_process
 from viewsphere.assets import isolated, limits
 from viewsphere.assets import reader as reader_program
-from viewsphere.aside import aside, of_this_process
 from viewsphere.assets.cache import PREFIX, cache_folder, load, load_normalised
 from viewsphere.assets.isolated import READ_HERE
 from viewsphere.assets.mesh_file import ARRAYS

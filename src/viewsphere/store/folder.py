@@ -170,8 +170,11 @@ class Store:
     @contextmanager
     def _own(self) -> Generator[Path]:
         """A folder for what is not whole yet, as long as the block lasts; StoreError for what the disk refuses meanwhile."""
-        with _disk_errors(self.root), aside(self.folder / "writing") as own:
-            yield own
+        writing = self.folder / "writing"
+        with _disk_errors(self.root):
+            writing.mkdir(parents=True, exist_ok=True)
+            with aside(writing) as own:
+                yield own
 
     def _write_atomically(self, file: Path, text: str) -> None:
         with self._own() as own:
