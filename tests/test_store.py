@@ -4,6 +4,7 @@ import json
 import os
 import pickle
 import re
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -107,6 +108,21 @@ def test_leftovers_of_the_dead_are_swept_and_those_of_the_living_stay(tmp_path):
         with store.occupied():
             (writing / f"{of_this_process()}of a worker that was killed meanwhile").mkdir()
         assert {p.name for p in writing.iterdir()} == {alive.name, "otherhost~1~x"}
+
+
+def test_runs_that_replace_one_folder_at_once_do_not_hinder_one_another(tmp_path):
+    store = Store(tmp_path / "out")
+    store.open_for(plan_record())
+
+    def replace_it(number):
+        for _ in range(100):
+            with store.replacing(store.root / "coco") as folder:
+                (folder / "made by").write_text(f"{number}")
+
+    with ThreadPoolExecutor(4) as pool:
+        list(pool.map(replace_it, range(4)))
+    assert (store.root / "coco" / "made by").read_text() in "0123"
+    assert not list((store.folder / "writing").iterdir())
 
 
 def test_what_was_being_replaced_comes_back(tmp_path):

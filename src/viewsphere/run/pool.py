@@ -335,7 +335,6 @@ def _serve(pipe: Connection, root: Path, portion: Portion) -> None:
 
 def _end_with_parent() -> None:
     """End this process, whatever it does, as soon as its parent is dead: another run may be at its work already."""
-    parent = parent_process()
-    assert parent is not None
-    wait([parent.sentinel])
-    os._exit(1)
+    if parent := parent_process():
+        wait([parent.sentinel])
+        os._exit(1)

@@ -9,7 +9,7 @@ import shutil
 from collections.abc import Generator, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import replace
-from itertools import chain
+from itertools import chain, count
 from pathlib import Path
 from typing import Any
 
@@ -235,12 +235,20 @@ class Store:
                 _become(folder, target)
 
     def _replace(self, folder: Path, target: Path) -> None:
-        """Put a folder that lies aside in the place of another, which goes with what is aside."""
-        if target.exists():
-            old = folder.parent / OLD / target.relative_to(self.root)
-            old.parent.mkdir(parents=True)
-            move(target, old)
-        move(folder, target)
+        """Put a folder that lies aside in the place of another, which goes with what is aside; and so does what other runs put
+        there at this moment.
+        """
+        old = folder.parent / OLD / target.relative_to(self.root)
+        old.parent.mkdir(parents=True)
+        for another in count():
+            with suppress(FileNotFoundError):  # there is none, or another run has moved it
+                move(target, folder.parent / f"{another}" if old.exists() else old)
+            try:
+                move(folder, target)
+                return
+            except OSError:
+                if not target.exists():
+                    raise
 
     @contextmanager
     def replacing(self, target: Path) -> Generator[Path]:
