@@ -42,10 +42,10 @@ BIGGER = {"models": [{"source": "zoo:post_box", "category": "post box", "count":
 
 @dataclass(frozen=True)
 class Work:
-    """A command, without `python -m viewsphere`, that writes into `out`; `prepared` makes what lies there before."""
+    """A command, without `python -m viewsphere`, that writes into `out`, where `base` lies, if any."""
 
     words: Callable[[Path, Path], list[str]]
-    prepared: Callable[[Path, Path], None] = lambda stock, out: None
+    base: str = ""
 
     def start(self, stock: Path, out: Path, *before: str) -> subprocess.Popen[str]:
         """Start it in a process group of its own, behind other words."""
@@ -61,20 +61,16 @@ class Work:
         assert process.returncode == 0, said
 
 
-def _copied(name: str) -> Callable[[Path, Path], None]:
-    return lambda stock, out: shutil.copytree(stock / name, out) and None
-
-
 def _rendered(file: str, *more: str) -> Callable[[Path, Path], list[str]]:
     return lambda stock, out: ["render", str(stock / file), "-o", str(out), "--workers", "2", *more]
 
 
 WORKS = {
     "render": Work(_rendered("recipe.yaml")),
-    "append": Work(_rendered("bigger.yaml", "--append"), _copied("small")),
+    "append": Work(_rendered("bigger.yaml", "--append"), "small"),
     "merge": Work(lambda stock, out: ["merge", str(stock / "small"), str(stock / "other"), "-o", str(out), "--format", "coco"]),
     "import": Work(lambda stock, out: ["import", "native", str(stock / "small" / "native"), "-o", str(out)]),
-    "export": Work(lambda stock, out: ["export", str(out), "--format", "coco,native,csv"], _copied("small")),
+    "export": Work(lambda stock, out: ["export", str(out), "--format", "coco,native,csv"], "small"),
 }
 
 
@@ -148,7 +144,8 @@ class Course:
 
     def _begin(self) -> None:
         shutil.rmtree(self.out, ignore_errors=True)
-        self.work.prepared(self.stock, self.out)
+        if self.work.base:
+            shutil.copytree(self.stock / self.work.base, self.out)
 
     def _await(self, process: subprocess.Popen[str]) -> None:
         """Wait until the work writes something."""
@@ -177,7 +174,8 @@ class Course:
     def look(self, there: set[str]) -> None:
         """Count what was lost of the shots that were there, and what is torn now."""
         self.tally.lost += len(there - finished(self.out))
-        self.tally.torn += len(torn(self.out, self.model))
+        base = [self.stock / self.work.base] if self.work.base else []
+        self.tally.torn += len(torn(self.out, self.model, *base))
 
     def renew(self) -> None:
         """Finish the work, compare with the model, and begin anew."""
@@ -191,8 +189,8 @@ def finished(out: Path) -> set[str]:
     return {path.parent.name for path in out.glob(f"store/shots/*/*/{MANIFEST}")}
 
 
-def torn(out: Path, model: Path) -> list[str]:
-    """Shots, models and exports that look finished, and are not; files at the root that are half written."""
+def torn(out: Path, *wholes: Path) -> list[str]:
+    """Shots, models and exports that look finished, and are not; files at the root that are not those of whole trees."""
     found = []
     for path in (*out.glob("store/shots/*/*"), *out.glob("store/models/*")):
         try:
@@ -201,10 +199,10 @@ def torn(out: Path, model: Path) -> list[str]:
             damage = [str(error)]
         found += damage[:1]
     for path in out.glob("*"):
-        same = model / path.name
-        if path.name != "store" and not same.exists():
+        same = [whole / path.name for whole in wholes if (whole / path.name).exists()]
+        if not same:
             found.append(f"{path}: expected no such file")
-        elif path.is_file() and path.read_bytes() != same.read_bytes():
+        elif path.is_file() and path.read_bytes() not in [file.read_bytes() for file in same]:
             found.append(f"{path}: differs")
         elif path.is_dir() and path.name != "store":
             found += [f"{path}: {problem}" for problem in damaged_files(path)][:1]

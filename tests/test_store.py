@@ -14,6 +14,7 @@ from viewsphere.aside import aside, of_this_process
 from viewsphere.errors import StoreError
 from viewsphere.labels import channels
 from viewsphere.model.tracks import TRACK
+from viewsphere.run.exporting import export
 from viewsphere.store import Block, Category, Dataset, Part, PlanRecord, Store, decode, encode, new_folder
 
 PART = Part(
@@ -143,6 +144,17 @@ def test_what_was_being_replaced_comes_back(tmp_path):
     assert not (store.root / "csv").exists()
     assert (store.root / "elsewhere" / "a").is_dir()
     assert not left.exists()
+
+
+def test_an_export_puts_back_and_clears_what_a_killed_one_left(small_dataset):
+    root = small_dataset.root
+    left = root / "store" / "writing" / f"{of_this_process()}x"
+    (left / "new").mkdir(parents=True)
+    (left / "old").mkdir()
+    (root / "native").rename(left / "old" / "native")
+    export(root, ["coco"])
+    assert (root / "native").is_dir()
+    assert not list((root / "store" / "writing").iterdir())
 
 
 @pytest.mark.parametrize("changes", [{"digest": "other"}, {"version": "2"}])
