@@ -83,7 +83,7 @@ def cost(turns: int = 5) -> None:
     from viewsphere.run.generate import generate
     from viewsphere.store.moving import DURABILITY
 
-    views = {"azimuth": {"start": 0, "stop": 357, "step": 3}, "elevation": [15, 40], "distance": 1.0}
+    views = {"azimuth": {"start": 0, "stop": 351, "step": 9}, "elevation": [15, 40], "distance": 1.0}
     asked = recipe(viewpoints=views, camera={"size": [640, 480], "fov_deg": 35}, shot_frames=16, formats=[])
     seconds: dict[str, list[float]] = {"none": [], "fsync": []}
     with tempfile.TemporaryDirectory(prefix="viewsphere-faults-", dir=Path.cwd()) as place:
