@@ -35,7 +35,8 @@ NOTE = "<!-- written by scripts/docs; do not edit -->\n\n"
 
 def cli_page() -> str:
     text = NOTE + "# Command line\n\n"
-    text += "Exit status: 0 done, 1 a data set failed its check, 2 a mistake that can be mended, 130 stopped with Ctrl-C.\n"
+    text += "Exit status: 0 done, 1 a data set failed its check, 2 a mistake that can be mended, 130 stopped with Ctrl-C or "
+    text += "SIGTERM.\n"
     for command in app.registered_commands:
         function = command.callback
         assert function is not None

@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 
 from deadline import DEADLINE, until
+from viewsphere.aside import aside, of_this_process
 from viewsphere.assets import isolated
 from viewsphere.assets import reader as reader_program
-from viewsphere.assets.cache import ASIDE, cache_folder, load, load_normalised
+from viewsphere.assets.cache import PREFIX, cache_folder, load, load_normalised
 from viewsphere.assets.isolated import READ_HERE
 from viewsphere.assets.mesh_file import ARRAYS
 from viewsphere.assets.reader import Job
@@ -177,13 +178,12 @@ def test_zoo_models_stay_here(spec, monkeypatch):
 
 def test_what_was_left_behind_is_swept(spec):
     folder = cache_folder()
-    old, new = folder / f"{ASIDE}old", folder / f"{ASIDE}new"
-    for place in (old, new):
-        place.mkdir(parents=True)
-        (place / "mesh.npz").write_bytes(b"half")
-    os.utime(old, (1, 1))
-    load_normalised(spec)
-    assert {p.name for p in folder.iterdir() if p.is_dir()} == {new.name}
+    killed = folder / f"{PREFIX}{of_this_process()}x"
+    killed.mkdir(parents=True)
+    (killed / "mesh.npz").write_bytes(b"half")
+    with aside(folder, PREFIX) as alive:
+        load_normalised(spec)
+        assert {p.name for p in folder.iterdir() if p.is_dir()} == {alive.name}
 
 
 PARENT = """

@@ -2,8 +2,10 @@
 
 import os
 import signal
+import sys
 from collections import Counter
 from multiprocessing import active_children
+from pathlib import Path
 
 import pytest
 
@@ -57,11 +59,14 @@ def test_every_job_is_handed_out_once():
     assert set(seen.values()) == {1}
 
 
-def test_a_job_is_tried_twice():
-    queue = Queue(jobs(a=1))
+def test_a_job_is_tried_twice_the_second_time_when_nobody_else_is_at_work():
+    queue = Queue(jobs(a=2))
     job = queue.next("")
+    assert queue.last() is None
     assert queue.again(job)
-    assert queue.next("") is job
+    assert [other.key for other in left(queue)] == ["a-1"]
+    assert queue.last() is job
+    assert queue.last() is None
     assert not queue.again(job)
 
 
@@ -82,18 +87,78 @@ def test_jobs_are_counted_out_when_somebody_is_free():
     assert asked == [0, 1, 2]
 
 
-class Deadly:
+class Ends:
     """A task that ends the process which unpacks it."""
 
+    def __init__(self, how, *told):
+        self.how = how, told
+
     def __reduce__(self):
-        return os._exit, (3,)
+        return self.how
 
 
-def test_a_worker_that_dies_costs_a_retry_then_an_error(tmp_path):
+def _note(folder):
+    """Where a worker notes that it tries; gives how often that was."""
+    Path(folder, f"{os.getpid()}").touch()
+    return len(list(Path(folder).iterdir()))
+
+
+def _killed(folder):
+    _note(folder)
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def _while_alone(folder, parent):
+    """Dies at first, and then says who else is at work."""
+    if _note(folder) == 1:
+        os._exit(3)
+    children = Path(f"/proc/{parent}/task/{parent}/children").read_text().split()
+    commands = (Path(f"/proc/{pid}/cmdline").read_text() for pid in children)
+    raise UserError(f"{sum('spawn_main' in command for command in commands)} workers")
+
+
+class Calls:
+    """A task that calls a function as it is done."""
+
+    def __init__(self, function, *told):
+        self.function, self.told = function, told
+
+    @property
+    def kind(self):
+        self.function(*self.told)
+
+
+def _without_memory():
+    raise MemoryError
+
+
+@pytest.mark.parametrize(
+    ("task", "said"),
+    [
+        (lambda folder: Ends(os._exit, 3), "died 2 times (exit code 3)"),
+        (lambda folder: Calls(_without_memory), "died 2 times (it was refused memory, the last time while it was alone: give"),
+        pytest.param(
+            lambda folder: Calls(_killed, folder),
+            "died 2 times (it was killed, as systems do when memory runs out, the last time while it was alone: give it more",
+            marks=pytest.mark.skipif(os.name == "nt", reason="signals"),
+        ),
+    ],
+)  # fmt: skip
+def test_a_worker_that_dies_costs_a_retry_then_an_error(task, said, tmp_path):
     with Crew(tmp_path, 1, PORTION) as crew:
-        outcomes = list(crew.run(Listed((Job("x", "x", Deadly()),))))
+        outcomes = list(crew.run(Listed((Job("x", "x", task(tmp_path)),))))
     assert len(outcomes) == 1
-    assert "died 2 times (exit code 3)" in str(outcomes[0].error)
+    assert said in str(outcomes[0].error)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
+def test_it_is_tried_again_alone_when_all_others_are_done(tmp_path):
+    tasks = {"bad": Calls(_while_alone, tmp_path, os.getpid()), **dict.fromkeys(("a", "b", "c"), LOOK_AT_CHAIR)}
+    with Crew(tmp_path / "out", 2, PORTION) as crew:
+        outcomes = list(crew.run(Listed(tuple(Job(key, key, task) for key, task in tasks.items()))))
+    assert [outcome.key for outcome in outcomes][-1] == "bad"
+    assert str(outcomes[-1].error) == "1 workers"
+    assert not any(outcome.error for outcome in outcomes[:-1])
 
 
 def test_what_a_worker_cannot_do_ends_the_run_with_its_traceback(tmp_path):

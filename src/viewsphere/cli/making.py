@@ -13,6 +13,7 @@ from viewsphere.cli.arguments import (
     AllowScripts,
     AsJson,
     Changes,
+    Durability,
     FormatOptions,
     Formats,
     RecipeFile,
@@ -274,6 +275,7 @@ def render(
     append: Annotated[
         bool, typer.Option("--append", help="Add what a finished data set lacks: models, poses, channels.")
     ] = False,
+    durability: Durability = None,
     json_: AsJson = False,
     allow_scripts: AllowScripts = False,
 ) -> None:

@@ -6,6 +6,7 @@ warm, hence our own: one pipe a worker, spawn rather than fork.
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
 import traceback
@@ -13,9 +14,10 @@ from collections import Counter, deque
 from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from multiprocessing import get_context, resource_tracker
+from multiprocessing import get_context, parent_process, resource_tracker
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
+from threading import Thread
 from typing import TYPE_CHECKING, Any, Protocol, cast
 
 from viewsphere.errors import UserError, ViewsphereError
@@ -25,7 +27,13 @@ if TYPE_CHECKING:
     from viewsphere.sampling.extension import Portion
 
 LIVES = 2
-"""How often a task is tried when its process dies."""
+"""How often a task is tried when its process dies; the last time alone, as memory may have been what it lacked."""
+
+OUT_OF_MEMORY = 77
+"""Exit code of a worker that was refused memory."""
+
+DYING_S = 10.0
+"""Seconds that a worker whose pipe is closed has to end by itself, so that its exit code is its own."""
 
 
 class Work(Protocol):
@@ -96,10 +104,14 @@ class Crew:
         return self
 
     def __exit__(self, *_: object) -> None:
+        self._dismiss()
+        self._here = None
+
+    def _dismiss(self) -> None:
+        """End all workers, and give back the memory of what they have warm."""
         for hand in self._hands:
             hand.stop()
         self._hands.clear()
-        self._here = None
 
     @property
     def under_way(self) -> int:
@@ -127,6 +139,9 @@ class Crew:
         while busy:
             for pipe in wait(list(busy)):
                 yield from self._hear(busy, cast(Connection, pipe), queue, heard)  # Windows has another class
+            if not busy and (job := queue.last()):
+                self._dismiss()
+                self._give_to(None, job, busy)
 
     def _note(self, job: Job, frames: int, heard: Callable[[], None]) -> None:
         """Remember how many frames of a job are made."""
@@ -150,14 +165,16 @@ class Crew:
     def _give(self, hand: _Hand | None, queue: Queue, busy: dict[Connection, _Hand]) -> bool:
         """Hand out the next job, to a new worker if none is given; False if there is none."""
         job = queue.next(hand.line if hand else "")
-        if job is None:
-            return False
+        if job is not None:
+            self._give_to(hand, job, busy)
+        return job is not None
+
+    def _give_to(self, hand: _Hand | None, job: Job, busy: dict[Connection, _Hand]) -> None:
         if hand is None:
             hand = _Hand(self._root, self._portion)
             self._hands.append(hand)
         busy[hand.pipe] = hand
         hand.give(job)
-        return True
 
     def _hear(
         self, busy: dict[Connection, _Hand], pipe: Connection, queue: Queue, heard: Callable[[], None]
@@ -171,9 +188,10 @@ class Crew:
         except (EOFError, ConnectionResetError):
             self._end(job, busy, pipe)
             self._hands.remove(hand)
+            hand.process.join(DYING_S)
             code = hand.stop()
             if not queue.again(job):
-                yield Outcome(job.key, error=ViewsphereError(f"{job.key}: its worker died {LIVES} times (exit code {code})"))
+                yield Outcome(job.key, error=ViewsphereError(f"{job.key}: its worker died {LIVES} times ({_end_of(code)})"))
             self._give(None, queue, busy)
             return
         if isinstance(answer, int):
@@ -204,18 +222,14 @@ class Queue:
         self._untaken = deque(self._left)
         self._open: dict[str, Iterator[Job]] = {}
         self._takers = Counter(warm)
-        self._tries: Counter[str] = Counter()
         self._again: list[Job] = []
+        self._tried: set[str] = set()
 
     def __contains__(self, line: str) -> bool:
         return line in self._left
 
     def next(self, warm: str) -> Job | None:
         """The next job for a worker that has this line warm; None if there is none."""
-        if self._again:
-            job = self._again.pop()
-            self._tries[job.key] += 1
-            return job
         while self._left:
             line = warm if warm in self._left else self._coldest()
             job = next(self._open.setdefault(line, self._work.jobs(line)), None)
@@ -238,10 +252,26 @@ class Queue:
 
     def again(self, job: Job) -> bool:
         """Put back a job whose worker died; False if it was tried often enough."""
-        if self._tries[job.key] >= LIVES - 1:
+        if job.key in self._tried:
             return False
+        self._tried.add(job.key)
         self._again.append(job)
         return True
+
+    def last(self) -> Job | None:
+        """A job that was put back, for when nobody is at work; None if there is none."""
+        return self._again.pop() if self._again else None
+
+
+def _end_of(code: int | None) -> str:
+    """How a worker with this exit code came to its end, and what to do."""
+    if code == OUT_OF_MEMORY:
+        how = "it was refused memory"
+    elif code == -getattr(signal, "SIGKILL", 0):
+        how = "it was killed, as systems do when memory runs out"
+    else:
+        return f"exit code {code}"
+    return f"{how}, the last time while it was alone: give it more memory, or ask for smaller pictures or models"
 
 
 class _Hand:
@@ -264,7 +294,7 @@ class _Hand:
 
     def stop(self) -> int | None:
         """End the process; what it had not finished is lost, what it had is not."""
-        self.process.terminate()
+        self.process.kill()  # which ends one that is stopped, too
         self.process.join()
         self.pipe.close()
         return self.process.exitcode
@@ -287,6 +317,7 @@ def _deaf() -> Generator[None]:
 def _serve(pipe: Connection, root: Path, portion: Portion) -> None:
     """A worker's life: take a job, tell of each of its frames by their number so far, answer, until the other side is gone."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's to handle
+    Thread(target=_end_with_parent, daemon=True).start()
     from viewsphere.run.allocator import keep_freed_memory
     from viewsphere.run.tasks import Worker
 
@@ -299,5 +330,14 @@ def _serve(pipe: Connection, root: Path, portion: Portion) -> None:
                 pipe.send(Outcome(job.key, worker.do(job.task, pipe.send)))
             except UserError as error:
                 pipe.send(Outcome(job.key, error=type(error)(str(error))))
+            except MemoryError:
+                os._exit(OUT_OF_MEMORY)
             except Exception:
                 pipe.send(traceback.format_exc())
+
+
+def _end_with_parent() -> None:
+    """End this process, whatever it does, as soon as its parent is dead: another run may be at its work already."""
+    if parent := parent_process():
+        wait([parent.sentinel])
+        os._exit(1)

@@ -6,17 +6,17 @@ import hashlib
 import json
 import os
 import shutil
-import socket
 from collections import defaultdict
 from collections.abc import Generator, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
-from itertools import chain
+from itertools import chain, count
 from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
 
+from viewsphere.aside import Aside, aside, left_by_dead, of_this_process, sweep
 from viewsphere.errors import StoreError
 from viewsphere.labels import channels
 from viewsphere.model.files import Files
@@ -33,8 +33,8 @@ from viewsphere.store.records import ModelInfo, PlanRecord
 from viewsphere.store.sample_records import short_sample, whole_sample
 from viewsphere.store.texts import parsed
 
-OLD_MODEL = "old model~"
-"""Begins the name of a model's folder that another takes the place of."""
+NEW, OLD = "new", "old"
+"""What is being made, aside; and below the other, by its path in the data set, what it takes the place of."""
 
 
 @dataclass(frozen=True)
@@ -103,15 +103,15 @@ class Store:
 
     @contextmanager
     def occupied(self) -> Generator[None]:
-        """Show other runs that this one is at work, as long as the block lasts."""
-        sign = self.folder / "writing" / f"{_writer()}run"
+        """Show other runs that this one is at work, as long as the block lasts; then what workers left that died goes, too."""
         with _disk_errors(self.root):
-            sign.touch()
+            own = Aside.make(self.folder / "writing")
         try:
             yield
         finally:
+            own.remove()
             with suppress(OSError):
-                sign.unlink(missing_ok=True)
+                self._sweep()
 
     def save(self, plan: PlanRecord) -> None:
         """Put a plan in the place of the one that it continues."""
@@ -154,7 +154,7 @@ class Store:
 
     def drop_unnamed_models(self) -> None:
         """Remove the models that the plan does not name, unless another run is at work on them."""
-        own = _writer()
+        own = of_this_process()
         if any(not path.name.startswith(own) for path in (self.folder / "writing").iterdir()):
             return
         named = set(self.plan().models)
@@ -165,7 +165,8 @@ class Store:
     def make_ready(self) -> None:
         """See that the folder can be written, and clear what dead runs left; raises StoreError if it cannot."""
         self._make(self.folder / "writing")
-        self._sweep()
+        with _disk_errors(self.root):
+            self._sweep()
 
     def _is_of(self, plan: PlanRecord) -> bool:
         try:
@@ -198,19 +199,28 @@ class Store:
         if not os.access(folder, os.W_OK):
             raise StoreError(f"{self.root}: expected a writable output folder, found one that cannot be written")
 
-    def _write_atomically(self, file: Path, text: str) -> None:
-        aside = self.folder / "writing" / f"{_writer()}{file.name}"
+    @contextmanager
+    def _own(self) -> Generator[Path]:
+        """A folder for what is not whole yet, as long as the block lasts; StoreError for what the disk refuses meanwhile."""
+        writing = self.folder / "writing"
         with _disk_errors(self.root):
-            aside.write_text(text, "utf-8", newline="\n")
-            move(aside, file)
+            writing.mkdir(parents=True, exist_ok=True)
+            with aside(writing) as own:
+                yield own
+
+    def _write_atomically(self, file: Path, text: str) -> None:
+        with self._own() as own:
+            (own / NEW).write_text(text, "utf-8", newline="\n")
+            move(own / NEW, file)
 
     def _sweep(self) -> None:
-        """Remove what dead writers of this machine left unfinished; models that they were about to replace come back."""
-        for left in (self.folder / "writing").glob(f"*~{OLD_MODEL}*"):
-            target = self.model_folder(left.name.partition(f"~{OLD_MODEL}")[2])
-            if not target.exists() and _is_of_dead(left):
-                move(left, target)
-        _remove_of_dead((self.folder / "writing").iterdir())
+        """Remove what dead writers left unfinished; what they were about to replace comes back."""
+        for left in left_by_dead(self.folder / "writing"):
+            for old in _replaced(left / OLD):
+                target = self.root / old.relative_to(left / OLD)
+                if not target.exists():
+                    target.parent.mkdir(parents=True, exist_ok=True)
+                    move(old, target)
 
     def shot_folder(self, key: str) -> Path:
         """Where a finished shot lies."""
@@ -243,54 +253,50 @@ class Store:
         If another writer finished the same target first, that one stays: both hold the same bytes. With `again` it takes the
         place of a damaged one; raises StoreError where it is not equal to what that was before, as far as that is known.
         """
-        folder = self.folder / "writing" / f"{_writer()}{target.name}"
-        with _disk_errors(self.root):
-            shutil.rmtree(folder, ignore_errors=True)
-            folder.mkdir(parents=True)
-        try:
-            with _disk_errors(self.root):
-                yield folder
-                if not (folder / MANIFEST).is_file():
-                    Manifest.of(folder).write(folder)
-                target.parent.mkdir(parents=True, exist_ok=True)
-                if again and target.is_dir():
-                    refuse_another(target, folder)
-                    self._replace(folder, target)
-                else:
-                    _become(folder, target)
-        finally:
-            shutil.rmtree(folder, ignore_errors=True)
+        with self._own() as own:
+            folder = own / NEW
+            folder.mkdir()
+            yield folder
+            if not (folder / MANIFEST).is_file():
+                Manifest.of(folder).write(folder)
+            target.parent.mkdir(parents=True, exist_ok=True)
+            if again and target.is_dir():
+                refuse_another(target, folder)
+                self._replace(folder, target)
+            else:
+                _become(folder, target)
 
     def _replace(self, folder: Path, target: Path) -> None:
-        """Put a folder in the place of another, which is removed."""
-        is_model = target.parent == self.folder / "models"
-        old = self.folder / "writing" / f"{_writer()}{OLD_MODEL if is_model else 'old~'}{target.name}"
-        shutil.rmtree(old, ignore_errors=True)
-        if target.exists():
-            move(target, old)
-        move(folder, target)
-        shutil.rmtree(old, ignore_errors=True)
+        """Put a folder that lies aside in the place of another, which goes with what is aside; and so does what other runs put
+        there at this moment.
+        """
+        old = folder.parent / OLD / target.relative_to(self.root)
+        old.parent.mkdir(parents=True)
+        for another in count():
+            with suppress(FileNotFoundError):  # there is none, or another run has moved it
+                move(target, folder.parent / f"{another}" if old.exists() else old)
+            try:
+                move(folder, target)
+                return
+            except OSError:
+                if not target.exists():
+                    raise
 
     @contextmanager
     def replacing(self, target: Path) -> Generator[Path]:
-        """A folder to write into that takes the place of `target` when the block ends well. A model's gets a manifest, and is
-        never lost: where a run dies between the two, the next one puts the old folder back.
+        """A folder to write into that takes the place of `target` when the block ends well; a model's gets a manifest. The old
+        one is never lost: where a run dies between the two, the next one puts it back.
         """
         if target == self.folder:
             raise StoreError(f"{target}: expected a format's name, found the store's")
         self._make(self.folder / "writing")
-        folder = self.folder / "writing" / f"{_writer()}{target.name}"
-        with _disk_errors(self.root):
-            shutil.rmtree(folder, ignore_errors=True)
+        with self._own() as own:
+            folder = own / NEW
             folder.mkdir()
-        try:
-            with _disk_errors(self.root):
-                yield folder
-                if target.parent == self.folder / "models":
-                    Manifest.of(folder).write(folder)
-                self._replace(folder, target)
-        finally:
-            shutil.rmtree(folder, ignore_errors=True)
+            yield folder
+            if target.parent == self.folder / "models":
+                Manifest.of(folder).write(folder)
+            self._replace(folder, target)
 
     def write_file(self, name: str, text: str) -> None:
         """Write a small file of the store in one step."""
@@ -428,39 +434,33 @@ def _no_scene(file: Path, error: Exception) -> StoreError:
     )
 
 
-def _remove_of_dead(paths: Iterable[Path]) -> None:
-    """Remove those that were written by processes of this machine that are no more."""
-    for path in filter(_is_of_dead, paths):
-        shutil.rmtree(path, ignore_errors=True)
-        path.unlink(missing_ok=True)
-
-
-def _is_of_dead(path: Path) -> bool:
-    """Whether its name says that a process of this machine wrote it that is no more."""
-    host, _, rest = path.name.partition("~")
-    pid = rest.partition("~")[0]
-    return host == socket.gethostname() and pid.isdigit() and not _alive(int(pid))
+def _replaced(old: Path) -> Iterator[Path]:
+    """The models, shots and exports that lie here by their paths in a data set; no links that lead elsewhere."""
+    exports = (path for path in old.glob("*") if path.name != "store")
+    for path in chain(old.glob("store/models/*"), old.glob("store/shots/*/*"), exports):
+        if path.resolve() == old.resolve() / path.relative_to(old):
+            yield path
 
 
 @contextmanager
 def new_folder(target: Path) -> Generator[Path]:
     """A folder to write into that becomes `target` when the block ends well; raises StoreError where files lie there."""
-    aside = target.with_name(f"{_writer()}{target.name}")
-    missing = [parent for parent in aside.parents if not parent.exists()]
-    with _disk_errors(target):
-        if target.exists() and (not target.is_dir() or any(target.iterdir())):
-            raise StoreError(f"{target}: expected an empty or new folder, found other files: choose another, or delete it")
-        shutil.rmtree(aside, ignore_errors=True)
-        aside.mkdir(parents=True)
-        _remove_of_dead(path for path in aside.parent.iterdir() if path.name.endswith(f"~{target.name}"))
+    place, prefix = target.parent, f"{target.name}~"
+    missing = [parent for parent in target.parents if not parent.exists()]
     try:
         with _disk_errors(target):
-            yield aside
-            if target.exists():
-                target.rmdir()
-            move(aside, target)
+            if target.exists() and (not target.is_dir() or any(target.iterdir())):
+                raise StoreError(f"{target}: expected an empty or new folder, found other files: choose another, or delete it")
+            place.mkdir(parents=True, exist_ok=True)
+            sweep(place, prefix)
+            with aside(place, prefix) as own:
+                folder = own / NEW
+                folder.mkdir()
+                yield folder
+                if target.exists():
+                    target.rmdir()
+                move(folder, target)
     finally:
-        shutil.rmtree(aside, ignore_errors=True)
         for parent in missing:
             with suppress(OSError):  # something is in it
                 parent.rmdir()
@@ -482,10 +482,6 @@ def _write(file: str, data: bytes) -> None:
         os.close(descriptor)
 
 
-def _writer() -> str:
-    return f"{socket.gethostname()}~{os.getpid()}~"
-
-
 def _become(folder: Path, target: Path) -> None:
     try:
         if target.is_dir() and not (target / MANIFEST).is_file():
@@ -494,36 +490,6 @@ def _become(folder: Path, target: Path) -> None:
     except OSError:
         if not target.is_dir():
             raise
-
-
-def _alive(pid: int) -> bool:
-    if pid == os.getpid():
-        return True
-    if os.name == "nt":  # where os.kill would end the process
-        return _alive_on_windows(pid)
-    try:
-        os.kill(pid, 0)
-    except ProcessLookupError:
-        return False
-    except OSError:
-        return True
-    return True
-
-
-def _alive_on_windows(pid: int) -> bool:
-    """Whether a process runs: it can be opened, and has no exit code yet (OpenProcess, GetExitCodeProcess of kernel32)."""
-    import ctypes
-
-    kernel: Any = getattr(ctypes, "windll").kernel32  # noqa: B009, not in the stubs of other systems
-    query, denied, running = 0x1000, 5, 259
-    handle = kernel.OpenProcess(query, False, pid)
-    if not handle:
-        return kernel.GetLastError() == denied
-    try:
-        code = ctypes.c_ulong()
-        return not kernel.GetExitCodeProcess(handle, ctypes.byref(code)) or code.value == running
-    finally:
-        kernel.CloseHandle(handle)
 
 
 @contextmanager
