@@ -108,13 +108,17 @@ def _killed(folder):
     os.kill(os.getpid(), signal.SIGKILL)
 
 
-def _while_alone(folder, parent):
+def _children(parent):
+    """The processes that a process started by `multiprocessing`."""
+    pids = Path(f"/proc/{parent}/task/{parent}/children").read_text().split()
+    return {pid for pid in pids if "spawn_main" in Path(f"/proc/{pid}/cmdline").read_text()}
+
+
+def _while_alone(folder, parent, before):
     """Dies at first, and then says who else is at work."""
     if _note(folder) == 1:
         os._exit(3)
-    children = Path(f"/proc/{parent}/task/{parent}/children").read_text().split()
-    commands = (Path(f"/proc/{pid}/cmdline").read_text() for pid in children)
-    raise UserError(f"{sum('spawn_main' in command for command in commands)} workers")
+    raise UserError(f"{len(_children(parent) - before)} workers")
 
 
 class Calls:
@@ -153,7 +157,8 @@ def test_a_worker_that_dies_costs_a_retry_then_an_error(task, said, tmp_path):
 
 @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
 def test_it_is_tried_again_alone_when_all_others_are_done(tmp_path):
-    tasks = {"bad": Calls(_while_alone, tmp_path, os.getpid()), **dict.fromkeys(("a", "b", "c"), LOOK_AT_CHAIR)}
+    before = _children(os.getpid())
+    tasks = {"bad": Calls(_while_alone, tmp_path, os.getpid(), before), **dict.fromkeys(("a", "b", "c"), LOOK_AT_CHAIR)}
     with Crew(tmp_path / "out", 2, PORTION) as crew:
         outcomes = list(crew.run(Listed(tuple(Job(key, key, task) for key, task in tasks.items()))))
     assert [outcome.key for outcome in outcomes][-1] == "bad"
