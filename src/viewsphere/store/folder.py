@@ -7,7 +7,7 @@ import json
 import os
 import shutil
 import socket
-from collections.abc import Generator, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from itertools import chain
@@ -89,7 +89,7 @@ class Store:
     @contextmanager
     def occupied(self) -> Generator[None]:
         """Show other runs that this one is at work, as long as the block lasts."""
-        sign = self.folder / "writing" / f"{_writer()}run"
+        sign = self.folder / "writing" / f"{writer()}run"
         with _disk_errors(self.root):
             sign.touch()
         try:
@@ -122,7 +122,7 @@ class Store:
 
     def drop_unnamed_models(self) -> None:
         """Remove the models that the plan does not name, unless another run is at work on them."""
-        own = _writer()
+        own = writer()
         if any(not path.name.startswith(own) for path in (self.folder / "writing").iterdir()):
             return
         named = set(self.plan().models)
@@ -133,7 +133,7 @@ class Store:
     def make_ready(self) -> None:
         """See that the folder can be written, and clear what dead runs left; raises StoreError if it cannot."""
         self._make(self.folder / "writing")
-        self._sweep()
+        self._sweep(_is_of_dead)
 
     def _is_of(self, plan: PlanRecord) -> bool:
         try:
@@ -167,18 +167,22 @@ class Store:
             raise StoreError(f"{self.root}: expected a writable output folder, found one that cannot be written")
 
     def _write_atomically(self, file: Path, text: str) -> None:
-        aside = self.folder / "writing" / f"{_writer()}{file.name}"
+        aside = self.folder / "writing" / f"{writer()}{file.name}"
         with _disk_errors(self.root):
             aside.write_text(text, "utf-8", newline="\n")
             move(aside, file)
 
-    def _sweep(self) -> None:
-        """Remove what dead writers of this machine left unfinished; models that they were about to replace come back."""
+    def clear_after(self, dead: str) -> None:
+        """Remove what a writer of this name left unfinished when it died; a model that it was about to replace comes back."""
+        with suppress(OSError):  # somebody else clears it, too
+            self._sweep(lambda path: path.name.startswith(dead))
+
+    def _sweep(self, is_of_dead: Callable[[Path], bool]) -> None:
         for left in (self.folder / "writing").glob(f"*~{OLD_MODEL}*"):
             target = self.model_folder(left.name.partition(f"~{OLD_MODEL}")[2])
-            if not target.exists() and _is_of_dead(left):
+            if not target.exists() and is_of_dead(left):
                 move(left, target)
-        _remove_of_dead((self.folder / "writing").iterdir())
+        _remove(filter(is_of_dead, (self.folder / "writing").iterdir()))
 
     def shot_folder(self, key: str) -> Path:
         """Where a finished shot lies."""
@@ -211,7 +215,7 @@ class Store:
         If another writer finished the same target first, that one stays: both hold the same bytes. With `again` it takes the
         place of a damaged one; raises StoreError where it is not equal to what that was before, as far as that is known.
         """
-        folder = self.folder / "writing" / f"{_writer()}{target.name}"
+        folder = self.folder / "writing" / f"{writer()}{target.name}"
         with _disk_errors(self.root):
             shutil.rmtree(folder, ignore_errors=True)
             folder.mkdir(parents=True)
@@ -232,7 +236,7 @@ class Store:
     def _replace(self, folder: Path, target: Path) -> None:
         """Put a folder in the place of another, which is removed."""
         is_model = target.parent == self.folder / "models"
-        old = self.folder / "writing" / f"{_writer()}{OLD_MODEL if is_model else 'old~'}{target.name}"
+        old = self.folder / "writing" / f"{writer()}{OLD_MODEL if is_model else 'old~'}{target.name}"
         shutil.rmtree(old, ignore_errors=True)
         if target.exists():
             move(target, old)
@@ -247,7 +251,7 @@ class Store:
         if target == self.folder:
             raise StoreError(f"{target}: expected a format's name, found the store's")
         self._make(self.folder / "writing")
-        folder = self.folder / "writing" / f"{_writer()}{target.name}"
+        folder = self.folder / "writing" / f"{writer()}{target.name}"
         with _disk_errors(self.root):
             shutil.rmtree(folder, ignore_errors=True)
             folder.mkdir()
@@ -396,9 +400,8 @@ def _no_scene(file: Path, error: Exception) -> StoreError:
     )
 
 
-def _remove_of_dead(paths: Iterable[Path]) -> None:
-    """Remove those that were written by processes of this machine that are no more."""
-    for path in filter(_is_of_dead, paths):
+def _remove(paths: Iterable[Path]) -> None:
+    for path in paths:
         shutil.rmtree(path, ignore_errors=True)
         path.unlink(missing_ok=True)
 
@@ -413,14 +416,15 @@ def _is_of_dead(path: Path) -> bool:
 @contextmanager
 def new_folder(target: Path) -> Generator[Path]:
     """A folder to write into that becomes `target` when the block ends well; raises StoreError where files lie there."""
-    aside = target.with_name(f"{_writer()}{target.name}")
+    aside = target.with_name(f"{writer()}{target.name}")
     missing = [parent for parent in aside.parents if not parent.exists()]
     with _disk_errors(target):
         if target.exists() and (not target.is_dir() or any(target.iterdir())):
             raise StoreError(f"{target}: expected an empty or new folder, found other files: choose another, or delete it")
         shutil.rmtree(aside, ignore_errors=True)
         aside.mkdir(parents=True)
-        _remove_of_dead(path for path in aside.parent.iterdir() if path.name.endswith(f"~{target.name}"))
+        others = (path for path in aside.parent.iterdir() if path.name.endswith(f"~{target.name}"))
+        _remove(filter(_is_of_dead, others))
     try:
         with _disk_errors(target):
             yield aside
@@ -450,8 +454,9 @@ def _write(file: str, data: bytes) -> None:
         os.close(descriptor)
 
 
-def _writer() -> str:
-    return f"{socket.gethostname()}~{os.getpid()}~"
+def writer(pid: int | None = None) -> str:
+    """How the names of all begin that a process of this machine, by default this one, has not finished."""
+    return f"{socket.gethostname()}~{os.getpid() if pid is None else pid}~"
 
 
 def _become(folder: Path, target: Path) -> None:

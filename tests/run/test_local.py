@@ -1,4 +1,4 @@
-"""The pool hands out what is warm, keeps everybody busy, and survives the death of its workers."""
+"""The local executor hands out what is warm, keeps everybody busy, and survives the death of its workers."""
 
 import os
 import signal
@@ -11,7 +11,8 @@ import viewsphere as vs
 from small import small_recipe
 from viewsphere.errors import UserError, ViewsphereError
 from viewsphere.model.model_spec import ModelSpec
-from viewsphere.run.pool import Crew, Job, Listed, Queue
+from viewsphere.run.executors import Job, Listed, Queue
+from viewsphere.run.executors.local import LocalCrew
 from viewsphere.run.tasks import ModelTask
 from viewsphere.sampling.extension import whole
 
@@ -90,7 +91,7 @@ class Deadly:
 
 
 def test_a_worker_that_dies_costs_a_retry_then_an_error(tmp_path):
-    with Crew(tmp_path, 1, PORTION) as crew:
+    with LocalCrew(tmp_path, PORTION, 1) as crew:
         outcomes = list(crew.run(Listed((Job("x", "x", Deadly()),))))
     assert len(outcomes) == 1
     assert "died 2 times (exit code 3)" in str(outcomes[0].error)
@@ -99,7 +100,7 @@ def test_a_worker_that_dies_costs_a_retry_then_an_error(tmp_path):
 def test_what_a_worker_cannot_do_ends_the_run_with_its_traceback(tmp_path):
     with (
         pytest.raises(ViewsphereError, match=r"x: a worker failed\nTraceback(.|\n)*AttributeError") as caught,
-        Crew(tmp_path, 1, PORTION) as crew,
+        LocalCrew(tmp_path, PORTION, 1) as crew,
     ):
         list(crew.run(Listed((Job("x", "x", dict),))))
     assert not isinstance(caught.value, UserError)
@@ -116,7 +117,7 @@ def test_workers_stay_for_the_next_list_and_one_that_died_meanwhile_is_replaced(
         return {child.pid for child in active_children()} - before
 
     before, job = {child.pid for child in active_children()}, Job("chair", "chair", LOOK_AT_CHAIR)
-    with Crew(tmp_path, 1, PORTION) as crew:
+    with LocalCrew(tmp_path, PORTION, 1) as crew:
         first = list(crew.run(Listed((job,)))), pids()
         second = list(crew.run(Listed((job, job)))), pids()
         os.kill(*first[1], signal.SIGKILL)
@@ -146,7 +147,7 @@ def _interrupted():
 
 @pytest.mark.skipif(os.name != "posix", reason="signals are masked on POSIX alone")
 def test_ctrl_c_while_a_worker_starts_is_the_parents_to_hear(tmp_path, capfd):
-    with Crew(tmp_path, 1, Impatient()) as crew:
+    with LocalCrew(tmp_path, Impatient(), 1) as crew:
         outcomes = list(crew.run(Listed((Job("chair", "chair", LOOK_AT_CHAIR),))))
     assert [outcome.error for outcome in outcomes] == [None]
     assert "Traceback" not in capfd.readouterr().err

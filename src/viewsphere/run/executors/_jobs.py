@@ -1,0 +1,131 @@
+"""What there is to do, who gets which of it, and what became of it; the same for all executors."""
+
+from __future__ import annotations
+
+import traceback
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Protocol
+
+from viewsphere.errors import UserError, ViewsphereError
+
+if TYPE_CHECKING:
+    from viewsphere.run.tasks import Worker
+
+LIVES = 2
+"""How often a task is tried when its process dies."""
+
+
+class Work(Protocol):
+    """What there is to do, in lines: jobs of one line share what a worker has warm. Jobs are counted out one by one."""
+
+    def lines(self) -> Iterable[tuple[str, int]]:
+        """The name of each line, and about how many jobs are in it."""
+        ...
+
+    def jobs(self, line: str) -> Iterator[Job]:
+        """The jobs of a line, in order."""
+        ...
+
+
+@dataclass(frozen=True)
+class Job:
+    """Something to do: its key in the data set, its line, and what a worker is told."""
+
+    key: str
+    line: str
+    task: Any
+
+
+@dataclass(frozen=True)
+class Listed:
+    """A few jobs, all named at once."""
+
+    all: tuple[Job, ...]
+
+    def lines(self) -> Iterable[tuple[str, int]]:
+        """Their lines in the order of their first jobs."""
+        return Counter(job.line for job in self.all).items()
+
+    def jobs(self, line: str) -> Iterator[Job]:
+        """Those of a line."""
+        return (job for job in self.all if job.line == line)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of a job: the frames it made, or why it could not be done."""
+
+    key: str
+    frames: int = 0
+    error: ViewsphereError | None = None
+
+
+def ignored() -> None:
+    """Nobody wants to know of frames under way."""
+
+
+class Queue:
+    """Jobs in their lines: a worker is given what it has warm, then of a line that nobody has, then of the line of which most
+    is left. The next job of a line is asked for when a worker is free for it.
+
+    `warm`: lines of workers who have not asked yet.
+    """
+
+    def __init__(self, work: Work, warm: Iterable[str] = ()) -> None:
+        self._work = work
+        self._left = dict(work.lines())
+        self._open: dict[str, Iterator[Job]] = {}
+        self._takers = Counter(warm)
+        self._tries: Counter[str] = Counter()
+        self._again: list[Job] = []
+
+    def __contains__(self, line: str) -> bool:
+        return line in self._left
+
+    @property
+    def left(self) -> int:
+        """About how many jobs are to be handed out; 0 only if there is none."""
+        return len(self._again) + sum(max(count, 1) for count in self._left.values())
+
+    def next(self, warm: str) -> Job | None:
+        """The next job for a worker that has this line warm; None if there is none."""
+        if self._again:
+            job = self._again.pop()
+            self._tries[job.key] += 1
+            return job
+        while self._left:
+            line = warm if warm in self._left else self._coldest()
+            job = next(self._open.setdefault(line, self._work.jobs(line)), None)
+            if job is None:
+                del self._left[line], self._open[line]
+                continue
+            self._left[line] -= 1
+            if line != warm:
+                self._takers[line] += 1
+            return job
+        return None
+
+    def _coldest(self) -> str:
+        for line in self._left:
+            if not self._takers[line]:
+                return line
+        return max(self._left, key=lambda line: self._left[line] / self._takers[line])
+
+    def again(self, job: Job) -> bool:
+        """Put back a job whose worker died; False if it was tried often enough."""
+        if self._tries[job.key] >= LIVES - 1:
+            return False
+        self._again.append(job)
+        return True
+
+
+def answer(worker: Worker, job: Job, tell: Callable[[int], None]) -> Outcome | str:
+    """What a worker in a process of its own makes of a job: its outcome, or the traceback of what ends the run."""
+    try:
+        return Outcome(job.key, worker.do(job.task, tell))
+    except UserError as error:
+        return Outcome(job.key, error=type(error)(str(error)))
+    except Exception:
+        return traceback.format_exc()
