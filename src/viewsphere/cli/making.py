@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+from contextlib import nullcontext, redirect_stdout
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -305,7 +307,8 @@ def render(
         if addition is not None and Store(output).missing(addition.record):
             typer.echo(f"{output}: {addition}")
     everybody = cores() if ray is None else 0
-    with ProgressBar(quiet=json_) as bar:
+    aside = redirect_stdout(sys.stderr) if json_ else nullcontext()  # what libraries print is no JSON
+    with ProgressBar(quiet=json_) as bar, aside:
         try:
             summary = generate(
                 loaded,

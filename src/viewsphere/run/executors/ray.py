@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import logging
 import os
+import socket
 import time
 import warnings
 from collections import Counter
@@ -37,7 +38,7 @@ STARTS = 3
 """How often in a row workers may die while they start before their machine is left out."""
 
 GRACE = 10.0
-"""Seconds that workers have to be gone when a run ends."""
+"""Seconds that a cluster has to answer when a run begins, and its workers to be gone when it ends."""
 
 
 class RayCrew:
@@ -281,15 +282,23 @@ _ACTOR: Any = _remote(num_cpus=1, max_restarts=0, max_task_retries=0, concurrenc
 def _connect(address: str) -> None:
     """Raises UserError where no cluster answers, MissingExtraError where a part of Ray is not installed."""
     try:
+        if address != "auto":
+            _reach(address)
         with warnings.catch_warnings(action="ignore"):  # of what Ray will do in the future
             ray.init(address, log_to_driver=False, logging_level=logging.ERROR)
     except ImportError as error:
         raise MissingExtraError(f"--ray {address}: {_first_line(error)}: pip install 'viewsphere[ray]'") from None
-    except (OSError, RuntimeError, TimeoutError, ValueError, RayError) as error:
+    except (OSError, OverflowError, RuntimeError, ValueError, RayError) as error:
         raise UserError(
-            f"--ray {address}: expected a Ray cluster that answers; found {_first_line(error)}: start one with "
+            f"--ray {address}: expected a Ray cluster that answers; found: {_first_line(error)}: start one with "
             "`ray start --head`, or check the address"
         ) from None
+
+
+def _reach(address: str) -> None:
+    """Raises OSError, OverflowError or ValueError where nobody listens, which Ray itself would not notice for minutes."""
+    host, _, port = address.removeprefix("ray://").rpartition(":")
+    socket.create_connection((host.strip("[]"), int(port)), timeout=GRACE).close()
 
 
 def _nodes() -> dict[str, tuple[str, int]]:
@@ -320,4 +329,4 @@ def _first_line(error: BaseException) -> str:
     """Of the error that Ray tells of, if it tells of another's."""
     cause = getattr(error, "cause", None)
     lines = [line.strip() for line in str(cause if isinstance(cause, Exception) else error).splitlines() if line.strip()]
-    return lines[0] if lines else type(error).__name__
+    return lines[0].rstrip(".") if lines else type(error).__name__
