@@ -1,6 +1,8 @@
 """The Ray executor makes what a local run makes, whatever happens to the nodes of the cluster."""
 
+import json
 import os
+import re
 import signal
 import socket
 import subprocess
@@ -8,12 +10,14 @@ import sys
 from contextlib import contextmanager
 from pathlib import Path
 
+import jsonschema
 import pytest
+import yaml
 
 from command_line import viewsphere
 from deadline import DEADLINE, until
 from ray_nodes import SMALL, ray_cluster
-from small import small_recipe, tree_hash
+from small import ROOT, small_recipe, tree_hash
 from viewsphere import generate
 
 RECIPE = {
@@ -56,6 +60,15 @@ def test_where_no_cluster_answers_it_is_said_in_one_line(tmp_path, address, foun
     assert answer.returncode == 2
     assert len(answer.stderr.splitlines()) == 1
     assert found in answer.stderr
+
+
+def test_the_cluster_of_the_docs_is_as_ray_wants_it():
+    ray = pytest.importorskip("ray")
+    schema = json.loads((Path(ray.__file__).parent / "autoscaler" / "ray-schema.json").read_text("utf-8"))
+    (cluster,) = re.findall(r"```yaml\n(cluster_name.*?)```", (ROOT / "docs" / "scale.md").read_text("utf-8"), re.DOTALL)
+    jsonschema.validate(yaml.safe_load(cluster), schema)
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.validate(yaml.safe_load(cluster.replace("max_workers: 2", "max_workers: two")), schema)
 
 
 @pytest.mark.slow
@@ -102,7 +115,7 @@ LOST = """
 import os, sys
 from pathlib import Path
 import viewsphere as vs
-from small import small_recipe
+from small import ROOT, small_recipe
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.run.executors import Job, Listed, hired
 from viewsphere.run.tasks import ModelTask
@@ -120,7 +133,7 @@ chairs = [ModelSpec(key=f"chair{i}", source="zoo:chair", category="chair", categ
 tasks = [Job(spec.key, spec.key, ModelTask("model", spec)) for spec in chairs]
 with hired(root, portion, 0, sys.argv[1]) as crew:
     for outcome in crew.run(Listed((Job("x", "x", Deadly()), *tasks))):
-        print(outcome.key, "|", type(outcome.error).__name__, "|", outcome.error)
+        print(outcome.key, "|", type(outcome.error).__name__, "|", outcome.error, flush=True)
     print(crew.nodes, crew.under_way)
 """
 
@@ -129,7 +142,7 @@ with hired(root, portion, 0, sys.argv[1]) as crew:
 def test_what_kills_its_workers_is_told_and_the_rest_goes_on(tmp_path, ray):
     with ray() as cluster:
         done = script(LOST, cluster.address, tmp_path / "out", "shared")
-    *outcomes, last = done.stdout.splitlines()
+    *outcomes, last = (line for line in done.stdout.splitlines() if "(raylet)" not in line)  # which tells of deaths, too
     assert {line.split(" | ")[0] for line in outcomes} == {"x", "chair0", "chair1", "chair2"}
     (lost,) = (line for line in outcomes if line.startswith("x | WorkerDied | x: its worker died 2 times (last on node "))
     assert all(line.endswith(" | NoneType | None") for line in outcomes if line != lost)
@@ -151,8 +164,10 @@ def test_a_cluster_is_reached_through_its_client_server_too(tmp_path, ray, small
     with socket.socket() as found:
         found.bind(("127.0.0.1", 0))
         port = found.getsockname()[1]
-    with ray(ray_client_server_port=port), rendering(tmp_path, f"ray://127.0.0.1:{port}", changes={}) as run:
-        _, said = run.communicate(timeout=DEADLINE)
+    with ray(ray_client_server_port=port):
+        assert until(lambda: listens(port))
+        with rendering(tmp_path, f"ray://127.0.0.1:{port}", changes={}) as run:
+            _, said = run.communicate(timeout=DEADLINE)
     assert (run.returncode, said) == (0, "")
     assert tree_hash(tmp_path / "out") == tree_hash(small_run)
 
@@ -199,6 +214,11 @@ def script(text, *words):
     environment = os.environ | {"PYTHONPATH": str(TESTS)}
     command = [sys.executable, "-c", text, *map(str, words)]
     return subprocess.run(command, capture_output=True, text=True, timeout=DEADLINE, env=environment)
+
+
+def listens(port):
+    with socket.socket() as tried:
+        return tried.connect_ex(("127.0.0.1", port)) == 0
 
 
 def finished(folder):

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
-from viewsphere.errors import UserError, ViewsphereError
+from viewsphere.errors import UserError, ViewsphereError, WorkerDied
 
 if TYPE_CHECKING:
     from viewsphere.run.tasks import Worker
@@ -85,8 +85,13 @@ class Queue:
         return line in self._left
 
     @property
+    def is_done(self) -> bool:
+        """Whether there is surely none to be handed out."""
+        return not self._left and not self._again
+
+    @property
     def left(self) -> int:
-        """About how many jobs are to be handed out; 0 only if there is none."""
+        """About how many jobs are to be handed out."""
         return len(self._again) + sum(max(count, 1) for count in self._left.values())
 
     def next(self, warm: str) -> Job | None:
@@ -119,6 +124,11 @@ class Queue:
             return False
         self._again.append(job)
         return True
+
+
+def lost(job: Job, how: str) -> Outcome:
+    """What is said of a job whose workers died as often as it is tried, and how the last one did."""
+    return Outcome(job.key, error=WorkerDied(f"{job.key}: its worker died {LIVES} times ({how})"))
 
 
 def answer(worker: Worker, job: Job, tell: Callable[[int], None]) -> Outcome | str:

@@ -15,8 +15,8 @@ from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
-from viewsphere.errors import UserError, ViewsphereError, WorkerDied
-from viewsphere.run.executors._jobs import LIVES, Job, Outcome, Queue, Work, answer, ignored
+from viewsphere.errors import UserError, ViewsphereError
+from viewsphere.run.executors._jobs import Job, Outcome, Queue, Work, answer, ignored, lost
 
 if TYPE_CHECKING:
     from viewsphere.run.tasks import Worker
@@ -127,7 +127,7 @@ class LocalCrew:
             self._hands.remove(hand)
             code = self._end_of(hand)
             if not queue.again(job):
-                yield Outcome(job.key, error=WorkerDied(f"{job.key}: its worker died {LIVES} times (exit code {code})"))
+                yield lost(job, f"exit code {code}")
             self._give(None, queue, busy)
             return
         if isinstance(news, int):

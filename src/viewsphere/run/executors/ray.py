@@ -17,8 +17,8 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from viewsphere.errors import MissingExtraError, StoreError, UserError, ViewsphereError, WorkerDied
-from viewsphere.run.executors._jobs import LIVES, Job, Outcome, Queue, Work, answer, ignored
+from viewsphere.errors import MissingExtraError, StoreError, UserError, ViewsphereError
+from viewsphere.run.executors._jobs import Job, Outcome, Queue, Work, answer, ignored, lost
 
 try:
     import ray
@@ -102,7 +102,7 @@ class RayCrew:
                 self._give(hand, queue)
             for hand in [hand for hand in self._hands if hand.is_idle]:
                 self._give(hand, queue)
-            if not queue.left and not any(hand.job for hand in self._hands):
+            if queue.is_done and not any(hand.job for hand in self._hands):
                 return
             if time.monotonic() - self._looked > TICK:
                 self._look(queue.left)
@@ -154,8 +154,7 @@ class RayCrew:
             if job is None:
                 self._suspect(hand, error)
             elif not queue.again(job):
-                how = f"last on node {hand.address}: {_first_line(error)}"
-                yield Outcome(job.key, error=WorkerDied(f"{job.key}: its worker died {LIVES} times ({how})"))
+                yield lost(job, f"last on node {hand.address}: {_first_line(error)}")
             return
         if job is None:
             hand.writer = str(news)
@@ -326,7 +325,9 @@ def _scripts() -> str:
 
 
 def _first_line(error: BaseException) -> str:
-    """Of the error that Ray tells of, if it tells of another's."""
+    """Of the error that Ray tells of, if it tells of another's; what follows a colon is told by the last line."""
     cause = getattr(error, "cause", None)
     lines = [line.strip() for line in str(cause if isinstance(cause, Exception) else error).splitlines() if line.strip()]
-    return lines[0].rstrip(".") if lines else type(error).__name__
+    if not lines:
+        return type(error).__name__
+    return f"{lines[0]} {lines[-1]}" if lines[0].endswith(":") else lines[0].rstrip(".")
