@@ -160,6 +160,8 @@ IN_THE_SOURCE = {
     "expected nobody else to append",
     "stopped; <what is kept>",
     "its worker died",
+    "expected a Ray cluster that answers",
+    "expected a folder that all machines",
     "a worker failed",
     "expected embreex",
 }

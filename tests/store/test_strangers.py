@@ -18,7 +18,7 @@ from viewsphere.check import check
 from viewsphere.codecs.png_tiff import decode_png, encode_png
 from viewsphere.codecs.size import check_size
 from viewsphere.errors import StoreError, UserError
-from viewsphere.run import pool
+from viewsphere.run.executors import local
 from viewsphere.run.exporting import export
 from viewsphere.run.importing import import_dataset
 from viewsphere.store import Dataset
@@ -312,7 +312,7 @@ def test_a_worker_whose_parent_is_gone_ends_quietly(error, tmp_path):
             raise error
 
     with patch("signal.signal"), patch("viewsphere.run.tasks.Worker"):
-        pool._serve(Pipe(), tmp_path, None)
+        local._serve(Pipe(), tmp_path, None)
 
 
 def test_a_plain_path_is_followed_without_looking_at_what_is_above(tmp_path, monkeypatch):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+from contextlib import nullcontext, redirect_stdout
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -269,13 +271,23 @@ def render(
     format_option: FormatOptions = None,
     workers: Annotated[
         int | None,
-        typer.Option(min=0, help="Processes; default: one a core. 0: this one.", show_default=False),
+        typer.Option(
+            min=0,
+            help="Processes; default: one a core. 0: this one. With --ray: CPUs at most; default: all.",
+            show_default=False,
+        ),
     ] = None,
     keep_going: Annotated[bool, typer.Option(help="Leave out models that cannot be used.")] = False,
     append: Annotated[
         bool, typer.Option("--append", help="Add what a finished data set lacks: models, poses, channels.")
     ] = False,
     durability: Durability = None,
+    ray: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ADDRESS", help="Render on a Ray cluster: auto, HOST:PORT or ray://HOST:PORT.", show_default=False
+        ),
+    ] = None,
     json_: AsJson = False,
     allow_scripts: AllowScripts = False,
 ) -> None:
@@ -296,16 +308,18 @@ def render(
         print_plan(planned)
         if addition is not None and any(Store(output).gaps(addition.record)):
             typer.echo(f"{output}: {addition}")
-    crew = cores() if workers is None else workers
-    with ProgressBar(quiet=json_) as bar:
+    everybody = cores() if ray is None else 0
+    aside = redirect_stdout(sys.stderr) if json_ else nullcontext()  # what libraries print is no JSON
+    with ProgressBar(quiet=json_) as bar, aside:
         try:
             summary = generate(
                 loaded,
                 output,
-                workers=crew,
+                workers=everybody if workers is None else workers,
                 formats=formats,
                 keep_going=keep_going,
                 append=append,
+                ray=ray,
                 listener=bar.show,
             )
         except KeyboardInterrupt:

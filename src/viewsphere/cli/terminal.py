@@ -199,6 +199,8 @@ class ProgressBar:
             seen = progress.done + progress.under_way
             made = seen - progress.resumed
             rate = _rate(made, elapsed) if progress.phase == "frames" and made and elapsed else ""
+            if progress.nodes is not None:
+                rate = ", ".join(filter(None, (rate, f"{progress.nodes} node{'' if progress.nodes == 1 else 's'}")))
             self._rich.update(bar, completed=seen, rate=rate)
 
         return listen

@@ -13,14 +13,14 @@ from os import PathLike
 from pathlib import Path
 
 from viewsphere import plugins
-from viewsphere.errors import ModelError, RecipeError, ViewsphereError, joined
+from viewsphere.errors import ModelError, RecipeError, ViewsphereError, WorkerDied, joined
 from viewsphere.model.channel import missing
 from viewsphere.recipe.formats import FormatEntry, Formats, options_of, read_formats
 from viewsphere.recipe.recipe import Recipe
+from viewsphere.run.executors import Crew, Job, Listed, Outcome, hired
 from viewsphere.run.exporting import export, is_out_of_date, writable
 from viewsphere.run.framing import MOST_TRIES, hidden_frames
 from viewsphere.run.opening import commit, prepare, to_append, to_render
-from viewsphere.run.pool import Crew, Job, Listed, Outcome
 from viewsphere.run.progress import Listener, Progress, unheard
 from viewsphere.run.skies import check_skies
 from viewsphere.run.stages import Stages, StoredBoxes
@@ -71,6 +71,7 @@ def generate(
     formats: Formats | None = None,
     keep_going: bool = False,
     append: bool = False,
+    ray: str | None = None,
     listener: Listener | None = None,
 ) -> Summary:
     """Render all frames of a recipe (or of the one in this file) that `out` does not hold yet, then write the formats (default:
@@ -79,9 +80,14 @@ def generate(
     With `append`, `out` is a finished data set, and models, poses and channels of the recipe that it lacks are added to it;
     what was there stays as it was.
 
-    `workers` 0 renders in the calling process; more need a `__main__` guard in the calling script. A model that cannot be
-    used is an error before rendering starts, or with `keep_going` left out and reported. Raises UserError for the user's
-    mistakes; whatever was finished stays, and the same call goes on from there.
+    `workers` 0 renders in the calling process; more need a `__main__` guard in the calling script. `ray` is the address of a
+    Ray cluster whose CPUs render instead, such as "auto" (the one that this machine is of), "host:6379" or "ray://host:10001":
+    at most `workers` of them, 0 for all; `out` is where all its machines see it.
+
+    A model that cannot be used is an error before rendering starts, or with `keep_going` left out and reported. Raises
+    UserError for the user's mistakes, and WorkerDied, when all others are made, for shots that were lost with their workers
+    again and again (with `keep_going` they are left out, too); whatever was finished stays, and the same call goes on from
+    there.
     """
     begun = time.monotonic()
     tell = listener or unheard
@@ -102,12 +108,13 @@ def generate(
         notes: tuple[str, ...] = ()
         rendered, skipped = 0, dict[str, str]()
         work = Missing(portion, store)
-        with Crew(store.root, workers, portion) as crew:
+        with hired(store.root, portion, workers, ray) as crew:
             if portion.adds_nothing:
                 _compare_models(portion, store, crew)
             else:
                 notes = _check_skies(work, tell)
                 rendered, skipped = _render_part(work, crew, keep_going, tell)
+            notes += crew.notes
         notes += tuple(_renew_threshold(store, recipe.keep_annotations_above))
         dataset = Dataset(store.root)
         write_credits(dataset)
@@ -281,13 +288,19 @@ def _render_shots(work: Missing, crew: Crew, keep_going: bool, tell: Listener) -
         tell(Progress("kernels", 1, 1))
 
     def report() -> None:
-        tell(Progress("frames", resumed + rendered, total, resumed, crew.under_way))
+        tell(Progress("frames", resumed + rendered, total, resumed, crew.under_way, crew.nodes))
 
     report()
-    for outcome in crew.run(work, report):
-        _accept(outcome, keep_going, skipped)
+    lost: list[ViewsphereError] = []
+    for outcome in crew.run(work, report) if first is not None else ():
+        if isinstance(outcome.error, WorkerDied) and not keep_going:
+            lost.append(outcome.error)  # the others are made nevertheless
+        else:
+            _accept(outcome, keep_going, skipped)
         rendered += outcome.frames
         report()
+    if lost:
+        raise joined(lost)
     return rendered
 
 
@@ -368,7 +381,7 @@ class Missing:
 def _accept(outcome: Outcome, keep_going: bool, skipped: dict[str, str]) -> None:
     if outcome.error is None:
         return
-    if not (keep_going and isinstance(outcome.error, ModelError)):
+    if not (keep_going and isinstance(outcome.error, ModelError | WorkerDied)):
         raise outcome.error
     skipped[outcome.key] = str(outcome.error)
 

@@ -1,4 +1,4 @@
-"""The pool hands out what is warm, keeps everybody busy, and survives the death of its workers."""
+"""The local executor hands out what is warm, keeps everybody busy, and survives the death of its workers."""
 
 import os
 import signal
@@ -13,7 +13,8 @@ import viewsphere as vs
 from small import small_recipe
 from viewsphere.errors import UserError, ViewsphereError
 from viewsphere.model.model_spec import ModelSpec
-from viewsphere.run.pool import Crew, Job, Listed, Queue
+from viewsphere.run.executors import Job, Listed, Queue
+from viewsphere.run.executors.local import LocalCrew
 from viewsphere.run.tasks import ModelTask
 from viewsphere.sampling.extension import whole
 
@@ -149,7 +150,7 @@ def _without_memory():
     ],
 )  # fmt: skip
 def test_a_worker_that_dies_costs_a_retry_then_an_error(task, said, tmp_path):
-    with Crew(tmp_path, 1, PORTION) as crew:
+    with LocalCrew(tmp_path, PORTION, 1) as crew:
         outcomes = list(crew.run(Listed((Job("x", "x", task(tmp_path)),))))
     assert len(outcomes) == 1
     assert said in str(outcomes[0].error)
@@ -159,7 +160,7 @@ def test_a_worker_that_dies_costs_a_retry_then_an_error(task, said, tmp_path):
 def test_it_is_tried_again_alone_when_all_others_are_done(tmp_path):
     before = _children(os.getpid())
     tasks = {"bad": Calls(_while_alone, tmp_path, os.getpid(), before), **dict.fromkeys(("a", "b", "c"), LOOK_AT_CHAIR)}
-    with Crew(tmp_path / "out", 2, PORTION) as crew:
+    with LocalCrew(tmp_path / "out", PORTION, 2) as crew:
         outcomes = list(crew.run(Listed(tuple(Job(key, key, task) for key, task in tasks.items()))))
     assert [outcome.key for outcome in outcomes][-1] == "bad"
     assert str(outcomes[-1].error) == "1 workers"
@@ -169,7 +170,7 @@ def test_it_is_tried_again_alone_when_all_others_are_done(tmp_path):
 def test_what_a_worker_cannot_do_ends_the_run_with_its_traceback(tmp_path):
     with (
         pytest.raises(ViewsphereError, match=r"x: a worker failed\nTraceback(.|\n)*AttributeError") as caught,
-        Crew(tmp_path, 1, PORTION) as crew,
+        LocalCrew(tmp_path, PORTION, 1) as crew,
     ):
         list(crew.run(Listed((Job("x", "x", dict),))))
     assert not isinstance(caught.value, UserError)
@@ -186,7 +187,7 @@ def test_workers_stay_for_the_next_list_and_one_that_died_meanwhile_is_replaced(
         return {child.pid for child in active_children()} - before
 
     before, job = {child.pid for child in active_children()}, Job("chair", "chair", LOOK_AT_CHAIR)
-    with Crew(tmp_path, 1, PORTION) as crew:
+    with LocalCrew(tmp_path, PORTION, 1) as crew:
         first = list(crew.run(Listed((job,)))), pids()
         second = list(crew.run(Listed((job, job)))), pids()
         os.kill(*first[1], signal.SIGKILL)
@@ -216,7 +217,7 @@ def _interrupted():
 
 @pytest.mark.skipif(os.name != "posix", reason="signals are masked on POSIX alone")
 def test_ctrl_c_while_a_worker_starts_is_the_parents_to_hear(tmp_path, capfd):
-    with Crew(tmp_path, 1, Impatient()) as crew:
+    with LocalCrew(tmp_path, Impatient(), 1) as crew:
         outcomes = list(crew.run(Listed((Job("chair", "chair", LOOK_AT_CHAIR),))))
     assert [outcome.error for outcome in outcomes] == [None]
     assert "Traceback" not in capfd.readouterr().err
