@@ -174,3 +174,17 @@ def test_a_part_is_exported_beside_the_data_set(small_run, tmp_path):
 
 def test_an_export_to_no_format_is_a_mistake(small_run):
     assert f"expected one or more of {', '.join(plugins.names('formats'))}" in fails("export", small_run, "-f", ",")
+
+
+def test_what_libraries_print_while_rendering_is_not_in_the_json(monkeypatch, tmp_path):
+    from viewsphere.run import generate
+
+    def chatty(*values, export=generate.export, **options):
+        print("hello")
+        return export(*values, **options)
+
+    monkeypatch.setattr(generate, "export", chatty)
+    (tmp_path / "recipe.yaml").write_text(small_recipe(formats=[]).model_dump_json(exclude_unset=True))
+    run = viewsphere("render", tmp_path / "recipe.yaml", "-o", tmp_path / "out", "--workers", "0", "--json")
+    assert json.loads(run.stdout)["frames"] == 12
+    assert run.stderr == "hello\n"

@@ -91,7 +91,7 @@ def contents(root):
 
 def test_a_worker_s_pipe_may_be_of_any_class(tmp_path, monkeypatch):
     """On Windows `Pipe()` makes a PipeConnection, which is no Connection."""
-    monkeypatch.setattr("viewsphere.run.pool.Connection", type("Another", (), {}))
+    monkeypatch.setattr("viewsphere.run.executors.local.Connection", type("Another", (), {}))
     generate(small_recipe(formats=[]), tmp_path / "out", workers=1)
     assert len(Dataset(tmp_path / "out")) > 0
 

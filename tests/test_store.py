@@ -4,15 +4,17 @@ import json
 import os
 import pickle
 import re
-import socket
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from viewsphere.aside import aside, of_this_process
 from viewsphere.errors import StoreError
 from viewsphere.labels import channels
 from viewsphere.model.tracks import TRACK
+from viewsphere.run.exporting import export
 from viewsphere.store import Block, Category, Dataset, Part, PlanRecord, Store, decode, encode, new_folder
 
 PART = Part(
@@ -100,12 +102,59 @@ def test_two_writers_of_one_shot(tmp_path):
 def test_leftovers_of_the_dead_are_swept_and_those_of_the_living_stay(tmp_path):
     store = Store(tmp_path / "out")
     store.open_for(plan_record())
-    writing, host = store.folder / "writing", socket.gethostname()
-    (writing / f"{host}~999999999~m-0").mkdir()
-    (writing / f"{host}~{os.getppid()}~m-1").mkdir()
-    (writing / "otherhost~1~m-2").mkdir()
+    writing = store.folder / "writing"
+    (writing / f"{of_this_process()}of a killed process of this number").mkdir()
+    (writing / "otherhost~1~x").mkdir()
+    with aside(writing) as alive:
+        with store.occupied():
+            (writing / f"{of_this_process()}of a worker that was killed meanwhile").mkdir()
+        assert {p.name for p in writing.iterdir()} == {alive.name, "otherhost~1~x"}
+
+
+def test_runs_that_replace_one_folder_at_once_do_not_hinder_one_another(tmp_path):
+    store = Store(tmp_path / "out")
     store.open_for(plan_record())
-    assert {p.name for p in writing.iterdir()} == {f"{host}~{os.getppid()}~m-1", "otherhost~1~m-2"}
+
+    def replace_it(number):
+        for _ in range(100):
+            with store.replacing(store.root / "coco") as folder:
+                (folder / "made by").write_text(f"{number}")
+
+    with ThreadPoolExecutor(4) as pool:
+        list(pool.map(replace_it, range(4)))
+    assert (store.root / "coco" / "made by").read_text() in "0123"
+    assert not list((store.folder / "writing").iterdir())
+
+
+def test_what_was_being_replaced_comes_back(tmp_path):
+    """A run that died between putting the old folder aside and the new one in its place."""
+    store = Store(tmp_path / "out")
+    store.open_for(plan_record())
+    (store.root / "elsewhere" / "a").mkdir(parents=True)
+    left = store.folder / "writing" / f"{of_this_process()}x"
+    for old in ("coco", "store/models/m", "store/shots/ab/m-000000", "native"):
+        (left / "old" / old).mkdir(parents=True)
+        (left / "old" / old / "file").write_text("old")
+    (left / "old" / "csv").symlink_to(store.root / "elsewhere")
+    (store.root / "native").mkdir()
+    store.make_ready()
+    for back in ("coco", "store/models/m", "store/shots/ab/m-000000"):
+        assert (store.root / back / "file").read_text() == "old"
+    assert not any((store.root / "native").iterdir())
+    assert not (store.root / "csv").exists()
+    assert (store.root / "elsewhere" / "a").is_dir()
+    assert not left.exists()
+
+
+def test_an_export_puts_back_and_clears_what_a_killed_one_left(small_dataset):
+    root = small_dataset.root
+    left = root / "store" / "writing" / f"{of_this_process()}x"
+    (left / "new").mkdir(parents=True)
+    (left / "old").mkdir()
+    (root / "native").rename(left / "old" / "native")
+    export(root, ["coco"])
+    assert (root / "native").is_dir()
+    assert not list((root / "store" / "writing").iterdir())
 
 
 @pytest.mark.parametrize("changes", [{"digest": "other"}, {"version": "2"}])

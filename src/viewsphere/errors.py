@@ -7,6 +7,7 @@
     │   ├── StoreError            an output folder that cannot be used
     │   └── MissingExtraError     a feature whose optional package is not installed
     ├── CheckFailedError          a data set that is not what it claims to be: exit status 1
+    ├── WorkerDied                who did a job died, as often as it is tried; other jobs go on
     ├── BlenderError              Blender answered that it cannot; it lives, and can be asked again
     └── BlenderDied               Blender crashed, or hung and was ended; only another one can be asked
 
@@ -52,6 +53,10 @@ class MissingExtraError(UserError):
 
 class CheckFailedError(ViewsphereError):
     """A data set that is not what it claims to be."""
+
+
+class WorkerDied(ViewsphereError):
+    """The process that did a job died, or its machine, as often as a job is tried; other jobs go on."""
 
 
 class BlenderError(ViewsphereError):

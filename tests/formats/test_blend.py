@@ -213,8 +213,8 @@ def test_a_format_that_cannot_be_written_stops_the_others(monkeypatch, small_run
 
 def test_what_a_killed_export_left_is_removed(small_run, tmp_path):
     over = subprocess.run([sys.executable, "-c", "import os; print(os.getpid())"], capture_output=True, text=True)
-    left, other = (tmp_path / f"{socket.gethostname()}~{over.stdout.strip()}~{name}" for name in ("coco", "native"))
-    foreign = tmp_path / "elsewhere~1~coco"
+    left, other = (tmp_path / f"{name}~{socket.gethostname()}~{over.stdout.strip()}~x" for name in ("coco", "native"))
+    foreign = tmp_path / "coco~elsewhere~1~x"
     for folder in (left, other, foreign):
         folder.mkdir()
         (folder / "half.json").touch()

@@ -82,11 +82,11 @@ assert len(list(vs.render(recipe))) == 1
 WORKER = """
 from pathlib import Path
 from types import SimpleNamespace
-from viewsphere.run import pool
+from viewsphere.run.executors import local
 class Gone:
     def recv(self):
         raise EOFError
-pool._serve(Gone(), Path("nowhere"), SimpleNamespace(plan=SimpleNamespace(recipe=None)))
+local._serve(Gone(), Path("nowhere"), SimpleNamespace(plan=SimpleNamespace(recipe=None)))
 """
 COMMAND = """
 from viewsphere import cli

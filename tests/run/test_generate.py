@@ -3,6 +3,7 @@
 import json
 import os
 import random
+import shutil
 import signal
 import subprocess
 import sys
@@ -14,10 +15,13 @@ import pytest
 import viewsphere as vs
 from deadline import DEADLINE
 from small import small_recipe, tree_hash
-from viewsphere.errors import ModelError, RecipeError, StoreError, UserError
+from viewsphere.errors import ModelError, RecipeError, StoreError, UserError, WorkerDied
+from viewsphere.run.executors import Listed, Outcome
+from viewsphere.run.executors.local import LocalCrew
 from viewsphere.run.exporting import export
 from viewsphere.run.generate import generate
 from viewsphere.run.progress import Progress
+from viewsphere.store import Store
 
 
 def command(recipe_file, out, workers):
@@ -41,7 +45,8 @@ def recipe_file(tmp_path):
     return file
 
 
-@pytest.mark.parametrize("workers", [2, pytest.param(4, marks=pytest.mark.slow)])
+@pytest.mark.slow  # two workers that are killed are the default suite's
+@pytest.mark.parametrize("workers", [2, 4])
 def test_any_number_of_workers_gives_the_same_bytes(workers, recipe_file, small_run, tmp_path):
     subprocess.run(command(recipe_file, tmp_path / "out", workers), check=True, timeout=DEADLINE, capture_output=True)
     assert tree_hash(tmp_path / "out") == tree_hash(small_run)
@@ -217,6 +222,38 @@ def test_one_bad_model_is_left_out_if_asked(one_bad, tmp_path):
     assert list(summary.skipped) == ["bad"]
     assert summary.frames == 2
     assert {o.key for s in vs.open(tmp_path / "out") for o in s.objects} == {"good"}
+
+
+@pytest.fixture
+def losing(monkeypatch):
+    """The first two shots are lost with their workers, whoever makes them."""
+
+    class Losing(LocalCrew):
+        def run(self, work, *heard):
+            for number, outcome in enumerate(super().run(work, *heard)):
+                if isinstance(work, Listed) or number > 1:
+                    yield outcome
+                else:
+                    shutil.rmtree(Store(self._root).shot_folder(outcome.key))
+                    yield Outcome(outcome.key, error=WorkerDied(f"{outcome.key}: its worker died 2 times (it was lost)"))
+
+    monkeypatch.setattr("viewsphere.run.generate.hired", lambda root, portion, *_: Losing(root, portion, 0))
+
+
+def test_shots_lost_with_their_workers_are_told_when_all_others_are_made(losing, monkeypatch, small_run, tmp_path):
+    with pytest.raises(WorkerDied) as caught:
+        generate(small_recipe(), tmp_path / "out")
+    assert [line.partition(": ")[2] for line in str(caught.value).splitlines()] == ["its worker died 2 times (it was lost)"] * 2
+    assert len(vs.open(tmp_path / "out")) == 12 - 2 * 2
+    monkeypatch.undo()
+    assert generate(small_recipe(), tmp_path / "out").rendered == 2 * 2
+    assert tree_hash(tmp_path / "out") == tree_hash(small_run)
+
+
+def test_shots_lost_with_their_workers_are_left_out_if_asked(losing, tmp_path):
+    summary = generate(small_recipe(), tmp_path / "out", keep_going=True)
+    assert (summary.frames, summary.rendered, len(summary.skipped)) == (8, 8, 2)
+    assert (tmp_path / "out" / "coco").is_dir()
 
 
 def test_a_changed_model_is_refused(one_bad, tmp_path):

@@ -37,6 +37,7 @@ def test_frames_of_several_workers_add_up(tmp_path):
     assert all(after - before in (0, 1) for before, after in pairwise(told))
 
 
+@pytest.mark.slow
 def test_frames_of_a_worker_that_dies_are_not_counted_twice(tmp_path):
     large = {**WHOLE, "camera": {"size": [800, 600], "fov_deg": 35}}  # which leaves time to kill it within its shot
     others, seen = set(active_children()), list[Progress]()
@@ -53,7 +54,7 @@ def test_frames_of_a_worker_that_dies_are_not_counted_twice(tmp_path):
     assert told.count(1) == told.count(2) == 2  # they were made twice
     assert max(told) == told[-1] == summary.rendered == summary.frames == 12
     generate(small_recipe(**large), tmp_path / "whole")
-    assert tree_hash(tmp_path / "killed" / "store" / "shots") == tree_hash(tmp_path / "whole" / "store" / "shots")
+    assert tree_hash(tmp_path / "killed") == tree_hash(tmp_path / "whole")  # nothing that it began is left
 
 
 def test_the_bar_moves_within_a_shot_but_keeps_only_what_is_finished():
@@ -63,6 +64,14 @@ def test_the_bar_moves_within_a_shot_but_keeps_only_what_is_finished():
         (task,) = bar._rich.tasks
         assert (task.completed, task.total) == (130, 400)
         assert bar.kept == "100 of 400 frames are kept"
+
+
+def test_the_bar_tells_the_machines_of_a_cluster():
+    with ProgressBar(quiet=False) as bar:
+        bar.show(Progress("frames", 0, 400, nodes=1))
+        assert bar._rich.tasks[0].fields["rate"] == "1 node"
+        bar.show(Progress("frames", 100, 400, nodes=2))
+        assert bar._rich.tasks[0].fields["rate"].endswith(" frames/s, 2 nodes")
 
 
 def test_slow_frames_are_not_told_as_none():

@@ -1,22 +1,34 @@
 """Shards of a job array, in any order, several at once, killed and run again, make what one run makes."""
 
-import os
+import errno
 import random
+import shutil
 import signal
 import subprocess
 import sys
-import time
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from itertools import islice
 
 import pytest
+from filelock import FileLock
+from hypothesis import given
+from hypothesis import strategies as st
 
-from deadline import DEADLINE
+from command_line import viewsphere
+from counting import counted
+from deadline import DEADLINE, until
 from small import small_recipe, tree_hash
-from viewsphere.errors import ModelError, UserError
-from viewsphere.run.generate import generate
+from viewsphere.check import check
+from viewsphere.errors import ModelError, StoreError, UserError
+from viewsphere.model.share import Share
+from viewsphere.run.generate import Missing, generate
 from viewsphere.run.opening import prepare, to_render
 from viewsphere.run.share import shard_named
-from viewsphere.store import Store
+from viewsphere.run.status import status
+from viewsphere.sampling.extension import whole
+from viewsphere.store import Dataset, Store, folder
+from viewsphere.store.index import Block, Index
 
 OWN = {"start_new_session": True, "stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE}
 
@@ -104,8 +116,6 @@ def test_what_shards_left_out_is_what_one_run_leaves_out(tmp_path):
 
 
 def test_shards_add_to_a_data_set_as_one_run_does(small_dataset, tmp_path):
-    import shutil
-
     more = small_recipe(models=[{**small_recipe().model_dump()["models"][0], "count": 3}])
     shutil.copytree(small_dataset.root, tmp_path / "one")
     generate(more, tmp_path / "one", append=True)
@@ -123,20 +133,56 @@ def test_what_is_no_shard_is_refused(shard, tmp_path):
 
 def test_shards_on_the_command_line():
     assert shard_named("3/16") == (3, 16)
-    for text in ("16/16", "3", "3/", "-1/4", "a/b"):
+    for text in ("16/16", "3", "3/", "-1/4", "a/b", "0/0", "", "1/2/3", "1" * 5000 + "/2", "\u0663/16"):
         with pytest.raises(UserError, match="--shard: expected k/n"):
             shard_named(text)
 
 
+def test_a_bad_shard_is_refused_in_one_line_before_anything_is_made(recipe_file, tmp_path):
+    answer = viewsphere("render", recipe_file, "-o", tmp_path / "out", "--shard", "7/7")
+    assert (answer.returncode, answer.stderr.count("\n")) == (2, 1)
+    assert "--shard: expected k/n, the k-th of n shares counted from 0, such as 0/16; found '7/7'" in answer.stderr
+    assert not (tmp_path / "out").exists()
+
+
 def test_each_shot_is_in_one_shard(tmp_path):
-    from dataclasses import replace
-
-    from viewsphere.sampling.share import Share
-
     portion = to_render(prepare(small_recipe(shot_frames=1)), Store(tmp_path / "out"))
     shares = [[row.key for row in replace(portion, share=Share(k, 5)).rows] for k in range(5)]
     assert sorted(key for keys in shares for key in keys) == sorted(row.key for row in portion.rows)
     assert {len(keys) for keys in shares} == {2, 3}
+
+
+@given(st.data())
+def test_a_share_of_an_index_is_counted_as_its_rows_are(data):
+    number = st.integers(1, 12)
+    blocks: list[Block] = []
+    for first in range(0, 100 * data.draw(st.integers(1, 3)), 100):
+        subjects = data.draw(st.lists(st.sampled_from("abc"), min_size=1, unique=True))
+        blocks.append(Block(tuple(subjects), ((first, first + data.draw(number)),), data.draw(st.integers(1, 3))))
+    index = Index(tuple(blocks), first=data.draw(number), most=data.draw(number), part=0)
+    rows, of = list(index), data.draw(number)
+    k = data.draw(st.integers(0, of - 1))
+    own = replace(index, share=Share(k, of))
+    assert list(own) == [own[i] for i in range(len(own))] == rows[k::of]
+    assert own.samples == sum(row.count for row in own)
+    assert [own.find(row.key) == row for row in rows] == [row in rows[k::of] for row in rows]
+    for subject in "abc":
+        shots = [row for row in rows[k::of] if row.subject == subject]
+        assert list(own.of(subject)) == shots and own.counts[subject] == own.count_of(subject) == len(shots)
+        assert own.samples_of(subject) == sum(row.count for row in shots)
+
+
+def test_a_shard_of_a_hundred_million_frames_counts_out_no_row_that_it_does_not_render(tmp_path, monkeypatch):
+    views = {"kind": "sphere", "count": 50_000_000, "distance": 3}
+    planned = prepare(small_recipe(viewpoints=views, max_frames=10**9, shot_frames=16))
+    made = counted(monkeypatch, Index, "_row")
+    shares = [replace(whole(planned), share=Share(k, 7)) for k in range(7)]
+    works = [Missing(portion, Store(tmp_path)) for portion in shares]
+    assert sum(work.total for work in works) == planned.frames == 10**8
+    assert sum(count for work in works for _, count in work.lines()) == 10**8 // 16
+    assert all(len(portion.models) == len(portion.subjects) == 2 for portion in shares)
+    assert len(list(islice(works[3].rows(), 5))) == 5 and works[3].resumed == 0
+    assert len(made) <= 7 * 2 + 6
 
 
 def test_two_that_finish_at_once_leave_what_one_leaves(recipe_file, small_run, tmp_path):
@@ -169,44 +215,120 @@ def test_many_put_one_export_in_place_and_none_is_refused(small_dataset):
 def test_a_run_that_is_told_to_end_leaves_nothing_unfinished(recipe_file, tmp_path):
     out = tmp_path / "out"
     run = subprocess.Popen(command(recipe_file, out, "0/1", 1), **OWN)
-    deadline = time.monotonic() + DEADLINE
-    while not any((out / "store" / "writing").glob("*~run")) and time.monotonic() < deadline:
-        time.sleep(0.02)
+    assert until(lambda: Store(out).heartbeats() or run.poll() is not None)
     run.send_signal(signal.SIGTERM)
     _, said = run.communicate(timeout=DEADLINE)
     assert (run.returncode, b"stopped;" in said) == (130, True), said
     assert not any((out / "store" / "writing").iterdir())
 
 
-def killed(words, seconds):
-    """A run of which all processes are killed after so many seconds, unless it was done before; whether it was killed."""
+def test_who_hangs_where_all_take_turns_is_told_of_in_one_line(tmp_path, monkeypatch):
+    monkeypatch.setattr(folder, "LOCK_S", 0.1)
+    store = Store(tmp_path)
+    store.make_ready()
+    with FileLock(store.folder / "lock"), pytest.raises(StoreError, match=r"lock: expected other runs to be done .* end it"):
+        Store(tmp_path / "store" / "..").open_for(to_render(prepare(small_recipe()), store).record)
+    assert not store.plan_file.exists()
+
+
+def test_where_a_file_system_has_no_locks_a_run_takes_no_turns(small_run, tmp_path, monkeypatch):
+    def refuse(*_, **__):
+        raise OSError(errno.ENOLCK, "No locks available")
+
+    monkeypatch.setattr(FileLock, "acquire", refuse)
+    generate(small_recipe(), tmp_path / "out", shard=(0, 1))
+    assert not (tmp_path / "out" / "store" / "lock").exists()
+    (tmp_path / "out" / "store" / "lock").touch()
+    assert tree_hash(tmp_path / "out") == tree_hash(small_run)
+
+
+DYING = """
+import os, signal, sys
+from viewsphere.cli import main
+from viewsphere.store import folder
+become, lives = folder._become, int(sys.argv.pop(1))
+def put(made, target):
+    global lives
+    lives -= 1
+    if lives < 0:
+        os.kill(os.getpid(), signal.SIGKILL)
+    become(made, target)
+folder._become = put
+main()
+"""
+"""The command line, killed when it is about to put in place what it makes after so many models and shots."""
+
+
+def killed_at(lives, words):
+    """A run that is killed after so many models and shots; when it is dead."""
+    run = subprocess.Popen([sys.executable, "-c", DYING, f"{lives}", *words[3:]], **OWN)
+    _, said = run.communicate(timeout=DEADLINE)
+    assert run.returncode == -signal.SIGKILL, said
+
+
+def killed_at_start(out, shard, words):
+    """A run that is killed, without its workers, when it has told of itself; when it is dead."""
     run = subprocess.Popen(words, **OWN)
-    try:
-        run.wait(timeout=seconds)
-        return False
-    except subprocess.TimeoutExpired:
-        os.killpg(run.pid, signal.SIGKILL)
-        return True
-    finally:
-        run.communicate(timeout=DEADLINE)
+    assert until(lambda: shard in [told.shard for told, _ in Store(out).heartbeats()] or run.poll() is not None)
+    run.kill()
+    _, said = run.communicate(timeout=DEADLINE)
+    assert run.returncode == -signal.SIGKILL, said
+
+
+@pytest.fixture(scope="module")
+def many(tmp_path_factory):
+    """A recipe of 24 shots, and the tree that one run makes of it."""
+    views = {"azimuth": {"start": 0, "stop": 330, "step": 30}, "elevation": [15], "distance": 1.0}
+    recipe = small_recipe(viewpoints=views, shot_frames=1, channels=["rgb", "depth", "instances"])
+    out = tmp_path_factory.mktemp("many") / "out"
+    generate(recipe, out)
+    return recipe, tree_hash(out)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [0, 1])
-def test_seven_shards_three_at_a_time_two_of_them_killed(seed, recipe_file, small_run, tmp_path):
-    out, rng = tmp_path / "out", random.Random(seed)
+def test_seven_shards_three_at_a_time_two_of_them_killed(many, tmp_path):
+    recipe, whole_tree = many
+    file, out, rng = tmp_path / "recipe.yaml", tmp_path / "out", random.Random(1)
+    file.write_text(recipe.to_yaml())
     order = rng.sample(range(7), 7)
-    victims = {order[0]: rng.uniform(1.5, 4.0), order[rng.randrange(1, 7)]: rng.uniform(1.5, 4.0)}
+    at_start, at_work = rng.sample(order, 2)
 
-    def made(k):
-        again = k in victims and killed(command(recipe_file, out, f"{k}/7"), victims[k])
-        done = subprocess.run(command(recipe_file, out, f"{k}/7"), capture_output=True, timeout=DEADLINE)
+    def make(k):
+        words = command(file, out, f"{k}/7")
+        if k == at_start:
+            killed_at_start(out, (k, 7), words)
+        elif k == at_work:
+            killed_at(rng.randrange(3), command(file, out, f"{k}/7", workers=0))
+        done = subprocess.run(words, capture_output=True, timeout=DEADLINE)
         assert done.returncode == 0, done.stderr
-        return again
 
     with ThreadPoolExecutor(3) as three:
-        assert any(list(three.map(made, order)))
-    assert tree_hash(out) == tree_hash(small_run)
+        list(three.map(make, order))
+    assert tree_hash(out) == whole_tree
+    found = status(out)
+    assert found.complete and not found.runs and not found.failed
+
+
+@pytest.mark.slow
+def test_what_a_killed_shard_left_is_told_exported_and_proved(many, tmp_path):
+    recipe, whole_tree = many
+    file, out = tmp_path / "recipe.yaml", tmp_path / "out"
+    file.write_text(recipe.to_yaml())
+    generate(recipe, out, shard=(0, 2))
+    killed_at(5, command(file, out, "1/2", workers=0))
+    found = status(out)
+    assert (found.frames, found.finished, found.missing) == (24, 17, 7)
+    assert [(run.state, run.told.shard) for run in found.runs] == [("dead", (1, 2))]
+    said = viewsphere("status", out)
+    assert said.returncode == 3 and "shard 1/2" in said.stdout and "run it again" in said.stdout
+    assert viewsphere("export", out, "-f", "coco,csv").returncode == 0
+    report = check(Dataset(out))
+    assert {finding.check for finding in report.findings} == {"counts"}
+    assert len(Dataset(out)) == 17
+    generate(recipe, out, shard=(1, 2))
+    assert viewsphere("check", out).returncode == 0
+    shutil.rmtree(out / "csv")
+    assert tree_hash(out) == whole_tree
 
 
 def test_a_bad_model_fails_its_shard_and_not_the_others(tmp_path):

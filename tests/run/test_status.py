@@ -10,14 +10,21 @@ import pytest
 
 import viewsphere as vs
 from command_line import viewsphere
+from counting import counted
 from deadline import until
 from small import small_recipe
+from viewsphere.aside import LOCK
 from viewsphere.errors import StoreError
 from viewsphere.run.exporting import export
 from viewsphere.run.generate import generate
 from viewsphere.run.status import status
+from viewsphere.sampling.extension import whole
 from viewsphere.store import Store
-from viewsphere.store.heartbeat import GONE_S, SILENT_S, Heartbeat, Pulse
+from viewsphere.store.folder import RUN
+from viewsphere.store.heartbeat import SILENT_S, Heartbeat, Pulse
+from viewsphere.store.index import Index
+
+SPHERE = {"kind": "sphere", "count": 50_000_000, "distance": 3}
 
 
 @pytest.fixture
@@ -27,11 +34,12 @@ def half(tmp_path):
     return tmp_path / "out"
 
 
-def leave(store, told, name=None):
-    """What a run has left of its heartbeat."""
-    file = store.folder / "writing" / (name or f"{told.host}~{told.pid}~run")
+def leave(store, told):
+    """What a run has left of its heartbeat, without a lock that is held."""
+    file = store.folder / "writing" / f"{told.host}~{told.pid}~x" / RUN
+    file.parent.mkdir()
     file.write_text(told.to_json())
-    return file
+    file.with_name(LOCK).touch()
 
 
 def test_a_finished_data_set(small_run):
@@ -73,8 +81,8 @@ def test_a_run_is_seen_at_work(tmp_path):
             seen.append(Store(tmp_path / "out").heartbeats())
 
     generate(small_recipe(), tmp_path / "out", shard=(1, 2), listener=look)
-    ((told,),) = {one for one in seen}
-    assert (told.host, told.pid, told.shard) == (socket.gethostname(), os.getpid(), (1, 2))
+    (((told, is_alive),),) = {one for one in seen}
+    assert is_alive and (told.host, told.pid, told.shard) == (socket.gethostname(), os.getpid(), (1, 2))
     assert status(tmp_path / "out").runs == ()
 
 
@@ -103,53 +111,53 @@ def test_the_pulse_goes_on_by_itself(tmp_path, monkeypatch):
 
 def test_runs_that_work_died_or_fell_silent(half):
     now, store = time.time(), Store(half)
-    here = Heartbeat(socket.gethostname(), os.getppid(), (0, 3), "frames", 2, 4, 0, 1, now - 30, now, ("box-000000",))
+    here = Heartbeat(socket.gethostname(), 7, (0, 3), "frames", 2, 4, 0, 1, now - 30, now, ("box-000000",))
     leave(store, here)
-    leave(store, replace(here, pid=999_999_999))
-    leave(store, replace(here, host="far", pid=7))
+    leave(store, replace(here, host="far"))
     leave(store, replace(here, host="far", pid=8, beat=now - SILENT_S - 1))
-    found = status(half)
+    with store.occupied() as own:
+        long_ago = replace(here, pid=9, begun=now - SILENT_S - 31, beat=now - SILENT_S - 1)
+        (own / RUN).write_text(long_ago.to_json())
+        found, said = status(half), viewsphere("status", half).stdout
     assert {(r.told.host, r.told.pid): r.state for r in found.runs} == {
-        (here.host, here.pid): "running",
-        (here.host, 999_999_999): "dead",
+        (here.host, 7): "dead",
+        (here.host, 9): "running",  # it holds its lock
         ("far", 7): "running",
         ("far", 8): "silent",
     }
     assert found.under_way == 2 and found.rate == pytest.approx(2 * 3 / 30)
     assert found.seconds_left == pytest.approx((6 - 2) / found.rate)
-    said = viewsphere("status", half).stdout
     assert "silent: far (pid 8), shard 0/3: frames 3 of 4" in said and "box-000000" in said and "about 20 s left" in said
 
 
 def test_what_failed_is_told(half):
-    told = Heartbeat("far", 7, (1, 2), error="models/a.obj: expected faces, found none")
-    leave(Store(half), told, "_failed~1~2")
-    assert status(half).failed == (told,)
-    assert "failed: far (pid 7), shard 1/2: models/a.obj: expected faces, found none" in viewsphere("status", half).stdout
+    store = Store(half)
+    with pytest.raises(ZeroDivisionError), store.occupied() as own, store.telling(own, (1, 2)):
+        raise ZeroDivisionError("models/a.obj: expected faces, found none")
+    (told,) = status(half).failed
+    assert (told.pid, told.shard, told.error) == (os.getpid(), (1, 2), "models/a.obj: expected faces, found none")
+    assert f"failed: {socket.gethostname()} (pid {os.getpid()}), shard 1/2: {told.error}" in viewsphere("status", half).stdout
+    assert not any((store.folder / "writing").iterdir())
     assert generate(small_recipe(), half, shard=(1, 2)).missing == 0
-    assert status(half).failed == ()
+    assert status(half).failed == () and not (store.folder / "failed").exists()
 
 
 def test_what_cannot_be_read_is_left_out(half):
     writing = half / "store" / "writing"
     for i, text in enumerate(("", "null", "{", '{"shard": 3}')):
-        (writing / f"far~{i}~run").write_text(text)
+        (writing / f"far~{i}~x").mkdir()
+        (writing / f"far~{i}~x" / RUN).write_text(text)
     assert status(half).runs == ()
 
 
-def test_what_others_left_goes_when_nobody_has_told_of_it_for_long(half):
-    store, now = Store(half), time.time()
-    writing, long_ago = store.folder / "writing", (now - GONE_S - 1,) * 2
-    for name in ("far~7~box-000001", "far~7~run", "far~8~box-000002", "near~9~box-000003", "near~9~box-000004"):
-        (writing / name).mkdir()
-        os.utime(writing / name, long_ago)
-    (writing / "far~7~run").rmdir()
-    dead = leave(store, Heartbeat("far", 7, beat=now - GONE_S - 1))
-    os.utime(dead, long_ago)
-    leave(store, Heartbeat("head", 1, beat=now, working_on=("box-000003",)))  # whose workers are on other machines
-    os.utime(writing / "near~9~box-000004")
-    store.make_ready()
-    assert {path.name for path in writing.iterdir()} == {"head~1~run", "near~9~box-000003", "near~9~box-000004"}
+def test_an_endless_plan_takes_no_time(tmp_path, monkeypatch):
+    portion = whole(vs.plan(small_recipe(viewpoints=SPHERE, max_frames=10**9, shot_frames=16)))
+    store = Store(tmp_path)
+    store.open_for(portion.record)
+    made = counted(monkeypatch, Index, "_row")
+    found = status(tmp_path)
+    assert (found.frames, found.finished, found.missing, found.left_out) == (10**8, 0, 10**8, 0)
+    assert len(made) <= 3
 
 
 def test_what_was_left_out_is_not_missing(tmp_path):

@@ -5,6 +5,9 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import time
+from concurrent.futures import ThreadPoolExecutor
+from threading import Barrier
 
 import pytest
 
@@ -42,6 +45,29 @@ def test_the_parent_of_workers_loads_no_kernels(tmp_path):
         return subprocess.run(words, env=environment, capture_output=True, text=True, check=True).stdout
 
     assert [run("a", 3), run("b", 3), run("c", 4.5)] == ["False\n"] * 3
+
+
+@pytest.mark.skipif(os.name != "posix", reason="folders have locks on POSIX alone")
+def test_of_processes_that_need_kernels_at_once_one_compiles_them(monkeypatch, tmp_path):
+    compiled, both = [], Barrier(2)
+
+    def compile_one(shot):
+        compiled.append(shot)
+        time.sleep(0.3)  # which leaves the other time to begin, too
+        (tmp_path / "kernel.nbi").touch()
+
+    def worker():
+        both.wait()
+        warm.compile_kernels(shot)
+
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    monkeypatch.setattr(warm, "_render", compile_one)
+    shot = next(iter(plan(RECIPE).shots(unit_box)))
+    with ThreadPoolExecutor(2) as workers:  # locks are those of open files: threads are to them as processes are
+        for done in [workers.submit(worker) for _ in range(2)]:
+            done.result()
+    assert len(compiled) == 1
+    assert warm.is_compiled(shot)
 
 
 RECIPE = Recipe(models=[{"source": "zoo:chair"}], viewpoints={"azimuth": [0], "elevation": [20], "distance": 3})

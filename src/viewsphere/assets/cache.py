@@ -12,18 +12,15 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-import shutil
-import tempfile
-import time
 from collections.abc import Callable, Generator, Iterable, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
 import platformdirs
 
-from viewsphere.assets import limits
+from viewsphere.aside import aside, sweep, temporary
 from viewsphere.assets.inside import split_source
 from viewsphere.assets.isolated import read_apart
 from viewsphere.assets.load import check_source
@@ -33,16 +30,15 @@ from viewsphere.assets.normalise import normalise
 from viewsphere.assets.parts import taken
 from viewsphere.assets.primitive import FileFacts, extents
 from viewsphere.errors import ModelError
+from viewsphere.limits import limits
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.thing import TimeStep
 
 SETTINGS = ("up", "forward", "unit", "centring", "scale", "real_size", "confined", "clip", "fps", "shown")
 ZOO = "zoo:"
-ASIDE = "reading-"
+PREFIX = "reading-"
 BATCH = 32
 """Most frames of a file that are read at once."""
-
-STALE_SECONDS = 86_400.0
 
 
 def load_normalised(
@@ -152,24 +148,14 @@ def _batches(frames: Sequence[int]) -> Iterable[Sequence[int]]:
 @contextmanager
 def _aside(folder: Path) -> Generator[Path]:
     """A new folder in the cache (in the system's folder for such, if that cannot be written) that does not stay."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        place = Path(tempfile.mkdtemp(prefix=ASIDE, dir=folder))
-    except OSError:
-        place = Path(tempfile.mkdtemp(prefix=f"viewsphere-{ASIDE}"))
-    try:
+    with ExitStack() as then:
+        then.callback(sweep, folder, PREFIX)
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            place = then.enter_context(aside(folder, PREFIX))
+        except OSError:
+            place = then.enter_context(temporary("reading"))
         yield place
-    finally:
-        shutil.rmtree(place, ignore_errors=True)
-        _sweep(folder)
-
-
-def _sweep(folder: Path) -> None:
-    """Remove what processes that were killed left behind."""
-    with suppress(OSError):
-        for left in folder.glob(f"{ASIDE}*"):
-            if left.stat().st_mtime < time.time() - STALE_SECONDS:
-                shutil.rmtree(left, ignore_errors=True)
 
 
 def load_zoo(spec: ModelSpec, build: Callable[[ModelSpec], Mesh] | None) -> tuple[Mesh, FileFacts]:

@@ -6,19 +6,17 @@ import os
 import shutil
 import subprocess
 import sys
-import tempfile
-import time
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
 import platformdirs
 
+from viewsphere.aside import Aside, sweep
 from viewsphere.errors import UserError
 
 PACKAGES = ("bpy==5.0.*", "numpy<2")
-ASIDE = "blender-making-"
-STALE_S = 86_400.0
+PREFIX = "blender-making-"
 INSTALL_S = 3600.0
 
 Listener = Callable[[str], None]
@@ -44,20 +42,20 @@ def make_environment(listener: Listener) -> Path:
     base = _python311()
     try:
         place.parent.mkdir(parents=True, exist_ok=True)
-        _sweep(place.parent)
-        aside = Path(tempfile.mkdtemp(prefix=ASIDE, dir=place.parent))
+        sweep(place.parent, PREFIX)
+        aside = Aside.make(place.parent, PREFIX)
     except OSError as error:
         raise UserError(f"{place}: expected a place to write, found: {error.strerror or error}") from None
     try:
         listener(f"making {place} with {base}: about 1 GB")
-        _run([base, "-m", "venv", aside / "new"], listener)
-        made = interpreter_of(aside / "new")
+        _run([base, "-m", "venv", aside.folder / "new"], listener)
+        made = interpreter_of(aside.folder / "new")
         _run([made, "-m", "pip", "install", "--disable-pip-version-check", *PACKAGES], listener)
         with suppress(FileNotFoundError):
-            place.rename(aside / "old")
-        (aside / "new").rename(place)
+            place.rename(aside.folder / "old")
+        (aside.folder / "new").rename(place)
     finally:
-        shutil.rmtree(aside, ignore_errors=True)
+        aside.remove()
     return interpreter_of(place)
 
 
@@ -97,11 +95,3 @@ def _run(command: list[str | Path], listener: Listener) -> None:
             raise
     if process.returncode:
         raise UserError(f"--setup-blender: expected `python -m {command[2]}` to succeed, found: {said or 'no word'}")
-
-
-def _sweep(place: Path) -> None:
-    """Remove environments that killed processes left half made."""
-    for left in place.glob(f"{ASIDE}*"):
-        with suppress(OSError):
-            if left.stat().st_mtime < time.time() - STALE_S:
-                shutil.rmtree(left, ignore_errors=True)

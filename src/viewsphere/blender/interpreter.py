@@ -8,11 +8,11 @@ import re
 import shutil
 import subprocess
 import sys
-import tempfile
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
+from viewsphere.aside import temporary
 from viewsphere.blender import environment
 from viewsphere.blender.process import BlenderProcess
 from viewsphere.errors import BlenderDied, BlenderError, MissingExtraError, UserError
@@ -118,9 +118,9 @@ def find_blender(python: str | None = None) -> Path:
 
 def probe(python: Path) -> Blender:
     """Start this interpreter's Blender, ask for its version and devices, and try to draw; takes two minutes at most."""
-    with tempfile.TemporaryDirectory(prefix="viewsphere-probe-") as folder:
+    with temporary("probe") as folder:
         try:
-            with BlenderProcess(python, Path(folder) / "log") as process:
+            with BlenderProcess(python, folder / "log") as process:
                 told = process.ask("hello", PROBE_S)
                 graphics = _graphics(process)
         except (BlenderError, BlenderDied) as error:

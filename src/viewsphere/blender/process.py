@@ -26,6 +26,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from viewsphere.aside import Aside, sweep
 from viewsphere.errors import BlenderDied, BlenderError
 
 START = """\
@@ -42,8 +43,7 @@ MEMORY = Path("/dev/shm")
 LEAST_MEMORY = 2 << 30
 """Bytes that must be free in `MEMORY` to be used: containers often have 64 MB."""
 
-ASIDE = "viewsphere-blender-"
-STALE_S = 86_400.0
+PREFIX = "viewsphere-blender-"
 TAIL_BYTES, TAIL_LINES = 4096, 6
 
 SHELLS_SIGNALS = 128
@@ -61,7 +61,8 @@ class BlenderProcess:
     """
 
     def __init__(self, python: Path, log: Path | None = None, readable: Sequence[Path] | None = None, threads: int = 0) -> None:
-        self.folder = _private_folder() if readable is None else Path(tempfile.mkdtemp(prefix=ASIDE))
+        aside = _aside(Path(tempfile.gettempdir()) if readable is not None else _memory())
+        self.folder = aside.folder
         self.log = log or self.folder / "blender.log"
         self._put: list[Path] = []
         told = [json.dumps(None if readable is None else [str(place) for place in readable]), json.dumps(threads)]
@@ -78,9 +79,9 @@ class BlenderProcess:
                     creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
                 )
         except OSError as error:
-            shutil.rmtree(self.folder, ignore_errors=True)
+            aside.remove()
             raise BlenderDied(f"{python}: Blender cannot be started: {error.strerror or error}") from None
-        self._end: weakref.finalize[Any, Any] = weakref.finalize(self, _end, self._process, self.folder, os.getpid())
+        self._end: weakref.finalize[Any, Any] = weakref.finalize(self, _end, self._process, aside, os.getpid())
 
     def __enter__(self) -> BlenderProcess:
         return self
@@ -177,7 +178,7 @@ class BlenderProcess:
         return []
 
 
-def _end(process: subprocess.Popen[bytes], folder: Path, owner: int) -> None:
+def _end(process: subprocess.Popen[bytes], aside: Aside, owner: int) -> None:
     """Let Blender end by itself, else kill it, and remove its folder; a forked copy of the owning process does nothing."""
     if os.getpid() != owner:
         return
@@ -190,7 +191,8 @@ def _end(process: subprocess.Popen[bytes], folder: Path, owner: int) -> None:
         _kill(process)
         process.wait()
     process.stdout.close()
-    shutil.rmtree(folder, ignore_errors=True)
+    aside.remove()
+    sweep(aside.folder.parent, PREFIX)
 
 
 def _kill(process: subprocess.Popen[bytes]) -> None:
@@ -218,19 +220,15 @@ def _environment(python: Path, folder: Path) -> dict[str, str]:
     return {**kept, **own, "BLENDER_USER_RESOURCES": str(folder / "user")}
 
 
-def _private_folder() -> Path:
-    """A new folder that other users cannot read, in `MEMORY` where enough of it is free, else among the temporary files."""
-    place = Path(tempfile.gettempdir())
+def _memory() -> Path:
+    """A place for large arrays: `MEMORY` where enough of it is free, else that of temporary files."""
     with suppress(OSError):
         if os.access(MEMORY, os.W_OK) and shutil.disk_usage(MEMORY).free >= LEAST_MEMORY:
-            place = MEMORY
-    _sweep(place)
-    return Path(tempfile.mkdtemp(prefix=ASIDE, dir=place))
+            return MEMORY
+    return Path(tempfile.gettempdir())
 
 
-def _sweep(place: Path) -> None:
-    """Remove old folders that stayed because this process and its Blender were killed at the same time."""
-    for left in place.glob(f"{ASIDE}*"):
-        with suppress(OSError):
-            if left.stat().st_mtime < time.time() - STALE_S:
-                shutil.rmtree(left, ignore_errors=True)
+def _aside(place: Path) -> Aside:
+    """A new folder there, once those of processes that were killed with their Blender are gone."""
+    sweep(place, PREFIX)
+    return Aside.make(place, PREFIX)

@@ -7,10 +7,10 @@ import re
 from collections.abc import Iterator
 from itertools import islice, zip_longest
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import numpy as np
 
+from viewsphere.aside import temporary
 from viewsphere.assets.export import export_obj
 from viewsphere.assets.exported import read_exported
 from viewsphere.assets.mesh import Mesh
@@ -59,9 +59,9 @@ def _problems(dataset: Dataset, info: ModelInfo, categories: dict[int, Category]
     if library is None:
         yield f"{Path(info.obj).name}: expected materials of the model, found others"
         return
-    with TemporaryDirectory() as aside:
-        export_obj(mesh, Path(aside), Path(info.obj).stem, library)
-        for file in sorted(Path(aside).iterdir()):
+    with temporary("check") as aside:
+        export_obj(mesh, aside, Path(info.obj).stem, library)
+        for file in sorted(aside.iterdir()):
             yield from _compared(file, folder / file.name)
 
 

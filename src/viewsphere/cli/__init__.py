@@ -7,8 +7,10 @@ from __future__ import annotations
 
 import errno
 import os
+import signal
 import sys
 from io import TextIOWrapper
+from typing import NoReturn
 
 from viewsphere.errors import CheckFailedError, UserError, ViewsphereError
 
@@ -24,6 +26,7 @@ def main() -> None:
     from viewsphere.run.allocator import keep_freed_memory
 
     _print_anything()
+    signal.signal(signal.SIGTERM, _stop)
     try:
         if os.environ.get("_VIEWSPHERE_COMPLETE") == completion.BASH:
             completion.in_bash(app, os.environ)
@@ -31,7 +34,8 @@ def main() -> None:
         sys.exit(app(standalone_mode=False))
     except UsageError as error:
         explain(error)
-    except typer.Abort:
+    except (typer.Abort, KeyboardInterrupt):
+        typer.echo("stopped; what is finished is kept: run the same command to go on", err=True)
         sys.exit(130)
     except CheckFailedError as error:
         complain(error, 1)
@@ -44,8 +48,11 @@ def main() -> None:
             raise
         problem = f"expected a path that the file system takes, found: {error.strerror}: choose another"
         complain(UserError(f"{error.filename}: {problem}"), 2)
-    except KeyboardInterrupt:
-        sys.exit(130)
+
+
+def _stop(*_: object) -> NoReturn:
+    """End as Ctrl-C does, with its message, when a system or a cluster asks for it."""
+    raise KeyboardInterrupt
 
 
 def _print_anything() -> None:

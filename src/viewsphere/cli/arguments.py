@@ -54,6 +54,29 @@ def _allow_scripts(allowed: bool) -> bool:
 AllowScripts = Annotated[
     bool, typer.Option("--allow-scripts", help="Let the recipe's engine.script run: a program.", callback=_allow_scripts)
 ]
+
+
+def _keep(durability: str | None) -> str | None:
+    """Have what is finished kept so in this process, and in those that it starts."""
+    from viewsphere.store.moving import DURABILITY
+    from viewsphere.store.moving import durability as asked
+
+    if durability is not None:
+        os.environ[DURABILITY] = durability
+        asked()
+    return durability
+
+
+Durability = Annotated[
+    str | None,
+    typer.Option(
+        "--durability",
+        metavar="none|fsync",
+        help="fsync: what is finished is whole even after a crash of the machine; slower.",
+        callback=_keep,
+        show_default=False,
+    ),
+]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON for scripts.")]
 Formats = Annotated[
     str | None,

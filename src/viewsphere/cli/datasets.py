@@ -8,7 +8,17 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from viewsphere.cli import completion
-from viewsphere.cli.arguments import AllowScripts, AsJson, DataFolder, FormatOptions, asked_formats, cores, split, with_options
+from viewsphere.cli.arguments import (
+    AllowScripts,
+    AsJson,
+    DataFolder,
+    Durability,
+    FormatOptions,
+    asked_formats,
+    cores,
+    split,
+    with_options,
+)
 from viewsphere.cli.terminal import ProgressBar, print_json, print_report, print_status
 from viewsphere.errors import UserError
 
@@ -36,6 +46,7 @@ def export(
         str | None,
         typer.Option(help="Only these frames: numbers from 0 and ranges, such as 0-15,40; needs --output.", show_default=False),
     ] = None,
+    durability: Durability = None,
     json_: AsJson = False,
 ) -> None:
     """Write a finished or half-finished data set, or some of its frames, in other formats, without rendering."""
@@ -90,6 +101,7 @@ def check(
     against_cycles: Annotated[
         int, typer.Option(min=0, metavar="N", help="Compare N frames with Cycles' own pass of object indices; needs Blender.")
     ] = 0,
+    durability: Durability = None,
     json_: AsJson = False,
     allow_scripts: AllowScripts = False,
 ) -> None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from viewsphere.cli import completion
-from viewsphere.cli.arguments import AsJson, FormatOptions, Formats, asked_formats, with_options
+from viewsphere.cli.arguments import AsJson, Durability, FormatOptions, Formats, asked_formats, with_options
 from viewsphere.cli.terminal import MOST_FINDINGS, ProgressBar, print_json
 from viewsphere.errors import UserError
 
@@ -26,6 +26,7 @@ def merge(
     keep_going: Annotated[bool, typer.Option(help="Take what unfinished data sets hold.")] = False,
     format_: Formats = None,
     format_option: FormatOptions = None,
+    durability: Durability = None,
     json_: AsJson = False,
 ) -> None:
     """Join data sets into a new one: categories by name, models by content. The pictures are linked, the sources only read."""
@@ -57,6 +58,7 @@ def import_(
     keep_going: Annotated[bool, typer.Option(help="Leave out what is broken.")] = False,
     format_: Formats = None,
     format_option: FormatOptions = None,
+    durability: Durability = None,
     json_: AsJson = False,
 ) -> None:
     """Open a data set that was made elsewhere, to merge it with others, look at it and export it. The pictures are linked."""

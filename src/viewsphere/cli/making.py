@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+from contextlib import nullcontext, redirect_stdout
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -13,6 +15,7 @@ from viewsphere.cli.arguments import (
     AllowScripts,
     AsJson,
     Changes,
+    Durability,
     FormatOptions,
     Formats,
     RecipeFile,
@@ -28,7 +31,6 @@ from viewsphere.cli.terminal import (
     print_json,
     print_plan,
     print_summary,
-    stop_when_terminated,
     write,
     write_picture,
 )
@@ -277,18 +279,29 @@ def render(
     format_option: FormatOptions = None,
     workers: Annotated[
         int | None,
-        typer.Option(min=0, help="Processes; default: one a core. 0: this one.", show_default=False),
+        typer.Option(
+            min=0,
+            help="Processes; default: one a core. 0: this one. With --ray: CPUs at most; default: all.",
+            show_default=False,
+        ),
     ] = None,
     keep_going: Annotated[bool, typer.Option(help="Leave out models that cannot be used.")] = False,
     append: Annotated[
         bool, typer.Option("--append", help="Add what a finished data set lacks: models, poses, channels.")
     ] = False,
+    durability: Durability = None,
     shard: Annotated[
         str | None,
         typer.Option(
             metavar="K/N",
             help="Render only the K-th of N fixed shares of the shots, K from 0: for job arrays.",
             show_default=False,
+        ),
+    ] = None,
+    ray: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ADDRESS", help="Render on a Ray cluster: auto, HOST:PORT or ray://HOST:PORT.", show_default=False
         ),
     ] = None,
     json_: AsJson = False,
@@ -303,6 +316,7 @@ def render(
 
     if recipe is None or output is None:
         raise UserError(for_render(recipe, output))
+    share = None if shard is None else shard_named(shard)
     loaded = load_recipe(recipe, changes)
     asked = asked_formats(format_)
     planned = make_plan(loaded)
@@ -310,20 +324,21 @@ def render(
     addition = to_append(planned, Store(output)) if append else None
     if not json_:
         print_plan(planned)
-        if addition is not None and Store(output).missing(addition.record):
+        if addition is not None and any(Store(output).gaps(addition.record)):
             typer.echo(f"{output}: {addition}")
-    crew = cores() if workers is None else workers
-    stop_when_terminated()
-    with ProgressBar(quiet=json_) as bar:
+    everybody = cores() if ray is None else 0
+    aside = redirect_stdout(sys.stderr) if json_ else nullcontext()  # what libraries print is no JSON
+    with ProgressBar(quiet=json_) as bar, aside:
         try:
             summary = generate(
                 loaded,
                 output,
-                workers=crew,
+                workers=everybody if workers is None else workers,
                 formats=formats,
                 keep_going=keep_going,
                 append=append,
-                shard=None if shard is None else shard_named(shard),
+                shard=share,
+                ray=ray,
                 listener=bar.show,
             )
         except KeyboardInterrupt:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import signal
 import sys
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
@@ -32,15 +31,6 @@ def complain(error: ViewsphereError, status: int) -> None:
     for line in str(error).splitlines():
         typer.echo(f"viewsphere: {line}", err=True)
     sys.exit(status)
-
-
-def stop_when_terminated() -> None:
-    """Let SIGTERM, which batch systems send before they kill, stop this process as Ctrl-C does: the unfinished is removed."""
-
-    def stop(*_: object) -> None:
-        raise KeyboardInterrupt
-
-    signal.signal(signal.SIGTERM, stop)
 
 
 def write(file: Path, data: bytes) -> None:
@@ -164,18 +154,26 @@ def print_status(found: Status) -> None:
     waiting = found.missing - found.under_way
     typer.echo(f"{found.root}: {found.frames:,} frames: {counts}, {waiting:,} missing{_share_done(found)}")
     if found.models:
-        typer.echo(f"models to be made: {len(found.models):,} ({', '.join(found.models[:MOST_FINDINGS])})")
+        typer.echo(f"models to be made: {_some(found.models)}")
     for run in found.runs:
-        what = f"{run.told.phase} {run.told.done + run.told.under_way:,} of {run.told.total:,}"
+        what = run.told.phase
+        if run.told.total:
+            what += f" {run.told.done + run.told.under_way:,} of {run.told.total:,}"
         rate = f", {_rate(1, 1 / run.told.rate)}" if run.told.rate and run.state == "running" else ""
-        shots = f"; {', '.join(run.told.working_on[:MOST_FINDINGS])}" if run.told.working_on else ""
-        gone = "" if run.state == "running" else ": run it again"
+        shots = f"; {_some(run.told.working_on)}" if run.told.working_on else ""
+        gone = "" if run.state == "running" or found.complete else ": run it again"
         heard = f"heard of {_duration(run.seconds_ago)} ago"
         typer.echo(f"{run.state}: {_who(run.told)}: {what}{rate}, {heard}{shots}{gone}")
     for told in found.failed:
         typer.echo(f"failed: {_who(told)}: {told.error}")
     if found.seconds_left is not None:
         typer.echo(f"{_rate(1, 1 / found.rate)}, about {_duration(found.seconds_left)} left")
+
+
+def _some(names: Sequence[str]) -> str:
+    """As many of them as a reader has use for."""
+    left = len(names) - MOST_FINDINGS
+    return ", ".join(names[:MOST_FINDINGS]) + (f" and {left:,} more" if left > 0 else "")
 
 
 def _share_done(found: Status) -> str:
@@ -241,6 +239,8 @@ class ProgressBar:
             seen = progress.done + progress.under_way
             made = seen - progress.resumed
             rate = _rate(made, elapsed) if progress.phase == "frames" and made and elapsed else ""
+            if progress.nodes is not None:
+                rate = ", ".join(filter(None, (rate, f"{progress.nodes} node{'' if progress.nodes == 1 else 's'}")))
             self._rich.update(bar, completed=seen, rate=rate)
 
         return listen

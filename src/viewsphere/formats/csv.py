@@ -14,9 +14,9 @@ from collections.abc import Callable, Collection, Generator, Iterator
 from contextlib import contextmanager
 from itertools import zip_longest
 from pathlib import Path, PurePosixPath
-from tempfile import TemporaryDirectory
 from typing import Any
 
+from viewsphere.aside import temporary
 from viewsphere.formats import Remark
 from viewsphere.formats._contents import Expected, check_files, put
 from viewsphere.model.sample import ObjectAnnotation, Sample
@@ -64,13 +64,13 @@ def writer(dataset: Dataset, folder: Path, note: Callable[[str], None]) -> Gener
 
 def verify(dataset: Dataset, folder: Path, sampled: Collection[int]) -> Iterator[Remark]:
     """All that is not as it would be exported now."""
-    with TemporaryDirectory() as aside:
-        with _table(Path(aside) / TABLE) as append:
+    with temporary("csv") as aside:
+        with _table(aside / TABLE) as append:
             yield from check_files(
                 dataset, folder, _expected(dataset, append), _expected(dataset, lambda sample: None), [TABLE]
             )
         if (folder / TABLE).is_file():
-            yield from _rows_that_differ(Path(aside) / TABLE, folder / TABLE)
+            yield from _rows_that_differ(aside / TABLE, folder / TABLE)
 
 
 def _expected(dataset: Dataset, append: Callable[[Sample], None]) -> Iterator[Expected]:

@@ -9,13 +9,15 @@ Which compiler is used: `compiler` for versions of numba that it is tested with,
 
 from __future__ import annotations
 
+import atexit
 import hashlib
 import os
 import re
 import sys
 import tempfile
+import time
 from collections.abc import Callable, Generator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import cache, partial
 from pathlib import Path
 from threading import Lock
@@ -23,6 +25,7 @@ from typing import Any
 
 from numba.core import config
 
+from viewsphere.aside import STALE_S, Aside, sweep
 from viewsphere.kernels.kernel_cache import BUILD, IS_STOCK, kernel_folder
 
 if IS_STOCK:
@@ -103,5 +106,18 @@ def _cache_folder(sources: frozenset[str]) -> str:
         except OSError:
             continue
         if os.access(folder, os.W_OK):
+            _sweep(folder)
             return str(folder)
-    return tempfile.mkdtemp(prefix="viewsphere-kernels-")
+    place, prefix = Path(tempfile.gettempdir()), "viewsphere-kernels-"
+    sweep(place, prefix)
+    made = Aside.make(place, prefix)
+    atexit.register(made.remove)
+    return str(made.folder)
+
+
+def _sweep(folder: Path) -> None:
+    """Remove what numba was writing when its process was killed, long ago: whose that was nobody knows."""
+    for left in folder.glob("*.tmp.*"):
+        with suppress(OSError):
+            if left.stat().st_mtime < time.time() - STALE_S:
+                left.unlink()

@@ -32,7 +32,7 @@ class Timing:
 def timing(dataset: Dataset) -> Timing | None:
     """When the finished shots were written; None where no shot is finished."""
     found: list[tuple[float, int]] = []
-    for row in dataset.plan.rows:
+    for row in dataset.rows:
         try:
             found.append(((dataset.store.shot_folder(row.key) / "frames.json").stat().st_mtime, row.count))
         except OSError:

@@ -1,1 +1,1 @@
-"""From a recipe to samples in memory or a data set on disk: tasks, the local pool, exports."""
+"""From a recipe to samples in memory or a data set on disk: tasks, executors, exports."""

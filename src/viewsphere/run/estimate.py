@@ -14,8 +14,8 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
+from viewsphere.aside import temporary
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.thing import TimeStep
 from viewsphere.recipe.formats import FormatEntry, options_of
@@ -86,8 +86,8 @@ def extrapolate(planned: Plan, rates: Rates, workers: int) -> Estimate:
 def measure(recipe: Recipe, clock: Callable[[], float] = time.perf_counter) -> Rates:
     """Make a few frames as a run would, exports included, in a temporary folder; `clock` gives seconds."""
     planned = prepare(recipe.model_copy(update={"shot_frames": SHOT_FRAMES}))
-    with TemporaryDirectory(prefix="viewsphere-estimate-") as folder, recipe.located():
-        return _measure_in(planned, Store(Path(folder) / "out"), _Stopwatch(clock))
+    with temporary("estimate") as folder, recipe.located():
+        return _measure_in(planned, Store(folder / "out"), _Stopwatch(clock))
 
 
 def _measure_in(planned: Plan, store: Store, stopwatch: _Stopwatch) -> Rates:

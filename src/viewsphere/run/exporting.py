@@ -50,6 +50,9 @@ def export(
         writable(entry.name)
         entry.arguments()
     with ExitStack() as whole:
+        if is_own:
+            dataset.store.make_ready()
+            whole.enter_context(dataset.store.occupied())
         written = [(entry, whole.enter_context(_folder(dataset, place / entry.name, is_own))) for entry in entries]
         notes = (*write(dataset, written, listener or unheard), *_lacks(dataset))
     kinds = dataset.link_kinds - {"hard link"}

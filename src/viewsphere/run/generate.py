@@ -5,22 +5,24 @@ from __future__ import annotations
 import json
 import time
 from collections import Counter, defaultdict
-from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager
+from collections.abc import Container, Generator, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import chain, product
 from os import PathLike
 from pathlib import Path
 
 from viewsphere import plugins
-from viewsphere.errors import ModelError, RecipeError, ViewsphereError, joined
+from viewsphere.errors import ModelError, RecipeError, ViewsphereError, WorkerDied, joined
 from viewsphere.model.channel import missing
+from viewsphere.model.share import ALL
 from viewsphere.recipe.formats import FormatEntry, Formats, options_of, read_formats
 from viewsphere.recipe.recipe import Recipe
+from viewsphere.run.executors import Crew, Job, Listed, Outcome, hired
 from viewsphere.run.exporting import export, is_out_of_date, is_written, writable
 from viewsphere.run.framing import MOST_TRIES, hidden_frames
 from viewsphere.run.opening import commit, prepare, to_append, to_render
-from viewsphere.run.pool import Crew, Job, Listed, Outcome
 from viewsphere.run.progress import Listener, Progress, unheard
 from viewsphere.run.pulse import heard, watched
 from viewsphere.run.share import share_of
@@ -34,17 +36,12 @@ from viewsphere.run.warm import is_compiled
 from viewsphere.sampling.distances import Distances
 from viewsphere.sampling.extension import Portion
 from viewsphere.sampling.plan import Plan
-from viewsphere.sampling.share import ALL
 from viewsphere.store import Choice, Dataset, Row, Store
 from viewsphere.store.credits import write_credits
 from viewsphere.store.heartbeat import Pulse
-from viewsphere.store.index import Index
 
 MOST_SUBJECTS = 10_000
 """Models or scenes whose cameras are looked at before rendering, evenly over all; the others are when their turn comes."""
-
-
-NONE: Mapping[str, tuple[str, ...]] = {}
 
 
 @dataclass(frozen=True)
@@ -81,6 +78,7 @@ def generate(
     keep_going: bool = False,
     append: bool = False,
     shard: tuple[int, int] | None = None,
+    ray: str | None = None,
     listener: Listener | None = None,
 ) -> Summary:
     """Render all frames of a recipe (or of the one in this file) that `out` does not hold yet, then write the formats (default:
@@ -93,9 +91,14 @@ def generate(
     `out`, in any order, several at once, together render everything. The run after which nothing is missing writes the
     formats; others write none.
 
-    `workers` 0 renders in the calling process; more need a `__main__` guard in the calling script. A model that cannot be
-    used is an error before rendering starts, or with `keep_going` left out and reported. Raises UserError for the user's
-    mistakes; whatever was finished stays, and the same call goes on from there.
+    `workers` 0 renders in the calling process; more need a `__main__` guard in the calling script. `ray` is the address of a
+    Ray cluster whose CPUs render instead, such as "auto" (the one that this machine is of), "host:6379" or "ray://host:10001":
+    at most `workers` of them, 0 for all; `out` is where all its machines see it.
+
+    A model that cannot be used is an error before rendering starts, or with `keep_going` left out and reported. Raises
+    UserError for the user's mistakes, and WorkerDied, when all others are made, for shots that were lost with their workers
+    again and again (with `keep_going` they are left out, too); whatever was finished stays, and the same call goes on from
+    there.
     """
     begun = time.monotonic()
     share = ALL if shard is None else share_of(shard)
@@ -112,26 +115,27 @@ def generate(
         tell = heard(pulse, listener or unheard)
         notes: tuple[str, ...] = ()
         rendered, skipped = 0, dict[str, str]()
-        with Crew(store.root, workers, portion) as crew:
+        work = Missing(portion, store)
+        with hired(store.root, portion, workers, ray) as crew:
             if portion.adds_nothing:
                 _compare_models(portion, store, crew)
             else:
-                notes = _check_skies(portion, store, tell)
-                rendered, skipped = _render_part(portion, store, crew, keep_going, tell, pulse)
+                notes = _check_skies(work, tell)
+                rendered, skipped = _render_part(work, crew, keep_going, tell, pulse)
+            notes += crew.notes
         with store.locked():
             notes += tuple(_renew_threshold(store, recipe.keep_annotations_above))
             dataset = Dataset(store.root)
             write_credits(dataset)
-        far = status(store.root)
-        is_last = share.is_all or far.complete
-        if is_last:
+        left_over = None if share.is_all else status(store.root)
+        if left_over is None or left_over.complete:
             wanted = tuple(_due(wanted, portion, rendered > 0, store))
             notes += export(store.root, wanted, listener=tell)
             store.forget_failures()
-    if not is_last:
-        warnings, notes = _warnings(planned, dataset), (*notes, _left_to_others(portion, far))
+    if left_over is not None and not left_over.complete:
+        warnings, notes = _warnings(planned, dataset), (*notes, _left_to_others(portion, left_over))
         seconds = time.monotonic() - begun
-        return Summary(store.root, len(dataset), rendered, skipped, seconds, (), notes, warnings, far.missing)
+        return Summary(store.root, len(dataset), rendered, skipped, seconds, (), notes, warnings, left_over.missing)
     left = unused(store, options_of((*wanted, *_others(wanted, store))))
     notes += (f"note: {left}",) if left else ()
     if append and not rendered and share.is_all:
@@ -144,13 +148,16 @@ def generate(
     )
 
 
-def _at_work(portion: Portion, store: Store) -> AbstractContextManager[Pulse]:
-    """Open the store for a run's portion, and show others that it is at work."""
-    shard = (portion.share.number, portion.share.of)
+@contextmanager
+def _at_work(portion: Portion, store: Store) -> Generator[Pulse]:
+    """Open the store for a run's portion, and show others that it is at work, and how far."""
     if portion.number:
         store.make_ready()
-        return store.occupied(shard)
-    return store.opened_for(portion.record, shard)
+        opened = store.occupied()
+    else:
+        opened = store.opened_for(portion.record)
+    with opened as own, store.telling(own, (portion.share.number, portion.share.of)) as pulse:
+        yield pulse
 
 
 def _due(wanted: Sequence[FormatEntry], portion: Portion, has_rendered: bool, store: Store) -> Iterator[FormatEntry]:
@@ -212,14 +219,14 @@ def _hidden(store: Store, portion: Portion) -> Iterator[str]:
         )
 
 
-def _warnings(planned: Plan, dataset: Dataset, misses: Mapping[str, tuple[str, ...]] = NONE) -> Warnings:
+def _warnings(planned: Plan, dataset: Dataset, misses: Mapping[str, tuple[str, ...]] | None = None) -> Warnings:
     """Warnings about models and files, each once; `misses` are others about models, by their keys."""
     source_of = {spec.key: Path(spec.source).name for spec in planned.kept_specs if spec.parts is not None}
     models, files = defaultdict[str, list[str]](list), defaultdict[str, list[str]](list)
     for info in dataset.models:
         named = files[source_of[info.key]] if info.key in source_of else models[info.key]
         named += info.warnings
-    for key, lines in misses.items():
+    for key, lines in (misses or {}).items():
         models[key] += lines
     return Warnings(_said(models), _said(files))
 
@@ -242,29 +249,28 @@ def _check_channels(name: str, channels: Sequence[str], sensor: str) -> None:
         )
 
 
-def _check_skies(portion: Portion, store: Store, tell: Listener) -> tuple[str, ...]:
+def _check_skies(work: Missing, tell: Listener) -> tuple[str, ...]:
     """Notes on the skies' pictures, if there is anything left to render; raises RecipeError for one that cannot be used."""
-    if all(store.has_shot(row.key) for row in portion.rows):
+    if next(work.rows(), None) is None:
         return ()
-    return check_skies(portion.plan, lambda done, total: tell(Progress("skies", done, total)))
+    return check_skies(work.portion.plan, lambda done, total: tell(Progress("skies", done, total)))
 
 
-def _render_part(
-    portion: Portion, store: Store, crew: Crew, keep_going: bool, tell: Listener, pulse: Pulse
-) -> tuple[int, dict[str, str]]:
+def _render_part(work: Missing, crew: Crew, keep_going: bool, tell: Listener, pulse: Pulse) -> tuple[int, dict[str, str]]:
     """Make the part's models, take it into the data set, render its shots; gives the frames made and what was left out."""
+    portion, store = work.portion, work.store
     if portion.number:
         store.drop_unnamed_models()  # of appending that ended before it began
     try:
-        skipped = _prepare_models(portion, store, crew, keep_going, tell)
+        work.skipped.update(_prepare_models(portion, store, crew, keep_going, tell))
         commit(portion, store)
     except ViewsphereError:
         if portion.number:
             store.drop_unnamed_models()
         raise
-    rendered = _render_shots(portion, store, crew, keep_going, skipped, tell, pulse)
-    _note_skipped(portion, store, skipped)
-    return rendered, skipped
+    rendered = _render_shots(work, crew, keep_going, tell, pulse)
+    _note_skipped(portion, store, work.skipped)
+    return rendered, work.skipped
 
 
 def _prepare_models(portion: Portion, store: Store, crew: Crew, keep_going: bool, tell: Listener) -> dict[str, str]:
@@ -317,11 +323,9 @@ def _distance_problems(portion: Portion, store: Store, failed: Container[str]) -
             yield subject, problem
 
 
-def _render_shots(
-    portion: Portion, store: Store, crew: Crew, keep_going: bool, skipped: dict[str, str], tell: Listener, pulse: Pulse
-) -> int:
-    """Render the shots that the store lacks; gives the number of frames made. Failed shots land in `skipped`."""
-    work = Missing(portion, store, skipped)
+def _render_shots(work: Missing, crew: Crew, keep_going: bool, tell: Listener, pulse: Pulse) -> int:
+    """Render the shots that the store lacks; gives the number of frames made. Failed shots land in what was left out."""
+    portion, store, skipped = work.portion, work.store, work.skipped
     total, resumed, rendered = work.total, work.resumed, 0
     first = next(work.rows(), None)
     if first is not None:
@@ -335,30 +339,42 @@ def _render_shots(
         tell(Progress("kernels", 1, 1))
 
     def report() -> None:
-        tell(Progress("frames", resumed + rendered, total, resumed, crew.under_way))
+        tell(Progress("frames", resumed + rendered, total, resumed, crew.under_way, crew.nodes))
 
     report()
-    for outcome in watched(crew, work, pulse, report):
-        _accept(outcome, keep_going, skipped)
+    lost: list[ViewsphereError] = []
+    for outcome in watched(crew, work, pulse, report) if first is not None else ():
+        if isinstance(outcome.error, WorkerDied) and not keep_going:
+            lost.append(outcome.error)  # the others are made nevertheless
+        else:
+            _accept(outcome, keep_going, skipped)
         rendered += outcome.frames
         report()
+    if lost:
+        raise joined(lost)
     return rendered
 
 
 @dataclass(frozen=True)
 class Missing:
-    """The shots of a part that the store lacks, counted out row by row: those that no model left out is in."""
+    """The shots of a portion that the store lacks, counted out row by row: those that no model left out is in.
+
+    What is finished is looked for once, with one look at each shot; `skipped` is what is left out, and why.
+    """
 
     portion: Portion
     store: Store
-    skipped: dict[str, str]
+    skipped: dict[str, str] = field(default_factory=dict[str, str])
+
+    @cached_property
+    def _finished(self) -> frozenset[str]:
+        """Keys of the shots that were finished when this was first asked."""
+        return frozenset(self.store.finished())
 
     @property
     def total(self) -> int:
         """Frames that the portion has, without those that are left out."""
-        if not self.portion.share.is_all:
-            return sum(row.count for row in self._wanted())
-        indices = [self.portion.record.indices[self.portion.number], *self._added]
+        indices = self.portion.indices
         if not self.skipped:
             return sum(index.samples for index in indices)
         if self.portion.plan.recipe.scene.is_moved_each_frame:
@@ -371,35 +387,24 @@ class Missing:
     @property
     def resumed(self) -> int:
         """Frames of the portion that are there."""
-        if not self.portion.share.is_all:
-            return sum(row.count for row in self.portion.rows if self.store.has_shot(row.key))
-        found = (self.portion.record.find(key) for key in self.store.finished())
-        return sum(row.count for row in found if row is not None and row.part == self.portion.number)
+        return sum(row.count for row in map(self.portion.find, self._finished) if row is not None)
 
     def lines(self) -> Iterable[tuple[str, int]]:
         """The models, and how many shots each has."""
-        if not self.portion.share.is_all:
-            return Counter(row.subject for row in self.portion.rows).items()
-        indices = (self.portion.record.indices[self.portion.number], *self._added)
-        counts: Counter[str] = Counter()
-        for index in indices:
-            for subject in index.subjects:
-                counts[subject] += index.count_of(subject)
-        return counts.items()
+        return sum((index.counts for index in self.portion.indices), Counter[str]()).items()
 
     def jobs(self, line: str) -> Iterator[Job]:
         """The shots of a model that are to be rendered."""
-        indices = (self.portion.record.indices[self.portion.number], *self._added)
-        rows = chain.from_iterable(index.of(line) for index in indices)
-        own = (row for row in rows if self.portion.share.has(row.number))
-        return (Job(row.key, line, row) for row in self._lacking(own))
+        rows = chain.from_iterable(index.of(line) for index in self.portion.indices)
+        return (Job(row.key, line, row) for row in self._lacking(rows))
 
     def rows(self) -> Iterator[Row]:
         """All shots that are to be rendered."""
         return self._lacking(self.portion.rows)
 
     def _lacking(self, rows: Iterable[Row]) -> Iterator[Row]:
-        return (row for row in rows if not self.store.has_shot(row.key) and not self._lacks_model(row))
+        left = (row for row in rows if row.key not in self._finished)
+        return (row for row in left if not self.store.has_shot(row.key) and not self._lacks_model(row))
 
     def _wanted(self) -> Iterator[Row]:
         return (row for row in self.portion.rows if not self._lacks_model(row))
@@ -415,16 +420,11 @@ class Missing:
             self.skipped[row.key] = f"in it stands {lacking[0]}, which was left out"
         return bool(lacking)
 
-    @property
-    def _added(self) -> Iterator[Index]:
-        supplements = self.portion.record.supplements
-        return (index for index, _ in supplements if index.part == self.portion.number)
-
 
 def _accept(outcome: Outcome, keep_going: bool, skipped: dict[str, str]) -> None:
     if outcome.error is None:
         return
-    if not (keep_going and isinstance(outcome.error, ModelError)):
+    if not (keep_going and isinstance(outcome.error, ModelError | WorkerDied)):
         raise outcome.error
     skipped[outcome.key] = str(outcome.error)
 
@@ -433,11 +433,6 @@ def _note_skipped(portion: Portion, store: Store, skipped: dict[str, str]) -> No
     """Keep what was left out, of other parts and shares too."""
     own = {spec.key for spec, _ in portion.models} | set(portion.subjects)
     with store.locked():
-        others = {key: why for key, why in store.skipped().items() if key not in own and not _is_of(portion, key)}
+        others = {key: why for key, why in store.skipped().items() if key not in own and portion.find(key) is None}
         others = others if portion.number or not portion.share.is_all else {}
         store.write_file("skipped.json", json.dumps(others | skipped, indent=1, sort_keys=True))
-
-
-def _is_of(portion: Portion, key: str) -> bool:
-    row = portion.record.find(key)
-    return row is not None and row.part == portion.number and portion.share.has(row.number)

@@ -11,6 +11,7 @@ from viewsphere.errors import UserError
 from viewsphere.model.mistakes import shown
 from viewsphere.model.notebook import Shown
 from viewsphere.model.sample import Sample
+from viewsphere.model.share import Share
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.run.framing import Framing
 from viewsphere.run.opening import prepare
@@ -18,7 +19,6 @@ from viewsphere.run.share import known_to_loaders, share_of, share_of_rank, shar
 from viewsphere.run.stages import Stages
 from viewsphere.sampling.plan import Plan, plan
 from viewsphere.sampling.seeds import generator
-from viewsphere.sampling.share import Share
 from viewsphere.sampling.turns import Turns
 
 

@@ -11,8 +11,8 @@ from pathlib import Path
 from viewsphere.errors import StoreError, UserError, ViewsphereError
 from viewsphere.model.thing import TimeStep
 from viewsphere.recipe.recipe import Recipe
+from viewsphere.run.executors import Job, Listed, hired
 from viewsphere.run.opening import check_whether_same
-from viewsphere.run.pool import Crew, Job, Listed
 from viewsphere.run.progress import Listener, Progress
 from viewsphere.run.stages import StoredBoxes
 from viewsphere.run.tasks import Damaged, ModelTask
@@ -83,7 +83,7 @@ class Mender:
         return errors
 
     def _run(self, number: int, jobs: Sequence[Job], errors: Errors) -> None:
-        with Crew(self.store.root, min(self.workers, len(jobs)), self._portion(number)) as crew:
+        with hired(self.store.root, self._portion(number), min(self.workers, len(jobs))) as crew:
             for done, outcome in enumerate(crew.run(Listed(tuple(jobs))), 1):
                 if outcome.error is not None:
                     errors[outcome.key] = outcome.error

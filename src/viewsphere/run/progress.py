@@ -9,7 +9,8 @@ from dataclasses import dataclass
 @dataclass(frozen=True)
 class Progress:
     """Where a run stands: `done` of `total`; `resumed` of them were there before this run. `under_way` are frames of shots that
-    are not finished, which do not count as done: a run that is stopped loses them.
+    are not finished, which do not count as done: a run that is stopped loses them. `nodes` are the machines of a cluster at
+    work, None without one.
 
     Phases are skies (their pictures are looked at), models, kernels (compiled once on a machine, then cached), frames and
     exports (counted in frames, too); those without anything to do are left out.
@@ -20,6 +21,7 @@ class Progress:
     total: int
     resumed: int = 0
     under_way: int = 0
+    nodes: int | None = None
 
 
 Listener = Callable[[Progress], None]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 
-from viewsphere.run.pool import Crew, Job, Outcome, Work
+from viewsphere.run.executors import Crew, Job, Outcome, Work
 from viewsphere.run.progress import Listener, Progress
 from viewsphere.store.heartbeat import Pulse
 

@@ -5,12 +5,13 @@ PyTorch is asked only where somebody else has imported it: it is no dependency.
 
 from __future__ import annotations
 
+import re
 import sys
 from typing import Any
 
 from viewsphere.errors import UserError
 from viewsphere.model.mistakes import shown
-from viewsphere.sampling.share import Share
+from viewsphere.model.share import Share
 
 
 def share_of(shard: object) -> Share:
@@ -26,10 +27,10 @@ def share_of(shard: object) -> Share:
 
 def shard_named(text: str) -> tuple[int, int]:
     """The shard that the command line names k/n, k from 0; raises UserError for anything else."""
-    number, _, of = text.partition("/")
-    if not (number.isdecimal() and of.isdecimal() and int(number) < int(of)):
-        raise UserError(f"--shard: expected k/n, the k-th of n shares counted from 0, such as 0/16; found {text}")
-    return int(number), int(of)
+    found = re.fullmatch(r"([0-9]{1,9})/([0-9]{1,9})", text)
+    if found is None or int(found[1]) >= int(found[2]):
+        raise UserError(f"--shard: expected k/n, the k-th of n shares counted from 0, such as 0/16; found {shown(text)}")
+    return int(found[1]), int(found[2])
 
 
 def share_of_rank() -> Share:

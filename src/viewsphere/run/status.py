@@ -3,19 +3,13 @@
 from __future__ import annotations
 
 import os
-import socket
 import time
-from collections.abc import Iterator
 from dataclasses import asdict, dataclass
-from itertools import chain
 from pathlib import Path
 from typing import Any
 
 from viewsphere.store import Store
-from viewsphere.store.folder import is_alive
 from viewsphere.store.heartbeat import SILENT_S, Heartbeat
-from viewsphere.store.index import Index, Row
-from viewsphere.store.records import PlanRecord
 
 
 @dataclass(frozen=True)
@@ -33,26 +27,30 @@ class Run:
 class Status:
     """How far a data set is.
 
-    Frames are counted shot by shot: those that are `finished`, `under_way` (made by a run, in shots that are not whole: lost if
-    it dies), `left_out` at the user's wish, and `missing`: all others, those under way included. Frames that get a channel
-    later count once more. `models` are keys of models that are still to be made, `failed` what runs told last that ended with
-    an error, until they are run again. `rate` is that of all runs together, frames a second; `seconds_left` what is missing at
-    this rate, None where no run makes frames.
+    Frames are counted shot by shot: those that are `finished`, `left_out` at the user's wish, and `missing`: all others, also
+    those `under_way` (made by a run, in shots that are not whole: lost if it dies). Frames that get a channel later count once
+    more. `models` are keys of models that are still to be made, `failed` what shards told last that ended with an error, until
+    they are run again. `rate` is that of all runs together, frames a second; `seconds_left` what is missing at this rate, None
+    where no run makes frames.
     """
 
     root: Path
     frames: int
     finished: int
-    under_way: int
-    left_out: int
+    missing: int
     models: tuple[str, ...]
     runs: tuple[Run, ...]
     failed: tuple[Heartbeat, ...]
 
     @property
-    def missing(self) -> int:
-        """Frames that are still to be finished."""
-        return self.frames - self.finished - self.left_out
+    def left_out(self) -> int:
+        """Frames that nobody is to make."""
+        return self.frames - self.finished - self.missing
+
+    @property
+    def under_way(self) -> int:
+        """Missing frames that runs have made, of shots that are not whole."""
+        return sum(run.told.under_way for run in self.runs if run.state == "running")
 
     @property
     def complete(self) -> bool:
@@ -72,47 +70,31 @@ class Status:
     def to_json(self) -> dict[str, Any]:
         """All of it as plain data, for scripts."""
         told = {**asdict(self), "root": str(self.root), "models": list(self.models)}
-        asked = ("missing", "complete", "rate", "seconds_left")
+        asked = ("left_out", "under_way", "complete", "rate", "seconds_left")
         return told | {name: getattr(self, name) for name in asked}
 
 
 def status(out: Path | str | os.PathLike[str]) -> Status:
     """How far the data set in a folder is; raises StoreError if there is none.
 
-    Nothing is written, and no shot is opened: it takes as long as listing the shots' folders.
+    Nothing is written, and no shot is opened: it takes as long as listing the finished shots, however many are planned.
     """
     store = Store(Path(out))
     plan = store.plan()
-    done, skipped = set(store.finished()), store.skipped()
-    runs = tuple(map(_run, store.heartbeats()))
-    models = tuple(k for k in plan.models if k not in skipped and not (store.model_folder(k) / "model.json").is_file())
+    done, skipped = tuple(store.finished()), store.skipped()
     return Status(
         store.root,
-        frames=sum(index.samples for index in _indices(plan)),
+        frames=sum(index.samples for index in plan.all_indices),
         finished=sum(row.count for row in map(plan.find, done) if row is not None),
-        under_way=sum(run.told.under_way for run in runs if run.state == "running"),
-        left_out=sum(row.count for row in _rows(plan, skipped) if row.key not in done),
-        models=models,
-        runs=runs,
+        missing=sum(gap.frames for gap in store.gaps(plan, done)),
+        models=tuple(k for k in plan.models if k not in skipped and not (store.model_folder(k) / "model.json").is_file()),
+        runs=tuple(_run(told, is_alive) for told, is_alive in store.heartbeats()),
         failed=store.failures(),
     )
 
 
-def _indices(plan: PlanRecord) -> Iterator[Index]:
-    return chain(plan.indices, (index for index, _ in plan.supplements))
-
-
-def _rows(plan: PlanRecord, skipped: dict[str, str]) -> Iterator[Row]:
-    """The shots that were left out, by their own keys or by those of what they show, each once."""
-    for key in skipped:
-        yield from chain.from_iterable(index.of(key) for index in _indices(plan))
-        row = plan.find(key)
-        if row is not None and row.subject not in skipped:
-            yield row
-
-
-def _run(told: Heartbeat) -> Run:
+def _run(told: Heartbeat, is_alive: bool | None) -> Run:
     ago = max(time.time() - told.beat, 0.0)
-    if told.host == socket.gethostname():
-        return Run(told, ago, "running" if is_alive(told.pid) else "dead")
-    return Run(told, ago, "running" if ago < SILENT_S else "silent")
+    if is_alive is False:
+        return Run(told, ago, "dead")
+    return Run(told, ago, "running" if is_alive or ago < SILENT_S else "silent")

@@ -85,6 +85,11 @@ class Worker:
             self.models.make(task.spec, task.steps, task.credit, trusted=task.kind == "model")
         return 0
 
+    def compile_for(self, row: Row) -> None:
+        """See to it that this machine has the kernels that the shot of a row needs."""
+        with self._portion.plan.recipe.located():
+            compile_kernels(self._portion.shot(row, self._boxes))
+
     def make_shot(self, row: Row, tell: Callable[[int], None], again: bool = False) -> int:
         """Make the shot of a row and render it into the store; gives the number of its frames, and `tell` so far after each.
         Errors of one that takes the place of a damaged one (`again`) as for `Store.aside`.

@@ -6,7 +6,8 @@ import hashlib
 import json
 import math
 import os
-from contextlib import suppress
+from collections.abc import Generator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -45,17 +46,38 @@ PACKAGE = Path(plugins.__file__).parent
 def compile_kernels(shot: Shot) -> None:
     """See to it that the kernels a shot needs are compiled.
 
-    The first time on a machine this takes some 20 CPU-seconds. It leaves a mark beside the kernels, the list of their files.
-    Later nothing is loaded, as long as these are there, and viewsphere, numba, Python, the processor and what the shot uses,
-    about as strongly, are the same.
+    The first time on a machine this takes some 20 CPU-seconds of one process; others wait for it. It leaves a mark beside the
+    kernels, the list of their files. Later nothing is loaded, as long as these are there, and viewsphere, numba, Python, the
+    processor and what the shot uses, about as strongly, are the same.
     """
     small = _small(shot)
     mark = _mark(small)
-    if not _is_true(mark):
+    if _is_true(mark):
+        return
+    with _alone(mark.parent):
+        if _is_true(mark):
+            return
         _render(small)
         with suppress(OSError):  # a folder that others may not write
             kernels = (file.relative_to(mark.parent).as_posix() for file in mark.parent.rglob("*.nbi"))
             mark.write_text("\n".join(sorted(kernels)), "utf-8", newline="\n")
+
+
+@contextmanager
+def _alone(folder: Path) -> Generator[None]:
+    """No other process is in a block of this folder meanwhile, where the system has locks of folders."""
+    descriptor = -1
+    with suppress(ImportError, OSError):
+        import fcntl
+
+        folder.mkdir(parents=True, exist_ok=True)
+        descriptor = os.open(folder, os.O_RDONLY)
+        fcntl.flock(descriptor, fcntl.LOCK_EX)
+    try:
+        yield
+    finally:
+        if descriptor >= 0:
+            os.close(descriptor)
 
 
 def is_compiled(shot: Shot) -> bool:

@@ -18,6 +18,7 @@ import numpy as np
 from viewsphere.errors import RecipeError
 from viewsphere.model.instant import Instant
 from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.share import ALL, Share
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import TimeStep
 from viewsphere.sampling.composition import BoxOf
@@ -34,9 +35,8 @@ from viewsphere.sampling.pose_numbers import (
     numbered,
 )
 from viewsphere.sampling.sendable import Sendable
-from viewsphere.sampling.share import ALL, Share
 from viewsphere.store import Block, Category, Part, PlanRecord, Row
-from viewsphere.store.index import Ranges, numbers
+from viewsphere.store.index import Index, Ranges, numbers
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,20 +82,42 @@ class Portion(Sendable):
 
     @cached_property
     def _needed(self) -> frozenset[str]:
-        """Keys of the models that may be in the shots."""
+        """Keys of the models that may be in the shots; no more of these are looked at than it takes to find all models."""
         around = () if self.plan.composition is None else self.plan.composition.models
-        rows = self.rows if self.plan.recipe.scene.is_moved_each_frame else {row.subject: row for row in self.rows}.values()
-        return frozenset(spec.key for spec in chain(around, *map(self.cast, rows)))
+        found, every = {spec.key for spec in around}, {spec.key for spec in self.plan.kept_specs}
+        for row in self._told_apart:
+            found.update(spec.key for spec in self.cast(row))
+            if every <= found:
+                break
+        return frozenset(found)
+
+    @property
+    def _told_apart(self) -> Iterator[Row]:
+        """The shots, but for those that show the same models as another."""
+        if self.plan.recipe.scene.is_moved_each_frame:
+            return self.rows
+        return (next(index.of(subject)) for index in self.indices for subject, shots in index.counts.items() if shots)
+
+    @cached_property
+    def indices(self) -> tuple[Index, ...]:
+        """The indices of the shots: of its own ones, then of those with channels of older frames."""
+        return tuple(replace(index, share=self.share) for index in self.record.indices_of(self.number))
 
     @property
     def rows(self) -> Iterator[Row]:
-        """The shots: its own ones, then those with channels of older frames."""
-        return (row for row in self.record.rows_of(self.number) if self.share.has(row.number))
+        """The shots, in the order of their indices."""
+        return chain.from_iterable(self.indices)
 
     @cached_property
     def subjects(self) -> tuple[str, ...]:
-        """What the shots show, each once."""
-        return self.plan.subjects if self.share.is_all else tuple(dict.fromkeys(row.subject for row in self.rows))
+        """What the shots show, each once; of the whole part all that the plan has."""
+        if self.share.is_all:
+            return self.plan.subjects
+        return tuple(dict.fromkeys(subject for index in self.indices for subject, shots in index.counts.items() if shots))
+
+    def find(self, key: str) -> Row | None:
+        """The row of this key among the shots, None if there is none."""
+        return next((row for row in (index.find(key) for index in self.indices) if row is not None), None)
 
     def cast(self, row: Row) -> tuple[ModelSpec, ...]:
         """The recipe's models in a shot, that of its frames first."""

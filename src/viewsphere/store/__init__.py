@@ -5,7 +5,8 @@
     OUT/store/shots/<hh>/<shot>/frames.json    records of the shot's frames
     OUT/store/shots/<hh>/<shot>/shot.json      the scene that they show (scenery.json: its things that are no objects)
     OUT/store/shots/<hh>/<shot>/<channel>/<sample>.png|.tiff|...
-    OUT/store/writing/                         folders that are not whole yet; heartbeats of runs at work, notes of failed ones
+    OUT/store/writing/                         folders that are not whole yet; heartbeats of runs at work
+    OUT/store/failed/<k>-of-<n>.json           what the last run of a shard told, if it failed
     OUT/store/lock                             held for moments by who changes what runs have in common
 
 `hh` are the first two hexadecimal digits of the shot key's SHA-256, so that no folder grows large. Workers never share

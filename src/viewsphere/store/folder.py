@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import json
 import os
 import shutil
-import socket
-import time
-from collections.abc import Generator, Iterable, Iterator
+from collections import defaultdict
+from collections.abc import Generator, Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
-from dataclasses import replace
-from itertools import chain
+from dataclasses import dataclass, replace
+from itertools import chain, count
 from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
 
+from viewsphere.aside import Aside, aside, left_by_dead, lives, of_this_process, sweep
 from viewsphere.errors import StoreError
 from viewsphere.labels import channels
 from viewsphere.model.files import Files
@@ -25,8 +26,8 @@ from viewsphere.model.sample import Sample
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
 from viewsphere.store.channel_files import encode
-from viewsphere.store.heartbeat import GONE_S, Heartbeat, Pulse
-from viewsphere.store.index import Row
+from viewsphere.store.heartbeat import Heartbeat, Pulse
+from viewsphere.store.index import Index, Row
 from viewsphere.store.manifest import MANIFEST, Manifest, Seal, digest, refuse_another, seal_of
 from viewsphere.store.moving import move
 from viewsphere.store.paths import file_inside
@@ -34,14 +35,31 @@ from viewsphere.store.records import ModelInfo, PlanRecord
 from viewsphere.store.sample_records import short_sample, whole_sample
 from viewsphere.store.texts import parsed
 
-OLD_MODEL = "old model~"
-"""Begins the name of a model's folder that another takes the place of."""
+NEW, OLD = "new", "old"
+"""What is being made, aside; and below the other, by its path in the data set, what it takes the place of."""
 
-FAILED = "_failed~"
-"""Begins the name of what a run that failed leaves: as no machine's name begins."""
+RUN = "run.json"
+"""The heartbeat of a run, in the folder that it has aside, which goes with it."""
 
 LOCK_S = 600
 """Seconds that a run waits for others who change what runs have in common, which takes them moments."""
+
+NO_LOCKS = {errno.ENOLCK, errno.ENOSYS, errno.ENOTSUP, errno.EOPNOTSUPP}
+"""What file systems say that have no locks."""
+
+
+@dataclass(frozen=True)
+class Gap:
+    """What is missing of a part, or of the channels that it adds to other parts: its first missing row, how many shots and
+    frames these are, and of how many frames.
+    """
+
+    part: int
+    is_added: bool
+    first: Row
+    shots: int
+    frames: int
+    of: int
 
 
 class Store:
@@ -85,7 +103,7 @@ class Store:
         self.make_ready()
         with self.locked():
             if self.plan_file.exists():
-                if self._is_busy() or any((self.folder / "shots").glob("*/*")):
+                if any((self.folder / "writing").iterdir()) or any((self.folder / "shots").glob("*/*")):
                     self._refuse_other(plan)
                     return
                 if not self._is_of(plan):
@@ -94,42 +112,60 @@ class Store:
             self._write_atomically(self.plan_file, plan.to_json())
 
     @contextmanager
-    def opened_for(self, plan: PlanRecord, shard: tuple[int, int] = (0, 1)) -> Generator[Pulse]:
+    def opened_for(self, plan: PlanRecord) -> Generator[Path]:
         """`open_for`, then `occupied`, with nobody else in between."""
         self._refuse_strangers()
         self._make(self.folder / "writing")
         with ExitStack() as stack:
             with self.locked():
                 self.open_for(plan)
-                pulse = stack.enter_context(self.occupied(shard))
-            yield pulse
+                own = stack.enter_context(self.occupied())
+            yield own
 
     @contextmanager
-    def occupied(self, shard: tuple[int, int] = (0, 1)) -> Generator[Pulse]:
-        """Show other runs that this one is at work, and how far it is, as long as the block lasts.
-
-        One that fails leaves a note that says why, until its shard is rendered again, or all is finished.
+    def occupied(self) -> Generator[Path]:
+        """Show other runs that this one is at work, by a folder that it has aside as long as the block lasts; then what workers
+        left that died goes, too.
         """
-        writing = self.folder / "writing"
-        sign, note = writing / f"{_writer()}run", writing / f"{FAILED}{shard[0]}~{shard[1]}"
+        with _disk_errors(self.root):
+            own = Aside.make(self.folder / "writing")
         try:
-            with Pulse(lambda text: self._write_atomically(sign, text), shard) as pulse:
-                note.unlink(missing_ok=True)
-                try:
-                    yield pulse
-                except Exception as error:
-                    with suppress(StoreError):
-                        self._write_atomically(note, pulse.told(str(error) or type(error).__name__))
-                    raise
+            yield own.folder
         finally:
-            with suppress(OSError, StoreError):
-                sign.unlink(missing_ok=True)
+            own.remove()
+            with suppress(OSError):
                 self._sweep()
 
     @contextmanager
+    def telling(self, own: Path, shard: tuple[int, int]) -> Generator[Pulse]:
+        """Tell of a run of this shard, as long as the block lasts, in the folder that `occupied` gave it.
+
+        One of several that fails leaves a note that says why, until its shard is rendered again, or all is finished.
+        """
+        note = self._failed / f"{shard[0]}-of-{shard[1]}.json"
+        with Pulse(lambda text: self._tell(own, text), shard) as pulse:
+            note.unlink(missing_ok=True)
+            try:
+                yield pulse
+            except Exception as error:
+                if shard[1] > 1:
+                    self._note_failure(note, pulse.told(str(error) or type(error).__name__))
+                raise
+
+    def _note_failure(self, note: Path, text: str) -> None:
+        with suppress(OSError, StoreError):  # the error itself is what is told
+            note.parent.mkdir(exist_ok=True)
+            self._write_atomically(note, text)
+
+    def _tell(self, own: Path, text: str) -> None:
+        with _disk_errors(self.root):
+            (own / NEW).write_text(text, "utf-8", newline="\n")
+            move(own / NEW, own / RUN)
+
+    @contextmanager
     def locked(self) -> Generator[None]:
-        """Nobody else changes what runs have in common (the plan, what was left out, credits, which model or export is in
-        place) as long as the block lasts. Blocks may be nested; a lock ends with its process.
+        """Nobody else changes what runs have in common (the plan, what was left out, credits) as long as the block lasts, where
+        the file system has locks. Blocks may be nested; a lock ends with its process.
         """
         from filelock import FileLock, Timeout
 
@@ -142,36 +178,59 @@ class Store:
                     f"{lock.lock_file}: expected other runs to be done with it within {LOCK_S} s, found one that is not: "
                     "end it if it hangs, or try again"
                 ) from None
+            except OSError as error:
+                if error.errno not in NO_LOCKS:
+                    raise
         try:
             yield
         finally:
             lock.release()
 
-    def heartbeats(self) -> tuple[Heartbeat, ...]:
-        """What the runs at work told last; also those that died, as long as nothing removed what they left."""
-        signs = sorted(path for path in (self.folder / "writing").glob("*~run") if path.name.count("~") == 2)
-        return tuple(filter(None, map(Heartbeat.read, signs)))
+    def heartbeats(self) -> tuple[tuple[Heartbeat, bool | None], ...]:
+        """What the runs at work told last, and whether each of them lives, None where that is not known: also those that died,
+        as long as nothing removed what they left.
+        """
+        files = sorted((self.folder / "writing").glob(f"*/{RUN}"))
+        return tuple((told, lives(file.parent)) for file in files if (told := Heartbeat.read(file)))
 
     def failures(self) -> tuple[Heartbeat, ...]:
         """What the runs told last that failed, and were not tried again since."""
-        return tuple(filter(None, map(Heartbeat.read, sorted((self.folder / "writing").glob(f"{FAILED}*")))))
+        return tuple(filter(None, map(Heartbeat.read, sorted(self._failed.glob("*.json")))))
 
     def forget_failures(self) -> None:
         """Remove the notes of runs that failed."""
-        for note in (self.folder / "writing").glob(f"{FAILED}*"):
-            note.unlink(missing_ok=True)
+        shutil.rmtree(self._failed, ignore_errors=True)
 
-    def _is_busy(self) -> bool:
-        """Whether anybody is at work here."""
-        return any(not path.name.startswith(FAILED) for path in (self.folder / "writing").iterdir())
+    @property
+    def _failed(self) -> Path:
+        return self.folder / "failed"
 
     def save(self, plan: PlanRecord) -> None:
         """Put a plan in the place of the one that it continues."""
         self._write_atomically(self.plan_file, plan.to_json())
 
-    def missing(self, plan: PlanRecord) -> list[Row]:
-        """The shots of a plan that are neither finished nor left out at the user's wish."""
-        return [row for row in self.wanted(plan) if not self.has_shot(row.key)]
+    def gaps(self, plan: PlanRecord, finished: Sequence[str] | None = None) -> Iterator[Gap]:
+        """What is missing of each part and of the channels that it adds, but for what was left out at the user's wish; where
+        just these shots are finished, by default all that are.
+
+        Takes as long as shots are finished, however many are planned.
+        """
+        skipped, finished = self.skipped().keys(), tuple(self.finished()) if finished is None else finished
+        alike: defaultdict[tuple[int, bool], list[Index]] = defaultdict(list)
+        for number, index in enumerate(plan.all_indices):
+            alike[index.part, number >= len(plan.indices)].append(index)
+        for (part, is_added), indices in alike.items():
+            left_out = [row for row in _found(indices, skipped) if row.subject not in skipped]
+            there = [row for row in _found(indices, finished) if not {row.key, row.subject} & skipped]
+            shots = sum(len(index) - sum(map(index.count_of, skipped)) for index in indices) - len(left_out)
+            frames = sum(index.samples - sum(map(index.samples_of, skipped)) for index in indices)
+            frames -= sum(row.count for row in left_out)
+            if len(there) < shots:
+                known = {row.key for row in chain(left_out, there)}
+                rows = chain.from_iterable(index.without(skipped) for index in indices)
+                first = next(row for row in rows if row.key not in known)
+                lost = frames - sum(row.count for row in there)
+                yield Gap(part, is_added, first, shots - len(there), lost, frames)
 
     def finished(self) -> Iterator[str]:
         """Keys of all shots that are there, in no order."""
@@ -183,13 +242,12 @@ class Store:
     def wanted(self, plan: PlanRecord) -> Iterator[Row]:
         """The shots of a plan, those with channels that were added later last, but for what was left out at the user's wish."""
         skipped = self.skipped().keys()
-        for row in chain(plan.rows, *(index for index, _ in plan.supplements)):
-            if not {row.key, row.subject} & skipped:
-                yield row
+        rows = chain.from_iterable(index.without(skipped) for index in plan.all_indices)
+        return (row for row in rows if row.key not in skipped)
 
     def drop_unnamed_models(self) -> None:
         """Remove the models that the plan does not name, unless another run is at work on them."""
-        own = (_writer(), FAILED)
+        own = of_this_process()
         with self.locked():
             if any(not path.name.startswith(own) for path in (self.folder / "writing").iterdir()):
                 return
@@ -201,7 +259,8 @@ class Store:
     def make_ready(self) -> None:
         """See that the folder can be written, and clear what dead runs left; raises StoreError if it cannot."""
         self._make(self.folder / "writing")
-        self._sweep()
+        with _disk_errors(self.root):
+            self._sweep()
 
     def _refuse_strangers(self) -> None:
         """Raise StoreError for a folder with files that viewsphere did not make."""
@@ -240,22 +299,28 @@ class Store:
         if not os.access(folder, os.W_OK):
             raise StoreError(f"{self.root}: expected a writable output folder, found one that cannot be written")
 
-    def _write_atomically(self, file: Path, text: str) -> None:
-        aside = self.folder / "writing" / f"{_writer()}{file.name}"
+    @contextmanager
+    def _own(self) -> Generator[Path]:
+        """A folder for what is not whole yet, as long as the block lasts; StoreError for what the disk refuses meanwhile."""
+        writing = self.folder / "writing"
         with _disk_errors(self.root):
-            aside.write_text(text, "utf-8", newline="\n")
-            move(aside, file)
+            writing.mkdir(parents=True, exist_ok=True)
+            with aside(writing) as own:
+                yield own
+
+    def _write_atomically(self, file: Path, text: str) -> None:
+        with self._own() as own:
+            (own / NEW).write_text(text, "utf-8", newline="\n")
+            move(own / NEW, file)
 
     def _sweep(self) -> None:
-        """Remove what dead writers left unfinished; models that they were about to replace come back."""
-        with self.locked():
-            told, now = self.heartbeats(), time.time()
-            left = [p for p in (self.folder / "writing").iterdir() if _is_of_dead(p) or _is_of_gone(p, told, now)]
-            for path in left:
-                _, is_model, key = path.name.partition(f"~{OLD_MODEL}")
-                if is_model and not self.model_folder(key).exists():
-                    move(path, self.model_folder(key))
-            _remove(left)
+        """Remove what dead writers left unfinished; what they were about to replace comes back."""
+        for left in left_by_dead(self.folder / "writing"):
+            for old in _replaced(left / OLD):
+                target = self.root / old.relative_to(left / OLD)
+                if not target.exists():
+                    target.parent.mkdir(parents=True, exist_ok=True)
+                    move(old, target)
 
     def shot_folder(self, key: str) -> Path:
         """Where a finished shot lies."""
@@ -288,55 +353,50 @@ class Store:
         If another writer finished the same target first, that one stays: both hold the same bytes. With `again` it takes the
         place of a damaged one; raises StoreError where it is not equal to what that was before, as far as that is known.
         """
-        folder = self.folder / "writing" / f"{_writer()}{target.name}"
-        with _disk_errors(self.root):
-            shutil.rmtree(folder, ignore_errors=True)
-            folder.mkdir(parents=True)
-        try:
-            with _disk_errors(self.root):
-                yield folder
-                if not (folder / MANIFEST).is_file():
-                    Manifest.of(folder).write(folder)
-                target.parent.mkdir(parents=True, exist_ok=True)
-                if again and target.is_dir():
-                    refuse_another(target, folder)
-                    self._replace(folder, target)
-                else:
-                    _become(folder, target)
-        finally:
-            shutil.rmtree(folder, ignore_errors=True)
+        with self._own() as own:
+            folder = own / NEW
+            folder.mkdir()
+            yield folder
+            if not (folder / MANIFEST).is_file():
+                Manifest.of(folder).write(folder)
+            target.parent.mkdir(parents=True, exist_ok=True)
+            if again and target.is_dir():
+                refuse_another(target, folder)
+                self._replace(folder, target)
+            else:
+                _become(folder, target)
 
     def _replace(self, folder: Path, target: Path) -> None:
-        """Put a folder in the place of another, which is removed."""
-        is_model = target.parent == self.folder / "models"
-        old = self.folder / "writing" / f"{_writer()}{OLD_MODEL if is_model else 'old~'}{target.name}"
-        shutil.rmtree(old, ignore_errors=True)
-        with self.locked():
-            if target.exists():
-                move(target, old)
-            move(folder, target)
-        shutil.rmtree(old, ignore_errors=True)
+        """Put a folder that lies aside in the place of another, which goes with what is aside; and so does what other runs put
+        there at this moment.
+        """
+        old = folder.parent / OLD / target.relative_to(self.root)
+        old.parent.mkdir(parents=True)
+        for another in count():
+            with suppress(FileNotFoundError):  # there is none, or another run has moved it
+                move(target, folder.parent / f"{another}" if old.exists() else old)
+            try:
+                move(folder, target)
+                return
+            except OSError:
+                if not target.exists():
+                    raise
 
     @contextmanager
     def replacing(self, target: Path) -> Generator[Path]:
-        """A folder to write into that takes the place of `target` when the block ends well. A model's gets a manifest, and is
-        never lost: where a run dies between the two, the next one puts the old folder back.
+        """A folder to write into that takes the place of `target` when the block ends well; a model's gets a manifest. The old
+        one is never lost: where a run dies between the two, the next one puts it back.
         """
         if target == self.folder:
             raise StoreError(f"{target}: expected a format's name, found the store's")
         self._make(self.folder / "writing")
-        folder = self.folder / "writing" / f"{_writer()}{target.name}"
-        with _disk_errors(self.root):
-            shutil.rmtree(folder, ignore_errors=True)
+        with self._own() as own:
+            folder = own / NEW
             folder.mkdir()
-        try:
-            with _disk_errors(self.root):
-                yield folder
-                if target.parent == self.folder / "models":
-                    Manifest.of(folder).write(folder)
-                self._replace(folder, target)
-        finally:
-            shutil.rmtree(folder, ignore_errors=True)
+            yield folder
+            if target.parent == self.folder / "models":
+                Manifest.of(folder).write(folder)
+            self._replace(folder, target)
 
     def write_file(self, name: str, text: str) -> None:
         """Write a small file of the store in one step."""
@@ -474,52 +534,33 @@ def _no_scene(file: Path, error: Exception) -> StoreError:
     )
 
 
-def _remove(paths: Iterable[Path]) -> None:
-    """Remove files and folders that nobody writes any more."""
-    for path in paths:
-        shutil.rmtree(path, ignore_errors=True)
-        path.unlink(missing_ok=True)
-
-
-def _is_of_dead(path: Path) -> bool:
-    """Whether its name says that a process of this machine wrote it that is no more."""
-    host, _, rest = path.name.partition("~")
-    pid = rest.partition("~")[0]
-    return host == socket.gethostname() and pid.isdigit() and not is_alive(int(pid))
-
-
-def _is_of_gone(path: Path, told: Iterable[Heartbeat], now: float) -> bool:
-    """Whether another machine wrote it, and for long nobody has: neither it changed, nor did a run tell that it works on it."""
-    host, _, rest = path.name.partition("~")
-    pid, _, target = rest.partition("~")
-    if host == socket.gethostname() or not pid.isdigit():
-        return False
-    with suppress(OSError):  # it may be gone by now
-        if now - path.stat().st_mtime < GONE_S:
-            return False
-    heard = (beat for beat in told if now - beat.beat < GONE_S)
-    return not any((beat.host, f"{beat.pid}") == (host, pid) or target in beat.working_on for beat in heard)
+def _replaced(old: Path) -> Iterator[Path]:
+    """The models, shots and exports that lie here by their paths in a data set; no links that lead elsewhere."""
+    exports = (path for path in old.glob("*") if path.name != "store")
+    for path in chain(old.glob("store/models/*"), old.glob("store/shots/*/*"), exports):
+        if path.resolve() == old.resolve() / path.relative_to(old):
+            yield path
 
 
 @contextmanager
 def new_folder(target: Path) -> Generator[Path]:
     """A folder to write into that becomes `target` when the block ends well; raises StoreError where files lie there."""
-    aside = target.with_name(f"{_writer()}{target.name}")
-    missing = [parent for parent in aside.parents if not parent.exists()]
-    with _disk_errors(target):
-        if target.exists() and (not target.is_dir() or any(target.iterdir())):
-            raise StoreError(f"{target}: expected an empty or new folder, found other files: choose another, or delete it")
-        shutil.rmtree(aside, ignore_errors=True)
-        aside.mkdir(parents=True)
-        _remove(filter(_is_of_dead, [path for path in aside.parent.iterdir() if path.name.endswith(f"~{target.name}")]))
+    place, prefix = target.parent, f"{target.name}~"
+    missing = [parent for parent in target.parents if not parent.exists()]
     try:
         with _disk_errors(target):
-            yield aside
-            if target.exists():
-                target.rmdir()
-            move(aside, target)
+            if target.exists() and (not target.is_dir() or any(target.iterdir())):
+                raise StoreError(f"{target}: expected an empty or new folder, found other files: choose another, or delete it")
+            place.mkdir(parents=True, exist_ok=True)
+            sweep(place, prefix)
+            with aside(place, prefix) as own:
+                folder = own / NEW
+                folder.mkdir()
+                yield folder
+                if target.exists():
+                    target.rmdir()
+                move(folder, target)
     finally:
-        shutil.rmtree(aside, ignore_errors=True)
         for parent in missing:
             with suppress(OSError):  # something is in it
                 parent.rmdir()
@@ -541,10 +582,6 @@ def _write(file: str, data: bytes) -> None:
         os.close(descriptor)
 
 
-def _writer() -> str:
-    return f"{socket.gethostname()}~{os.getpid()}~"
-
-
 def _become(folder: Path, target: Path) -> None:
     try:
         if target.is_dir() and not (target / MANIFEST).is_file():
@@ -555,37 +592,6 @@ def _become(folder: Path, target: Path) -> None:
             raise
 
 
-def is_alive(pid: int) -> bool:
-    """Whether a process of this machine is there."""
-    if pid == os.getpid():
-        return True
-    if os.name == "nt":  # where os.kill would end the process
-        return _alive_on_windows(pid)
-    try:
-        os.kill(pid, 0)
-    except ProcessLookupError:
-        return False
-    except OSError:
-        return True
-    return True
-
-
-def _alive_on_windows(pid: int) -> bool:
-    """Whether a process runs: it can be opened, and has no exit code yet (OpenProcess, GetExitCodeProcess of kernel32)."""
-    import ctypes
-
-    kernel: Any = getattr(ctypes, "windll").kernel32  # noqa: B009, not in the stubs of other systems
-    query, denied, running = 0x1000, 5, 259
-    handle = kernel.OpenProcess(query, False, pid)
-    if not handle:
-        return kernel.GetLastError() == denied
-    try:
-        code = ctypes.c_ulong()
-        return not kernel.GetExitCodeProcess(handle, ctypes.byref(code)) or code.value == running
-    finally:
-        kernel.CloseHandle(handle)
-
-
 @contextmanager
 def _disk_errors(root: Path) -> Generator[None]:
     """Say in one line what the disk refused; what is finished stays."""
@@ -593,3 +599,8 @@ def _disk_errors(root: Path) -> Generator[None]:
         yield
     except OSError as error:
         raise StoreError(f"{root}: expected to write, found: {error.strerror or error}; what is finished is kept") from error
+
+
+def _found(indices: Iterable[Index], keys: Iterable[str]) -> list[Row]:
+    """The rows of these keys in some indices."""
+    return [row for index in indices for row in map(index.find, keys) if row is not None]

@@ -23,12 +23,9 @@ BEAT_S = 5.0
 """Seconds from one heartbeat to the next."""
 
 SILENT_S = 120.0
-"""Seconds without a heartbeat after which a run of another machine is told as silent: clocks differ, and network file systems
-show changes late.
+"""Seconds without a heartbeat after which a run of which nothing else is known is told as silent: clocks differ, and network
+file systems show changes late.
 """
-
-GONE_S = 3600.0
-"""Seconds without a heartbeat after which what a run of another machine left unfinished may be removed."""
 
 
 @dataclass(frozen=True)

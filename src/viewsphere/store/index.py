@@ -6,12 +6,14 @@ Nothing here grows with the number of samples: rows are counted out when somebod
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections import Counter, defaultdict
+from collections.abc import Container, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import accumulate
 from typing import overload
+
+from viewsphere.model.share import ALL, Share
 
 Ranges = tuple[tuple[int, int], ...]
 """Numbers, as ranges [first, stop) in order."""
@@ -20,8 +22,7 @@ Ranges = tuple[tuple[int, int], ...]
 @dataclass(frozen=True, slots=True)
 class Row:
     """One shot: its key (stable, unique, fit for a folder's name), what it shows, its first sample and number of samples, the
-    number of the part that renders it, at which positions its subject is taken (numbers of poses, or of scenes), and its own
-    number in its index.
+    number of the part that renders it, and at which positions its subject is taken: numbers of poses, or of scenes.
     """
 
     key: str
@@ -30,7 +31,6 @@ class Row:
     count: int
     part: int
     positions: Ranges
-    number: int
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,8 @@ class Block:
 class Index(Sequence[Row]):
     """The shots of some blocks, in order, of `most` positions at most: those of one subject differ by one position at most.
 
-    `first` is the number of the first sample, `part` that of the part that renders them; `suffix` ends all keys.
+    `first` is the number of the first sample, `part` that of the part that renders them; `suffix` ends all keys. An index may
+    have but a `share` of these shots, which are as they are in the whole one.
     """
 
     blocks: tuple[Block, ...]
@@ -64,9 +65,10 @@ class Index(Sequence[Row]):
     most: int
     part: int
     suffix: str = ""
+    share: Share = ALL
 
     def __len__(self) -> int:
-        return self._rows[-1]
+        return self.share.size(self._rows[-1])
 
     @overload
     def __getitem__(self, index: int) -> Row: ...
@@ -79,40 +81,56 @@ class Index(Sequence[Row]):
         i = index + len(self) if index < 0 else index
         if not 0 <= i < len(self):
             raise IndexError(f"expected a shot of 0..{len(self) - 1}, got {index}")
-        number = bisect_right(self._rows, i) - 1
-        subject, chunk = divmod(i - self._rows[number], self._chunks(number))
+        row = self.share.nth(i)
+        number = bisect_right(self._rows, row) - 1
+        subject, chunk = divmod(row - self._rows[number], self._chunks(number))
         return self._row(number, subject, chunk)
 
     def __iter__(self) -> Iterator[Row]:
+        return self.without(())
+
+    def without(self, subjects: Container[str]) -> Iterator[Row]:
+        """The rows of all other subjects, in order; however many those of these are, they take no time."""
         for number, block in enumerate(self.blocks):
-            for subject in range(len(block.subjects)):
-                yield from (self._row(number, subject, chunk) for chunk in range(self._chunks(number)))
+            for place, subject in enumerate(block.subjects):
+                if subject not in subjects:
+                    yield from (self._row(number, place, chunk) for chunk in self._own(number, place))
 
     @property
     def samples(self) -> int:
         """Number of all samples."""
-        return self._samples[-1] - self.first
+        return sum(self._samples_in(number, 0, len(block.subjects)) for number, block in enumerate(self.blocks))
 
     def of(self, subject: str) -> Iterator[Row]:
         """The rows of a subject, in order."""
         for number, place in self._places.get(subject, ()):
-            yield from (self._row(number, place, chunk) for chunk in range(self._chunks(number)))
+            yield from (self._row(number, place, chunk) for chunk in self._own(number, place))
 
     def row_of(self, subject: str, place: int) -> Row:
         """One of the rows of a subject, by its place among them; raises IndexError past the end."""
         for number, own in self._places.get(subject, ()):
-            if place < self._chunks(number):
-                return self._row(number, own, place)
-            place -= self._chunks(number)
+            chunks = self._own(number, own)
+            if place < len(chunks):
+                return self._row(number, own, chunks[place])
+            place -= len(chunks)
         raise IndexError(f"expected a shot of {subject}, found no {place} more")
 
     def count_of(self, subject: str) -> int:
         """Number of the rows of a subject."""
-        return sum(self._chunks(number) for number, _ in self._places.get(subject, ()))
+        return sum(len(self._own(number, place)) for number, place in self._places.get(subject, ()))
+
+    @property
+    def counts(self) -> Counter[str]:
+        """Number of the rows of each subject, in order."""
+        found: Counter[str] = Counter()
+        for number, block in enumerate(self.blocks):
+            for place, subject in enumerate(block.subjects):
+                found[subject] += len(self._own(number, place))
+        return found
 
     def samples_of(self, subject: str) -> int:
         """Number of the samples of a subject."""
-        return sum(self.blocks[number].size * self.blocks[number].each for number, _ in self._places.get(subject, ()))
+        return sum(self._samples_in(number, place, place + 1) for number, place in self._places.get(subject, ()))
 
     def taken(self, subject: str) -> tuple[Ranges, ...]:
         """The positions at which a subject is taken, block by block."""
@@ -127,12 +145,9 @@ class Index(Sequence[Row]):
         """The row that holds a sample; raises IndexError for one that none holds."""
         if not self.first <= sample < self._samples[-1]:
             raise IndexError(f"expected a sample of {self.first}..{self._samples[-1] - 1}, got {sample}")
-        number = bisect_right(self._samples, sample) - 1
-        block = self.blocks[number]
-        subject, position = divmod((sample - self._samples[number]) // block.each, block.size)
-        chunk = min((position + 1) * self._chunks(number) // block.size, self._chunks(number) - 1)
-        while self._edge(number, chunk) > position:
-            chunk -= 1
+        number, subject, chunk = self._place_of(sample)
+        if chunk not in self._own(number, subject):
+            raise IndexError(f"expected a sample of share {self.share}, got {sample}")
         return self._row(number, subject, chunk)
 
     def find(self, key: str) -> Row | None:
@@ -143,8 +158,10 @@ class Index(Sequence[Row]):
         for number, place in self._places.get(subject, ()) if digits.isdecimal() else ():
             offset = _offset(self.blocks[number].positions, int(digits))
             if offset is not None:
-                row = self.at(self._samples[number] + (place * self.blocks[number].size + offset) * self.blocks[number].each)
-                return row if row.key == key else None
+                block = self.blocks[number]
+                _, _, chunk = self._place_of(self._samples[number] + (place * block.size + offset) * block.each)
+                row = self._row(number, place, chunk)
+                return row if row.key == key and chunk in self._own(number, place) else None
         return None
 
     def _row(self, number: int, subject: int, chunk: int) -> Row:
@@ -154,8 +171,36 @@ class Index(Sequence[Row]):
         name = block.subjects[subject]
         first = self._samples[number] + (subject * block.size + begin) * block.each
         key = f"{name}-{positions[0][0]:06d}{self.suffix}"
-        place = self._rows[number] + subject * self._chunks(number) + chunk
-        return Row(key, name, first, (end - begin) * block.each, self.part, positions, place)
+        return Row(key, name, first, (end - begin) * block.each, self.part, positions)
+
+    def _place_of(self, sample: int) -> tuple[int, int, int]:
+        """The block that holds a sample, its subject's place there, and which of the subject's chunks it is in."""
+        number = bisect_right(self._samples, sample) - 1
+        block = self.blocks[number]
+        subject, position = divmod((sample - self._samples[number]) // block.each, block.size)
+        chunk = min((position + 1) * self._chunks(number) // block.size, self._chunks(number) - 1)
+        while self._edge(number, chunk) > position:
+            chunk -= 1
+        return number, subject, chunk
+
+    def _own(self, number: int, subject: int) -> range:
+        """Which chunks of a block's subject are in the share."""
+        chunks = self._chunks(number)
+        first = self.share.next(self._rows[number] + subject * chunks) - self._rows[number] - subject * chunks
+        return range(first, chunks, self.share.of)
+
+    def _samples_in(self, number: int, begin: int, end: int) -> int:
+        """Number of the samples of the subjects begin..end-1 of a block, without counting out their rows."""
+        block, chunks = self.blocks[number], self._chunks(number)
+        if self.share.is_all or not chunks:
+            return (end - begin) * block.size * block.each
+        first = self.share.next(self._rows[number] + begin * chunks) - self._rows[number]
+        rows = range(first, end * chunks, self.share.of)
+        # Before the row q of a block are floor(q * size / chunks) of its positions, whichever subject it is of.
+        before, until = (
+            floor_sum(len(rows), chunks, self.share.of * block.size, row * block.size) for row in (first, first + 1)
+        )
+        return (until - before) * block.each
 
     def _chunks(self, number: int) -> int:
         return -(-self.blocks[number].size // self.most)
@@ -182,6 +227,19 @@ class Index(Sequence[Row]):
             for place, subject in enumerate(block.subjects):
                 places[subject].append((number, place))
         return dict(places)
+
+
+def floor_sum(count: int, divisor: int, step: int, start: int) -> int:
+    """The sum of (start + i * step) // divisor for i in 0..count-1, all of them positive or 0, in as many steps as Euclid's
+    algorithm takes for `divisor` and `step`.
+    """
+    total = 0
+    while count:
+        total += count * (count - 1) // 2 * (step // divisor) + count * (start // divisor)
+        step, start = step % divisor, start % divisor
+        count, start = divmod(step * count + start, divisor)
+        step, divisor = divisor, step
+    return total
 
 
 def length(ranges: Ranges) -> int:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
+from viewsphere.aside import temporary
 from viewsphere.formats import Remark
 from viewsphere.formats._contents import Expected, check_files, models
 from viewsphere.formats._json_proof import check_json
@@ -27,12 +27,12 @@ def verify(dataset: Dataset, folder: Path, sampled: Collection[int], options: Op
     instance maps, and detections made from the latter have to score AP 1.
     """
     names = [file_name(split) for split in dataset.splits]
-    with TemporaryDirectory() as aside:
-        with instances(dataset, Path(aside), options) as append:
+    with temporary("coco") as aside:
+        with instances(dataset, aside, options) as append:
             expected, again = _expected(dataset, append, options), _expected(dataset, _nowhere, options)
             yield from check_files(dataset, folder, expected, again, [f"annotations/{name}" for name in names])
         for name in names:
-            yield from check_json(Path(aside) / name, folder / "annotations" / name, OPENED, _frame)
+            yield from check_json(aside / name, folder / "annotations" / name, OPENED, _frame)
         for split in dataset.splits:
             yield from testify(dataset, folder / "annotations" / file_name(split), split, sampled, options)
 

@@ -8,12 +8,12 @@ import json
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from viewsphere.aside import temporary
 from viewsphere.errors import ViewsphereError
 from viewsphere.formats import Remark
 from viewsphere.formats._json_rows import rows
@@ -90,8 +90,8 @@ def _loaded(file: Path, images: Collection[int]) -> Any:
             value[name] = row
         elif row["id" if name == "images" else "image_id"] in images:
             value[name].append(row)
-    with TemporaryDirectory() as aside, contextlib.redirect_stdout(io.StringIO()):
-        part = Path(aside) / file.name
+    with temporary("coco") as aside, contextlib.redirect_stdout(io.StringIO()):
+        part = aside / file.name
         part.write_text(json.dumps(value), "utf-8", newline="\n")
         return COCO(part)
 

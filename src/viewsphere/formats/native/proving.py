@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
+from viewsphere.aside import temporary
 from viewsphere.formats import Remark
 from viewsphere.formats._contents import Expected, check_files, models
 from viewsphere.formats._json_proof import check_json
@@ -24,11 +24,11 @@ OPENED: tuple[Where, ...] = (
 
 def verify(dataset: Dataset, folder: Path, sampled: Collection[int]) -> Iterator[Remark]:
     """All that is not as it would be exported now; there is nothing that is proved of the `sampled` frames alone."""
-    with TemporaryDirectory() as aside:
-        with poses(dataset, Path(aside)) as append:
+    with temporary("native") as aside:
+        with poses(dataset, aside) as append:
             again = _expected(dataset, lambda sample: None)
             yield from check_files(dataset, folder, _expected(dataset, append), again, [FILE_NAME])
-        yield from check_json(Path(aside) / FILE_NAME, folder / FILE_NAME, OPENED, lambda where, value: None)
+        yield from check_json(aside / FILE_NAME, folder / FILE_NAME, OPENED, lambda where, value: None)
 
 
 def _expected(dataset: Dataset, append: Callable[[Sample], None]) -> Iterator[Expected]:

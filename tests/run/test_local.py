@@ -1,9 +1,11 @@
-"""The pool hands out what is warm, keeps everybody busy, and survives the death of its workers."""
+"""The local executor hands out what is warm, keeps everybody busy, and survives the death of its workers."""
 
 import os
 import signal
+import sys
 from collections import Counter
 from multiprocessing import active_children
+from pathlib import Path
 
 import pytest
 
@@ -11,7 +13,8 @@ import viewsphere as vs
 from small import small_recipe
 from viewsphere.errors import UserError, ViewsphereError
 from viewsphere.model.model_spec import ModelSpec
-from viewsphere.run.pool import Crew, Job, Listed, Queue
+from viewsphere.run.executors import Job, Listed, Queue
+from viewsphere.run.executors.local import LocalCrew
 from viewsphere.run.tasks import ModelTask
 from viewsphere.sampling.extension import whole
 
@@ -57,11 +60,14 @@ def test_every_job_is_handed_out_once():
     assert set(seen.values()) == {1}
 
 
-def test_a_job_is_tried_twice():
-    queue = Queue(jobs(a=1))
+def test_a_job_is_tried_twice_the_second_time_when_nobody_else_is_at_work():
+    queue = Queue(jobs(a=2))
     job = queue.next("")
+    assert queue.last() is None
     assert queue.again(job)
-    assert queue.next("") is job
+    assert [other.key for other in left(queue)] == ["a-1"]
+    assert queue.last() is job
+    assert queue.last() is None
     assert not queue.again(job)
 
 
@@ -82,24 +88,89 @@ def test_jobs_are_counted_out_when_somebody_is_free():
     assert asked == [0, 1, 2]
 
 
-class Deadly:
+class Ends:
     """A task that ends the process which unpacks it."""
 
+    def __init__(self, how, *told):
+        self.how = how, told
+
     def __reduce__(self):
-        return os._exit, (3,)
+        return self.how
 
 
-def test_a_worker_that_dies_costs_a_retry_then_an_error(tmp_path):
-    with Crew(tmp_path, 1, PORTION) as crew:
-        outcomes = list(crew.run(Listed((Job("x", "x", Deadly()),))))
+def _note(folder):
+    """Where a worker notes that it tries; gives how often that was."""
+    Path(folder, f"{os.getpid()}").touch()
+    return len(list(Path(folder).iterdir()))
+
+
+def _killed(folder):
+    _note(folder)
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def _children(parent):
+    """The processes that a process started by `multiprocessing`."""
+    pids = Path(f"/proc/{parent}/task/{parent}/children").read_text().split()
+    return {pid for pid in pids if "spawn_main" in Path(f"/proc/{pid}/cmdline").read_text()}
+
+
+def _while_alone(folder, parent, before):
+    """Dies at first, and then says who else is at work."""
+    if _note(folder) == 1:
+        os._exit(3)
+    raise UserError(f"{len(_children(parent) - before)} workers")
+
+
+class Calls:
+    """A task that calls a function as it is done."""
+
+    def __init__(self, function, *told):
+        self.function, self.told = function, told
+
+    @property
+    def kind(self):
+        self.function(*self.told)
+
+
+def _without_memory():
+    raise MemoryError
+
+
+@pytest.mark.parametrize(
+    ("task", "said"),
+    [
+        (lambda folder: Ends(os._exit, 3), "died 2 times (exit code 3)"),
+        (lambda folder: Calls(_without_memory), "died 2 times (it was refused memory, the last time while it was alone: give"),
+        pytest.param(
+            lambda folder: Calls(_killed, folder),
+            "died 2 times (it was killed, as systems do when memory runs out, the last time while it was alone: give it more",
+            marks=pytest.mark.skipif(os.name == "nt", reason="signals"),
+        ),
+    ],
+)  # fmt: skip
+def test_a_worker_that_dies_costs_a_retry_then_an_error(task, said, tmp_path):
+    with LocalCrew(tmp_path, PORTION, 1) as crew:
+        outcomes = list(crew.run(Listed((Job("x", "x", task(tmp_path)),))))
     assert len(outcomes) == 1
-    assert "died 2 times (exit code 3)" in str(outcomes[0].error)
+    assert said in str(outcomes[0].error)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
+def test_it_is_tried_again_alone_when_all_others_are_done(tmp_path):
+    before = _children(os.getpid())
+    tasks = {"bad": Calls(_while_alone, tmp_path, os.getpid(), before), **dict.fromkeys(("a", "b", "c"), LOOK_AT_CHAIR)}
+    with LocalCrew(tmp_path / "out", PORTION, 2) as crew:
+        outcomes = list(crew.run(Listed(tuple(Job(key, key, task) for key, task in tasks.items()))))
+    assert [outcome.key for outcome in outcomes][-1] == "bad"
+    assert str(outcomes[-1].error) == "1 workers"
+    assert not any(outcome.error for outcome in outcomes[:-1])
 
 
 def test_what_a_worker_cannot_do_ends_the_run_with_its_traceback(tmp_path):
     with (
         pytest.raises(ViewsphereError, match=r"x: a worker failed\nTraceback(.|\n)*AttributeError") as caught,
-        Crew(tmp_path, 1, PORTION) as crew,
+        LocalCrew(tmp_path, PORTION, 1) as crew,
     ):
         list(crew.run(Listed((Job("x", "x", dict),))))
     assert not isinstance(caught.value, UserError)
@@ -116,7 +187,7 @@ def test_workers_stay_for_the_next_list_and_one_that_died_meanwhile_is_replaced(
         return {child.pid for child in active_children()} - before
 
     before, job = {child.pid for child in active_children()}, Job("chair", "chair", LOOK_AT_CHAIR)
-    with Crew(tmp_path, 1, PORTION) as crew:
+    with LocalCrew(tmp_path, PORTION, 1) as crew:
         first = list(crew.run(Listed((job,)))), pids()
         second = list(crew.run(Listed((job, job)))), pids()
         os.kill(*first[1], signal.SIGKILL)
@@ -146,7 +217,7 @@ def _interrupted():
 
 @pytest.mark.skipif(os.name != "posix", reason="signals are masked on POSIX alone")
 def test_ctrl_c_while_a_worker_starts_is_the_parents_to_hear(tmp_path, capfd):
-    with Crew(tmp_path, 1, Impatient()) as crew:
+    with LocalCrew(tmp_path, Impatient(), 1) as crew:
         outcomes = list(crew.run(Listed((Job("chair", "chair", LOOK_AT_CHAIR),))))
     assert [outcome.error for outcome in outcomes] == [None]
     assert "Traceback" not in capfd.readouterr().err

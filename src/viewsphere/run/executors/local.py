@@ -1,4 +1,4 @@
-"""The local pool: processes that each do one job at a time, are handed what they have warm, and may die.
+"""Processes of this machine that each do one job at a time, are handed what they have warm, and may die.
 
 `ProcessPoolExecutor` can hang when a worker dies or is replaced (CPython issue 115634) and knows nothing of what a worker has
 warm, hence our own: one pipe a worker, spawn rather than fork.
@@ -6,85 +6,42 @@ warm, hence our own: one pipe a worker, spawn rather than fork.
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
-import traceback
-from collections import Counter
-from collections.abc import Callable, Generator, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
-from multiprocessing import get_context, resource_tracker
+from multiprocessing import get_context, parent_process, resource_tracker
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol, cast
+from threading import Thread
+from typing import TYPE_CHECKING, cast
 
 from viewsphere.errors import UserError, ViewsphereError
+from viewsphere.run.executors._jobs import Job, Outcome, Queue, Work, answer, ignored, lost
 
 if TYPE_CHECKING:
     from viewsphere.run.tasks import Worker
     from viewsphere.sampling.extension import Portion
 
-LIVES = 2
-"""How often a task is tried when its process dies."""
+OUT_OF_MEMORY = 77
+"""Exit code of a worker that was refused memory."""
+
+DYING_S = 10.0
+"""Seconds that a worker whose pipe is closed has to end by itself, so that its exit code is its own."""
 
 
-class Work(Protocol):
-    """What there is to do, in lines: jobs of one line share what a worker has warm. Jobs are counted out one by one."""
-
-    def lines(self) -> Iterable[tuple[str, int]]:
-        """The name of each line, and about how many jobs are in it."""
-        ...
-
-    def jobs(self, line: str) -> Iterator[Job]:
-        """The jobs of a line, in order."""
-        ...
-
-
-@dataclass(frozen=True)
-class Job:
-    """Something to do: its key in the data set, its line, and what a worker is told."""
-
-    key: str
-    line: str
-    task: Any
-
-
-@dataclass(frozen=True)
-class Listed:
-    """A few jobs, all named at once."""
-
-    all: tuple[Job, ...]
-
-    def lines(self) -> Iterable[tuple[str, int]]:
-        """Their lines in the order of their first jobs."""
-        return Counter(job.line for job in self.all).items()
-
-    def jobs(self, line: str) -> Iterator[Job]:
-        """Those of a line."""
-        return (job for job in self.all if job.line == line)
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """What became of a job: the frames it made, or why it could not be done."""
-
-    key: str
-    frames: int = 0
-    error: ViewsphereError | None = None
-
-
-def ignored() -> None:
-    """Nobody wants to know of frames under way."""
-
-
-class Crew:
+class LocalCrew:
     """So many workers for a part of a data set, this process itself if none; workers that were started stay until the context
     ends.
 
     A worker is started when there is a job for it, and takes a second.
     """
 
-    def __init__(self, root: Path, workers: int, portion: Portion) -> None:
+    nodes: int | None = None
+    notes: tuple[str, ...] = ()
+
+    def __init__(self, root: Path, portion: Portion, workers: int) -> None:
         self._root = root
         self._workers = workers
         self._portion = portion
@@ -92,14 +49,18 @@ class Crew:
         self._here: Worker | None = None
         self._begun: dict[str, int] = {}
 
-    def __enter__(self) -> Crew:
+    def __enter__(self) -> LocalCrew:
         return self
 
     def __exit__(self, *_: object) -> None:
+        self._dismiss()
+        self._here = None
+
+    def _dismiss(self) -> None:
+        """End all workers, and give back the memory of what they have warm."""
         for hand in self._hands:
             hand.stop()
         self._hands.clear()
-        self._here = None
 
     @property
     def under_way(self) -> int:
@@ -107,10 +68,7 @@ class Crew:
         return sum(self._begun.values())
 
     def run(self, work: Work, heard: Callable[[], None] = ignored) -> Iterator[Outcome]:
-        """Do all jobs; outcomes come as they are ready. `heard` is called when another frame is under way.
-
-        A UserError is an outcome; anything else a worker raises ends the run with its traceback.
-        """
+        """As `Crew.run`; `heard` is called when another frame is under way."""
         queue = Queue(work, [hand.line for hand in self._hands])
         if self._workers == 0:
             yield from self._run_here(queue, heard)
@@ -127,6 +85,9 @@ class Crew:
         while busy:
             for pipe in wait(list(busy)):
                 yield from self._hear(busy, cast(Connection, pipe), queue, heard)  # Windows has another class
+            if not busy and (job := queue.last()):
+                self._dismiss()
+                self._give_to(None, job, busy)
 
     def _note(self, job: Job, frames: int, heard: Callable[[], None]) -> None:
         """Remember how many frames of a job are made."""
@@ -150,14 +111,16 @@ class Crew:
     def _give(self, hand: _Hand | None, queue: Queue, busy: dict[Connection, _Hand]) -> bool:
         """Hand out the next job, to a new worker if none is given; False if there is none."""
         job = queue.next(hand.line if hand else "")
-        if job is None:
-            return False
+        if job is not None:
+            self._give_to(hand, job, busy)
+        return job is not None
+
+    def _give_to(self, hand: _Hand | None, job: Job, busy: dict[Connection, _Hand]) -> None:
         if hand is None:
             hand = _Hand(self._root, self._portion)
             self._hands.append(hand)
         busy[hand.pipe] = hand
         hand.give(job)
-        return True
 
     def _hear(
         self, busy: dict[Connection, _Hand], pipe: Connection, queue: Queue, heard: Callable[[], None]
@@ -167,23 +130,24 @@ class Crew:
         job = hand.job
         assert job is not None
         try:
-            answer: Outcome | str | int = pipe.recv()
+            news: Outcome | str | int = pipe.recv()
         except (EOFError, ConnectionResetError):
             self._end(job, busy, pipe)
             self._hands.remove(hand)
+            hand.process.join(DYING_S)
             code = hand.stop()
             if not queue.again(job):
-                yield Outcome(job.key, error=ViewsphereError(f"{job.key}: its worker died {LIVES} times (exit code {code})"))
+                yield lost(job, _end_of(code))
             self._give(None, queue, busy)
             return
-        if isinstance(answer, int):
-            self._note(job, answer, heard)
+        if isinstance(news, int):
+            self._note(job, news, heard)
             return
         self._end(job, busy, pipe)
-        if isinstance(answer, str):
-            raise ViewsphereError(f"{job.key}: a worker failed\n{answer}")
+        if isinstance(news, str):
+            raise ViewsphereError(f"{job.key}: a worker failed\n{news}")
         self._give(hand, queue, busy)
-        yield answer
+        yield news
 
     def _end(self, job: Job, busy: dict[Connection, _Hand], pipe: Connection) -> None:
         """Its worker no longer does a job; the frames of one that died are made again, those of an outcome are in it."""
@@ -191,54 +155,15 @@ class Crew:
         del busy[pipe]
 
 
-class Queue:
-    """Jobs in their lines: a worker is given what it has warm, then of a line that nobody has, then of the line of which most
-    is left. The next job of a line is asked for when a worker is free for it.
-
-    `warm`: lines of workers who have not asked yet.
-    """
-
-    def __init__(self, work: Work, warm: Iterable[str] = ()) -> None:
-        self._work = work
-        self._left = dict(work.lines())
-        self._open: dict[str, Iterator[Job]] = {}
-        self._takers = Counter(warm)
-        self._tries: Counter[str] = Counter()
-        self._again: list[Job] = []
-
-    def __contains__(self, line: str) -> bool:
-        return line in self._left
-
-    def next(self, warm: str) -> Job | None:
-        """The next job for a worker that has this line warm; None if there is none."""
-        if self._again:
-            job = self._again.pop()
-            self._tries[job.key] += 1
-            return job
-        while self._left:
-            line = warm if warm in self._left else self._coldest()
-            job = next(self._open.setdefault(line, self._work.jobs(line)), None)
-            if job is None:
-                del self._left[line], self._open[line]
-                continue
-            self._left[line] -= 1
-            if line != warm:
-                self._takers[line] += 1
-            return job
-        return None
-
-    def _coldest(self) -> str:
-        for line in self._left:
-            if not self._takers[line]:
-                return line
-        return max(self._left, key=lambda line: self._left[line] / self._takers[line])
-
-    def again(self, job: Job) -> bool:
-        """Put back a job whose worker died; False if it was tried often enough."""
-        if self._tries[job.key] >= LIVES - 1:
-            return False
-        self._again.append(job)
-        return True
+def _end_of(code: int | None) -> str:
+    """How a worker with this exit code came to its end, and what to do."""
+    if code == OUT_OF_MEMORY:
+        how = "it was refused memory"
+    elif code == -getattr(signal, "SIGKILL", 0):
+        how = "it was killed, as systems do when memory runs out"
+    else:
+        return f"exit code {code}"
+    return f"{how}, the last time while it was alone: give it more memory, or ask for smaller pictures or models"
 
 
 class _Hand:
@@ -261,7 +186,7 @@ class _Hand:
 
     def stop(self) -> int | None:
         """End the process; what it had not finished is lost, what it had is not."""
-        self.process.terminate()
+        self.process.kill()  # which ends one that is stopped, too
         self.process.join()
         self.pipe.close()
         return self.process.exitcode
@@ -284,6 +209,7 @@ def _deaf() -> Generator[None]:
 def _serve(pipe: Connection, root: Path, portion: Portion) -> None:
     """A worker's life: take a job, tell of each of its frames by their number so far, answer, until the other side is gone."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's to handle
+    Thread(target=_end_with_parent, daemon=True).start()
     from viewsphere.run.allocator import keep_freed_memory
     from viewsphere.run.tasks import Worker
 
@@ -293,8 +219,13 @@ def _serve(pipe: Connection, root: Path, portion: Portion) -> None:
         while True:
             job: Job = pipe.recv()
             try:
-                pipe.send(Outcome(job.key, worker.do(job.task, pipe.send)))
-            except UserError as error:
-                pipe.send(Outcome(job.key, error=type(error)(str(error))))
-            except Exception:
-                pipe.send(traceback.format_exc())
+                pipe.send(answer(worker, job, pipe.send))
+            except MemoryError:
+                os._exit(OUT_OF_MEMORY)
+
+
+def _end_with_parent() -> None:
+    """End this process, whatever it does, as soon as its parent is dead: another run may be at its work already."""
+    if parent := parent_process():
+        wait([parent.sentinel])
+        os._exit(1)

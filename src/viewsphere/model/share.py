@@ -33,6 +33,14 @@ class Share:
         """Whether the thing of this number, counted from 0, is in it."""
         return number % self.of == self.number
 
+    def nth(self, place: int) -> int:
+        """The number of the thing that is at this place in it."""
+        return self.number + place * self.of
+
+    def next(self, number: int) -> int:
+        """The number of the first thing in it that is not before this one."""
+        return number + (self.number - number) % self.of
+
     def size(self, count: int) -> int:
         """How many of `count` it has."""
         return len(range(self.number, count, self.of))

@@ -1,0 +1,182 @@
+"""Folders for what is not whole yet: each belongs to one process, and goes when that process is gone.
+
+    <prefix><host>~<pid>~<random>/lock    held by the process that made the folder, as long as it lives
+    <prefix><host>~<pid>~<random>/...     what it makes there
+
+The system takes a lock back when its holder ends, however that comes about; a process's number, by contrast, is soon another's.
+So whoever gets the lock of a folder that was made on the same host knows that its maker is dead. Of other hosts' folders, and
+where a file system has no locks, nothing is known: such a folder is left alone until nothing in it has changed for a day.
+A folder whose lock is seen to be held is left alone in any case.
+"""
+
+from __future__ import annotations
+
+import glob
+import os
+import shutil
+import socket
+import sys
+import tempfile
+import time
+from collections.abc import Generator, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+LOCK = "lock"
+"""Name of the file in such a folder."""
+
+OPEN = os.O_RDWR | getattr(os, "O_NOFOLLOW", 0)
+"""How it is opened."""
+
+STALE_S = 86_400.0
+"""Seconds without a change after which a folder of which nothing else is known is taken for a dead process's."""
+
+
+@dataclass(frozen=True)
+class Aside:
+    """A folder of this process, which other users cannot read, and its open lock."""
+
+    folder: Path
+    lock: int
+
+    @staticmethod
+    def make(place: Path, prefix: str = "") -> Aside:
+        """A folder in this place, which exists; raises OSError where that is not possible."""
+        while True:
+            folder = Path(tempfile.mkdtemp(prefix=prefix + of_this_process(), dir=place))
+            with suppress(FileNotFoundError, BlockingIOError):  # somebody sweeps, and takes it for a dead process's
+                return Aside(folder, _lock_of(folder))
+
+    def remove(self) -> None:
+        """Remove the folder with all that is in it."""
+        os.close(self.lock)
+        shutil.rmtree(self.folder, ignore_errors=True)
+
+
+def of_this_process() -> str:
+    """How names of this process's folders begin, behind their prefix."""
+    return f"{socket.gethostname()}~{os.getpid()}~"
+
+
+@contextmanager
+def aside(place: Path, prefix: str = "") -> Generator[Path]:
+    """A folder of this process in a place that exists, for as long as the block lasts; raises OSError if none can be made."""
+    made = Aside.make(place, prefix)
+    try:
+        yield made.folder
+    finally:
+        made.remove()
+
+
+@contextmanager
+def temporary(what: str) -> Generator[Path]:
+    """An empty folder among the system's temporary files, for as long as the block lasts. `what` it is for tells it from
+    others, and those of dead processes go first.
+    """
+    place, prefix = Path(tempfile.gettempdir()), f"viewsphere-{what}-"
+    sweep(place, prefix)
+    with aside(place, prefix) as own:
+        folder = own / "new"
+        folder.mkdir()
+        yield folder
+
+
+def sweep(place: Path, prefix: str = "") -> None:
+    """Remove what dead processes left in this place."""
+    for _ in left_by_dead(place, prefix):
+        pass
+
+
+def left_by_dead(place: Path, prefix: str = "") -> Iterator[Path]:
+    """The folders in this place whose makers are dead; each is removed when the next one is asked for."""
+    for folder in sorted(path for path in place.glob(f"{glob.escape(prefix)}*~*~*") if not path.is_symlink()):
+        is_own = folder.name.startswith(f"{prefix}{socket.gethostname()}~")
+        try:
+            with _locked(folder / LOCK, OPEN | (os.O_CREAT if is_own else 0)) as taken:
+                if not (taken and is_own) and not _is_stale(folder):
+                    continue
+                yield folder
+                gone = _out_of_the_way(folder)
+        except BlockingIOError:
+            continue
+        shutil.rmtree(gone, ignore_errors=True)
+
+
+def lives(folder: Path) -> bool | None:
+    """Whether the maker of a folder that lies where it made it, without a prefix, is at work; None where that is not known."""
+    is_own = folder.name.startswith(f"{socket.gethostname()}~")
+    try:
+        with _locked(folder / LOCK, OPEN) as taken:
+            return False if taken and is_own else None
+    except BlockingIOError:
+        return True
+
+
+def _lock_of(folder: Path) -> int:
+    """The lock of a folder that this process has just made; FileNotFoundError or BlockingIOError where somebody sweeps it."""
+    try:
+        lock = os.open(folder / LOCK, OPEN | os.O_CREAT)
+    except FileNotFoundError:
+        raise
+    except OSError:
+        folder.rmdir()
+        raise
+    try:
+        if _take(lock) and not os.path.samestat(os.fstat(lock), (folder / LOCK).stat()):
+            raise FileNotFoundError(folder)
+    except OSError:
+        os.close(lock)
+        raise
+    return lock
+
+
+@contextmanager
+def _locked(file: Path, flags: int) -> Generator[bool]:
+    """Whether a lock is this process's while the block lasts, False where that cannot be known; raises BlockingIOError where
+    it is another's.
+    """
+    try:
+        lock = os.open(file, flags)
+    except OSError:
+        yield False
+        return
+    try:
+        yield _take(lock)
+    finally:
+        os.close(lock)
+
+
+def _take(lock: int) -> bool:
+    """Take a lock, False where the file system has none; raises BlockingIOError where another has it."""
+    try:
+        if sys.platform == "win32":
+            import msvcrt
+
+            msvcrt.locking(lock, msvcrt.LK_NBLCK, 1)
+        else:
+            import fcntl
+
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except (BlockingIOError, PermissionError) as error:
+        raise BlockingIOError(error.errno, "another process has it") from None
+    except OSError:
+        return False
+    return True
+
+
+def _is_stale(folder: Path) -> bool:
+    """Whether nothing in a folder that has a lock has changed for `STALE_S`."""
+    try:
+        last = max(path.lstat().st_mtime for path in (folder, folder / LOCK, *folder.rglob("*")))
+    except OSError:  # it has none, or is being changed
+        return False
+    return last < time.time() - STALE_S
+
+
+def _out_of_the_way(folder: Path) -> Path:
+    """Rename a folder, so that a maker that wakes up after all finds nothing of it, rather than a part."""
+    if not folder.name.endswith("~"):
+        with suppress(OSError):  # Windows renames no folder of an open file
+            return folder.rename(folder.with_name(f"{folder.name}~"))
+    return folder

@@ -1,0 +1,320 @@
+"""A Ray cluster's machines: on each of their CPUs an actor that does one job at a time. Nothing else knows Ray.
+
+Every actor is bound to a machine, so that it is known which one a job was lost with, and which cannot be used. Ray tries
+nothing again by itself: a job that is lost is handed out anew, as in `local`.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import socket
+import time
+import warnings
+from collections import Counter
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from viewsphere.errors import MissingExtraError, StoreError, UserError, ViewsphereError
+from viewsphere.run.executors._jobs import Job, Outcome, Queue, Work, answer, ignored, lost
+
+try:
+    import ray
+    from ray.exceptions import RayError, RayTaskError
+    from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
+except ImportError:
+    raise MissingExtraError("--ray: expected the package ray, found none: pip install 'viewsphere[ray]'") from None
+
+if TYPE_CHECKING:
+    from viewsphere.run.tasks import Worker
+    from viewsphere.sampling.extension import Portion
+
+TICK = 1.0
+"""Seconds between two looks at which machines there are, and how far workers are with their jobs."""
+
+STARTS = 3
+"""How often in a row workers may die while they start before their machine is left out."""
+
+GRACE = 10.0
+"""Seconds that a cluster has to answer when a run begins, and its workers to be gone when it ends."""
+
+OF_A_MACHINE = frozenset({"VIEWSPHERE_CACHE", "VIEWSPHERE_BLENDER_PYTHON"})
+"""Variables of the environment that say where something is on one machine, and mean nothing on others."""
+
+
+class RayCrew:
+    """Workers on the CPUs of a cluster, at most so many, all if 0; machines that join later get workers, too."""
+
+    def __init__(self, root: Path, portion: Portion, most: int, address: str) -> None:
+        if address != "auto" and ":" not in address:
+            raise UserError(f"--ray: expected auto, HOST:PORT or ray://HOST:PORT; found {address!r}")
+        self._root = root.absolute()
+        self._portion = portion
+        self._most = most
+        self._address = address
+        self._begun: dict[str, int] = {}
+        self._hands: list[_Hand] = []
+        self._failures: Counter[str] = Counter()
+        self._unfit: dict[str, str] = {}
+        self._looked = 0.0
+
+    def __enter__(self) -> RayCrew:
+        self._connected_here = not ray.is_initialized()
+        if self._connected_here:
+            _connect(self._address)
+        self._told = ray.put((self._root, self._portion, os.getcwd(), _settings()))  # noqa: PTH109, pickled
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        with suppress(RayError):  # a cluster that is gone has no workers left
+            for hand in self._hands:
+                ray.kill(hand.actor)
+            refs = [hand.ref for hand in self._hands]
+            if refs:
+                ray.wait(refs, num_returns=len(refs), timeout=GRACE)
+        self._hands.clear()
+        if self._connected_here:
+            ray.shutdown()
+
+    @property
+    def under_way(self) -> int:
+        """As of `Crew`."""
+        return sum(self._begun.values())
+
+    @property
+    def nodes(self) -> int:
+        """As of `Crew`."""
+        return len({hand.node for hand in self._hands if hand.is_ready})
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """The machines that were left out, and why."""
+        return tuple(f"left out {why}" for why in self._unfit.values())
+
+    def run(self, work: Work, heard: Callable[[], None] = ignored) -> Iterator[Outcome]:
+        """As `Crew.run`; `heard` is called now and then."""
+        queue = Queue(work, [hand.line for hand in self._hands])
+        self._looked = 0.0
+        while True:
+            for hand in [hand for hand in self._hands if hand.is_idle and hand.line in queue]:
+                self._give(hand, queue)
+            for hand in [hand for hand in self._hands if hand.is_idle]:
+                self._give(hand, queue)
+            if queue.is_done and not any(hand.job for hand in self._hands):
+                return
+            if time.monotonic() - self._looked > TICK:
+                self._look(queue.left)
+                heard()
+            for hand in self._heard_of():
+                yield from self._hear(hand, queue)
+
+    def _give(self, hand: _Hand, queue: Queue) -> None:
+        job = queue.next(hand.line)
+        if job is None and not any(other.job for other in self._hands if other.node == hand.node):
+            job = queue.last()
+        if job is not None:
+            hand.give(job)
+
+    def _look(self, left: int) -> None:
+        """See how far the workers are, and start others where there are CPUs for them, no more than there are jobs left."""
+        self._looked = time.monotonic()
+        for hand in self._hands:
+            hand.ask()
+        for hand in _ready([hand for hand in self._hands if hand.asked is not None], "asked"):
+            key, frames = hand.told()
+            if hand.job is not None and hand.job.key == key:
+                self._begun[key] = frames
+        nodes = {node: about for node, about in _nodes().items() if node not in self._unfit}
+        if self._unfit and not nodes and not self._hands:
+            raise ViewsphereError("\n".join(self._unfit.values()))
+        taken = Counter(hand.node for hand in self._hands)
+        places = [(i, node) for node, (_, cpus) in nodes.items() for i in range(taken[node], cpus)]
+        wanted = left - sum(not hand.is_ready for hand in self._hands)
+        if self._most:
+            wanted = min(wanted, self._most - len(self._hands))
+        for _, node in sorted(places)[: max(wanted, 0)]:  # machines in turns
+            self._hands.append(_Hand(node, nodes[node][0], self._told))
+
+    def _heard_of(self) -> list[_Hand]:
+        """Those with an answer, or who died; waits for the first, but not long."""
+        awaited = [hand for hand in self._hands if not hand.is_idle]
+        if not awaited:
+            time.sleep(TICK)  # until a machine joins
+        return _ready(awaited, "ref", TICK)
+
+    def _hear(self, hand: _Hand, queue: Queue) -> Iterator[Outcome]:
+        """Take one answer, or the news of a death."""
+        job, hand.job = hand.job, None
+        if job is not None:
+            self._begun.pop(job.key, None)
+        try:
+            news: Outcome | str = ray.get(hand.ref)
+        except RayError as error:
+            self._lose(hand)
+            if job is None:
+                self._suspect(hand, error)
+            elif not queue.again(job, alone=hand.node in _nodes()):
+                yield lost(job, f"last on node {hand.address}: {_first_line(error)}")
+            return
+        if job is None:
+            hand.is_ready = True
+            self._failures[hand.node] = 0
+        elif isinstance(news, str):
+            raise ViewsphereError(f"{job.key}: a worker failed\n{news}")
+        else:
+            yield news
+
+    def _lose(self, hand: _Hand) -> None:
+        """A worker that is gone, or that nobody can reach, is done with."""
+        self._hands.remove(hand)
+        with suppress(RayError):
+            ray.kill(hand.actor)
+
+    def _suspect(self, hand: _Hand, error: RayError) -> None:
+        """Leave a machine out where workers cannot start."""
+        self._failures[hand.node] += 1
+        if isinstance(error, RayTaskError) or self._failures[hand.node] >= STARTS:
+            self._unfit[hand.node] = f"node {hand.address}: {_first_line(error)}"
+
+
+class _Hand:
+    """One worker, seen from here; `ref` is what it answers next, first of all that it is ready."""
+
+    def __init__(self, node: str, address: str, told: Any) -> None:
+        self.node, self.address = node, address
+        self.actor: Any = _ACTOR.options(scheduling_strategy=NodeAffinitySchedulingStrategy(node, soft=False)).remote(told)
+        self.ref: Any = self.actor.ready.remote()
+        self.asked: Any = None
+        self.is_ready = False
+        self.line = ""
+        self.job: Job | None = None
+
+    @property
+    def is_idle(self) -> bool:
+        """Whether it has started, and does nothing."""
+        return self.job is None and self.is_ready
+
+    def give(self, job: Job) -> None:
+        """Have it do a job."""
+        self.job, self.line = job, job.line
+        self.ref = self.actor.do.remote(job)
+
+    def ask(self) -> None:
+        """Ask how far it is with its job, unless it has not answered that yet."""
+        if self.job is not None and self.asked is None:
+            self.asked = self.actor.begun.remote()
+
+    def told(self) -> tuple[str, int]:
+        """What it answered: a job's key, and how many of its frames are made."""
+        ref, self.asked = self.asked, None
+        try:
+            return ray.get(ref)
+        except RayError:  # its death is heard of by its job
+            return "", 0
+
+
+class _Actor:
+    """A worker, on a machine of the cluster."""
+
+    def __init__(self, told: tuple[Path, Portion, str, dict[str, str]]) -> None:
+        self._root, self._portion, self._folder, self._settings = told
+        self._key, self._frames = "", 0
+        self._worker: Worker | None = None
+        self._is_compiled = False
+
+    def ready(self) -> None:
+        """Begin. Raises StoreError for a machine without the data set, or whose viewsphere would render another one."""
+        from viewsphere.run.allocator import keep_freed_memory
+        from viewsphere.run.opening import check_whether_same
+        from viewsphere.run.tasks import Worker
+        from viewsphere.store import Store
+
+        with suppress(OSError):  # a folder of the machine that began the run; names of files may count from it
+            os.chdir(self._folder)
+        os.environ.update(self._settings)
+        store = Store(self._root)
+        if not store.plan_file.is_file():
+            raise StoreError(f"{self._root}: expected a folder that all machines of the cluster share; found none here")
+        check_whether_same(store, self._portion.part)
+        keep_freed_memory()
+        self._worker = Worker(self._root, self._portion)
+
+    def do(self, job: Job) -> Outcome | str:
+        """Do a job; of all workers of a machine that has no kernels yet, one compiles them."""
+        from viewsphere.store import Row
+
+        assert self._worker is not None
+        self._key, self._frames = job.key, 0
+        if isinstance(job.task, Row) and not self._is_compiled:
+            with suppress(UserError):  # which the job itself says
+                self._worker.compile_for(job.task)
+            self._is_compiled = True
+        return answer(self._worker, job, self._count)
+
+    def _count(self, frames: int) -> None:
+        self._frames = frames
+
+    @ray.method(concurrency_group="asking")
+    def begun(self) -> tuple[str, int]:
+        """How far it is: the key of its job, and how many frames of it are made."""
+        return self._key, self._frames
+
+
+_remote: Any = ray.remote  # whose types lack groups
+_ACTOR: Any = _remote(num_cpus=1, max_restarts=0, max_task_retries=0, concurrency_groups={"asking": 1})(_Actor)
+
+
+def _connect(address: str) -> None:
+    """Raises UserError where no cluster answers, MissingExtraError where a part of Ray is not installed."""
+    try:
+        if address != "auto":
+            _reach(address)
+        with warnings.catch_warnings(action="ignore"):  # of what Ray will do in the future
+            ray.init(address, log_to_driver=False, logging_level=logging.ERROR)
+    except ImportError as error:
+        raise MissingExtraError(f"--ray {address}: {_first_line(error)}: pip install 'viewsphere[ray]'") from None
+    except (OSError, OverflowError, RuntimeError, ValueError, RayError) as error:
+        raise UserError(
+            f"--ray {address}: expected a Ray cluster that answers; found: {_first_line(error)}: start one with "
+            "`ray start --head`, or check the address"
+        ) from None
+
+
+def _reach(address: str) -> None:
+    """Raises OSError, OverflowError or ValueError where nobody listens, which Ray itself would not notice for minutes."""
+    host, _, port = address.removeprefix("ray://").rpartition(":")
+    socket.create_connection((host.strip("[]"), int(port)), timeout=GRACE).close()
+
+
+def _nodes() -> dict[str, tuple[str, int]]:
+    """The machines of the cluster with CPUs: each one's address and how many it has, by its id."""
+    found = ((node, int(node["Resources"].get("CPU", 0))) for node in ray.nodes() if node["Alive"])
+    return {node["NodeID"]: (str(node["NodeManagerAddress"]), cpus) for node, cpus in found if cpus}
+
+
+def _ready(hands: list[_Hand], which: str, seconds: float = 0.0) -> list[_Hand]:
+    """Those whose answer is there, or comes first within so many seconds."""
+    hand_of = {getattr(hand, which): hand for hand in hands}
+    if not hand_of:
+        return []
+    refs = list(hand_of)
+    if seconds:
+        ray.wait(refs, num_returns=1, timeout=seconds)
+    found, _ = ray.wait(refs, num_returns=len(refs), timeout=0)
+    return [hand_of[ref] for ref in found]
+
+
+def _settings() -> dict[str, str]:
+    """What the user asked for by variables of the environment: limits, scripts, durability."""
+    return {name: value for name, value in os.environ.items() if name.startswith("VIEWSPHERE_") and name not in OF_A_MACHINE}
+
+
+def _first_line(error: BaseException) -> str:
+    """Of the error that Ray tells of, if it tells of another's; what follows a colon is told by the last line."""
+    cause = getattr(error, "cause", None)
+    lines = [line.strip() for line in str(cause if isinstance(cause, Exception) else error).splitlines() if line.strip()]
+    if not lines:
+        return type(error).__name__
+    return f"{lines[0]} {lines[-1]}" if lines[0].endswith(":") else lines[0].rstrip(".")

@@ -1,0 +1,169 @@
+"""Real faults, at moments drawn with a seed: nothing that was finished is lost or torn, and the work goes on to the same bytes.
+
+scripts/faults does the same many times over, and writes the table in docs/reliability.md.
+"""
+
+from __future__ import annotations
+
+import os
+import random
+import shutil
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from deadline import DEADLINE
+from faults import SIGNALS, WORKS, Course, Tally, finished, make_stock, recipe, small_disk, torn
+from small import tree_hash
+from viewsphere.aside import aside
+from viewsphere.run.generate import generate
+from viewsphere.store import Store
+
+pytestmark = [pytest.mark.slow, pytest.mark.skipif(sys.platform != "linux", reason="signals, and /proc")]
+
+rooted = pytest.mark.skipif(os.name == "nt" or os.geteuid() != 0, reason="mounts a file system")
+
+OBEDIENT = ("setpriv", "--bounding-set=-dac_override,-dac_read_search", "--inh-caps=-all")
+"""Before a command: even root may not write where the mode of a folder forbids it."""
+
+
+@pytest.fixture(scope="module")
+def stock(tmp_path_factory):
+    return make_stock(tmp_path_factory.mktemp("stock"))
+
+
+@pytest.fixture(scope="module")
+def whole(stock):
+    """The undisturbed tree of the work "render"."""
+    WORKS["render"].finish(stock, stock / "whole")
+    return stock / "whole"
+
+
+@pytest.mark.parametrize("work", WORKS)
+def test_kills_at_any_moment(work, stock, tmp_path):
+    course = Course(WORKS[work], stock, tmp_path, random.Random(f"kills {work}"))
+    for _ in range(3):
+        course.hit(SIGNALS["SIGKILL of everything"])
+    course.renew()
+    assert course.tally.is_good, course.tally
+
+
+@pytest.mark.parametrize("fault", [fault for fault in SIGNALS if fault != "SIGKILL of everything"])
+def test_signals_at_any_moment(fault, stock, tmp_path):
+    course = Course(WORKS["render"], stock, tmp_path, random.Random(f"signals {fault}"))
+    for _ in range(2):
+        course.hit(SIGNALS[fault])
+    course.renew()
+    assert course.tally.is_good, course.tally
+    if fault in ("SIGTERM", "Ctrl-C", "workers SIGSTOPped, Ctrl-C"):
+        assert all("stopped; " in line and "to go on" in line for line in course.tally.said), course.tally
+
+
+@pytest.mark.parametrize("runs", [2, 3])
+def test_several_runs_on_one_output(runs, stock, whole, tmp_path):
+    started = [WORKS["render"].start(stock, tmp_path / "out") for _ in range(runs)]
+    said = [process.communicate(timeout=DEADLINE)[1] for process in started]
+    assert [process.returncode for process in started] == [0] * runs, said
+    assert tree_hash(tmp_path / "out") == tree_hash(whole)
+
+
+def ended(process: subprocess.Popen[str], words: str) -> None:
+    """The run ended with a mistake, in one line that has these words."""
+    said = process.communicate(timeout=DEADLINE)[1]
+    lines = [line for line in said.splitlines() if line.startswith("viewsphere: ")]
+    assert process.returncode == 2, said
+    assert len(lines) == 1 and words in lines[0], said
+    assert "Traceback" not in said
+
+
+@rooted
+@pytest.mark.parametrize(("what", "ample"), [("size", 1 << 26), ("nr_inodes", 20_000)], ids=["bytes", "inodes"])
+def test_a_full_disk(what, ample, stock, whole, tmp_path):
+    """It ends among the shots, again and again, and then there is room."""
+    used = {part: [path.lstat() for path in (whole / "store" / part).rglob("*")] for part in ("models", "shots")}
+    taken = {
+        part: sum(512 * file.st_blocks for file in files) if what == "size" else len(files) for part, files in used.items()
+    }
+    with small_disk(tmp_path / "disk", **{what: f"{taken['models'] + taken['shots'] * 2 // 3}"}) as change:
+        out = tmp_path / "disk" / "out"
+        for _ in range(2):
+            ended(WORKS["render"].start(stock, out), "No space left on device; what is finished is kept")
+            assert not torn(out, whole)
+        there = finished(out)
+        assert there
+        change(**{what: f"{ample}"})
+        WORKS["render"].finish(stock, out)
+        assert there <= finished(out)
+        assert tree_hash(out) == tree_hash(whole)
+
+
+@rooted
+def test_a_disk_that_cannot_be_written_from_the_start(stock, whole, tmp_path):
+    with small_disk(tmp_path / "disk", size="64m") as change:
+        change(ro="")
+        ended(
+            WORKS["render"].start(stock, tmp_path / "disk" / "out"),
+            "expected a writable output folder, found Read-only file system",
+        )
+        change(rw="")
+        WORKS["render"].finish(stock, tmp_path / "disk" / "out")
+        assert tree_hash(tmp_path / "disk" / "out") == tree_hash(whole)
+
+
+def forbid(out: Path, mode: int) -> None:
+    for folder in (out, *(path for path in out.rglob("*") if path.is_dir())):
+        folder.chmod(mode)
+
+
+@pytest.mark.skipif(not shutil.which("setpriv"), reason="needs setpriv")
+def test_a_folder_that_cannot_be_written_any_more(stock, whole, tmp_path):
+    out = tmp_path / "out"
+    process = WORKS["render"].start(stock, out, *(OBEDIENT if os.geteuid() == 0 else ()))
+    end = time.monotonic() + DEADLINE
+    while len(finished(out)) < 2 and process.poll() is None and time.monotonic() < end:
+        time.sleep(0.01)
+    there = finished(out)
+    forbid(out, 0o555)
+    ended(process, "Permission denied; what is finished is kept")
+    assert there <= finished(out)
+    process = WORKS["render"].start(stock, out, *(OBEDIENT if os.geteuid() == 0 else ()))
+    ended(process, "expected a writable output folder, found one that cannot be written")
+    forbid(out, 0o755)
+    assert not torn(out, whole)
+    WORKS["render"].finish(stock, out)
+    assert tree_hash(out) == tree_hash(whole)
+
+
+def test_clocks_that_jump(stock, whole, tmp_path, monkeypatch):
+    """By years, forth and back, while others are at work; and files of a time to come."""
+    store, now, rng = Store(tmp_path / "out"), time.time, random.Random(5)
+    monkeypatch.setattr(time, "time", lambda: now() + rng.uniform(-1e8, 1e8))
+
+    def jump(progress):
+        for path in store.folder.rglob("*"):
+            moment = now() + rng.uniform(-1e8, 1e8)
+            os.utime(path, (moment, moment))
+
+    (store.folder / "writing").mkdir(parents=True)
+    with aside(store.folder / "writing") as others:
+        (others / "half").write_text("half")
+        generate(recipe(), store.root, listener=jump)
+        assert (others / "half").is_file()
+    generate(recipe(), store.root)
+    assert tree_hash(store.root) == tree_hash(whole)
+
+
+def test_a_tally_knows_bad_from_good(stock, whole, tmp_path):
+    """What the other tests rest upon: each kind of loss is seen."""
+    assert Tally().is_good and not Tally(lost=1).is_good
+    out = Path(shutil.copytree(whole, tmp_path / "out"))
+    assert not torn(out, whole)
+    half = next(out.glob("store/shots/*/*/depth/*"))
+    half.write_bytes(half.read_bytes()[:-1])
+    next(out.glob("coco/annotations/*")).write_text("{")
+    (out / "store" / "plan.json").write_text("{")
+    (out / f"{out.name}~").mkdir()
+    assert len(torn(out, whole)) == 4

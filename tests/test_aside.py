@@ -1,0 +1,165 @@
+"""Folders that are not whole yet go with their process, however it ends, and not before."""
+
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+
+from deadline import DEADLINE, until
+from viewsphere.aside import LOCK, STALE_S, Aside, aside, left_by_dead, of_this_process, sweep, temporary
+
+MAKER = """
+import sys, time
+from pathlib import Path
+from viewsphere.aside import Aside
+made = Aside.make(Path(sys.argv[1]), "x-")
+(made.folder / "half").write_text("half")
+print(made.folder, flush=True)
+time.sleep(600)
+"""
+
+
+@pytest.fixture
+def maker(tmp_path):
+    """A process that has made a folder in the test's, and the folder."""
+    process = subprocess.Popen([sys.executable, "-c", MAKER, tmp_path], stdout=subprocess.PIPE, text=True)
+    try:
+        yield process, Path(process.stdout.readline().strip())
+    finally:
+        process.kill()
+        process.communicate(timeout=DEADLINE)
+
+
+def anothers(folder: Path, host: str = "otherhost") -> Path:
+    """The folder as one of another machine."""
+    _, _, rest = folder.name.partition("~")
+    return folder.rename(folder.with_name(f"x-{host}~{rest}"))
+
+
+def age(folder: Path) -> None:
+    """Let nothing have changed in a folder for long."""
+    moment = folder.stat().st_mtime - STALE_S - 60
+    for path in (*folder.rglob("*"), folder):
+        os.utime(path, (moment, moment))
+
+
+@pytest.mark.parametrize("how", ["SIGKILL", "SIGTERM", "SIGINT"])
+def test_what_a_process_left_goes_when_it_is_dead(maker, tmp_path, how):
+    process, folder = maker
+    sweep(tmp_path, "x-")
+    assert (folder / "half").is_file()
+    process.send_signal(getattr(signal, how, signal.SIGTERM))
+    process.wait(DEADLINE)
+    sweep(tmp_path, "y-")
+    assert (folder / "half").is_file()
+    sweep(tmp_path, "x-")
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals")
+def test_one_that_is_stopped_is_not_dead(maker, tmp_path):
+    process, folder = maker
+    process.send_signal(signal.SIGSTOP)
+    age(folder)
+    sweep(tmp_path, "x-")
+    assert (folder / "half").is_file()
+
+
+def test_the_number_of_a_dead_process_may_be_ours(tmp_path):
+    left = tmp_path / f"{of_this_process()}left"
+    left.mkdir()
+    with aside(tmp_path) as own:
+        assert list(left_by_dead(tmp_path)) == [left]
+        assert list(tmp_path.iterdir()) == [own]
+
+
+def test_another_machine_s_is_left_until_it_is_old(maker, tmp_path):
+    process, folder = maker
+    process.kill()
+    process.wait(DEADLINE)
+    folder = anothers(folder)
+    sweep(tmp_path, "x-")
+    assert (folder / "half").is_file()
+    age(folder)
+    (folder / "half").write_text("still at it")
+    sweep(tmp_path, "x-")
+    assert (folder / "half").is_file()
+    age(folder)
+    sweep(tmp_path, "x-")
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.skipif(os.name == "nt", reason="renames no folder of an open file")
+def test_another_machine_s_that_is_seen_to_be_held_is_left(maker, tmp_path):
+    folder = anothers(maker[1])
+    age(folder)
+    sweep(tmp_path, "x-")
+    assert (folder / "half").is_file()
+
+
+def test_where_there_are_no_locks_age_decides(maker, tmp_path, monkeypatch):
+    process, folder = maker
+    process.kill()
+    process.wait(DEADLINE)
+    monkeypatch.setattr("viewsphere.aside._take", lambda lock: False)
+    with aside(tmp_path, "x-") as own:
+        sweep(tmp_path, "x-")
+        assert {path for path in tmp_path.iterdir()} == {own, folder}
+        age(folder)
+        sweep(tmp_path, "x-")
+        assert list(tmp_path.iterdir()) == [own]
+
+
+def test_what_is_named_alike_is_nobody_s_to_remove(tmp_path):
+    stranger = tmp_path / "x-my~own~folder"
+    stranger.mkdir()
+    age(stranger)
+    sweep(tmp_path, "x-")
+    assert stranger.is_dir()
+
+
+@pytest.mark.skipif(os.name == "nt", reason="links need a right there")
+def test_links_are_not_followed(tmp_path):
+    home = tmp_path / "home"
+    home.mkdir()
+    (home / "thesis").write_text("x")
+    place = tmp_path / "place"
+    place.mkdir()
+    (place / f"{of_this_process()}folder").symlink_to(home)
+    left = place / f"{of_this_process()}lock"
+    left.mkdir()
+    (left / LOCK).symlink_to(home / "new")
+    sweep(place)
+    assert [path.name for path in home.iterdir()] == ["thesis"]
+
+
+def test_temporary_folders_are_empty_and_go(tmp_path, monkeypatch):
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    (tmp_path / f"viewsphere-proof-{of_this_process()}left").mkdir()
+    with temporary("proof") as folder:
+        assert not list(folder.iterdir())
+        assert [path.name for path in tmp_path.iterdir()] == [folder.parent.name]
+    assert not list(tmp_path.iterdir())
+
+
+def test_nobody_loses_a_folder_to_those_who_sweep(tmp_path):
+    """Makers are met by sweepers between any two of their steps."""
+
+    def make(_: int) -> bool:
+        made = Aside.make(tmp_path)
+        (made.folder / "a").write_text("a")
+        whole = {path.name for path in made.folder.iterdir()} == {LOCK, "a"}
+        made.remove()
+        return whole
+
+    with ThreadPoolExecutor(4) as pool:
+        sweeps = [pool.submit(lambda: [sweep(tmp_path) for _ in range(300)]) for _ in range(2)]
+        assert all(pool.map(make, range(300)))
+        for done in sweeps:
+            done.result(DEADLINE)
+    assert until(lambda: sweep(tmp_path) or not list(tmp_path.iterdir()))
