@@ -159,7 +159,9 @@ def test_a_worker_that_dies_costs_a_retry_then_an_error(task, said, tmp_path):
 @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
 def test_it_is_tried_again_alone_when_all_others_are_done(tmp_path):
     before = _children(os.getpid())
-    tasks = {"bad": Calls(_while_alone, tmp_path, os.getpid(), before), **dict.fromkeys(("a", "b", "c"), LOOK_AT_CHAIR)}
+    notes = tmp_path / "notes"
+    notes.mkdir()
+    tasks = {"bad": Calls(_while_alone, notes, os.getpid(), before), **dict.fromkeys(("a", "b", "c"), LOOK_AT_CHAIR)}
     with LocalCrew(tmp_path / "out", PORTION, 2) as crew:
         outcomes = list(crew.run(Listed(tuple(Job(key, key, task) for key, task in tasks.items()))))
     assert [outcome.key for outcome in outcomes][-1] == "bad"
