@@ -44,11 +44,12 @@ def submit(script, folder, tasks, path):
         assert run.returncode == 0, problem
 
 
+@pytest.mark.slow
 def test_the_slurm_script_renders_the_whole_data_set(small_run, tmp_path):
     script = block("bash", "#SBATCH --array=0-")
     (tmp_path / "shards.sh").write_text(script)
     (tmp_path / "recipe.yaml").write_text(small_recipe().to_yaml())
-    submit("shards.sh", tmp_path, 3, viewsphere_for(tmp_path))
+    submit("shards.sh", tmp_path, 2, viewsphere_for(tmp_path))
     assert tree_hash(tmp_path / "out") == tree_hash(small_run)
 
 
@@ -75,8 +76,8 @@ def test_the_kubernetes_manifest_shards_as_it_counts():
     assert mounted == {volume["name"] for volume in spec["template"]["spec"]["volumes"]}
 
 
-@pytest.mark.parametrize("index", [0, 1])
-def test_a_pod_s_command_runs(index, tmp_path):
+@pytest.mark.slow
+def test_a_pod_s_command_runs(tmp_path):
     spec = manifest()["spec"]
     (container,) = spec["template"]["spec"]["containers"]
     recipe = small_recipe(formats=[], channels=["rgb"]).to_yaml()
@@ -87,7 +88,7 @@ def test_a_pod_s_command_runs(index, tmp_path):
         .replace(f"/{spec['completions']}", "/2")
         .replace("--workers 4", "--workers 0")
     )
-    env = {**os.environ, "PATH": viewsphere_for(tmp_path), "JOB_COMPLETION_INDEX": f"{index}"}
+    env = {**os.environ, "PATH": viewsphere_for(tmp_path), "JOB_COMPLETION_INDEX": "1"}
     run = subprocess.run([*container["command"], text], env=env, capture_output=True, text=True, timeout=DEADLINE)
     assert run.returncode == 0, run.stderr
     assert "6 frames (6 new" in run.stdout

@@ -185,11 +185,12 @@ def test_a_shard_of_a_hundred_million_frames_counts_out_no_row_that_it_does_not_
     assert len(made) <= 7 * 2 + 6
 
 
+@pytest.mark.slow
 def test_two_that_finish_at_once_leave_what_one_leaves(recipe_file, small_run, tmp_path):
     out = tmp_path / "out"
     generate(small_recipe(), out, shard=(0, 3))
     generate(small_recipe(), out, shard=(1, 3))
-    runs = [subprocess.Popen(command(recipe_file, out, "2/3", 0), **OWN) for _ in range(3)]
+    runs = [subprocess.Popen(command(recipe_file, out, "2/3", 0), **OWN) for _ in range(2)]
     for run in runs:
         _, problem = run.communicate(timeout=DEADLINE)
         assert run.returncode == 0, problem
@@ -294,11 +295,11 @@ def test_seven_shards_three_at_a_time_two_of_them_killed(many, tmp_path):
     at_start, at_work = rng.sample(order, 2)
 
     def make(k):
-        words = command(file, out, f"{k}/7")
+        words = command(file, out, f"{k}/7", workers=0)
         if k == at_start:
-            killed_at_start(out, (k, 7), words)
+            killed_at_start(out, (k, 7), command(file, out, f"{k}/7"))
         elif k == at_work:
-            killed_at(rng.randrange(3), command(file, out, f"{k}/7", workers=0))
+            killed_at(rng.randrange(3), words)
         done = subprocess.run(words, capture_output=True, timeout=DEADLINE)
         assert done.returncode == 0, done.stderr
 
@@ -329,6 +330,21 @@ def test_what_a_killed_shard_left_is_told_exported_and_proved(many, tmp_path):
     assert viewsphere("check", out).returncode == 0
     shutil.rmtree(out / "csv")
     assert tree_hash(out) == whole_tree
+
+
+@pytest.mark.slow
+def test_shards_that_add_at_once_add_what_one_run_adds(small_dataset, tmp_path):
+    box = small_recipe().model_dump()["models"][0]
+    more = small_recipe(models=[{**box, "count": 3}])
+    (tmp_path / "more.yaml").write_text(more.to_yaml())
+    shutil.copytree(small_dataset.root, tmp_path / "one")
+    generate(more, tmp_path / "one", append=True)
+    words = [[*command(tmp_path / "more.yaml", small_dataset.root, f"{k}/2", 0), "--append"] for k in range(2)]
+    runs = [subprocess.Popen(one, **OWN) for one in words]
+    for run in runs:
+        _, problem = run.communicate(timeout=DEADLINE)
+        assert run.returncode == 0, problem
+    assert tree_hash(small_dataset.root) == tree_hash(tmp_path / "one")
 
 
 def test_a_bad_model_fails_its_shard_and_not_the_others(tmp_path):

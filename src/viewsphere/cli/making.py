@@ -25,15 +25,7 @@ from viewsphere.cli.arguments import (
     with_options,
 )
 from viewsphere.cli.next_step import for_command, for_render
-from viewsphere.cli.terminal import (
-    ProgressBar,
-    print_estimate,
-    print_json,
-    print_plan,
-    print_summary,
-    write,
-    write_picture,
-)
+from viewsphere.cli.terminal import ProgressBar, print_estimate, print_json, print_plan, print_summary, write, write_picture
 from viewsphere.errors import StoreError, UserError
 from viewsphere.recipe.starts import FIRST, kinds, start
 
