@@ -5,6 +5,8 @@ import os
 import pickle
 import re
 import socket
+import subprocess
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -106,6 +108,17 @@ def test_leftovers_of_the_dead_are_swept_and_those_of_the_living_stay(tmp_path):
     (writing / "otherhost~1~m-2").mkdir()
     store.open_for(plan_record())
     assert {p.name for p in writing.iterdir()} == {f"{host}~{os.getppid()}~m-1", "otherhost~1~m-2"}
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="as Linux tells it")
+def test_who_has_ended_is_dead_though_its_parent_did_not_ask_yet(tmp_path):
+    store = Store(tmp_path / "out")
+    store.open_for(plan_record())
+    with subprocess.Popen([sys.executable, "-c", ""]) as ended:
+        os.waitid(os.P_PID, ended.pid, os.WEXITED | os.WNOWAIT)  # and stays to be asked after
+        (store.folder / "writing" / f"{socket.gethostname()}~{ended.pid}~m-0").mkdir()
+        store.open_for(plan_record())
+        assert list((store.folder / "writing").iterdir()) == []
 
 
 @pytest.mark.parametrize("changes", [{"digest": "other"}, {"version": "2"}])

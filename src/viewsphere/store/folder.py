@@ -507,7 +507,17 @@ def _alive(pid: int) -> bool:
         return False
     except OSError:
         return True
-    return True
+    return not _has_ended(pid)
+
+
+def _has_ended(pid: int) -> bool:
+    """Whether a process is no more than a number that its parent has not asked after yet: a zombie, as Linux tells it. In a
+    container whose first process asks after nobody, workers whose run was killed stay so.
+    """
+    try:
+        return Path(f"/proc/{pid}/stat").read_text("utf-8", "replace").rpartition(")")[2].split()[0] in {"Z", "X"}
+    except (OSError, IndexError):
+        return False
 
 
 def _alive_on_windows(pid: int) -> bool:
