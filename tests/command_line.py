@@ -5,11 +5,17 @@ from __future__ import annotations
 import contextlib
 import io
 import sys
+from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 from unittest.mock import patch
 
+import typer
+
 from viewsphere import cli
+
+built = cache(typer.main.get_command)
+"""The commands and their options are made from their functions once; that would take as long as a short command itself."""
 
 
 class Answer(NamedTuple):
@@ -25,6 +31,7 @@ def viewsphere(*words: object, cwd: Path | str = ".") -> Answer:
     out, err, status = io.StringIO(), io.StringIO(), 0
     with (
         patch.object(sys, "argv", ["viewsphere", *map(str, words)]),
+        patch.object(typer.main, "get_command", built),
         contextlib.chdir(cwd),
         contextlib.redirect_stdout(out),
         contextlib.redirect_stderr(err),

@@ -2,11 +2,13 @@
 
 import csv
 import json
+import os
 import pickle
 import re
 import sys
 import types
 from collections.abc import Callable, Iterator
+from importlib import metadata
 from importlib.metadata import EntryPoint
 from pathlib import Path
 
@@ -175,3 +177,21 @@ def test_every_sample_is_read_once_for_all_formats(small_dataset, tmp_path, monk
     monkeypatch.setattr(Dataset, "_sample", lambda self, *args: read.append(args) or samples(self, *args))
     export(small_dataset.root, ["csv_boxes", "coco", "native"])
     assert len(read) == len(small_dataset)
+
+
+def test_entry_points_are_read_once_and_again_where_a_package_was_installed(monkeypatch, tmp_path):
+    monkeypatch.syspath_prepend(tmp_path)
+    os.utime(tmp_path, ns=(1, 1))  # however coarse the clock of files is, what is installed now comes later
+    read = []
+    monkeypatch.setattr(metadata, "entry_points", lambda own=metadata.entry_points: read.append(None) or own())
+    assert "mine" not in plugins.names("formats")
+    assert plugins.load("formats", "coco").__name__ == "viewsphere.formats.coco"
+    assert len(read) == 1
+    folder = tmp_path / "mine-1.0.dist-info"
+    folder.mkdir()
+    (folder / "METADATA").write_text("Metadata-Version: 2.1\nName: mine\nVersion: 1.0\n")
+    (folder / "entry_points.txt").write_text("[viewsphere.formats]\nmine = json\n")
+    os.utime(tmp_path, ns=(2, 2))
+    assert "mine" in plugins.names("formats")
+    assert plugins.load("formats", "mine") is json
+    assert len(read) == 2

@@ -109,11 +109,12 @@ def furnace(tmp_path, mesh: Mesh, material: Material, distance: float, **options
     return light[seen >= 0]
 
 
-@pytest.mark.parametrize("material", MATERIALS)
-@pytest.mark.parametrize("occlusion", ["off", "fast", "fine"])
+@pytest.mark.parametrize(
+    ("material", "occlusion"),
+    [*((material, "off") for material in MATERIALS), *((MATERIALS[i], "fast") for i in (0, 3, 7)), (MATERIALS[0], "fine")],
+)
 def test_white_furnace_of_a_ball(tmp_path, material, occlusion):
-    if occlusion == "fine" and material is not MATERIALS[0]:
-        pytest.skip("baked alike for all")
+    """Occlusion is baked alike for all materials."""
     light = furnace(tmp_path, ball(0.5, (0, 0, 0), 48), material, 1.6, ambient_occlusion=occlusion)
     assert np.abs(light - 1).max() < 0.01
 

@@ -36,6 +36,7 @@ def recipe_of(folder, material=None, **changes):
         "scene": {"ground": "off", "materials": [{"images": str(folder), **(material or {})}]},
         "splits": {"train": 1.0},
         "channels": ["rgb", "instances", "depth"],
+        "engine": {"name": "raster", "ambient_occlusion": "off"},
         "formats": [],
     }
     return Recipe(**{**values, **changes})

@@ -120,7 +120,7 @@ LENSES = {
 }
 
 
-def finely_seen(camera, corners, samples=4001):
+def finely_seen(camera, corners, samples=1001):
     """Pixels of many points on a triangle's edges, most where one leaves the lens' field or turns, and on the field's rim."""
     local = corners @ camera.R.T + camera.t
     local /= np.linalg.norm(local, axis=1)[:, None]

@@ -2,6 +2,7 @@
 
 import json
 import re
+from functools import cache
 from pathlib import Path
 from unittest.mock import patch
 
@@ -180,14 +181,16 @@ def test_to_yaml_reads_back_as_the_same_recipe(write, fields):
     validator().validate(read(path)[0])
 
 
+@cache
 def validator() -> jsonschema.Draft202012Validator:
     return jsonschema.Draft202012Validator(schema())
 
 
 def test_the_schema_is_one_and_describes_every_field():
-    jsonschema.Draft202012Validator.check_schema(schema())
-    json.dumps(schema())
-    for name, definition in {"recipe": schema(), **schema()["$defs"]}.items():
+    whole = schema()
+    jsonschema.Draft202012Validator.check_schema(whole)
+    json.dumps(whole)
+    for name, definition in {"recipe": whole, **whole["$defs"]}.items():
         for field, value in definition.get("properties", {}).items():
             assert value.get("description"), f"{name}.{field} has no description"
 
@@ -244,7 +247,8 @@ def test_every_block_of_the_documentation_is_a_recipe_or_a_part_of_one(write, bl
 
 def test_the_documentation_names_every_field():
     text = (ROOT / "docs" / "recipe.md").read_text("utf-8")
-    for name, definition in {"recipe": schema(), **schema()["$defs"]}.items():
+    whole = schema()
+    for name, definition in {"recipe": whole, **whole["$defs"]}.items():
         for field in definition.get("properties", {}):
             assert re.search(rf"\b{field}\b", text), f"docs/recipe.md does not mention {name}.{field}"
 

@@ -40,7 +40,7 @@ def recipe_of(models=("zoo:car", "zoo:bicycle", "zoo:chair"), **more):
         "viewpoints": VIEWPOINTS["grid"],
         "camera": LENSES["wide"],
         "scene": {"ground": "off"},
-        "channels": ["rgb"],
+        "channels": ["instances"],
         "shot_frames": 3,
     }
     return Recipe(**{**values, **more})

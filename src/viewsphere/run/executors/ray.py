@@ -37,6 +37,9 @@ TICK = 1.0
 STARTS = 3
 """How often in a row workers may die while they start before their machine is left out."""
 
+CALLS = 3
+"""How often a cluster is called where somebody listens: one whose machines are busy may be too slow to answer at once."""
+
 GRACE = 10.0
 """Seconds that a cluster has to answer when a run begins, and its workers to be gone when it ends."""
 
@@ -271,8 +274,15 @@ def _connect(address: str) -> None:
     try:
         if address != "auto":
             _reach(address)
-        with warnings.catch_warnings(action="ignore"):  # of what Ray will do in the future
-            ray.init(address, log_to_driver=False, logging_level=logging.ERROR)
+        for left in reversed(range(CALLS)):
+            try:
+                with warnings.catch_warnings(action="ignore"):  # of what Ray will do in the future
+                    ray.init(address, log_to_driver=False, logging_level=logging.ERROR)
+                return
+            except ConnectionError:
+                if not left:
+                    raise
+                ray.shutdown()
     except ImportError as error:
         raise MissingExtraError(f"--ray {address}: {_first_line(error)}: pip install 'viewsphere[ray]'") from None
     except (OSError, OverflowError, RuntimeError, ValueError, RayError) as error:
