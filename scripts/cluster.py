@@ -89,7 +89,8 @@ class _Run:
 
     def __init__(self, load: Load, cluster: Cluster, rng: np.random.Generator) -> None:
         self.load, self.cluster, self.rng = load, cluster, rng
-        self.factors = np.where(np.arange(cluster.nodes) < round(cluster.slow * cluster.nodes), cluster.slow_factor, 1.0).tolist()
+        slow = round(cluster.slow * cluster.nodes)
+        self.factors = [cluster.slow_factor] * slow + [1.0] * (cluster.nodes - slow)
         self.seconds = self._drawn(np.asarray(load.seconds, float))
         self.storing = max(load.objects / cluster.requests_per_s, load.bytes / cluster.bytes_per_s)
         self.events: list[tuple[float, int, int, int, int]] = []

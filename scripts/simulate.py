@@ -38,6 +38,7 @@ MEASURED, PAGE = ROOT / "scripts" / "measured.json", ROOT / "docs" / "scale.md"
 BEGIN, END = "<!-- scripts/simulate -->\n", "<!-- end -->\n"
 
 IMAGES = (10**6, 10**7, 10**8)
+SIMULATED = 10**7
 NODES = (10, 100, 1000, 10_000)
 FRAMES = 240
 
@@ -51,8 +52,8 @@ ASSUMED = {
     "bytes_per_s": 10e9,
 }
 """Nodes of 16 cores that fail every 1,000 hours (a spot machine more often) and are back after 5 minutes; 2 % of them half as
-fast; one prefix of an object store (S3 takes 3,500 PUT requests a second of each: docs.aws.amazon.com/AmazonS3/latest/userguide/
-optimizing-performance.html), and 10 GB/s to it.
+fast; one prefix of an object store, and 10 GB/s to it. S3 takes 3,500 PUT requests a second of each prefix:
+https://docs.aws.amazon.com/AmazonS3/latest/userguide/optimizing-performance.html
 """
 
 
@@ -88,8 +89,8 @@ class Stopwatch:
 
 
 def scene(frames: int, folder: Path) -> Recipe:
-    """The benchmark's reference scene, in shots of four frames."""
-    return reference_recipe(frames, 4, folder).model_copy(update={"shot_frames": 4})
+    """The benchmark's reference scene, in shots of eight frames."""
+    return reference_recipe(frames, 4, folder).model_copy(update={"shot_frames": 8})
 
 
 def timed(frames: int, folder: Path, number: int) -> list[float]:
@@ -161,9 +162,9 @@ def compare(count: int, frames: int, folder: Path) -> None:
     known = Load(len(watch.moments) - 1, measured.frames, measured.seconds, measured.objects, measured.bytes)
     whole = Cluster(count, cores=1, start_s=max(0.0, measured.start_s - watch.moments[0]), handout_s=stored().handout_s)
     predicted = [simulate(known, whole, seed).makespan for seed in range(20)]
-    mean = statistics.mean(predicted)
+    mean, between = statistics.mean(predicted), f"{min(predicted):.1f} to {max(predicted):.1f}"
     print(f"{known.shots} shots of {measured.frames:.0f} frames on {count} Ray nodes of one CPU:")
-    print(f"predicted {mean:.1f} s ({min(predicted):.1f} to {max(predicted):.1f}), found {found:.1f} s ({found / mean - 1:+.1%})")
+    print(f"predicted {mean:.1f} s ({between}), found {found:.1f} s ({found / mean - 1:+.1%})")
 
 
 @contextmanager
@@ -191,8 +192,8 @@ def costs(measured: Measured) -> str:
     table = [["Images", "Core hours", "Stored", "Files (requests)", "In one tar a shot"]]
     for images in IMAGES:
         load = measured.load(images)
-        size = load.shots * load.bytes / 1e12
-        table.append([f"{images:,}", f"{load.core_hours:,.0f}", f"{size:,.2f} TB", f"{load.shots * load.objects:,.0f}", f"{load.shots:,}"])
+        size, files = load.shots * load.bytes / 1e12, load.shots * load.objects
+        table.append([f"{images:,}", f"{load.core_hours:,.0f}", f"{size:,.2f} TB", f"{files:,.0f}", f"{load.shots:,}"])
     return rows(table)
 
 
@@ -202,29 +203,30 @@ def duration(seconds: float) -> str:
     return f"{minutes:.0f} min" if minutes < 90 else f"{minutes / 60:.1f} h" if minutes < 2880 else f"{minutes / 1440:.1f} days"
 
 
-def courses(measured: Measured, is_tar: bool) -> str:
-    """How long images take, and how well nodes are used, with files or one tar a shot in an object store."""
-    table = [["Nodes", *(f"{images:,}" for images in IMAGES)]]
+def courses(measured: Measured) -> str:
+    """How long SIMULATED images take, and how well nodes are used, with files or one tar a shot in an object store."""
+    load = measured.load(SIMULATED)
+    table = [["Nodes", "Each file an object", "One tar a shot", "Shots made twice"]]
     for count in NODES:
         cluster = Cluster(count, start_s=measured.start_s, handout_s=measured.handout_s, **ASSUMED)
-        loads = [replace(measured.load(images), objects=1.0) if is_tar else measured.load(images) for images in IMAGES]
-        table.append([f"{count:,}", *(told(simulate(load, cluster)) for load in loads)])
-    return rows(table)
+        files, tars = (simulate(kind, cluster) for kind in (load, replace(load, objects=1.0)))
+        table.append([f"{count:,}", told(files), told(tars), f"{tars.lost:,}"])
+    return f"\n{SIMULATED:,} images, makespan and efficiency:\n\n{rows(table)}"
 
 
 def told(course: Course) -> str:
-    """Makespan, efficiency and what failures cost."""
-    return f"{duration(course.makespan)}, {course.efficiency:.0%}" + (f", {course.lost:,} made twice" if course.lost else "")
+    """Makespan and efficiency."""
+    return f"{duration(course.makespan)}, {course.efficiency:.0%}"
 
 
-def page(measured: Measured, with_courses: str) -> str:
-    """The generated part of docs/scale.md."""
-    mean = statistics.mean(measured.seconds) / measured.frames
+def page(measured: Measured) -> str:
+    """What images cost, of the generated part of docs/scale.md."""
+    seconds, size = statistics.mean(measured.seconds) / measured.frames, measured.bytes / measured.frames / 1e6
     intro = (
-        f"Measured on one core of a {measured.machine}, with the other cores at work: {mean:.3f} s and "
-        f"{measured.bytes / measured.frames / 1e6:.2f} MB a frame, {measured.objects:.0f} files a shot of {measured.frames:.0f} frames.\n\n"
+        f"Measured on one core of a {measured.machine}, with another core at work: {seconds:.3f} s and {size:.2f} MB a frame, "
+        f"{measured.objects:.0f} files a shot of {measured.frames:.0f} frames.\n\n"
     )
-    return intro + costs(measured) + with_courses
+    return intro + costs(measured)
 
 
 def main() -> None:
@@ -240,15 +242,10 @@ def main() -> None:
         if asked.compare:
             compare(asked.compare, asked.frames, Path(folder))
             return
-    measured = stored()
-    tables = "".join(
-        f"\nMakespan and efficiency, {what}:\n\n{courses(measured, is_tar)}"
-        for what, is_tar in (("each file an object", False), ("one tar a shot", True))
-    )
+    told = page(stored()) + courses(stored())
     before, _, rest = PAGE.read_text("utf-8").partition(BEGIN)
-    after = rest.partition(END)[2]
-    PAGE.write_text(before + BEGIN + page(measured, tables) + END + after, "utf-8")
-    print(page(measured, tables))
+    PAGE.write_text(before + BEGIN + told + END + rest.partition(END)[2], "utf-8")
+    print(told)
 
 
 if __name__ == "__main__":

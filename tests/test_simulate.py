@@ -12,6 +12,7 @@ from small import ROOT
 
 sys.path.insert(0, str(ROOT / "scripts"))
 from cluster import Cluster, Load, simulate
+from simulate import page, stored
 
 
 def load(shots, *seconds, objects=0.0, size=0.0):
@@ -75,6 +76,4 @@ def test_every_shot_is_made_within_the_bounds_of_any_schedule(shots, seconds, no
 
 
 def test_the_page_about_scale_says_what_is_computed():
-    simulation = pytest.importorskip("simulate")
-    measured = simulation.stored()
-    assert simulation.page(measured, "") in (ROOT / "docs" / "scale.md").read_text("utf-8")
+    assert page(stored()) in (ROOT / "docs" / "scale.md").read_text("utf-8")
