@@ -33,6 +33,7 @@ from viewsphere.store import Dataset, ModelInfo, PlanRecord, Row
 from viewsphere.store.checksums import damaged_files, written_least, written_options
 from viewsphere.store.credits import credits_problem
 from viewsphere.store.index import numbers
+from viewsphere.store.places import here
 
 
 @dataclass(frozen=True)
@@ -188,7 +189,8 @@ def _export_proof(views: Views, folder: Path, module: Verified, sampled: Collect
         return
     try:
         entry = FormatEntry(name=folder.name, options=written_options(folder))
-        yield from module.verify(views.of(module, written_least(folder)), folder, sampled, *entry.arguments())
+        with here(folder) as local:
+            yield from module.verify(views.of(module, written_least(folder)), local, sampled, *entry.arguments())
     except Exception as error:
         yield None, failure("an export that can be checked", error)
 

@@ -15,6 +15,7 @@ from viewsphere.cli.arguments import (
     Durability,
     FormatOptions,
     asked_formats,
+    at,
     cores,
     split,
     with_options,
@@ -36,7 +37,9 @@ def export(
     format_option: FormatOptions = None,
     output: Annotated[
         Path | None,
-        typer.Option("-o", "--output", help="Folder for the formats' folders; default: the data set's.", show_default=False),
+        typer.Option(
+            "-o", "--output", help="Folder for the formats' folders; default: the data set's.", show_default=False, callback=at
+        ),
     ] = None,
     models: Annotated[
         str | None,
@@ -114,7 +117,7 @@ def check(
 def report(
     folder: DataFolder,
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="Page to write; default: report.html in the folder.")
+        Path | None, typer.Option("-o", "--output", help="Page to write; default: report.html in the folder.", callback=at)
     ] = None,
     frames: Annotated[int, typer.Option(min=1, max=2000, help="Frames shown; all are counted.")] = 240,
     proofs: Annotated[bool, typer.Option("--check/--no-check", help="Show what `check` finds.")] = True,

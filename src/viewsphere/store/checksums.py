@@ -12,7 +12,6 @@ No more of it is held in memory than a line. The last line is the digest of all 
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from itertools import takewhile
@@ -24,6 +23,7 @@ import xxhash
 from viewsphere.errors import StoreError
 from viewsphere.store.manifest import seal_of
 from viewsphere.store.paths import file_inside
+from viewsphere.store.places import files_below
 from viewsphere.store.texts import parsed
 
 CHECKSUMS = "checksums.xxh128"
@@ -120,7 +120,4 @@ def _digest(file: Path) -> str | None:
 
 def _files(folder: Path) -> Iterator[str]:
     """All files but the list, by their paths, in an order that does not depend on the disk."""
-    for place, folders, names in os.walk(folder):
-        folders.sort()
-        inside = Path(place).relative_to(folder)
-        yield from (path for path in ((inside / name).as_posix() for name in sorted(names)) if path != CHECKSUMS)
+    return (path for path in files_below(folder) if path != CHECKSUMS)

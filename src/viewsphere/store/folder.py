@@ -1,22 +1,20 @@
-"""The store's folder: finished shots and models, each written aside and renamed when whole."""
+"""The store's folder: finished shots and models, each written aside and put in its place when whole."""
 
 from __future__ import annotations
 
 import hashlib
 import json
 import os
-import shutil
 from collections import defaultdict
 from collections.abc import Generator, Iterable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, replace
-from itertools import chain, count
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
 
-from viewsphere.aside import Aside, aside, left_by_dead, of_this_process, sweep
 from viewsphere.errors import StoreError
 from viewsphere.labels import channels
 from viewsphere.model.files import Files
@@ -27,14 +25,12 @@ from viewsphere.model.thing import Thing
 from viewsphere.store.channel_files import encode
 from viewsphere.store.index import Index, Row
 from viewsphere.store.manifest import MANIFEST, Manifest, Seal, digest, refuse_another, seal_of
-from viewsphere.store.moving import move
 from viewsphere.store.paths import file_inside
+from viewsphere.store.places import place_of
+from viewsphere.store.places.local import NEW
 from viewsphere.store.records import ModelInfo, PlanRecord
 from viewsphere.store.sample_records import short_sample, whole_sample
 from viewsphere.store.texts import parsed
-
-NEW, OLD = "new", "old"
-"""What is being made, aside; and below the other, by its path in the data set, what it takes the place of."""
 
 
 @dataclass(frozen=True)
@@ -56,6 +52,7 @@ class Store:
 
     def __init__(self, root: Path) -> None:
         self.root = root
+        self.place = place_of(root)
         self.folder = root / "store"
 
     @property
@@ -88,30 +85,21 @@ class Store:
         can be mended and tried again. Raises StoreError if the folder cannot be written, holds another recipe's data, or
         files that viewsphere did not make.
         """
-        writing = self.folder / "writing"
         known = self.plan_file.exists()
-        if not known and self.root.is_dir() and any(self.root.iterdir()) and not writing.is_dir():
+        if not known and self.place.is_foreign():
             raise StoreError(f"{self.root}: expected an empty or new folder, found other files: choose another output folder")
         self.make_ready()
         if known:
-            if any(writing.iterdir()) or any((self.folder / "shots").glob("*/*")):
+            if self.place.is_begun():
                 self._refuse_other(plan)
                 return
             if not self._is_of(plan):
-                shutil.rmtree(self.folder / "models", ignore_errors=True)
+                self.place.remove(self.folder / "models")
         self._write_atomically(self.plan_file, plan.to_json())
 
-    @contextmanager
-    def occupied(self) -> Generator[None]:
+    def occupied(self) -> AbstractContextManager[None]:
         """Show other runs that this one is at work, as long as the block lasts; then what workers left that died goes, too."""
-        with _disk_errors(self.root):
-            own = Aside.make(self.folder / "writing")
-        try:
-            yield
-        finally:
-            own.remove()
-            with suppress(OSError):
-                self._sweep()
+        return self.place.occupied()
 
     def save(self, plan: PlanRecord) -> None:
         """Put a plan in the place of the one that it continues."""
@@ -141,10 +129,7 @@ class Store:
 
     def finished(self) -> Iterator[str]:
         """Keys of all shots that are there, in no order."""
-        with suppress(FileNotFoundError):
-            for group in os.scandir(self.folder / "shots"):
-                shots = os.scandir(group.path)
-                yield from (shot.name for shot in shots if os.path.exists(f"{shot.path}/{MANIFEST}"))  # noqa: PTH110
+        return self.place.finished()
 
     def wanted(self, plan: PlanRecord) -> Iterator[Row]:
         """The shots of a plan, those with channels that were added later last, but for what was left out at the user's wish."""
@@ -154,19 +139,16 @@ class Store:
 
     def drop_unnamed_models(self) -> None:
         """Remove the models that the plan does not name, unless another run is at work on them."""
-        own = of_this_process()
-        if any(not path.name.startswith(own) for path in (self.folder / "writing").iterdir()):
+        if self.place.others_at_work():
             return
         named = set(self.plan().models)
         for folder in (self.folder / "models").glob("*"):
             if folder.name not in named:
-                shutil.rmtree(folder, ignore_errors=True)
+                self.place.remove(folder)
 
     def make_ready(self) -> None:
         """See that the folder can be written, and clear what dead runs left; raises StoreError if it cannot."""
-        self._make(self.folder / "writing")
-        with _disk_errors(self.root):
-            self._sweep()
+        self.place.make()
 
     def _is_of(self, plan: PlanRecord) -> bool:
         try:
@@ -191,36 +173,10 @@ class Store:
                 "install that version to go on, or choose another output folder"
             )
 
-    def _make(self, folder: Path) -> None:
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise StoreError(f"{self.root}: expected a writable output folder, found {error.strerror or error}") from None
-        if not os.access(folder, os.W_OK):
-            raise StoreError(f"{self.root}: expected a writable output folder, found one that cannot be written")
-
-    @contextmanager
-    def _own(self) -> Generator[Path]:
-        """A folder for what is not whole yet, as long as the block lasts; StoreError for what the disk refuses meanwhile."""
-        writing = self.folder / "writing"
-        with _disk_errors(self.root):
-            writing.mkdir(parents=True, exist_ok=True)
-            with aside(writing) as own:
-                yield own
-
     def _write_atomically(self, file: Path, text: str) -> None:
-        with self._own() as own:
+        with self.place.aside() as own:
             (own / NEW).write_text(text, "utf-8", newline="\n")
-            move(own / NEW, file)
-
-    def _sweep(self) -> None:
-        """Remove what dead writers left unfinished; what they were about to replace comes back."""
-        for left in left_by_dead(self.folder / "writing"):
-            for old in _replaced(left / OLD):
-                target = self.root / old.relative_to(left / OLD)
-                if not target.exists():
-                    target.parent.mkdir(parents=True, exist_ok=True)
-                    move(old, target)
+            self.place.put(own / NEW, file)
 
     def shot_folder(self, key: str) -> Path:
         """Where a finished shot lies."""
@@ -253,34 +209,17 @@ class Store:
         If another writer finished the same target first, that one stays: both hold the same bytes. With `again` it takes the
         place of a damaged one; raises StoreError where it is not equal to what that was before, as far as that is known.
         """
-        with self._own() as own:
+        with self.place.aside() as own:
             folder = own / NEW
             folder.mkdir()
             yield folder
             if not (folder / MANIFEST).is_file():
                 Manifest.of(folder).write(folder)
-            target.parent.mkdir(parents=True, exist_ok=True)
             if again and target.is_dir():
                 refuse_another(target, folder)
-                self._replace(folder, target)
+                self.place.replace(folder, target)
             else:
-                _become(folder, target)
-
-    def _replace(self, folder: Path, target: Path) -> None:
-        """Put a folder that lies aside in the place of another, which goes with what is aside; and so does what other runs put
-        there at this moment.
-        """
-        old = folder.parent / OLD / target.relative_to(self.root)
-        old.parent.mkdir(parents=True)
-        for another in count():
-            with suppress(FileNotFoundError):  # there is none, or another run has moved it
-                move(target, folder.parent / f"{another}" if old.exists() else old)
-            try:
-                move(folder, target)
-                return
-            except OSError:
-                if not target.exists():
-                    raise
+                self.place.put(folder, target)
 
     @contextmanager
     def replacing(self, target: Path) -> Generator[Path]:
@@ -289,14 +228,13 @@ class Store:
         """
         if target == self.folder:
             raise StoreError(f"{target}: expected a format's name, found the store's")
-        self._make(self.folder / "writing")
-        with self._own() as own:
+        with self.place.aside() as own:
             folder = own / NEW
             folder.mkdir()
             yield folder
             if target.parent == self.folder / "models":
                 Manifest.of(folder).write(folder)
-            self._replace(folder, target)
+            self.place.replace(folder, target)
 
     def write_file(self, name: str, text: str) -> None:
         """Write a small file of the store in one step."""
@@ -434,36 +372,9 @@ def _no_scene(file: Path, error: Exception) -> StoreError:
     )
 
 
-def _replaced(old: Path) -> Iterator[Path]:
-    """The models, shots and exports that lie here by their paths in a data set; no links that lead elsewhere."""
-    exports = (path for path in old.glob("*") if path.name != "store")
-    for path in chain(old.glob("store/models/*"), old.glob("store/shots/*/*"), exports):
-        if path.resolve() == old.resolve() / path.relative_to(old):
-            yield path
-
-
-@contextmanager
-def new_folder(target: Path) -> Generator[Path]:
+def new_folder(target: Path) -> AbstractContextManager[Path]:
     """A folder to write into that becomes `target` when the block ends well; raises StoreError where files lie there."""
-    place, prefix = target.parent, f"{target.name}~"
-    missing = [parent for parent in target.parents if not parent.exists()]
-    try:
-        with _disk_errors(target):
-            if target.exists() and (not target.is_dir() or any(target.iterdir())):
-                raise StoreError(f"{target}: expected an empty or new folder, found other files: choose another, or delete it")
-            place.mkdir(parents=True, exist_ok=True)
-            sweep(place, prefix)
-            with aside(place, prefix) as own:
-                folder = own / NEW
-                folder.mkdir()
-                yield folder
-                if target.exists():
-                    target.rmdir()
-                move(folder, target)
-    finally:
-        for parent in missing:
-            with suppress(OSError):  # something is in it
-                parent.rmdir()
+    return place_of(target).new()
 
 
 def channel_path(channel: str, sample: int, kinds: Files | None = None) -> str:
@@ -480,25 +391,6 @@ def _write(file: str, data: bytes) -> None:
             left = left[os.write(descriptor, left) :]
     finally:
         os.close(descriptor)
-
-
-def _become(folder: Path, target: Path) -> None:
-    try:
-        if target.is_dir() and not (target / MANIFEST).is_file():
-            shutil.rmtree(target)
-        move(folder, target)
-    except OSError:
-        if not target.is_dir():
-            raise
-
-
-@contextmanager
-def _disk_errors(root: Path) -> Generator[None]:
-    """Say in one line what the disk refused; what is finished stays."""
-    try:
-        yield
-    except OSError as error:
-        raise StoreError(f"{root}: expected to write, found: {error.strerror or error}; what is finished is kept") from error
 
 
 def _found(indices: Iterable[Index], keys: Iterable[str]) -> list[Row]:
