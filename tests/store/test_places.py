@@ -18,6 +18,7 @@ from viewsphere.errors import RemoteError, StoreError, UserError
 from viewsphere.run.exporting import export
 from viewsphere.run.merging import merge
 from viewsphere.store import Store, located
+from viewsphere.store.checksums import CHECKSUMS
 from viewsphere.store.places import byte_range, files_below, here, remote_path
 from viewsphere.store.places.remote_path import RemotePath
 
@@ -236,12 +237,14 @@ def test_damage_is_found_and_mended(few, uploaded):
     assert check(Dataset(root), sample=2, rays=False).ok
     spoilt = damage(root, few)
     assert len(spoilt) > 6
-    found = [str(finding) for finding in check(Dataset(root), sample=0, rays=False).findings]
+    found = [str(finding) for finding in check(Dataset(root), fast=True).findings]
     for path in spoilt:
         known = Path(path).parts[-2:]  # a lost manifest is found by the shot that is missing
+        known += (CHECKSUMS,) if path.startswith("coco/") else ()  # a list that is damaged, too, vouches for nothing
         assert any(name in text for name in known for text in found), path
-    repaired = repair(root, sample=0, rays=False)
+    repaired = repair(root, fast=True)
     assert repaired.report.ok, repaired.report.findings
+    assert check(Dataset(root), fast=True).notes == ("only digests were compared: check without --fast proves the labels",)
     assert contents(root) == contents(few)
 
 

@@ -130,7 +130,7 @@ def test_damage_is_found_and_mended(few, faults):
         data = bytearray((root / path).read_bytes())
         data[len(data) // 2] ^= 4
         (root / path).write_bytes(bytes(data))
-    findings = [str(finding) for finding in check(Dataset(root), sample=0, rays=False).findings]
+    findings = [str(finding) for finding in check(Dataset(root), fast=True).findings]
     assert len(files) > 5 and all(any(str(root / path) in text for text in findings) for path in files)
-    assert repair(root, sample=0, rays=False).report.ok
+    assert repair(root, fast=True).report.ok
     assert contents(root) == contents(few)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -78,6 +78,9 @@ def check(
     folder: DataFolder,
     sample: Annotated[int, typer.Option(min=0, help="Frames whose labels are computed again.")] = 50,
     all_: Annotated[bool, typer.Option("--all", help="Compute the labels of all frames again.")] = False,
+    fast: Annotated[
+        bool, typer.Option("--fast", help="Compare digests alone, of the store and of exports; no picture is decoded.")
+    ] = False,
     mend: Annotated[
         bool, typer.Option("--repair", help="Render damaged shots again, and write damaged models and exports again.")
     ] = False,
@@ -99,13 +102,14 @@ def check(
     from viewsphere.check.repair import repair
     from viewsphere.store import Dataset
 
-    asked, crew = None if all_ else sample, cores() if workers is None else workers
+    crew = cores() if workers is None else workers
+    options: dict[str, Any] = {"sample": None if all_ else sample, "against_cycles": against_cycles, "fast": fast}
     if mend:
         with ProgressBar(quiet=json_) as bar:
-            repaired = repair(folder, workers=crew, listener=bar.show, sample=asked, against_cycles=against_cycles)
+            repaired = repair(folder, workers=crew, listener=bar.show, **options)
         done, report = repaired.done, repaired.report
     else:
-        done, report = (), prove(Dataset(folder), sample=asked, workers=crew, against_cycles=against_cycles)
+        done, report = (), prove(Dataset(folder), workers=crew, **options)
     if json_:
         print_json({**({"repaired": list(done)} if mend else {}), **report.to_json()})
     else:
