@@ -5,6 +5,7 @@
     │   ├── RecipeError           a recipe's field, with file and line
     │   ├── ModelError            a model file that cannot be used
     │   ├── StoreError            an output folder that cannot be used
+    │   ├── RemoteError           a URL that does not answer, or refuses
     │   └── MissingExtraError     a feature whose optional package is not installed
     ├── CheckFailedError          a data set that is not what it claims to be: exit status 1
     ├── WorkerDied                who did a job died, as often as it is tried; other jobs go on
@@ -45,6 +46,10 @@ class ModelError(UserError):
 
 class StoreError(UserError):
     """An output folder that cannot be used."""
+
+
+class RemoteError(UserError):
+    """A URL that does not answer, or refuses; what is finished there is kept."""
 
 
 class MissingExtraError(UserError):

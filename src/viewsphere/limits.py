@@ -67,6 +67,7 @@ class Limits:
     MAX_SIZE = Limit(1e5, "metres, the longest side of a model at most")
     MAX_RECIPE_VALUES = Limit(200_000, "values of a recipe: by aliases a few lines can stand for billions")
     MAX_STORED_PIXELS = Limit(1 << 28, "pixels of a picture or map of a data set, also of an imported one")
+    MAX_REMOTE_TRIES = Limit(5, "times that a URL is asked for the same, 0.2 seconds and then three times as long apart")
     MAX_REPAIRED_SHOTS = Limit(1_000_000, "shots that a repair renders because they are missing")
 
 

@@ -21,8 +21,9 @@ from small import small_recipe, tree_hash
 from viewsphere.errors import UserError
 from viewsphere.run.generate import generate
 from viewsphere.run.merging import merge
-from viewsphere.store import folder, moving
+from viewsphere.store import moving
 from viewsphere.store.manifest import MANIFEST, digest, unsealed
+from viewsphere.store.places import local
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="asks /proc which file is synced")
 
@@ -89,7 +90,7 @@ class Disk:
 
     @contextmanager
     def watched(self):
-        sync, rename, move = os.fsync, os.replace, folder.move
+        sync, rename, move = os.fsync, os.replace, local.move
 
         def synced(descriptor):
             sync(descriptor)
@@ -107,7 +108,7 @@ class Disk:
             patch.object(moving, "AT_ONCE", 1),  # what is noted of one file is of one moment
             patch.object(os, "fsync", synced),
             patch.object(os, "replace", renamed),
-            patch.object(folder, "move", moved),
+            patch.object(local, "move", moved),
         ):
             yield
 

@@ -2,27 +2,34 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from viewsphere.errors import StoreError
 from viewsphere.store import Dataset
+from viewsphere.store.checksums import AT_ONCE
 from viewsphere.store.manifest import Manifest
 
 
 def damaged(dataset: Dataset) -> tuple[int, dict[Path, list[str]]]:
     """How many files stand in the manifests of finished shots and models; and of each folder with damage what is wrong."""
-    count, found = 0, dict[Path, list[str]]()
-    for folder in _folders(dataset):
-        try:
-            manifest = Manifest.read(folder)
-        except StoreError as error:
-            found[folder] = [str(error)]
-            continue
-        count += len(manifest.files)
-        messages = list(manifest.damage(folder))
-        if messages:
-            found[folder] = messages
-    return count, found
+    folders, found = _folders(dataset), dict[Path, list[str]]()
+    with ThreadPoolExecutor(AT_ONCE) as pool:
+        counts = 0
+        for folder, (count, messages) in zip(folders, pool.map(_damage, folders), strict=True):
+            counts += count
+            if messages:
+                found[folder] = messages
+    return counts, found
+
+
+def _damage(folder: Path) -> tuple[int, list[str]]:
+    """How many files stand in a folder's manifest, and what is wrong with them."""
+    try:
+        manifest = Manifest.read(folder)
+    except StoreError as error:
+        return 0, [str(error)]
+    return len(manifest.files), list(manifest.damage(folder))
 
 
 def _folders(dataset: Dataset) -> list[Path]:

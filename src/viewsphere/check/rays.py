@@ -21,6 +21,7 @@ from viewsphere.model.thing import Thing
 from viewsphere.run.tasks import SceneryRecord
 from viewsphere.store import Dataset, depth_step
 from viewsphere.store.channel_files import MOST_STEPS
+from viewsphere.store.places import here
 from viewsphere.truth.visibility import EDGE_ON
 
 Float = NDArray[np.float64]
@@ -199,7 +200,8 @@ def _read(file: Path, step: str | None) -> _Soup:
     """An exported GLB in the object's axes; of a model that deforms what is below a time step's node."""
     import trimesh
 
-    scene: Any = trimesh.load_scene(file, process=False)
+    with here(file) as local:
+        scene: Any = trimesh.load_scene(local, process=False)
     corners: list[Float] = []
     opaque: list[NDArray[np.bool_]] = []
     shown = scene.graph.transforms.successors(step or scene.graph.base_frame)

@@ -17,7 +17,16 @@ if TYPE_CHECKING:
     from viewsphere.recipe.recipe import Recipe
 
 RecipeFile = Annotated[Path, typer.Argument(help="Recipe (YAML).", show_default=False)]
-DataFolder = Annotated[Path, typer.Argument(help="Folder that `render` wrote.", show_default=False)]
+
+
+def at(path: Path | None) -> Path | None:
+    """The folder of this path, or what is at the URL that it stands for."""
+    from viewsphere.store import located
+
+    return None if path is None else located(path)
+
+
+DataFolder = Annotated[Path, typer.Argument(help="Folder or URL that `render` wrote.", show_default=False, callback=at)]
 Changes = Annotated[
     list[str] | None,
     typer.Option(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -15,6 +15,7 @@ from viewsphere.cli.arguments import (
     Durability,
     FormatOptions,
     asked_formats,
+    at,
     cores,
     split,
     with_options,
@@ -36,7 +37,9 @@ def export(
     format_option: FormatOptions = None,
     output: Annotated[
         Path | None,
-        typer.Option("-o", "--output", help="Folder for the formats' folders; default: the data set's.", show_default=False),
+        typer.Option(
+            "-o", "--output", help="Folder for the formats' folders; default: the data set's.", show_default=False, callback=at
+        ),
     ] = None,
     models: Annotated[
         str | None,
@@ -91,6 +94,9 @@ def check(
     folder: DataFolder,
     sample: Annotated[int, typer.Option(min=0, help="Frames whose labels are computed again.")] = 50,
     all_: Annotated[bool, typer.Option("--all", help="Compute the labels of all frames again.")] = False,
+    fast: Annotated[
+        bool, typer.Option("--fast", help="Compare digests alone, of the store and of exports; no picture is decoded.")
+    ] = False,
     mend: Annotated[
         bool, typer.Option("--repair", help="Render damaged shots again, and write damaged models and exports again.")
     ] = False,
@@ -112,13 +118,14 @@ def check(
     from viewsphere.check.repair import repair
     from viewsphere.store import Dataset
 
-    asked, crew = None if all_ else sample, cores() if workers is None else workers
+    crew = cores() if workers is None else workers
+    options: dict[str, Any] = {"sample": None if all_ else sample, "against_cycles": against_cycles, "fast": fast}
     if mend:
         with ProgressBar(quiet=json_) as bar:
-            repaired = repair(folder, workers=crew, listener=bar.show, sample=asked, against_cycles=against_cycles)
+            repaired = repair(folder, workers=crew, listener=bar.show, **options)
         done, report = repaired.done, repaired.report
     else:
-        done, report = (), prove(Dataset(folder), sample=asked, workers=crew, against_cycles=against_cycles)
+        done, report = (), prove(Dataset(folder), workers=crew, **options)
     if json_:
         print_json({**({"repaired": list(done)} if mend else {}), **report.to_json()})
     else:
@@ -130,7 +137,7 @@ def check(
 def report(
     folder: DataFolder,
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="Page to write; default: report.html in the folder.")
+        Path | None, typer.Option("-o", "--output", help="Page to write; default: report.html in the folder.", callback=at)
     ] = None,
     frames: Annotated[int, typer.Option(min=1, max=2000, help="Frames shown; all are counted.")] = 240,
     proofs: Annotated[bool, typer.Option("--check/--no-check", help="Show what `check` finds.")] = True,

@@ -9,14 +9,16 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from viewsphere.cli import completion
-from viewsphere.cli.arguments import AsJson, Durability, FormatOptions, Formats, asked_formats, with_options
+from viewsphere.cli.arguments import AsJson, Durability, FormatOptions, Formats, asked_formats, at, with_options
 from viewsphere.cli.terminal import MOST_FINDINGS, ProgressBar, print_json
 from viewsphere.errors import UserError
 
 if TYPE_CHECKING:
     from viewsphere.recipe.formats import FormatEntry
 
-NewFolder = Annotated[Path | None, typer.Option("-o", "--output", help="Folder of the new data set.", show_default=False)]
+NewFolder = Annotated[
+    Path | None, typer.Option("-o", "--output", help="Folder of the new data set.", show_default=False, callback=at)
+]
 
 
 def merge(

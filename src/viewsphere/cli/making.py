@@ -20,6 +20,7 @@ from viewsphere.cli.arguments import (
     Formats,
     RecipeFile,
     asked_formats,
+    at,
     cores,
     load_recipe,
     with_options,
@@ -196,7 +197,9 @@ def plan(
 
 
 def preview(
-    source: Annotated[Path, typer.Argument(help="Recipe (YAML), or a folder that `render` wrote.", show_default=False)],
+    source: Annotated[
+        Path, typer.Argument(help="Recipe (YAML), or a folder or URL that `render` wrote.", show_default=False, callback=at)
+    ],
     output: Annotated[Path, typer.Option("-o", "--output", help="Picture to write.")] = Path("preview.png"),
     count: Annotated[int, typer.Option("-n", "--count", min=1, help="Frames shown; of sequences instants.")] = 12,
     draw: Annotated[
@@ -265,7 +268,10 @@ def _write_video(source: Path, file: Path, draw: list[str], sequence: str | None
 
 def render(
     recipe: Annotated[Path | None, typer.Argument(help="Recipe (YAML).", show_default=False)] = None,
-    output: Annotated[Path | None, typer.Option("-o", "--output", help="Folder of the data set.", show_default=False)] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", help="Folder of the data set, or a URL (s3://...).", show_default=False, callback=at),
+    ] = None,
     changes: Changes = None,
     format_: Formats = None,
     format_option: FormatOptions = None,

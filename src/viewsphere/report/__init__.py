@@ -23,6 +23,7 @@ from viewsphere.report.table import FrameTable, read_table
 from viewsphere.report.unknown import numbers
 from viewsphere.store import Dataset, ModelInfo
 from viewsphere.store.films import Film, films_of
+from viewsphere.store.places import here
 
 LIMIT = 20_000_000
 """Bytes that the page may have at most."""
@@ -122,7 +123,8 @@ def _models(dataset: Dataset, table: FrameTable, tell: Listener) -> list[dict[st
     found: list[dict[str, Any]] = []
     for done, info in enumerate(chosen, 1):
         try:
-            shape = {"mesh": mesh_data(read_small(dataset.path(info.glb), most, info.node)), "problem": None}
+            with here(dataset.path(info.glb)) as file:
+                shape = {"mesh": mesh_data(read_small(file, most, info.node)), "problem": None}
         except ViewsphereError as error:
             shape = {"mesh": None, "problem": without_folders(str(error))}
         found.append({"key": info.key, **shape, **_cameras(info, table)})

@@ -18,7 +18,7 @@ from viewsphere.model.rig import CAMERA
 from viewsphere.model.sample import Sample
 from viewsphere.recipe.formats import FormatEntry, Formats, options_of, read_formats
 from viewsphere.run.progress import Listener, Progress, unheard
-from viewsphere.store import Choice, Dataset, Exported, new_folder
+from viewsphere.store import Choice, Dataset, Exported, located, new_folder
 from viewsphere.store.checksums import write_checksums, written_credits, written_frames, written_least, written_options
 from viewsphere.store.credits import credits_digest
 
@@ -40,7 +40,7 @@ def export(
     is no data set or one of the folders cannot be written.
     """
     dataset = Dataset(out, choice)
-    place = dataset.root if output is None else Path(output)
+    place = dataset.root if output is None else located(output)
     is_own = place.resolve() == dataset.root.resolve()
     _check_choice(dataset, is_own)
     if place.resolve().is_relative_to(dataset.store.folder.resolve()):
@@ -55,7 +55,7 @@ def export(
             whole.enter_context(dataset.store.occupied())
         written = [(entry, whole.enter_context(_folder(dataset, place / entry.name, is_own))) for entry in entries]
         notes = (*write(dataset, written, listener or unheard), *_lacks(dataset))
-    kinds = dataset.link_kinds - {"hard link"}
+    kinds = dataset.link_kinds - {"hard link", "download"}
     return tuple(dict.fromkeys(notes)) + tuple(
         f"{dataset.root}: files of the exports are made as a {kind}, hard links do not work here" for kind in sorted(kinds)
     )

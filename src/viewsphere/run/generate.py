@@ -14,7 +14,7 @@ from os import PathLike
 from pathlib import Path
 
 from viewsphere import plugins
-from viewsphere.errors import ModelError, RecipeError, ViewsphereError, WorkerDied, joined
+from viewsphere.errors import ModelError, RecipeError, UserError, ViewsphereError, WorkerDied, joined
 from viewsphere.model.channel import missing
 from viewsphere.model.share import ALL
 from viewsphere.recipe.formats import FormatEntry, Formats, options_of, read_formats
@@ -36,7 +36,7 @@ from viewsphere.run.warm import is_compiled
 from viewsphere.sampling.distances import Distances
 from viewsphere.sampling.extension import Portion
 from viewsphere.sampling.plan import Plan
-from viewsphere.store import Choice, Dataset, Row, Store
+from viewsphere.store import Choice, Dataset, Row, Store, located
 from viewsphere.store.credits import write_credits
 from viewsphere.store.heartbeat import Pulse
 
@@ -105,7 +105,11 @@ def generate(
     recipe = Recipe.of(recipe)
     planned = prepare(recipe)
     wanted = _asked(recipe, formats)
-    store = Store(Path(out))
+    store = Store(located(out))
+    if workers and not store.place.is_shared():
+        raise UserError(
+            f"{store.root}: expected workers 0, as other processes do not see this process's memory; found {workers}"
+        )
     portion = replace(to_append(planned, store) if append else to_render(planned, store), share=share)
     wanted += _others(wanted, store) if portion.number else ()
     with recipe.located():

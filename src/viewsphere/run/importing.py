@@ -10,7 +10,7 @@ from pathlib import Path
 from viewsphere import plugins
 from viewsphere.errors import UserError
 from viewsphere.run.progress import Listener, Progress
-from viewsphere.store import Block, Dataset, Part, PlanRecord, Store
+from viewsphere.store import Block, Dataset, Part, PlanRecord, Store, located
 from viewsphere.store.credits import write_credits
 from viewsphere.store.foreign import ForeignDataset
 from viewsphere.store.linking import link_model, link_shot
@@ -43,7 +43,7 @@ def import_dataset(
     if kind not in known:
         raise UserError(f"import: expected one of {', '.join(known)}; found {kind!r}")
     foreign: ForeignDataset = plugins.load("formats", kind).read(Path(source), keep_going=keep_going)
-    store = Store(Path(out))
+    store = Store(located(out))
     record = _plan_record(foreign)
     with store.opened_for(record):
         for model in foreign.models:

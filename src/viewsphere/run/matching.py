@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +16,7 @@ from viewsphere.model.sample import Sample, Taken
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
 from viewsphere.run.stages import Stages
-from viewsphere.store import Store
+from viewsphere.store import Store, located
 from viewsphere.truth.correspondence import Match
 from viewsphere.truth.shot_views import views_of
 from viewsphere.truth.view import View
@@ -70,7 +69,7 @@ def _shot_of(sample: Sample) -> Shot:
 
 @lru_cache(maxsize=SHOTS)
 def _stored(root: str, key: str) -> Shot | None:
-    return Store(Path(root)).shot(key)
+    return Store(located(root)).shot(key)
 
 
 def _subject(shot: Shot) -> str:
@@ -96,11 +95,11 @@ def _meshes(taken: Taken) -> Callable[[Thing], Mesh]:
 
 @lru_cache(maxsize=64)
 def _exported(root: str, key: str, frame: int | None) -> Mesh:
-    info = Store(Path(root)).model_info(key)
+    info = Store(located(root)).model_info(key)
     if info is None:
         raise StoreError(f"{root}: expected a finished model {key}, found none")
     shown = info.at(frame)
-    return read_exported(Path(root) / shown.glb, shown.parts, shown.node)
+    return read_exported(located(root) / shown.glb, shown.parts, shown.node)
 
 
 def _built(thing: Thing) -> Mesh:

@@ -20,7 +20,7 @@ from viewsphere.model.credit import Credit
 from viewsphere.model.sample import MERGED, ObjectAnnotation, Sample
 from viewsphere.run.progress import Listener, Progress
 from viewsphere.sampling.pose_numbers import kept, names_of
-from viewsphere.store import Block, Category, Dataset, ModelInfo, Part, PlanRecord, Row, Store, encode
+from viewsphere.store import Block, Category, Dataset, ModelInfo, Part, PlanRecord, Row, Store, encode, located
 from viewsphere.store.credits import write_credits
 from viewsphere.store.foreign import ForeignFrame
 from viewsphere.store.index import length
@@ -71,7 +71,7 @@ def merge(
     what is there, and for an `out` that holds other data.
     """
     datasets = [Dataset(source) for source in sources]
-    _check_sources(datasets, Path(out))
+    _check_sources(datasets, located(out))
     if not keep_going:
         _check_whole(datasets)
     if not mixed:
@@ -79,7 +79,7 @@ def merge(
     categories, models, parts = _reconciled(datasets)
     record = _plan_record(parts, categories, models)
     credits = _credits(parts)
-    store = Store(Path(out))
+    store = Store(located(out))
     with store.opened_for(record):
         for part in parts:
             _link_models(part, store, credits)

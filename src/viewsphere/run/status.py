@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from viewsphere.store import Store
+from viewsphere.store import Store, located
 from viewsphere.store.heartbeat import SILENT_S, Heartbeat
 
 
@@ -79,7 +79,7 @@ def status(out: Path | str | os.PathLike[str]) -> Status:
 
     Nothing is written, and no shot is opened: it takes as long as listing the finished shots, however many are planned.
     """
-    store = Store(Path(out))
+    store = Store(located(out))
     plan = store.plan()
     done, skipped = tuple(store.finished()), store.skipped()
     return Status(

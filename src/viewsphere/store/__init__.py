@@ -1,4 +1,5 @@
-"""The store: finished shots on disk, each written aside and renamed when whole, and the data set they make up.
+"""The store: finished shots, each written aside and put in its place when whole, and the data set they make up. It lies on a
+disk or at a URL (`places`).
 
     OUT/store/plan.json                        the plan: what a recipe asked for
     OUT/store/models/<key>/                    the normalised model (OBJ, GLB) and model.json
@@ -19,6 +20,7 @@ from viewsphere.store.dataset import Dataset
 from viewsphere.store.exported import Exported
 from viewsphere.store.folder import Store, new_folder
 from viewsphere.store.index import Block, Row
+from viewsphere.store.places import located
 from viewsphere.store.records import Category, ModelInfo, Part, PlanRecord
 
 __all__ = [
@@ -37,5 +39,6 @@ __all__ = [
     "depth_step",
     "encode",
     "frame_ranges",
+    "located",
     "new_folder",
 ]

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.errors import MissingExtraError, StoreError, UserError
+from viewsphere.errors import MissingExtraError, RemoteError, StoreError, UserError
 from viewsphere.model.channel import Channel
 from viewsphere.model.files import Files
 
@@ -60,6 +60,8 @@ def depth_step(file: Path) -> float:
     try:
         data = file.read_bytes()
         return (png_tiff.png_unit(data) or 0.0) if data[:4] == b"\x89PNG" else 0.0
+    except RemoteError:
+        raise
     except (OSError, UserError) as error:
         raise StoreError(f"{file}: expected a readable file, found: {error}") from None
 
@@ -110,7 +112,7 @@ def decode(channel: Channel, file: Path, written: Callable[[bytes], None] | None
             raise UserError(f"expected {np.dtype(channel.dtype)}, found {array.dtype}")
     except MissingExtraError as error:
         raise MissingExtraError(f"{file}: {error}") from None
-    except StoreError:
+    except (StoreError, RemoteError):
         raise
     except (OSError, ValueError, SyntaxError, UserError) as error:
         problem = (error.strerror if isinstance(error, OSError) else None) or error

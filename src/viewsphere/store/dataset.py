@@ -27,6 +27,7 @@ from viewsphere.store.index import Row
 from viewsphere.store.linking import link_file
 from viewsphere.store.manifest import MANIFEST, Manifest
 from viewsphere.store.paths import file_inside, files_inside, names
+from viewsphere.store.places import located
 from viewsphere.store.point_tracks import PointTracks, joined
 from viewsphere.store.records import Category, ModelInfo
 from viewsphere.store.sample_records import ShotRecords, from_whole_sample
@@ -42,7 +43,7 @@ class Dataset(Shown, Sequence[Sample]):
     """
 
     def __init__(self, root: str | os.PathLike[str], choice: Choice | None = None) -> None:
-        self.root = Path(root)
+        self.root = located(root)
         self.choice = choice or Choice()
         self.store = Store(self.root)
         self.plan = self.store.plan()

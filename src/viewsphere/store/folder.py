@@ -1,23 +1,21 @@
-"""The store's folder: finished shots and models, each written aside and renamed when whole."""
+"""The store's folder: finished shots and models, each written aside and put in its place when whole."""
 
 from __future__ import annotations
 
-import errno
 import hashlib
 import json
 import os
-import shutil
 from collections import defaultdict
 from collections.abc import Generator, Iterable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
 from dataclasses import dataclass, replace
-from itertools import chain, count
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
 
-from viewsphere.aside import Aside, aside, left_by_dead, lives, of_this_process, sweep
+from viewsphere.aside import lives
 from viewsphere.errors import StoreError
 from viewsphere.labels import channels
 from viewsphere.model.files import Files
@@ -31,21 +29,14 @@ from viewsphere.store.index import Index, Row
 from viewsphere.store.manifest import MANIFEST, Manifest, Seal, digest, refuse_another, seal_of
 from viewsphere.store.moving import move
 from viewsphere.store.paths import file_inside
+from viewsphere.store.places import place_of
+from viewsphere.store.places.local import NEW, disk_errors
 from viewsphere.store.records import ModelInfo, PlanRecord
 from viewsphere.store.sample_records import short_sample, whole_sample
 from viewsphere.store.texts import parsed
 
-NEW, OLD = "new", "old"
-"""What is being made, aside; and below the other, by its path in the data set, what it takes the place of."""
-
 RUN = "run.json"
 """The heartbeat of a run, in the folder that it has aside, which goes with it."""
-
-LOCK_S = 600
-"""Seconds that a run waits for others who change what runs have in common, which takes them moments."""
-
-NO_LOCKS = {errno.ENOLCK, errno.ENOSYS, errno.ENOTSUP, errno.EOPNOTSUPP}
-"""What file systems say that have no locks."""
 
 
 @dataclass(frozen=True)
@@ -67,6 +58,7 @@ class Store:
 
     def __init__(self, root: Path) -> None:
         self.root = root
+        self.place = place_of(root)
         self.folder = root / "store"
 
     @property
@@ -103,11 +95,11 @@ class Store:
         self.make_ready()
         with self.locked():
             if self.plan_file.exists():
-                if any((self.folder / "writing").iterdir()) or any((self.folder / "shots").glob("*/*")):
+                if self.place.is_begun():
                     self._refuse_other(plan)
                     return
                 if not self._is_of(plan):
-                    shutil.rmtree(self.folder / "models", ignore_errors=True)
+                    self.place.remove(self.folder / "models")
                     self.forget_failures()
             self._write_atomically(self.plan_file, plan.to_json())
 
@@ -115,26 +107,24 @@ class Store:
     def opened_for(self, plan: PlanRecord) -> Generator[Path]:
         """`open_for`, then `occupied`, with nobody else in between."""
         self._refuse_strangers()
-        self._make(self.folder / "writing")
+        self.make_ready()
         with ExitStack() as stack:
             with self.locked():
                 self.open_for(plan)
                 own = stack.enter_context(self.occupied())
             yield own
 
-    @contextmanager
-    def occupied(self) -> Generator[Path]:
-        """Show other runs that this one is at work, by a folder that it has aside as long as the block lasts; then what workers
-        left that died goes, too.
+    def occupied(self) -> AbstractContextManager[Path]:
+        """Show other runs that this one is at work, by a folder of this machine that it has aside as long as the block lasts;
+        then what workers left that died goes, too.
         """
-        with _disk_errors(self.root):
-            own = Aside.make(self.folder / "writing")
-        try:
-            yield own.folder
-        finally:
-            own.remove()
-            with suppress(OSError):
-                self._sweep()
+        return self.place.occupied()
+
+    def locked(self) -> AbstractContextManager[None]:
+        """Nobody else changes what runs have in common (the plan, what was left out, credits) as long as the block lasts, where
+        that can be known. Blocks may be nested; a lock ends with its process.
+        """
+        return self.place.locked()
 
     @contextmanager
     def telling(self, own: Path, shard: tuple[int, int]) -> Generator[Pulse]:
@@ -154,37 +144,12 @@ class Store:
 
     def _note_failure(self, note: Path, text: str) -> None:
         with suppress(OSError, StoreError):  # the error itself is what is told
-            note.parent.mkdir(exist_ok=True)
             self._write_atomically(note, text)
 
     def _tell(self, own: Path, text: str) -> None:
-        with _disk_errors(self.root):
+        with disk_errors(self.root):
             (own / NEW).write_text(text, "utf-8", newline="\n")
             move(own / NEW, own / RUN)
-
-    @contextmanager
-    def locked(self) -> Generator[None]:
-        """Nobody else changes what runs have in common (the plan, what was left out, credits) as long as the block lasts, where
-        the file system has locks. Blocks may be nested; a lock ends with its process.
-        """
-        from filelock import FileLock, Timeout
-
-        lock = FileLock(self.folder.absolute() / "lock", timeout=LOCK_S, is_singleton=True)
-        with _disk_errors(self.root):
-            try:
-                lock.acquire()
-            except Timeout:
-                raise StoreError(
-                    f"{lock.lock_file}: expected other runs to be done with it within {LOCK_S} s, found one that is not: "
-                    "end it if it hangs, or try again"
-                ) from None
-            except OSError as error:
-                if error.errno not in NO_LOCKS:
-                    raise
-        try:
-            yield
-        finally:
-            lock.release()
 
     def heartbeats(self) -> tuple[tuple[Heartbeat, bool | None], ...]:
         """What the runs at work told last, and whether each of them lives, None where that is not known: also those that died,
@@ -199,7 +164,7 @@ class Store:
 
     def forget_failures(self) -> None:
         """Remove the notes of runs that failed."""
-        shutil.rmtree(self._failed, ignore_errors=True)
+        self.place.remove(self._failed)
 
     @property
     def _failed(self) -> Path:
@@ -234,10 +199,7 @@ class Store:
 
     def finished(self) -> Iterator[str]:
         """Keys of all shots that are there, in no order."""
-        with suppress(FileNotFoundError):
-            for group in os.scandir(self.folder / "shots"):
-                shots = os.scandir(group.path)
-                yield from (shot.name for shot in shots if os.path.exists(f"{shot.path}/{MANIFEST}"))  # noqa: PTH110
+        return self.place.finished()
 
     def wanted(self, plan: PlanRecord) -> Iterator[Row]:
         """The shots of a plan, those with channels that were added later last, but for what was left out at the user's wish."""
@@ -247,25 +209,21 @@ class Store:
 
     def drop_unnamed_models(self) -> None:
         """Remove the models that the plan does not name, unless another run is at work on them."""
-        own = of_this_process()
         with self.locked():
-            if any(not path.name.startswith(own) for path in (self.folder / "writing").iterdir()):
+            if self.place.others_at_work():
                 return
             named = set(self.plan().models)
             for folder in (self.folder / "models").glob("*"):
                 if folder.name not in named:
-                    shutil.rmtree(folder, ignore_errors=True)
+                    self.place.remove(folder)
 
     def make_ready(self) -> None:
         """See that the folder can be written, and clear what dead runs left; raises StoreError if it cannot."""
-        self._make(self.folder / "writing")
-        with _disk_errors(self.root):
-            self._sweep()
+        self.place.make()
 
     def _refuse_strangers(self) -> None:
         """Raise StoreError for a folder with files that viewsphere did not make."""
-        is_ours = self.plan_file.exists() or (self.folder / "writing").is_dir()
-        if not is_ours and self.root.is_dir() and any(self.root.iterdir()):
+        if not self.plan_file.exists() and self.place.is_foreign():
             raise StoreError(f"{self.root}: expected an empty or new folder, found other files: choose another output folder")
 
     def _is_of(self, plan: PlanRecord) -> bool:
@@ -291,36 +249,10 @@ class Store:
                 "install that version to go on, or choose another output folder"
             )
 
-    def _make(self, folder: Path) -> None:
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise StoreError(f"{self.root}: expected a writable output folder, found {error.strerror or error}") from None
-        if not os.access(folder, os.W_OK):
-            raise StoreError(f"{self.root}: expected a writable output folder, found one that cannot be written")
-
-    @contextmanager
-    def _own(self) -> Generator[Path]:
-        """A folder for what is not whole yet, as long as the block lasts; StoreError for what the disk refuses meanwhile."""
-        writing = self.folder / "writing"
-        with _disk_errors(self.root):
-            writing.mkdir(parents=True, exist_ok=True)
-            with aside(writing) as own:
-                yield own
-
     def _write_atomically(self, file: Path, text: str) -> None:
-        with self._own() as own:
+        with self.place.aside() as own:
             (own / NEW).write_text(text, "utf-8", newline="\n")
-            move(own / NEW, file)
-
-    def _sweep(self) -> None:
-        """Remove what dead writers left unfinished; what they were about to replace comes back."""
-        for left in left_by_dead(self.folder / "writing"):
-            for old in _replaced(left / OLD):
-                target = self.root / old.relative_to(left / OLD)
-                if not target.exists():
-                    target.parent.mkdir(parents=True, exist_ok=True)
-                    move(old, target)
+            self.place.put(own / NEW, file)
 
     def shot_folder(self, key: str) -> Path:
         """Where a finished shot lies."""
@@ -353,34 +285,17 @@ class Store:
         If another writer finished the same target first, that one stays: both hold the same bytes. With `again` it takes the
         place of a damaged one; raises StoreError where it is not equal to what that was before, as far as that is known.
         """
-        with self._own() as own:
+        with self.place.aside() as own:
             folder = own / NEW
             folder.mkdir()
             yield folder
             if not (folder / MANIFEST).is_file():
                 Manifest.of(folder).write(folder)
-            target.parent.mkdir(parents=True, exist_ok=True)
             if again and target.is_dir():
                 refuse_another(target, folder)
-                self._replace(folder, target)
+                self.place.replace(folder, target)
             else:
-                _become(folder, target)
-
-    def _replace(self, folder: Path, target: Path) -> None:
-        """Put a folder that lies aside in the place of another, which goes with what is aside; and so does what other runs put
-        there at this moment.
-        """
-        old = folder.parent / OLD / target.relative_to(self.root)
-        old.parent.mkdir(parents=True)
-        for another in count():
-            with suppress(FileNotFoundError):  # there is none, or another run has moved it
-                move(target, folder.parent / f"{another}" if old.exists() else old)
-            try:
-                move(folder, target)
-                return
-            except OSError:
-                if not target.exists():
-                    raise
+                self.place.put(folder, target)
 
     @contextmanager
     def replacing(self, target: Path) -> Generator[Path]:
@@ -389,14 +304,13 @@ class Store:
         """
         if target == self.folder:
             raise StoreError(f"{target}: expected a format's name, found the store's")
-        self._make(self.folder / "writing")
-        with self._own() as own:
+        with self.place.aside() as own:
             folder = own / NEW
             folder.mkdir()
             yield folder
             if target.parent == self.folder / "models":
                 Manifest.of(folder).write(folder)
-            self._replace(folder, target)
+            self.place.replace(folder, target)
 
     def write_file(self, name: str, text: str) -> None:
         """Write a small file of the store in one step."""
@@ -534,36 +448,9 @@ def _no_scene(file: Path, error: Exception) -> StoreError:
     )
 
 
-def _replaced(old: Path) -> Iterator[Path]:
-    """The models, shots and exports that lie here by their paths in a data set; no links that lead elsewhere."""
-    exports = (path for path in old.glob("*") if path.name != "store")
-    for path in chain(old.glob("store/models/*"), old.glob("store/shots/*/*"), exports):
-        if path.resolve() == old.resolve() / path.relative_to(old):
-            yield path
-
-
-@contextmanager
-def new_folder(target: Path) -> Generator[Path]:
+def new_folder(target: Path) -> AbstractContextManager[Path]:
     """A folder to write into that becomes `target` when the block ends well; raises StoreError where files lie there."""
-    place, prefix = target.parent, f"{target.name}~"
-    missing = [parent for parent in target.parents if not parent.exists()]
-    try:
-        with _disk_errors(target):
-            if target.exists() and (not target.is_dir() or any(target.iterdir())):
-                raise StoreError(f"{target}: expected an empty or new folder, found other files: choose another, or delete it")
-            place.mkdir(parents=True, exist_ok=True)
-            sweep(place, prefix)
-            with aside(place, prefix) as own:
-                folder = own / NEW
-                folder.mkdir()
-                yield folder
-                if target.exists():
-                    target.rmdir()
-                move(folder, target)
-    finally:
-        for parent in missing:
-            with suppress(OSError):  # something is in it
-                parent.rmdir()
+    return place_of(target).new()
 
 
 def channel_path(channel: str, sample: int, kinds: Files | None = None) -> str:
@@ -580,25 +467,6 @@ def _write(file: str, data: bytes) -> None:
             left = left[os.write(descriptor, left) :]
     finally:
         os.close(descriptor)
-
-
-def _become(folder: Path, target: Path) -> None:
-    try:
-        if target.is_dir() and not (target / MANIFEST).is_file():
-            shutil.rmtree(target)
-        move(folder, target)
-    except OSError:
-        if not target.is_dir():
-            raise
-
-
-@contextmanager
-def _disk_errors(root: Path) -> Generator[None]:
-    """Say in one line what the disk refused; what is finished stays."""
-    try:
-        yield
-    except OSError as error:
-        raise StoreError(f"{root}: expected to write, found: {error.strerror or error}; what is finished is kept") from error
 
 
 def _found(indices: Iterable[Index], keys: Iterable[str]) -> list[Row]:

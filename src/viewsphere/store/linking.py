@@ -15,12 +15,18 @@ from viewsphere.labels import channels
 from viewsphere.store.folder import Store
 from viewsphere.store.foreign import ForeignFrame
 from viewsphere.store.manifest import MANIFEST
+from viewsphere.store.places import RemotePath, download
 from viewsphere.store.records import ModelInfo
 from viewsphere.store.sample_records import whole_sample
 
 
 def link_file(source: Path, destination: Path) -> str:
-    """Put a file at `destination`, which must not exist: as a `hard link`, else a `reflink`, else a `copy`; returns which."""
+    """Put a file at `destination` on a disk, which must not exist: as a `hard link`, else a `reflink`, else a `copy`; returns
+    which. What lies at a URL is a `download`.
+    """
+    if isinstance(source, RemotePath):
+        download(source, destination)
+        return "download"
     with suppress(OSError):
         os.link(source, destination)
         return "hard link"

@@ -12,6 +12,7 @@ from pathlib import Path, PurePosixPath, PureWindowsPath
 from stat import S_ISLNK
 
 from viewsphere.errors import StoreError
+from viewsphere.store.places import RemotePath
 
 _PLAIN = re.compile(r"[\w+-][\w+.-]*(?:/[\w+-][\w+.-]*)*", re.ASCII)
 """Relative paths that mean the same on every system; other ones are looked at more closely."""
@@ -28,7 +29,7 @@ def file_inside(root: Path, relative: str) -> Path:
             "data set"
         )
     file = root / relative
-    if _is_straight(root, relative):
+    if isinstance(file, RemotePath) or _is_straight(root, relative):
         return file
     try:
         leads_to = file.resolve()

@@ -37,6 +37,7 @@ from viewsphere.model.scene import Matrix4, Scene
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Motion, Thing, TimeStep
 from viewsphere.store import Dataset
+from viewsphere.store.places import here
 from viewsphere.zoo import build
 
 ENGINE = "cycles"
@@ -197,10 +198,10 @@ class StoredModels:
         info = model and next((one for one in (model, *model.steps) if one.key == own), None)
         if info is None:
             raise StoreError(f"{self.dataset.root}: expected model {own!r} in the store, found none: render again")
-        file = self.dataset.path(info.glb).absolute()
-        if info.node is None:
-            return load_normalised(_spec(own, str(file)))
-        return normalise(*load_model(file, node=info.node), _spec(own, str(file)))
+        with here(self.dataset.path(info.glb).absolute()) as file:
+            if info.node is None:
+                return load_normalised(_spec(own, str(file)))
+            return normalise(*load_model(file, node=info.node), _spec(own, str(file)))
 
 
 def _from_zoo(spec: ModelSpec) -> Mesh:

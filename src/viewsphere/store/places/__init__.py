@@ -1,0 +1,168 @@
+"""Where data sets lie: on a disk, or at a URL of any kind that fsspec knows (`s3://`, `gs://`, `az://`, `memory://`, ...).
+
+A data set's root is a path, and all else is named below it. The root of one on a disk is a `pathlib.Path`; that of one at a URL
+is a `RemotePath`, which has those methods of a Path that read and list, and no others, so that nothing is done to the disk by
+mistake:
+
+    read    path.read_bytes(), path.read_text(), path.open() in blocks; `byte_range` of a file
+    list    path.iterdir(), path.glob(), path.is_file(), path.is_dir(), path.stat(); `files_below` a folder
+    link    `store.linking.link_file`: hard links on one disk, else a copy
+    local   `here`: a file or folder for programs that need it on this machine
+
+What is written goes by a `Place`: it is made in a folder of this machine's that is aside, and put in its place when it is
+whole. A disk does that by a rename. A URL has none: files are uploaded, and the one that tells that a folder is whole comes
+last; a folder without it is absent, and is made again over what is there. No run knows of others at a URL: those that make
+the same shot put the same bytes there. Files of the store are never changed, so nothing has to be locked to be read.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+from collections.abc import Generator, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from pathlib import Path
+from typing import Protocol
+
+from viewsphere.aside import temporary
+from viewsphere.store.places.remote_path import RemotePath
+
+_URL = re.compile(r"[A-Za-z][A-Za-z0-9+.:-]+:/")
+"""How a URL begins, also where pathlib has made one slash of two; drives of Windows have but one letter."""
+
+
+class Place(Protocol):
+    """Writes a data set below its root."""
+
+    def make(self) -> None:
+        """See that it can be written, and clear what dead runs left; raises StoreError if it cannot."""
+        ...
+
+    def is_foreign(self) -> bool:
+        """Whether there are files which no store has, though nothing tells of a store."""
+        ...
+
+    def is_begun(self) -> bool:
+        """Whether any shot is there, or another run is at work."""
+        ...
+
+    def is_shared(self) -> bool:
+        """Whether other processes find there what this one writes."""
+        ...
+
+    def others_at_work(self) -> bool:
+        """Whether another run is at work; False where nothing is known of others."""
+        ...
+
+    def occupied(self) -> AbstractContextManager[Path]:
+        """Show other runs that this one is at work, by a folder of this machine that is aside as long as the block lasts; then
+        what workers left that died goes, too.
+        """
+        ...
+
+    def locked(self) -> AbstractContextManager[None]:
+        """Nobody else changes what runs have in common as long as the block lasts, where that can be known. Blocks may be
+        nested.
+        """
+        ...
+
+    def aside(self) -> AbstractContextManager[Path]:
+        """A folder of this machine for what is not whole yet, as long as the block lasts; StoreError for what the disk refuses
+        meanwhile.
+        """
+        ...
+
+    def put(self, made: Path, target: Path) -> None:
+        """Put a file or folder that lies aside in its place. A file takes the place of another; where another writer finished
+        the same folder first, that one stays.
+        """
+        ...
+
+    def replace(self, made: Path, target: Path) -> None:
+        """Put a folder that lies aside in the place of another one."""
+        ...
+
+    def remove(self, folder: Path) -> None:
+        """Remove a folder of the data set with all that is in it, as far as that is possible."""
+        ...
+
+    def finished(self) -> Iterator[str]:
+        """Keys of all shots whose manifest is there, in no order."""
+        ...
+
+    def new(self) -> AbstractContextManager[Path]:
+        """A folder to write into that becomes the root itself when the block ends well; raises StoreError where files lie
+        there.
+        """
+        ...
+
+
+def located(root: str | os.PathLike[str]) -> Path:
+    """The path of a data set's root: that of a folder, or a `RemotePath` for a URL. Raises UserError for a URL with a password,
+    which would be shown and kept.
+    """
+    if isinstance(root, RemotePath):
+        return root
+    text = os.fspath(root)
+    if not _URL.match(text):
+        return Path(root)
+    if text.startswith("file:"):
+        return Path("/" + text.removeprefix("file:").lstrip("/"))
+    return RemotePath.of(text)
+
+
+def place_of(root: Path) -> Place:
+    """What writes below this root."""
+    if isinstance(root, RemotePath):
+        from viewsphere.store.places.remote import Remote
+
+        return Remote(root)
+    from viewsphere.store.places.local import Local
+
+    return Local(root)
+
+
+def files_below(folder: Path) -> Iterator[str]:
+    """Paths, from a folder, of all files in it and below, in an order that does not depend on the disk."""
+    if isinstance(folder, RemotePath):
+        yield from folder.files_below()
+        return
+    for place, folders, names in os.walk(folder):
+        folders.sort()
+        inside = Path(place).relative_to(folder)
+        yield from ((inside / name).as_posix() for name in sorted(names))
+
+
+def byte_range(file: Path, start: int, size: int) -> bytes:
+    """So many bytes of a file from `start` on, fewer where it ends before; raises OSError as reading does."""
+    if isinstance(file, RemotePath):
+        return file.byte_range(start, size)
+    with file.open("rb") as stream:
+        stream.seek(start)
+        return stream.read(size)
+
+
+@contextmanager
+def here(path: Path) -> Generator[Path]:
+    """A file or a folder on this machine, for as long as the block lasts: itself, or a copy of the same name of what lies at a
+    URL.
+    """
+    if not isinstance(path, RemotePath):
+        yield path
+        return
+    with temporary("copy") as folder:
+        copy = folder / path.name
+        if path.is_file():
+            download(path, copy)
+        else:
+            for inside in path.files_below():
+                download(path / inside, copy / inside)
+        yield copy
+
+
+def download(file: Path, destination: Path) -> None:
+    """Copy a file from a URL to a disk, block by block."""
+    destination.parent.mkdir(parents=True, exist_ok=True)
+    with file.open("rb") as read, destination.open("wb") as write:
+        shutil.copyfileobj(read, write)

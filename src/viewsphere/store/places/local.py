@@ -1,0 +1,205 @@
+"""A data set on a disk: folders are made aside, and renamed when they are whole."""
+
+from __future__ import annotations
+
+import errno
+import os
+import shutil
+from collections.abc import Generator, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from itertools import chain, count
+from pathlib import Path
+
+from viewsphere.aside import Aside, aside, left_by_dead, of_this_process, sweep
+from viewsphere.errors import StoreError
+from viewsphere.store.manifest import MANIFEST
+from viewsphere.store.moving import move
+
+NEW, OLD = "new", "old"
+"""What is being made, aside; and below the other, by its path in the data set, what it takes the place of."""
+
+LOCK_S = 600
+"""Seconds that a run waits for others who change what runs have in common, which takes them moments."""
+
+NO_LOCKS = {errno.ENOLCK, errno.ENOSYS, errno.ENOTSUP, errno.EOPNOTSUPP}
+"""What file systems say that have no locks."""
+
+
+@dataclass(frozen=True)
+class Local:
+    """Writes a data set below a folder."""
+
+    root: Path
+
+    @property
+    def _store(self) -> Path:
+        return self.root / "store"
+
+    @property
+    def _writing(self) -> Path:
+        return self._store / "writing"
+
+    def make(self) -> None:
+        """As `Place` says."""
+        try:
+            self._writing.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise StoreError(f"{self.root}: expected a writable output folder, found {error.strerror or error}") from None
+        if not os.access(self._writing, os.W_OK):
+            raise StoreError(f"{self.root}: expected a writable output folder, found one that cannot be written")
+        with disk_errors(self.root):
+            self._sweep()
+
+    def is_foreign(self) -> bool:
+        """As `Place` says."""
+        return self.root.is_dir() and any(self.root.iterdir()) and not self._writing.is_dir()
+
+    def is_begun(self) -> bool:
+        """As `Place` says."""
+        return any(self._writing.iterdir()) or any((self._store / "shots").glob("*/*"))
+
+    def is_shared(self) -> bool:
+        """As `Place` says."""
+        return True
+
+    def others_at_work(self) -> bool:
+        """As `Place` says."""
+        own = of_this_process()
+        return any(not path.name.startswith(own) for path in self._writing.iterdir())
+
+    @contextmanager
+    def occupied(self) -> Generator[Path]:
+        """As `Place` says."""
+        with disk_errors(self.root):
+            own = Aside.make(self._writing)
+        try:
+            yield own.folder
+        finally:
+            own.remove()
+            with suppress(OSError):
+                self._sweep()
+
+    @contextmanager
+    def locked(self) -> Generator[None]:
+        """As `Place` says."""
+        from filelock import FileLock, Timeout
+
+        lock = FileLock(self._store.absolute() / "lock", timeout=LOCK_S, is_singleton=True)
+        with disk_errors(self.root):
+            try:
+                lock.acquire()
+            except Timeout:
+                raise StoreError(
+                    f"{lock.lock_file}: expected other runs to be done with it within {LOCK_S} s, found one that is not: "
+                    "end it if it hangs, or try again"
+                ) from None
+            except OSError as error:
+                if error.errno not in NO_LOCKS:
+                    raise
+        try:
+            yield
+        finally:
+            lock.release()
+
+    @contextmanager
+    def aside(self) -> Generator[Path]:
+        """As `Place` says."""
+        with disk_errors(self.root):
+            self._writing.mkdir(parents=True, exist_ok=True)
+            with aside(self._writing) as own:
+                yield own
+
+    def put(self, made: Path, target: Path) -> None:
+        """As `Place` says."""
+        target.parent.mkdir(parents=True, exist_ok=True)
+        if made.is_file():
+            move(made, target)
+            return
+        try:
+            if target.is_dir() and not (target / MANIFEST).is_file():
+                shutil.rmtree(target)
+            move(made, target)
+        except OSError:
+            if not target.is_dir():
+                raise
+
+    def replace(self, made: Path, target: Path) -> None:
+        """As `Place` says. The old folder goes with what is aside; and so does what other runs put there at this moment. It is
+        never lost: where a run dies between the two, the next one puts it back.
+        """
+        target.parent.mkdir(parents=True, exist_ok=True)
+        old = made.parent / OLD / target.relative_to(self.root)
+        old.parent.mkdir(parents=True)
+        for another in count():
+            with suppress(FileNotFoundError):  # there is none, or another run has moved it
+                move(target, made.parent / f"{another}" if old.exists() else old)
+            try:
+                move(made, target)
+                return
+            except OSError:
+                if not target.exists():
+                    raise
+
+    def remove(self, folder: Path) -> None:
+        """As `Place` says."""
+        shutil.rmtree(folder, ignore_errors=True)
+
+    def finished(self) -> Iterator[str]:
+        """As `Place` says."""
+        with suppress(FileNotFoundError):
+            for group in os.scandir(self._store / "shots"):
+                shots = os.scandir(group.path)
+                yield from (shot.name for shot in shots if os.path.exists(f"{shot.path}/{MANIFEST}"))  # noqa: PTH110
+
+    def _sweep(self) -> None:
+        """Remove what dead writers left unfinished; what they were about to replace comes back."""
+        for left in left_by_dead(self._writing):
+            for old in _replaced(left / OLD):
+                target = self.root / old.relative_to(left / OLD)
+                if not target.exists():
+                    target.parent.mkdir(parents=True, exist_ok=True)
+                    move(old, target)
+
+    @contextmanager
+    def new(self) -> Generator[Path]:
+        """As `Place` says."""
+        target = self.root
+        place, prefix = target.parent, f"{target.name}~"
+        missing = [parent for parent in target.parents if not parent.exists()]
+        try:
+            with disk_errors(target):
+                if target.exists() and (not target.is_dir() or any(target.iterdir())):
+                    raise StoreError(
+                        f"{target}: expected an empty or new folder, found other files: choose another, or delete it"
+                    )
+                place.mkdir(parents=True, exist_ok=True)
+                sweep(place, prefix)
+                with aside(place, prefix) as own:
+                    folder = own / NEW
+                    folder.mkdir()
+                    yield folder
+                    if target.exists():
+                        target.rmdir()
+                    move(folder, target)
+        finally:
+            for parent in missing:
+                with suppress(OSError):  # something is in it
+                    parent.rmdir()
+
+
+def _replaced(old: Path) -> Iterator[Path]:
+    """The models, shots and exports that lie here by their paths in a data set; no links that lead elsewhere."""
+    exports = (path for path in old.glob("*") if path.name != "store")
+    for path in chain(old.glob("store/models/*"), old.glob("store/shots/*/*"), exports):
+        if path.resolve() == old.resolve() / path.relative_to(old):
+            yield path
+
+
+@contextmanager
+def disk_errors(root: Path) -> Generator[None]:
+    """Say in one line what the disk refused; what is finished stays."""
+    try:
+        yield
+    except OSError as error:
+        raise StoreError(f"{root}: expected to write, found: {error.strerror or error}; what is finished is kept") from error

@@ -1,0 +1,133 @@
+"""A data set at a URL: folders are made on this machine, and uploaded file by file when they are whole."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
+from dataclasses import dataclass
+from itertools import chain
+from pathlib import Path
+from typing import TypeVar, cast
+
+from viewsphere.aside import temporary
+from viewsphere.errors import StoreError
+from viewsphere.store.checksums import CHECKSUMS
+from viewsphere.store.manifest import MANIFEST
+from viewsphere.store.places import files_below
+from viewsphere.store.places.local import NEW, disk_errors
+from viewsphere.store.places.remote_path import RemotePath
+
+AT_ONCE = 16
+"""Files that are uploaded or asked for at once: storages answer many requests in the time of one."""
+
+TELLING = (CHECKSUMS, MANIFEST, "model.json")
+"""Files that tell what lies in a folder, in the order in which they are uploaded, after all others; the last one of them that
+a folder has tells that it is whole.
+"""
+
+Item = TypeVar("Item")
+Made = TypeVar("Made")
+
+
+@dataclass(frozen=True)
+class Remote:
+    """Writes a data set below a URL."""
+
+    root: RemotePath
+
+    def make(self) -> None:
+        """As `Place` says; whether it can be written shows when the first file is."""
+
+    def is_foreign(self) -> bool:
+        """As `Place` says."""
+        return any(self.root.glob("*"))
+
+    def is_begun(self) -> bool:
+        """As `Place` says; of other runs nothing is known."""
+        return any(True for _ in self.finished())
+
+    def is_shared(self) -> bool:
+        """As `Place` says."""
+        return self.root.is_shared
+
+    def others_at_work(self) -> bool:
+        """As `Place` says; nothing is known of others."""
+        return False
+
+    def occupied(self) -> AbstractContextManager[Path]:
+        """As `Place` says; others do not see it."""
+        return temporary("run")
+
+    def locked(self) -> AbstractContextManager[None]:
+        """As `Place` says; nothing is known of others."""
+        return nullcontext()
+
+    @contextmanager
+    def aside(self) -> Generator[Path]:
+        """As `Place` says."""
+        with disk_errors(self.root), temporary("aside") as own:
+            yield own
+
+    def put(self, made: Path, target: Path) -> None:
+        """As `Place` says."""
+        place = cast(RemotePath, target)
+        if made.is_file():
+            place.upload(made)
+            return
+        paths = list(files_below(made))
+        telling = [name for name in TELLING if name in paths]
+        if telling and (place / telling[-1]).is_file():
+            return
+        _each(lambda path: (place / path).unlink(), set(place.files_below()) - set(paths))  # of a run that was ended
+        _each(lambda path: (place / path).upload(made / path), [path for path in paths if path not in telling])
+        for name in telling:
+            (place / name).upload(made / name)
+
+    def replace(self, made: Path, target: Path) -> None:
+        """As `Place` says. The old folder is absent from the first file on, and the new one is there with the last."""
+        place = cast(RemotePath, target)
+        for name in reversed(TELLING):
+            (place / name).unlink()
+        self.put(made, place)
+
+    def remove(self, folder: Path) -> None:
+        """As `Place` says."""
+        place = cast(RemotePath, folder)
+        for name in reversed(TELLING):
+            (place / name).unlink()
+        _each(lambda path: (place / path).unlink(), place.files_below())
+
+    def finished(self) -> Iterator[str]:
+        """As `Place` says. Folders of shots are listed group by group, with all that is in them: a thousand files an answer."""
+        groups = list((self.root / "store" / "shots").glob("*"))
+        yield from chain.from_iterable(_each(_finished_of, groups))
+
+    @contextmanager
+    def new(self) -> Generator[Path]:
+        """As `Place` says."""
+        if self.is_foreign():
+            raise StoreError(f"{self.root}: expected an empty or new folder, found other files: choose another, or delete it")
+        with self.aside() as own:
+            folder = own / NEW
+            folder.mkdir()
+            yield folder
+            self.put(folder, self.root)
+
+
+def _finished_of(group: RemotePath) -> list[str]:
+    """Keys of the shots of a group whose manifest is there."""
+    parted = (path.partition("/") for path in group.files_below())
+    return [key for key, _, file in parted if file == MANIFEST]
+
+
+def _each(work: Callable[[Item], Made], items: Iterable[Item]) -> list[Made]:
+    """What becomes of each item, in order, several at once; the first error ends it."""
+    with ThreadPoolExecutor(AT_ONCE) as pool:
+        futures = [pool.submit(work, item) for item in items]
+        try:
+            return [future.result() for future in futures]
+        except BaseException:
+            with suppress(Exception):
+                pool.shutdown(wait=False, cancel_futures=True)
+            raise

@@ -1,0 +1,305 @@
+"""A file or folder at a URL, read through fsspec. What does not answer is asked again, a few times, and then told in a line."""
+
+from __future__ import annotations
+
+import errno
+import io
+import os
+import re
+import time
+from collections.abc import Callable, Generator
+from fnmatch import fnmatchcase
+from typing import IO, TYPE_CHECKING, Any, TypeVar
+
+from viewsphere.errors import MissingExtraError, RemoteError, UserError
+from viewsphere.limits import limits
+
+if TYPE_CHECKING:
+    from pathlib import Path
+    from pathlib import Path as Base
+else:
+    from pathlib import PurePosixPath as Base
+
+Answer = TypeVar("Answer")
+
+BLOCK = 8 << 20
+"""Bytes of a larger file that are asked for at once."""
+
+FIRST_WAIT_S = 0.2
+"""Seconds before the second try; before each further one it is three times as long."""
+
+MISTAKES = (TypeError, AttributeError, NameError, NotImplementedError, MemoryError)
+"""Exceptions that no further try mends, and no user."""
+
+OPTIONS: dict[str, dict[str, Any]] = {"s3": {"max_concurrency": 1, "config_kwargs": {"retries": {"max_attempts": 0}}}}
+"""What file systems are told of each kind of URL: s3fs asks neither for the size of what it reads, nor again by itself, where
+MAX_REMOTE_TRIES counts.
+"""
+
+ANSWERS = (FileNotFoundError, FileExistsError, IsADirectoryError, NotADirectoryError)
+"""Exceptions that say what is there."""
+
+_SECRET = re.compile(r"://[^/\s@]*:[^/\s@]*@")
+"""User and password in a URL."""
+
+
+class RemotePath(Base):
+    """A path below a URL: it reads and lists as a `pathlib.Path` does, which type checkers take it for. Files are never
+    written by it but whole.
+
+    Raises FileNotFoundError as a Path does, and RemoteError where the URL does not answer, or refuses.
+    """
+
+    @classmethod
+    def of(cls, url: str) -> RemotePath:
+        """The path of a URL; raises UserError for one with a password."""
+        if _SECRET.search(re.sub(r":/+", "://", url)):
+            raise UserError(
+                f"{shown(url)}: expected a URL without a password, which others would see; found one: give it where the "
+                "storage's own programs look for it (for s3://: AWS_PROFILE, or AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY)"
+            )
+        return cls(url)
+
+    def __str__(self) -> str:
+        protocol, *inside = self.parts or ("",)
+        return f"{protocol}//{'/'.join(inside)}" if protocol.endswith(":") else super().__str__()
+
+    def __fspath__(self) -> str:
+        raise TypeError(f"{self}: expected a file on this machine, found one at a URL")
+
+    def read_bytes(self) -> bytes:
+        """All bytes of the file."""
+        return self._asked("read", lambda system, path: bytes(system.cat_file(path)))
+
+    def read_text(self, encoding: str | None = None, errors: str | None = None) -> str:
+        """The file's text, its line ends as they are."""
+        return self.read_bytes().decode(encoding or "utf-8", errors or "strict")
+
+    def byte_range(self, start: int, size: int) -> bytes:
+        """So many bytes of the file from `start` on, fewer where it ends before."""
+        if not size:
+            return b""
+        return self._asked("read", lambda system, path: bytes(system.cat_file(path, start=start, end=start + size)))
+
+    def open(self, mode: str = "r", buffering: int = -1, encoding: str | None = None, **_: Any) -> IO[Any]:  # pyright: ignore[reportIncompatibleMethodOverride]
+        """The file, to be read in blocks; text has its line ends as they are."""
+        if set(mode) - set("rbt"):
+            raise io.UnsupportedOperation(mode)
+        size = self.stat().st_size
+        stream = io.BytesIO(self.read_bytes()) if size <= BLOCK else io.BufferedReader(_Blocks(self, size), BLOCK)
+        return stream if "b" in mode else io.TextIOWrapper(stream, encoding or "utf-8", newline="\n")
+
+    def write_bytes(self, data: bytes) -> int:  # pyright: ignore[reportIncompatibleMethodOverride]
+        """Put a file of these bytes here, whole or not at all; gives their number."""
+
+        def write(system: Any, path: str) -> None:
+            _make_parent(system, path)
+            system.pipe_file(path, data)
+
+        self._written(write)
+        return len(data)
+
+    def upload(self, file: Path) -> None:
+        """Put a copy of a disk's file here, whole or not at all."""
+
+        def write(system: Any, path: str) -> None:
+            _make_parent(system, path)
+            system.put_file(str(file), path)
+
+        self._written(write)
+
+    def unlink(self, missing_ok: bool = True) -> None:
+        """Remove the file; nothing happens where there is none."""
+        try:
+            self._asked("remove", lambda system, path: system.rm_file(path))
+        except FileNotFoundError:
+            if not missing_ok:
+                raise
+
+    def exists(self, **_: bool) -> bool:
+        """Whether there is a file or a folder."""
+        return self._info() is not None
+
+    def is_file(self, **_: bool) -> bool:
+        """Whether there is a file."""
+        return (self._info() or {}).get("type") == "file"
+
+    def is_dir(self, **_: bool) -> bool:
+        """Whether anything lies below."""
+        return (self._info() or {}).get("type") == "directory"
+
+    def is_symlink(self) -> bool:
+        """There are no links."""
+        return False
+
+    def resolve(self, strict: bool = False) -> RemotePath:
+        """The path itself, as there are no links."""
+        return self
+
+    def absolute(self) -> RemotePath:
+        """The path itself."""
+        return self
+
+    def samefile(self, other_path: Any) -> bool:
+        """Whether this is the same path."""
+        return self == other_path
+
+    def mkdir(self, mode: int = 0o777, parents: bool = False, exist_ok: bool = False) -> None:
+        """Nothing: folders are there as soon as something is in them."""
+
+    def stat(self, **_: bool) -> os.stat_result:
+        """Size in bytes, and when it was written in seconds since 1970, where that is known (else 0); all else is 0."""
+        info = self._info()
+        if info is None:
+            raise self._lacking()
+        written: Any = next((info[name] for name in ("LastModified", "mtime", "updated", "created") if name in info), 0)
+        seconds = float(written.timestamp() if hasattr(written, "timestamp") else written if isinstance(written, float) else 0)
+        return os.stat_result((0, 0, 0, 0, 0, 0, int(info.get("size") or 0), 0, seconds, 0))
+
+    def iterdir(self) -> Generator[RemotePath]:
+        """What lies in the folder; raises FileNotFoundError where there is none."""
+
+        def names(system: Any, path: str) -> set[str]:
+            head = path.rstrip("/") + "/"
+            found = (str(name).rstrip("/") for name in system.ls(path, detail=False))
+            return {name.removeprefix(head) for name in found if name.startswith(head)}
+
+        yield from (self / name for name in sorted(self._asked("list", names)))
+
+    def glob(self, pattern: str, **_: Any) -> Generator[RemotePath]:
+        """What lies in the folder and has such a name; nothing where there is no folder."""
+        try:
+            yield from (path for path in self.iterdir() if fnmatchcase(path.name, pattern))
+        except FileNotFoundError:
+            return
+
+    def rglob(self, pattern: str, **_: Any) -> Generator[RemotePath]:
+        """The files below, no folders, that have such a name."""
+        yield from (self / path for path in self.files_below() if fnmatchcase(path.rpartition("/")[2], pattern))
+
+    def files_below(self) -> list[str]:
+        """Paths of all files below, from here, sorted; none where there is no folder."""
+
+        def find(system: Any, path: str) -> list[str]:
+            head = path.rstrip("/") + "/"
+            return sorted(str(file).removeprefix(head) for file in system.find(path) if str(file).startswith(head))
+
+        return [file for file in self._asked("list", find) if file and not file.endswith("/")]
+
+    @property
+    def is_shared(self) -> bool:
+        """Whether other processes find the same files there."""
+        return self.parts[0] != "memory:"
+
+    def _info(self) -> dict[str, Any] | None:
+        try:
+            return self._asked("look at", lambda system, path: system.info(path))
+        except FileNotFoundError:
+            return None
+
+    def _written(self, write: Callable[[Any, str], None]) -> None:
+        try:
+            self._asked("write", write)
+        except FileNotFoundError as error:
+            why = f"expected to write, found: {shown(error)}: make the bucket, or correct its name"
+            raise RemoteError(f"{self}: {why}") from None
+
+    def _lacking(self) -> FileNotFoundError:
+        return FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(self))
+
+    def _asked(self, what: str, ask: Callable[[Any, str], Answer]) -> Answer:
+        """The file system's answer, which is asked up to MAX_REMOTE_TRIES times."""
+        system, path = _system(str(self))
+        for tries in range(1, limits.MAX_REMOTE_TRIES + 1):
+            try:
+                return ask(system, path)
+            except FileNotFoundError as error:
+                raise FileNotFoundError(errno.ENOENT, error.strerror or os.strerror(errno.ENOENT), str(self)) from None
+            except (*ANSWERS, *MISTAKES):
+                raise
+            except Exception as error:
+                if _is_refusal(error):
+                    raise RemoteError(
+                        f"{self}: expected to be allowed to {what} it, found: {shown(error)}: see that the storage's "
+                        "credentials are set, and allow it"
+                    ) from None
+                if tries == limits.MAX_REMOTE_TRIES:
+                    raise RemoteError(
+                        f"{self}: expected to {what} it, found, {tries} times: {shown(error)}: what is finished is kept; run "
+                        "the same command again when the storage answers"
+                    ) from None
+            time.sleep(FIRST_WAIT_S * 3 ** (tries - 1))
+        raise AssertionError
+
+
+class _Blocks(io.RawIOBase):
+    """A file of known size as a stream that asks for its blocks one by one."""
+
+    def __init__(self, path: RemotePath, size: int) -> None:
+        self._path, self._size, self._at = path, size, 0
+
+    def readable(self) -> bool:
+        """It is."""
+        return True
+
+    def seekable(self) -> bool:
+        """It is."""
+        return True
+
+    def seek(self, offset: int, whence: int = io.SEEK_SET) -> int:
+        """Go to a place in the file."""
+        self._at = offset + {io.SEEK_SET: 0, io.SEEK_CUR: self._at, io.SEEK_END: self._size}[whence]
+        return self._at
+
+    def tell(self) -> int:
+        """The place in the file."""
+        return self._at
+
+    def readinto(self, buffer: Any) -> int:
+        """Read the next bytes; raises RemoteError where the file became shorter."""
+        wanted = max(0, min(len(buffer), self._size - self._at))
+        data = self._path.byte_range(self._at, wanted)
+        if len(data) != wanted:
+            where = f"{wanted:,} bytes from {self._at:,} on"
+            raise RemoteError(f"{self._path}: expected {where}, found {len(data):,}: read it again when nobody writes it")
+        buffer[:wanted] = data
+        self._at += wanted
+        return wanted
+
+
+def shown(error: object) -> str:
+    """An error or a URL in one line, without passwords."""
+    text = " ".join(str(error).split()) or type(error).__name__
+    return _SECRET.sub("://...@", text if isinstance(error, str) else f"{type(error).__name__}: {text}"[:300])
+
+
+def _is_refusal(error: Exception) -> bool:
+    """Whether it is about who asks, so that asking again does not help."""
+    return isinstance(error, PermissionError) or "Credential" in type(error).__name__
+
+
+def _make_parent(system: Any, path: str) -> None:
+    """Make the folder of a file, where folders are made: object stores have none, and would make buckets."""
+    if not system.async_impl:
+        system.makedirs(path.rpartition("/")[0], exist_ok=True)
+
+
+def _system(url: str) -> tuple[Any, str]:
+    """The file system of a URL and the path there; fsspec keeps one file system of each kind a process. Listings are not kept:
+    other processes write, too. Raises MissingExtraError where a package is missing.
+    """
+    protocol = url.partition("://")[0]
+    try:
+        from fsspec.core import url_to_fs  # pyright: ignore[reportMissingTypeStubs]
+
+        system, path = url_to_fs(url, use_listings_cache=False, **OPTIONS.get(protocol, {}))
+    except ImportError as error:
+        extra = "viewsphere[s3]" if protocol == "s3" else "viewsphere[remote]"
+        raise MissingExtraError(
+            f"{url}: expected the packages that open {protocol}:// URLs, found: {error}: pip install '{extra}'"
+        ) from None
+    except ValueError as error:
+        raise UserError(f"{url}: expected a URL that fsspec opens, found: {shown(error)}: correct it") from None
+    if protocol == "s3":
+        system.retries = 1
+    return system, path

@@ -1,0 +1,136 @@
+"""A data set on a server that speaks S3, whose answers are wrong, slow, cut short or missing."""
+
+import os
+import signal
+import subprocess
+import sys
+
+import pytest
+
+from deadline import until
+from s3_server import BUCKET, KEYS, make_bucket, s3_server
+from small import small_recipe
+from viewsphere import Dataset, generate
+from viewsphere.check import check
+from viewsphere.check.repair import repair
+from viewsphere.errors import RemoteError
+from viewsphere.store import located
+from viewsphere.store.places import files_below, remote_path
+
+pytestmark = pytest.mark.slow
+
+FEW = {"channels": ["rgb", "depth", "instances"], "formats": ["coco"], "camera": {"size": [48, 36], "fov_deg": 35}}
+URL = f"s3://{BUCKET}/cars/out"
+
+RUN = """
+import sys
+sys.path.insert(0, "tests")
+from small import small_recipe
+from test_s3 import FEW, URL
+from viewsphere import generate
+generate(small_recipe(**FEW), URL)
+"""
+
+
+@pytest.fixture(scope="module")
+def server():
+    with s3_server() as found:
+        yield found
+
+
+@pytest.fixture
+def faults(server, monkeypatch):
+    """What the server does; the bucket is empty."""
+    url, faults = server
+    monkeypatch.setattr(remote_path, "FIRST_WAIT_S", 0.01)
+    for name, value in {**KEYS, "AWS_ENDPOINT_URL": url}.items():
+        monkeypatch.setenv(name, value)
+    make_bucket()
+    faults.asked.clear()
+    faults.hit.clear()
+    yield faults
+    faults.none()
+
+
+@pytest.fixture(scope="module")
+def few(tmp_path_factory):
+    root = tmp_path_factory.mktemp("few") / "out"
+    generate(small_recipe(**FEW), root)
+    return root
+
+
+def contents(root):
+    return {path: (root / path).read_bytes() for path in files_below(root)}
+
+
+def test_two_workers_make_the_same_through_all_faults(few, faults):
+    kinds, seen = ("500", "503", "drop", "cut", "slow"), {}
+
+    def fault(method, path):
+        """Every seventh request fails, of each kind in turn; the next one of the same does not."""
+        seen[method, path] = seen.get((method, path), 0) + 1
+        number = len(faults.asked)
+        return kinds[number // 7 % len(kinds)] if number % 7 == 0 and seen[method, path] < 3 else ""
+
+    faults.fault = fault
+    generate(small_recipe(**FEW), URL, workers=2)
+    assert len(faults.hit) > 20
+    assert check(Dataset(URL), sample=2).ok
+    faults.none()
+    assert contents(located(URL)) == contents(few)
+    samples = [sample.channels["depth"].tobytes() for sample in Dataset(URL)]
+    assert samples == [sample.channels["depth"].tobytes() for sample in Dataset(few)]
+
+
+def test_a_killed_run_goes_on(few, faults):
+    run = subprocess.Popen([sys.executable, "-c", RUN], env={**os.environ, "PYTHONPATH": "tests/store"})
+    until(lambda: run.poll() is not None or any("PUT" in m and "manifest.json" in p and "shots" in p for m, p in faults.asked))
+    run.send_signal(signal.SIGKILL)
+    run.wait()
+    for shot in Dataset(URL).rows:
+        assert Dataset(URL).store.has_shot(shot.key)
+    assert check(Dataset(URL), sample=0, rays=False).checked["files"] == len(Dataset(URL))
+    assert generate(small_recipe(**FEW), URL).rendered < 12
+    assert contents(located(URL)) == contents(few)
+
+
+@pytest.mark.parametrize("kind", ["500", "503", "drop", "cut"])
+def test_what_never_answers_is_one_line(few, faults, kind):
+    for path, data in contents(few).items():
+        (located(URL) / path).write_bytes(data)
+    faults.always(kind, "depth")
+    with pytest.raises(
+        RemoteError, match=rf"{URL}/store/shots/.*/depth/00000000.tiff: expected to read it, found, 5 times"
+    ) as told:
+        Dataset(URL)[0].channels["depth"]
+    assert "\n" not in str(told.value) and KEYS["AWS_SECRET_ACCESS_KEY"] not in str(told.value)
+
+
+def test_uploads_that_are_refused_leave_nothing_half_visible(few, faults):
+    faults.always("500", "manifest.json", "PUT")
+    with pytest.raises(RemoteError, match="expected to write it, found, 5 times"):
+        generate(small_recipe(**FEW), URL)
+    assert len(Dataset(URL)) == 0
+    faults.none()
+    generate(small_recipe(**FEW), URL)
+    assert contents(located(URL)) == contents(few)
+
+
+def test_a_missing_bucket_is_told(faults):
+    with pytest.raises(RemoteError, match="make the bucket, or correct its name"):
+        generate(small_recipe(**FEW), "s3://no-such-bucket/out")
+
+
+def test_damage_is_found_and_mended(few, faults):
+    root = located(URL)
+    for path, data in contents(few).items():
+        (root / path).write_bytes(data)
+    files = [path for path in contents(few) if path.startswith("store/") and path.count("/") > 2][::9]
+    for path in files:
+        data = bytearray((root / path).read_bytes())
+        data[len(data) // 2] ^= 4
+        (root / path).write_bytes(bytes(data))
+    findings = [str(finding) for finding in check(Dataset(root), fast=True).findings]
+    assert len(files) > 5 and all(any(str(root / path) in text for text in findings) for path in files)
+    assert repair(root, fast=True).report.ok
+    assert contents(root) == contents(few)
