@@ -11,9 +11,10 @@ import pytest
 
 import viewsphere as vs
 from small import small_recipe
-from viewsphere.errors import UserError, ViewsphereError
+from viewsphere.errors import UserError, ViewsphereError, WorkerDied
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.run.executors import Job, Listed, Queue
+from viewsphere.run.executors._jobs import MOST_DEATHS
 from viewsphere.run.executors.local import LocalCrew
 from viewsphere.run.tasks import ModelTask
 from viewsphere.sampling.extension import whole
@@ -64,11 +65,31 @@ def test_a_job_is_tried_twice_the_second_time_when_nobody_else_is_at_work():
     queue = Queue(jobs(a=2))
     job = queue.next("")
     assert queue.last() is None
-    assert queue.again(job)
+    assert queue.again(job, "it fell") is None
     assert [other.key for other in left(queue)] == ["a-1"]
     assert queue.last() is job
     assert queue.last() is None
-    assert not queue.again(job)
+    assert str(queue.again(job, "it fell").error) == "a-0: its worker died 2 times (it fell)"
+
+
+def test_a_job_lost_with_its_machine_goes_to_the_next_worker():
+    queue = Queue(jobs(a=2))
+    job = queue.next("")
+    assert queue.again(job, "a machine fell", alone=False) is None
+    assert not queue.is_done
+    assert [other.key for other in left(queue)] == ["a-0", "a-1"]
+    assert queue.is_done
+
+
+def test_a_run_in_which_nobody_lives_ends():
+    queue = Queue(jobs(a=99))
+    for _ in range(MOST_DEATHS - 1):
+        assert queue.again(queue.next(""), "it fell") is None
+    queue.ended()
+    for _ in range(MOST_DEATHS - 1):
+        assert queue.again(queue.next(""), "it fell") is None
+    with pytest.raises(WorkerDied, match=f"a-30: its worker died .it fell., and so did {MOST_DEATHS - 1} before it"):
+        queue.again(queue.next(""), "it fell")
 
 
 def test_jobs_are_counted_out_when_somebody_is_free():

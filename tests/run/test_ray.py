@@ -93,12 +93,13 @@ def test_nodes_may_die_and_join_in_the_middle(tmp_path, ray):
 
 
 @pytest.mark.slow
-def test_ctrl_c_ends_all_workers_and_the_run_goes_on_elsewhere(tmp_path, ray):
+@pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGTERM])
+def test_ctrl_c_ends_all_workers_and_the_run_goes_on_elsewhere(sent, tmp_path, ray):
     generate(small_recipe(**RECIPE), tmp_path / "local")
     with ray() as cluster:
         with rendering(tmp_path, cluster.address) as run:
             assert until(lambda: finished(tmp_path) > 1)
-            run.send_signal(signal.SIGINT)
+            run.send_signal(sent)
             _, said = run.communicate(timeout=DEADLINE)
         assert run.returncode == 130
         assert said.startswith("stopped; ")

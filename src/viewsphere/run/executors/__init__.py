@@ -42,7 +42,8 @@ class Crew(Protocol):
     def run(self, work: Work, heard: Callable[[], None] = ignored) -> Iterator[Outcome]:
         """Do all jobs; outcomes come as they are ready. `heard` is called when there is news, such as another frame under way.
 
-        A UserError is an outcome, and so is WorkerDied, of a job that was lost with its worker LIVES times; anything else
+        A UserError is an outcome, and so is WorkerDied, of a job that was lost with its worker LIVES times; this one is raised
+        where MOST_DEATHS workers die one after another and nothing is done in between, and anything else
         that a worker raises ends the run with its traceback.
         """
         ...

@@ -16,6 +16,9 @@ if TYPE_CHECKING:
 LIVES = 2
 """How often a task is tried when its process dies; the last time alone, as memory may have been what it lacked."""
 
+MOST_DEATHS = 16
+"""Deaths of workers, with no job ended in between, after which a run ends: what kills these kills the next ones, too."""
+
 
 class Work(Protocol):
     """What there is to do, in lines: jobs of one line share what a worker has warm. Jobs are counted out one by one."""
@@ -82,6 +85,7 @@ class Queue:
         self._back: list[Job] = []
         self._again: list[Job] = []
         self._tried: set[str] = set()
+        self._deaths = 0
 
     def __contains__(self, line: str) -> bool:
         return line in self._left
@@ -120,24 +124,27 @@ class Queue:
             self._untaken.popleft()
         return max(self._left, key=lambda line: self._left[line] / self._takers[line])
 
-    def again(self, job: Job, alone: bool = True) -> bool:
-        """Put back a job whose worker died, for the next one or, if it may be to blame, for when it is `alone`; False if it was
-        tried often enough.
+    def ended(self) -> None:
+        """A job came to its end: workers can live."""
+        self._deaths = 0
+
+    def again(self, job: Job, how: str, alone: bool = True) -> Outcome | None:
+        """Put back a job whose worker died, for the next one or, if it may be to blame, for when it is `alone`; gives what there
+        is to say of it if it was tried often enough. Raises WorkerDied where nobody lives long enough to end a job.
         """
+        self._deaths += 1
+        if self._deaths == MOST_DEATHS:
+            before = f"and so did {MOST_DEATHS - 1} before it, without a shot in between"
+            raise WorkerDied(f"{job.key}: its worker died ({how}), {before}")
         if job.key in self._tried:
-            return False
+            return Outcome(job.key, error=WorkerDied(f"{job.key}: its worker died {LIVES} times ({how})"))
         self._tried.add(job.key)
         (self._again if alone else self._back).append(job)
-        return True
+        return None
 
     def last(self) -> Job | None:
         """A job that was put back, for when nobody is at work beside it; None if there is none."""
         return self._again.pop() if self._again else None
-
-
-def lost(job: Job, how: str) -> Outcome:
-    """What is said of a job whose workers died as often as it is tried, and how the last one did."""
-    return Outcome(job.key, error=WorkerDied(f"{job.key}: its worker died {LIVES} times ({how})"))
 
 
 def answer(worker: Worker, job: Job, tell: Callable[[int], None]) -> Outcome | str:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import signal
 import sys
+import time
 from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager, suppress
 from multiprocessing import get_context, parent_process, resource_tracker
@@ -18,7 +19,7 @@ from threading import Thread
 from typing import TYPE_CHECKING, cast
 
 from viewsphere.errors import UserError, ViewsphereError
-from viewsphere.run.executors._jobs import Job, Outcome, Queue, Work, answer, ignored, lost
+from viewsphere.run.executors._jobs import Job, Outcome, Queue, Work, answer, ignored
 
 if TYPE_CHECKING:
     from viewsphere.run.tasks import Worker
@@ -29,6 +30,9 @@ OUT_OF_MEMORY = 77
 
 DYING_S = 10.0
 """Seconds that a worker whose pipe is closed has to end by itself, so that its exit code is its own."""
+
+LEAVING_S = 5.0
+"""Seconds that workers have to end when all is done."""
 
 
 class LocalCrew:
@@ -52,9 +56,19 @@ class LocalCrew:
     def __enter__(self) -> LocalCrew:
         return self
 
-    def __exit__(self, *_: object) -> None:
+    def __exit__(self, kind: object, *_: object) -> None:
+        if kind is None:
+            self._let_go()
         self._dismiss()
         self._here = None
+
+    def _let_go(self) -> None:
+        """Give all workers the time to end by themselves, and to clear away what others could only find later."""
+        until = time.monotonic() + LEAVING_S
+        for hand in self._hands:
+            hand.pipe.close()
+        for hand in self._hands:
+            hand.process.join(max(0.0, until - time.monotonic()))
 
     def _dismiss(self) -> None:
         """End all workers, and give back the memory of what they have warm."""
@@ -131,13 +145,13 @@ class LocalCrew:
         assert job is not None
         try:
             news: Outcome | str | int = pipe.recv()
-        except (EOFError, ConnectionResetError):
+        except (EOFError, OSError):  # it may die in the middle of an answer
             self._end(job, busy, pipe)
             self._hands.remove(hand)
             hand.process.join(DYING_S)
             code = hand.stop()
-            if not queue.again(job):
-                yield lost(job, _end_of(code))
+            if told := queue.again(job, _end_of(code)):
+                yield told
             self._give(None, queue, busy)
             return
         if isinstance(news, int):
@@ -146,6 +160,7 @@ class LocalCrew:
         self._end(job, busy, pipe)
         if isinstance(news, str):
             raise ViewsphereError(f"{job.key}: a worker failed\n{news}")
+        queue.ended()
         self._give(hand, queue, busy)
         yield news
 

@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import logging
 import os
+import signal
 import socket
+import threading
 import time
 import warnings
 from collections import Counter
@@ -18,7 +20,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from viewsphere.errors import MissingExtraError, StoreError, UserError, ViewsphereError
-from viewsphere.run.executors._jobs import Job, Outcome, Queue, Work, answer, ignored, lost
+from viewsphere.run.executors._jobs import Job, Outcome, Queue, Work, answer, ignored
 
 try:
     import ray
@@ -71,7 +73,7 @@ class RayCrew:
         return self
 
     def __exit__(self, *_: object) -> None:
-        with suppress(RayError):  # a cluster that is gone has no workers left
+        with suppress(RayError, ConnectionError):  # a cluster that is gone has no workers left
             for hand in self._hands:
                 ray.kill(hand.actor)
             refs = [hand.ref for hand in self._hands]
@@ -97,7 +99,15 @@ class RayCrew:
         return tuple(f"left out {why}" for why in self._unfit.values())
 
     def run(self, work: Work, heard: Callable[[], None] = ignored) -> Iterator[Outcome]:
-        """As `Crew.run`; `heard` is called now and then."""
+        """As `Crew.run`; `heard` is called now and then. Raises ViewsphereError if the cluster is gone."""
+        try:
+            yield from self._run(work, heard)
+        except ConnectionError as error:
+            raise ViewsphereError(
+                f"--ray {self._address}: expected a Ray cluster, found it gone: {_first_line(error)}"
+            ) from None
+
+    def _run(self, work: Work, heard: Callable[[], None]) -> Iterator[Outcome]:
         queue = Queue(work, [hand.line for hand in self._hands])
         self._looked = 0.0
         while True:
@@ -129,9 +139,10 @@ class RayCrew:
             key, frames = hand.told()
             if hand.job is not None and hand.job.key == key:
                 self._begun[key] = frames
-        nodes = {node: about for node, about in _nodes().items() if node not in self._unfit}
-        if self._unfit and not nodes and not self._hands:
-            raise ViewsphereError("\n".join(self._unfit.values()))
+        there = _nodes()
+        nodes = {node: about for node, about in there.items() if node not in self._unfit}
+        if there and not nodes and not self._hands:
+            raise ViewsphereError("\n".join(self._unfit[node] for node in there))
         taken = Counter(hand.node for hand in self._hands)
         places = [(i, node) for node, (_, cpus) in nodes.items() for i in range(taken[node], cpus)]
         wanted = left - sum(not hand.is_ready for hand in self._hands)
@@ -158,8 +169,8 @@ class RayCrew:
             self._lose(hand)
             if job is None:
                 self._suspect(hand, error)
-            elif not queue.again(job, alone=hand.node in _nodes()):
-                yield lost(job, f"last on node {hand.address}: {_first_line(error)}")
+            elif told := queue.again(job, f"last on node {hand.address}: {_first_line(error)}", alone=hand.node in _nodes()):
+                yield told
             return
         if job is None:
             hand.is_ready = True
@@ -167,6 +178,7 @@ class RayCrew:
         elif isinstance(news, str):
             raise ViewsphereError(f"{job.key}: a worker failed\n{news}")
         else:
+            queue.ended()
             yield news
 
     def _lose(self, hand: _Hand) -> None:
@@ -176,7 +188,9 @@ class RayCrew:
             ray.kill(hand.actor)
 
     def _suspect(self, hand: _Hand, error: RayError) -> None:
-        """Leave a machine out where workers cannot start."""
+        """Leave a machine out where workers cannot start, though it is there."""
+        if hand.node not in _nodes():
+            return
         self._failures[hand.node] += 1
         if isinstance(error, RayTaskError) or self._failures[hand.node] >= STARTS:
             self._unfit[hand.node] = f"node {hand.address}: {_first_line(error)}"
@@ -241,6 +255,7 @@ class _Actor:
         if not store.plan_file.is_file():
             raise StoreError(f"{self._root}: expected a folder that all machines of the cluster share; found none here")
         check_whether_same(store, self._portion.part)
+        store.make_ready()  # clears what dead workers of this machine left
         keep_freed_memory()
         self._worker = Worker(self._root, self._portion)
 
@@ -271,6 +286,7 @@ _ACTOR: Any = _remote(num_cpus=1, max_restarts=0, max_task_retries=0, concurrenc
 
 def _connect(address: str) -> None:
     """Raises UserError where no cluster answers, MissingExtraError where a part of Ray is not installed."""
+    before = signal.getsignal(signal.SIGTERM)
     try:
         if address != "auto":
             _reach(address)
@@ -290,6 +306,9 @@ def _connect(address: str) -> None:
             f"--ray {address}: expected a Ray cluster that answers; found: {_first_line(error)}: start one with "
             "`ray start --head`, or check the address"
         ) from None
+    finally:
+        if threading.current_thread() is threading.main_thread():
+            signal.signal(signal.SIGTERM, before)  # Ray puts its own in its place
 
 
 def _reach(address: str) -> None:
