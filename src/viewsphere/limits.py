@@ -55,6 +55,7 @@ class Limits:
     MAX_FILES = Limit(10_000, "files that a model names: textures, buffers, material libraries")
     MAX_TRIANGLES = Limit(20_000_000, "triangles of a model, all instances counted")
     MAX_BLENDER_TRIANGLES = Limit(10_000_000, "triangles that Blender makes of a file")
+    MAX_LAYERS = Limit(1_000, "times that the surface of a model's triangles may be that of its box")
     MAX_VERTICES = Limit(60_000_000, "vertices while a model is read, and elements of a glTF accessor")
     MAX_INSTANCES = Limit(1_000_000, "instances of objects in a model's scene")
     MAX_NESTING = Limit(500, "nodes, objects or components within one another")
@@ -66,6 +67,9 @@ class Limits:
     MIN_SIZE = Limit(1e-4, "metres, the longest side of a model at least")
     MAX_SIZE = Limit(1e5, "metres, the longest side of a model at most")
     MAX_RECIPE_VALUES = Limit(200_000, "values of a recipe: by aliases a few lines can stand for billions")
+    MAX_RECIPE_BYTES = Limit(10_000_000, "bytes of a recipe, and of each that it extends")
+    MAX_POSES_BYTES = Limit(1 << 30, "bytes of a file of poses")
+    MAX_RIG_BYTES = Limit(1_000_000, "bytes of a rig's calibration")
     MAX_STORED_PIXELS = Limit(1 << 28, "pixels of a picture or map of a data set, also of an imported one")
     MAX_REPAIRED_SHOTS = Limit(1_000_000, "shots that a repair renders because they are missing")
 
