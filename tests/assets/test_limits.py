@@ -23,12 +23,15 @@ TESTED = {
     "MAX_BLENDER_TRIANGLES": "test_formats",
     "MAX_RECIPE_VALUES": "test_file",
     "MAX_STORED_PIXELS": "test_strangers",
+    "MAX_RECIPE_BYTES": "test_file",
+    "MAX_POSES_BYTES": "test_pose_files",
+    "MAX_RIG_BYTES": "test_rig_files",
     "MAX_REPAIRED_SHOTS": "test_endless_plans",
     **dict.fromkeys(
         (
             "MAX_FILE_BYTES", "MAX_FILES", "MAX_TRIANGLES", "MAX_VERTICES", "MAX_PICTURE_PIXELS",
             "MAX_TEXTURES", "MAX_ALL_TEXTURE_PIXELS", "MAX_ZEROS", "MAX_INSTANCES", "MAX_NESTING", "MAX_ARCHIVE_BYTES",
-            "MAX_SIZE", "MIN_SIZE",
+            "MAX_SIZE", "MIN_SIZE", "MAX_LAYERS",
         ),
         "here",
     ),
@@ -108,6 +111,10 @@ def test_triangles_and_vertices(kind, name, found, refused, tmp_path):
     (trimesh.util.concatenate(boxes) if kind == "stl" else trimesh.Scene(boxes)).export(path)
     # Vertices are those of the mesh in the making, flat faces apart.
     refused(path, name, 7 if name == "MAX_VERTICES" else found - 1, "" if name == "MAX_VERTICES" else found)
+
+
+def test_layers(write, refused):
+    refused(write("a.obj", TRIANGLE + "f 1 2 3\n" * 50), "MAX_LAYERS", 10, 12)
 
 
 def test_instances_count_as_triangles(gltf, cube, refused):

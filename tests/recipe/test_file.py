@@ -11,7 +11,7 @@ import pytest
 import yaml
 
 from viewsphere.errors import RecipeError, UserError
-from viewsphere.recipe.file import _Loader, read, schema
+from viewsphere.recipe.file import _Loader, parse, read, schema
 from viewsphere.recipe.recipe import Recipe
 
 ROOT = Path(__file__).parents[2]
@@ -266,3 +266,14 @@ def test_values_beyond_the_limit_are_not_read(tmp_path, monkeypatch):
     monkeypatch.setenv("VIEWSPHERE_MAX_RECIPE_VALUES", "many")
     with pytest.raises(UserError, match="VIEWSPHERE_MAX_RECIPE_VALUES: expected a whole number above 0, found 'many'"):
         read(file)
+
+
+def test_brackets_within_one_another_cost_little_and_halves_of_characters_are_refused(tmp_path, monkeypatch):
+    halves = '{"a\\ud800": 1}', 'name: "\\ud800"'
+    for text, found in (("[" * 100_000, "nested too deeply"), *((half, "half of one") for half in halves)):
+        with pytest.raises(RecipeError, match=found):
+            parse(text, "recipe.yaml")
+    (tmp_path / "a.yaml").write_text("name: long\n")
+    monkeypatch.setenv("VIEWSPHERE_MAX_RECIPE_BYTES", "5")
+    with pytest.raises(RecipeError, match=r"at most 5 bytes \(limit MAX_RECIPE_BYTES\), found 11"):
+        read(tmp_path / "a.yaml")

@@ -285,3 +285,14 @@ def test_a_lens_of_the_viewpoints_has_to_be_there(tmp_path):
         make(file, camera={"of_viewpoints": True})
     with pytest.raises(RecipeError, match="expected no size and no distortion beside of_viewpoints"):
         make(file, camera={"of_viewpoints": True, "size": [3, 4]})
+
+
+def test_a_lens_out_of_bounds_and_a_large_file_are_one_line(tmp_path, monkeypatch):
+    (tmp_path / "images.txt").write_text("1 1 0 0 0 0 0 3 1 a.png\n\n")
+    for camera in ("1 PINHOLE 640 0.5 420 425 315 239", "1 OPENCV 640 480 420 425 315 239 1e308 0 0 0"):
+        (tmp_path / "cameras.txt").write_text(camera + "\n")
+        with pytest.raises(RecipeError, match=r"cameras\.txt:1: expected a number"):
+            read_poses(tmp_path)
+    monkeypatch.setenv("VIEWSPHERE_MAX_POSES_BYTES", "9")
+    with pytest.raises(RecipeError, match=r"at most 9 bytes \(limit MAX_POSES_BYTES\); found 45"):
+        read_poses(tmp_path)

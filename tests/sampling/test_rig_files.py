@@ -209,3 +209,13 @@ def test_a_file_that_is_not_there(tmp_path: Path):
     )
     with pytest.raises(RecipeError, match=r"gone\.yaml: expected a readable file of a calibration"):
         rig_of(recipe, recipe.camera.intrinsics)
+
+
+def test_a_large_calibration_and_deep_brackets_are_one_line(tmp_path, monkeypatch):
+    with pytest.raises(RecipeError, match="nested too deeply"):
+        read(tmp_path, "K1: " + "[" * 100_000)
+    with pytest.raises(RecipeError, match="D1: expected a number"):
+        read(tmp_path, opencv(K1=K1, D1=[1e308, 0, 0, 0], K2=K2, R=R, T=T[:, None]))
+    monkeypatch.setenv("VIEWSPHERE_MAX_RIG_BYTES", "9")
+    with pytest.raises(RecipeError, match="limit MAX_RIG_BYTES"):
+        read(tmp_path, "camera_matrix: 1\n")

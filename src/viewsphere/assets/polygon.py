@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
+
 import numpy as np
 
 from viewsphere.assets.primitive import Float, Int
 from viewsphere.assets.transform import unit
-
-MAX_EARS = 2_048
-"""Polygons with more corners are cut as a fan, even concave ones: cutting ears takes quadratic time."""
 
 
 def triangulate(positions: Float, corners: Int, counts: Int) -> tuple[Int, Int]:
@@ -39,7 +39,7 @@ def triangulate(positions: Float, corners: Int, counts: Int) -> tuple[Int, Int]:
         better = np.flatnonzero(other_lean > lean[quads])
         at = first[quads[better]]
         triangles[at], triangles[at + 1] = other[2 * better], other[2 * better + 1]
-    for polygon in folded[(counts[folded] > 4) & (counts[folded] <= MAX_EARS)]:
+    for polygon in folded[counts[folded] > 4]:
         start, count = int(starts[polygon]), int(counts[polygon])
         flat = _flattened(points[start : start + count], normals[polygon])
         if flat is not None:
@@ -68,35 +68,92 @@ def _flattened(points: Float, normal: Float) -> Float | None:
 
 
 def _ears(points: Float) -> Int:
-    """Triangles (n - 2, 3) of a simple polygon (n, 2), counter-clockwise, cut ear by ear."""
-    ring = np.arange(len(points))
+    """Triangles (n - 2, 3) of a simple polygon (n, 2), counter-clockwise, cut ear by ear; of one that is not simple, any.
+
+    Every corner is kept, those on straight edges too, so that the triangles meet those of neighbours without cracks: that, and
+    equal rounding on every processor, are why no library cuts them.
+    """
+    ring = _Ring(points.tolist())
     triangles: list[tuple[int, int, int]] = []
-    while len(ring) > 3:
-        before, after = np.roll(ring, 1), np.roll(ring, -1)
-        turn = _turn(points[before], points[ring], points[after])
-        order = np.flatnonzero(turn > 0)
-        ear = next(
-            (int(i) for i in order if _is_empty(points, ring, before[i], ring[i], after[i])),
-            int(np.argmax(turn)),
-        )
-        triangles.append((int(before[ear]), int(ring[ear]), int(after[ear])))
-        ring = np.delete(ring, ear)
-    triangles.append((int(ring[0]), int(ring[1]), int(ring[2])))
+    at, left, passed = 0, len(points), 0
+    while left > 3:
+        before, after = ring.before[at], ring.after[at]
+        if passed < left and not ring.is_ear(at):
+            at, passed = after, passed + 1
+            continue
+        triangles.append((before, at, after))
+        ring.cut(at)
+        at, left, passed = ring.after[after], left - 1, 0
+    triangles.append((ring.before[at], at, ring.after[at]))
     return np.array(triangles)
 
 
-def _turn(a: Float, b: Float, c: Float) -> Float:
-    """Twice the signed area of triangles a b c in the plane."""
-    u, v = b - a, c - b
-    return u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]
+Point = tuple[float, float]
 
 
-def _is_empty(points: Float, ring: Int, a: int, b: int, c: int) -> bool:
-    """Whether no other point of the ring lies in this triangle."""
-    others = points[ring]
-    corners = points[[a, b, c]]
-    inside = np.ones(len(others), bool)
-    for i in range(3):
-        inside &= _turn(corners[i], corners[(i + 1) % 3], others) >= 0
-        inside &= (others != corners[i]).any(axis=1)
-    return not inside.any()
+class _Ring:
+    """The corners of a polygon that are not cut off yet, and the places of those that are not convex: only they may lie in an
+    ear.
+    """
+
+    def __init__(self, points: Sequence[Point]) -> None:
+        count = len(points)
+        self.points = points
+        self.before, self.after = [count - 1, *range(count - 1)], [*range(1, count), 0]
+        self._low = min(x for x, _ in points), min(y for _, y in points)
+        width, height = max(x for x, _ in points) - self._low[0], max(y for _, y in points) - self._low[1]
+        self._cell = max(width, height) / max(math.isqrt(count), 1) or 1.0
+        self._reflex: dict[tuple[int, int], set[int]] = {}
+        for i in range(count):
+            if not self._is_convex(i):
+                self._reflex.setdefault(self._place(points[i]), set()).add(i)
+
+    def is_ear(self, i: int) -> bool:
+        """Whether a corner is convex and no other lies in the triangle of it and its neighbours; or it lies on a neighbour."""
+        a, b, c = (self.points[k] for k in (self.before[i], i, self.after[i]))
+        if b in (a, c):
+            return True
+        if _turn(a, b, c) <= 0:
+            return False
+        x0, y0 = self._place((min(a[0], b[0], c[0]), min(a[1], b[1], c[1])))
+        x1, y1 = self._place((max(a[0], b[0], c[0]), max(a[1], b[1], c[1])))
+        cells = self._reflex
+        if (x1 - x0 + 1) * (y1 - y0 + 1) < len(cells):
+            near = ((x, y) for x in range(x0, x1 + 1) for y in range(y0, y1 + 1) if (x, y) in cells)
+        else:
+            near = (place for place in cells if x0 <= place[0] <= x1 and y0 <= place[1] <= y1)
+        return not any(_holds(a, b, c, self.points[k]) for place in near for k in cells[place])
+
+    def cut(self, i: int) -> None:
+        """Take a corner away; its neighbours may become convex."""
+        before, after = self.before[i], self.after[i]
+        was_reflex = [k for k in (before, after) if not self._is_convex(k)]
+        self.after[before], self.before[after] = after, before
+        self._forget(i)
+        for k in was_reflex:
+            if self._is_convex(k):
+                self._forget(k)
+
+    def _forget(self, i: int) -> None:
+        place = self._place(self.points[i])
+        known = self._reflex.get(place, set())
+        known.discard(i)
+        if not known:
+            self._reflex.pop(place, None)
+
+    def _is_convex(self, i: int) -> bool:
+        return _turn(*(self.points[k] for k in (self.before[i], i, self.after[i]))) > 0
+
+    def _place(self, point: Point) -> tuple[int, int]:
+        """The cell of a grid in which a point lies."""
+        return int((point[0] - self._low[0]) / self._cell), int((point[1] - self._low[1]) / self._cell)
+
+
+def _turn(a: Point, b: Point, c: Point) -> float:
+    """Twice the signed area of the triangle a b c."""
+    return (b[0] - a[0]) * (c[1] - b[1]) - (b[1] - a[1]) * (c[0] - b[0])
+
+
+def _holds(a: Point, b: Point, c: Point, p: Point) -> bool:
+    """Whether a triangle, its edges too, holds a point that is none of its corners."""
+    return p not in (a, b, c) and _turn(a, b, p) >= 0 and _turn(b, c, p) >= 0 and _turn(c, a, p) >= 0

@@ -113,6 +113,7 @@ def assemble(
     positions, origin = _around_origin(positions, triangles)
     solid = _solid_triangles(folder, positions, triangles)
     triangles, part, material = triangles[solid], part[solid], material[solid]
+    _check_layers(folder, positions, triangles)
     order = np.lexsort((material, part))
     triangles, part, material = triangles[order], part[order], material[order]
 
@@ -137,6 +138,19 @@ def assemble(
         warnings=tuple(folder.warnings),
     )
     return mesh, replace(facts, origin=(origin[0], origin[1], origin[2]), size=extents(mesh), files=tuple(folder.files))
+
+
+def _check_layers(folder: ModelFolder, positions: Float, triangles: Int) -> None:
+    """Raise ModelError where triangles lie upon one another so often that drawing the model would take no end of time."""
+    area = 0.0
+    for start in range(0, len(triangles), 1 << 20):
+        a, b, c = (positions[triangles[start : start + (1 << 20), i]] for i in range(3))
+        area += float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()) / 2
+    used = positions[np.unique(triangles)]
+    width, length, height = (used.max(axis=0) - used.min(axis=0)).tolist()
+    box = 2 * (width * length + length * height + height * width)
+    if box > 0:
+        folder.check("MAX_LAYERS", int(area / box), "layers of triangles")
 
 
 def _without_lost_textures(

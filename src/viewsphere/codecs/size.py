@@ -31,7 +31,7 @@ def opened(file: Path | IO[bytes]) -> Generator[Image]:
     """
     from PIL import Image
 
-    limit, Image.MAX_IMAGE_PIXELS = Image.MAX_IMAGE_PIXELS, None  # ours is checked at once
+    limit, Image.MAX_IMAGE_PIXELS = Image.MAX_IMAGE_PIXELS, None  # Pillow has no other way; ours is checked at once
     try:
         image = Image.open(file)
     finally:

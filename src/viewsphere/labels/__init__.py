@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from viewsphere import plugins
 from viewsphere.labels._label import TAIL, ChannelLabel, Color, Drawing, Extent, Field, Label, ModelFacts, Needs, ObjectLabel
 from viewsphere.labels._placement import Placement
-from viewsphere.labels._record import annotation_of, from_short_record, from_whole_record, short_record, whole_record
+from viewsphere.labels._record import annotation_of, finite, from_short_record, from_whole_record, short_record, whole_record
 from viewsphere.labels._sight import Around, Sight
 from viewsphere.model.camera import Camera
 from viewsphere.model.channel import DEFAULT_CHANNELS, PASSES, Channel
@@ -46,6 +46,7 @@ __all__ = [
     "channel_labels",
     "channels",
     "drawings",
+    "finite",
     "from_short_record",
     "from_whole_record",
     "labels",

@@ -148,14 +148,37 @@ class Field:
     def value(self, plain: Any) -> Any:
         """The value that `plain` was made of, to the last bit."""
         if self.is_array:
-            return np.array(plain, self.type)
-        if plain is None:
-            return None if self.optional else math.nan
-        if self.shape:
-            return tuple(map(_number, plain))
-        if hasattr(self.type, "__dataclass_fields__"):
-            return self.type(**{name: _number(part) for name, part in plain.items()})
-        return plain
+            value = np.array(plain, self.type)
+        elif plain is None:
+            value = None if self.optional else math.nan
+        elif self.shape:
+            value = tuple(map(_number, plain))
+        elif hasattr(self.type, "__dataclass_fields__"):
+            value = self.type(**{name: _number(part) for name, part in plain.items()})
+        else:
+            value = plain
+        self.check(value)
+        return value
+
+    def check(self, value: Any) -> None:
+        """Raise ValueError for a value that the field cannot have; NaN stands for numbers that are not known."""
+        if value is None and self.optional:
+            return
+        if isinstance(value, np.ndarray):
+            is_right = value.shape == self.shape and not np.isinf(value).any()
+        elif self.shape:
+            is_right = isinstance(value, tuple) and len(value) == self.shape[0] and all(map(_is_number, value))
+        elif isinstance(value, str):
+            is_right = self.type is str
+        elif hasattr(self.type, "__dataclass_fields__"):
+            types = {name: str(field.type) for name, field in self.type.__dataclass_fields__.items()}
+            is_right = all(
+                isinstance(getattr(value, n), str) if t == "str" else _is_number(getattr(value, n)) for n, t in types.items()
+            )
+        else:
+            is_right = self.type in {int, float} and _is_number(value)
+        if not is_right:
+            raise ValueError(f"{self.name}: expected {self.type.__name__} {self.shape or ''}, found {value!r:.60}")
 
     def equals(self, one: Any, other: Any) -> bool:
         """Whether two values are the same number for number; NaN equals itself."""
@@ -164,6 +187,16 @@ class Field:
 
 def _number(value: Any) -> Any:
     return math.nan if value is None else value
+
+
+def _is_number(value: Any) -> bool:
+    return (
+        isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool) and not abs(value) > _GREATEST
+    )
+
+
+_GREATEST = 1e300
+"""A number above it is a mistake."""
 
 
 def _without_nan(value: Any) -> Any:

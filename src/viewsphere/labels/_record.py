@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import fields
 from typing import Any
 
 from viewsphere.errors import StoreError
-from viewsphere.labels._label import Field, ObjectLabel
+from viewsphere.labels._label import Field, ObjectLabel, nothing
 from viewsphere.labels._placement import Placement
 from viewsphere.model.sample import ObjectAnnotation
 
@@ -35,7 +36,16 @@ def whole_record(o: ObjectAnnotation, labels: Sequence[ObjectLabel]) -> dict[str
 def from_whole_record(record: Mapping[str, Any], labels: Sequence[ObjectLabel]) -> ObjectAnnotation:
     """The object that a whole record was made of."""
     values = {f.name: f.value(record[f.name]) for f in _fields(labels) if f.name in record}
+    if type(record["id"]) is not int or record["id"] < 1:
+        raise ValueError(f"object {record['id']!r:.40}: expected a number from 1 on")
+    finite(record.get("source"))
     return annotation_of(record["id"], [values], record.get("source"))
+
+
+def finite(source: Any) -> None:
+    """Raise ValueError for a foreign entry with numbers that no JSON has: NaN, infinite."""
+    if source is not None:
+        json.dumps(source, allow_nan=False)
 
 
 def _fields(labels: Sequence[ObjectLabel]) -> Iterable[Field]:
@@ -68,7 +78,11 @@ class _Restored(ObjectAnnotation):
         if label is None:
             return self._other(name)
         try:
-            own.update(label.restore(own["_record"].get(label.name), own["_placement"], self))
+            restored = label.restore(own["_record"].get(label.name), own["_placement"], self)
+            if label.keep is not nothing:  # all others follow from what is whole
+                for field in label.fields:
+                    field.check(restored[field.name])
+            own.update(restored)
             return own[name]
         except (LookupError, TypeError, ValueError, AttributeError, ArithmeticError) as error:
             raise StoreError(

@@ -138,6 +138,15 @@ def first_of(error: ValidationError) -> str:
     return _words(error.errors(include_url=False)[0], ())
 
 
+@contextmanager
+def told_of(where: str) -> Generator[None]:
+    """Tell a value that is out of bounds as a RecipeError that begins with `where`."""
+    try:
+        yield
+    except ValidationError as error:
+        raise RecipeError(f"{where}: {first_of(error)}") from None
+
+
 def _follows(error: ErrorDetails, errors: Sequence[ErrorDetails], fields: Sequence[str]) -> bool:
     """Whether an error only follows from others: invalid items of a list are not counted, and a misspelt field is missing."""
     place, depth = error["loc"], len(error["loc"])

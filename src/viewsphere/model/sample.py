@@ -122,10 +122,15 @@ class ObjectAnnotation:
 
     @property
     def mask(self) -> NDArray[np.bool_]:
-        """Visible pixels, (H, W) bool."""
+        """Visible pixels, (H, W) bool. Raises UserError for run lengths, which a stranger may have written, that are none."""
+        from viewsphere.codecs.size import check_size
         from viewsphere.geometry.mask import decode_rle
 
-        return decode_rle(self.rle.height, self.rle.width, self.rle.counts)
+        check_size(self.rle.width, self.rle.height)
+        try:
+            return decode_rle(self.rle.height, self.rle.width, self.rle.counts)
+        except ValueError as error:
+            raise StoreError(f"object {self.id}: expected a mask, found {error}") from None
 
     @property
     def polygons(self) -> list[list[float]]:

@@ -17,17 +17,19 @@ from viewsphere.limits import limits
 from viewsphere.model.mistakes import Marks, Place, dotted, shown
 from viewsphere.model.mistakes import Path as Steps
 
-LARGEST_FILE = 10_000_000
+DEEPEST = 200
+"""Brackets within one another: each takes the YAML reader as long as all those around it."""
 
 UNCLOSED = ("while scanning a quoted scalar", "while parsing a flow sequence", "while parsing a flow mapping")
 """What was being read, in the YAML reader's words, where a quote or a bracket is not closed, and the reader knows its place."""
 
-OPENING = {"'": "quoted text", '"': "quoted text", "[": "list", "{": "mapping"}
+OPENING: dict[str, str] = {"'": "quoted text", '"': "quoted text", "[": "list", "{": "mapping"}
 """What begins with each sign that has to be closed."""
 
 ENDS = ("end of stream", "<stream end>")
 """The YAML reader's words for the end of a file."""
 
+_HALF = re.compile("[\ud800-\udfff]")
 _INT = re.compile(r"[-+]?[0-9]+\Z")
 _FLOAT = re.compile(r"(?:[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?|[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN))\Z")
 _TAG = "tag:yaml.org,2002:"
@@ -42,7 +44,17 @@ def _use_yaml_12(rules: type[yaml.SafeLoader] | type[yaml.SafeDumper]) -> None:
     rules.add_implicit_resolver(f"{_TAG}float", _FLOAT, list("-+.0123456789"))
 
 
-class _Loader(yaml.SafeLoader):
+class ShallowLoader(yaml.SafeLoader):
+    """A loader that raises RecursionError for more than `DEEPEST` brackets within one another, before it reads on."""
+
+    def fetch_flow_collection_start(self, TokenClass: Any) -> None:
+        """Begin a list or a mapping in brackets."""
+        if self.flow_level >= DEEPEST:
+            raise RecursionError("lists or mappings nested too deeply")
+        super().fetch_flow_collection_start(TokenClass)
+
+
+class _Loader(ShallowLoader):
     """A loader that follows the rules of YAML 1.2, and ends at the first value beyond the limit, before the rest is read."""
 
     def __init__(self, text: str) -> None:
@@ -104,8 +116,9 @@ def _text(path: Path) -> str:
     try:
         if path.is_dir():
             raise RecipeError(f"{path}: expected a recipe file, found a folder: name the .yaml file in it")
-        if path.stat().st_size > LARGEST_FILE:
-            raise RecipeError(f"{path}: expected a recipe of at most {LARGEST_FILE:,} bytes, found {path.stat().st_size:,}")
+        size, most = path.stat().st_size, limits.MAX_RECIPE_BYTES
+        if size > most:
+            raise RecipeError(f"{path}: expected a recipe of at most {most:,} bytes (limit MAX_RECIPE_BYTES), found {size:,}")
         raw = path.read_bytes()
     except OSError as error:
         raise RecipeError(f"{path}: expected a readable recipe file, found: {error.strerror or error}") from None
@@ -131,10 +144,10 @@ def _syntax(path: str, text: str, error: yaml.MarkedYAMLError) -> str:
         return f"{path}:{line}: expected spaces; found a tab: YAML is indented with spaces"
     is_ended = any(end in problem for end in ENDS)
     begun = error.context_mark if error.context in UNCLOSED else _innermost_open(text) if is_ended else None
-    if begun is None:
+    sign = "" if begun is None else lines[begun.line][begun.column : begun.column + 1] if begun.line < len(lines) else ""
+    if begun is None or sign not in OPENING:  # characters that the YAML reader does not count as ends of lines
         context = f" {error.context}" if error.context else ""
         return f"{path}:{line}: expected YAML; found a mistake{context}: {problem}"
-    sign = lines[begun.line][begun.column]
     kind, where = OPENING[sign], f"{path}:{begun.line + 1}"
     what = f"the {kind} that begins with {sign} in column {begun.column + 1}"
     if is_ended or mark is None or sign in "'\"":
@@ -196,6 +209,7 @@ class _Reader:
             key = key_node.value if isinstance(key_node, ScalarNode) else None
             if not isinstance(key, str):
                 raise self._error(line, place, "expected a name before the colon; found a list or mapping")
+            self._character(key, key_node, place)
             if key in result:
                 first = self.lines[(*place, key)]
                 raise self._error(line, (*place, key), f"expected every field once; found {key!r} again, after line {first}")
@@ -215,10 +229,16 @@ class _Reader:
             case "float" if _FLOAT.match(text):
                 return _float(text)
             case "str":
-                return text
+                return self._character(text, node, place)
             case _:
                 line = node.start_mark.line + 1
                 raise self._error(line, place, f"expected plain YAML; found {shown(text)} with the tag {node.tag!r}")
+
+    def _character(self, text: str, node: Node, place: Steps) -> str:
+        """The text; raises RecipeError for halves of pairs, such as `\\ud800` in quotes, which no file can hold."""
+        if not text.isascii() and _HALF.search(text):
+            raise self._error(node.start_mark.line + 1, place, f"expected characters; found half of one in {text!a:.60}")
+        return text
 
     def _error(self, line: int, place: Steps, problem: str) -> RecipeError:
         return RecipeError(f"{self.file}:{line}: {dotted(place)}: {problem}")

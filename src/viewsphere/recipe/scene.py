@@ -21,7 +21,7 @@ from pydantic import (
 from viewsphere.geometry.camera import focal_from_fov, focal_from_sensor
 from viewsphere.model.camera import Distortion, Intrinsics
 from viewsphere.model.frozen import Frozen
-from viewsphere.model.mistakes import at, shown
+from viewsphere.model.mistakes import at, shown, told_of
 from viewsphere.model.numbers import Count, Number, Positive
 from viewsphere.recipe.blend import BlendField, VariantEntry
 from viewsphere.recipe.draws import Drawn, alternatives, is_random
@@ -169,7 +169,8 @@ class CameraEntry(Frozen):
             across = width if self.fov_axis == "horizontal" else height
             is_fisheye = self.distortion is not None and self.distortion.model == "fisheye"
             fx = fy = focal_from_fov(math.radians(self.fov_deg), across, is_fisheye)
-        return Intrinsics(width=width, height=height, fx=fx, fy=fy, cx=cx, cy=cy, skew=skew, distortion=self.distortion)
+        with told_of("camera"):
+            return Intrinsics(width=width, height=height, fx=fx, fy=fy, cx=cx, cy=cy, skew=skew, distortion=self.distortion)
 
 
 class SceneEntry(Frozen):

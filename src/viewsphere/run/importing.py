@@ -14,14 +14,11 @@ from viewsphere.store import Block, Dataset, Part, PlanRecord, Store, located
 from viewsphere.store.credits import write_credits
 from viewsphere.store.foreign import ForeignDataset
 from viewsphere.store.linking import link_model, link_shot
-from viewsphere.store.records import IMPORT
+from viewsphere.store.records import IMPORT, NAME_BYTES
 
 SHOT_FRAMES = 1000
 """Frames that are kept in one folder and written at once."""
 
-
-NAME_BYTES = 8
-"""A pose's name in `Part.pose_names`; zeros are that of no pose a recipe can mean."""
 
 """Frames in the order of another data set; how they were chosen nobody knows."""
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.rotation import compose, rigid, transform
 from viewsphere.model.camera import Intrinsics
-from viewsphere.model.mistakes import one_of
+from viewsphere.model.mistakes import one_of, told_of
 from viewsphere.model.rig import Rig, Sensor
 from viewsphere.model.scene import IDENTITY, Matrix4
 from viewsphere.recipe.recipe import Recipe
@@ -156,7 +156,8 @@ def _calibrated(recipe: Recipe, entry: RigFile, lens: Intrinsics) -> Rig:
 def _sized(found: Calibrated, lens: Intrinsics) -> Intrinsics:
     """The calibrated lens; at the recipe's size where the calibration says none."""
     width, height = found.size or (lens.width, lens.height)
-    return Intrinsics(width=width, height=height, **found.lens, distortion=found.distortion)
+    with told_of(f"rig: sensor {found.name}"):
+        return Intrinsics(width=width, height=height, **found.lens, distortion=found.distortion)
 
 
 def _check_disparity(recipe: Recipe, rig: Rig) -> None:

@@ -54,7 +54,7 @@ class Dataset(Shown, Sequence[Sample]):
         self._facts = lru_cache(maxsize=10_000)(self._model_facts)
 
     def __repr__(self) -> str:
-        return f"<Dataset {self.name} in {self.root}: {len(self):,} frames; {', '.join(self.plan.recipe['channels'])}>"
+        return f"<Dataset {self.name} in {self.root}: {len(self):,} frames; {', '.join(self.plan.channels)}>"
 
     def __reduce__(self) -> tuple[type[Dataset], tuple[Path, Choice]]:
         """A data set travels to other processes (data loaders) as its folder."""
@@ -249,6 +249,8 @@ class Dataset(Shown, Sequence[Sample]):
                 raise ValueError("no list of records")
             if row is None or len(records) != row.count:
                 raise ValueError(f"{len(records)} frames instead of {row and row.count}")
+            if any(record.get("index") != row.first + i for i, record in enumerate(records)):
+                raise ValueError(f"other numbers of frames than {row.first} and on")
             is_short = any("camera" not in record for record in records)
         except (OSError, TypeError, ValueError) as error:
             raise _damaged(file, error) from None
@@ -278,7 +280,7 @@ class Dataset(Shown, Sequence[Sample]):
             supplied = self._supplied(record)
             files |= {name: file for name, file in supplied.items() if records.shot.keeps(place, name)}
             return self._named(records.shot.sample(place, record, _ChannelFiles(self.root, files, self._manifests), files))
-        except (LookupError, TypeError, ValueError, AttributeError) as error:
+        except (LookupError, TypeError, ValueError, AttributeError, ArithmeticError) as error:
             raise _damaged(records.file, error) from None
 
     def _named(self, sample: Sample) -> Sample:
@@ -287,7 +289,14 @@ class Dataset(Shown, Sequence[Sample]):
             raise ValueError(f"split {sample.split!r:.100} where one of the plan's is expected")
         names([*sample.files], "channel")
         names([name for o in sample.objects for name in (o.key, o.track) if name], "the key")
+        strange = next((o.category_id for o in sample.objects if o.category_id not in self._category_ids), None)
+        if strange is not None:
+            raise ValueError(f"category {strange} where one of the plan's is expected")
         return sample
+
+    @cached_property
+    def _category_ids(self) -> frozenset[int]:
+        return frozenset(category.id for category in self.categories)
 
     def _supplied(self, record: dict[str, Any]) -> dict[str, str]:
         """Files of channels that were added to a frame later."""

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+from base64 import b64decode
+from binascii import Error as NoBase64
 from bisect import bisect_right
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from itertools import accumulate, chain
 from pathlib import PurePosixPath
-from typing import Any
+from typing import Annotated, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import ConfigDict, PlainValidator, TypeAdapter, ValidationError
 
 from viewsphere.model.credit import Credit
+from viewsphere.model.mistakes import first_of
 from viewsphere.model.model_spec import Size, step_key
 from viewsphere.model.thing import TimeStep
 from viewsphere.store.index import Block, Index, Row
@@ -36,9 +40,26 @@ KEEP = "keep_annotations_above"
 """The field of recipes that says which annotations exports leave out."""
 
 
+_STRICTLY = ConfigDict(extra="forbid", allow_inf_nan=False)
+"""How what was read is compared with the types of a record's fields."""
+
+
+def _box(value: Any) -> NDArray[np.float64]:
+    found = np.array(value, np.float64)
+    if found.shape != (8, 3) or not np.isfinite(found).all():
+        raise ValueError(f"expected 8 vertices; found {found.shape}")
+    return found
+
+
+Box3d = Annotated[NDArray[np.float64], PlainValidator(_box)]
+"""Vertices (8, 3)."""
+
+
 @dataclass(frozen=True)
 class Category:
     """A category of the data set; ids count from 1 in order of appearance in the recipe."""
+
+    __pydantic_config__ = _STRICTLY
 
     id: int
     name: str
@@ -53,13 +74,15 @@ class ModelInfo:
     same of each of its `steps`, ascending, whose `track` is its key; its own fields are those of its file's first frame.
     """
 
+    __pydantic_config__ = _STRICTLY
+
     key: str
     category: str
     supercategory: str
     category_id: int
     obj: str
     glb: str
-    box3d_object: NDArray[np.float64]
+    box3d_object: Box3d
     size: Size
     real_size: Size | None
     parts: tuple[str, ...]
@@ -106,18 +129,10 @@ class ModelInfo:
     @staticmethod
     def from_plain(value: Mapping[str, Any]) -> ModelInfo:
         """The record that `to_plain` was asked of; raises LookupError, TypeError or ValueError for anything else."""
-        plain = dict(value)
-        plain["box3d_object"] = np.array(value["box3d_object"])
-        for name in ("size", "real_size", "parts", "warnings"):
-            plain[name] = None if value[name] is None else tuple(value[name])
-        names([plain["key"]], "the key")
-        if "step" in value:
-            names([plain["track"]] if plain["track"] else [], "the key")
-            plain["step"] = TimeStep.model_validate(value["step"])
-            plain["steps"] = tuple(map(ModelInfo.from_plain, value["steps"]))
-        if "credit" in value:
-            plain["credit"] = Credit.model_validate(value["credit"])
-        return ModelInfo(**plain)
+        found = typed(_MODEL, value)
+        for one in (found, *found.steps):
+            names([one.key, *([one.track] if one.track else [])], "the key")
+        return found
 
 
 @dataclass(frozen=True)
@@ -150,6 +165,7 @@ class Part:
     pose_names: str | None = None
     dealt_splits: dict[str, str] = field(default_factory=dict[str, str])
     merged: bool = False
+    __pydantic_config__ = _STRICTLY
 
     @property
     def subjects(self) -> tuple[str, ...]:
@@ -166,21 +182,29 @@ class Part:
         """Whether a recipe made it: its subjects, models or scenes, are taken from known poses."""
         return self.sampler != IMPORT and bool(self.blocks)
 
-    @staticmethod
-    def from_plain(value: dict[str, Any]) -> Part:
-        """The part whose fields are these, as JSON gives them back."""
-        plain = dict(value)
-        plain["channels"] = tuple(value["channels"])
-        blocks = ((names(b["subjects"], "the name"), b["positions"], b["each"]) for b in value["blocks"])
-        plain["blocks"] = tuple(Block(s, tuple((int(a), int(z)) for a, z in p), int(e)) for s, p, e in blocks)
-        if any(b.each < 1 or any(not 0 <= a < z for a, z in b.positions) for b in plain["blocks"]):
+    def checked(self) -> Part:
+        """Itself; raises ValueError for numbers and names that no part has."""
+        for block in self.blocks:
+            names(block.subjects, "the name")
+        if any(b.each < 1 or any(not 0 <= a < z for a, z in b.positions) for b in self.blocks):
             raise ValueError("blocks of other than ascending ranges of poses")
-        if not 0 < sum(b.samples for b in plain["blocks"]) + value["first"] + value["frames"] + 1 <= MOST_FRAMES:
+        if min(self.first, self.frames, self.max_objects, self.new_poses) < 0:
+            raise ValueError("numbers below 0")
+        if not 0 < sum(b.samples for b in self.blocks) + self.first + self.frames + 1 <= MOST_FRAMES:
             raise ValueError(f"more than {MOST_FRAMES:,} frames")
-        if value["shot_frames"] < 1:
+        if self.shot_frames < 1:
             raise ValueError("shots without frames")
-        plain["supplies"] = tuple((int(part), tuple(channels)) for part, channels in value["supplies"])
-        return Part(**plain)
+        try:
+            named = len(b64decode(self.pose_names or "", validate=True))
+        except NoBase64 as error:
+            raise ValueError(f"names of poses that are no base64: {error}") from None
+        if self.pose_names is not None and named != NAME_BYTES * self.new_poses:
+            raise ValueError(f"{named:,} bytes of names of {self.new_poses:,} poses")
+        return self
+
+
+NAME_BYTES = 8
+"""Of a pose's name in `Part.pose_names`; zeros are that of no pose a recipe can mean."""
 
 
 @dataclass(frozen=True)
@@ -203,6 +227,7 @@ class PlanRecord:
     frames: int
     max_objects: int
     parts: tuple[Part, ...] = ()
+    __pydantic_config__ = _STRICTLY
 
     @property
     def keep_annotations_above(self) -> float | None:
@@ -324,12 +349,29 @@ class PlanRecord:
             raise ValueError(f"a store of version {found}, where this viewsphere reads {STORE_VERSION}: render the recipe anew")
         value = unsealed(text)
         del value["store"]
-        value["categories"] = tuple(Category(**c) for c in value["categories"])
-        value["parts"] = tuple(Part.from_plain(part) for part in value.get("parts", ()))
-        value["channels"] = tuple(value["channels"])
-        value |= {name: names(value[name], "the name") for name in ("splits", "models")}
-        return PlanRecord(**value)
+        record = typed(_PLAN, value)
+        for number, part in enumerate(map(Part.checked, record.parts)):
+            if any(not 0 <= other < number for other, _ in part.supplies):
+                raise ValueError("channels that were added to a part that was not there")
+        names((*record.splits, *record.models), "the name")
+        if min(record.frames, record.poses, record.max_objects) < 0:
+            raise ValueError("numbers below 0")
+        return record
 
 
 def _keeping(recipe: dict[str, Any], least: float | None) -> dict[str, Any]:
     return recipe if recipe.get(KEEP) == least else recipe | {KEEP: least}
+
+
+_MODEL, _PLAN = TypeAdapter(ModelInfo), TypeAdapter(PlanRecord)
+
+Record = TypeVar("Record")
+
+
+def typed(kind: TypeAdapter[Record], value: Any) -> Record:
+    """The record whose fields are these, as JSON gives them back; raises ValueError, in one line, for fields of other types."""
+    try:
+        return kind.validate_python(value)
+    except ValidationError as error:
+        place = ".".join(map(str, error.errors()[0]["loc"]))
+        raise ValueError(f"{place}: {first_of(error)}") from None

@@ -13,10 +13,12 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import ConfigDict, PositiveInt, TypeAdapter
 
 from viewsphere.labels import (
     ModelFacts,
     Placement,
+    finite,
     from_short_record,
     from_whole_record,
     object_labels,
@@ -28,6 +30,7 @@ from viewsphere.model.instant import Viewpoint
 from viewsphere.model.rig import CAMERA
 from viewsphere.model.sample import ObjectAnnotation, Sample, Taken
 from viewsphere.model.shot import Shot
+from viewsphere.store.records import typed
 
 Channels = Mapping[str, NDArray[Any]]
 Facts = Callable[[str, int | None], ModelFacts]
@@ -64,29 +67,57 @@ def whole_sample(sample: Sample) -> dict[str, Any]:
     }
 
 
+@dataclass(frozen=True)
+class _Picture:
+    """What a whole record says of a picture, but for its camera, pose and objects."""
+
+    __pydantic_config__ = ConfigDict(allow_inf_nan=False)
+    index: int
+    split: str
+    instant: int
+    files: dict[str, str]
+    objects: list[dict[str, Any]]
+    sequence: str = ""
+    sensor: str = CAMERA
+    time: float = 0.0
+    size: tuple[PositiveInt, PositiveInt] | None = None
+    source: dict[str, Any] | None = None
+
+
+_PICTURE = TypeAdapter(_Picture)
+
+
 def from_whole_sample(record: Mapping[str, Any], channels: Channels, files: Mapping[str, str]) -> Sample:
     """The sample a whole record was made of, with these channels and files; every number is equal to the last bit."""
-    camera, pose, size, labels = record["camera"], record["pose"], record.get("size"), object_labels()
+    camera, pose, labels, picture = record["camera"], record["pose"], object_labels(), typed(_PICTURE, record)
+    finite(picture.source)
     return Sample(
-        index=record["index"],
-        split=record["split"],
+        index=picture.index,
+        split=picture.split,
         known_camera=camera
         and Camera(
             Intrinsics.model_validate(camera["intrinsics"]),
-            np.array(camera["R"], np.float64),
-            np.array(camera["t"], np.float64),
+            _array(camera["R"], (3, 3)),
+            _array(camera["t"], (3,)),
         ),
         known_pose=pose and Viewpoint.model_validate(pose),
-        image_size=size and (int(size[0]), int(size[1])),
-        source=record.get("source"),
-        objects=tuple(from_whole_record(o, labels) for o in record["objects"]),
+        image_size=picture.size,
+        source=picture.source,
+        objects=tuple(from_whole_record(o, labels) for o in picture.objects),
         channels=channels,
         files=files,
-        sequence=record.get("sequence", ""),
-        sensor=record.get("sensor", CAMERA),
-        instant=record["instant"],
-        time=record.get("time", 0.0),
+        sequence=picture.sequence,
+        sensor=picture.sensor,
+        instant=picture.instant,
+        time=picture.time,
     )
+
+
+def _array(value: Any, shape: tuple[int, ...]) -> NDArray[np.float64]:
+    found = np.array(value, np.float64)
+    if found.shape != shape or not np.isfinite(found).all():
+        raise ValueError(f"finite numbers {shape} expected, found {found.shape}")
+    return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,6 +170,8 @@ class ShotRecords:
     def _objects(self, records: list[dict[str, Any]], instant: int, camera: Camera) -> Iterator[ObjectAnnotation]:
         things = self.shot.objects
         for record in records:
+            if not 0 < record["id"] <= len(things):
+                raise ValueError(f"object {record['id']}: expected one of 1 to {len(things)}")
             spec, motion = things[record["id"] - 1].model, things[record["id"] - 1].motion
             pose, step = motion.at(instant), motion.step_at(instant)
             if pose is None:

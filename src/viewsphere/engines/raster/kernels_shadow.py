@@ -23,6 +23,8 @@ COARSEST = 16  # texels a side that a map's coarsest level has at least
 LEVELS = 12
 GAP = 16  # unused texels between rows: without them the rows of a window would push each other out of the cache
 STEEP = 15.0
+WIDE = 16  # texels of a row from which on it is worth to find out which of them a triangle covers
+ROUNDING = 1e-14
 # Columns of Views.form: four rows of the matrix, then what `kernels_arrive.look` needs: texels per length (at distance 1), the
 # bias in q of a distant light and in shares of q of a near one, the least q in the map, how far from the middle the map is
 # read, half its size, whether the light is round, how an ellipse grows with the squared texels from the middle; a rectangle's
@@ -77,6 +79,18 @@ def _reach(corners, i, j, k, near, axis):
     return low, high
 
 
+@inner
+def _between(a, b, c, low, high):
+    """The part of [low, high] in which a x + b + c may be 0 or more, and what rounding may add to it."""
+    if a == 0.0:
+        return low, high
+    at = -(b + c) / a
+    slack = ROUNDING * (abs(b) + abs(c)) / abs(a)
+    if a > 0.0:
+        return max(low, at - slack), high
+    return low, min(high, at + slack)
+
+
 @njit
 def draw_depth(corners, surfaces, textures, begin, tilt, nearest, farthest):  # noqa: PLR0912, PLR0915, one loop
     """Draw q of all triangles at the texels' centres: the least into nearest (n, n + GAP), the greatest into farthest.
@@ -124,7 +138,13 @@ def draw_depth(corners, surfaces, textures, begin, tilt, nearest, farthest):  # 
         q0, q1, q2 = a0 * aq + b0 * bq + c0 * cq, a1 * aq + b1 * bq + c1 * cq, a2 * aq + b2 * bq + c2 * cq
         for row in range(top, bottom + 1):
             y = row + 0.5 - half
-            for column in range(left, right + 1):
+            first, stop = left, right + 1
+            if stop - first > WIDE:
+                low, high = _between(a0, a1 * y, a2, -half, half)
+                low, high = _between(b0, b1 * y, b2, low, high)
+                low, high = _between(c0, c1 * y, c2, low, high)
+                first, stop = max(first, math.floor(low + half) - 1), min(stop, math.ceil(high + half) + 1)
+            for column in range(first, stop):
                 x = column + 0.5 - half
                 ea, eb, ec = a0 * x + a1 * y + a2, b0 * x + b1 * y + b2, c0 * x + c1 * y + c2
                 total = ea + eb + ec

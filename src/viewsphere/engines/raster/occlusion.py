@@ -34,6 +34,7 @@ _PAD, _WIDE_PAD = 3, 6  # cells around the targets, without and with scenery
 _PUSH = 1.6  # cells between a surface and where it reads the volume
 _FLOOR = 128  # cells of the ground's map, each way
 _MOST_MARKED = 200_000  # points of surfaces at a time
+_MOST_MARKS = 50_000_000  # points of all surfaces; for more of them, all points of the volume are computed instead
 _DEEPEST = 0.92  # the rest is light that objects and ground throw back and forth
 
 
@@ -270,6 +271,8 @@ def _read_points(casters: Casters, corner: Float, cells: float, shape: NDArray[n
     a, b, c = (known[:3, corners] for corners in triangles)
     longest = np.sqrt(np.max([(d * d).sum(axis=0) for d in (b - a, c - b, a - c)], axis=0))
     parts = np.maximum(np.ceil(1.5 * longest), 1)
+    if (parts * parts).sum(dtype=np.float64) > _MOST_MARKS:
+        return np.ones(shape, np.bool_)
     is_first = np.zeros(shape, np.bool_)
     is_corner = np.zeros(vertices.shape[1], np.bool_)
     is_corner[triangles[:, parts == 1]] = True

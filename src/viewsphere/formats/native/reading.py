@@ -322,7 +322,10 @@ def _vertices(named: Mapping[str, Mapping[str, list[float] | None]] | None, size
     for face in (named or {}).values():
         for vertex, point in face.items():
             if point is not None:
-                points[int(vertex)] = point
+                try:
+                    points[int(vertex)] = point
+                except OverflowError as error:  # a whole number beyond all floats
+                    raise ValueError(str(error)) from None
     if np.isinf(points).any():
         raise ValueError("found an infinite vertex")
     return points

@@ -10,6 +10,7 @@ import numpy as np
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.camera import Distortion, Intrinsics
+from viewsphere.model.mistakes import told_of
 from viewsphere.sampling.pose_files.entries import Extrinsics, PoseFile
 from viewsphere.sampling.pose_files.lens import one_lens
 from viewsphere.sampling.pose_files.lines import counted, number, numbers, read_lines, read_text
@@ -65,7 +66,8 @@ def _camera(words: Sequence[str], where: str) -> Intrinsics:
     if min(fx, width, height) <= 0:
         raise RecipeError(f"{where}: expected a size and a focal length above 0; found {' '.join(words[2:5])}")
     size = {"width": int(width), "height": int(height)}
-    return Intrinsics(**size, fx=fx, fy=p.get("fy", fx), cx=p["cx"], cy=p["cy"], distortion=_distortion(model, p))
+    with told_of(where):
+        return Intrinsics(**size, fx=fx, fy=p.get("fy", fx), cx=p["cx"], cy=p["cy"], distortion=_distortion(model, p))
 
 
 def _distortion(model: str, p: dict[str, float]) -> Distortion | None:

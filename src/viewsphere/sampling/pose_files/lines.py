@@ -7,15 +7,18 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from viewsphere.errors import RecipeError
+from viewsphere.limits import limits
 
-LARGEST_FILE = 1 << 30
 
-
-def read_text(path: Path, of: str = "poses") -> str:
-    """The text of a file in UTF-8; raises RecipeError if there is none."""
+def read_text(path: Path, of: str = "poses", limit: str = "MAX_POSES_BYTES") -> str:
+    """The text of a file in UTF-8; raises RecipeError if there is none, or one beyond the named limit."""
     try:
-        if path.stat().st_size > LARGEST_FILE:
-            raise RecipeError(f"{path}: expected a file of at most {LARGEST_FILE:,} bytes; found {path.stat().st_size:,}")
+        size, most = path.stat().st_size, getattr(limits, limit)
+        if size > most:
+            raise RecipeError(
+                f"{path}: expected a file of at most {most:,} bytes (limit {limit}); found {size:,}; set VIEWSPHERE_{limit} "
+                "higher if it is meant so"
+            )
         return path.read_text("utf-8-sig")
     except OSError as error:
         raise RecipeError(f"{path}: expected a readable file of {of}; found: {error.strerror or error}") from None

@@ -13,6 +13,7 @@ import numpy as np
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.camera import focal_from_fov
 from viewsphere.model.camera import Distortion, Intrinsics
+from viewsphere.model.mistakes import told_of
 from viewsphere.sampling.pose_files.entries import Extrinsics, PoseFile
 from viewsphere.sampling.pose_files.lens import one_lens
 from viewsphere.sampling.pose_files.lines import number, read_text
@@ -66,15 +67,16 @@ def _lens(given: Mapping[str, Any], where: str) -> Intrinsics | None:
     fx = values.get("fl_x") or (focal_from_fov(angle, values["w"]) if angle and 0 < angle < math.pi else None)
     if fx is None or fx <= 0 or values["w"] < 1 or values["h"] < 1:
         raise RecipeError(f"{where}: expected w, h and fl_x (or camera_angle_x) above 0; found {fx}")
-    return Intrinsics(
-        width=int(values["w"]),
-        height=int(values["h"]),
-        fx=fx,
-        fy=values.get("fl_y") or fx,
-        cx=values.get("cx", values["w"] / 2),
-        cy=values.get("cy", values["h"] / 2),
-        distortion=_distortion("OPENCV_FISHEYE" if given["is_fisheye"] else given["camera_model"], values, where),
-    )
+    with told_of(where):
+        return Intrinsics(
+            width=int(values["w"]),
+            height=int(values["h"]),
+            fx=fx,
+            fy=values.get("fl_y") or fx,
+            cx=values.get("cx", values["w"] / 2),
+            cy=values.get("cy", values["h"] / 2),
+            distortion=_distortion("OPENCV_FISHEYE" if given["is_fisheye"] else given["camera_model"], values, where),
+        )
 
 
 def _distortion(model: object, values: Mapping[str, float], where: str) -> Distortion | None:

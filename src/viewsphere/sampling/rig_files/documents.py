@@ -11,14 +11,13 @@ import yaml
 from numpy.typing import NDArray
 
 from viewsphere.errors import RecipeError
+from viewsphere.recipe.file import ShallowLoader
 from viewsphere.sampling.pose_files.lines import number, read_text
 
 Float = NDArray[np.float64]
 
-LARGEST = 1_000_000
 
-
-class _Loader(yaml.SafeLoader):
+class _Loader(ShallowLoader):
     """Plain data; `!!opencv-matrix` is the mapping that follows."""
 
 
@@ -34,9 +33,7 @@ def read_document(path: Path) -> dict[str, Any]:
 
     OpenCV writes `%YAML:1.0`, which is no directive of YAML (https://docs.opencv.org/4.x/da/d56/group__core__xml.html).
     """
-    text = read_text(path, "a calibration")
-    if len(text) > LARGEST:
-        raise RecipeError(f"{path}: expected a calibration of at most {LARGEST:,} characters; found {len(text):,}")
+    text = read_text(path, "a calibration", "MAX_RIG_BYTES")
     if text.startswith("%YAML:"):
         text = text.partition("\n")[2]
     try:

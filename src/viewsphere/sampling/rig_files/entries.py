@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.rotation import rigid, transform
 from viewsphere.model.camera import Distortion
+from viewsphere.model.mistakes import told_of
 from viewsphere.sampling.pose_files.motions import nearest_rotation
 
 Float = NDArray[np.float64]
@@ -55,14 +56,16 @@ def brown_conrady(numbers: Sequence[float], where: str) -> Distortion | None:
         )
     if not any(numbers):
         return None
-    return Distortion(model="brown_conrady", coefficients=tuple(numbers[:8]))
+    with told_of(where):
+        return Distortion(model="brown_conrady", coefficients=tuple(numbers[:8]))
 
 
 def fisheye(numbers: Sequence[float], where: str) -> Distortion:
     """Four numbers of Kannala and Brandt; all 0 is the equidistant fisheye."""
     if len(numbers) != 4:
         raise RecipeError(f"{where}: expected 4 numbers; found {len(numbers)}")
-    return Distortion(model="fisheye", coefficients=tuple(numbers))
+    with told_of(where):
+        return Distortion(model="fisheye", coefficients=tuple(numbers))
 
 
 def rotation(matrix: Float, where: str) -> Float:

@@ -1,0 +1,87 @@
+"""Damaged files are read or refused, and nothing else: some seeds of every target."""
+
+import pytest
+from campaign import findings
+from targets import TARGETS
+
+QUICK = {
+    "obj": 60,
+    "gltf": 80,
+    "models": 60,
+    "poses": 150,
+    "rigs": 10,
+    "channels": 100,
+    "textures": 60,
+    "sky": 40,
+    "recipe": 15,
+}
+LONG = {"store": 12, "records": 8, "exports": 6, "coco": 15, "native": 15}
+"""Inputs of each target; those of whole data sets take longest."""
+
+
+def told(target, seeds):
+    return [one for one in findings(target, seeds) if not isinstance(one, int)]
+
+
+@pytest.fixture(autouse=True)
+def alone(monkeypatch):
+    """What a campaign sets in its own process is as before."""
+    from viewsphere import plugins
+
+    monkeypatch.setenv("VIEWSPHERE_READ_HERE", "1")
+    monkeypatch.setattr(plugins, "entry_points", plugins.entry_points)
+
+
+@pytest.mark.parametrize("target", QUICK)
+def test_single_files(target):
+    assert not told(target, range(QUICK[target]))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("target", LONG)
+def test_data_sets(target):
+    assert not told(target, range(LONG[target]))
+
+
+@pytest.mark.parametrize(("target", "seeds"), [("recipe", (1096, 3996, 6245)), ("poses", (70, 142)), ("native", (198,))])
+def test_what_was_found_stays_mended(target, seeds):
+    assert not [one for seed in seeds for one in told(target, [seed])]
+
+
+def test_no_target_is_forgotten():
+    assert TARGETS.keys() == QUICK.keys() | LONG.keys()
+
+
+def test_an_input_is_known_by_its_seed(tmp_path):
+    from campaign import make
+
+    for folder in ("a", "b"):
+        (tmp_path / folder).mkdir()
+        assert make("gltf", 5, tmp_path / folder)
+    one, other = ({p.name: p.read_bytes() for p in (tmp_path / folder).iterdir()} for folder in ("a", "b"))
+    assert one == other
+
+
+def test_foreign_errors_hangs_and_empty_messages_are_findings(monkeypatch):
+    import campaign
+    from targets import Files, Sample
+
+    from viewsphere.errors import UserError
+
+    def ends(error):
+        def call(path):
+            raise error
+
+        monkeypatch.setitem(TARGETS, "made", Files(call, lambda: (Sample("x", b"abc"),)))
+        return told("made", range(1))
+
+    def hangs(path):
+        while True:
+            pass
+
+    assert not ends(UserError("expected something else"))
+    assert ends(UserError(""))[0].what == "UserError without words"
+    assert ends(KeyError("a"))[0].what == "KeyError: 'a'"
+    monkeypatch.setattr(campaign, "SECONDS", 0.2)
+    monkeypatch.setitem(TARGETS, "made", Files(hangs, lambda: (Sample("x", b"abc"),)))
+    assert "more than 0.2 seconds" in told("made", range(1))[0].what
