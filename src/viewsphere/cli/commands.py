@@ -32,6 +32,7 @@ for command in (
     datasets.export,
     datasets.check,
     datasets.report,
+    datasets.view,
     doctor.doctor,
 ):
     app.command(cls=Command)(command)

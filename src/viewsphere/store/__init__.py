@@ -18,6 +18,7 @@ from viewsphere.store.exported import Exported
 from viewsphere.store.folder import Store, new_folder
 from viewsphere.store.index import Block, Row
 from viewsphere.store.records import Category, ModelInfo, Part, PlanRecord
+from viewsphere.store.watching import Finished, Watch
 
 __all__ = [
     "Block",
@@ -25,11 +26,13 @@ __all__ = [
     "Choice",
     "Dataset",
     "Exported",
+    "Finished",
     "ModelInfo",
     "Part",
     "PlanRecord",
     "Row",
     "Store",
+    "Watch",
     "check_codecs",
     "decode",
     "depth_step",

@@ -125,7 +125,7 @@ class Dataset(Shown, Sequence[Sample]):
         shots, starts = self._shots
         number = bisect_right(starts, i) - 1
         key, places = shots[number]
-        return self.shown(self._sample(self._records(key), places[i - starts[number]]))
+        return self.sample_at(key, places[i - starts[number]])
 
     def __iter__(self) -> Iterator[Sample]:
         for key, places in self._shots[0]:
@@ -140,6 +140,10 @@ class Dataset(Shown, Sequence[Sample]):
         records = self._read_records(key)
         for place in places:
             yield self.shown(self._sample(records, place))
+
+    def sample_at(self, key: str, place: int) -> Sample:
+        """One of a finished shot's samples, counted from 0; the records of a few shots are kept for those who ask again."""
+        return self.shown(self._sample(self._records(key), place))
 
     def shown(self, sample: Sample) -> Sample:
         """A sample as it is given out: as it is kept."""
@@ -218,6 +222,8 @@ class Dataset(Shown, Sequence[Sample]):
 
     def _read_records(self, key: str) -> _Records:
         file = self.store.shot_folder(key) / "frames.json"
+        for name in ("frames.json", "shot.json"):
+            file_inside(self.root, file.with_name(name).relative_to(self.root).as_posix())
         try:
             records: list[dict[str, Any]] = parsed(file.read_bytes())
             row = self.plan.find(key)

@@ -88,5 +88,8 @@ export function onLayout(element, draw) {
     width = element.clientWidth;
     soon();
   }).observe(element);
-  document.addEventListener("themechange", soon);
+  document.addEventListener("themechange", function changed() {
+    if (element.isConnected) soon();
+    else document.removeEventListener("themechange", changed);
+  });
 }

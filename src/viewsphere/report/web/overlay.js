@@ -15,7 +15,7 @@ function bitmap(url) {
     const image = new Image();
     image.src = url;
     if (bitmaps.size > 400) bitmaps.delete(bitmaps.keys().next().value);
-    bitmaps.set(url, image.decode().then(() => image));
+    bitmaps.set(url, image.decode().then(() => image, () => null)); // a server may have none: then nothing is drawn
   }
   return bitmaps.get(url);
 }

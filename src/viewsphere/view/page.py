@@ -1,0 +1,16 @@
+"""The page that a server gives: the report's, with modules of its own that ask for what they show."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from viewsphere.report.page import page
+
+WEB = Path(__file__).parent / "web"
+
+
+def live_page(title: str, data: Mapping[str, Any]) -> str:
+    """The whole HTML text."""
+    return page(title, data, own=WEB)
