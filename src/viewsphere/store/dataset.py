@@ -366,7 +366,7 @@ ManifestOf = Callable[[str], Manifest]
 
 
 def _manifest_of(root: Path, folder: str) -> Manifest:
-    return Manifest.read(root / folder)
+    return Manifest.read(file_inside(root, f"{folder}/{MANIFEST}").parent)
 
 
 def _parted(file: str) -> tuple[str, str]:

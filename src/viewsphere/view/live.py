@@ -9,8 +9,9 @@ from __future__ import annotations
 import signal
 import threading
 import time
+from collections import deque
 from collections.abc import Iterator, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures import BrokenExecutor, Future, ProcessPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass
 from multiprocessing import get_context
@@ -207,27 +208,33 @@ class Live:
 
     def _read_columns(self) -> None:
         """Read the columns of all frames that have none, in the order of the list."""
-        waiting = self._shots[self._shots_read :]
-        pieces = list(_pieces(waiting))
-        root = self.dataset.root
-        if sum(shot.count for shot in waiting) < MANY:
-            for piece in pieces:
-                self._take(piece, _tables(self.dataset, piece))
-            return
-        with ProcessPoolExecutor(min(self._workers, len(pieces)), get_context("spawn"), _step_back) as pool:
-            ahead: list[tuple[Sequence[Shot], Future[list[FrameTable | str]]]] = []
-            for piece in pieces:
-                ahead.append((piece, pool.submit(_read, root, piece)))
+        if sum(shot.count for shot in self._shots[self._shots_read :]) >= MANY:
+            with suppress(BrokenExecutor):  # then this process reads what is left, and tells which shot is to blame
+                self._read_elsewhere()
+        for piece in _pieces(self._shots[self._shots_read :]):
+            if self._end.is_set():
+                return
+            self._take(piece, _tables(self.dataset, piece))
+
+    def _read_elsewhere(self) -> None:
+        """Read the columns in other processes, and look for news meanwhile."""
+        ahead: deque[tuple[Sequence[Shot], Future[list[FrameTable | str]]]] = deque()
+        with ProcessPoolExecutor(self._workers, get_context("spawn"), _step_back) as pool:
+            for piece in _pieces(self._shots[self._shots_read :]):
+                ahead.append((piece, pool.submit(_read, self.dataset.root, piece)))
                 if len(ahead) > 2 * self._workers:
-                    done, future = ahead.pop(0)
-                    self._take(done, future.result())
+                    self._take_first(ahead)
                 if self._end.is_set():
                     pool.shutdown(wait=False, cancel_futures=True)
                     return
-                with suppress(OSError, ViewsphereError):
-                    self._list_news()
-            for done, future in ahead:
-                self._take(done, future.result())
+            while ahead:
+                self._take_first(ahead)
+
+    def _take_first(self, ahead: deque[tuple[Sequence[Shot], Future[list[FrameTable | str]]]]) -> None:
+        piece, future = ahead.popleft()
+        self._take(piece, future.result())
+        with suppress(OSError, ViewsphereError):
+            self._list_news()
 
     def _take(self, shots: Sequence[Shot], tables: Sequence[FrameTable | str]) -> None:
         with self._lock:
@@ -269,7 +276,7 @@ def _tables(dataset: Dataset, shots: Sequence[Shot]) -> list[FrameTable | str]:
     for shot in shots:
         try:
             found.append(table_of(dataset.samples_of(shot.key, range(shot.count))))
-        except ViewsphereError as error:
+        except (ViewsphereError, ArithmeticError, TypeError, ValueError) as error:  # numbers that no column holds, too
             found.append(str(error))
     return found
 

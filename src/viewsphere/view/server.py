@@ -124,7 +124,11 @@ class Server(ThreadingMixIn, TCPServer):
         """Somebody hung up, or a mistake of ours: in a line, for the page's other requests go on."""
         error = sys.exc_info()[1]
         if not isinstance(error, (ConnectionError, TimeoutError)):
-            print(f"viewsphere: view: {type(error).__name__}: {error}", file=sys.stderr)  # noqa: T201
+            self.complain(error)
+
+    def complain(self, error: BaseException | None) -> None:
+        """Tell the one who runs the server of a mistake of ours."""
+        print(f"viewsphere: view: {type(error).__name__}: {error}", file=sys.stderr)  # noqa: T201
 
 
 def _parted(host: str) -> tuple[str, int | None]:
@@ -198,6 +202,10 @@ class _Handler(BaseHTTPRequestHandler):
             answer = None if target.scheme or target.netloc else self.server.answers.of(target.path, asked)
         except ViewsphereError as error:
             self.send_error(HTTPStatus.UNPROCESSABLE_ENTITY, without_folders(str(error)))
+            return
+        except Exception as error:
+            self.server.complain(error)
+            self.send_error(HTTPStatus.INTERNAL_SERVER_ERROR)
             return
         if answer is None:
             self.send_error(HTTPStatus.NOT_FOUND)
