@@ -1,4 +1,4 @@
-"""What the server answers to strangers, byte by byte: nothing of what lies beside the data set, and nothing without its name."""
+"""What the server answers to strangers, byte by byte: nothing that lies beside the data set, nothing without its name."""
 
 import json
 import shutil
