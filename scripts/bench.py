@@ -3,8 +3,8 @@
 Reference scene (bench_scene.py): a zoo car cut to about 75,000 triangles with 1,024 x 1,024 textures (base colour,
 occlusion-roughness-metallic, normals) on every material, the ground, an environment with a sun, 640x480; files: RGB PNG,
 instance PNG, float32 depth and normals, annotations. `--scaling` measures how cost grows instead and draws
-docs/images/scaling.svg. `--motion` measures sequences (bench_motion.py), `--cycles` and `--endurance` the Cycles engine
-(bench_cycles.py).
+docs/images/scaling.svg. `--motion` measures sequences (bench_motion.py), `--training` how fast frames reach a training loop
+(bench_training.py, with PyTorch), `--cycles` and `--endurance` the Cycles engine (bench_cycles.py).
 """
 
 from __future__ import annotations
@@ -258,6 +258,7 @@ def main() -> None:
     options.add_argument("--workers", action="store_true", help="measure frames a second with one and two workers, too")
     options.add_argument("--scaling", action="store_true", help="measure how cost grows, and draw it")
     options.add_argument("--motion", action="store_true", help="measure what flow, states, tracks and moving pictures cost")
+    options.add_argument("--training", action="store_true", help="measure reading and rendering for a training loop")
     options.add_argument("--cycles", type=int, metavar="FRAMES", help="measure the Cycles engine beside BlenderProc's way")
     options.add_argument("--threads", type=int, default=0, help="of BlenderProc's Blender, beside --cycles; 0: all cores")
     options.add_argument("--endurance", type=int, metavar="FRAMES", help="tell the memory of one Blender over so many frames")
@@ -276,6 +277,13 @@ def main() -> None:
         with tempfile.TemporaryDirectory() as name:
             write_reference(Path(name))
             motion(Path(name))
+        return
+    if args.training:
+        from bench_training import training
+
+        with tempfile.TemporaryDirectory() as name:
+            write_reference(Path(name))
+            training(Path(name))
         return
     if args.cycles or args.endurance:
         from bench_cycles import cycles, endurance

@@ -26,6 +26,7 @@ from typer.models import ArgumentInfo
 from viewsphere import plugins
 from viewsphere.cli.commands import app
 from viewsphere.labels import Field, channels, object_labels
+from viewsphere.limits import table
 from viewsphere.recipe.file import schema
 
 DOCS = Path(__file__).parent.parent / "docs"
@@ -166,7 +167,19 @@ def field_type(field: Field) -> str:
     return f"{kind}{shape}" + (" or None" if field.optional else "")
 
 
+def limits_page() -> str:
+    """All limits and their defaults."""
+    text = NOTE + (
+        "# Limits\n\nWhat files may ask for has limits, in memory, time and number. A message gives the "
+        "limit's name, its value and what was found. The variable `VIEWSPHERE_<name>` of the environment sets a limit anew, "
+        "such as `VIEWSPHERE_MAX_TRIANGLES=50000000`; a recipe says itself how many frames it may have (`max_frames`).\n\n"
+        "| Limit | Default | Of what |\n|---|---|---|\n"
+    )
+    return text + "".join(f"| `{name}` | {limit.default:,} | {limit.meaning} |\n" for name, limit in table().items())
+
+
 PAGES = {
+    "limits.md": limits_page,
     "cli.md": cli_page,
     "channels.md": channels_page,
     "formats.md": partial(options_page, "formats", "formats.md"),

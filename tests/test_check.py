@@ -535,7 +535,7 @@ def record_of(dataset, frame):
     return json.loads(file.read_text())[frame % 4]
 
 
-@pytest.mark.parametrize("kind", ["short", "merged"])
+@pytest.mark.parametrize("kind", ["short", pytest.param("merged", marks=pytest.mark.slow)])
 def test_every_field_of_every_record_is_proved(whole, merged, tmp_path, kind):
     """One number, text or truth of each field of each label, and of each thing that is known of a frame."""
     source = whole if kind == "short" else merged

@@ -123,7 +123,7 @@ def test_what_ffmpeg_cannot_do_is_one_line_of_its_own_words(tmp_path):
 def _program(folder: Path, script: str) -> Encoder:
     """A shell script in ffmpeg's place, which leaves its process's number."""
     file = folder / "ffmpeg"
-    file.write_text(f"#!/bin/sh\necho $$ > '{folder}/pid'\n{script}\n")
+    file.write_text(f"#!/bin/sh\necho $$ > '{folder}/begun' && mv '{folder}/begun' '{folder}/pid'\n{script}\n")
     file.chmod(file.stat().st_mode | stat.S_IXUSR)
     return Encoder(str(file), "libx264")
 

@@ -256,8 +256,9 @@ def test_reading_takes_too_much(said, monkeypatch, tmp_path):
 
     monkeypatch.setenv("VIEWSPHERE_CACHE", str(tmp_path / "cache"))
     monkeypatch.setenv("VIEWSPHERE_READ_HERE", "1")
-    monkeypatch.setattr("viewsphere.assets.limits.MAX_TRIANGLES", 0)
-    assert_shown("(limit MAX_TRIANGLES)", said("inspect here/ok.obj"))
+    monkeypatch.setenv("VIEWSPHERE_MAX_TRIANGLES", "1")
+    (tmp_path / "here" / "two.obj").write_text(TRIANGLE + "f 3 2 1\n")
+    assert_shown("(limit MAX_TRIANGLES)", said("inspect here/two.obj"))
     monkeypatch.setattr("viewsphere.assets.load.load_model", flood)
     assert_shown("reading it takes more", said("inspect here/ok.obj"))
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from deadline import DEADLINE, until
-from viewsphere.assets import isolated, limits
+from viewsphere.assets import isolated
 from viewsphere.assets import reader as reader_program
 from viewsphere.assets.cache import ASIDE, cache_folder, load, load_normalised
 from viewsphere.assets.isolated import READ_HERE
@@ -121,7 +121,7 @@ def test_a_crash_costs_one_message(spec, reader, body, said):
 
 def test_an_endless_loop_is_stopped(spec, reader, monkeypatch):
     reader("while True: pass")
-    monkeypatch.setattr(limits, "MAX_READ_SECONDS", 1.0)
+    monkeypatch.setenv("VIEWSPHERE_MAX_READ_SECONDS", str(1.0))
     assert "within 1 s (limit MAX_READ_SECONDS)" in refusal(spec)
 
 
@@ -135,7 +135,7 @@ def test_a_loop_that_keeps_the_interpreter_to_itself_is_stopped(spec, reader, mo
 @pytest.mark.parametrize("body", ["import numpy; numpy.ones(1 << 40)", "x = [bytearray(1 << 20) for _ in range(1 << 20)]"])
 def test_a_flood_of_memory_is_stopped(spec, reader, monkeypatch, body):
     reader(body)
-    monkeypatch.setattr(limits, "MAX_READ_BYTES", 1 << 30)
+    monkeypatch.setenv("VIEWSPHERE_MAX_READ_BYTES", str(1 << 30))
     assert "more than 1,073,741,824 bytes of memory (limit MAX_READ_BYTES)" in refusal(spec)
 
 
@@ -155,7 +155,7 @@ def test_processor_time_is_bounded_by_the_cores_that_a_reader_uses(monkeypatch):
 
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems do not enforce it")
 def test_too_little_memory_to_start_is_said(spec, monkeypatch):
-    monkeypatch.setattr(limits, "MAX_READ_BYTES", 1 << 24)
+    monkeypatch.setenv("VIEWSPHERE_MAX_READ_BYTES", str(1 << 24))
     assert "the process that reads it failed" in refusal(spec) or "crashed" in refusal(spec)
 
 

@@ -10,17 +10,20 @@ import pytest
 import trimesh
 from PIL import Image
 
-from viewsphere.assets import limits
 from viewsphere.assets.cache import load_normalised
 from viewsphere.assets.load import load_model
 from viewsphere.errors import ModelError, UserError
+from viewsphere.limits import limits, table
 from viewsphere.model.model_spec import ModelSpec
 
-LIMITS = {name for name in vars(limits) if name.startswith(("MAX_", "MIN_"))}
+LIMITS = table().keys()
 TESTED = {
     "MAX_READ_SECONDS": "test_isolated",
     "MAX_READ_BYTES": "test_isolated",
     "MAX_BLENDER_TRIANGLES": "test_formats",
+    "MAX_RECIPE_VALUES": "test_file",
+    "MAX_STORED_PIXELS": "test_strangers",
+    "MAX_REPAIRED_SHOTS": "test_endless_plans",
     **dict.fromkeys(
         (
             "MAX_FILE_BYTES", "MAX_FILES", "MAX_TRIANGLES", "MAX_VERTICES", "MAX_PICTURE_PIXELS",
@@ -49,7 +52,7 @@ def refused(monkeypatch):
     def check(path, name, value, found, loads=True):
         if loads:
             load_model(path)
-        monkeypatch.setattr(limits, name, value)
+        monkeypatch.setenv(f"VIEWSPHERE_{name}", str(value))
         with pytest.raises(ModelError, match=name) as error:
             load_model(path)
         text = str(error.value)
@@ -86,7 +89,7 @@ def test_file_bytes(write, refused, monkeypatch):
     refused(path, "MAX_FILE_BYTES", 20, size)
     with pytest.raises(ModelError, match="MAX_FILE_BYTES"):
         load_normalised(ModelSpec(key="a", source=str(path), category="x", category_id=1))
-    monkeypatch.setattr(limits, "MAX_FILE_BYTES", 2 * size)
+    monkeypatch.setenv("VIEWSPHERE_MAX_FILE_BYTES", str(2 * size))
     write("m.mtl", "#" * 3 * size)
     mesh, _ = load_model(write("b.obj", "mtllib m.mtl\n" + TRIANGLE + "f 1 2 3\n"))
     assert "MAX_FILE_BYTES" in mesh.warnings[0]
@@ -201,14 +204,19 @@ def test_sizes(write, unit, name):
         load_normalised(spec)
 
 
-def test_the_environment_raises_the_limits_of_reading(monkeypatch):
-    assert limits.from_environment("MAX_READ_SECONDS") == limits.MAX_READ_SECONDS
-    monkeypatch.setenv("VIEWSPHERE_MAX_READ_SECONDS", "7.5")
-    assert limits.from_environment("MAX_READ_SECONDS") == 7.5
-    for wrong in ("long", "-1", "nan", "inf"):
-        monkeypatch.setenv("VIEWSPHERE_MAX_READ_SECONDS", wrong)
-        with pytest.raises(UserError, match=f"VIEWSPHERE_MAX_READ_SECONDS.*'{wrong}'"):
-            limits.from_environment("MAX_READ_SECONDS")
+@pytest.mark.parametrize("name", table())
+def test_the_environment_sets_every_limit_anew(monkeypatch, name):
+    limit = table()[name]
+    assert getattr(limits, name) == limit.default
+    monkeypatch.setenv(f"VIEWSPHERE_{name}", "7")
+    assert getattr(limits, name) == 7
+    wrong = ["long", "-1", "0", "nan", "inf", *(["7.5"] if isinstance(limit.default, int) else [])]
+    for text in wrong:
+        monkeypatch.setenv(f"VIEWSPHERE_{name}", text)
+        with pytest.raises(UserError, match=f"VIEWSPHERE_{name}: expected a .*number above 0, found '{text}'"):
+            getattr(limits, name)
+    monkeypatch.setenv(f"VIEWSPHERE_{name}", "")
+    assert getattr(limits, name) == limit.default
 
 
 def test_a_deep_json_is_refused(write):

@@ -15,7 +15,6 @@ import pytest
 
 from deadline import until
 from viewsphere import Recipe
-from viewsphere.assets import limits
 from viewsphere.assets.cache import load
 from viewsphere.assets.inspect import describe
 from viewsphere.assets.isolated import READ_HERE
@@ -418,7 +417,7 @@ def test_time_and_memory_are_bounded(made, monkeypatch, tmp_path):
         with pytest.raises(ModelError, match=r"800,000,000 bytes of memory \(limit MAX_READ_BYTES\)"):
             load(spec, folder=tmp_path)
         monkeypatch.delenv("VIEWSPHERE_MAX_READ_BYTES")
-    monkeypatch.setattr(limits, "MAX_READ_SECONDS", 0.2)  # Blender takes longer to start, on any machine
+    monkeypatch.setenv("VIEWSPHERE_MAX_READ_SECONDS", str(0.2))  # Blender takes longer to start, on any machine
     with pytest.raises(ModelError, match=r"within 0.2 s \(limit MAX_READ_SECONDS\)"):
         load(spec, folder=tmp_path)
     assert until(lambda: not readers())

@@ -74,8 +74,10 @@ def cut(shot, first, stop):
     return shot.model_copy(update={"things": tuple(things), "instants": shot.instants[first:stop]})
 
 
-@pytest.mark.parametrize("has_scenery, moves", [(False, False), (True, False), (True, True)])
-@pytest.mark.parametrize("scene", SCENES)
+@pytest.mark.parametrize(
+    "has_scenery, moves", [(False, False), (True, True), pytest.param(True, False, marks=pytest.mark.slow)]
+)
+@pytest.mark.parametrize("scene", ["sun", pytest.param("lamp", marks=pytest.mark.slow)])
 def test_an_instant_looks_as_if_it_were_built_alone(scene, has_scenery, moves):
     """In any order, with a neighbour's geometry asked for between, on one stage or cut into shots of any length."""
     shot = sequence_of(scene, has_scenery, moves=moves)

@@ -149,7 +149,8 @@ def test_every_field_is_compared(exported, name, every):
         for other in changed(at(value, where))
         if json.dumps(other) != json.dumps(at(value, where))
     ]
-    assert len(cases) > 200 or not exported[0].known_camera
+    least = 50 if name == "webdataset" else 200  # whose JSON is an index alone
+    assert len(cases) > least or not exported[0].known_camera
     missed = []
     for file, where, other in cases[::every]:
         with restored(file):

@@ -9,7 +9,7 @@ import jsonschema
 import pytest
 import yaml
 
-from viewsphere.errors import RecipeError
+from viewsphere.errors import RecipeError, UserError
 from viewsphere.recipe.file import _Loader, read, schema
 from viewsphere.recipe.recipe import Recipe
 
@@ -111,7 +111,7 @@ def test_what_is_no_yaml_is_reported_at_its_line(write, text, message):
 def test_aliases_cannot_explode(write):
     lines = ["a0: &a0 [x, x, x, x, x, x, x, x, x, x]"]
     lines += [f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 10)}]" for i in range(1, 10)]
-    assert "expected at most 200,000 values (limit MOST_VALUES); found more: write fewer aliases" in load_error(
+    assert "expected at most 200,000 values (limit MAX_RECIPE_VALUES); found more: write fewer aliases" in load_error(
         write("\n".join(lines))
     )
 
@@ -250,15 +250,15 @@ def test_the_documentation_names_every_field():
 
 
 def test_values_beyond_the_limit_are_not_read(tmp_path, monkeypatch):
-    monkeypatch.setenv("VIEWSPHERE_MOST_VALUES", "100")
+    monkeypatch.setenv("VIEWSPHERE_MAX_RECIPE_VALUES", "100")
     file = tmp_path / "r.yaml"
     file.write_text("name: x\nmodels:\n" + "- 1\n" * 5000)
     with patch.object(_Loader, "compose_scalar_node", autospec=True, side_effect=_Loader.compose_scalar_node) as made:
-        with pytest.raises(RecipeError, match=r"r.yaml:100: expected at most 100 values \(limit MOST_VALUES\)"):
+        with pytest.raises(RecipeError, match=r"r.yaml:100: expected at most 100 values \(limit MAX_RECIPE_VALUES\)"):
             read(file)
         assert made.call_count < 110
     file.write_text("name: x\nmodels:\n" + "- 1\n" * 97)
     assert len(read(file)[0]["models"]) == 97
-    monkeypatch.setenv("VIEWSPHERE_MOST_VALUES", "many")
-    with pytest.raises(RecipeError, match="VIEWSPHERE_MOST_VALUES: expected a whole number above 0; found 'many'"):
+    monkeypatch.setenv("VIEWSPHERE_MAX_RECIPE_VALUES", "many")
+    with pytest.raises(UserError, match="VIEWSPHERE_MAX_RECIPE_VALUES: expected a whole number above 0, found 'many'"):
         read(file)

@@ -113,7 +113,7 @@ def test_changed_options_are_damage(small_dataset):
 def test_a_format_that_is_only_read_cannot_be_asked_for(plugin, monkeypatch, small_run):
     assert asked_formats("hello, coco") == ("hello", "coco")
     monkeypatch.delattr("my_hello.writer")
-    known = r"expected one of blend, coco, csv, native; found 'hello'"
+    known = r"expected one of blend, coco, csv, huggingface, native, webdataset; found 'hello'"
     with pytest.raises(UserError, match=f"^--format: {known}"):
         asked_formats("coco,hello")
     with pytest.raises(UserError, match=f"^format: {known}"):

@@ -269,6 +269,7 @@ def test_only_frames_of_the_recipe_are_counted_as_hidden(tmp_path):
     assert again.notes == first.notes
 
 
+@pytest.mark.slow
 def test_empty_pictures_are_the_same_without_their_models(tmp_path):
     scene = {"company": 2, "place": {"source": "zoo:neighbourhood"}}
     recipe = recipe_of(

@@ -41,7 +41,8 @@ def recipe_file(tmp_path):
     return file
 
 
-@pytest.mark.parametrize("workers", [2, pytest.param(4, marks=pytest.mark.slow)])
+@pytest.mark.slow  # two workers that are killed are the default suite's
+@pytest.mark.parametrize("workers", [2, 4])
 def test_any_number_of_workers_gives_the_same_bytes(workers, recipe_file, small_run, tmp_path):
     subprocess.run(command(recipe_file, tmp_path / "out", workers), check=True, timeout=DEADLINE, capture_output=True)
     assert tree_hash(tmp_path / "out") == tree_hash(small_run)

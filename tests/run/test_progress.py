@@ -37,6 +37,7 @@ def test_frames_of_several_workers_add_up(tmp_path):
     assert all(after - before in (0, 1) for before, after in pairwise(told))
 
 
+@pytest.mark.slow
 def test_frames_of_a_worker_that_dies_are_not_counted_twice(tmp_path):
     large = {**WHOLE, "camera": {"size": [800, 600], "fov_deg": 35}}  # which leaves time to kill it within its shot
     others, seen = set(active_children()), list[Progress]()

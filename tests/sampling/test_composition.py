@@ -147,7 +147,7 @@ def test_the_orbit_s_centre_is_that_of_all_targets():
     assert own.instants[0].viewpoint.target == (1, 2, 3)
 
 
-@pytest.mark.parametrize("draw", ["fixed", "per_model", "per_frame"])
+@pytest.mark.parametrize("draw", ["fixed", "per_model", pytest.param("per_frame", marks=pytest.mark.slow)])
 def test_company_comes_from_the_same_split_and_follows_from_names_alone(draw):
     scene = {"company": {"count": 1, "draw": draw}}
     splits = {"by": "model", "train": 0.5, "val": 0.5}

@@ -8,8 +8,8 @@ import OpenEXR
 import pytest
 from PIL import Image
 
-from viewsphere.assets import limits
 from viewsphere.errors import RecipeError
+from viewsphere.limits import limits
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.sampling.plan import check_images, plan
 

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import viewsphere as vs
+from counting import counted
 from small import ROOT, small_recipe, tree_hash
 from viewsphere import plugins
 from viewsphere.check import check
@@ -25,6 +26,7 @@ from viewsphere.run.generate import Missing
 from viewsphere.sampling.extension import extend, whole
 from viewsphere.sampling.placing import footprint
 from viewsphere.sampling.plan import Plan
+from viewsphere.sampling.viewpoints import SpherePoses
 from viewsphere.store import Store
 
 
@@ -307,8 +309,31 @@ def test_a_hundred_million_frames_are_planned_in_little_memory(models, poses, by
     vs.plan(small_recipe())  # what is loaded once does not count
     tracemalloc.start()
     portion = whole(vs.plan(big))
-    first = next(Missing(portion, Store(tmp_path), {}).rows())
+    first = next(Missing(portion, Store(tmp_path)).rows())
     assert sum(portion.plan.split_counts.values()) == portion.plan.frames == 10**8
     assert next(iter(portion.rows)) == first and len(portion.record.to_json()) < 500_000
     assert tracemalloc.get_traced_memory()[1] < 20_000_000
     tracemalloc.stop()
+
+
+@pytest.mark.parametrize("views", [None, 2])
+def test_planning_counts_scenes_out_once_and_asks_for_no_pose_again(views, monkeypatch):
+    sampler = plugins.load("samplers", "scenes")
+    blocks, ranges = counted(monkeypatch, sampler, "blocks"), counted(monkeypatch, sampler, "as_ranges")
+    named = counted(monkeypatch, SpherePoses, "name")
+    planned = vs.plan(recipe(count=300, scenes={"views": views}))
+    assert (planned.frames, planned.shot_count) == (300 * (views or 3), len(planned.rows))
+    assert len(blocks) == 1
+    assert len(ranges) == (300 if views else 0)
+    assert len(named) == (3 if views else 0)
+
+
+def test_splits_of_more_scenes_than_are_counted_are_what_some_of_them_say(monkeypatch):
+    exact = vs.plan(recipe(count=400)).split_counts
+    monkeypatch.setattr("viewsphere.sampling.plan.COUNTED", 200)
+    planned = vs.plan(recipe(count=400))
+    drawn = counted(monkeypatch, planned.sampler, "split")
+    assert planned.split_counts.keys() == exact.keys()
+    assert sum(planned.split_counts.values()) == planned.frames
+    assert max(abs(planned.split_counts[name] - exact[name]) for name in exact) < 0.1 * planned.frames
+    assert len(drawn) == 200

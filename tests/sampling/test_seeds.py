@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from viewsphere.sampling.seeds import generator, share
+from viewsphere.sampling.seeds import generator, share, shares
 
 
 def test_the_same_names_give_the_same_stream():
@@ -32,3 +32,8 @@ def test_shares_are_uniform_and_follow_from_seed_and_names():
     steps = np.arange(1, 4001) / 4000
     assert np.abs(values - steps).max() < 1.63 / np.sqrt(4000)  # Kolmogorov-Smirnov, 1 %
     assert share(1, "a") != share(2, "a") != share(2, "b")
+
+
+def test_shares_of_many_names_are_those_of_each():
+    names = ["", "a", "ab", "b", "ä"]
+    assert shares(5, "car", "x", each=names) == [share(5, "car", "x", name) for name in names]

@@ -313,3 +313,23 @@ def test_a_worker_whose_parent_is_gone_ends_quietly(error, tmp_path):
 
     with patch("signal.signal"), patch("viewsphere.run.tasks.Worker"):
         pool._serve(Pipe(), tmp_path, None)
+
+
+def test_a_plain_path_is_followed_without_looking_at_what_is_above(tmp_path, monkeypatch):
+    (tmp_path / "a").mkdir()
+    (tmp_path / "a" / "b.png").touch()
+    (tmp_path / "link").symlink_to(tmp_path / "a")
+    (tmp_path / "out").symlink_to(tmp_path.parent)
+    followed = []
+    resolve = Path.resolve
+    monkeypatch.setattr(Path, "resolve", lambda self, **options: followed.append(self) or resolve(self, **options))
+    assert file_inside(tmp_path, "a/b.png") == tmp_path / "a" / "b.png"
+    assert file_inside(tmp_path, "a/none/c.png") == tmp_path / "a" / "none" / "c.png"
+    assert not followed
+    assert file_inside(tmp_path, "link/b.png") == tmp_path / "link" / "b.png"
+    assert followed
+    with pytest.raises(StoreError, match="a link that leads out of it"):
+        file_inside(tmp_path, "out/b.png")
+    for outside in ("..", "a/../..", "a/..", "/a", "C:/a", "a\\..\\b", "\0"):
+        with pytest.raises(StoreError):
+            file_inside(tmp_path, outside)

@@ -23,7 +23,6 @@ from typing import Any
 
 import platformdirs
 
-from viewsphere.assets import limits
 from viewsphere.assets.inside import split_source
 from viewsphere.assets.isolated import read_apart
 from viewsphere.assets.load import check_source
@@ -33,6 +32,7 @@ from viewsphere.assets.normalise import normalise
 from viewsphere.assets.parts import taken
 from viewsphere.assets.primitive import FileFacts, extents
 from viewsphere.errors import ModelError
+from viewsphere.limits import limits
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.thing import TimeStep
 

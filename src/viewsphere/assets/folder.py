@@ -17,9 +17,9 @@ from urllib.parse import unquote, unquote_to_bytes
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.assets import limits
 from viewsphere.assets.mesh import Image
 from viewsphere.errors import ModelError
+from viewsphere.limits import limits
 
 SHARPEST = 4096
 """Longest side, in texels, that textures are reduced to: five of 8,192 would take a worker more than a gigabyte."""
@@ -71,7 +71,10 @@ class ModelFolder:
         """Raise ModelError when `found`, the number of `what`, exceeds the value of the named `limit`."""
         most: int = getattr(limits, limit)
         if found > most:
-            raise self.error(f"expected at most {most:,} {what} (limit {limit}), found {found:,}; simplify the model")
+            raise self.error(
+                f"expected at most {most:,} {what} (limit {limit}), found {found:,}; simplify the model, or set "
+                f"VIEWSPHERE_{limit} higher"
+            )
 
     def read_model(self) -> bytes:
         """The model file's own bytes; ModelError when it is missing, empty, unreadable or too large."""

@@ -9,7 +9,7 @@ import zipfile
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from viewsphere.assets import limits
+from viewsphere.limits import limits
 
 ENOUGH = 10**12
 """Counting stops here: more digits would be a message of pages."""

@@ -12,10 +12,11 @@ from pathlib import Path
 from threading import Event, Timer
 from typing import Any
 
-from viewsphere.assets import limits
+from viewsphere.assets import endings
 from viewsphere.assets.load import BLENDER_SUFFIXES, check_source
 from viewsphere.assets.reader import OUTCOME, Job, mesh_name, read
 from viewsphere.errors import ModelError
+from viewsphere.limits import limits
 from viewsphere.model.model_spec import ModelSpec
 
 LOG = "log.txt"
@@ -33,8 +34,8 @@ def read_apart(spec: ModelSpec, frames: Sequence[int], folder: Path) -> tuple[li
     Gives the files that `mesh_file.read_mesh` reads, one a frame, and the files that the model named. Raises ModelError in one
     line: what the reader says of the file, or how its process came to its end (killed for time or memory, crashed).
     """
-    memory = int(limits.from_environment("MAX_READ_BYTES"))
-    seconds = limits.from_environment("MAX_READ_SECONDS") * (1 + len(frames))
+    memory = limits.MAX_READ_BYTES
+    seconds = limits.MAX_READ_SECONDS * (1 + len(frames))
     by_blender = bool(frames) or check_source(Path(spec.source)) in BLENDER_SUFFIXES
     job = Job(spec.model_dump(mode="json"), str(folder), seconds, memory, os.getpid(), by_blender, tuple(frames))
     outcome = read(job) if os.environ.get(READ_HERE) == "1" else _run(job)
@@ -86,13 +87,13 @@ def _started(job: Job) -> tuple[subprocess.Popen[bytes], int]:
 def _end(job: Job, code: int, *, late: bool) -> str:
     """Why a child ended without an outcome."""
     if late or (code < 0 and -code == getattr(signal, "SIGXCPU", None)):
-        return limits.too_slow(job.seconds)
+        return endings.too_slow(job.seconds)
     if code == 1 and (reason := _last_line(Path(job.folder) / LOG)):
         return f"the process that reads it failed ({reason})"
     how = f"exit code {code}"
     if code < 0:
         how = signal.Signals(-code).name if -code in set(signal.Signals) else f"signal {-code}"
-    return limits.ended("the process that reads it", how, job.memory)
+    return endings.ended("the process that reads it", how, job.memory)
 
 
 def _last_line(log: Path) -> str:

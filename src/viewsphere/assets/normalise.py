@@ -7,10 +7,10 @@ from typing import cast
 
 import numpy as np
 
-from viewsphere.assets import limits
 from viewsphere.assets.mesh import Mesh
 from viewsphere.assets.primitive import FileFacts, Float, face_normals, unit_normals
 from viewsphere.errors import ModelError
+from viewsphere.limits import limits
 from viewsphere.model.model_spec import Axis, ModelSpec, Size
 
 PROPORTION_TOLERANCE = 0.1

@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from viewsphere.assets import limits
 from viewsphere.assets.via_blender import why_no_answer
 from viewsphere.blender.interpreter import find_blender
 from viewsphere.blender.process import BlenderProcess
 from viewsphere.errors import BlenderDied, BlenderError, ModelError
 from viewsphere.geometry.rotation import Float, matrix_from_quaternion, rigid
+from viewsphere.limits import limits
 
 
 @dataclass(frozen=True)
@@ -96,7 +96,7 @@ def _asked(path: Path, confined: bool, do: str, **told: Any) -> Any:
     place = path.parent.resolve()
     readable = [place] if confined else [Path("/")]
     told |= {"file": str(path.resolve()), "root": str(place) if confined else None}
-    seconds = limits.from_environment("MAX_READ_SECONDS")
+    seconds = limits.MAX_READ_SECONDS
     try:
         process = BlenderProcess(find_blender(), readable=readable)
     except BlenderDied as error:

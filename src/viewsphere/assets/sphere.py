@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from viewsphere.assets import limits
 from viewsphere.assets.folder import UnreadableError
+from viewsphere.limits import limits
 
 EXPECTED = "expected an equirectangular EXR or HDR picture"
 

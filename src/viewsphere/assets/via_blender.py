@@ -18,7 +18,7 @@ from urllib.parse import unquote
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.assets import limits
+from viewsphere.assets import endings
 from viewsphere.assets.alpha import SOLID, with_alpha_modes
 from viewsphere.assets.folder import SHARPEST, ModelFolder, reduced
 from viewsphere.assets.mesh import Image, Material, Mesh
@@ -28,6 +28,7 @@ from viewsphere.assets.transform import moved
 from viewsphere.blender.interpreter import find_blender
 from viewsphere.blender.process import BlenderProcess
 from viewsphere.errors import BlenderDied, BlenderError, MissingExtraError, UserError
+from viewsphere.limits import limits
 
 NAMES = {
     "abc": "Alembic",
@@ -132,7 +133,7 @@ def started(folder: ModelFolder) -> BlenderProcess:
 def asked(folder: ModelFolder, process: BlenderProcess, do: str, /, **told: Any) -> dict[str, Any]:
     """Blender's answer to a request about the file; ModelError when the answer is an error, or Blender dies."""
     root = str(folder.model.parent.resolve()) if folder.confined else None
-    seconds = limits.from_environment("MAX_READ_SECONDS")
+    seconds = limits.MAX_READ_SECONDS
     kind = folder.model.suffix[1:].lower()
     try:
         return process.ask(do, seconds, file=str(folder.model.resolve()), kind=kind, root=root, **told)
@@ -147,9 +148,9 @@ def why_no_answer(died: BlenderDied, seconds: float) -> str:
     """The message for a Blender that ended, after so many seconds, instead of answering about a file."""
     said = str(died).partition("; its log")[0]
     if died.signal == "SIGXCPU" or said.startswith("Blender hung"):
-        return limits.too_slow(seconds)
-    how = died.signal if died.signal in limits.FROM_OUTSIDE else said
-    return limits.ended("Blender, which reads it,", how, int(limits.from_environment("MAX_READ_BYTES")))
+        return endings.too_slow(seconds)
+    how = died.signal if died.signal in endings.FROM_OUTSIDE else said
+    return endings.ended("Blender, which reads it,", how, limits.MAX_READ_BYTES)
 
 
 def _check_layers(folder: ModelFolder, log: Path) -> None:

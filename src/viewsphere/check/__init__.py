@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import multiprocessing
-from collections import defaultdict
+from bisect import bisect_right
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass
 from functools import partial
+from itertools import accumulate
 from pathlib import Path
 from typing import Any
 
@@ -226,22 +227,15 @@ def _credits(dataset: Dataset) -> Iterator[str]:
 def _missing_shots(dataset: Dataset) -> Iterator[str]:
     """What is missing of each part, and of the channels that each one added to others."""
     plan, store = dataset.plan, dataset.store
-    groups: defaultdict[tuple[int, bool], list[Row]] = defaultdict(list)
-    for row in store.wanted(plan):
-        groups[row.part, row.part != plan.part_of(row.first)].append(row)
-    for (number, added), rows in groups.items():
-        missing = [row for row in rows if not store.has_shot(row.key)]
-        if not missing:
-            continue
-        expected, lost = (sum(row.count for row in some) for some in (rows, missing))
+    for gap in store.gaps(plan):
         what = _factors(plan)
         if len(plan.parts) > 1:
-            channels = dict.fromkeys(name for _, names in plan.parts[number].supplies for name in names)
-            what = f"{', '.join(channels)} of older frames, " if added else ""
-            what += f"part {number + 1}, recipe {plan.parts[number].name!r}"
+            channels = dict.fromkeys(name for _, names in plan.parts[gap.part].supplies for name in names)
+            what = f"{', '.join(channels)} of older frames, " if gap.is_added else ""
+            what += f"part {gap.part + 1}, recipe {plan.parts[gap.part].name!r}"
         yield (
-            f"expected {expected} frames ({what}), found {expected - lost}: shot {missing[0].key} is the first of "
-            f"{len(missing)} missing: render again to go on"
+            f"expected {gap.of} frames ({what}), found {gap.of - gap.frames}: shot {gap.first.key} is the first of "
+            f"{gap.shots} missing: render again to go on"
         )
 
 
@@ -258,25 +252,22 @@ def _factors(plan: PlanRecord) -> str:
 
 def _frames(dataset: Dataset, positions: range) -> Iterator[tuple[int, int, Sample | str]]:
     """Position, index and sample of these finished frames, or what is wrong with a record."""
-    position = 0
-    for row in dataset.plan.rows:
-        if not dataset.store.has_shot(row.key):
-            continue
-        for i in range(row.count):
-            if position + i not in positions:
-                continue
-            try:
-                yield position + i, row.first + i, dataset[position + i]
-            except (ViewsphereError, LookupError, TypeError, ValueError, AttributeError) as error:
-                problem = f"{type(error).__name__}: {error}"
-                yield position + i, row.first + i, f"shot {row.key}: expected a readable record, found {problem}"
-        position += row.count
+    starts = list(accumulate((row.count for row in dataset.rows), initial=0))
+    for position in positions:
+        number = bisect_right(starts, position) - 1
+        row = dataset.rows[number]
+        index = row.first + position - starts[number]
+        try:
+            yield position, index, dataset[position]
+        except (ViewsphereError, LookupError, TypeError, ValueError, AttributeError) as error:
+            problem = f"{type(error).__name__}: {error}"
+            yield position, index, f"shot {row.key}: expected a readable record, found {problem}"
 
 
 def _alone(dataset: Dataset) -> Iterator[str]:
     """A note on frames of which nothing is known but what their records say."""
-    finished = ((row, dataset.store.shot_folder(row.key) / "shot.json") for row in dataset.plan.rows)
-    frames = sum(row.count for row, file in finished if dataset.store.has_shot(row.key) and not file.exists())
+    folder_of = dataset.store.shot_folder
+    frames = sum(row.count for row in dataset.rows if not (folder_of(row.key) / "shot.json").exists())
     if frames:
         yield f"{frames:,} frames came without their shots: nothing is computed again, they are proved against themselves alone"
 

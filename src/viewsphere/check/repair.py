@@ -11,6 +11,7 @@ from viewsphere.check import Finding, Report, check, exports, lacking_models
 from viewsphere.check.digests import damaged
 from viewsphere.check.models import differing
 from viewsphere.errors import UserError, ViewsphereError
+from viewsphere.limits import limits
 from viewsphere.run.exporting import export
 from viewsphere.run.mending import Mender
 from viewsphere.run.progress import Listener, unheard
@@ -68,8 +69,13 @@ class _Mending:
 
     def damaged_shots(self) -> Iterator[str]:
         """Keys of shots that are not as they were written, or are missing."""
-        store, folders = self._dataset.store, damaged(self._dataset)[1]
-        wanted = (row.key for row in store.wanted(self._dataset.plan))
+        store, folders, plan = self._dataset.store, damaged(self._dataset)[1], self._dataset.plan
+        missing, most = sum(gap.shots for gap in store.gaps(plan)), limits.MAX_REPAIRED_SHOTS
+        if missing > most:
+            why = f"expected at most {most:,} missing shots (limit MAX_REPAIRED_SHOTS), found {missing:,}: render them first"
+            self.refused.append(Finding("repair", None, why))
+            return (key for key in store.finished() if store.shot_folder(key) in folders)
+        wanted = (row.key for row in store.wanted(plan))
         return (key for key in wanted if store.shot_folder(key) in folders or not store.has_shot(key))
 
     def models(self, keys: Iterable[str]) -> bool:

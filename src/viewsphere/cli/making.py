@@ -292,7 +292,7 @@ def render(
     addition = to_append(planned, Store(output)) if append else None
     if not json_:
         print_plan(planned)
-        if addition is not None and Store(output).missing(addition.record):
+        if addition is not None and any(Store(output).gaps(addition.record)):
             typer.echo(f"{output}: {addition}")
     crew = cores() if workers is None else workers
     with ProgressBar(quiet=json_) as bar:

@@ -7,13 +7,15 @@ from __future__ import annotations
 
 import io
 import struct
-from typing import Any
+import zipfile
+from typing import IO, Any
 
 import numpy as np
 from isal import isal_zlib
 from numpy.typing import NDArray
 
 from viewsphere.codecs.deflate import deflate
+from viewsphere.codecs.size import check_size
 from viewsphere.errors import UserError
 
 _DEFLATED, _VERSION, _DATE = 8, 20, 33  # ZIP 2.0; dated 1 January 1980, so that equal arrays make equal files
@@ -39,11 +41,26 @@ def encode_npz(array: NDArray[Any], name: str) -> bytes:
 
 
 def decode_npz(data: bytes, name: str) -> NDArray[Any]:
-    """The array of this name in an archive; raises UserError where the file is damaged or has no such array."""
+    """The array of this name in an archive; raises UserError where the file is damaged, without it or beyond the limit."""
     try:
+        with zipfile.ZipFile(io.BytesIO(data)) as archive, archive.open(f"{name}.npy") as member:
+            check_size(*_promised(member))
         with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
             return arrays[name]
+    except UserError:
+        raise
     except Exception as error:  # numpy, zipfile, zlib and tokenize each have errors of their own
         raise UserError(
             f"NPZ: expected an archive with the array {name!r}, found {error}: the file is damaged or none"
         ) from error
+
+
+def _promised(member: IO[bytes]) -> tuple[int, int]:
+    """Width and height that an array promises at its head: of rows of numbers the number of the rows and 1."""
+    major, _ = np.lib.format.read_magic(member)
+    read = np.lib.format.read_array_header_1_0 if major == 1 else np.lib.format.read_array_header_2_0
+    shape, _, _ = read(member)
+    if len(shape) > 3 or (len(shape) == 3 and shape[2] > 4):
+        raise ValueError(f"an array of shape {shape}")
+    height, width = (*shape, 1, 1)[:2]
+    return width, height

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.codecs.size import opened
+from viewsphere.codecs.heads import JXL_BARE, JXL_BOXES, jxl_size, qoi_size
+from viewsphere.codecs.size import check_size, opened
 from viewsphere.errors import MissingExtraError
 
 Picture = NDArray[np.uint8]
@@ -63,8 +64,10 @@ def decode_picture(data: bytes, components: int) -> Picture:
     if data[:4] == b"qoif":
         if not data.endswith(_QOI_END):
             raise ValueError("QOI: expected its last 8 bytes, found the file's end: it is cut off")
+        check_size(*qoi_size(data))
         return _decoded("QOI", "qoi_decode", data, components)
-    if data[:2] == b"\xff\x0a" or data[:12] == b"\0\0\0\x0cJXL \r\n\x87\n":
+    if data.startswith((JXL_BARE, JXL_BOXES)):
+        check_size(*jxl_size(data))
         return _decoded("JPEG XL", "jpegxl_decode", data, components)
     with opened(io.BytesIO(data)) as image:
         if image.mode.startswith("I"):  # 16 bits of grey, which Pillow would cut off above 255

@@ -2,37 +2,26 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Generator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, TYPE_CHECKING
 
 from viewsphere.errors import UserError
+from viewsphere.limits import limits
 
 if TYPE_CHECKING:
     from PIL.Image import Image
 
-MAX_STORED_PIXELS = 1 << 28
-"""16384 x 16384, the largest picture that is rendered; `$VIEWSPHERE_MAX_STORED_PIXELS` overrides it."""
-
 
 def check_size(width: int, height: int) -> None:
     """Raise UserError for a file of more pixels than the limit; to be called before its pixels are unpacked."""
-    most = most_pixels()
+    most = limits.MAX_STORED_PIXELS
     if width * height > most:
         raise UserError(f"expected at most {most:,} pixels (limit MAX_STORED_PIXELS), found {width:,} x {height:,}; {RAISE}")
 
 
 RAISE = "set VIEWSPHERE_MAX_STORED_PIXELS higher if it is meant so"
-
-
-def most_pixels() -> int:
-    """The limit that holds here; UserError where the variable is no whole number above 0."""
-    text = os.environ.get("VIEWSPHERE_MAX_STORED_PIXELS", "") or str(MAX_STORED_PIXELS)
-    if not (text.isascii() and text.isdigit() and 0 < int(text[:20]) < 10**19):
-        raise UserError(f"VIEWSPHERE_MAX_STORED_PIXELS: expected a whole number above 0, found {text!r:.60}")
-    return int(text)
 
 
 @contextmanager

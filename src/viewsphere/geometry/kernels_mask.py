@@ -141,18 +141,15 @@ def trace_rings(mask):
 
 
 @njit(_nrt=True)
-def decode_runs(codes, height, width):
-    """The mask (height, width) bool of a compressed run-length code's characters, and whether the code is whole and fills
-    it.
-    """
-    mask = np.zeros((height, width), np.bool_)
+def read_runs(codes, size):
+    """The run lengths of a compressed code's characters, and whether the code is whole and they are `size` pixels together."""
     runs = np.zeros(len(codes) + 1, np.int64)
     count, position, i = 0, 0, 0
     while i < len(codes):
         run, shift, more = np.int64(0), 0, True
         while more:
             if i == len(codes) or shift > 30 or not 48 <= codes[i] < 112:
-                return mask, False
+                return runs[:count], False
             bits = np.int64(codes[i]) - 48
             run |= (bits & 31) << shift
             shift += 5
@@ -162,16 +159,26 @@ def decode_runs(codes, height, width):
             i += 1
         if count > 2:
             run += runs[count - 2]
-        if run < 0 or position + run > height * width:
-            return mask, False
-        if count % 2:
+        if run < 0 or position + run > size:
+            return runs[:count], False
+        runs[count] = run
+        count += 1
+        position += run
+    return runs[:count], position == size
+
+
+@njit(_nrt=True)
+def draw_runs(runs, height, width):
+    """The mask (height, width) bool of run lengths that fill it."""
+    mask = np.zeros((height, width), np.bool_)
+    position = 0
+    for i in range(len(runs)):
+        if i % 2:
             x, y = position // height, position % height
-            for _ in range(run):
+            for _ in range(runs[i]):
                 mask[y, x] = True
                 y += 1
                 if y == height:
                     x, y = x + 1, 0
-        runs[count] = run
-        count += 1
-        position += run
-    return mask, position == height * width
+        position += runs[i]
+    return mask

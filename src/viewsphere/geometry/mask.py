@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Mask = NDArray[np.bool_]
+Runs = NDArray[np.int64]
 
 
 def encode_rle(mask: Mask) -> str:
@@ -24,13 +25,34 @@ def encode_rle(mask: Mask) -> str:
 
 def decode_rle(height: int, width: int, counts: str) -> Mask:
     """The (height, width) bool mask of a compressed run-length code; raises ValueError when it does not fill the image."""
-    from viewsphere.geometry.kernels_mask import decode_runs
+    from viewsphere.geometry.kernels_mask import draw_runs
+
+    return draw_runs(rle_runs(height, width, counts), height, width)
+
+
+def rle_runs(height: int, width: int, counts: str) -> Runs:
+    """The run lengths (column-major, first of pixels that are not in the mask) of a compressed code, without its pixels;
+    raises ValueError when they do not fill the image.
+    """
+    from viewsphere.geometry.kernels_mask import read_runs
 
     codes = np.frombuffer(counts.encode("ascii", "replace"), np.uint8)
-    mask, whole = decode_runs(codes, height, width)
+    runs, whole = read_runs(codes, height * width)
     if not whole:
         raise ValueError(f"RLE: expected runs that fill {width} x {height} pixels, found {counts[:40]!r}")
-    return mask
+    return runs
+
+
+def rle_of_runs(height: int, width: int, runs: Runs) -> str:
+    """The one compressed code of run lengths that fill the image; runs of no pixels count with their neighbours."""
+    from pycocotools import mask as coco
+
+    ends = np.cumsum(runs)
+    turns, times = np.unique(ends[:-1], return_counts=True)
+    turns = turns[times % 2 == 1]
+    whole = np.diff(turns[turns < height * width], prepend=0, append=height * width)
+    code: Any = coco.frPyObjects({"size": [height, width], "counts": whole.tolist()}, height, width)
+    return code["counts"].decode("ascii")
 
 
 def rle_area(height: int, width: int, counts: str) -> int:

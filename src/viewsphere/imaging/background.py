@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.assets import limits
 from viewsphere.assets.srgb import linear
 from viewsphere.errors import RecipeError
+from viewsphere.limits import limits
 from viewsphere.model.scene import Background
 
 if TYPE_CHECKING:

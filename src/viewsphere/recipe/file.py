@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 import re
 from collections.abc import Sequence
 from pathlib import Path
@@ -14,14 +13,11 @@ from yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 from yaml.tokens import FlowMappingEndToken, FlowMappingStartToken, FlowSequenceEndToken, FlowSequenceStartToken
 
 from viewsphere.errors import RecipeError
+from viewsphere.limits import limits
 from viewsphere.model.mistakes import Marks, Place, dotted, shown
 from viewsphere.model.mistakes import Path as Steps
 
 LARGEST_FILE = 10_000_000
-MOST_VALUES = 200_000
-"""Most values of a recipe: by YAML's aliases a file of a few lines can stand for billions of values.
-`$VIEWSPHERE_MOST_VALUES` overrides it.
-"""
 
 UNCLOSED = ("while scanning a quoted scalar", "while parsing a flow sequence", "while parsing a flow mapping")
 """What was being read, in the YAML reader's words, where a quote or a bracket is not closed, and the reader knows its place."""
@@ -51,7 +47,7 @@ class _Loader(yaml.SafeLoader):
 
     def __init__(self, text: str) -> None:
         super().__init__(text)
-        self.most = most_values()
+        self.most = limits.MAX_RECIPE_VALUES
         self._left = self.most
 
     def compose_node(self, parent: Node | None, index: Any) -> Node | None:
@@ -65,14 +61,6 @@ class _Loader(yaml.SafeLoader):
 
 class _TooMany(Exception):
     """More values than a recipe may have; the argument is the line of the first of them."""
-
-
-def most_values() -> int:
-    """The limit of values that holds here; RecipeError where the variable is no whole number above 0."""
-    text = os.environ.get("VIEWSPHERE_MOST_VALUES", "") or str(MOST_VALUES)
-    if not re.fullmatch("[0-9]{1,18}", text) or not int(text):
-        raise RecipeError(f"VIEWSPHERE_MOST_VALUES: expected a whole number above 0; found {shown(text)}")
-    return int(text)
 
 
 class _Dumper(yaml.SafeDumper):
@@ -105,8 +93,8 @@ def parse(text: str, source: str) -> tuple[Any, Marks]:
     except yaml.MarkedYAMLError as error:
         raise RecipeError(_syntax(source, text, error)) from None
     except _TooMany as error:
-        found = f"expected at most {loader.most:,} values (limit MOST_VALUES); found more"
-        raise RecipeError(f"{source}:{error}: {found}: write fewer, or set VIEWSPHERE_MOST_VALUES higher") from None
+        found = f"expected at most {loader.most:,} values (limit MAX_RECIPE_VALUES); found more"
+        raise RecipeError(f"{source}:{error}: {found}: write fewer, or set VIEWSPHERE_MAX_RECIPE_VALUES higher") from None
     except RecursionError:
         raise RecipeError(f"{source}: expected a recipe, found lists or mappings nested too deeply") from None
     return data, Marks(source, {steps: Place(source, line) for steps, line in reader.lines.items()})
@@ -185,7 +173,7 @@ class _Reader:
         self.lines.setdefault(place, line)
         self._count += 1
         if self._count > self.most:
-            found = f"expected at most {self.most:,} values (limit MOST_VALUES); found more: write fewer aliases"
+            found = f"expected at most {self.most:,} values (limit MAX_RECIPE_VALUES); found more: write fewer aliases"
             raise self._error(line, place, found)
         if id(node) in self._open:
             raise self._error(line, place, "expected a value; found an alias for the value it stands in")

@@ -32,7 +32,7 @@ class Timing:
 def finished(dataset: Dataset) -> list[tuple[float, int]]:
     """When each finished shot was written, in seconds since 1970, and its number of frames."""
     found: list[tuple[float, int]] = []
-    for row in dataset.plan.rows:
+    for row in dataset.rows:
         try:
             found.append(((dataset.store.shot_folder(row.key) / "frames.json").stat().st_mtime, row.count))
         except OSError:

@@ -7,6 +7,7 @@ import time
 from collections import Counter, defaultdict
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from itertools import chain, product
 from os import PathLike
 from pathlib import Path
@@ -100,12 +101,13 @@ def generate(
     with recipe.located(), store.occupied():
         notes: tuple[str, ...] = ()
         rendered, skipped = 0, dict[str, str]()
+        work = Missing(portion, store)
         with Crew(store.root, workers, portion) as crew:
             if portion.adds_nothing:
                 _compare_models(portion, store, crew)
             else:
-                notes = _check_skies(portion, store, tell)
-                rendered, skipped = _render_part(portion, store, crew, keep_going, tell)
+                notes = _check_skies(work, tell)
+                rendered, skipped = _render_part(work, crew, keep_going, tell)
         notes += tuple(_renew_threshold(store, recipe.keep_annotations_above))
         dataset = Dataset(store.root)
         write_credits(dataset)
@@ -190,27 +192,28 @@ def _check_channels(name: str, channels: Sequence[str], sensor: str) -> None:
         )
 
 
-def _check_skies(portion: Portion, store: Store, tell: Listener) -> tuple[str, ...]:
+def _check_skies(work: Missing, tell: Listener) -> tuple[str, ...]:
     """Notes on the skies' pictures, if there is anything left to render; raises RecipeError for one that cannot be used."""
-    if all(store.has_shot(row.key) for row in portion.rows):
+    if next(work.rows(), None) is None:
         return ()
-    return check_skies(portion.plan, lambda done, total: tell(Progress("skies", done, total)))
+    return check_skies(work.portion.plan, lambda done, total: tell(Progress("skies", done, total)))
 
 
-def _render_part(portion: Portion, store: Store, crew: Crew, keep_going: bool, tell: Listener) -> tuple[int, dict[str, str]]:
+def _render_part(work: Missing, crew: Crew, keep_going: bool, tell: Listener) -> tuple[int, dict[str, str]]:
     """Make the part's models, take it into the data set, render its shots; gives the frames made and what was left out."""
+    portion, store = work.portion, work.store
     if portion.number:
         store.drop_unnamed_models()  # of appending that ended before it began
     try:
-        skipped = _prepare_models(portion, store, crew, keep_going, tell)
+        work.skipped.update(_prepare_models(portion, store, crew, keep_going, tell))
         commit(portion, store)
     except ViewsphereError:
         if portion.number:
             store.drop_unnamed_models()
         raise
-    rendered = _render_shots(portion, store, crew, keep_going, skipped, tell)
-    _note_skipped(portion, store, skipped)
-    return rendered, skipped
+    rendered = _render_shots(work, crew, keep_going, tell)
+    _note_skipped(portion, store, work.skipped)
+    return rendered, work.skipped
 
 
 def _prepare_models(portion: Portion, store: Store, crew: Crew, keep_going: bool, tell: Listener) -> dict[str, str]:
@@ -262,9 +265,9 @@ def _distance_problems(planned: Plan, store: Store, failed: Container[str]) -> I
             yield subject, problem
 
 
-def _render_shots(portion: Portion, store: Store, crew: Crew, keep_going: bool, skipped: dict[str, str], tell: Listener) -> int:
-    """Render the shots that the store lacks; gives the number of frames made. Failed shots land in `skipped`."""
-    work = Missing(portion, store, skipped)
+def _render_shots(work: Missing, crew: Crew, keep_going: bool, tell: Listener) -> int:
+    """Render the shots that the store lacks; gives the number of frames made. Failed shots land in what was left out."""
+    portion, store, skipped = work.portion, work.store, work.skipped
     total, resumed, rendered = work.total, work.resumed, 0
     first = next(work.rows(), None)
     if first is not None:
@@ -290,11 +293,19 @@ def _render_shots(portion: Portion, store: Store, crew: Crew, keep_going: bool, 
 
 @dataclass(frozen=True)
 class Missing:
-    """The shots of a part that the store lacks, counted out row by row: those that no model left out is in."""
+    """The shots of a part that the store lacks, counted out row by row: those that no model left out is in.
+
+    What is finished is looked for once, with one look at each shot; `skipped` is what is left out, and why.
+    """
 
     portion: Portion
     store: Store
-    skipped: dict[str, str]
+    skipped: dict[str, str] = field(default_factory=dict[str, str])
+
+    @cached_property
+    def _finished(self) -> frozenset[str]:
+        """Keys of the shots that were finished when this was first asked."""
+        return frozenset(self.store.finished())
 
     @property
     def total(self) -> int:
@@ -312,17 +323,13 @@ class Missing:
     @property
     def resumed(self) -> int:
         """Frames of the part that are there."""
-        found = (self.portion.record.find(key) for key in self.store.finished())
+        found = (self.portion.record.find(key) for key in self._finished)
         return sum(row.count for row in found if row is not None and row.part == self.portion.number)
 
     def lines(self) -> Iterable[tuple[str, int]]:
         """The models, and how many shots each has."""
         indices = (self.portion.record.indices[self.portion.number], *self._added)
-        counts: Counter[str] = Counter()
-        for index in indices:
-            for subject in index.subjects:
-                counts[subject] += index.count_of(subject)
-        return counts.items()
+        return sum((index.counts for index in indices), Counter[str]()).items()
 
     def jobs(self, line: str) -> Iterator[Job]:
         """The shots of a model that are to be rendered."""
@@ -335,7 +342,8 @@ class Missing:
         return self._lacking(self.portion.rows)
 
     def _lacking(self, rows: Iterable[Row]) -> Iterator[Row]:
-        return (row for row in rows if not self.store.has_shot(row.key) and not self._lacks_model(row))
+        left = (row for row in rows if row.key not in self._finished)
+        return (row for row in left if not self.store.has_shot(row.key) and not self._lacks_model(row))
 
     def _wanted(self) -> Iterator[Row]:
         return (row for row in self.portion.rows if not self._lacks_model(row))

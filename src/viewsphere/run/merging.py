@@ -6,7 +6,6 @@ import hashlib
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from importlib.metadata import version
 from itertools import count, islice
 from pathlib import Path
@@ -50,10 +49,10 @@ class _Source:
         """Whether every category id stays what it is."""
         return all(old == new.id for old, new in self.categories.items())
 
-    @cached_property
+    @property
     def rows(self) -> tuple[Row, ...]:
         """Its finished shots, as it numbers them."""
-        return tuple(row for row in self.dataset.plan.rows if self.dataset.store.has_shot(row.key))
+        return self.dataset.rows
 
 
 def merge(
@@ -108,8 +107,10 @@ def _check_sources(datasets: Sequence[Dataset], out: Path) -> None:
 
 def _check_whole(datasets: Sequence[Dataset]) -> None:
     for dataset in datasets:
-        added = (row for index, _ in dataset.plan.supplements for row in index)
-        left = sum(row.count for row in added if not dataset.store.has_shot(row.key))
+        own = {row.key for row in dataset.rows}
+        added = [index for index, _ in dataset.plan.supplements]
+        there = (row for key in dataset.store.finished() if (row := dataset.plan.find(key)) is not None)
+        left = sum(index.samples for index in added) - sum(row.count for row in there if row.key not in own)
         if left and len(dataset) == dataset.plan.frames:
             raise StoreError(
                 f"{dataset.root}: expected all channels, found {left:,} frames that lack those that were added last: render it "

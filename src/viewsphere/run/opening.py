@@ -56,12 +56,12 @@ def to_append(planned: Plan, store: Store) -> Portion:
     _check_versions(store, found.parts)
     if found.frames and not found.parts:
         raise StoreError(f"{store.root}: expected a data set whose plan names its parts, found an older one: render it anew")
-    left = store.missing(found)
+    left = tuple(store.gaps(found))
     if left:
-        frames = sum(row.count for row in left)
+        frames = sum(gap.frames for gap in left)
         raise StoreError(
             f"{store.root}: expected a finished data set to append to, found {frames:,} frames missing (first shot "
-            f"{left[0].key}): first render the recipe that they are of to the end (the last was {found.name!r})"
+            f"{left[0].first.key}): first render the recipe that they are of to the end (the last was {found.name!r})"
         )
     return extend(planned, found)
 

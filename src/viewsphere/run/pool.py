@@ -9,7 +9,7 @@ from __future__ import annotations
 import signal
 import sys
 import traceback
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -201,6 +201,7 @@ class Queue:
     def __init__(self, work: Work, warm: Iterable[str] = ()) -> None:
         self._work = work
         self._left = dict(work.lines())
+        self._untaken = deque(self._left)
         self._open: dict[str, Iterator[Job]] = {}
         self._takers = Counter(warm)
         self._tries: Counter[str] = Counter()
@@ -228,9 +229,11 @@ class Queue:
         return None
 
     def _coldest(self) -> str:
-        for line in self._left:
-            if not self._takers[line]:
+        while self._untaken:
+            line = self._untaken[0]
+            if line in self._left and not self._takers[line]:
                 return line
+            self._untaken.popleft()
         return max(self._left, key=lambda line: self._left[line] / self._takers[line])
 
     def again(self, job: Job) -> bool:

@@ -10,10 +10,10 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from viewsphere.assets import limits
 from viewsphere.assets.folder import UnreadableError
 from viewsphere.assets.sphere import read_head
 from viewsphere.errors import RecipeError
+from viewsphere.limits import limits
 from viewsphere.model.mistakes import nearest
 from viewsphere.model.scene import Background, Ground
 from viewsphere.recipe.draws import alternatives

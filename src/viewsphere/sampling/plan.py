@@ -11,6 +11,7 @@ from functools import cached_property
 from itertools import chain, repeat
 from os import PathLike
 from pathlib import Path
+from typing import Any, Self
 
 from viewsphere import plugins
 from viewsphere.assets.timeline import Timeline
@@ -49,14 +50,14 @@ from viewsphere.sampling.scenes import is_night
 from viewsphere.sampling.seeds import share
 from viewsphere.sampling.sequence_checks import check_sequences
 from viewsphere.sampling.sequence_poses import SequencePoses, poses_of
-from viewsphere.sampling.splits import expected
+from viewsphere.sampling.splits import expected, quotas
 from viewsphere.sampling.time_steps import check_keys, timed
 from viewsphere.sampling.tracks import tracks_digest, tracks_of
 from viewsphere.store import Block, Category, Row
 from viewsphere.store.index import Index, numbers
 
 COUNTED = 200_000
-"""Frames whose splits are counted one by one."""
+"""Frames, or scenes, whose splits are counted one by one."""
 
 SHOT_FRAMES = 16
 """Most frames of a shot, unless the recipe or the caller says otherwise."""
@@ -128,12 +129,15 @@ class Plan(Shown, Stock):
     @cached_property
     def split_counts(self) -> dict[str, int]:
         """Split -> number of its frames; of hashed ones what is expected, where there are more than `COUNTED` to hash."""
-        by = self.recipe.splits.by
+        by, drawn = self.recipe.splits.by, self.recipe.scenes is not None and self.recipe.splits.by == "model"
         found = Counter({name: 0 for name in self.splits})
-        if by in ("model", "scene", "sequence"):
+        if by in ("model", "scene", "sequence") and not (drawn and len(self.subjects) > COUNTED):
             for block in self.blocks:
                 for subject in block.subjects:
                     found[self.split(subject, block.positions[0][0])] += block.size * block.each
+        elif drawn:
+            some = Counter(self.split(subject, 0) for subject in self.subjects[:COUNTED])
+            found = Counter(quotas({name: some[name] / COUNTED for name in self.splits}, self.frames))
         elif by == "pose" and len(self.blocks) == 1 and self.poses <= COUNTED:
             for pose in numbers(self.blocks[0].positions):
                 found[self.split(self.subjects[0], pose)] += len(self.subjects) * len(self.rig.sensors)
@@ -185,12 +189,19 @@ class Plan(Shown, Stock):
         """
         own = self if not isinstance(self.pose_list, SequencePoses) else self._numbering(self.pose_list.instants, poses)
         kept = {key: name for key, name in splits.items() if key in own.dealt_splits}
-        return _composed(replace(own, kept_splits=kept)) if kept else own
+        return _composed(own.changed(kept_splits=kept)) if kept else own
+
+    def changed(self, **fields: Any) -> Self:
+        """The same plan with other fields, of which its blocks do not follow: they are not counted out again."""
+        made = replace(self, **fields)
+        if "blocks" in vars(self):
+            vars(made)["blocks"] = self.blocks
+        return made
 
     def _numbering(self, instants: int, poses: Sequence[int]) -> Plan:
         """The same plan, whose sequences are numbered as those of a data set, where it has these numbers for their poses."""
         numbers = tuple(pose // instants for pose in poses[::instants])
-        return self if numbers == tuple(range(len(numbers))) else _composed(replace(self, sequence_numbers=numbers))
+        return self if numbers == tuple(range(len(numbers))) else _composed(self.changed(sequence_numbers=numbers))
 
     @cached_property
     def blocks(self) -> tuple[Block, ...]:
@@ -314,7 +325,7 @@ def plan(recipe: Recipe | str | PathLike[str], shot_frames: int | None = None) -
         planned = _composed(planned)
         if recipe.time is not None:
             check_sequences(planned)
-        return replace(planned, credits=_credits(planned))
+        return planned.changed(credits=_credits(planned))
 
 
 def _credits(planned: Plan) -> dict[str, Credit]:
@@ -333,7 +344,7 @@ def _composed(planned: Plan) -> Plan:
     splits = [dealt.get(spec.key, "") for spec in specs]
     numbering = Numbering(planned.subjects, planned.pose_list, planned.schedules if planned.timings else ())
     composition = compose(recipe, planned.subjects, specs, categories(recipe), splits, numbering)
-    return replace(planned, categories=composition.categories, composition=composition)
+    return planned.changed(categories=composition.categories, composition=composition)
 
 
 def check_engine(recipe: Recipe) -> None:

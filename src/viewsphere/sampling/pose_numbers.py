@@ -100,8 +100,9 @@ def as_ranges(numbers: Indices) -> Ranges:
     """Ascending numbers as ranges [first, stop)."""
     if not len(numbers):
         return ()
-    runs = np.split(numbers, np.flatnonzero(np.diff(numbers) > 1) + 1)
-    return tuple((int(run[0]), int(run[-1]) + 1) for run in runs)
+    gaps = np.flatnonzero(numbers[1:] - numbers[:-1] > 1)
+    firsts, lasts = np.append(numbers[:1], numbers[gaps + 1]), np.append(numbers[gaps], numbers[-1:])
+    return tuple(zip(firsts.tolist(), (lasts + 1).tolist(), strict=True))
 
 
 def _views(part: Part) -> Poses:

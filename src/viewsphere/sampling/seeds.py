@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 import numpy as np
 
@@ -14,9 +14,13 @@ Names = tuple[str, ...]
 def _digest(names: tuple[str, ...], size: int) -> bytes:
     hasher = hashlib.blake2b(digest_size=size)
     for name in names:
-        text = name.encode()
-        hasher.update(len(text).to_bytes(8, "little") + text)
+        hasher.update(_told(name))
     return hasher.digest()
+
+
+def _told(name: str) -> bytes:
+    text = name.encode()
+    return len(text).to_bytes(8, "little") + text
 
 
 def generator(seed: int, *names: str) -> np.random.Generator:
@@ -35,4 +39,20 @@ def scene_generators(seed: int, names: tuple[str, ...]) -> Callable[[tuple[str, 
 
 def share(seed: int, *names: str) -> float:
     """A number of [0, 1) for a seed and names, uniform over names: for choices too many to make a generator for each."""
-    return int.from_bytes(_digest((str(seed), *names), 8), "little") / 2**64
+    return _share(_digest((str(seed), *names), 8))
+
+
+def shares(seed: int, *names: str, each: Iterable[str]) -> list[float]:
+    """`share(seed, *names, name)` for each name: what is before it is read once."""
+    begun, found = hashlib.blake2b(digest_size=8), list[float]()
+    for name in (str(seed), *names):
+        begun.update(_told(name))
+    for name in each:
+        hasher = begun.copy()
+        hasher.update(_told(name))
+        found.append(_share(hasher.digest()))
+    return found
+
+
+def _share(digest: bytes) -> float:
+    return int.from_bytes(digest, "little") / 2**64

@@ -30,6 +30,7 @@ from viewsphere.store.paths import file_inside, files_inside, names
 from viewsphere.store.point_tracks import PointTracks, joined
 from viewsphere.store.records import Category, ModelInfo
 from viewsphere.store.sample_records import ShotRecords, from_whole_sample
+from viewsphere.store.selection import Selection
 from viewsphere.store.texts import parsed
 
 
@@ -94,13 +95,18 @@ class Dataset(Shown, Sequence[Sample]):
         return found
 
     @cached_property
+    def rows(self) -> tuple[Row, ...]:
+        """The rows of all finished shots, chosen or not, in frame order; without those that add channels to others."""
+        found = (self.plan.find(key) for key in self.store.finished())
+        own = (row for row in found if row is not None and row.part == self.plan.part_of(row.first))
+        return tuple(sorted(own, key=lambda row: row.first))
+
+    @cached_property
     def _shots(self) -> tuple[list[tuple[str, Sequence[int]]], list[int]]:
         """Key and chosen places of each finished shot, in frame order; and the number of frames before each shot."""
         shots: list[tuple[str, Sequence[int]]] = []
         starts, total = [0], 0
-        found = (self.plan.find(key) for key in self.store.finished())
-        own = (row for row in found if row is not None and row.part == self.plan.part_of(row.first))
-        for row in sorted(own, key=lambda row: row.first):
+        for row in self.rows:
             places = self._places(row)
             if places:
                 shots.append((row.key, places))
@@ -130,6 +136,23 @@ class Dataset(Shown, Sequence[Sample]):
     def __iter__(self) -> Iterator[Sample]:
         for key, places in self._shots[0]:
             yield from self.samples_of(key, places)
+
+    def select(self, *fields: str, split: str | None = None) -> Selection:
+        """Some fields of the frames, of one split or of all: a map-style data set for PyTorch's DataLoader. Only what is named
+        is decoded.
+
+        `fields`: names of channels (`rgb`), of values of samples (`index`, `split`, `sensor`, `time`, `camera.K`,
+        `pose.azimuth_deg`, ...), and of objects (`objects.box2d`, `objects.category_id`, `objects.mask`, ...), which become
+        arrays (N, ...), float64, int64 or bool, NaN where there is no value, or lists of texts; `objects.view` is (N, 4):
+        azimuth, elevation (degrees), distance (metres), tilt (degrees). Raises UserError for others.
+        """
+        return Selection(self, fields, split)
+
+    def of_split(self, split: str) -> Iterator[int]:
+        """Positions of the frames of a split in the data set; reads all records."""
+        for (key, places), first in zip(*self._shots, strict=False):
+            splits = self._read_records(key).splits
+            yield from (first + i for i, place in enumerate(places) if splits[place] == split)
 
     def shots(self) -> Iterator[tuple[str, Sequence[int]]]:
         """Key of every finished shot, in frame order, and which of its frames are chosen, counted from 0."""
@@ -297,7 +320,8 @@ class Dataset(Shown, Sequence[Sample]):
         StoreError for a path that leads out of the data set.
         """
         destination.parent.mkdir(parents=True, exist_ok=True)
-        self.link_kinds.add(link_file(self.path(relative).resolve(), destination))
+        file = self.path(relative)
+        self.link_kinds.add(link_file(file.resolve() if file.is_symlink() else file, destination))
 
     def model_files(self) -> Iterator[tuple[str, str]]:
         """Every finished model's OBJ, GLB, materials and textures: `<key>/<name>`, and the path from the data set's root. A
@@ -331,6 +355,14 @@ class _Records:
         if self.shot is None:
             return [record.get("sequence", "") for record in self.records]
         return [self.shot.shot.sequence] * len(self.records)
+
+    @property
+    def splits(self) -> list[str]:
+        """The split of each sample."""
+        if self.shot is None:
+            return [record["split"] for record in self.records]
+        shot = self.shot.shot
+        return [shot.instants[instant].split for _, instant, _ in shot.samples]
 
 
 class _ChannelFiles(Mapping[str, NDArray[Any]]):

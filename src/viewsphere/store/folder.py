@@ -7,9 +7,10 @@ import json
 import os
 import shutil
 import socket
+from collections import defaultdict
 from collections.abc import Generator, Iterable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -24,7 +25,7 @@ from viewsphere.model.sample import Sample
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
 from viewsphere.store.channel_files import encode
-from viewsphere.store.index import Row
+from viewsphere.store.index import Index, Row
 from viewsphere.store.manifest import MANIFEST, Manifest, Seal, digest, refuse_another, seal_of
 from viewsphere.store.moving import move
 from viewsphere.store.paths import file_inside
@@ -34,6 +35,20 @@ from viewsphere.store.texts import parsed
 
 OLD_MODEL = "old model~"
 """Begins the name of a model's folder that another takes the place of."""
+
+
+@dataclass(frozen=True)
+class Gap:
+    """What is missing of a part, or of the channels that it adds to other parts: its first missing row, how many shots and
+    frames these are, and of how many frames.
+    """
+
+    part: int
+    is_added: bool
+    first: Row
+    shots: int
+    frames: int
+    of: int
 
 
 class Store:
@@ -102,9 +117,27 @@ class Store:
         """Put a plan in the place of the one that it continues."""
         self._write_atomically(self.plan_file, plan.to_json())
 
-    def missing(self, plan: PlanRecord) -> list[Row]:
-        """The shots of a plan that are neither finished nor left out at the user's wish."""
-        return [row for row in self.wanted(plan) if not self.has_shot(row.key)]
+    def gaps(self, plan: PlanRecord) -> Iterator[Gap]:
+        """What is missing of each part and of the channels that it adds, but for what was left out at the user's wish.
+
+        Takes as long as shots are finished, however many are planned.
+        """
+        skipped, finished = self.skipped().keys(), tuple(self.finished())
+        alike: defaultdict[tuple[int, bool], list[Index]] = defaultdict(list)
+        for number, index in enumerate(plan.all_indices):
+            alike[index.part, number >= len(plan.indices)].append(index)
+        for (part, is_added), indices in alike.items():
+            left_out = [row for row in _found(indices, skipped) if row.subject not in skipped]
+            there = [row for row in _found(indices, finished) if not {row.key, row.subject} & skipped]
+            shots = sum(len(index) - sum(map(index.count_of, skipped)) for index in indices) - len(left_out)
+            frames = sum(index.samples - sum(map(index.samples_of, skipped)) for index in indices)
+            frames -= sum(row.count for row in left_out)
+            if len(there) < shots:
+                known = {row.key for row in chain(left_out, there)}
+                rows = chain.from_iterable(index.without(skipped) for index in indices)
+                first = next(row for row in rows if row.key not in known)
+                lost = frames - sum(row.count for row in there)
+                yield Gap(part, is_added, first, shots - len(there), lost, frames)
 
     def finished(self) -> Iterator[str]:
         """Keys of all shots that are there, in no order."""
@@ -116,9 +149,8 @@ class Store:
     def wanted(self, plan: PlanRecord) -> Iterator[Row]:
         """The shots of a plan, those with channels that were added later last, but for what was left out at the user's wish."""
         skipped = self.skipped().keys()
-        for row in chain(plan.rows, *(index for index, _ in plan.supplements)):
-            if not {row.key, row.subject} & skipped:
-                yield row
+        rows = chain.from_iterable(index.without(skipped) for index in plan.all_indices)
+        return (row for row in rows if row.key not in skipped)
 
     def drop_unnamed_models(self) -> None:
         """Remove the models that the plan does not name, unless another run is at work on them."""
@@ -501,3 +533,8 @@ def _disk_errors(root: Path) -> Generator[None]:
         yield
     except OSError as error:
         raise StoreError(f"{root}: expected to write, found: {error.strerror or error}; what is finished is kept") from error
+
+
+def _found(indices: Iterable[Index], keys: Iterable[str]) -> list[Row]:
+    """The rows of these keys in some indices."""
+    return [row for index in indices for row in map(index.find, keys) if row is not None]

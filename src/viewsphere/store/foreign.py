@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from viewsphere.errors import StoreError
-from viewsphere.geometry.mask import encode_rle, mask_box
+from viewsphere.geometry.mask import rle_area, rle_box, rle_of_runs
 from viewsphere.model.sample import Box, ObjectAnnotation, ObjectView, Rle, Sample
 from viewsphere.store.records import Category, ModelInfo
 
@@ -68,22 +68,22 @@ def foreign_object(
     category: Category,
     size: tuple[int, int],
     source: Mapping[str, Any],
-    mask: NDArray[np.bool_] | None,
+    counts: str | None,
     box: Box | None,
     **known: Any,
 ) -> ObjectAnnotation:
-    """An object of which only `mask` (H, W), or only `box`, is known, and the fields in `known`; all others are NaN.
+    """An object of which only its mask, the run-length code `counts`, or only its `box`, is known, and the fields in `known`;
+    all others are NaN.
 
     `size` is the image's (width, height), `source` the annotation as it stood in the other data set.
     """
     width, height = size
-    tight = None if mask is None else mask_box(mask)
-    seen = np.zeros((height, width), np.bool_) if mask is None else mask
-    area = round(float(source.get("area") or 0)) if mask is None else int(np.count_nonzero(mask))
+    tight = counts and rle_box(height, width, counts)
+    area = rle_area(height, width, counts) if counts else round(float(source.get("area") or 0))
     values: dict[str, Any] = {
         "key": "",
         "model": "",
-        "box2d": box if tight is None else tuple(map(float, tight)),
+        "box2d": tuple(map(float, tight)) if tight else box,
         "box2d_projected": None,
         "box2d_unclipped": None,
         "box3d_object": np.full((8, 3), np.nan),
@@ -106,8 +106,14 @@ def foreign_object(
         category=category.name,
         supercategory=category.supercategory,
         category_id=category.id,
-        rle=Rle(height, width, encode_rle(seen)),
+        rle=Rle(height, width, counts or _nothing(height, width)),
         area=area,
         source=dict(source),
         **{**values, **known},
     )
+
+
+@cache
+def _nothing(height: int, width: int) -> str:
+    """The run-length code of a mask without pixels."""
+    return rle_of_runs(height, width, np.array([height * width]))

@@ -6,8 +6,8 @@ Nothing here grows with the number of samples: rows are counted out when somebod
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections import Counter, defaultdict
+from collections.abc import Container, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import accumulate
@@ -82,9 +82,14 @@ class Index(Sequence[Row]):
         return self._row(number, subject, chunk)
 
     def __iter__(self) -> Iterator[Row]:
+        return self.without(())
+
+    def without(self, subjects: Container[str]) -> Iterator[Row]:
+        """The rows of all other subjects, in order; however many those of these are, they take no time."""
         for number, block in enumerate(self.blocks):
-            for subject in range(len(block.subjects)):
-                yield from (self._row(number, subject, chunk) for chunk in range(self._chunks(number)))
+            for place, subject in enumerate(block.subjects):
+                if subject not in subjects:
+                    yield from (self._row(number, place, chunk) for chunk in range(self._chunks(number)))
 
     @property
     def samples(self) -> int:
@@ -107,6 +112,16 @@ class Index(Sequence[Row]):
     def count_of(self, subject: str) -> int:
         """Number of the rows of a subject."""
         return sum(self._chunks(number) for number, _ in self._places.get(subject, ()))
+
+    @property
+    def counts(self) -> Counter[str]:
+        """Number of the rows of each subject, in order."""
+        found: Counter[str] = Counter()
+        for number, block in enumerate(self.blocks):
+            each = self._chunks(number)
+            for subject in block.subjects:
+                found[subject] += each
+        return found
 
     def samples_of(self, subject: str) -> int:
         """Number of the samples of a subject."""

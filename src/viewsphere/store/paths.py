@@ -5,10 +5,16 @@ Whoever turns a stored path into a file does it here.
 
 from __future__ import annotations
 
+import os
+import re
 from collections.abc import Sequence
 from pathlib import Path, PurePosixPath, PureWindowsPath
+from stat import S_ISLNK
 
 from viewsphere.errors import StoreError
+
+_PLAIN = re.compile(r"[\w+-][\w+.-]*(?:/[\w+-][\w+.-]*)*", re.ASCII)
+"""Relative paths that mean the same on every system; other ones are looked at more closely."""
 
 
 def file_inside(root: Path, relative: str) -> Path:
@@ -22,6 +28,8 @@ def file_inside(root: Path, relative: str) -> Path:
             "data set"
         )
     file = root / relative
+    if _is_straight(root, relative):
+        return file
     try:
         leads_to = file.resolve()
         is_below = leads_to.is_relative_to(root.resolve())
@@ -35,6 +43,23 @@ def file_inside(root: Path, relative: str) -> Path:
     return file
 
 
+def _is_straight(root: Path, relative: str) -> bool:
+    """Whether nothing on the way from a folder to what lies below it is a link; False, too, where that is not plain to see."""
+    if os.name == "nt" or not _PLAIN.fullmatch(relative):
+        return False
+    place = str(root)
+    for name in relative.split("/"):
+        place = f"{place}/{name}"
+        try:
+            if S_ISLNK(os.lstat(place).st_mode):
+                return False
+        except FileNotFoundError:
+            return True
+        except (OSError, ValueError):
+            return False
+    return True
+
+
 def files_inside(root: Path, folder: Path) -> Sequence[Path]:
     """The files that lie in a folder of the data set, sorted; raises StoreError as `file_inside` does."""
     found = (file_inside(root, (folder / path.name).relative_to(root).as_posix()) for path in sorted(folder.iterdir()))
@@ -43,6 +68,8 @@ def files_inside(root: Path, folder: Path) -> Sequence[Path]:
 
 def is_inside(relative: str) -> bool:
     """Whether a path is relative on every system, and goes up nowhere."""
+    if _PLAIN.fullmatch(relative):
+        return True
     path, on_windows = PurePosixPath(relative), PureWindowsPath(relative)
     return not (path.is_absolute() or on_windows.anchor or ".." in on_windows.parts or "\0" in relative)
 

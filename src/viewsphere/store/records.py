@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from itertools import accumulate, chain
 from pathlib import PurePosixPath
@@ -22,6 +22,9 @@ from viewsphere.store.paths import names
 from viewsphere.store.texts import parsed
 
 STORE_VERSION = 2
+
+MOST_FRAMES = 2**53
+"""Frames of a data set: larger numbers would not be exact in everybody's JSON."""
 
 PRODUCT = "product"
 """The sampler of models x poses."""
@@ -170,6 +173,12 @@ class Part:
         plain["channels"] = tuple(value["channels"])
         blocks = ((names(b["subjects"], "the name"), b["positions"], b["each"]) for b in value["blocks"])
         plain["blocks"] = tuple(Block(s, tuple((int(a), int(z)) for a, z in p), int(e)) for s, p, e in blocks)
+        if any(b.each < 1 or any(not 0 <= a < z for a, z in b.positions) for b in plain["blocks"]):
+            raise ValueError("blocks of other than ascending ranges of poses")
+        if not 0 < sum(b.samples for b in plain["blocks"]) + value["first"] + value["frames"] + 1 <= MOST_FRAMES:
+            raise ValueError(f"more than {MOST_FRAMES:,} frames")
+        if value["shot_frames"] < 1:
+            raise ValueError("shots without frames")
         plain["supplies"] = tuple((int(part), tuple(channels)) for part, channels in value["supplies"])
         return Part(**plain)
 
@@ -262,6 +271,11 @@ class PlanRecord:
         )
 
     @property
+    def all_indices(self) -> tuple[Index, ...]:
+        """The indices of all shots: of parts' own ones, then of those that add channels."""
+        return (*self.indices, *(index for index, _ in self.supplements))
+
+    @property
     def rows(self) -> Iterator[Row]:
         """Rows of all shots in the order of their samples, without shots that add channels later."""
         return chain.from_iterable(self.indices)
@@ -273,8 +287,7 @@ class PlanRecord:
 
     def find(self, key: str) -> Row | None:
         """The row of this key, None if there is none."""
-        every = chain(self.indices, (index for index, _ in self.supplements))
-        return next((row for row in (index.find(key) for index in every) if row is not None), None)
+        return next((row for row in (index.find(key) for index in self.all_indices) if row is not None), None)
 
     def row_at(self, sample: int) -> Row:
         """The row that holds a sample; raises IndexError for a sample beyond all rows."""
@@ -296,7 +309,7 @@ class PlanRecord:
         value |= {
             "store": STORE_VERSION,
             "categories": [c.__dict__ for c in self.categories],
-            "parts": [asdict(part) for part in self.parts],
+            "parts": [vars(part) | {"blocks": [vars(block) for block in part.blocks]} for part in self.parts],
         }
         return sealed(value)
 

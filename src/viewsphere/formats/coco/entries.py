@@ -19,12 +19,12 @@ from viewsphere.store import Dataset
 FOLDER_SIZE = 10_000
 
 Masks = Mapping[int, NDArray[np.bool_]]
-"""Masks (H, W) of the visible pixels of a sample's visible objects, by the objects' ids."""
+"""Masks (H, W) of the visible pixels of a sample's visible objects but imported ones, by the objects' ids."""
 
 
 def seen(sample: Sample) -> Masks:
-    """Every object's mask, decoded once."""
-    return {o.id: o.mask for o in sample.objects if o.area}
+    """Every object's mask, decoded once; imported ones stay as they are."""
+    return {o.id: o.mask for o in sample.objects if o.area and o.source is None}
 
 
 def files(dataset: Dataset, sample: Sample, masks: Masks, options: Options) -> Iterator[Expected]:

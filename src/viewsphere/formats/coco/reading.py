@@ -13,11 +13,10 @@ from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from viewsphere.codecs.size import opened
 from viewsphere.errors import StoreError, UserError
-from viewsphere.geometry.mask import decode_rle
+from viewsphere.geometry.mask import rle_of_runs, rle_runs
 from viewsphere.model.sample import Box, Sample
 from viewsphere.store import Category
 from viewsphere.store.foreign import ForeignDataset, ForeignFrame, foreign_object, refuse_broken
@@ -207,7 +206,7 @@ def _annotation_problem(
     size = sizes.get(annotation["image_id"])
     if outline and size:
         try:
-            _mask(outline, size)
+            _rle(outline, size)
         except Exception as error:  # pycocotools' C code raises errors of many kinds
             return f"expected a segmentation of COCO; found {outline!r:.60} ({error})"
     return None
@@ -220,8 +219,9 @@ def _are_numbers(value: Any, count: int | None) -> bool:
     )
 
 
-def _mask(outline: Any, size: tuple[int, int]) -> NDArray[np.bool_] | None:
-    """Mask (H, W) of polygons or run lengths, as decoded by pycocotools; None without an outline.
+def _rle(outline: Any, size: tuple[int, int]) -> str | None:
+    """The run-length code of polygons or run lengths, as pycocotools draws them; None without an outline. No pixel is drawn: a
+    few characters may stand for the largest picture.
 
     Raises ValueError for outlines on which pycocotools, which does not check its input, could crash.
     """
@@ -235,18 +235,16 @@ def _mask(outline: Any, size: tuple[int, int]) -> NDArray[np.bool_] | None:
         reach = MOST_IMAGES_BESIDE * max(size)
         if not all(_are_numbers(p, None) and len(p) >= 6 and max(map(abs, p)) <= reach for p in polygons):
             raise ValueError("expected polygons of three corners or more, near the image")
-        return coco.decode(coco.merge(coco.frPyObjects([p[: len(p) // 2 * 2] for p in polygons], height, width))).astype(
-            np.bool_
-        )
+        code: Any = coco.merge(coco.frPyObjects([p[: len(p) // 2 * 2] for p in polygons], height, width))
+        return rle_of_runs(height, width, rle_runs(height, width, code["counts"].decode("ascii")))
     if outline["size"] != [height, width]:
         raise ValueError(f"expected run lengths of size {[height, width]}")
     counts = outline["counts"]
     if isinstance(counts, str):
-        return decode_rle(height, width, counts)
+        return rle_of_runs(height, width, rle_runs(height, width, counts))
     if not all(_is_id(c) for c in counts) or sum(counts) != width * height:
         raise ValueError("expected run lengths that fill the image")
-    values = np.arange(len(counts)) % 2 == 1
-    return np.repeat(values, counts).reshape(width, height).T.copy()
+    return rle_of_runs(height, width, np.array(counts, np.int64))
 
 
 def _clashes(parts: Sequence[_Split]) -> Iterator[str]:
@@ -275,7 +273,7 @@ def _sample(part: _Split, image: dict[str, Any], index: int) -> Sample:
             part.categories[source["category_id"]],
             size,
             source,
-            _mask(source.get("segmentation"), size),
+            _rle(source.get("segmentation"), size),
             _corners(source),
         )
         for number, source in enumerate(part.annotations.get(image["id"], ()), 1)

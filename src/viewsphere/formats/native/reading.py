@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from viewsphere.codecs.size import opened
 from viewsphere.errors import StoreError, UserError
 from viewsphere.geometry.box import box_size
-from viewsphere.geometry.mask import mask_box, mask_polygons
+from viewsphere.geometry.mask import encode_rle, mask_box, mask_polygons
 from viewsphere.labels import channels
 from viewsphere.model.camera import Camera, Distortion, Intrinsics
 from viewsphere.model.credit import Credit
@@ -287,7 +287,7 @@ def _object(number: int, category: Category, key: str, mask: NDArray[np.bool_], 
         category,
         (mask.shape[1], mask.shape[0]),
         source,
-        mask,
+        encode_rle(mask),
         None,
         key=key,
         track=str(entry.get("id_track", "")),

@@ -9,8 +9,6 @@ from collections import Counter, defaultdict
 from collections.abc import Sequence
 from functools import lru_cache, partial
 
-import numpy as np
-
 from viewsphere.errors import RecipeError
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.thing import Thing
@@ -21,9 +19,8 @@ from viewsphere.sampling.cast import balanced, mixed
 from viewsphere.sampling.composition import BoxOf, placed, still
 from viewsphere.sampling.placing import Room
 from viewsphere.sampling.samplers._stock import Stock
-from viewsphere.sampling.seeds import generator, share
+from viewsphere.sampling.seeds import generator, share, shares
 from viewsphere.sampling.splits import drawn_split, shared
-from viewsphere.sampling.viewpoints import Poses
 
 
 def scenes_entry(recipe: Recipe) -> ScenesEntry:
@@ -91,7 +88,7 @@ def scene_split(stock: Stock, subject: str) -> str:
     """The split of a scene where splits are by model: it draws its split first, then models of this split; shares follow from
     the numbers of models where some of these are listed.
     """
-    return drawn_split(_shares(stock), stock.recipe.lasting_seed, (subject,))
+    return drawn_split(_shares(stock.untried or stock), stock.recipe.lasting_seed, (subject,))
 
 
 def scene_things(stock: Stock, subject: str, pose: str | None, box_of: BoxOf) -> tuple[Thing, ...]:
@@ -102,13 +99,18 @@ def scene_things(stock: Stock, subject: str, pose: str | None, box_of: BoxOf) ->
     return still(models, placed(entry.placer, models, room, box_of, rng, entry.orientation))
 
 
-def scene_views(stock: Stock, subject: str, views: Poses) -> Sequence[int]:
-    """Numbers of the poses that a scene is taken from, ascending: where they are drawn, those of the lowest hashes."""
+def scene_views(stock: Stock, subject: str) -> Sequence[int]:
+    """Numbers of the viewpoints that a scene is taken from, ascending: where they are drawn, those of the lowest hashes."""
+    if not are_views_drawn(stock):
+        return range(len(stock.views))
+    hashed = shares(stock.recipe.seed, "scene's views", subject, each=stock.view_names)
+    return sorted(sorted(range(len(hashed)), key=hashed.__getitem__)[: scenes_entry(stock.recipe).views])
+
+
+def are_views_drawn(stock: Stock) -> bool:
+    """Whether scenes are taken from some of the viewpoints each, rather than from all."""
     count = scenes_entry(stock.recipe).views
-    if count is None or count >= len(views):
-        return range(len(views))
-    order = sorted(range(len(views)), key=lambda i: share(stock.recipe.seed, "scene's views", subject, views.name(i)))
-    return np.sort(np.array(order[:count], np.int64)).tolist()
+    return count is not None and count < len(stock.views)
 
 
 def check_scene_models(stock: Stock) -> None:
@@ -126,6 +128,7 @@ def check_scene_models(stock: Stock) -> None:
             )
 
 
+@lru_cache(maxsize=2)
 def _shares(stock: Stock) -> dict[str, float]:
     """The share of the scenes that each split has, where splits are by model."""
     splits = stock.recipe.splits

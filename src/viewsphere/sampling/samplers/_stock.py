@@ -66,6 +66,16 @@ class Stock(Sendable):
         vars(made).update({name: value for name, value in vars(self).items() if name not in known})
         return made
 
+    @property
+    def views(self) -> Poses:
+        """All viewpoints: of poses over time those of whole sequences."""
+        return self.pose_list.base if isinstance(self.pose_list, SequencePoses) else self.pose_list
+
+    @cached_property
+    def view_names(self) -> tuple[str, ...]:
+        """The names of all viewpoints."""
+        return tuple(map(self.views.name, range(len(self.views))))
+
     @cached_property
     def rig(self) -> Rig:
         """The sensors of all shots."""

@@ -16,6 +16,7 @@ from viewsphere.sampling.composition import BoxOf, center_of_all
 from viewsphere.sampling.pose_numbers import as_ranges
 from viewsphere.sampling.samplers import Standing, Stock
 from viewsphere.sampling.samplers._random import (
+    are_views_drawn,
     check_scene_models,
     scene_cast,
     scene_names,
@@ -50,6 +51,8 @@ def factors(stock: Stock) -> str:
 def blocks(stock: Stock) -> tuple[Block, ...]:
     """All poses of every scene, or those that are drawn for each. Raises RecipeError where too few models may meet."""
     check_scene_models(stock)
+    if not are_views_drawn(stock):
+        return (Block(stock.subjects, ((0, len(stock.pose_list)),)),)
     taken = groupby(stock.subjects, partial(_poses, stock))
     return tuple(Block(tuple(names), poses) for poses, names in taken)
 
@@ -101,4 +104,4 @@ def shot(stock: Stock, subject: str, poses: Sequence[int], box_of: BoxOf, key: s
 
 def _poses(stock: Stock, subject: str) -> Ranges:
     """Numbers of the poses that a scene is taken from."""
-    return as_ranges(np.array(scene_views(stock, subject, stock.pose_list), np.int64))
+    return as_ranges(np.array(scene_views(stock, subject), np.int64))

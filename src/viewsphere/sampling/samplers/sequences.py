@@ -160,6 +160,6 @@ def _taken(stock: Stock) -> dict[int, list[str]]:
         return {view: list(stock.subjects) for view in range(len(base))}
     found: defaultdict[int, list[str]] = defaultdict(list)
     for subject in stock.subjects:
-        for view in scene_views(stock, subject, base):
+        for view in scene_views(stock, subject):
             found[view].append(subject)
     return dict(sorted(found.items()))

@@ -1,0 +1,72 @@
+"""The proof of an export: each file beside what would be written now."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator
+from itertools import zip_longest
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from viewsphere.formats import Remark
+from viewsphere.formats._contents import check_files, same_bytes
+from viewsphere.formats.huggingface.arrow import arrow
+from viewsphere.formats.huggingface.card import CARD, card
+from viewsphere.formats.huggingface.columns import Columns
+from viewsphere.formats.huggingface.options import Options
+from viewsphere.formats.huggingface.shards import Shards
+from viewsphere.store import Dataset
+
+FOREIGN = "parquet-cpp-arrow version "
+"""How pyarrow begins to say which version of it wrote a file; another version may write the same values in other bytes."""
+
+
+def verify(dataset: Dataset, folder: Path, sampled: Collection[int], options: Options) -> Iterator[Remark]:
+    """All that is not as it would be exported now; of the export that is made for it one file a split is there at a time."""
+    names = [CARD]
+    with TemporaryDirectory() as aside:
+        shards = Shards(Columns(dataset), Path(aside), options)
+        for name in _all(shards, dataset):
+            names.append(name)
+            if (folder / name).is_file():
+                yield from ((frame, f"{name}: {what}: export again") for frame, what in _changes(Path(aside), folder, name))
+            (Path(aside) / name).unlink()
+    file = folder / CARD
+    if file.is_file() and file.read_bytes() != card(dataset, shards).encode():
+        yield None, f"{CARD}: expected the card that is exported, found another: export again"
+    yield from check_files(dataset, folder, (), (), names)
+
+
+def _all(shards: Shards, dataset: Dataset) -> Iterator[str]:
+    for sample in dataset:
+        yield from shards.add(sample)
+    yield from shards.end()
+
+
+def _changes(aside: Path, folder: Path, name: str) -> Iterator[Remark]:
+    """What of a file is not as in that of the same name that was made for comparison."""
+    if same_bytes(aside / name, folder / name):
+        return
+    pa = arrow()
+    try:
+        ours, theirs = (pa.parquet.ParquetFile(place / name) for place in (aside, folder))
+        with ours, theirs:
+            same = ours.schema_arrow.equals(theirs.schema_arrow, check_metadata=True)
+            if not same:
+                yield None, "expected the columns that are exported, found others"
+            for one, other in zip_longest(_rows(ours), _rows(theirs)):
+                differing = [key for key in one or other if repr((one or {}).get(key)) != repr((other or {}).get(key))]
+                same = same and not differing
+                if differing:
+                    yield (one or other)["index"], f"expected the {differing[0]} that is exported, found another"
+            wrote, other = ours.metadata.created_by, theirs.metadata.created_by
+    except (pa.ArrowException, OSError, ValueError, TypeError, KeyError, MemoryError) as error:
+        yield None, f"expected a Parquet file, found: {error!s:.200}"
+        return
+    if same and (wrote == other or not other.startswith(FOREIGN)):
+        yield None, "expected the bytes that are exported, found the same values in others"
+
+
+def _rows(file: Any) -> Iterator[dict[str, Any]]:
+    for batch in file.iter_batches(batch_size=1):
+        yield from batch.to_pylist()

@@ -1,0 +1,79 @@
+"""Every limit on what files may ask for, so that none of them makes a program run out of memory or time.
+
+The variable `VIEWSPHERE_<NAME>` of the environment sets a limit anew, for this process and those that it starts. Messages say
+the limit's name and value, and what was found.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from typing import Generic, TypeVar
+
+from viewsphere.errors import UserError
+
+Number = TypeVar("Number", int, float)
+
+
+class Limit(Generic[Number]):
+    """A limit: its value here is read from the environment whenever somebody asks, else it is the default one.
+
+    Raises UserError where the variable is no number above 0, or no whole one for a default that is.
+    """
+
+    def __init__(self, default: Number, meaning: str) -> None:
+        self.default = default
+        self.meaning = meaning
+        self.name = ""
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self.name = name
+
+    @property
+    def variable(self) -> str:
+        """The variable of the environment that sets it."""
+        return f"VIEWSPHERE_{self.name}"
+
+    def __get__(self, owner: object, kind: type | None = None) -> Number:
+        text, number = os.environ.get(self.variable, ""), type(self.default)
+        try:
+            value = number(text) if text else self.default
+        except ValueError:
+            value = number(0)
+        if not 0 < value < math.inf:
+            whole = "whole " if number is int else ""
+            raise UserError(f"{self.variable}: expected a {whole}number above 0, found {text!r:.60}")
+        return value
+
+
+class Limits:
+    """All limits, in the order of the documentation."""
+
+    MAX_READ_SECONDS = Limit(120.0, "seconds to read one model file")
+    MAX_READ_BYTES = Limit(4 << 30, "bytes of memory of the process that reads one (Linux)")
+    MAX_FILE_BYTES = Limit(4 << 30, "bytes of a model file, and of each that it names")
+    MAX_FILES = Limit(10_000, "files that a model names: textures, buffers, material libraries")
+    MAX_TRIANGLES = Limit(20_000_000, "triangles of a model, all instances counted")
+    MAX_BLENDER_TRIANGLES = Limit(10_000_000, "triangles that Blender makes of a file")
+    MAX_VERTICES = Limit(60_000_000, "vertices while a model is read, and elements of a glTF accessor")
+    MAX_INSTANCES = Limit(1_000_000, "instances of objects in a model's scene")
+    MAX_NESTING = Limit(500, "nodes, objects or components within one another")
+    MAX_ARCHIVE_BYTES = Limit(1 << 28, "bytes of a 3MF archive once it is unpacked")
+    MAX_ZEROS = Limit(10_000_000, "elements of a glTF accessor without bytes in the file")
+    MAX_TEXTURES = Limit(1_024, "textures of a model")
+    MAX_PICTURE_PIXELS = Limit(100_000_000, "pixels of a texture, or of any other picture of a scene; 400 MB as RGBA")
+    MAX_ALL_TEXTURE_PIXELS = Limit(1 << 29, "pixels of all textures of a model; 2 GiB as RGBA")
+    MIN_SIZE = Limit(1e-4, "metres, the longest side of a model at least")
+    MAX_SIZE = Limit(1e5, "metres, the longest side of a model at most")
+    MAX_RECIPE_VALUES = Limit(200_000, "values of a recipe: by aliases a few lines can stand for billions")
+    MAX_STORED_PIXELS = Limit(1 << 28, "pixels of a picture or map of a data set, also of an imported one")
+    MAX_REPAIRED_SHOTS = Limit(1_000_000, "shots that a repair renders because they are missing")
+
+
+limits = Limits()
+"""What the limits are here: `limits.MAX_TRIANGLES`."""
+
+
+def table() -> dict[str, Limit[int] | Limit[float]]:
+    """All limits by their names."""
+    return {name: limit for name, limit in vars(Limits).items() if isinstance(limit, Limit)}

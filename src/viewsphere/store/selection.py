@@ -1,0 +1,83 @@
+"""Some fields of a data set's frames, as arrays that data loaders batch."""
+
+from __future__ import annotations
+
+from array import array
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, overload
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.errors import UserError
+from viewsphere.labels import Field, object_labels
+from viewsphere.model.mistakes import one_of
+from viewsphere.model.sample import ObjectView, Sample
+
+if TYPE_CHECKING:
+    from viewsphere.store.dataset import Dataset
+
+OF_SAMPLE = ("index", "split", "sequence", "sensor", "instant", "time", "width", "height")
+OF_CAMERA = ("camera.K", "camera.R", "camera.t", "camera.P")
+OF_POSE = ("pose.azimuth_deg", "pose.elevation_deg", "pose.distance", "pose.tilt_deg", "pose.category")
+
+
+class Selection(Sequence[dict[str, Any]]):
+    """Some fields of some frames: item i is a dict of the fields of the i-th frame; what `Dataset.select` gives.
+
+    A map-style data set for PyTorch's DataLoader, which needs no PyTorch itself: it has a length, reads any item at once and
+    in memory that does not grow, and travels to workers as the data set's path.
+    """
+
+    def __init__(self, dataset: Dataset, fields: Sequence[str], split: str | None = None) -> None:
+        known = (*dataset.plan.channels, *OF_SAMPLE, *OF_CAMERA, *OF_POSE, *(f"objects.{name}" for name in _of_objects()))
+        for name in fields:
+            if name not in known:
+                raise UserError(f"{dataset.root}: select: {one_of(name, known)}")
+        if split is not None and split not in dataset.splits:
+            raise UserError(f"{dataset.root}: select: split: {one_of(split, dataset.splits)}")
+        self.dataset, self.fields, self.split = dataset, tuple(fields), split
+        self._numbers = None if split is None else array("q", dataset.of_split(split))
+
+    def __repr__(self) -> str:
+        return f"<Selection of {self.dataset.name}: {len(self):,} frames; {', '.join(self.fields)}>"
+
+    def __len__(self) -> int:
+        return len(self.dataset if self._numbers is None else self._numbers)
+
+    @overload
+    def __getitem__(self, index: int) -> dict[str, Any]: ...
+    @overload
+    def __getitem__(self, index: slice) -> list[dict[str, Any]]: ...
+    def __getitem__(self, index: int | slice) -> dict[str, Any] | list[dict[str, Any]]:
+        """The fields of the i-th frame; raises IndexError past the end, AttributeError where the frame lacks a channel."""
+        if isinstance(index, slice):
+            return [self[i] for i in range(*index.indices(len(self)))]
+        sample = self.dataset[index if self._numbers is None else self._numbers[index]]
+        return {name: _value(sample, name) for name in self.fields}
+
+
+def _value(sample: Sample, name: str) -> Any:
+    whole, _, part = name.partition(".")
+    if whole == "objects":
+        return _stacked(sample, part)
+    return getattr(getattr(sample, whole), part) if part else getattr(sample, whole)
+
+
+def _of_objects() -> dict[str, Field]:
+    """The fields of objects that arrays or texts can hold."""
+    fields = {field.name: field for label in object_labels() for field in label.fields}
+    plain = {name: field for name, field in fields.items() if field.type in (float, int, bool, str, ObjectView)}
+    return {"id": Field("id", "", int), "mask": Field("mask", "", bool), **plain}
+
+
+def _stacked(sample: Sample, name: str) -> NDArray[Any] | list[str]:
+    """A field of all objects: an array (N, ...), NaN where an object has no such value, or a list of texts."""
+    field, values = _of_objects()[name], [getattr(o, name) for o in sample.objects]
+    if field.type is str:
+        return values
+    if field.type is ObjectView:
+        return np.array([[*view.__dict__.values()] for view in values], np.float64).reshape(-1, 4)
+    shape = (sample.height, sample.width) if name == "mask" else field.shape
+    filled = [np.full(shape, np.nan) if value is None else value for value in values]
+    return np.array(filled, {float: np.float64, int: np.int64, bool: np.bool_}[field.type]).reshape(-1, *shape)
