@@ -6,6 +6,7 @@ import base64
 import html
 import json
 import re
+import secrets
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -14,28 +15,51 @@ WEB = Path(__file__).parent / "web"
 VENDOR = WEB / "vendor" / "vendor.min.js"
 
 
-def page(title: str, data: Mapping[str, Any], own: Path | None = None) -> str:
-    """The whole HTML text. `own` is a folder with a style and modules of another page, which asks its server for more than
-    the data; they are called `own/<file>`, and its `main.js` begins. The libraries are its module `own/vendor.js`, which runs
-    when it is asked for.
-    """
-    style, modules = (WEB / "style.css").read_text("utf-8"), _modules(WEB, "report")
-    vendor = VENDOR.read_text("utf-8")
-    if own is not None:
-        style, modules = style + (own / "style.css").read_text("utf-8"), modules | _modules(own, "own")
-        modules["own/vendor.js"] = _data_url(f"{vendor}\nglobalThis.viewsphereVendor = viewsphereVendor;".encode())
-        vendor = ""
+def page(title: str, data: Mapping[str, Any]) -> str:
+    """The whole HTML text of a page that is a file."""
     parts = {
-        "title": html.escape(title),
-        "server": "'none'" if own is None else "'self'",
-        "pictures": "" if own is None else "'self'",
-        "style": style,
-        "modules": json.dumps({"imports": modules}),
-        "main": "report/main.js" if own is None else "own/main.js",
-        "vendor": vendor,
-        "licenses": html.escape((WEB / "vendor" / "LICENSES.txt").read_text("utf-8")),
-        "data": script_json(data),
+        "server": "'none'",
+        "pictures": "",
+        "scripts": "'unsafe-inline' data:",
+        "nonce": "",
+        "style": (WEB / "style.css").read_text("utf-8"),
+        "modules": json.dumps({"imports": _modules(WEB, "report")}),
+        "main": "report/main.js",
+        "vendor": VENDOR.read_text("utf-8"),
     }
+    return _filled(title, data, parts)
+
+
+def served_page(title: str, data: Mapping[str, Any], own: Path, vendor: str) -> str:
+    """The whole HTML text of a page that asks its server for more than the data.
+
+    `own` is a folder with a style and modules of that page: they are called `own/<file>`, and its `main.js` begins. The
+    libraries are the module `own/vendor.js`, which is asked for at the path `vendor` when it is needed. No script runs but
+    those of this text and what they import.
+    """
+    nonce = secrets.token_urlsafe(16)
+    modules = {**_modules(WEB, "report"), **_modules(own, "own"), "own/vendor.js": vendor}
+    parts = {
+        "server": "'self'",
+        "pictures": "'self'",
+        "scripts": f"'nonce-{nonce}'",
+        "nonce": f' nonce="{nonce}"',
+        "style": (WEB / "style.css").read_text("utf-8") + (own / "style.css").read_text("utf-8"),
+        "modules": json.dumps({"imports": modules}),
+        "main": "own/main.js",
+        "vendor": "",
+    }
+    return _filled(title, data, parts)
+
+
+def vendor_module() -> str:
+    """The libraries as a module's text."""
+    return f"{VENDOR.read_text('utf-8')}\nglobalThis.viewsphereVendor = viewsphereVendor;"
+
+
+def _filled(title: str, data: Mapping[str, Any], parts: Mapping[str, str]) -> str:
+    licenses = (WEB / "vendor" / "LICENSES.txt").read_text("utf-8")
+    parts = {**parts, "title": html.escape(title), "licenses": html.escape(licenses), "data": script_json(data)}
     return re.sub(r"\{\{(\w+)\}\}", lambda match: parts[match[1]], (WEB / "page.html").read_text("utf-8"))
 
 

@@ -52,11 +52,14 @@ PART_COLORS = np.array(
 
 @dataclass(frozen=True)
 class Scale:
-    """Sizes of a frame's pictures: width in pixels and WebP quality of the colours, width of the other layers."""
+    """Sizes of a frame's pictures: width in pixels and WebP quality of the colours, width of the other layers; `quick` ones are
+    made in a third of the time, and a tenth larger.
+    """
 
     width: int
     quality: int
     layer_width: int
+    quick: bool = False
 
 
 SCALES = (
@@ -165,7 +168,8 @@ def layer(sample: Sample, name: str, scale: Scale, within: Mapping[str, Extent] 
 
 
 def _rgb(sample: Sample, scale: Scale, within: Mapping[str, Extent]) -> Layer:
-    return Layer(webp(_shrunk(np.asarray(sample.picture, np.uint8), scale.width), scale.quality))
+    picture = _shrunk(np.asarray(sample.picture, np.uint8), scale)
+    return Layer(webp(picture, scale.quality, method=1 if scale.quick else 4))
 
 
 def _depth(sample: Sample, scale: Scale, within: Mapping[str, Extent]) -> Layer:
@@ -233,10 +237,10 @@ def _widened(lines: NDArray[np.bool_], width: int) -> NDArray[np.bool_]:
     return np.asarray(Image.fromarray(lines.astype(np.uint8) * 255).resize(size, Image.Resampling.BOX)) > 0
 
 
-def webp(picture: Picture, quality: int) -> bytes:
-    """A picture (H, W, 3 or 4) uint8 as lossy WebP."""
+def webp(picture: Picture, quality: int, method: int = 4) -> bytes:
+    """A picture (H, W, 3 or 4) uint8 as lossy WebP; a greater `method` takes longer for fewer bytes."""
     file = io.BytesIO()
-    Image.fromarray(picture).save(file, "WEBP", quality=quality, method=4, alpha_quality=90)
+    Image.fromarray(picture).save(file, "WEBP", quality=quality, method=method, alpha_quality=90)
     return file.getvalue()
 
 
@@ -291,8 +295,9 @@ def _thinned(array: NDArray[Any], width: int) -> NDArray[Any]:
     return array[rows[:, None], columns]
 
 
-def _shrunk(picture: Picture, width: int) -> Picture:
-    height = max(1, round(picture.shape[0] * width / picture.shape[1]))
-    if width >= picture.shape[1]:
+def _shrunk(picture: Picture, scale: Scale) -> Picture:
+    height = max(1, round(picture.shape[0] * scale.width / picture.shape[1]))
+    if scale.width >= picture.shape[1]:
         return picture
-    return np.asarray(Image.fromarray(picture).resize((width, height), Image.Resampling.LANCZOS))
+    way = Image.Resampling.HAMMING if scale.quick else Image.Resampling.LANCZOS
+    return np.asarray(Image.fromarray(picture).resize((scale.width, height), way))

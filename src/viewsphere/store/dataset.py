@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache, partial
 from pathlib import Path, PurePosixPath
-from typing import Any, overload
+from typing import Any, Self, overload
 
 from numpy.typing import NDArray
 
@@ -371,6 +371,10 @@ class _ChannelFiles(Mapping[str, NDArray[Any]]):
     def __init__(self, root: Path, files: Mapping[str, str], manifest_of: ManifestOf) -> None:
         self._root, self._files, self._manifest_of = root, files, manifest_of
         self._arrays: dict[str, NDArray[Any]] = {}
+
+    def __copy__(self) -> Self:
+        """The same files; none of them is read so far."""
+        return type(self)(self._root, self._files, self._manifest_of)
 
     def __getstate__(self) -> dict[str, Any]:
         """What other processes are sent: they read manifests anew."""

@@ -19,15 +19,16 @@ from viewsphere.model.channel import picture_of
 from viewsphere.report import conventions, model_data
 from viewsphere.report.facts import facts
 from viewsphere.report.frames import frame_data
+from viewsphere.report.page import vendor_module
 from viewsphere.report.paths import without_folders
 from viewsphere.report.pictures import Scale, layer, layer_names
 from viewsphere.report.summary import hues, summary
 from viewsphere.report.unknown import number
 from viewsphere.view.live import Live
-from viewsphere.view.page import live_page
+from viewsphere.view.page import VENDOR, live_page
 from viewsphere.view.query import MEASURES, Query
 
-SMALL = Scale(400, 78, 400)
+SMALL = Scale(400, 78, 400, quick=True)
 LARGE = Scale(1600, 88, 1600)
 """The pictures of cards, and those that are enlarged."""
 
@@ -69,6 +70,7 @@ class Answers:
             "/summary": self._summary,
             "/model": self._model,
             "/facts": self._facts,
+            VENDOR: self._vendor,
         }
         self._found = lru_cache(maxsize=16)(self._find)
         self._painting = threading.BoundedSemaphore(PAINTERS_AT_ONCE)
@@ -102,6 +104,9 @@ class Answers:
             **self._conventions,
         }
         return Answer(live_page(dataset.name, data).encode(), "text/html; charset=utf-8")
+
+    def _vendor(self, asked: Parameters) -> Answer:
+        return Answer(vendor_module().encode(), "text/javascript; charset=utf-8", keep=3600)
 
     def _state(self, asked: Parameters) -> Answer:
         return _as_json(self._live.state())

@@ -13,7 +13,9 @@ from collections import deque
 from collections.abc import Iterator, Sequence
 from concurrent.futures import BrokenExecutor, Future, ProcessPoolExecutor
 from contextlib import suppress
-from dataclasses import dataclass
+from copy import copy
+from dataclasses import dataclass, replace
+from functools import lru_cache
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
@@ -35,6 +37,9 @@ PIECE = 2048
 
 MANY = 2 * PIECE
 """Frames without columns from which on other processes read them, so that this one has time for the page."""
+
+KEPT = 512
+"""Samples whose records are kept."""
 
 PAUSE = 0.5
 """Seconds between two looks at the store."""
@@ -103,6 +108,7 @@ class Live:
         self._frames, self._damaged = Rows(LISTED), Rows(np.dtype(np.bool_))
         self._columns = Columns()
         self._unreadable: dict[str, str] = {}
+        self._sample = lru_cache(maxsize=KEPT)(self._read_sample)
         self._lock = threading.Lock()
         self._end = threading.Event()
         self._thread = threading.Thread(target=self._look, name="viewsphere view", daemon=True)
@@ -123,8 +129,14 @@ class Live:
             return Known(self._frames.array, self._columns.table, self._damaged.array)
 
     def sample(self, number: int) -> Sample:
-        """The sample of a frame's number; raises StoreError for one that is not there or cannot be read."""
-        dataset = self.dataset
+        """The sample of a frame's number; raises StoreError for one that is not there or cannot be read.
+
+        Records of late are kept for those who ask for their pictures; arrays are not.
+        """
+        sample = self._sample(self.dataset, number)
+        return replace(sample, channels=copy(sample.channels))
+
+    def _read_sample(self, dataset: Dataset, number: int) -> Sample:
         try:
             row = dataset.plan.row_at(number)
         except IndexError:

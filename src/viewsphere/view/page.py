@@ -6,11 +6,14 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from viewsphere.report.page import page
+from viewsphere.report.page import served_page
 
 WEB = Path(__file__).parent / "web"
+
+VENDOR = "/vendor.js"
+"""The path of the libraries."""
 
 
 def live_page(title: str, data: Mapping[str, Any]) -> str:
     """The whole HTML text."""
-    return page(title, data, own=WEB)
+    return served_page(title, data, WEB, VENDOR)

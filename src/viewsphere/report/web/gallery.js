@@ -31,10 +31,12 @@ export function layerButtons() {
   return buttons;
 }
 
-/** A frame's picture with a canvas over it; `large` for the enlarged view. */
-export function picture(frame, large) {
+/** A frame's picture with a canvas over it; `large` for the enlarged view; `room(frame)` gives its width and height on the page
+ *  where somebody knows them. */
+export function picture(frame, large, room = null) {
   const { width, height } = frameSize(frame);
   const canvas = el("canvas", { "aria-hidden": "true" });
+  if (room) canvas.room = () => room(frame);
   const base = frame.layers.rgb
     ? el("img", { src: (large && frame.layers.rgbLarge) || frame.layers.rgb, alt: describe(frame), decoding: "async", onerror: unreadable })
     : el("span", { class: "missing" }, "no colour picture");
@@ -49,9 +51,9 @@ function describe(frame) {
   return `Frame ${frame.index}: ${subject(frame)}${pose}`;
 }
 
-/** A frame's card; a click enlarges it among those that `among()` gives. */
-export function card(frame, among) {
-  const { holder, redraw } = picture(frame, false);
+/** A frame's card; a click enlarges it among those that `among()` gives; `room` as for `picture`. */
+export function card(frame, among, room = null) {
+  const { holder, redraw } = picture(frame, false, room);
   const first = frame.objects[0];
   const about = [
     frame.pose ? `${poseName(first?.pose || frame.pose.name)}` : first ? categoryName(first.category) : "",

@@ -23,7 +23,7 @@ function bitmap(url) {
 export const surfaceLayer = (frame) => LAYERS.find((layer) => layer.surface && layers.has(layer.name) && frame.layers[layer.name]);
 
 /** Draw everything that is switched on; `large` adds words, `base` the picture itself. The canvas takes the size it has on the
- *  page; `trail`: the sensor's frames before, in order. */
+ *  page, or that `canvas.room()` says, which costs no layout; `trail`: the sensor's frames before, in order. */
 export async function draw(canvas, frame, large, base = false, trail = []) {
   const turn = (canvas.drawing = (canvas.drawing ?? 0) + 1);
   const surface = surfaceLayer(frame);
@@ -33,8 +33,9 @@ export async function draw(canvas, frame, large, base = false, trail = []) {
   if (canvas.drawing !== turn) return; // something newer is being drawn
   const ratio = Math.min(window.devicePixelRatio || 1, 3);
   const size = frameSize(frame);
-  canvas.width = Math.max(1, Math.round(canvas.clientWidth * ratio));
-  canvas.height = Math.max(1, Math.round(canvas.clientHeight * ratio));
+  const [width, height] = canvas.room?.() ?? [canvas.clientWidth, canvas.clientHeight];
+  canvas.width = Math.max(1, Math.round(width * ratio));
+  canvas.height = Math.max(1, Math.round(height * ratio));
   const pen = canvas.getContext("2d");
   if (picture) drawPicture(pen, picture, surface);
   if (image) pen.drawImage(image, 0, 0, canvas.width, canvas.height);

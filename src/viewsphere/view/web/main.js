@@ -22,16 +22,29 @@ live.model = async (key) => {
   return model;
 };
 
-const sections = ["viewpoints", "distributions", "models"];
+const sections = {
+  viewpoints: async () => (await import("report/sphere.js")).showSphere(),
+  distributions: async () => (await import("report/charts.js")).showDistributions(),
+  models: async () => (await import("report/models.js")).showModels(),
+};
+const drawn = new Set();
 let counted = 0;
 let countedAt = -Infinity;
 
-/** The sections that need the libraries, which are loaded when there is something to count. */
-async function libraries() {
+/** Draws a section when somebody comes near it: the libraries that it needs take longer than all else of the page. */
+const watcher = new IntersectionObserver((entries) => {
+  for (const { isIntersecting, target } of entries) {
+    if (!isIntersecting) continue;
+    watcher.unobserve(target);
+    drawSection(target.id);
+  }
+}, { rootMargin: "400px" });
+
+async function drawSection(name) {
   await import("own/vendor.js");
-  const [{ showDistributions }, { showModels }, { showSphere }] =
-    await Promise.all(["charts", "models", "sphere"].map((name) => import(`report/${name}.js`)));
-  return { showDistributions, showModels, showSphere };
+  await sections[name]();
+  drawn.add(name);
+  byId(name).classList.remove("empty-yet");
 }
 
 /** Count all frames whose labels are read, if there are more than before. */
@@ -40,17 +53,19 @@ async function recount(state) {
   if (!state.read || state.read === counted || (!isDone && performance.now() - countedAt < COUNTED)) return;
   countedAt = performance.now();
   const first = !counted;
-  const [found, show] = await Promise.all([ask("summary"), libraries()]);
+  const found = await ask("summary");
   counted = found.frames ? state.read : counted;
   if (!found.frames) return;
   renew(found);
   showFigures();
   if (first) {
-    for (const name of sections) byId(name).hidden = false;
-    show.showSphere();
-    show.showModels();
+    for (const name of Object.keys(sections)) {
+      byId(name).hidden = false;
+      byId(name).classList.add("empty-yet");
+      watcher.observe(byId(name));
+    }
   }
-  show.showDistributions();
+  if (drawn.has("distributions")) sections.distributions();
   tell("summary");
   document.documentElement.dataset.counted = found.frames;
 }
@@ -78,11 +93,9 @@ async function provenance() {
 
 theme();
 showOverview(live.state);
-for (const name of sections) byId(name).hidden = true;
-showPictures();
+for (const name of Object.keys(sections)) byId(name).hidden = true;
 markSection();
 document.documentElement.dataset.ready = "true";
-requestIdleCallback(() => {
-  look();
-  provenance();
-});
+await showPictures(); // before anything else is asked for
+look();
+provenance();

@@ -43,7 +43,7 @@ function show(stay) {
     Object.assign(own, { listed: answer.listed, read: answer.read });
     return answer;
   };
-  begin(fetchRows, (answer, problem) => {
+  return begin(fetchRows, (answer, problem) => {
     busy = false;
     if (answer) known = { ...own, total: answer.total, searched: answer.searched, needsLabels: answer.needsLabels };
     tell(problem);
@@ -114,6 +114,7 @@ function showLists() {
   byId("lists").querySelectorAll("select").forEach((select) => (select.value = filter[select.name]));
 }
 
+/** Show the first pictures; done when the server has told of them, or why it cannot. */
 export function showPictures() {
   const order = state.finished < state.planned ? "newest" : "mixed";
   Object.assign(filter, Object.assign(EVERYTHING, { order, measure: "", least: "", most: "" }));
@@ -129,5 +130,5 @@ export function showPictures() {
     clearTimeout(due);
     due = setTimeout(() => show(false), SOON);
   });
-  show(false);
+  return show(false);
 }
