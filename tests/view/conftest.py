@@ -40,7 +40,7 @@ def open_view(browser, settle):
     troubles = []
     with ExitStack() as stack:
 
-        def open_(url, width=1400, height=900):
+        def open_(url, width=1400, height=900, awaited=".card[data-frame]"):
             context = stack.enter_context(browser.new_context(viewport={"width": width, "height": height}))
             page = context.new_page()
             page.on("console", lambda m: troubles.append(m.text) if m.type == "error" else None)
@@ -49,7 +49,7 @@ def open_view(browser, settle):
             page.set_default_timeout(1000 * DEADLINE)
             page.goto(url)
             page.wait_for_selector("html[data-ready=true]")
-            page.wait_for_selector(".card[data-frame]")
+            page.wait_for_selector(awaited)
             settle(page)
             return page
 

@@ -24,8 +24,8 @@ def large_dataset(small: Path, root: Path, frames: int = FRAMES) -> Path:
     """A data set of so many frames, those of the small one in turn, in a new folder."""
     samples = list(Dataset(small))
     picture = Dataset(small).path(samples[0].files["rgb"]).read_bytes()
-    records = [json.dumps({**whole_sample(sample), "files": None})[:-1] for sample in samples]
-    tails = [record.partition(",")[2].removesuffix('"files": null') for record in records]
+    records = [json.dumps({**_rounded(whole_sample(sample)), "files": None}, separators=(",", ":"))[:-1] for sample in samples]
+    tails = [record.partition(",")[2].removesuffix('"files":null') for record in records]
     store = Store(root)
     shutil.copytree(Store(small).folder / "models", store.folder / "models")
     (store.folder / "writing").mkdir()
@@ -44,3 +44,8 @@ def large_dataset(small: Path, root: Path, frames: int = FRAMES) -> Path:
         seals = {"frames.json": (len(text), digest(text)), "rgb/00000000.png": (len(picture), digest(picture))}
         Manifest(seals).write(folder)
     return root
+
+
+def _rounded(value):
+    """Half as many bytes of numbers."""
+    return json.loads(json.dumps(value), parse_float=lambda text: round(float(text), 5))

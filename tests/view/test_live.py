@@ -50,6 +50,25 @@ def test_frames_are_known_as_they_are_finished(tmp_path):
     assert seen[0]["age"] is None
 
 
+def test_what_is_left_out_is_told_while_others_are_made(tmp_path):
+    from viewsphere import generate
+
+    (tmp_path / "bad.obj").write_text("v 0 0 0\n")
+    good = {"source": "zoo:post_box", "category": "post box", "scale": {"length": 0.18}}
+    bad = {"source": str(tmp_path / "bad.obj"), "category": "bad"}
+    seen = []
+    with looking_later(tmp_path / "out") as begin:
+
+        def listen(progress):
+            if progress.phase == "frames":
+                seen.append(begin().state())
+
+        recipe = small_recipe(models=[good, bad], channels=["rgb"], formats=[])
+        generate(recipe, tmp_path / "out", keep_going=True, listener=listen)
+    assert {(state["planned"], state["leftOut"], state["failed"]) for state in seen} == {(6, 6, 1)}
+    assert [name for name, _ in seen[0]["failures"]] == ["bad"]
+
+
 @contextmanager
 def looking_later(root):
     """A function that gives what is known of a folder which is no data set yet."""

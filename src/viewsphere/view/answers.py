@@ -171,7 +171,7 @@ class Answers:
         known = self._live.known
         with self._counting:
             if self._counted is None or (self._counted[0] != known.read and time.monotonic() - self._counted[1] > RENEWED):
-                found = {**summary(self._live.dataset, known.sound), "sequences": 0}
+                found = {**summary(self._live.dataset, known.sound), "sequences": 0, "read": known.read}
                 self._counted = (known.read, time.monotonic(), _as_json(found).body)
             return Answer(self._counted[2])
 

@@ -10,7 +10,7 @@ import signal
 import threading
 import time
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, Future, ProcessPoolExecutor
 from contextlib import suppress
 from copy import copy
@@ -159,15 +159,17 @@ class Live:
         return {key: without_folders(why) for key, why in found.items()}
 
     def state(self) -> dict[str, Any]:
-        """How far the data set is, as plain data: frames planned, finished and with columns, frames a second, seconds left,
-        failures, and when the newest frame was finished.
+        """How far the data set is, as plain data: frames planned (without those left out), left out, finished and with columns,
+        frames a second, seconds left, failures, and when the newest frame was finished.
         """
         known, failures, now = self.known, self.failures(), time.time()
-        finished, planned = len(known.frames), self.dataset.plan.frames
+        left_out = self._left_out(failures)
+        finished, planned = len(known.frames), self.dataset.plan.frames - left_out
         made = known.frames["made"]
         rate = _rate(made, now)
         return {
             "planned": planned,
+            "leftOut": left_out,
             "finished": finished,
             "read": known.read,
             "rate": round(rate, 3),
@@ -176,6 +178,13 @@ class Live:
             "failed": len(failures),
             "failures": list(failures.items())[:MOST_FAILURES],
         }
+
+    def _left_out(self, failures: Collection[str]) -> int:
+        """How many frames of the plan will never be there."""
+        plan = self.dataset.plan
+        shots = (row for row in map(plan.find, failures) if row is not None and row.subject not in failures)
+        subjects = sum(index.samples_of(name) for index in plan.indices for name in failures)
+        return subjects + sum(row.count for row in shots if not self.dataset.store.has_shot(row.key))
 
     def _look(self) -> None:
         # Ctrl-C is for the main thread; readers that this one starts inherit that they do not hear of it.

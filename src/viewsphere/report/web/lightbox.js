@@ -28,7 +28,10 @@ function prepare() {
     if (event.key === "ArrowLeft") turn(-1);
     else if (event.key === "ArrowRight") turn(1);
   });
-  dialog.addEventListener("close", () => document.querySelector(`.card[data-frame="${current.frame.index}"]`)?.focus());
+  dialog.addEventListener("close", () => {
+    frames.show?.(at);
+    document.querySelector(`.card[data-frame="${current.frame.index}"]`)?.focus();
+  });
   subscribe("layers", refresh);
   new ResizeObserver(refresh).observe(holder);
   document.addEventListener("themechange", refresh);
@@ -36,7 +39,7 @@ function prepare() {
 }
 
 /** Enlarge a frame. `among` are the frames that the arrows turn to: a list, or what has `length`, `indexOf` and `at`, which may
- *  give a promise of a frame.
+ *  give a promise of a frame, and perhaps `show`, which brings one into sight among its neighbours.
  */
 export function openLightbox(frame, among) {
   frames = among.indexOf(frame) >= 0 ? among : [frame];

@@ -40,11 +40,12 @@ const hidden = () => Math.max(0, tallness() - grid.sight);
 const bar = () => Math.max(0, Math.min(TALL, tallness()) - grid.sight);
 const roomOf = ({ size: [width, height] }) => [Math.min(grid.width, (grid.height * width) / height), grid.height];
 
-/** How many frames there are, and any of them, for those who turn from one to the next. */
+/** How many frames there are, and any of them, for those who turn from one to the next; `show` brings one into sight. */
 const all = () => ({
   length: total,
   indexOf: (frame) => frame.place,
   at: (place) => rowAt(place) ?? piece(Math.floor(place / PIECE)).then(() => rowAt(place)),
+  show: bringIntoSight,
 });
 
 function layOut() {
@@ -74,6 +75,12 @@ function goTo(pixels) {
   putBarRight();
   render();
   askForSight();
+}
+
+function bringIntoSight(place) {
+  const y = Math.floor(place / grid.columns) * grid.row;
+  if (y < top) goTo(y);
+  else if (y + grid.row > top + grid.sight) goTo(y + grid.row - grid.sight);
 }
 
 /** The scroll bar stands where the sight is; a wall taller than it can be is scrolled by its share. */
@@ -236,9 +243,7 @@ function keys(event) {
   const to = at + moves[event.key];
   if (!(to >= 0 && to < total)) return;
   event.preventDefault();
-  const y = Math.floor(to / grid.columns) * grid.row;
-  if (y < top) goTo(y);
-  else if (y + grid.row > top + grid.sight) goTo(y + grid.row - grid.sight);
+  bringIntoSight(to);
   space.querySelector(`[data-place="${to}"]`)?.focus({ preventScroll: true });
 }
 

@@ -54,7 +54,7 @@ async function recount(state) {
   countedAt = performance.now();
   const first = !counted;
   const found = await ask("summary");
-  counted = found.frames ? state.read : counted;
+  counted = found.frames ? found.read : counted; // the server does not count anew each time
   if (!found.frames) return;
   renew(found);
   showFigures();

@@ -118,7 +118,7 @@ function showLists() {
 export function showPictures() {
   const order = state.finished < state.planned ? "newest" : "mixed";
   Object.assign(filter, Object.assign(EVERYTHING, { order, measure: "", least: "", most: "" }));
-  byId("pictures-lead").textContent = "All frames that are finished. Choose what is drawn over them; select a picture to enlarge it.";
+  byId("pictures-lead").textContent = "All finished frames. Choose what is drawn over them; select one to enlarge it.";
   byId("layers").append(...layerButtons());
   byId("filters").append(el("div", { id: "lists", class: "lists" }), visibilityRange(), measureRange(), orderChoice(), cellChip(), reset());
   byId("pages").hidden = true;

@@ -19,7 +19,10 @@ function duration(seconds) {
 
 /** What is said of a state, in a line. */
 function said(state) {
-  if (state.finished >= state.planned) return `All ${plural(state.planned, "frame")} are finished.`;
+  if (state.finished >= state.planned) {
+    const others = state.leftOut ? ` ${plural(state.leftOut, "frame")} ${state.leftOut === 1 ? "was" : "were"} left out.` : "";
+    return `All ${plural(state.planned, "frame")} are finished.${others}`;
+  }
   const share = `${count(state.finished)} of ${plural(state.planned, "frame")} (${percent(state.finished / state.planned)})`;
   if (!state.rate) return state.age === null ? `${share}: none is finished yet.` : `${share}; the newest is ${duration(state.age)} old.`;
   return `${share}, ${decimal(state.rate, state.rate < 1 ? 2 : 1)} a second, about ${duration(state.left)} left.`;
