@@ -1,8 +1,10 @@
 """What the server answers to strangers, byte by byte: nothing that lies beside the data set, nothing without its name."""
 
 import json
+import re
 import shutil
 import socket
+from contextlib import suppress
 
 import pytest
 
@@ -16,10 +18,11 @@ SECRET = "the-secret-of-another-folder"
 
 def tell(server, request, host="127.0.0.1"):
     """All that a server says to these bytes, until it hangs up."""
-    with socket.create_connection((host, server.port), DEADLINE) as line:
+    found = b""
+    with socket.create_connection((host, server.port), DEADLINE) as line, suppress(ConnectionError):
         line.sendall(request if isinstance(request, bytes) else request.encode())
-        line.shutdown(socket.SHUT_WR)
-        found = b""
+        with suppress(OSError):  # it may have hung up by now
+            line.shutdown(socket.SHUT_WR)
         while block := line.recv(65536):
             found += block
     return found
@@ -141,6 +144,50 @@ def test_links_that_lead_out_of_the_data_set_are_not_followed(serve, small_datas
         assert body[8:12] != b"WEBP"
 
 
+@pytest.mark.parametrize("file", ["skipped.json", "models/post_box_000/model.json"])
+def test_what_is_told_of_models_is_no_link_out(serve, small_dataset, tmp_path, file):
+    inside = small_dataset.store.folder / file
+    outside = tmp_path / "outside.json"
+    if inside.exists():
+        shutil.move(inside, outside)
+    outside.write_text(json.dumps({"post_box_000": SECRET}))
+    inside.symlink_to(outside)
+    server = serve(small_dataset.root)
+    for target in ("/state", "/facts", "/summary", "/model?key=post_box_000", "/rows?first=0&count=12"):
+        assert SECRET.encode() not in get(server, target)[2]
+
+
+@pytest.mark.parametrize(
+    ("headers", "status"),
+    [
+        ({"Sec_Fetch_Site": "same-origin"}, 200),
+        ({"Sec_Fetch_Site": "none"}, 200),
+        ({"Sec_Fetch_Site": "cross-site"}, 403),
+        ({"Sec_Fetch_Site": "same-site"}, 403),
+        ({"Sec_Fetch_Site": "cross-site", "Sec_Fetch_Mode": "navigate", "Sec_Fetch_Dest": "iframe"}, 403),
+        ({"Sec_Fetch_Site": "cross-site", "Sec_Fetch_Mode": "navigate", "Sec_Fetch_Dest": "document"}, 200),
+    ],
+)
+def test_a_page_of_another_site_may_link_here_and_no_more(server, headers, status):
+    assert get(server, "/state", **headers)[0] == status
+
+
+def test_no_other_site_reads_an_answer(server):
+    headers = get(server, "/state", Origin="http://evil.example")[1]
+    assert not [name for name in headers if name.startswith("access-control-")]
+    assert get(server, "/state", method="OPTIONS", Origin="http://evil.example")[0] == 501
+
+
+def test_only_the_page_s_own_scripts_run(server):
+    _, headers, body = get(server, "/")
+    assert headers["content-security-policy"] == "frame-ancestors 'none'"
+    policy = re.search(rb'Content-Security-Policy" content="([^"]*)"', body)[1].decode()
+    nonce = re.search(r"script-src 'nonce-([\w-]{16,})'(?:;|$)", policy)[1]
+    assert body.count(b"<script") == body.count(f'<script nonce="{nonce}"'.encode()) + 1  # the data, which is no script
+    assert nonce not in get(server, "/")[2].decode()
+    assert get(server, "/state")[1]["content-security-policy"] == "default-src 'none'; frame-ancestors 'none'"
+
+
 def test_the_folder_of_a_shot_may_not_lead_out(serve, small_dataset, tmp_path):
     folder = small_dataset.store.shot_folder(next(iter(sorted(small_dataset.store.finished()))))
     first = small_dataset.plan.find(folder.name).first
@@ -186,14 +233,14 @@ def test_requests_that_are_none(server):
         f"POST /state HTTP/1.1\r\n{host}\r\n\r\n",
         f"PUT /state HTTP/1.1\r\n{host}\r\nContent-Length: 0\r\n\r\n",
         f"GET /state?{'&'.join('a=1' for _ in range(100))} HTTP/1.1\r\n{host}\r\n\r\n",
-        f"GET /{'a' * 100_000} HTTP/1.1\r\n{host}\r\n\r\n",
         f"GET /state extra HTTP/1.1\r\n{host}\r\n\r\n",
     ):
         answer = tell(server, request)
         assert 400 <= parted(answer)[0] < 600, request[:60]
         assert b"planned" not in answer
         assert answer.count(b"HTTP/1.1 ") == 1  # what came behind was not taken for another request
-    for silence in (b"GET /state HTTP/9.9\r\n\r\n", b"", b"\x00\x01\x02\r\n\r\n", b"GET /state\r\n\r\n"):
+    endless = f"GET /state?a={'a' * 100_000} HTTP/1.1\r\n{host}\r\n\r\n".encode()  # hung up on before it is read
+    for silence in (endless, b"GET /state HTTP/9.9\r\n\r\n", b"", b"\x00\x01\x02\r\n\r\n", b"GET /state\r\n\r\n"):
         assert b"planned" not in tell(server, silence)
     assert get(server, "/state")[0] == 200
 

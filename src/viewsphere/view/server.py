@@ -1,7 +1,8 @@
 """The server: one's own browser is answered, on this machine without a token, elsewhere with one. Others are not.
 
-A page of a stranger that is open in the same browser is kept out, too: its requests name another host (DNS rebinding), and what
-it embeds of this server the browser does not show it (Cross-Origin-Resource-Policy).
+A page of a stranger that is open in the same browser is kept out, too: its requests name another host (DNS rebinding) or say
+that they come from elsewhere (Sec-Fetch-Site), no header allows it to read an answer (CORS), and what it embeds of this server
+the browser does not show it (Cross-Origin-Resource-Policy).
 """
 
 from __future__ import annotations
@@ -48,6 +49,12 @@ GUARD = {
     "Cross-Origin-Opener-Policy": "same-origin",
 }
 """Sent with every answer."""
+
+NOTHING = "default-src 'none'; frame-ancestors 'none'"
+"""The policy of answers that are no page; a page says in its head what it may load."""
+
+OWN_SITES = ("same-origin", "none")
+"""What a browser says of requests that come from this server's page, or from nobody's."""
 
 
 @dataclass(frozen=True)
@@ -116,9 +123,9 @@ class Server(ThreadingMixIn, TCPServer):
         if port != self.port:
             return False
         if self.address.is_loopback:
-            return name in {"localhost", "127.0.0.1", "::1", self.address.host}
+            return name in {"localhost", "127.0.0.1", "::1", self.address.host.lower()}
         # An address is no name that a stranger could own; whoever comes by one has a token besides.
-        return _address(name) is not None or name in {"localhost", self.address.host, socket.gethostname().lower()}
+        return _address(name) is not None or name in {"localhost", self.address.host.lower(), socket.gethostname().lower()}
 
     def handle_error(self, request: Any, client_address: Any) -> None:
         """Somebody hung up, or a mistake of ours: in a line, for the page's other requests go on."""
@@ -219,6 +226,9 @@ class _Handler(BaseHTTPRequestHandler):
             return HTTPStatus.BAD_REQUEST, "expected one Host"
         if not self.server.names(hosts[0]):
             return HTTPStatus.MISDIRECTED_REQUEST, "expected the address that viewsphere view printed"
+        is_visit = self.headers.get("Sec-Fetch-Mode") == "navigate" and self.headers.get("Sec-Fetch-Dest") == "document"
+        if self.headers.get("Sec-Fetch-Site", "none") not in OWN_SITES and not is_visit:
+            return HTTPStatus.FORBIDDEN, "expected a request of this server's own page"
         if self.headers.get("Content-Length", "0") != "0" or "Transfer-Encoding" in self.headers:
             return HTTPStatus.BAD_REQUEST, "expected no body"
         return None
@@ -243,7 +253,9 @@ class _Handler(BaseHTTPRequestHandler):
     def _send(self, status: HTTPStatus, answer: Answer, extra: Mapping[str, str] | None = None) -> None:
         self.send_response(status)
         keep = f"private, max-age={answer.keep}, immutable" if answer.keep else "no-store"
+        policy = "frame-ancestors 'none'" if answer.kind.startswith("text/html") else NOTHING
         own = {"Content-Type": answer.kind, "Content-Length": str(len(answer.body)), "Cache-Control": keep}
+        own["Content-Security-Policy"] = policy
         for name, value in {**own, **GUARD, **(extra or {})}.items():
             self.send_header(name, value)
         if self.close_connection:
