@@ -148,7 +148,7 @@ class Answers:
             return {"index": frame, "problem": without_folders(str(error))}
         path = f"picture?frame={frame}&at={made:.0f}&layer="
         names = layer_names(sample)
-        large = {"rgbLarge": f"{path}rgb&large=1"} if "rgb" in names else {}
+        large = {f"{name}Large": f"{path}{name}&large=1" for name in names}
         return {**plain, "made": round(made, 1), "layers": {name: path + name for name in names} | large}
 
     def _range(self, asked: Parameters) -> Answer:

@@ -124,7 +124,7 @@ function orderChoice() {
   return el("label", {}, "Order", select);
 }
 
-export function visibilityRange() {
+function visibilityRange() {
   const slider = (name, label, value) => {
     const input = el("input", { type: "range", min: 0, max: 100, step: 1, value, name, "aria-label": label });
     input.addEventListener("input", () => {

@@ -28,7 +28,7 @@ export async function draw(canvas, frame, large, base = false, trail = []) {
   const turn = (canvas.drawing = (canvas.drawing ?? 0) + 1);
   const surface = surfaceLayer(frame);
   canvas.parentElement.classList.toggle("dimmed", Boolean(surface));
-  const image = surface ? await bitmap(frame.layers[surface.name]) : null;
+  const image = surface ? await bitmap((large && frame.layers[`${surface.name}Large`]) || frame.layers[surface.name]) : null;
   const picture = base && frame.layers.rgb ? await bitmap(frame.layers.rgb) : null;
   if (canvas.drawing !== turn) return; // something newer is being drawn
   const ratio = Math.min(window.devicePixelRatio || 1, 3);

@@ -2,7 +2,7 @@
 
 import { data, poseName, summary } from "report/data.js";
 import { byId, count, el, plural } from "report/dom.js";
-import { cellChip, choice, layerButtons, layerKeys, reset, visibilityRange } from "report/gallery.js";
+import { cellChip, choice, layerButtons, layerKeys, reset } from "report/gallery.js";
 import { EVERYTHING, filter, setFilter, subscribe } from "report/state.js";
 import { ask } from "own/ask.js";
 import { begin, isAtTop, showWall } from "own/endless.js";
@@ -18,9 +18,8 @@ let busy = false;
 
 /** The filter as the server understands it. */
 function query() {
-  const { category, model, split, pose, low, high, cell, order, measure, least, most } = filter;
+  const { category, model, split, pose, cell, order, measure, least, most } = filter;
   const within = {};
-  if (low > 0 || high < 1) within.visibility = `${low},${high}`;
   if (cell) {
     const front = cell.of === "cameras" ? "camera_" : "";
     within[`${front}azimuth`] = cell.azimuth.join(",");
@@ -120,7 +119,7 @@ export function showPictures() {
   Object.assign(filter, Object.assign(EVERYTHING, { order, measure: "", least: "", most: "" }));
   byId("pictures-lead").textContent = "All finished frames. Choose what is drawn over them; select one to enlarge it.";
   byId("layers").append(...layerButtons());
-  byId("filters").append(el("div", { id: "lists", class: "lists" }), visibilityRange(), measureRange(), orderChoice(), cellChip(), reset());
+  byId("filters").append(el("div", { id: "lists", class: "lists" }), measureRange(), orderChoice(), cellChip(), reset());
   byId("pages").hidden = true;
   document.addEventListener("keydown", layerKeys);
   showLists();

@@ -55,7 +55,6 @@ export function showSilence() {
 export function showFigures() {
   if (!summary.frames) return;
   figures.replaceChildren(figureList([
-    figure(summary.frames, "frame"),
     figure(summary.objects, "object"),
     figure(summary.models.length, "model"),
     figure(summary.categories.length, "category", "categories"),
