@@ -56,14 +56,6 @@ def wheel(page, times):
     assert until(lambda: page.evaluate("() => document.querySelector('#grid').scrollTop") > before)
 
 
-def press(page, key):
-    """Press a key over the pictures, and wait until it has scrolled them to where it does."""
-    page.evaluate("() => document.querySelector('#grid').addEventListener('scrollend', () => { window.ended = true; })")
-    page.evaluate("() => { window.ended = false; }")
-    page.locator("#grid").press(key)
-    assert until(lambda: page.evaluate("() => window.ended"))
-
-
 def work(session):
     """Seconds of work of the page's main thread so far."""
     found = {metric["name"]: metric["value"] for metric in session.send("Performance.getMetrics")["metrics"]}
@@ -88,11 +80,12 @@ def test_a_data_set_of_273_600_frames(serve, small_run, tmp_path, open_view, cap
     scrolled = work(session) - before
     assert until(lambda: in_order(page) and cards(page)[0][0] > 0)
 
-    press(page, "End")
-    assert until(lambda: whole(page) and cards(page)[-1] == [FRAMES - 1, FRAMES - 1])
+    grid = page.locator("#grid")
+    # Again and again: the wheel may still be turning.
+    assert until(lambda: grid.press("End") or (whole(page) and cards(page)[-1] == [FRAMES - 1, FRAMES - 1]))
     wall, last = page.locator("#grid").bounding_box(), page.locator(".card").last.bounding_box()
     assert wall["y"] < last["y"] < last["y"] + last["height"] <= wall["y"] + wall["height"] + 1
-    press(page, "Home")
+    grid.press("Home")
     assert until(lambda: in_order(page, 0))
     page.evaluate("() => { const grid = document.querySelector('#grid'); grid.scrollTop = grid.scrollHeight / 2; }")
     assert until(lambda: whole(page) and abs(cards(page)[0][0] / FRAMES - 0.5) < 0.01)

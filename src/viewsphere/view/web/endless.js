@@ -11,7 +11,6 @@ const HELD = 80; // pieces that are kept
 const TALL = 8e6; // pixels that every browser scrolls over; some end at 16 million
 const FAST = 0.5; // heights of the wall in one step from which on one is taken to be on the way to somewhere else
 const STILL = 60; // ms that a place is in sight before it is asked for, if one was fast
-const SYNC = 150; // ms without scrolling after which the scroll bar is put right
 const AT_ONCE = 6; // cards that are made for one picture of the screen
 const WORDS = 2.9; // a card's lines and their margin, rem
 const GAP = [0.9, 1.1]; // between columns and rows, rem
@@ -27,7 +26,6 @@ let down = true; // the way one scrolls
 let ratio = 4 / 3;
 let series = 0; // counts the answers that begin anew
 let due = 0;
-let syncing = 0;
 let painting = 0;
 let grid = { columns: 4, width: 300, height: 225, gap: 14, row: 290, sight: 600 };
 
@@ -109,8 +107,12 @@ function followShare(moved) {
   const end = scrolled <= 0 ? 0 : scrolled >= bar() - 1 ? hidden() : NaN;
   if (Math.abs(top - end) < grid.sight) top = end;
   else if (!Number.isNaN(end)) putBarRight(); // the bar is at its end before the wall is
-  clearTimeout(syncing);
-  syncing = setTimeout(() => { putBarRight(); render(); }, SYNC);
+}
+
+/** When one has come to rest, since a scroll bar that is put right ends what the browser is still moving. */
+function settle() {
+  putBarRight();
+  render();
 }
 
 function inSight() {
@@ -238,6 +240,12 @@ export async function begin(fetch, tell, stay = false) {
 export const isAtTop = () => top < grid.row;
 
 function keys(event) {
+  const ends = { Home: 0, End: hidden() };
+  if (event.key in ends) {
+    event.preventDefault();
+    goTo(ends[event.key]);
+    return;
+  }
   const moves = { ArrowLeft: -1, ArrowRight: 1, ArrowUp: -grid.columns, ArrowDown: grid.columns };
   const at = Number(document.activeElement.closest?.(".card")?.dataset.place ?? NaN);
   const to = at + moves[event.key];
@@ -253,6 +261,7 @@ export function showWall() {
   box.setAttribute("aria-label", "Pictures; scroll for more");
   box.append(space);
   box.addEventListener("scroll", follow, { passive: true });
+  box.addEventListener("scrollend", settle);
   box.addEventListener("keydown", keys);
   subscribe("layers", redraw);
   document.addEventListener("themechange", redraw);
