@@ -1,16 +1,32 @@
-"""Fixtures: the small recipe's data set."""
+"""Fixtures: the small recipe's data set, Blender, and a headless browser where there is one."""
 
 from __future__ import annotations
 
 import os
+import shutil
 
 import pytest
 from hypothesis import settings
 
+from deadline import DEADLINE
 from small import small_recipe
 
 EXAMPLES = 100 if os.environ.get("CI") == "true" else 25
 """That each property is tried with, but where it says so itself; CI has the time for more."""
+
+ARGUMENTS = (
+    "--no-sandbox",
+    "--disable-background-networking",
+    "--use-gl=angle",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+)
+
+SETTLED = """async () => {
+    for (let i = 0; i < 4; i++) await new Promise(requestAnimationFrame);  // layout, then what waits for its sizes
+    return [...document.querySelectorAll("canvas")].every((canvas) => canvas.drawing === canvas.drawn)
+        && [...document.images].every((image) => image.complete || image.loading === "lazy");
+}"""
 
 settings.register_profile("repeatable", derandomize=True, database=None, deadline=None, max_examples=EXAMPLES)
 settings.load_profile("repeatable")
@@ -65,3 +81,22 @@ def drawing(blender):
     if graphics is None or graphics.problem:
         pytest.skip(f"{blender}: {graphics and graphics.problem}")
     return blender
+
+
+@pytest.fixture(scope="session")
+def settle():
+    """A function that waits until a page has drawn everything that it was asked for."""
+    return lambda page: page.wait_for_function(SETTLED)
+
+
+@pytest.fixture(scope="session")
+def browser():
+    """Headless Chromium: the one on the path, else Playwright's own; skips where there is none."""
+    sync_api = pytest.importorskip("playwright.sync_api")
+    with sync_api.sync_playwright() as playwright:
+        path = shutil.which("chromium") or shutil.which("chromium-browser") or playwright.chromium.executable_path
+        if not os.path.exists(path):  # noqa: PTH110
+            pytest.skip("no Chromium: apt-get install chromium, or playwright install chromium")
+        browser = playwright.chromium.launch(executable_path=path, args=list(ARGUMENTS), timeout=1000 * DEADLINE)
+        yield browser
+        browser.close()

@@ -12,7 +12,7 @@ from deadline import DEADLINE
 from viewsphere import cli, plugins
 from viewsphere.cli import completion
 
-COMMANDS = ("new", "inspect", "plan", "preview", "render", "export", "check", "report", "merge", "import")
+COMMANDS = ("new", "inspect", "plan", "preview", "render", "export", "check", "report", "view", "merge", "import")
 ZOO = [f"zoo:{name}" for name in plugins.families()]
 
 

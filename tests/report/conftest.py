@@ -1,35 +1,13 @@
-"""A small data set and its report, and a headless browser where there is one."""
+"""A small data set and its report."""
 
 from __future__ import annotations
 
-import os
-import shutil
 from pathlib import Path
 
 import pytest
 
 from deadline import DEADLINE
 from small import small_recipe
-
-ARGUMENTS = (
-    "--no-sandbox",
-    "--disable-background-networking",
-    "--use-gl=angle",
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
-)
-
-SETTLED = """async () => {
-    for (let i = 0; i < 4; i++) await new Promise(requestAnimationFrame);  // layout, then what waits for its sizes
-    return [...document.querySelectorAll("canvas")].every((canvas) => canvas.drawing === canvas.drawn)
-        && [...document.images].every((image) => image.complete || image.loading === "lazy");
-}"""
-
-
-@pytest.fixture(scope="session")
-def settle():
-    """A function that waits until a page has drawn everything that it was asked for."""
-    return lambda page: page.wait_for_function(SETTLED)
 
 
 @pytest.fixture(scope="session")
@@ -54,19 +32,6 @@ def page_file(small_dataset) -> Path:
     file = small_dataset.root / "report.html"
     write_report(small_dataset, file, proof=Proof(False, {"boxes": 12}, ("boxes: frame 3: expected <b>this</b>",), ("a note",)))
     return file
-
-
-@pytest.fixture(scope="session")
-def browser():
-    """Headless Chromium: the one on the path, else Playwright's own; skips where there is none."""
-    sync_api = pytest.importorskip("playwright.sync_api")
-    with sync_api.sync_playwright() as playwright:
-        path = shutil.which("chromium") or shutil.which("chromium-browser") or playwright.chromium.executable_path
-        if not os.path.exists(path):  # noqa: PTH110
-            pytest.skip("no Chromium: apt-get install chromium, or playwright install chromium")
-        browser = playwright.chromium.launch(executable_path=path, args=list(ARGUMENTS), timeout=1000 * DEADLINE)
-        yield browser
-        browser.close()
 
 
 @pytest.fixture

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from seen import differs, equals, looks, pixels
 
 from deadline import until
+from seen import differs, equals, looks, pixels
 
 LAYERS = ("boxes", "boxes3d", "masks", "depth", "normals", "coordinates", "parts")
 

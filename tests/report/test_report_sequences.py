@@ -5,9 +5,9 @@ import re
 
 import numpy as np
 import pytest
-from seen import differs, equals, looks, pixels
 
 from moving import moving_recipe
+from seen import differs, equals, looks, pixels
 from viewsphere.labels.tracks import positions
 from viewsphere.report import write_report
 from viewsphere.report.frames import frame_data

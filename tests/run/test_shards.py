@@ -27,8 +27,9 @@ from viewsphere.run.opening import prepare, to_render
 from viewsphere.run.share import shard_named
 from viewsphere.run.status import status
 from viewsphere.sampling.extension import whole
-from viewsphere.store import Dataset, Store, folder
+from viewsphere.store import Dataset, Store
 from viewsphere.store.index import Block, Index
+from viewsphere.store.places import local
 
 OWN = {"start_new_session": True, "stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE}
 
@@ -224,7 +225,7 @@ def test_a_run_that_is_told_to_end_leaves_nothing_unfinished(recipe_file, tmp_pa
 
 
 def test_who_hangs_where_all_take_turns_is_told_of_in_one_line(tmp_path, monkeypatch):
-    monkeypatch.setattr(folder, "LOCK_S", 0.1)
+    monkeypatch.setattr(local, "LOCK_S", 0.1)
     store = Store(tmp_path)
     store.make_ready()
     with FileLock(store.folder / "lock"), pytest.raises(StoreError, match=r"lock: expected other runs to be done .* end it"):
@@ -246,15 +247,15 @@ def test_where_a_file_system_has_no_locks_a_run_takes_no_turns(small_run, tmp_pa
 DYING = """
 import os, signal, sys
 from viewsphere.cli import main
-from viewsphere.store import folder
-become, lives = folder._become, int(sys.argv.pop(1))
-def put(made, target):
+from viewsphere.store.places.local import Local
+own, lives = Local.put, int(sys.argv.pop(1))
+def put(place, made, target):
     global lives
-    lives -= 1
+    lives -= made.is_dir()
     if lives < 0:
         os.kill(os.getpid(), signal.SIGKILL)
-    become(made, target)
-folder._become = put
+    own(place, made, target)
+Local.put = put
 main()
 """
 """The command line, killed when it is about to put in place what it makes after so many models and shots."""

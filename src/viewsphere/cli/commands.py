@@ -33,6 +33,7 @@ for command in (
     datasets.status,
     datasets.check,
     datasets.report,
+    datasets.view,
     doctor.doctor,
 ):
     app.command(cls=Command)(command)

@@ -11,7 +11,7 @@ from viewsphere.errors import StoreError, UserError, ViewsphereError
 from viewsphere.geometry.box import EDGES, FACES, VERTEX_SIGNS
 from viewsphere.labels import drawings
 from viewsphere.report.choice import chosen_frames
-from viewsphere.report.facts import facts
+from viewsphere.report.facts import facts, finished
 from viewsphere.report.frames import frame_data
 from viewsphere.report.meshes import mesh_data, read_small, spread
 from viewsphere.report.page import page, script_json
@@ -105,14 +105,21 @@ def report_data(
 ) -> dict[str, Any]:
     """All that the page shows except pictures, as plain data."""
     return {
-        "facts": without_folders(facts(dataset)),
+        "facts": without_folders(facts(dataset, finished(dataset))),
         "summary": summary(dataset, table),
         "shown": [{**frame_data(sample), "layers": {}} for sample in map(dataset.__getitem__, positions)],
         "sequences": [],
-        "keys": {drawing.name: drawing.key for drawing in drawings() if drawing.key},
         "models": _models(dataset, table, tell),
-        "box": {"faces": FACES, "edges": EDGES, "signs": VERTEX_SIGNS},
+        **conventions(),
         "proof": None if proof is None else without_folders(asdict(proof)),
+    }
+
+
+def conventions() -> dict[str, Any]:
+    """What the page knows of any data set, as plain data: the colours of layers, and vertices, edges and faces of boxes."""
+    return {
+        "keys": {drawing.name: drawing.key for drawing in drawings() if drawing.key},
+        "box": {"faces": FACES, "edges": EDGES, "signs": VERTEX_SIGNS},
     }
 
 
@@ -122,14 +129,19 @@ def _models(dataset: Dataset, table: FrameTable, tell: Listener) -> list[dict[st
     most = min(MOST_TRIANGLES, TRIANGLES // max(1, len(chosen)))
     found: list[dict[str, Any]] = []
     for done, info in enumerate(chosen, 1):
-        try:
-            with here(dataset.path(info.glb)) as file:
-                shape = {"mesh": mesh_data(read_small(file, most, info.node)), "problem": None}
-        except ViewsphereError as error:
-            shape = {"mesh": None, "problem": without_folders(str(error))}
-        found.append({"key": info.key, **shape, **_cameras(info, table)})
+        found.append(model_data(dataset, info, table, most))
         tell("models", done, len(chosen))
     return found
+
+
+def model_data(dataset: Dataset, info: ModelInfo, table: FrameTable, most: int = MOST_TRIANGLES) -> dict[str, Any]:
+    """A model's mesh of at most so many triangles, or why there is none, and the cameras that saw it, as plain data."""
+    try:
+        with here(dataset.path(info.glb)) as file:
+            shape = {"mesh": mesh_data(read_small(file, most, info.node)), "problem": None}
+    except ViewsphereError as error:
+        shape = {"mesh": None, "problem": without_folders(str(error))}
+    return {"key": info.key, **shape, **_cameras(info, table)}
 
 
 def _cameras(info: ModelInfo, table: FrameTable) -> dict[str, Any]:
@@ -149,4 +161,4 @@ def _unheard(phase: str, done: int, total: int) -> None:
     """The listener of callers who gave none."""
 
 
-__all__ = ["Proof", "report_data", "script_json", "write_report"]
+__all__ = ["Proof", "conventions", "model_data", "report_data", "script_json", "write_report"]

@@ -43,8 +43,11 @@ def sphere_cells(azimuth_deg: NDArray[np.floating], elevation_deg: NDArray[np.fl
     first_elevation, height = _edges(elevation, 0.0)
     columns = np.floor(np.round((azimuth - first_azimuth) % 360 / width, 6)).astype(int) % round(360 / width)
     rows = np.floor(np.round((elevation - first_elevation) / height, 6)).astype(int)
-    pairs, counts = np.unique(np.column_stack([columns, rows]), axis=0, return_counts=True)
-    occupied = tuple((int(c), int(r), int(n)) for (c, r), n in zip(pairs.tolist(), counts, strict=True))
+    lowest = rows.min(initial=0)
+    height_in_rows = rows.max(initial=0) - lowest + 1
+    cells, counts = np.unique(columns * height_in_rows + rows - lowest, return_counts=True)
+    found = zip(*np.divmod(cells, height_in_rows), counts, strict=True)
+    occupied = tuple((int(column), int(row + lowest), int(count)) for column, row, count in found)
     return Cells((first_azimuth, width), (first_elevation, height), occupied)
 
 

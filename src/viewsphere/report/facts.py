@@ -29,17 +29,22 @@ class Timing:
     runs: int
 
 
-def timing(dataset: Dataset) -> Timing | None:
-    """When the finished shots were written; None where no shot is finished."""
+def finished(dataset: Dataset) -> list[tuple[float, int]]:
+    """When each finished shot was written, in seconds since 1970, and its number of frames."""
     found: list[tuple[float, int]] = []
     for row in dataset.rows:
         try:
             found.append(((dataset.store.shot_folder(row.key) / "frames.json").stat().st_mtime, row.count))
         except OSError:
             continue
+    return found
+
+
+def timing(found: list[tuple[float, int]]) -> Timing | None:
+    """When shots were written, from what `finished` gives; None where no shot is finished."""
     if not found:
         return None
-    found.sort()
+    found = sorted(found)
     times, counts = np.array([t for t, _ in found]), np.array([n for _, n in found])
     gaps = np.diff(times)
     working = gaps < PAUSE
@@ -52,10 +57,10 @@ def timing(dataset: Dataset) -> Timing | None:
     )
 
 
-def facts(dataset: Dataset) -> dict[str, Any]:
-    """Recipe (YAML), plan, versions, timing and the folder's name, as plain data."""
+def facts(dataset: Dataset, times: list[tuple[float, int]]) -> dict[str, Any]:
+    """Recipe (YAML), plan, versions, timing (from what `finished` gives) and the folder's name, as plain data."""
     plan = dataset.plan
-    made = timing(dataset)
+    made = timing(times)
     return {
         "name": dataset.name,
         "folder": dataset.root.resolve().name,

@@ -6,6 +6,7 @@ import base64
 import html
 import json
 import re
+import secrets
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -15,15 +16,50 @@ VENDOR = WEB / "vendor" / "vendor.min.js"
 
 
 def page(title: str, data: Mapping[str, Any]) -> str:
-    """The whole HTML text."""
+    """The whole HTML text of a page that is a file."""
     parts = {
-        "title": html.escape(title),
+        "server": "'none'",
+        "pictures": "",
+        "scripts": "'unsafe-inline' data:",
+        "nonce": "",
         "style": (WEB / "style.css").read_text("utf-8"),
-        "modules": json.dumps({"imports": _modules()}),
+        "modules": json.dumps({"imports": _modules(WEB, "report")}),
+        "main": "report/main.js",
         "vendor": VENDOR.read_text("utf-8"),
-        "licenses": html.escape((WEB / "vendor" / "LICENSES.txt").read_text("utf-8")),
-        "data": script_json(data),
     }
+    return _filled(title, data, parts)
+
+
+def served_page(title: str, data: Mapping[str, Any], own: Path, vendor: str) -> str:
+    """The whole HTML text of a page that asks its server for more than the data.
+
+    `own` is a folder with a style and modules of that page: they are called `own/<file>`, and its `main.js` begins. The
+    libraries are the module `own/vendor.js`, which is asked for at the path `vendor` when it is needed. No script runs but
+    those of this text and what they import.
+    """
+    nonce = secrets.token_urlsafe(16)
+    modules = {**_modules(WEB, "report"), **_modules(own, "own"), "own/vendor.js": vendor}
+    parts = {
+        "server": "'self'",
+        "pictures": "'self'",
+        "scripts": f"'nonce-{nonce}'",
+        "nonce": f' nonce="{nonce}"',
+        "style": (WEB / "style.css").read_text("utf-8") + (own / "style.css").read_text("utf-8"),
+        "modules": json.dumps({"imports": modules}),
+        "main": "own/main.js",
+        "vendor": "",
+    }
+    return _filled(title, data, parts)
+
+
+def vendor_module() -> str:
+    """The libraries as a module's text."""
+    return f"{VENDOR.read_text('utf-8')}\nglobalThis.viewsphereVendor = viewsphereVendor;"
+
+
+def _filled(title: str, data: Mapping[str, Any], parts: Mapping[str, str]) -> str:
+    licenses = (WEB / "vendor" / "LICENSES.txt").read_text("utf-8")
+    parts = {**parts, "title": html.escape(title), "licenses": html.escape(licenses), "data": script_json(data)}
     return re.sub(r"\{\{(\w+)\}\}", lambda match: parts[match[1]], (WEB / "page.html").read_text("utf-8"))
 
 
@@ -32,10 +68,10 @@ def script_json(value: object) -> str:
     return json.dumps(value, ensure_ascii=False, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
 
 
-def _modules() -> dict[str, str]:
-    """The page's own modules as data URLs, by the names under which they import one another."""
-    scripts = sorted(WEB.glob("*.js"))
-    return {
-        f"report/{file.name}": "data:text/javascript;base64," + base64.b64encode(file.read_bytes()).decode("ascii")
-        for file in scripts
-    }
+def _modules(folder: Path, name: str) -> dict[str, str]:
+    """A folder's modules as data URLs, by the names under which they import one another."""
+    return {f"{name}/{file.name}": _data_url(file.read_bytes()) for file in sorted(folder.glob("*.js"))}
+
+
+def _data_url(script: bytes) -> str:
+    return "data:text/javascript;base64," + base64.b64encode(script).decode("ascii")

@@ -59,7 +59,8 @@ def _categories(dataset: Dataset, table: FrameTable) -> list[dict[str, Any]]:
     objects = table.objects
     placed = Counter(objects["category"].tolist())
     seen = Counter(objects["category"][objects["seen"]].tolist())
-    in_frames = Counter(np.unique(objects[["frame", "category"]])["category"].tolist())
+    pairs = objects["frame"].astype(np.int64) << 32 | objects["category"]  # one number sorts far faster than a record of two
+    in_frames = Counter((np.unique(pairs) & 0xFFFFFFFF).tolist())
     colors = hues([(c.id, placed[c.id]) for c in dataset.categories])
     return [
         {

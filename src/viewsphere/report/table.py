@@ -73,16 +73,71 @@ class FrameTable:
 
 
 @dataclass(frozen=True)
-class _Names:
+class Names:
     """Names in order of appearance, and the number of each."""
 
     codes: dict[str, int] = field(default_factory=dict[str, int])
 
+    @property
+    def known(self) -> tuple[str, ...]:
+        """All names, in the order of their numbers."""
+        return tuple(self.codes)
+
     def code(self, name: str) -> int:
+        """The number of a name, a new one for a name that was not met before."""
         return self.codes.setdefault(name, len(self.codes))
 
     def translation(self, names: Iterable[str]) -> NDArray[np.int32]:
+        """The numbers of names."""
         return np.array([self.code(name) for name in names], np.int32)
+
+
+class Rows:
+    """Rows of one kind that only become more; the array of those that are there does not change when others come."""
+
+    def __init__(self, kind: np.dtype[Any]) -> None:
+        self._held = np.zeros(1024, kind)
+        self._count = 0
+
+    @property
+    def array(self) -> NDArray[Any]:
+        """All rows so far."""
+        return self._held[: self._count]
+
+    def extend(self, rows: NDArray[Any]) -> None:
+        """Put rows behind the others; the room for them doubles when it is used up."""
+        count = self._count + len(rows)
+        if count > len(self._held):
+            held = np.zeros(max(count, 2 * len(self._held)), self._held.dtype)
+            held[: self._count] = self.array
+            self._held = held
+        self._held[self._count : count] = rows
+        self._count = count
+
+
+class Columns:
+    """A table that becomes longer: tables one behind the other, with one numbering of names."""
+
+    def __init__(self) -> None:
+        self._frames, self._objects = Rows(FRAME), Rows(OBJECT)
+        self._splits, self._subjects, self._models, self._poses = Names(), Names(), Names(), Names()
+
+    @property
+    def table(self) -> FrameTable:
+        """All rows so far."""
+        names = (self._splits.known, self._subjects.known, self._models.known, self._poses.known)
+        return FrameTable(self._frames.array, self._objects.array, *names)
+
+    def extend(self, table: FrameTable) -> None:
+        """Put the rows of a table behind the others."""
+        frames, objects = table.frames.copy(), table.objects.copy()
+        for column, names, own in (("split", self._splits, table.splits), ("subject", self._subjects, table.subjects)):
+            frames[column] = names.translation(own)[frames[column]] if len(frames) else 0
+        for column, names, own in (("model", self._models, table.models), ("pose", self._poses, table.poses)):
+            objects[column] = names.translation(own)[objects[column]] if len(objects) else 0
+        objects["frame"] += len(self._frames.array)
+        self._objects.extend(objects)
+        self._frames.extend(frames)
 
 
 def read_table(dataset: Dataset, *, workers: int = 0, listener: Listener | None = None) -> FrameTable:
@@ -91,12 +146,12 @@ def read_table(dataset: Dataset, *, workers: int = 0, listener: Listener | None 
     Memory is bounded by the columns and one chunk of records a process. Raises StoreError for records that cannot be read.
     """
     chunks = [(at, min(at + CHUNK, len(dataset))) for at in range(0, len(dataset), CHUNK)]
-    read: list[FrameTable] = []
-    for table in _tables(dataset, chunks, workers):
-        read.append(table)
+    columns = Columns()
+    for (_, stop), table in zip(chunks, _tables(dataset, chunks, workers), strict=True):
+        columns.extend(table)
         if listener is not None:
-            listener(chunks[len(read) - 1][1], len(dataset))
-    return _joined(read)
+            listener(stop, len(dataset))
+    return columns.table
 
 
 def _tables(dataset: Dataset, chunks: list[tuple[int, int]], workers: int) -> Iterator[FrameTable]:
@@ -109,20 +164,20 @@ def _tables(dataset: Dataset, chunks: list[tuple[int, int]], workers: int) -> It
 
 def _table(dataset: Dataset, chunk: tuple[int, int]) -> FrameTable:
     """The columns of frames [start, stop)."""
-    splits, subjects, models, poses = _Names(), _Names(), _Names(), _Names()
+    return table_of(dataset[i] for i in range(*chunk))
+
+
+def table_of(samples: Iterable[Sample]) -> FrameTable:
+    """The columns of some samples."""
+    splits, subjects, models, poses = Names(), Names(), Names(), Names()
     frames: list[tuple[float, ...]] = []
     objects: list[tuple[float, ...]] = []
-    for row, sample in enumerate(dataset[i] for i in range(*chunk)):
+    for row, sample in enumerate(samples):
         seen = sum(o.area > 0 for o in sample.objects)
         frames.append((splits.code(sample.split), subjects.code(_subject(sample)), *_camera_columns(sample, seen)))
         objects += [(row, models.code(o.key), o.category_id, poses.code(o.pose_category), *_columns(o)) for o in sample.objects]
     return FrameTable(
-        np.array(frames, FRAME),
-        np.array(objects, OBJECT),
-        tuple(splits.codes),
-        tuple(subjects.codes),
-        tuple(models.codes),
-        tuple(poses.codes),
+        np.array(frames, FRAME), np.array(objects, OBJECT), splits.known, subjects.known, models.known, poses.known
     )
 
 
@@ -149,26 +204,4 @@ def _columns(o: ObjectAnnotation) -> tuple[float, ...]:
         view.azimuth_deg % 360,
         view.elevation_deg,
         view.distance,
-    )
-
-
-def _joined(tables: list[FrameTable]) -> FrameTable:
-    """Tables one behind the other, with one numbering of names."""
-    splits, subjects, models, poses = _Names(), _Names(), _Names(), _Names()
-    start = 0
-    for table in tables:
-        for column, names, own in (("split", splits, table.splits), ("subject", subjects, table.subjects)):
-            table.frames[column] = names.translation(own)[table.frames[column]]
-        if len(table.objects):
-            for column, names, own in (("model", models, table.models), ("pose", poses, table.poses)):
-                table.objects[column] = names.translation(own)[table.objects[column]]
-        table.objects["frame"] += start
-        start += len(table.frames)
-    return FrameTable(
-        np.concatenate([t.frames for t in tables]) if tables else np.zeros(0, FRAME),
-        np.concatenate([t.objects for t in tables]) if tables else np.zeros(0, OBJECT),
-        tuple(splits.codes),
-        tuple(subjects.codes),
-        tuple(models.codes),
-        tuple(poses.codes),
     )

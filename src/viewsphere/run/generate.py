@@ -272,6 +272,7 @@ def _render_part(work: Missing, crew: Crew, keep_going: bool, tell: Listener, pu
         if portion.number:
             store.drop_unnamed_models()
         raise
+    _note_skipped(portion, store, work.skipped)  # for those who watch the run
     rendered = _render_shots(work, crew, keep_going, tell, pulse)
     _note_skipped(portion, store, work.skipped)
     return rendered, work.skipped
@@ -352,6 +353,8 @@ def _render_shots(work: Missing, crew: Crew, keep_going: bool, tell: Listener, p
             lost.append(outcome.error)  # the others are made nevertheless
         else:
             _accept(outcome, keep_going, skipped)
+            if outcome.error is not None and len(skipped).bit_count() == 1:  # the list is not written for each of thousands
+                _note_skipped(portion, store, skipped)
         rendered += outcome.frames
         report()
     if lost:

@@ -22,6 +22,7 @@ from viewsphere.store.folder import Store, new_folder
 from viewsphere.store.index import Block, Row
 from viewsphere.store.places import located
 from viewsphere.store.records import Category, ModelInfo, Part, PlanRecord
+from viewsphere.store.watching import Finished, Watch
 
 __all__ = [
     "Block",
@@ -29,11 +30,13 @@ __all__ = [
     "Choice",
     "Dataset",
     "Exported",
+    "Finished",
     "ModelInfo",
     "Part",
     "PlanRecord",
     "Row",
     "Store",
+    "Watch",
     "check_codecs",
     "decode",
     "depth_step",

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache, partial
 from pathlib import Path, PurePosixPath
-from typing import Any, overload
+from typing import Any, Self, overload
 
 from numpy.typing import NDArray
 
@@ -132,7 +132,7 @@ class Dataset(Shown, Sequence[Sample]):
         shots, starts = self._shots
         number = bisect_right(starts, i) - 1
         key, places = shots[number]
-        return self.shown(self._sample(self._records(key), places[i - starts[number]]))
+        return self.sample_at(key, places[i - starts[number]])
 
     def __iter__(self) -> Iterator[Sample]:
         for key, places in self._shots[0]:
@@ -164,6 +164,10 @@ class Dataset(Shown, Sequence[Sample]):
         records = self._read_records(key)
         for place in places:
             yield self.shown(self._sample(records, place))
+
+    def sample_at(self, key: str, place: int) -> Sample:
+        """One of a finished shot's samples, counted from 0; the records of a few shots are kept for those who ask again."""
+        return self.shown(self._sample(self._records(key), place))
 
     def shown(self, sample: Sample) -> Sample:
         """A sample as it is given out: as it is kept."""
@@ -242,6 +246,8 @@ class Dataset(Shown, Sequence[Sample]):
 
     def _read_records(self, key: str) -> _Records:
         file = self.store.shot_folder(key) / "frames.json"
+        for name in ("frames.json", "shot.json"):
+            file_inside(self.root, file.with_name(name).relative_to(self.root).as_posix())
         try:
             records: list[dict[str, Any]] = parsed(file.read_bytes())
             row = self.plan.find(key)
@@ -376,6 +382,10 @@ class _ChannelFiles(Mapping[str, NDArray[Any]]):
         self._root, self._files, self._manifest_of = root, files, manifest_of
         self._arrays: dict[str, NDArray[Any]] = {}
 
+    def __copy__(self) -> Self:
+        """The same files; none of them is read so far."""
+        return type(self)(self._root, self._files, self._manifest_of)
+
     def __getstate__(self) -> dict[str, Any]:
         """What other processes are sent: they read manifests anew."""
         return {**self.__dict__, "_manifest_of": partial(_manifest_of, self._root)}
@@ -402,7 +412,7 @@ ManifestOf = Callable[[str], Manifest]
 
 
 def _manifest_of(root: Path, folder: str) -> Manifest:
-    return Manifest.read(root / folder)
+    return Manifest.read(file_inside(root, f"{folder}/{MANIFEST}").parent)
 
 
 def _parted(file: str) -> tuple[str, str]:

@@ -322,7 +322,7 @@ class Store:
 
     def skipped(self) -> dict[str, str]:
         """Models and shots that were left out at the user's wish, and why; raises StoreError if that cannot be read."""
-        file = self.folder / "skipped.json"
+        file = file_inside(self.root, "store/skipped.json")
         try:
             found: dict[Any, Any] = parsed(file.read_bytes())
             if not isinstance(found, dict) or not all(isinstance(text, str) for text in found.values()):
@@ -426,7 +426,7 @@ class Store:
 
     def model_info(self, key: str) -> ModelInfo | None:
         """What is known of a finished model; None if it is not there, StoreError if it cannot be read."""
-        file = self.model_folder(key) / "model.json"
+        file = file_inside(self.root, (self.model_folder(key) / "model.json").relative_to(self.root).as_posix())
         try:
             info = ModelInfo.from_plain(parsed(file.read_bytes()))
             if info.key != key:

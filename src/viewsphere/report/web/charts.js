@@ -87,7 +87,7 @@ function shareLists() {
   const splits = summary.splits.map((s) => ({
     name: s.name, count: s.frames, label: `${count(s.frames)} (${percent(s.frames / total)})`, choose: jump({ split: s.name }),
   }));
-  byId("shares").append(
+  byId("shares").replaceChildren(
     el("figure", {}, el("h3", {}, "Categories, objects"), bars(categories, "object")),
     el("figure", {}, el("h3", {}, "Splits, frames"), bars(splits, "frame")));
 }
@@ -96,5 +96,5 @@ export function showDistributions() {
   byId("distributions-lead").textContent = `Counted over all ${plural(summary.frames, "frame")} and ${plural(summary.objects, "object")}, not only those shown above.`;
   shareLists();
   const known = summary.distributions.filter((d) => d.known);
-  byId("histograms").append(...[legend(), ...known.map(distributionFigure)].filter(Boolean));
+  byId("histograms").replaceChildren(...[legend(), ...known.map(distributionFigure)].filter(Boolean));
 }

@@ -5,7 +5,15 @@ import { byId } from "report/dom.js";
 export const data = JSON.parse(byId("data").textContent);
 export const { facts, summary, shown, models, proof, box, sequences, keys } = data;
 
-const categories = new Map(summary.categories.map((category) => [category.id, category]));
+let categories = null;
+
+/** Put newer counts in the place of the old ones; those who show them are told by the caller. */
+export function renew(counts) {
+  Object.assign(summary, counts);
+  categories = new Map(summary.categories.map((category) => [category.id, category]));
+}
+
+renew({});
 
 export const categoryName = (id) => categories.get(id)?.name ?? `category ${id}`;
 

@@ -61,8 +61,14 @@ export function bars(rows, unit) {
   }));
 }
 
-/** The value of a style property of the page, such as --ink. */
-export const token = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+const tokens = new Map();
+document.addEventListener("themechange", () => tokens.clear());
+
+/** The value of a style property of the page, such as --ink; to ask the browser for it costs a layout of what is new on the page. */
+export function token(name) {
+  if (!tokens.has(name)) tokens.set(name, getComputedStyle(document.documentElement).getPropertyValue(name).trim());
+  return tokens.get(name);
+}
 
 const channels = (name) => {
   const value = parseInt(token(name).slice(1), 16);
@@ -88,5 +94,8 @@ export function onLayout(element, draw) {
     width = element.clientWidth;
     soon();
   }).observe(element);
-  document.addEventListener("themechange", soon);
+  document.addEventListener("themechange", function changed() {
+    if (element.isConnected) soon();
+    else document.removeEventListener("themechange", changed);
+  });
 }

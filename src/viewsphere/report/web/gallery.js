@@ -1,6 +1,6 @@
 // The pictures: what is drawn over them, filters, pages, cards.
 
-import { categoryName, frameSize, poseName, shown, subject, summary } from "report/data.js";
+import { categoryName, data, frameSize, poseName, shown, subject, summary } from "report/data.js";
 import { byId, count, decimal, degrees, el, onLayout, percent, plural } from "report/dom.js";
 import { openLightbox } from "report/lightbox.js";
 import { draw } from "report/overlay.js";
@@ -12,6 +12,7 @@ let cards = [];
 
 const hasObjects = shown.some((frame) => frame.objects.length);
 const present = (layer) => {
+  if (data.live) return layer.surface || layer.name === "tracks" ? data.live.layers.includes(layer.name) : true;
   if (layer.surface) return shown.some((frame) => frame.layers[layer.name]);
   if (layer.name === "tracks") return shown.some((frame) => frame.points?.length);
   if (layer.name === "boxes3d") return shown.some((frame) => frame.objects.some((o) => o.corners));
@@ -30,24 +31,29 @@ export function layerButtons() {
   return buttons;
 }
 
-/** A frame's picture with a canvas over it; `large` for the enlarged view. */
-export function picture(frame, large) {
+/** A frame's picture with a canvas over it; `large` for the enlarged view; `room(frame)` gives its width and height on the page
+ *  where somebody knows them. */
+export function picture(frame, large, room = null) {
   const { width, height } = frameSize(frame);
   const canvas = el("canvas", { "aria-hidden": "true" });
+  if (room) canvas.room = () => room(frame);
   const base = frame.layers.rgb
-    ? el("img", { src: frame.layers.rgb, alt: describe(frame), decoding: "async" })
+    ? el("img", { src: (large && frame.layers.rgbLarge) || frame.layers.rgb, alt: describe(frame), decoding: "async", onerror: unreadable })
     : el("span", { class: "missing" }, "no colour picture");
   const holder = el("span", { class: "picture", style: `aspect-ratio:${width}/${height};--ratio:${width / height}` }, base, canvas);
   return { holder, redraw: () => draw(canvas, frame, large) };
 }
+
+const unreadable = ({ target }) => target.replaceWith(el("span", { class: "missing" }, "the picture cannot be read"));
 
 function describe(frame) {
   const pose = frame.pose ? `, azimuth ${degrees(frame.pose.azimuth)}, elevation ${degrees(frame.pose.elevation)}` : "";
   return `Frame ${frame.index}: ${subject(frame)}${pose}`;
 }
 
-function card(frame) {
-  const { holder, redraw } = picture(frame, false);
+/** A frame's card; a click enlarges it among those that `among()` gives; `room` as for `picture`. */
+export function card(frame, among, room = null) {
+  const { holder, redraw } = picture(frame, false, room);
   const first = frame.objects[0];
   const about = [
     frame.pose ? `${poseName(first?.pose || frame.pose.name)}` : first ? categoryName(first.category) : "",
@@ -55,7 +61,7 @@ function card(frame) {
     first && first.visibility !== null && first.visibility < 0.9995 ? `${percent(first.visibility)} visible` : "",
     frame.split,
   ].filter(Boolean).join(" · ");
-  const node = el("button", { type: "button", class: "card", "data-frame": frame.index, onclick: () => openLightbox(frame, found()) },
+  const node = el("button", { type: "button", class: "card", "data-frame": frame.index, onclick: () => openLightbox(frame, among()) },
     holder, el("span", { class: "title" }, subject(frame)), el("span", { class: "about" }, about));
   return { node, redraw };
 }
@@ -81,7 +87,7 @@ function showPage() {
   const frames = found();
   const pages = Math.max(1, Math.ceil(frames.length / PAGE));
   page = Math.min(page, pages - 1);
-  cards = frames.slice(page * PAGE, (page + 1) * PAGE).map(card);
+  cards = frames.slice(page * PAGE, (page + 1) * PAGE).map((frame) => card(frame, found));
   const nothing = el("p", { class: "empty" }, "No picture on this page meets these filters. ",
     el("button", { type: "button", onclick: () => setFilter({ ...EVERYTHING }) }, "Show all"));
   byId("grid").replaceChildren(...(cards.length ? cards.map((c) => c.node) : [nothing]));
@@ -103,7 +109,8 @@ function turnTo(wanted) {
   if (!button.disabled) button.focus({ preventScroll: true });
 }
 
-function choice(label, name, options) {
+/** A list of what one may be asked for, none where there is no choice. */
+export function choice(label, name, options) {
   const select = el("select", { name, onchange: (event) => setFilter({ [name]: event.target.value }) },
     el("option", { value: "" }, "all"), ...options.map(([value, text]) => el("option", { value }, text)));
   subscribe("filter", () => (select.value = filter[name]));
@@ -139,7 +146,7 @@ function visibilityRange() {
   return el("fieldset", {}, el("legend", {}, "Visible share"), el("div", {}, low, high, output));
 }
 
-function cellChip() {
+export function cellChip() {
   const chip = el("button", { type: "button", class: "chip", onclick: () => setFilter({ cell: null }) });
   const show = () => {
     chip.hidden = !filter.cell;
@@ -150,16 +157,20 @@ function cellChip() {
   return chip;
 }
 
+export function reset() {
+  const button = el("button", { type: "button", class: "quiet", onclick: () => setFilter({ ...EVERYTHING }) }, "Reset");
+  const untouched = () => (button.hidden = Object.entries(EVERYTHING).every(([name, value]) => filter[name] === value));
+  subscribe("filter", untouched);
+  untouched();
+  return button;
+}
+
 function filterRow() {
   const distinct = (values) => [...new Set(values)].sort((a, b) => a.localeCompare(b, "en", { numeric: true }));
   const objects = shown.flatMap((frame) => frame.objects);
   const models = distinct(objects.map((o) => o.model).filter(Boolean));
   const poses = distinct(objects.map((o) => poseName(o.pose)));
   const categories = summary.categories.filter((c) => objects.some((o) => o.category === c.id));
-  const reset = el("button", { type: "button", class: "quiet", onclick: () => setFilter({ ...EVERYTHING }) }, "Reset");
-  const untouched = () => (reset.hidden = Object.entries(EVERYTHING).every(([name, value]) => filter[name] === value));
-  subscribe("filter", untouched);
-  untouched();
   return [
     choice("Category", "category", categories.map((c) => [String(c.id), c.name])),
     choice("Model", "model", models.map((key) => [key, key])),
@@ -168,7 +179,7 @@ function filterRow() {
     hasObjects ? visibilityRange() : null,
     orderChoice(),
     cellChip(),
-    reset,
+    reset(),
   ].filter(Boolean);
 }
 
@@ -180,7 +191,8 @@ function arrows(event) {
   event.preventDefault();
 }
 
-function keys(event) {
+/** The letters of the layers' buttons. */
+export function layerKeys(event) {
   if (event.ctrlKey || event.metaKey || event.altKey || /^(INPUT|SELECT|TEXTAREA)$/.test(event.target.tagName)) return;
   const layer = offered.find((l) => l.key === event.key.toLowerCase());
   if (layer) toggleLayer(layer.name);
@@ -195,7 +207,7 @@ export function showGallery() {
   byId("layers").append(...layerButtons());
   byId("filters").append(...filterRow());
   byId("grid").addEventListener("keydown", arrows);
-  document.addEventListener("keydown", keys);
+  document.addEventListener("keydown", layerKeys);
   subscribe("filter", () => {
     page = 0;
     showPage();

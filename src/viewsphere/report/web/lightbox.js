@@ -1,6 +1,6 @@
 // One picture enlarged, with its numbers; arrow keys turn to its neighbours.
 
-import { categoryName, categoryToken, keys, poseName, subject } from "report/data.js";
+import { categoryName, categoryToken, data, keys, poseName, subject } from "report/data.js";
 import { byId, count, decimal, degrees, el, percent, table } from "report/dom.js";
 import { layerButtons, picture } from "report/gallery.js";
 import { subscribe } from "report/state.js";
@@ -29,8 +29,8 @@ function prepare() {
     else if (event.key === "ArrowRight") turn(1);
   });
   dialog.addEventListener("close", () => {
-    const frame = frames[at];
-    document.querySelector(`.card[data-frame="${frame.index}"]`)?.focus();
+    frames.show?.(at);
+    document.querySelector(`.card[data-frame="${current.frame.index}"]`)?.focus();
   });
   subscribe("layers", refresh);
   new ResizeObserver(refresh).observe(holder);
@@ -38,8 +38,11 @@ function prepare() {
   return (parts = { dialog, title, holder, aside });
 }
 
+/** Enlarge a frame. `among` are the frames that the arrows turn to: a list, or what has `length`, `indexOf` and `at`, which may
+ *  give a promise of a frame, and perhaps `show`, which brings one into sight among its neighbours.
+ */
 export function openLightbox(frame, among) {
-  frames = among.includes(frame) ? among : [frame];
+  frames = among.indexOf(frame) >= 0 ? among : [frame];
   at = frames.indexOf(frame);
   const { dialog } = prepare();
   dialog.showModal();
@@ -51,8 +54,11 @@ function turn(change) {
   show();
 }
 
-function show() {
-  const frame = frames[at];
+async function show() {
+  const asked = frames.at(at);
+  const turned = at;
+  const frame = asked instanceof Promise ? await asked : asked;
+  if (turned !== at || !frame) return; // turned on meanwhile, or not to be had
   const { title, holder, aside } = parts;
   title.textContent = `Frame ${count(frame.index)}: ${subject(frame)}`;
   current = { frame, ...picture(frame, true), legend: el("div", { class: "ramp" }) };
@@ -62,10 +68,13 @@ function show() {
   refresh();
 }
 
-function refresh() {
+async function refresh() {
   if (!current || !parts.dialog.open) return;
+  const { frame, legend: place } = current;
   current.redraw();
-  current.legend.replaceChildren(...legend(current.frame));
+  const layer = surfaceLayer(frame)?.name;
+  if (data.live && layer) frame.layers[`${layer}Range`] ??= await data.live.range(frame, layer);
+  place.replaceChildren(...legend(frame));
 }
 
 /** What the colours of a layer mean, as swatches. */
@@ -74,16 +83,16 @@ const key = (layer) => keys[layer].map(([words, color]) =>
 
 export function legend(frame) {
   const layer = surfaceLayer(frame)?.name;
-  if (layer === "depth") {
+  if (layer === "depth" && frame.layers.depthRange) {
     const [near, far] = frame.layers.depthRange;
     const middle = Math.sqrt(Math.max(near, 0.01) * far);  // equal factors of distance are equal steps of colour
     return [`${decimal(near)} m`, el("i", { class: "viridis" }), `${decimal(far)} m and farther, the middle is ${decimal(middle)} m`];
   }
-  if (layer === "disparity") {
+  if (layer === "disparity" && frame.layers.disparityRange) {
     const [near, far] = frame.layers.disparityRange;
     return [`${decimal(near)} px`, el("i", { class: "viridis" }), `${decimal(far)} px and less`];
   }
-  if (layer === "flow") return [...key("flow"), `full colour: ${decimal(frame.layers.flowRange[1])} px to the next instant`];
+  if (layer === "flow" && frame.layers.flowRange) return [...key("flow"), `full colour: ${decimal(frame.layers.flowRange[1])} px to the next instant`];
   if (keys[layer]) return key(layer);
   return {
     normals: ["red: right, green: up, blue: towards the camera"],

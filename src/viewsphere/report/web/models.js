@@ -1,6 +1,6 @@
 // A model near by, and the same model among its cameras.
 
-import { box, frameSize, models, shown, summary, categoryName } from "report/data.js";
+import { box, data, frameSize, models, shown, summary, categoryName } from "report/data.js";
 import { byId, count, decimal, el, plural } from "report/dom.js";
 import { openLightbox } from "report/lightbox.js";
 import { makeStage, onSphere, themeColor } from "report/stage3d.js";
@@ -204,7 +204,7 @@ function facts(model) {
 }
 
 export function showModels() {
-  const usable = models.filter((model) => model.mesh);
+  const usable = data.live ? summary.models : models.filter((model) => model.mesh);
   if (!usable.length) {
     byId("model-pair").append(el("p", { class: "lead" }, models[0]?.problem ?? "This data set brings no models."));
     return;
@@ -214,16 +214,19 @@ export function showModels() {
   const hint = el("div", { class: "hint", "aria-hidden": "true" });
   byId("model-pair").append(
     el("figure", {}, near, el("figcaption", {}, "The model in its box. Drag to turn.")),
-    el("figure", {}, wide, el("figcaption", {}, "Its cameras: dots are viewpoints, pyramids the pictures shown above; select one to enlarge it.")));
+    el("figure", {}, wide, el("figcaption", {}, `Its cameras: dots are viewpoints, pyramids ${data.live ? "some pictures" : "the pictures shown above"}; select one to enlarge it.`)));
   const stages = [makeStage(near, "The model in 3D"), makeStage(wide, "The model among its cameras, in 3D")];
   if (!stages[0] || !stages[1]) return;
   wide.append(hint);
   pickFrames(stages[1], hint);
-  const show = () => {
-    const model = usable.find((m) => m.key === select.value);
+  const show = async () => {
+    const chosen = usable.find((m) => m.key === select.value);
+    const model = data.live ? await data.live.model(chosen.key) : chosen;
+    if (chosen.key !== select.value) return; // another was chosen meanwhile
+    byId("model-facts").textContent = model ? facts(model) : "This model cannot be read now.";
+    if (!model?.mesh) return;
     showNear(stages[0], model);
     showAround(stages[1], model);
-    byId("model-facts").textContent = facts(model);
   };
   const select = el("select", { name: "shown-model", onchange: show }, ...usable.map((m) => el("option", { value: m.key }, m.key)));
   const step = (change) => () => {

@@ -15,7 +15,7 @@ function bitmap(url) {
     const image = new Image();
     image.src = url;
     if (bitmaps.size > 400) bitmaps.delete(bitmaps.keys().next().value);
-    bitmaps.set(url, image.decode().then(() => image));
+    bitmaps.set(url, image.decode().then(() => image, () => null)); // a server may have none: then nothing is drawn
   }
   return bitmaps.get(url);
 }
@@ -23,18 +23,19 @@ function bitmap(url) {
 export const surfaceLayer = (frame) => LAYERS.find((layer) => layer.surface && layers.has(layer.name) && frame.layers[layer.name]);
 
 /** Draw everything that is switched on; `large` adds words, `base` the picture itself. The canvas takes the size it has on the
- *  page; `trail`: the sensor's frames before, in order. */
+ *  page, or that `canvas.room()` says, which costs no layout; `trail`: the sensor's frames before, in order. */
 export async function draw(canvas, frame, large, base = false, trail = []) {
   const turn = (canvas.drawing = (canvas.drawing ?? 0) + 1);
   const surface = surfaceLayer(frame);
   canvas.parentElement.classList.toggle("dimmed", Boolean(surface));
-  const image = surface ? await bitmap(frame.layers[surface.name]) : null;
+  const image = surface ? await bitmap((large && frame.layers[`${surface.name}Large`]) || frame.layers[surface.name]) : null;
   const picture = base && frame.layers.rgb ? await bitmap(frame.layers.rgb) : null;
   if (canvas.drawing !== turn) return; // something newer is being drawn
   const ratio = Math.min(window.devicePixelRatio || 1, 3);
   const size = frameSize(frame);
-  canvas.width = Math.max(1, Math.round(canvas.clientWidth * ratio));
-  canvas.height = Math.max(1, Math.round(canvas.clientHeight * ratio));
+  const [width, height] = canvas.room?.() ?? [canvas.clientWidth, canvas.clientHeight];
+  canvas.width = Math.max(1, Math.round(width * ratio));
+  canvas.height = Math.max(1, Math.round(height * ratio));
   const pen = canvas.getContext("2d");
   if (picture) drawPicture(pen, picture, surface);
   if (image) pen.drawImage(image, 0, 0, canvas.width, canvas.height);

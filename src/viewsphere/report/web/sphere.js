@@ -1,10 +1,10 @@
 // The sphere of viewpoints: a globe to turn and the same cells as a map; a cell shows its pictures.
 
-import { poseName, shown, summary } from "report/data.js";
+import { data, poseName, shown, summary } from "report/data.js";
 import { bars, byId, count, decimal, degrees, el, onLayout, plural, ramp, svg } from "report/dom.js";
 import { histogram } from "report/charts.js";
 import { makeStage, onSphere, themeColor } from "report/stage3d.js";
-import { setFilter } from "report/state.js";
+import { setFilter, subscribe } from "report/state.js";
 
 const { BufferAttribute, BufferGeometry, Color, DoubleSide, LineBasicMaterial, LineSegments, Mesh, MeshBasicMaterial, Raycaster, SphereGeometry, Vector2 } = globalThis.viewsphereVendor;
 
@@ -198,12 +198,13 @@ function poseLists(beside) {
   const rows = summary.poses.map((row) => ({
     name: poseName(row.name),
     count: row.objects,
-    choose: shown.some((frame) => frame.objects.some((o) => poseName(o.pose) === row.name))
+    choose: data.live || shown.some((frame) => frame.objects.some((o) => poseName(o.pose) === row.name))
       ? () => { setFilter({ pose: row.name }); byId("pictures").scrollIntoView(); }
       : null,
   }));
   const distance = el("figure", { class: "charts" }, el("h3", {}, "Distance of the camera from its target"));
-  byId("sides").append(el("h3", {}, "Sides seen"), bars(rows, "object"));
+  byId("sides").replaceChildren(el("h3", {}, "Sides seen"), bars(rows, "object"));
+  beside.querySelector(".charts")?.remove();
   if (summary.distances.counts.length) {
     beside.append(distance);
     histogram(distance, { edges: summary.distances.edges, series: [summary.distances.counts], tokens: ["--plain"], names: ["frames"], unit: "m", what: "frame" });
@@ -232,4 +233,8 @@ export function showSphere() {
   ofChoice(rebuild);
   onLayout(flat, rebuild);
   poseLists(beside);
+  subscribe("summary", () => {
+    rebuild();
+    poseLists(beside);
+  });
 }

@@ -21,11 +21,11 @@ export const EVERYTHING = { category: "", model: "", split: "", pose: "", low: 0
 
 export const filter = { ...EVERYTHING };
 
-const listeners = { layers: [], filter: [] };
+const listeners = { layers: [], filter: [], summary: [] };
 
 export const subscribe = (kind, listener) => listeners[kind].push(listener);
 
-const tell = (kind) => listeners[kind].forEach((listener) => listener());
+export const tell = (kind) => listeners[kind].forEach((listener) => listener());
 
 /** Layers that cover the surface exclude one another; drawings go over any of them. */
 export function toggleLayer(name) {

@@ -129,8 +129,8 @@ class Queue:
         self._deaths = 0
 
     def again(self, job: Job, how: str, alone: bool = True) -> Outcome | None:
-        """Put back a job whose worker died, for the next one or, if it may be to blame, for when it is `alone`; gives what there
-        is to say of it if it was tried often enough. Raises WorkerDied where nobody lives long enough to end a job.
+        """Put back a job whose worker died, for the next one or, if it may be to blame, for when it is `alone`; gives what
+        there is to say of it if it was tried often enough. Raises WorkerDied where nobody lives long enough to end a job.
         """
         self._deaths += 1
         if self._deaths == MOST_DEATHS:

@@ -1,0 +1,182 @@
+"""Which frames a page asks for, and in which order: filters and sorting over columns, without reading a record."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.errors import UserError
+from viewsphere.report.table import FrameTable
+from viewsphere.view.live import Known
+
+
+@dataclass(frozen=True)
+class Measure:
+    """A number to filter and sort by: its name, its unit, and the column of objects, or else of frames, that holds it."""
+
+    words: str
+    unit: str
+    column: str
+    is_of_object: bool
+
+
+MEASURES = {
+    "visibility": Measure("Visible share", "%", "visibility", True),
+    "truncation": Measure("Truncated share", "%", "truncation", True),
+    "side": Measure("Size of the 2D box", "px", "side", True),
+    "distance": Measure("Distance", "m", "distance", True),
+    "azimuth": Measure("Azimuth it is seen from", "°", "azimuth", True),
+    "elevation": Measure("Elevation it is seen from", "°", "elevation", True),
+    "camera_azimuth": Measure("Camera's azimuth", "°", "azimuth", False),
+    "camera_elevation": Measure("Camera's elevation", "°", "elevation", False),
+    "camera_distance": Measure("Camera's distance", "m", "distance", False),
+    "objects": Measure("Objects", "", "objects", False),
+    "seen": Measure("Objects seen", "", "seen", False),
+}
+"""By the names that a page says."""
+
+ORDERS = ("newest", "frame", "mixed")
+"""Orders besides those by a measure."""
+
+KNUTH = 2654435761
+"""The golden ratio as a share of 2**32: multiples of it jump about evenly."""
+
+
+@dataclass(frozen=True)
+class Within:
+    """A measure between two numbers, both inclusive, but for azimuths, which come round: from the first up to the second."""
+
+    measure: str
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Query:
+    """What frames have to meet: the split and camera themselves, all else one of their objects. An order is one of `ORDERS`, or
+    a measure, descending behind a minus.
+    """
+
+    category: int | None = None
+    model: str = ""
+    split: str = ""
+    pose: str = ""
+    within: tuple[Within, ...] = ()
+    order: str = "frame"
+
+    @property
+    def needs_labels(self) -> bool:
+        """Whether it cannot be answered of frames without columns."""
+        return self != Query(order=self.order) or self.order not in ORDERS
+
+    @staticmethod
+    def of(asked: Mapping[str, str]) -> Query:
+        """The query of a page's parameters; raises UserError for one that cannot be."""
+        known = {"category", "model", "split", "pose", "order", *MEASURES}
+        for name in asked.keys() - known:
+            raise UserError(f"{name}: expected one of {', '.join(sorted(known))}; found another")
+        order = asked.get("order", "frame")
+        if order not in ORDERS and order.removeprefix("-") not in MEASURES:
+            raise UserError(f"order: expected one of {', '.join((*ORDERS, *MEASURES))}; found {order!r:.100}")
+        category = asked.get("category", "")
+        within = tuple(_within(name, asked[name]) for name in MEASURES if name in asked)
+        model, split, pose = (asked.get(name, "") for name in ("model", "split", "pose"))
+        if not ((category.isascii() and category.isdecimal() and len(category) < 10) or not category):
+            raise UserError(f"category: expected a category's number, found {category!r:.100}")
+        return Query(int(category) if category else None, model, split, pose, within, order)
+
+    def answer(self, known: Known) -> NDArray[np.intp]:
+        """Rows of the frames that meet it, in its order."""
+        table = known.table
+        if not self.needs_labels:
+            return _ordered(self.order, known.frames)
+        frames = ~known.damaged
+        if self.split:
+            frames &= table.frames["split"] == _code(table.splits, self.split)
+        for one in self._of_frames(True):
+            frames &= _is_within(table.frames, one)
+        objects = self._objects(table)
+        if objects is not None:
+            frames &= np.bincount(table.objects["frame"][objects], minlength=len(frames)) > 0
+        rows = np.flatnonzero(frames)
+        if self.order in ORDERS:
+            return rows[_ordered(self.order, known.frames[: len(frames)][rows])]
+        return rows[self._sorted(table, objects)[rows].argsort(kind="stable")]
+
+    def _of_frames(self, wanted: bool) -> tuple[Within, ...]:
+        return tuple(one for one in self.within if MEASURES[one.measure].is_of_object != wanted)
+
+    def _objects(self, table: FrameTable) -> NDArray[np.bool_] | None:
+        """Which objects meet what is asked of objects; None where nothing is."""
+        objects = table.objects
+        conditions: list[Callable[[], NDArray[np.bool_]]] = []
+        if self.category is not None:
+            conditions.append(lambda: objects["category"] == self.category)
+        if self.model:
+            conditions.append(lambda: objects["model"] == _code(table.models, self.model))
+        if self.pose:
+            conditions.append(lambda: objects["pose"] == _code(table.poses, "" if self.pose == "unknown" else self.pose))
+        conditions += [lambda one=one: _is_within(objects, one) for one in self._of_frames(False)]
+        if not conditions:
+            return None
+        met = np.ones(len(objects), bool)
+        for condition in conditions:
+            met &= condition()
+        return met
+
+    def _sorted(self, table: FrameTable, objects: NDArray[np.bool_] | None) -> NDArray[np.float64]:
+        """What each frame is sorted by, ascending: the least, or behind a minus the greatest, of the objects that are meant;
+        unknown ones come last.
+        """
+        measure = MEASURES[self.order.removeprefix("-")]
+        sign = -1.0 if self.order.startswith("-") else 1.0
+        if not measure.is_of_object:
+            values = sign * table.frames[measure.column].astype(np.float64)
+            return np.where(np.isnan(values), math.inf, values)
+        met = np.ones(len(table.objects), bool) if objects is None else objects
+        values = sign * table.objects[measure.column][met].astype(np.float64)
+        least = np.full(len(table.frames), math.inf)
+        np.minimum.at(least, table.objects["frame"][met], np.where(np.isnan(values), math.inf, values))
+        return least
+
+
+def _is_within(rows: NDArray[Any], one: Within) -> NDArray[np.bool_]:
+    values = rows[MEASURES[one.measure].column]
+    if MEASURES[one.measure].column == "azimuth":
+        low, high = (free if math.isinf(end) else end for end, free in ((one.low, 0.0), (one.high, 360.0)))
+        return (values - low) % 360 < high - low
+    return (values >= one.low) & (values <= one.high)
+
+
+def _ordered(order: str, frames: NDArray[Any]) -> NDArray[np.intp]:
+    """The places of frames in one of `ORDERS`."""
+    number = frames["number"]
+    if order == "newest":
+        return np.lexsort((number, -frames["made"]))
+    return np.argsort(number if order == "frame" else number * KNUTH % 2**32, kind="stable")
+
+
+def _code(names: tuple[str, ...], name: str) -> int:
+    return names.index(name) if name in names else -1
+
+
+def _within(name: str, text: str) -> Within:
+    low, comma, high = text.partition(",")
+    if not comma:
+        raise UserError(f"{name}: expected two numbers with a comma between them, found {text!r:.100}")
+    return Within(name, _number(name, low, -math.inf), _number(name, high, math.inf))
+
+
+def _number(name: str, text: str, empty: float = math.nan) -> float:
+    try:
+        number = float(text) if text or math.isnan(empty) else empty
+    except ValueError:
+        number = math.nan
+    if math.isnan(number):
+        raise UserError(f"{name}: expected a number, found {text!r:.100}")
+    return number

@@ -1,0 +1,265 @@
+"""The server: one's own browser is answered, on this machine without a token, elsewhere with one. Others are not.
+
+A page of a stranger that is open in the same browser is kept out, too: its requests name another host (DNS rebinding) or say
+that they come from elsewhere (Sec-Fetch-Site), no header allows it to read an answer (CORS), and what it embeds of this server
+the browser does not show it (Cross-Origin-Resource-Policy).
+"""
+
+from __future__ import annotations
+
+import errno
+import hmac
+import ipaddress
+import re
+import socket
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass
+from http import HTTPStatus
+from http.cookies import CookieError, SimpleCookie
+from http.server import BaseHTTPRequestHandler
+from socketserver import TCPServer, ThreadingMixIn
+from typing import Any
+from urllib.parse import parse_qsl, urlencode, urlsplit
+
+from viewsphere.errors import UserError, ViewsphereError
+from viewsphere.report.paths import without_folders
+from viewsphere.view.answers import Answer, Answers
+from viewsphere.view.live import Live
+
+PORT = 8642
+LOOPBACK = "127.0.0.1"
+
+QUIET = 30.0
+"""Seconds after which somebody who says nothing is hung up on."""
+
+TOKEN = re.compile(r"[A-Za-z0-9_-]{16,256}")
+"""What a token may be: it stands in an address and in a cookie."""
+
+TEXT = "text/plain; charset=utf-8"
+
+MOST_PARAMETERS = 40
+"""Parameters of a request, at most."""
+
+GUARD = {
+    "X-Content-Type-Options": "nosniff",
+    "X-Frame-Options": "DENY",
+    "Referrer-Policy": "no-referrer",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Cross-Origin-Opener-Policy": "same-origin",
+}
+"""Sent with every answer."""
+
+NOTHING = "default-src 'none'; frame-ancestors 'none'"
+"""The policy of answers that are no page; a page says in its head what it may load."""
+
+OWN_SITES = ("same-origin", "none")
+"""What a browser says of requests that come from this server's page, or from nobody's."""
+
+
+@dataclass(frozen=True)
+class Address:
+    """Where to listen; `port` 0 is any that is free. The token is asked of everybody, if there is one."""
+
+    host: str = LOOPBACK
+    port: int = PORT
+    token: str | None = None
+
+    @property
+    def is_loopback(self) -> bool:
+        """Whether only this machine reaches it."""
+        if self.host == "localhost":
+            return True
+        address = _address(self.host)
+        return address is not None and address.is_loopback
+
+
+class Server(ThreadingMixIn, TCPServer):
+    """Answers of one data set, at an address. Raises UserError where one cannot listen there.
+
+    A plain `TCPServer`: http.server's own asks a name server for this machine's name before it listens.
+    """
+
+    daemon_threads = True
+    allow_reuse_address = True
+    request_queue_size = 64
+
+    def __init__(self, live: Live, address: Address) -> None:
+        if address.token is not None and not TOKEN.fullmatch(address.token):
+            raise UserError("--token: expected 16 to 256 letters, digits, - and _, found others: leave it out, and one is made")
+        if not (address.is_loopback or address.token):
+            raise UserError(f"--host {address.host}: expected a token where others reach the page, found none")
+        self.answers, self.address = Answers(live), address
+        try:
+            info = socket.getaddrinfo(address.host, address.port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)[0]
+            self.address_family = info[0]
+            super().__init__((address.host, address.port), _Handler)
+        except socket.gaierror as error:
+            raise UserError(f"--host {address.host}: expected an address of this machine, found: {error.strerror}") from None
+        except (OSError, OverflowError) as error:
+            raise UserError(_refused(address, error)) from None
+
+    @property
+    def port(self) -> int:
+        """The port that it listens at."""
+        return self.server_address[1]
+
+    @property
+    def url(self) -> str:
+        """What to open in a browser, with the token."""
+        host = {"0.0.0.0": socket.gethostname(), "::": socket.gethostname()}.get(self.address.host, self.address.host)
+        host = f"[{host}]" if ":" in host else host
+        token = f"?{urlencode({'token': self.address.token})}" if self.address.token else ""
+        return f"http://{host}:{self.port}/{token}"
+
+    @property
+    def cookie(self) -> str:
+        """The name of the cookie that holds the token: cookies do not tell ports apart."""
+        return f"viewsphere-{self.port}"
+
+    def names(self, host: str) -> bool:
+        """Whether a request's Host is this server: a name that a stranger made lead here is not."""
+        name, port = _parted(host)
+        if port != self.port:
+            return False
+        if self.address.is_loopback:
+            return name in {"localhost", "127.0.0.1", "::1", self.address.host.lower()}
+        # An address is no name that a stranger could own; whoever comes by one has a token besides.
+        return _address(name) is not None or name in {"localhost", self.address.host.lower(), socket.gethostname().lower()}
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """Somebody hung up, or a mistake of ours: in a line, for the page's other requests go on."""
+        error = sys.exc_info()[1]
+        if not isinstance(error, (ConnectionError, TimeoutError)):
+            self.complain(error)
+
+    def complain(self, error: BaseException | None) -> None:
+        """Tell the one who runs the server of a mistake of ours."""
+        print(f"viewsphere: view: {type(error).__name__}: {error}", file=sys.stderr)  # noqa: T201
+
+
+def _parted(host: str) -> tuple[str, int | None]:
+    """The name, in lower case, and the port of a Host; None for one that is no port."""
+    found = re.fullmatch(r"(\[[0-9a-fA-F:.]+\]|[^\[\]:/\\@\s]+)(?::([0-9]{1,5}))?", host)
+    if found is None:
+        return "", None
+    return found[1].strip("[]").lower(), int(found[2] or 80)
+
+
+def _address(name: str) -> ipaddress.IPv4Address | ipaddress.IPv6Address | None:
+    try:
+        return ipaddress.ip_address(name)
+    except ValueError:
+        return None
+
+
+def _refused(address: Address, error: Exception) -> str:
+    """Why one cannot listen at an address, and what to do."""
+    code = error.errno if isinstance(error, OSError) else None
+    if code == errno.EADDRINUSE:
+        return (
+            f"--port {address.port}: expected a free port, found one that another program listens at: choose another, or 0 "
+            "for any that is free"
+        )
+    if code == errno.EADDRNOTAVAIL:
+        return f"--host {address.host}: expected an address of this machine, found another: 0.0.0.0 means all it has"
+    if code == errno.EACCES:
+        return f"--port {address.port}: expected a port that one may listen at, found a reserved one: choose one from 1024 on"
+    return f"--port {address.port}: expected to listen at {address.host}, found: {error}"
+
+
+class _Handler(BaseHTTPRequestHandler):
+    server: Server  # pyright: ignore[reportIncompatibleVariableOverride]
+    protocol_version = "HTTP/1.1"
+    server_version = "viewsphere"
+    sys_version = ""
+    timeout = QUIET
+
+    def do_GET(self) -> None:
+        self._answer()
+
+    def do_HEAD(self) -> None:
+        self._answer()
+
+    def log_message(self, format: str, *args: Any) -> None:
+        """Nothing: a page asks a dozen times a second."""
+
+    def send_error(self, code: int, message: str | None = None, explain: str | None = None) -> None:
+        """Refuse in one line of text, and hang up: what follows on this connection may be anything."""
+        self.close_connection = True
+        self._send(HTTPStatus(code), Answer(f"{message or HTTPStatus(code).phrase}\n".encode("utf-8", "replace"), TEXT))
+
+    def _answer(self) -> None:
+        if refusal := self._refusal():
+            self.send_error(*refusal)
+            return
+        target = urlsplit(self.path)
+        try:
+            asked = dict(parse_qsl(target.query, max_num_fields=MOST_PARAMETERS, strict_parsing=bool(target.query)))
+        except ValueError:
+            self.send_error(HTTPStatus.BAD_REQUEST)
+            return
+        if self.server.address.token is not None and not self._has_token(asked):
+            self.send_error(HTTPStatus.FORBIDDEN, "expected the address that viewsphere view printed, with its token")
+            return
+        if asked.pop("token", None) is not None:
+            self._to_page()
+            return
+        try:
+            answer = None if target.scheme or target.netloc else self.server.answers.of(target.path, asked)
+        except ViewsphereError as error:
+            self.send_error(HTTPStatus.UNPROCESSABLE_ENTITY, without_folders(str(error)))
+            return
+        except Exception as error:
+            self.server.complain(error)
+            self.send_error(HTTPStatus.INTERNAL_SERVER_ERROR)
+            return
+        if answer is None:
+            self.send_error(HTTPStatus.NOT_FOUND)
+        else:
+            self._send(HTTPStatus.OK, answer)
+
+    def _refusal(self) -> tuple[HTTPStatus, str] | None:
+        """What is wrong with a request, whatever it asks for."""
+        hosts = self.headers.get_all("Host", [])
+        if len(hosts) != 1:
+            return HTTPStatus.BAD_REQUEST, "expected one Host"
+        if not self.server.names(hosts[0]):
+            return HTTPStatus.MISDIRECTED_REQUEST, "expected the address that viewsphere view printed"
+        is_visit = self.headers.get("Sec-Fetch-Mode") == "navigate" and self.headers.get("Sec-Fetch-Dest") == "document"
+        if self.headers.get("Sec-Fetch-Site", "none") not in OWN_SITES and not is_visit:
+            return HTTPStatus.FORBIDDEN, "expected a request of this server's own page"
+        if self.headers.get("Content-Length", "0") != "0" or "Transfer-Encoding" in self.headers:
+            return HTTPStatus.BAD_REQUEST, "expected no body"
+        return None
+
+    def _has_token(self, asked: Mapping[str, str]) -> bool:
+        """Whether the token is in the address, the cookie or the header Authorization, compared in constant time."""
+        try:
+            cookie = SimpleCookie(self.headers.get("Cookie", "")).get(self.server.cookie)
+        except CookieError:
+            cookie = None
+        bearer = self.headers.get("Authorization", "").removeprefix("Bearer ")
+        given = (asked.get("token", ""), cookie.value if cookie else "", bearer)
+        token = (self.server.address.token or "").encode()
+        return any([hmac.compare_digest(one.encode("utf-8", "replace"), token) for one in given])
+
+    def _to_page(self) -> None:
+        """Keep the token in a cookie, so that it stands in no address that is shown, kept or sent on."""
+        cookie = f"{self.server.cookie}={self.server.address.token}; Path=/; HttpOnly; SameSite=Strict"
+        extra = {"Location": "/", **({"Set-Cookie": cookie} if self.server.address.token else {})}
+        self._send(HTTPStatus.SEE_OTHER, Answer(b"", TEXT), extra)
+
+    def _send(self, status: HTTPStatus, answer: Answer, extra: Mapping[str, str] | None = None) -> None:
+        self.send_response(status)
+        keep = f"private, max-age={answer.keep}, immutable" if answer.keep else "no-store"
+        policy = "frame-ancestors 'none'" if answer.kind.startswith("text/html") else NOTHING
+        own = {"Content-Type": answer.kind, "Content-Length": str(len(answer.body)), "Cache-Control": keep}
+        own["Content-Security-Policy"] = policy
+        for name, value in {**own, **GUARD, **(extra or {})}.items():
+            self.send_header(name, value)
+        if self.close_connection:
+            self.send_header("Connection", "close")
+        self.end_headers()
+        if self.command != "HEAD":
+            self.wfile.write(answer.body)
