@@ -9,8 +9,8 @@ import pytest
 from deadline import until
 from small import small_recipe
 from viewsphere import Dataset
-from viewsphere.errors import StoreError
-from viewsphere.store import Watch
+from viewsphere.errors import StoreError, UserError
+from viewsphere.store import Watch, located
 from viewsphere.view import Live
 from viewsphere.view.live import MANY
 
@@ -180,6 +180,11 @@ def test_frames_that_are_not_there(small_run):
 def test_no_data_set(tmp_path):
     with pytest.raises(StoreError, match="found no such folder"):
         Live(tmp_path / "nothing")
+
+
+def test_nothing_is_watched_at_a_url():
+    with pytest.raises(UserError, match="memory://data: expected a folder on this machine, found a URL: viewsphere report"):
+        Live(located("memory://data"))
 
 
 def test_a_watch_tells_of_each_shot_once(small_dataset):

@@ -23,11 +23,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.errors import StoreError, ViewsphereError
+from viewsphere.errors import StoreError, UserError, ViewsphereError
 from viewsphere.model.sample import Sample
 from viewsphere.report.paths import without_folders
 from viewsphere.report.table import FRAME, OBJECT, Columns, FrameTable, Rows, table_of
 from viewsphere.store import Dataset, Watch
+from viewsphere.store.places import RemotePath
 
 LISTED = np.dtype([("number", "i8"), ("made", "f8")])
 """A finished frame: its number in the plan, and when it was finished, in seconds since 1970."""
@@ -95,10 +96,12 @@ class Known:
 class Live:
     """Looks at a data set from a thread of its own, between `start` and `stop`.
 
-    Raises StoreError where there is no data set.
+    Raises StoreError where there is no data set, UserError for a URL, whose files it would have to ask for again and again.
     """
 
     def __init__(self, root: Path, workers: int = 1) -> None:
+        if isinstance(root, RemotePath):
+            raise UserError(f"{root}: expected a folder on this machine, found a URL: viewsphere report writes a page of it")
         self.dataset = Dataset(root)
         self._workers = max(1, workers)
         self._plan_seen = self._plan_time()
