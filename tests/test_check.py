@@ -198,7 +198,7 @@ def test_what_was_left_out_on_purpose_is_a_note(tmp_path):
 
 def test_a_record_of_another_frame(dataset):
     edit_record(dataset, 6, lambda r: r.update(index=3))
-    assert ("ids", 6) in failures(dataset)
+    assert ("files", 6) in failures(dataset)
 
 
 def test_an_unknown_id_in_the_map(dataset):

@@ -40,7 +40,7 @@ def kinds(root):
     """The files by what they are: their paths without numbers, and without the digits that shots are spread by."""
     found = defaultdict(list)
     for file in sorted(root.rglob("*")):
-        if file.is_file():
+        if file.is_file() and file.name != "lock":  # which is empty
             path = re.sub(r"shots/../", "shots/", file.relative_to(root).as_posix())
             found[re.sub(r"\d+", "#", path)].append(file)
     return found

@@ -27,6 +27,7 @@ TESTED = {
     "MAX_POSES_BYTES": "test_pose_files",
     "MAX_RIG_BYTES": "test_rig_files",
     "MAX_REPAIRED_SHOTS": "test_endless_plans",
+    "MAX_REMOTE_TRIES": "test_places",
     **dict.fromkeys(
         (
             "MAX_FILE_BYTES", "MAX_FILES", "MAX_TRIANGLES", "MAX_VERTICES", "MAX_PICTURE_PIXELS",

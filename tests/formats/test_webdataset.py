@@ -51,7 +51,7 @@ def test_its_reader_gives_the_samples(dataset, tmp_path):
 
 def assert_same(record, sample):
     """The JSON has everything of a sample, to the last bit."""
-    restored = from_whole_sample({**record, "objects": [{**o, "model": ""} for o in record["objects"]]}, {}, {})
+    restored = from_whole_sample({**record, "files": {}, "objects": [{**o, "model": ""} for o in record["objects"]]}, {}, {})
     assert (restored.index, restored.split, restored.pose) == (sample.index, sample.split, sample.pose)
     np.testing.assert_array_equal(restored.camera.P, sample.camera.P)
     for one, other in zip(restored.objects, sample.objects, strict=True):

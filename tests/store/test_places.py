@@ -216,7 +216,7 @@ def test_data_sets_at_urls_are_merged(few, uploaded, tmp_path):
 
 def damage(root, few):
     """One file of each kind is changed, cut, lost or too many; gives which."""
-    files = [path for path in files_below(few) if not path.endswith(("plan.json", "skipped.json"))]
+    files = [path for path in contents(few) if not path.endswith(("plan.json", "skipped.json"))]
     kinds = {}
     for path in files:
         kinds.setdefault((path.split("/")[0], Path(path).suffix, Path(path).parent.name in FEW["channels"]), []).append(path)

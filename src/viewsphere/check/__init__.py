@@ -179,8 +179,6 @@ def _frame_proofs(dataset: Dataset, sampled: range, rays: bool | None, positions
         if not isinstance(read, Sample):
             findings.append(Finding("files", index, read))
             continue
-        if read.index != index:
-            findings.append(Finding("ids", index, f"expected a record of frame {index}, found one of {read.index}"))
         found = [*_proofs(models, read), ("shot", _carried_out(partial(_as_shot, dataset, scenery, read)))]
         found += _proofs_by_models(read, again, caster) if position in sampled else ()
         for name, messages in found:
