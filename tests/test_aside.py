@@ -115,6 +115,16 @@ def test_where_there_are_no_locks_age_decides(maker, tmp_path, monkeypatch):
         assert list(tmp_path.iterdir()) == [own]
 
 
+@pytest.mark.skipif(os.name == "nt", reason="renames no folder of an open file")
+def test_what_is_being_removed_has_another_name(tmp_path, monkeypatch):
+    seen = []
+    monkeypatch.setattr("shutil.rmtree", lambda folder, **_: seen.append(folder.name))
+    with aside(tmp_path) as own:
+        pass
+    assert seen == [f"{own.name}~"]
+    assert not list(left_by_dead(tmp_path))
+
+
 def test_what_is_named_alike_is_nobody_s_to_remove(tmp_path):
     stranger = tmp_path / "x-my~own~folder"
     stranger.mkdir()

@@ -26,6 +26,9 @@ from pathlib import Path
 LOCK = "lock"
 """Name of the file in such a folder."""
 
+HALF = "~"
+"""How names of folders end that somebody has begun to remove."""
+
 OPEN = os.O_RDWR | getattr(os, "O_NOFOLLOW", 0)
 """How it is opened."""
 
@@ -50,8 +53,13 @@ class Aside:
 
     def remove(self) -> None:
         """Remove the folder with all that is in it."""
+        gone = _out_of_the_way(self.folder)
+        self.leave()
+        shutil.rmtree(gone, ignore_errors=True)
+
+    def leave(self) -> None:
+        """Leave the folder as a dead process would: whoever sweeps removes it."""
         os.close(self.lock)
-        shutil.rmtree(self.folder, ignore_errors=True)
 
 
 def of_this_process() -> str:
@@ -89,14 +97,17 @@ def sweep(place: Path, prefix: str = "") -> None:
 
 
 def left_by_dead(place: Path, prefix: str = "") -> Iterator[Path]:
-    """The folders in this place whose makers are dead; each is removed when the next one is asked for."""
+    """The folders in this place whose makers are dead; each is removed when the next one is asked for. Those that somebody has
+    begun to remove are not whole any more: they go unseen.
+    """
     for folder in sorted(path for path in place.glob(f"{glob.escape(prefix)}*~*~*") if not path.is_symlink()):
         is_own = folder.name.startswith(f"{prefix}{socket.gethostname()}~")
         try:
             with _locked(folder / LOCK, OPEN | (os.O_CREAT if is_own else 0)) as taken:
                 if not (taken and is_own) and not _is_stale(folder):
                     continue
-                yield folder
+                if not folder.name.endswith(HALF):
+                    yield folder
                 gone = _out_of_the_way(folder)
         except BlockingIOError:
             continue
@@ -175,8 +186,10 @@ def _is_stale(folder: Path) -> bool:
 
 
 def _out_of_the_way(folder: Path) -> Path:
-    """Rename a folder, so that a maker that wakes up after all finds nothing of it, rather than a part."""
-    if not folder.name.endswith("~"):
+    """Rename a folder that is about to be removed, so that nobody takes a part of it for the whole: neither those who sweep nor
+    a maker that wakes up after all.
+    """
+    if not folder.name.endswith(HALF):
         with suppress(OSError):  # Windows renames no folder of an open file
-            return folder.rename(folder.with_name(f"{folder.name}~"))
+            return folder.rename(folder.with_name(f"{folder.name}{HALF}"))
     return folder

@@ -44,13 +44,26 @@ def move(source: Path, target: Path) -> None:
 
     Raises OSError; where refusals pass (`WAITS_S`), after the last try.
     """
-    is_durable = durability() == "fsync"
-    if is_durable:
-        _write_through(source)
+    write_through(source)
     _rename(source, target)
-    if is_durable:
+    if durability() == "fsync":
         for folder in target.parents:
             _write_entries(folder)
+
+
+def write_through(path: Path) -> None:
+    """Have the disk keep a file, or a folder with all that is in it, its entries last, if that is asked for; raises OSError."""
+    if durability() != "fsync":
+        return
+    if not path.is_dir():
+        _sync(path)
+        return
+    inside = list(os.walk(path, topdown=False))
+    with ThreadPoolExecutor(AT_ONCE) as pool:
+        for _ in pool.map(_sync, (Path(top, name) for top, _, names in inside for name in names)):
+            pass
+    for folder, _, _ in inside:
+        _write_entries(Path(folder))
 
 
 def _rename(source: Path, target: Path) -> None:
@@ -61,19 +74,6 @@ def _rename(source: Path, target: Path) -> None:
         except PermissionError:
             time.sleep(seconds)
     os.replace(source, target)  # noqa: PTH105
-
-
-def _write_through(path: Path) -> None:
-    """Have the disk keep a file, or a folder with all that is in it, its entries last."""
-    if not path.is_dir():
-        _sync(path)
-        return
-    inside = list(os.walk(path, topdown=False))
-    with ThreadPoolExecutor(AT_ONCE) as pool:
-        for _ in pool.map(_sync, (Path(top, name) for top, _, names in inside for name in names)):
-            pass
-    for folder, _, _ in inside:
-        _write_entries(Path(folder))
 
 
 def _write_entries(folder: Path) -> None:
