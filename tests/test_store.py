@@ -5,8 +5,12 @@ import json
 import os
 import pickle
 import re
+import stat
+import sys
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import nullcontext
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -17,7 +21,7 @@ from viewsphere.labels import channels
 from viewsphere.model.tracks import TRACK
 from viewsphere.run.exporting import export
 from viewsphere.store import Block, Category, Dataset, Part, PlanRecord, Store, decode, encode, new_folder
-from viewsphere.store.moving import DURABILITIES, DURABILITY, move
+from viewsphere.store.moving import DURABILITIES, DURABILITY, move, write_through
 from viewsphere.store.places import local
 
 PART = Part(
@@ -212,6 +216,38 @@ def test_a_disk_that_fills_up_fails_before_the_old_leaves(exported, monkeypatch)
     with pytest.raises(StoreError, match="No space left"):
         replace_again(exported)
     assert (exported.root / "coco" / "file").read_text() == "old"
+
+
+@pytest.mark.skipif(os.name != "posix", reason="writes folders to the disk")
+@pytest.mark.parametrize("number", [errno.EINVAL, errno.ENOTSUP, errno.EIO])
+def test_folders_whose_file_system_does_not_write_them_to_the_disk_are_left_to_it(number, tmp_path, monkeypatch):
+    def sync(descriptor):
+        if stat.S_ISDIR(os.fstat(descriptor).st_mode):
+            raise OSError(number, os.strerror(number))
+
+    monkeypatch.setattr(os, "fsync", sync)
+    monkeypatch.setattr(sys, "platform", "linux")
+    monkeypatch.setenv(DURABILITY, "fsync")
+    (tmp_path / "a").mkdir()
+    with pytest.raises(OSError, match=os.strerror(number)) if number == errno.EIO else nullcontext():
+        move(tmp_path / "a", tmp_path / "b")
+        assert (tmp_path / "b").is_dir()
+
+
+def test_where_the_disk_s_own_memory_cannot_be_emptied_the_system_s_is(tmp_path, monkeypatch):
+    """On macOS, with a disk of the network."""
+
+    def refuse(*_):
+        raise OSError(errno.ENOTSUP, "refused")
+
+    synced = []
+    monkeypatch.setitem(sys.modules, "fcntl", SimpleNamespace(fcntl=refuse, F_FULLFSYNC=51))
+    monkeypatch.setattr(sys, "platform", "darwin")
+    monkeypatch.setattr(os, "fsync", synced.append)
+    monkeypatch.setenv(DURABILITY, "fsync")
+    (tmp_path / "a").write_text("a")
+    write_through(tmp_path / "a")
+    assert len(synced) == 1
 
 
 def test_what_was_half_removed_does_not_come_back(tmp_path):

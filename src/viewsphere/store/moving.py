@@ -8,6 +8,7 @@ what was finished is there.
 
 from __future__ import annotations
 
+import errno
 import os
 import sys
 import time
@@ -29,6 +30,10 @@ AT_ONCE = 8
 WAITS_S = (0.02, 0.05, 0.1, 0.2, 0.4, 0.8) if os.name == "nt" else ()
 """Seconds before each further try. Windows refuses to move what another program has open, and virus scanners and indexers
 open what was just written."""
+
+NOT_OURS = {errno.EACCES, errno.EPERM, errno.EINVAL, errno.ENOTSUP, errno.EOPNOTSUPP}
+"""What systems say of folders that are not ours to write to the disk, or that their file system does not write so, as that of
+automatic mounts."""
 
 
 def durability() -> str:
@@ -79,8 +84,11 @@ def _rename(source: Path, target: Path) -> None:
 def _write_entries(folder: Path) -> None:
     """Have the disk keep which names are in a folder, where that is ours to ask for."""
     if os.name != "nt":  # which keeps them with the files
-        with suppress(PermissionError):
+        try:
             _sync(folder)
+        except OSError as error:
+            if error.errno not in NOT_OURS:
+                raise
 
 
 def _sync(path: Path) -> None:
@@ -89,8 +97,9 @@ def _sync(path: Path) -> None:
         if sys.platform == "darwin":
             import fcntl
 
-            fcntl.fcntl(descriptor, fcntl.F_FULLFSYNC)  # fsync leaves it in the disk's own memory there
-        else:
-            os.fsync(descriptor)
+            with suppress(OSError):  # network file systems have none
+                fcntl.fcntl(descriptor, fcntl.F_FULLFSYNC)  # fsync leaves it in the disk's own memory there
+                return
+        os.fsync(descriptor)
     finally:
         os.close(descriptor)
