@@ -58,8 +58,7 @@ def campaign(share: float, seed: int) -> bool:
         make_stock(stock)
         for (fault, work), times in TIMES.items():
             course = Course(WORKS[work], stock, Path(place, f"{fault} {work}"), random.Random(f"{seed} {fault} {work}"))
-            for _ in range(max(round(share * times), 1)):
-                course.hit(SIGNALS[fault])
+            course.suffer(SIGNALS[fault], max(round(share * times), 1))
             course.renew()
             rows.append(row(fault, work, course.tally))
             is_good &= course.tally.is_good

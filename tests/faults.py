@@ -27,8 +27,11 @@ from viewsphere.store.checksums import damaged_files
 from viewsphere.store.manifest import MANIFEST, Manifest
 
 CHANNELS = ["rgb", "depth", "instances"]
-SPAWNED = "spawn_main"
+SPAWNED = b"spawn_main"
 """Stands in the command line of each worker."""
+
+Fault = Callable[[subprocess.Popen[str]], bool]
+"""Hits a run; says whether there was something to hit."""
 
 
 def recipe(**changes):
@@ -96,12 +99,12 @@ class Tally:
     said: dict[str, int] = field(default_factory=dict)
     untidy: list[str] = field(default_factory=list)
 
-    def add(self, process: subprocess.Popen[str]) -> None:
-        """Count a run that has ended, and what it said at last: a line, or it is untidy."""
+    def add(self, process: subprocess.Popen[str], is_hit: bool) -> None:
+        """Count a run that has ended, if it was hit, and what it said at last: a line, or it is untidy."""
         lines = [
             line for line in process.communicate(timeout=DEADLINE)[1].splitlines() if not line.startswith(("note:", "warning:"))
         ]
-        self.times += 1
+        self.times += is_hit
         if "Traceback" in "".join(lines) or len(lines) > 1:
             self.untidy.append("\n".join(lines))
         if lines:
@@ -160,13 +163,19 @@ class Course:
         self._await(process)
         time.sleep(self.rng.uniform(0, self._span))
 
-    def hit(self, fault: Callable[[subprocess.Popen[str]], None]) -> None:
+    def suffer(self, fault: Fault, times: int) -> None:
+        """Let a fault hit the work so many times; a run that had ended before does not count."""
+        end = time.monotonic() + times * DEADLINE
+        while self.tally.times < times:
+            assert time.monotonic() < end, f"hit {self.tally.times} of {times} times"
+            self.hit(fault)
+
+    def hit(self, fault: Fault) -> None:
         """Start the work, let a fault hit it, and look at what there is."""
         process = self.work.start(self.stock, self.out)
         self.moment(process)
         there = finished(self.out)
-        fault(process)
-        self.tally.add(process)
+        self.tally.add(process, fault(process))
         self.look(there)
         if process.returncode == 0:
             self.renew()
@@ -214,69 +223,93 @@ def torn(out: Path, *wholes: Path) -> list[str]:
     return found
 
 
-def workers_of(process: subprocess.Popen[str]) -> list[int]:
-    """The numbers of a run's workers."""
+def workers_of(pid: int, processes: Path = Path("/proc")) -> list[int]:
+    """The numbers of a run's workers; those that end meanwhile are left out."""
     found = []
-    with suppress(OSError):
-        for pid in Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split():
-            with suppress(OSError):
-                if SPAWNED in Path(f"/proc/{pid}/cmdline").read_text():
-                    found.append(int(pid))
+    for process in processes.glob("[0-9]*"):
+        with suppress(OSError):
+            parent = (process / "stat").read_text().rpartition(")")[2].split()[1]
+            if int(parent) == pid and SPAWNED in (process / "cmdline").read_bytes():
+                found.append(int(process.name))
     return found
 
 
-def kill_all(process: subprocess.Popen[str]) -> None:
+def kill_all(process: subprocess.Popen[str]) -> bool:
     """SIGKILL of the run and its workers."""
-    _signal_all(process, signal.SIGKILL)
+    return _signal_all(process, signal.SIGKILL)
 
 
-def kill_parent(process: subprocess.Popen[str]) -> None:
+def kill_parent(process: subprocess.Popen[str]) -> bool:
     """SIGKILL of the run alone."""
-    process.kill()
+    return _signal(process, signal.SIGKILL)
 
 
-def kill_worker(rng: random.Random) -> Callable[[subprocess.Popen[str]], None]:
-    """SIGKILL of one worker, if there is one."""
+def kill_worker(rng: random.Random) -> Fault:
+    """SIGKILL of one worker, once there is one."""
 
-    def fault(process: subprocess.Popen[str]) -> None:
-        if found := workers_of(process):
-            with suppress(ProcessLookupError):
-                os.kill(rng.choice(found), signal.SIGKILL)
+    def fault(process: subprocess.Popen[str]) -> bool:
+        return any(_sent(pid, signal.SIGKILL) for pid in sorted(_workers(process), key=lambda _: rng.random())[:1])
 
     return fault
 
 
-def terminate(process: subprocess.Popen[str]) -> None:
+def terminate(process: subprocess.Popen[str]) -> bool:
     """SIGTERM, as clusters send it before they kill."""
-    process.terminate()
+    return _signal(process, signal.SIGTERM)
 
 
-def interrupt(process: subprocess.Popen[str]) -> None:
+def interrupt(process: subprocess.Popen[str]) -> bool:
     """Ctrl-C: all processes of the terminal's foreground hear it."""
-    _signal_all(process, signal.SIGINT)
+    return _signal_all(process, signal.SIGINT)
 
 
-def stop_and_go_on(process: subprocess.Popen[str]) -> None:
+def stop_and_go_on(process: subprocess.Popen[str]) -> bool:
     """SIGSTOP of all, and SIGCONT a second later."""
-    _signal_all(process, signal.SIGSTOP)
+    is_hit = _signal_all(process, signal.SIGSTOP)
     time.sleep(1)
     _signal_all(process, signal.SIGCONT)
+    return is_hit
 
 
-def stop_workers_and_interrupt(process: subprocess.Popen[str]) -> None:
-    """SIGSTOP of the workers, which then hear nothing any more; then Ctrl-C."""
-    for pid in workers_of(process):
-        with suppress(ProcessLookupError):
-            os.kill(pid, signal.SIGSTOP)
-    process.send_signal(signal.SIGINT)
+def stop_workers_and_interrupt(process: subprocess.Popen[str]) -> bool:
+    """SIGSTOP of the workers, once there are some, which then hear nothing any more; then Ctrl-C."""
+    stopped = [_sent(pid, signal.SIGSTOP) for pid in _workers(process)]
+    return _signal(process, signal.SIGINT) and any(stopped)
 
 
-def _signal_all(process: subprocess.Popen[str], what: signal.Signals) -> None:
+def _workers(process: subprocess.Popen[str]) -> list[int]:
+    """The workers that a run has, once it has some; none where it ends before."""
+    found: list[int] = []
+
+    def seen() -> bool:
+        found[:] = workers_of(process.pid)
+        return bool(found) or process.poll() is not None
+
+    assert until(seen)
+    return found
+
+
+def _signal(process: subprocess.Popen[str], what: signal.Signals) -> bool:
+    is_at_work = process.poll() is None
+    process.send_signal(what)
+    return is_at_work
+
+
+def _signal_all(process: subprocess.Popen[str], what: signal.Signals) -> bool:
+    is_at_work = process.poll() is None
     with suppress(ProcessLookupError):
         os.killpg(process.pid, what)
+    return is_at_work
 
 
-SIGNALS: dict[str, Callable[[subprocess.Popen[str]], None]] = {
+def _sent(pid: int, what: signal.Signals) -> bool:
+    with suppress(ProcessLookupError):
+        os.kill(pid, what)
+        return True
+    return False
+
+
+SIGNALS: dict[str, Fault] = {
     "SIGKILL of everything": kill_all,
     "SIGKILL of the parent": kill_parent,
     "SIGKILL of a worker": kill_worker(random.Random(1)),

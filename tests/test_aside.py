@@ -115,6 +115,90 @@ def test_where_there_are_no_locks_age_decides(maker, tmp_path, monkeypatch):
         assert list(tmp_path.iterdir()) == [own]
 
 
+@pytest.mark.skipif(os.name == "nt", reason="renames no folder of an open file")
+def test_what_is_being_removed_has_another_name(tmp_path, monkeypatch):
+    seen = []
+    monkeypatch.setattr("shutil.rmtree", lambda folder, **_: seen.append(folder.name))
+    with aside(tmp_path) as own:
+        pass
+    assert seen == [f"{own.name}~"]
+    assert not list(left_by_dead(tmp_path))
+
+
+def refused(error):
+    def refuse(*_, **__):
+        raise error(13, "refused")
+
+    return refuse
+
+
+@pytest.mark.skipif(os.name == "nt", reason="what flock says")
+def test_a_system_that_forbids_locks_has_none(tmp_path, monkeypatch):
+    monkeypatch.setattr("fcntl.flock", refused(PermissionError))
+    with aside(tmp_path) as own:
+        sweep(tmp_path)
+        assert list(tmp_path.iterdir()) == [own]
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.skipif(os.name == "nt", reason="what flock says")
+def test_where_somebody_takes_every_folder_it_is_said_and_none_is_left(tmp_path, monkeypatch):
+    monkeypatch.setattr("fcntl.flock", refused(BlockingIOError))
+    with pytest.raises(OSError, match="no folder stays"), aside(tmp_path):
+        pass
+    assert not list(tmp_path.iterdir())
+
+
+def test_where_files_change_their_numbers_a_folder_is_made_all_the_same(tmp_path, monkeypatch):
+    monkeypatch.setattr("os.path.samestat", lambda *_: False)
+    with aside(tmp_path) as own:
+        assert list(tmp_path.iterdir()) == [own]
+        assert list(own.iterdir()) == [own / LOCK]
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="forks")
+@pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning")
+def test_a_forked_process_removes_and_holds_nothing_of_its_parent_s(tmp_path):
+    made = Aside.make(tmp_path)
+    done, go = os.pipe(), os.pipe()
+    child = os.fork()
+    if not child:
+        try:
+            inside = Aside.make(tmp_path)  # whose lock may have the number of the parent's
+            made.remove()
+            inside.remove()
+            os.write(done[1], b"x")
+            os.read(go[0], 1)
+        finally:
+            os._exit(0)
+    os.read(done[0], 1)
+    try:
+        assert list(tmp_path.iterdir()) == [made.folder]
+        sweep(tmp_path)
+        assert list(tmp_path.iterdir()) == [made.folder]
+        made.leave()  # as if it had died
+        sweep(tmp_path)
+        assert not list(tmp_path.iterdir())
+    finally:
+        os.write(go[1], b"x")
+        os.waitpid(child, 0)
+        for end in (*done, *go):
+            os.close(end)
+
+
+def test_a_folder_whose_lock_cannot_be_removed_stays_whole(tmp_path, monkeypatch):
+    """As on Windows, where another process has it open."""
+    left = tmp_path / f"{of_this_process()}left"
+    left.mkdir()
+    (left / "half").write_text("half")
+    with monkeypatch.context() as patched:
+        patched.setattr(Path, "unlink", refused(PermissionError))
+        sweep(tmp_path)
+    assert len(list(tmp_path.rglob("half"))) == 1
+    sweep(tmp_path)
+    assert not list(tmp_path.iterdir())
+
+
 def test_what_is_named_alike_is_nobody_s_to_remove(tmp_path):
     stranger = tmp_path / "x-my~own~folder"
     stranger.mkdir()

@@ -1,11 +1,16 @@
 """The store: nothing half written is ever seen, and what is broken is said."""
 
+import errno
 import json
 import os
 import pickle
 import re
+import stat
+import sys
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import nullcontext
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,6 +21,8 @@ from viewsphere.labels import channels
 from viewsphere.model.tracks import TRACK
 from viewsphere.run.exporting import export
 from viewsphere.store import Block, Category, Dataset, Part, PlanRecord, Store, decode, encode, new_folder
+from viewsphere.store.moving import DURABILITIES, DURABILITY, move, write_through
+from viewsphere.store.places import local
 
 PART = Part(
     digest="d", version="1", name="n", recipe={"a": 1.5}, channels=("rgb",), first=0, frames=1, max_objects=1,
@@ -143,6 +150,113 @@ def test_what_was_being_replaced_comes_back(tmp_path):
     assert not any((store.root / "native").iterdir())
     assert not (store.root / "csv").exists()
     assert (store.root / "elsewhere" / "a").is_dir()
+    assert not left.exists()
+
+
+class Failing:
+    """`move` that fails at some of its calls: before it moves, or after."""
+
+    def __init__(self, errors, is_late=False):
+        self.errors, self.is_late, self.calls = errors, is_late, 0
+
+    def __call__(self, source, target):
+        self.calls += 1
+        error = self.errors.get(self.calls)
+        if error is None or self.is_late:
+            move(source, target)
+        if error is not None:
+            raise error
+
+
+def replace_again(store):
+    with store.replacing(store.root / "coco") as folder:
+        (folder / "file").write_text("new")
+
+
+@pytest.fixture(params=DURABILITIES)
+def exported(tmp_path, request, monkeypatch):
+    """A store with an export, whose run is asked for this durability."""
+    monkeypatch.setenv(DURABILITY, request.param)
+    store = Store(tmp_path / "out")
+    store.open_for(plan_record())
+    (store.root / "coco").mkdir()
+    (store.root / "coco" / "file").write_text("old")
+    return store
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt(), OSError(errno.EIO, "I/O error")], ids=["Ctrl-C", "EIO"])
+@pytest.mark.parametrize(
+    ("call", "is_late", "left"), [(1, False, "old"), (1, True, "old"), (2, False, "old"), (2, True, "new")]
+)
+def test_what_fails_while_it_replaces_loses_nothing(call, is_late, left, error, exported, monkeypatch):
+    monkeypatch.setattr(local, "move", Failing({call: error}, is_late))
+    with pytest.raises((KeyboardInterrupt, StoreError)):
+        replace_again(exported)
+    assert (exported.root / "coco" / "file").read_text() == left
+    assert not list((exported.folder / "writing").iterdir())
+
+
+@pytest.mark.parametrize("second", [KeyboardInterrupt(), OSError(errno.EIO, "I/O error")], ids=["Ctrl-C", "EIO"])
+def test_what_cannot_be_put_back_at_once_is_put_back_by_the_next_run(second, exported, monkeypatch):
+    with monkeypatch.context() as patched, pytest.raises(KeyboardInterrupt):
+        patched.setattr(local, "move", Failing({2: KeyboardInterrupt(), 3: second}))
+        replace_again(exported)
+    assert not (exported.root / "coco").exists()
+    exported.make_ready()
+    assert (exported.root / "coco" / "file").read_text() == "old"
+    assert not list((exported.folder / "writing").iterdir())
+
+
+def test_a_disk_that_fills_up_fails_before_the_old_leaves(exported, monkeypatch):
+    def full(path):
+        assert (exported.root / "coco" / "file").read_text() == "old"
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(local, "write_through", full)
+    with pytest.raises(StoreError, match="No space left"):
+        replace_again(exported)
+    assert (exported.root / "coco" / "file").read_text() == "old"
+
+
+@pytest.mark.skipif(os.name != "posix", reason="writes folders to the disk")
+@pytest.mark.parametrize("number", [errno.EINVAL, errno.ENOTSUP, errno.EIO])
+def test_folders_whose_file_system_does_not_write_them_to_the_disk_are_left_to_it(number, tmp_path, monkeypatch):
+    def sync(descriptor):
+        if stat.S_ISDIR(os.fstat(descriptor).st_mode):
+            raise OSError(number, os.strerror(number))
+
+    monkeypatch.setattr(os, "fsync", sync)
+    monkeypatch.setattr(sys, "platform", "linux")
+    monkeypatch.setenv(DURABILITY, "fsync")
+    (tmp_path / "a").mkdir()
+    with pytest.raises(OSError, match=os.strerror(number)) if number == errno.EIO else nullcontext():
+        move(tmp_path / "a", tmp_path / "b")
+        assert (tmp_path / "b").is_dir()
+
+
+def test_where_the_disk_s_own_memory_cannot_be_emptied_the_system_s_is(tmp_path, monkeypatch):
+    """On macOS, with a disk of the network."""
+
+    def refuse(*_):
+        raise OSError(errno.ENOTSUP, "refused")
+
+    synced = []
+    monkeypatch.setitem(sys.modules, "fcntl", SimpleNamespace(fcntl=refuse, F_FULLFSYNC=51))
+    monkeypatch.setattr(sys, "platform", "darwin")
+    monkeypatch.setattr(os, "fsync", synced.append)
+    monkeypatch.setenv(DURABILITY, "fsync")
+    (tmp_path / "a").write_text("a")
+    write_through(tmp_path / "a")
+    assert len(synced) == 1
+
+
+def test_what_was_half_removed_does_not_come_back(tmp_path):
+    store = Store(tmp_path / "out")
+    store.open_for(plan_record())
+    left = store.folder / "writing" / f"{of_this_process()}x~"
+    (left / "old" / "coco").mkdir(parents=True)
+    store.make_ready()
+    assert not (store.root / "coco").exists()
     assert not left.exists()
 
 

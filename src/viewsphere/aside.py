@@ -11,6 +11,7 @@ A folder whose lock is seen to be held is left alone in any case.
 
 from __future__ import annotations
 
+import errno
 import glob
 import os
 import shutil
@@ -26,8 +27,14 @@ from pathlib import Path
 LOCK = "lock"
 """Name of the file in such a folder."""
 
+HALF = "~"
+"""How names of folders end that somebody has begun to remove."""
+
 OPEN = os.O_RDWR | getattr(os, "O_NOFOLLOW", 0)
 """How it is opened."""
+
+TRIES = 30
+"""Folders that are made before it is said that none stays."""
 
 STALE_S = 86_400.0
 """Seconds without a change after which a folder of which nothing else is known is taken for a dead process's."""
@@ -43,15 +50,35 @@ class Aside:
     @staticmethod
     def make(place: Path, prefix: str = "") -> Aside:
         """A folder in this place, which exists; raises OSError where that is not possible."""
-        while True:
+        for left in reversed(range(TRIES)):
             folder = Path(tempfile.mkdtemp(prefix=prefix + of_this_process(), dir=place))
-            with suppress(FileNotFoundError, BlockingIOError):  # somebody sweeps, and takes it for a dead process's
-                return Aside(folder, _lock_of(folder))
+            try:
+                made = Aside(folder, _lock_of(folder, is_sure=left > 0))
+            except (FileNotFoundError, BlockingIOError):  # somebody sweeps, and takes it for a dead process's
+                with suppress(OSError):
+                    (folder / LOCK).unlink(missing_ok=True)
+                    folder.rmdir()
+            else:
+                _held.add(made)
+                return made
+        raise OSError(errno.EAGAIN, "no folder stays that is made there", str(place))
 
     def remove(self) -> None:
-        """Remove the folder with all that is in it."""
-        os.close(self.lock)
-        shutil.rmtree(self.folder, ignore_errors=True)
+        """Remove the folder with all that is in it; a forked copy of the process that made it does nothing."""
+        if self in _held:
+            gone = _out_of_the_way(self.folder)
+            self.leave()
+            _delete(gone)
+
+    def leave(self) -> None:
+        """Leave the folder as a dead process would: whoever sweeps removes it. A forked copy does nothing."""
+        if self in _held:
+            _held.remove(self)
+            os.close(self.lock)
+
+
+_held: set[Aside] = set()
+"""What this process has aside."""
 
 
 def of_this_process() -> str:
@@ -89,18 +116,21 @@ def sweep(place: Path, prefix: str = "") -> None:
 
 
 def left_by_dead(place: Path, prefix: str = "") -> Iterator[Path]:
-    """The folders in this place whose makers are dead; each is removed when the next one is asked for."""
+    """The folders in this place whose makers are dead; each is removed when the next one is asked for. Those that somebody has
+    begun to remove are not whole any more: they go unseen.
+    """
     for folder in sorted(path for path in place.glob(f"{glob.escape(prefix)}*~*~*") if not path.is_symlink()):
         is_own = folder.name.startswith(f"{prefix}{socket.gethostname()}~")
         try:
             with _locked(folder / LOCK, OPEN | (os.O_CREAT if is_own else 0)) as taken:
                 if not (taken and is_own) and not _is_stale(folder):
                     continue
-                yield folder
+                if not folder.name.endswith(HALF):
+                    yield folder
                 gone = _out_of_the_way(folder)
         except BlockingIOError:
             continue
-        shutil.rmtree(gone, ignore_errors=True)
+        _delete(gone)
 
 
 def lives(folder: Path) -> bool | None:
@@ -113,8 +143,11 @@ def lives(folder: Path) -> bool | None:
         return True
 
 
-def _lock_of(folder: Path) -> int:
-    """The lock of a folder that this process has just made; FileNotFoundError or BlockingIOError where somebody sweeps it."""
+def _lock_of(folder: Path, is_sure: bool) -> int:
+    """The lock of a folder that this process has just made; FileNotFoundError or BlockingIOError where somebody sweeps it.
+
+    `is_sure` where files are known by their numbers, which some file systems in user space change all the time.
+    """
     try:
         lock = os.open(folder / LOCK, OPEN | os.O_CREAT)
     except FileNotFoundError:
@@ -123,7 +156,7 @@ def _lock_of(folder: Path) -> int:
         folder.rmdir()
         raise
     try:
-        if _take(lock) and not os.path.samestat(os.fstat(lock), (folder / LOCK).stat()):
+        if _take(lock) and not os.path.samestat(os.fstat(lock), (folder / LOCK).stat()) and is_sure:
             raise FileNotFoundError(folder)
     except OSError:
         os.close(lock)
@@ -158,10 +191,12 @@ def _take(lock: int) -> bool:
             import fcntl
 
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except (BlockingIOError, PermissionError) as error:
-        raise BlockingIOError(error.errno, "another process has it") from None
-    except OSError:
-        return False
+    except BlockingIOError:
+        raise
+    except OSError as error:
+        if sys.platform == "win32" and isinstance(error, PermissionError):
+            raise BlockingIOError(error.errno, "another process has it") from None
+        return False  # a system that forbids locks has none
     return True
 
 
@@ -175,8 +210,34 @@ def _is_stale(folder: Path) -> bool:
 
 
 def _out_of_the_way(folder: Path) -> Path:
-    """Rename a folder, so that a maker that wakes up after all finds nothing of it, rather than a part."""
-    if not folder.name.endswith("~"):
+    """Rename a folder that is about to be removed, so that nobody takes a part of it for the whole: neither those who sweep nor
+    a maker that wakes up after all.
+    """
+    if not folder.name.endswith(HALF):
         with suppress(OSError):  # Windows renames no folder of an open file
-            return folder.rename(folder.with_name(f"{folder.name}~"))
+            return folder.rename(folder.with_name(f"{folder.name}{HALF}"))
     return folder
+
+
+def _delete(folder: Path) -> None:
+    """Delete a folder that nobody holds any more, its lock first: where Windows refuses that, another process has it open, and
+    the folder is that one's to remove.
+    """
+    gone = _out_of_the_way(folder)
+    try:
+        (gone / LOCK).unlink(missing_ok=True)
+    except OSError:
+        return
+    shutil.rmtree(gone, ignore_errors=True)
+
+
+def _forget() -> None:
+    """Close the locks in a forked process, so that they go with the one that made them."""
+    for made in _held:
+        with suppress(OSError):
+            os.close(made.lock)
+    _held.clear()
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_forget)

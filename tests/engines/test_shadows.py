@@ -471,23 +471,23 @@ def prism(sides, turn, radius=0.6, height=1.2):
 
 @pytest.mark.parametrize("kind", ["ball", "level area", "upright area"])
 @pytest.mark.parametrize("sides", [3, 4, 5, 6, 8, 12, 24])
-@pytest.mark.parametrize("draw", [0, pytest.param(1, marks=pytest.mark.slow)])
-def test_lamps_in_closed_prisms_light_nothing_outside(kind, sides, draw):
+def test_lamps_in_closed_prisms_light_nothing_outside(kind, sides):
     """However many walls there are and however they are turned; places from half a millimetre beside the foot to 3 m away."""
-    rng = np.random.default_rng((sides, draw))
+    rng = np.random.default_rng(sides)
     inner = 0.6 * math.cos(math.pi / sides)
-    turn, way = rng.uniform(0, 2 * np.pi, 2)
-    x, y, z = (rng.uniform(-0.3, 0.3, 3) * [inner, inner, 1]).tolist()
-    aim = (x, y, -9) if kind == "level area" else (x + math.cos(way), y + math.sin(way), z)
-    lamp = AreaLight(position=(x, y, z), toward=aim, strength=5, size=(0.5 * inner, 0.3 * inner))
-    if kind == "ball":
-        lamp = PointLight(position=(x, y, z), strength=5, radius=0.4 * inner)
-    stage = LightStage(flat(prism(sides, turn)))
-    angle = rng.uniform(0, 2 * np.pi, 4000)
-    across = np.cos((angle - turn) % (2 * np.pi / sides) - np.pi / sides)
-    r = (inner + 10 ** rng.uniform(-3.3, 0.5, 4000)) / across
-    beside = points(np.stack([r * np.cos(angle), r * np.sin(angle), 0 * r], axis=1), (0, 0, 1), 0.01, True)
-    assert stage.arrives(stage.lights([], [lamp]), 0, beside)["irradiance"].max() == 0
+    for _ in range(2):
+        turn, way = rng.uniform(0, 2 * np.pi, 2)
+        x, y, z = (rng.uniform(-0.3, 0.3, 3) * [inner, inner, 1]).tolist()
+        aim = (x, y, -9) if kind == "level area" else (x + math.cos(way), y + math.sin(way), z)
+        lamp = AreaLight(position=(x, y, z), toward=aim, strength=5, size=(0.5 * inner, 0.3 * inner))
+        if kind == "ball":
+            lamp = PointLight(position=(x, y, z), strength=5, radius=0.4 * inner)
+        stage = LightStage(flat(prism(sides, turn)))
+        angle = rng.uniform(0, 2 * np.pi, 4000)
+        across = np.cos((angle - turn) % (2 * np.pi / sides) - np.pi / sides)
+        r = (inner + 10 ** rng.uniform(-3.3, 0.5, 4000)) / across
+        beside = points(np.stack([r * np.cos(angle), r * np.sin(angle), 0 * r], axis=1), (0, 0, 1), 0.01, True)
+        assert stage.arrives(stage.lights([], [lamp]), 0, beside)["irradiance"].max() == 0
 
 
 def test_lights_at_awkward_places_give_finite_light():

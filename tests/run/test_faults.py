@@ -16,15 +16,13 @@ from pathlib import Path
 import pytest
 
 from deadline import DEADLINE
-from faults import SIGNALS, WORKS, Course, Tally, finished, make_stock, recipe, small_disk, torn
+from faults import SIGNALS, WORKS, Course, Tally, finished, make_stock, recipe, small_disk, torn, workers_of
 from small import tree_hash
 from viewsphere.aside import aside
 from viewsphere.run.generate import generate
 from viewsphere.store import Store
 
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(sys.platform != "linux", reason="signals, and /proc")]
-
-rooted = pytest.mark.skipif(os.name == "nt" or os.geteuid() != 0, reason="mounts a file system")
 
 OBEDIENT = ("setpriv", "--bounding-set=-dac_override,-dac_read_search", "--inh-caps=-all")
 """Before a command: even root may not write where the mode of a folder forbids it."""
@@ -42,11 +40,30 @@ def whole(stock):
     return stock / "whole"
 
 
+@pytest.fixture(scope="module")
+def mounts(tmp_path_factory):
+    """Skips where no file system can be mounted: containers forbid it even to root."""
+    try:
+        with small_disk(tmp_path_factory.mktemp("probe"), size="64k") as change:
+            change(ro="")
+    except (OSError, subprocess.CalledProcessError) as error:
+        pytest.skip(f"mounts a file system: {error}")
+
+
+@pytest.fixture(scope="module")
+def obedient():
+    """Words before a command that has to obey the modes of folders; skips where root cannot be made to."""
+    if os.geteuid() != 0:
+        return ()
+    if not shutil.which("setpriv") or subprocess.run([*OBEDIENT, "true"], capture_output=True).returncode:
+        pytest.skip("needs setpriv that may take rights from root")
+    return OBEDIENT
+
+
 @pytest.mark.parametrize("work", WORKS)
 def test_kills_at_any_moment(work, stock, tmp_path):
     course = Course(WORKS[work], stock, tmp_path, random.Random(f"kills {work}"))
-    for _ in range(3):
-        course.hit(SIGNALS["SIGKILL of everything"])
+    course.suffer(SIGNALS["SIGKILL of everything"], 3)
     course.renew()
     assert course.tally.is_good, course.tally
 
@@ -54,8 +71,7 @@ def test_kills_at_any_moment(work, stock, tmp_path):
 @pytest.mark.parametrize("fault", [fault for fault in SIGNALS if fault != "SIGKILL of everything"])
 def test_signals_at_any_moment(fault, stock, tmp_path):
     course = Course(WORKS["render"], stock, tmp_path, random.Random(f"signals {fault}"))
-    for _ in range(2):
-        course.hit(SIGNALS[fault])
+    course.suffer(SIGNALS[fault], 2)
     course.renew()
     assert course.tally.is_good, course.tally
     if fault in ("SIGTERM", "Ctrl-C", "workers SIGSTOPped, Ctrl-C"):
@@ -79,7 +95,7 @@ def ended(process: subprocess.Popen[str], words: str) -> None:
     assert "Traceback" not in said
 
 
-@rooted
+@pytest.mark.usefixtures("mounts")
 @pytest.mark.parametrize(("what", "ample"), [("size", 1 << 26), ("nr_inodes", 20_000)], ids=["bytes", "inodes"])
 def test_a_full_disk(what, ample, stock, whole, tmp_path):
     """It ends among the shots, again and again, and then there is room."""
@@ -100,7 +116,7 @@ def test_a_full_disk(what, ample, stock, whole, tmp_path):
         assert tree_hash(out) == tree_hash(whole)
 
 
-@rooted
+@pytest.mark.usefixtures("mounts")
 def test_a_disk_that_cannot_be_written_from_the_start(stock, whole, tmp_path):
     with small_disk(tmp_path / "disk", size="64m") as change:
         change(ro="")
@@ -118,10 +134,9 @@ def forbid(out: Path, mode: int) -> None:
         folder.chmod(mode)
 
 
-@pytest.mark.skipif(not shutil.which("setpriv"), reason="needs setpriv")
-def test_a_folder_that_cannot_be_written_any_more(stock, whole, tmp_path):
+def test_a_folder_that_cannot_be_written_any_more(obedient, stock, whole, tmp_path):
     out = tmp_path / "out"
-    process = WORKS["render"].start(stock, out, *(OBEDIENT if os.geteuid() == 0 else ()))
+    process = WORKS["render"].start(stock, out, *obedient)
     end = time.monotonic() + DEADLINE
     while len(finished(out)) < 2 and process.poll() is None and time.monotonic() < end:
         time.sleep(0.01)
@@ -129,7 +144,7 @@ def test_a_folder_that_cannot_be_written_any_more(stock, whole, tmp_path):
     forbid(out, 0o555)
     ended(process, "Permission denied; what is finished is kept")
     assert there <= finished(out)
-    process = WORKS["render"].start(stock, out, *(OBEDIENT if os.geteuid() == 0 else ()))
+    process = WORKS["render"].start(stock, out, *obedient)
     ended(process, "expected a writable output folder, found one that cannot be written")
     forbid(out, 0o755)
     assert not torn(out, whole)
@@ -154,6 +169,30 @@ def test_clocks_that_jump(stock, whole, tmp_path, monkeypatch):
         assert (others / "half").is_file()
     generate(recipe(), store.root)
     assert tree_hash(store.root) == tree_hash(whole)
+
+
+def test_faults_that_hit_nothing_do_not_count(stock, tmp_path):
+    """A run that has ended; and workers are waited for."""
+    for fault in SIGNALS.values():
+        process = subprocess.Popen(["true"], stderr=subprocess.PIPE, text=True, start_new_session=True)
+        process.wait(DEADLINE)
+        tally = Tally()
+        tally.add(process, fault(process))
+        assert tally.times == 0
+    process = WORKS["render"].start(stock, tmp_path / "out")
+    assert SIGNALS["SIGKILL of a worker"](process)
+    assert process.communicate(timeout=DEADLINE)[1] == ""
+
+
+def test_a_worker_that_ends_while_it_is_looked_at_is_left_out(tmp_path):
+    for number, words in ((5, b"python\0-c\0spawn_main()"), (6, b"python\0-c\0other()")):
+        process = tmp_path / f"{number}"
+        process.mkdir()
+        (process / "stat").write_text(f"{number} (a (b) c) S 1 2 3")
+        (process / "cmdline").write_bytes(words)
+    (tmp_path / "7").mkdir()
+    assert workers_of(1, tmp_path) == [5]
+    assert workers_of(2, tmp_path) == []
 
 
 def test_a_tally_knows_bad_from_good(stock, whole, tmp_path):

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 import viewsphere as vs
+from faults import workers_of
 from small import small_recipe
 from viewsphere.errors import UserError, ViewsphereError, WorkerDied
 from viewsphere.model.model_spec import ModelSpec
@@ -130,17 +131,11 @@ def _killed(folder):
     os.kill(os.getpid(), signal.SIGKILL)
 
 
-def _children(parent):
-    """The processes that a process started by `multiprocessing`."""
-    pids = Path(f"/proc/{parent}/task/{parent}/children").read_text().split()
-    return {pid for pid in pids if "spawn_main" in Path(f"/proc/{pid}/cmdline").read_text()}
-
-
 def _while_alone(folder, parent, before):
     """Dies at first, and then says who else is at work."""
     if _note(folder) == 1:
         os._exit(3)
-    raise UserError(f"{len(_children(parent) - before)} workers")
+    raise UserError(f"{len(set(workers_of(parent)) - before)} workers")
 
 
 class Calls:
@@ -179,7 +174,7 @@ def test_a_worker_that_dies_costs_a_retry_then_an_error(task, said, tmp_path):
 
 @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
 def test_it_is_tried_again_alone_when_all_others_are_done(tmp_path):
-    before = _children(os.getpid())
+    before = set(workers_of(os.getpid()))
     notes = tmp_path / "notes"
     notes.mkdir()
     tasks = {"bad": Calls(_while_alone, notes, os.getpid(), before), **dict.fromkeys(("a", "b", "c"), LOOK_AT_CHAIR)}

@@ -8,6 +8,7 @@ what was finished is there.
 
 from __future__ import annotations
 
+import errno
 import os
 import sys
 import time
@@ -30,6 +31,10 @@ WAITS_S = (0.02, 0.05, 0.1, 0.2, 0.4, 0.8) if os.name == "nt" else ()
 """Seconds before each further try. Windows refuses to move what another program has open, and virus scanners and indexers
 open what was just written."""
 
+NOT_OURS = {errno.EACCES, errno.EPERM, errno.EINVAL, errno.ENOTSUP, errno.EOPNOTSUPP}
+"""What systems say of folders that are not ours to write to the disk, or that their file system does not write so, as that of
+automatic mounts."""
+
 
 def durability() -> str:
     """What is asked for; raises UserError where that is unknown."""
@@ -44,13 +49,26 @@ def move(source: Path, target: Path) -> None:
 
     Raises OSError; where refusals pass (`WAITS_S`), after the last try.
     """
-    is_durable = durability() == "fsync"
-    if is_durable:
-        _write_through(source)
+    write_through(source)
     _rename(source, target)
-    if is_durable:
+    if durability() == "fsync":
         for folder in target.parents:
             _write_entries(folder)
+
+
+def write_through(path: Path) -> None:
+    """Have the disk keep a file, or a folder with all that is in it, its entries last, if that is asked for; raises OSError."""
+    if durability() != "fsync":
+        return
+    if not path.is_dir():
+        _sync(path)
+        return
+    inside = list(os.walk(path, topdown=False))
+    with ThreadPoolExecutor(AT_ONCE) as pool:
+        for _ in pool.map(_sync, (Path(top, name) for top, _, names in inside for name in names)):
+            pass
+    for folder, _, _ in inside:
+        _write_entries(Path(folder))
 
 
 def _rename(source: Path, target: Path) -> None:
@@ -63,24 +81,14 @@ def _rename(source: Path, target: Path) -> None:
     os.replace(source, target)  # noqa: PTH105
 
 
-def _write_through(path: Path) -> None:
-    """Have the disk keep a file, or a folder with all that is in it, its entries last."""
-    if not path.is_dir():
-        _sync(path)
-        return
-    inside = list(os.walk(path, topdown=False))
-    with ThreadPoolExecutor(AT_ONCE) as pool:
-        for _ in pool.map(_sync, (Path(top, name) for top, _, names in inside for name in names)):
-            pass
-    for folder, _, _ in inside:
-        _write_entries(Path(folder))
-
-
 def _write_entries(folder: Path) -> None:
     """Have the disk keep which names are in a folder, where that is ours to ask for."""
     if os.name != "nt":  # which keeps them with the files
-        with suppress(PermissionError):
+        try:
             _sync(folder)
+        except OSError as error:
+            if error.errno not in NOT_OURS:
+                raise
 
 
 def _sync(path: Path) -> None:
@@ -89,8 +97,9 @@ def _sync(path: Path) -> None:
         if sys.platform == "darwin":
             import fcntl
 
-            fcntl.fcntl(descriptor, fcntl.F_FULLFSYNC)  # fsync leaves it in the disk's own memory there
-        else:
-            os.fsync(descriptor)
+            with suppress(OSError):  # network file systems have none
+                fcntl.fcntl(descriptor, fcntl.F_FULLFSYNC)  # fsync leaves it in the disk's own memory there
+                return
+        os.fsync(descriptor)
     finally:
         os.close(descriptor)

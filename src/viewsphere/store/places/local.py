@@ -14,7 +14,7 @@ from pathlib import Path
 from viewsphere.aside import Aside, aside, left_by_dead, of_this_process, sweep
 from viewsphere.errors import StoreError
 from viewsphere.store.manifest import MANIFEST
-from viewsphere.store.moving import move
+from viewsphere.store.moving import move, write_through
 
 NEW, OLD = "new", "old"
 """What is being made, aside; and below the other, by its path in the data set, what it takes the place of."""
@@ -24,6 +24,9 @@ LOCK_S = 600
 
 NO_LOCKS = {errno.ENOLCK, errno.ENOSYS, errno.ENOTSUP, errno.EOPNOTSUPP}
 """What file systems say that have no locks."""
+
+TAKEN = {errno.ENOTEMPTY, errno.EEXIST}
+"""What POSIX systems say where another run was faster; Windows says it as it says all that it refuses."""
 
 
 @dataclass(frozen=True)
@@ -107,8 +110,13 @@ class Local:
         """As `Place` says."""
         with disk_errors(self.root):
             self._writing.mkdir(parents=True, exist_ok=True)
-            with aside(self._writing) as own:
-                yield own
+            own = Aside.make(self._writing)
+            try:
+                yield own.folder
+            except BaseException:
+                self._give_up(own)
+                raise
+            own.remove()
 
     def put(self, made: Path, target: Path) -> None:
         """As `Place` says."""
@@ -126,19 +134,20 @@ class Local:
 
     def replace(self, made: Path, target: Path) -> None:
         """As `Place` says. The old folder goes with what is aside; and so does what other runs put there at this moment. It is
-        never lost: where a run dies between the two, the next one puts it back.
+        never lost: where this ends between the two, `aside` puts it back; where the process dies, the next run.
         """
         target.parent.mkdir(parents=True, exist_ok=True)
         old = made.parent / OLD / target.relative_to(self.root)
         old.parent.mkdir(parents=True)
+        write_through(made)  # what takes longest, and fails on a full disk, comes before the old leaves
         for another in count():
             with suppress(FileNotFoundError):  # there is none, or another run has moved it
                 move(target, made.parent / f"{another}" if old.exists() else old)
             try:
                 move(made, target)
                 return
-            except OSError:
-                if not target.exists():
+            except OSError as error:
+                if not made.exists() or (error.errno not in TAKEN and not target.exists()):
                     raise
 
     def remove(self, folder: Path) -> None:
@@ -155,11 +164,32 @@ class Local:
     def _sweep(self) -> None:
         """Remove what dead writers left unfinished; what they were about to replace comes back."""
         for left in left_by_dead(self._writing):
-            for old in _replaced(left / OLD):
-                target = self.root / old.relative_to(left / OLD)
-                if not target.exists():
-                    target.parent.mkdir(parents=True, exist_ok=True)
+            self._put_back(left)
+
+    def _give_up(self, own: Aside) -> None:
+        """Remove what came to nothing; where what it was about to replace cannot be put back now, the next sweep does it."""
+        is_back = False
+        try:
+            with suppress(OSError):
+                self._put_back(own.folder)
+                is_back = True
+        finally:
+            if is_back:
+                own.remove()
+            else:
+                own.leave()
+
+    def _put_back(self, left: Path) -> None:
+        """Put back what was about to be replaced, where nothing has taken its place."""
+        for old in _replaced(left / OLD):
+            target = self.root / old.relative_to(left / OLD)
+            if not target.exists():
+                target.parent.mkdir(parents=True, exist_ok=True)
+                try:
                     move(old, target)
+                except OSError:
+                    if not target.exists():  # else another run was faster
+                        raise
 
     @contextmanager
     def new(self) -> Generator[Path]:
