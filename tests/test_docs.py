@@ -35,7 +35,7 @@ def test_readme_s_scripts_exist():
 def test_readme_s_commands_and_code_run(tmp_path):
     commands = re.findall(r"^(viewsphere [^#\n]+)", README, re.MULTILINE)
     assert len(commands) >= 5
-    for line in commands:
+    for line in (line for line in commands if not line.startswith("viewsphere view")):  # which goes on until Ctrl-C
         words = [sys.executable, "-m", *line.split()]
         run = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, timeout=DEADLINE)
         assert run.returncode == 0, f"{line}\n{run.stdout}{run.stderr}"

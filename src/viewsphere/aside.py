@@ -193,6 +193,8 @@ def _take(lock: int) -> bool:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
         raise
+    except ImportError:  # neither Windows nor POSIX
+        return False
     except OSError as error:
         if sys.platform == "win32" and isinstance(error, PermissionError):
             raise BlockingIOError(error.errno, "another process has it") from None

@@ -63,7 +63,7 @@ def obedient():
 @pytest.mark.parametrize("work", WORKS)
 def test_kills_at_any_moment(work, stock, tmp_path):
     course = Course(WORKS[work], stock, tmp_path, random.Random(f"kills {work}"))
-    course.suffer(SIGNALS["SIGKILL of everything"], 3)
+    course.suffer(SIGNALS["SIGKILL of everything"], 1)
     course.renew()
     assert course.tally.is_good, course.tally
 
@@ -71,7 +71,7 @@ def test_kills_at_any_moment(work, stock, tmp_path):
 @pytest.mark.parametrize("fault", [fault for fault in SIGNALS if fault != "SIGKILL of everything"])
 def test_signals_at_any_moment(fault, stock, tmp_path):
     course = Course(WORKS["render"], stock, tmp_path, random.Random(f"signals {fault}"))
-    course.suffer(SIGNALS[fault], 2)
+    course.suffer(SIGNALS[fault], 1)
     course.renew()
     assert course.tally.is_good, course.tally
     if fault in ("SIGTERM", "Ctrl-C", "workers SIGSTOPped, Ctrl-C"):

@@ -131,8 +131,9 @@ class LocalCrew:
 
     def _give_to(self, hand: _Hand | None, job: Job, busy: dict[Connection, _Hand]) -> None:
         if hand is None:
-            hand = _Hand(self._root, self._portion)
-            self._hands.append(hand)
+            with _deaf():  # until it is known here, so that it is ended with the others
+                hand = _Hand(self._root, self._portion)
+                self._hands.append(hand)
         busy[hand.pipe] = hand
         hand.give(job)
 
@@ -188,8 +189,7 @@ class _Hand:
         context = get_context("spawn")
         self.pipe, theirs = context.Pipe()
         self.process = context.Process(target=_serve, args=(theirs, root, portion), daemon=True)
-        with _deaf():
-            self.process.start()
+        self.process.start()
         theirs.close()
         self.line = ""
         self.job: Job | None = None
