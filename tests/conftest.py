@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import signal
 
 import pytest
 from hypothesis import settings
@@ -27,6 +28,9 @@ SETTLED = """async () => {
     return [...document.querySelectorAll("canvas")].every((canvas) => canvas.drawing === canvas.drawn)
         && [...document.images].every((image) => image.complete || image.loading === "lazy");
 }"""
+
+if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:  # as a shell's jobs in the background have it, and all that they start
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 settings.register_profile("repeatable", derandomize=True, database=None, deadline=None, max_examples=EXAMPLES)
 settings.load_profile("repeatable")
