@@ -19,8 +19,8 @@ from viewsphere.run.exporting import export
 from viewsphere.run.merging import merge
 from viewsphere.store import Store, located
 from viewsphere.store.checksums import CHECKSUMS
-from viewsphere.store.places import byte_range, files_below, here, remote_path
-from viewsphere.store.places.remote_path import RemotePath
+from viewsphere.urls import byte_range, files_below, here, remote_path
+from viewsphere.urls.remote_path import RemotePath
 
 FEW = {
     "viewpoints": {"azimuth": [0, 120], "elevation": [15], "distance": 1.0},

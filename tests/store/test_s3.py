@@ -15,7 +15,7 @@ from viewsphere.check import check
 from viewsphere.check.repair import repair
 from viewsphere.errors import RemoteError
 from viewsphere.store import located
-from viewsphere.store.places import files_below, remote_path
+from viewsphere.urls import files_below, remote_path
 
 pytestmark = pytest.mark.slow
 

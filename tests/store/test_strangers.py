@@ -23,8 +23,9 @@ from viewsphere.run.exporting import export
 from viewsphere.run.importing import import_dataset
 from viewsphere.store import Dataset
 from viewsphere.store.manifest import MANIFEST, Manifest, sealed, unsealed
-from viewsphere.store.paths import file_inside, is_inside, is_name
+from viewsphere.store.paths import file_inside, is_name
 from viewsphere.store.texts import parsed
+from viewsphere.urls.inside import is_inside
 
 SECRET = b"nobody's business"
 OUT = "../../../../../../"

@@ -21,7 +21,7 @@ from viewsphere.run.exporting import export
 from viewsphere.run.merging import merge
 from viewsphere.store import located
 from viewsphere.store.manifest import SHARD, Manifest, digest
-from viewsphere.store.places import files_below
+from viewsphere.urls import files_below
 
 CHANNELS = ["rgb", "depth", "instances", "normals"]
 FORMATS = ["coco", "csv", "native", "webdataset"]

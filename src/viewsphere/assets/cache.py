@@ -18,8 +18,6 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-import platformdirs
-
 from viewsphere.aside import aside, sweep, temporary
 from viewsphere.assets.inside import split_source
 from viewsphere.assets.isolated import read_apart
@@ -29,6 +27,7 @@ from viewsphere.assets.mesh_file import read_mesh
 from viewsphere.assets.normalise import normalise
 from viewsphere.assets.parts import taken
 from viewsphere.assets.primitive import FileFacts, extents
+from viewsphere.caches import cache_of
 from viewsphere.errors import ModelError
 from viewsphere.limits import limits
 from viewsphere.model.model_spec import ModelSpec
@@ -168,7 +167,7 @@ def load_zoo(spec: ModelSpec, build: Callable[[ModelSpec], Mesh] | None) -> tupl
 
 def cache_folder() -> Path:
     """Where models are cached: `$VIEWSPHERE_CACHE/models`, else in the user's cache folder."""
-    return Path(os.environ.get("VIEWSPHERE_CACHE") or platformdirs.user_cache_dir("viewsphere")) / "models"
+    return cache_of("models")
 
 
 def _first_digest(path: Path, inside: tuple[str, ...], spec: ModelSpec, frame: int | None) -> str:

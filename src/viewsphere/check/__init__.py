@@ -33,7 +33,7 @@ from viewsphere.store import Dataset, ModelInfo, PlanRecord, Row
 from viewsphere.store.checksums import damaged_files, written_least, written_options
 from viewsphere.store.credits import credits_problem
 from viewsphere.store.index import numbers
-from viewsphere.store.places import here
+from viewsphere.urls import here
 
 
 @dataclass(frozen=True)

@@ -21,8 +21,8 @@ from viewsphere.model.thing import Thing
 from viewsphere.run.tasks import SceneryRecord
 from viewsphere.store import Dataset, depth_step
 from viewsphere.store.channel_files import MOST_STEPS
-from viewsphere.store.places import here
 from viewsphere.truth.visibility import EDGE_ON
+from viewsphere.urls import here
 
 Float = NDArray[np.float64]
 

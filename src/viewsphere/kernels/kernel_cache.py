@@ -10,7 +10,8 @@ from importlib.metadata import version
 from pathlib import Path
 
 import llvmlite.binding
-import platformdirs
+
+from viewsphere.caches import cache_of
 
 QUICKER = ("0.66", "0.67", "0.68")
 """numba's minor versions whose internals are as `compiler` and `lowering` expect; with other versions `stock` compiles."""
@@ -27,7 +28,7 @@ def kernel_folder() -> Path:
     """Where compiled kernels are kept: `$NUMBA_CACHE_DIR`, `$VIEWSPHERE_CACHE/kernels`, or in the user's cache folder."""
     if os.environ.get("NUMBA_CACHE_DIR"):
         return Path(os.environ["NUMBA_CACHE_DIR"])
-    return Path(os.environ.get("VIEWSPHERE_CACHE") or platformdirs.user_cache_dir("viewsphere")) / "kernels"
+    return cache_of("kernels")
 
 
 @cache

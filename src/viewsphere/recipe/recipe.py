@@ -261,12 +261,15 @@ class Recipe(Shown, Frozen):
     def load(cls, path: str | PathLike[str], changes: Mapping[str, Any] | None = None) -> Self:
         """Read a recipe file and those it extends; `changes` are fields to set: `{"viewpoints.elevation": [10, 20]}`.
 
-        Raises RecipeError with file, line and field of every mistake.
+        A recipe at a URL (`s3://bucket/cars/recipe.yaml`) is copied here with all that lies in its folder. Raises RecipeError
+        with file, line and field of every mistake, RemoteError where a URL does not answer.
         """
         from viewsphere.recipe.extends import assemble
+        from viewsphere.recipe.fetched import fetched
 
-        data, marks = assemble(Path(path), _plain(changes))
-        return cls.model_validate(data, context={"marks": marks, "folder": Path(path).parent})
+        file = fetched(path)
+        data, marks = assemble(file, _plain(changes))
+        return cls.model_validate(data, context={"marks": marks, "folder": file.parent})
 
     @classmethod
     def of(cls, recipe: Recipe | str | PathLike[str]) -> Recipe:

@@ -23,7 +23,7 @@ from viewsphere.report.table import FrameTable, read_table
 from viewsphere.report.unknown import numbers
 from viewsphere.store import Dataset, ModelInfo
 from viewsphere.store.films import Film, films_of
-from viewsphere.store.places import here
+from viewsphere.urls import here
 
 LIMIT = 20_000_000
 """Bytes that the page may have at most."""

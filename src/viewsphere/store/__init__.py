@@ -20,9 +20,9 @@ from viewsphere.store.dataset import Dataset
 from viewsphere.store.exported import Exported
 from viewsphere.store.folder import Store, new_folder
 from viewsphere.store.index import Block, Row
-from viewsphere.store.places import located
 from viewsphere.store.records import Category, ModelInfo, Part, PlanRecord
 from viewsphere.store.watching import Finished, Watch
+from viewsphere.urls import located
 
 __all__ = [
     "Block",

@@ -25,8 +25,8 @@ import xxhash
 from viewsphere.errors import StoreError
 from viewsphere.store.manifest import seal_of
 from viewsphere.store.paths import file_inside
-from viewsphere.store.places import files_below
 from viewsphere.store.texts import parsed
+from viewsphere.urls import files_below
 
 CHECKSUMS = "checksums.xxh128"
 """Name of the file in an export's folder."""

@@ -27,12 +27,12 @@ from viewsphere.store.foreign import Loaded
 from viewsphere.store.index import Row
 from viewsphere.store.manifest import MANIFEST, Manifest
 from viewsphere.store.paths import file_inside, files_inside, names
-from viewsphere.store.places import link_file, located
 from viewsphere.store.point_tracks import PointTracks, joined
 from viewsphere.store.records import Category, ModelInfo
 from viewsphere.store.sample_records import ShotRecords, from_whole_sample
 from viewsphere.store.selection import Selection
 from viewsphere.store.texts import parsed
+from viewsphere.urls import link_file, located
 
 
 class Dataset(Shown, Sequence[Sample]):

@@ -12,10 +12,10 @@ from viewsphere.model.files import Files
 from viewsphere.store.folder import Store
 from viewsphere.store.foreign import ForeignFrame, Loaded
 from viewsphere.store.manifest import MANIFEST
-from viewsphere.store.places import link_file
 from viewsphere.store.records import ModelInfo
 from viewsphere.store.sample_records import whole_sample
 from viewsphere.store.shot_files import ShotFiles
+from viewsphere.urls import link_file
 
 
 def link_model(store: Store, key: str, info: ModelInfo, files: Iterable[Path], **changed: Any) -> None:

@@ -21,9 +21,10 @@ from typing import Any
 import xxhash
 
 from viewsphere.errors import StoreError
-from viewsphere.store.paths import file_inside, is_inside
-from viewsphere.store.places import byte_range
+from viewsphere.store.paths import file_inside
 from viewsphere.store.texts import parsed
+from viewsphere.urls import byte_range
+from viewsphere.urls.inside import is_inside
 
 MANIFEST = "manifest.json"
 """Name of the file in a finished folder."""

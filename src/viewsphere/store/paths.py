@@ -6,16 +6,13 @@ Whoever turns a stored path into a file does it here.
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Sequence
-from pathlib import Path, PurePosixPath, PureWindowsPath
+from pathlib import Path
 from stat import S_ISLNK
 
 from viewsphere.errors import StoreError
-from viewsphere.store.places import RemotePath
-
-_PLAIN = re.compile(r"[\w+-][\w+.-]*(?:/[\w+-][\w+.-]*)*", re.ASCII)
-"""Relative paths that mean the same on every system; other ones are looked at more closely."""
+from viewsphere.urls import RemotePath
+from viewsphere.urls.inside import PLAIN, is_inside
 
 
 def file_inside(root: Path, relative: str) -> Path:
@@ -46,7 +43,7 @@ def file_inside(root: Path, relative: str) -> Path:
 
 def _is_straight(root: Path, relative: str) -> bool:
     """Whether nothing on the way from a folder to what lies below it is a link; False, too, where that is not plain to see."""
-    if os.name == "nt" or not _PLAIN.fullmatch(relative):
+    if os.name == "nt" or not PLAIN.fullmatch(relative):
         return False
     place = str(root)
     for name in relative.split("/"):
@@ -65,14 +62,6 @@ def files_inside(root: Path, folder: Path) -> Sequence[Path]:
     """The files that lie in a folder of the data set, sorted; raises StoreError as `file_inside` does."""
     found = (file_inside(root, (folder / path.name).relative_to(root).as_posix()) for path in sorted(folder.iterdir()))
     return tuple(file for file in found if file.is_file())
-
-
-def is_inside(relative: str) -> bool:
-    """Whether a path is relative on every system, and goes up nowhere."""
-    if _PLAIN.fullmatch(relative):
-        return True
-    path, on_windows = PurePosixPath(relative), PureWindowsPath(relative)
-    return not (path.is_absolute() or on_windows.anchor or ".." in on_windows.parts or "\0" in relative)
 
 
 def is_name(text: object) -> bool:

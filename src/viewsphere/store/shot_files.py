@@ -12,7 +12,7 @@ import xxhash
 from viewsphere.codecs import tar
 from viewsphere.model.files import Files
 from viewsphere.store.manifest import SHARD, Manifest, Seal, Span, digest, seal_of
-from viewsphere.store.places import link_file
+from viewsphere.urls import link_file
 
 
 class ShotFiles:

@@ -28,7 +28,7 @@ from viewsphere.model.sample import Sample
 from viewsphere.report.paths import without_folders
 from viewsphere.report.table import FRAME, OBJECT, Columns, FrameTable, Rows, table_of
 from viewsphere.store import Dataset, Watch
-from viewsphere.store.places import RemotePath
+from viewsphere.urls import RemotePath
 
 LISTED = np.dtype([("number", "i8"), ("made", "f8")])
 """A finished frame: its number in the plan, and when it was finished, in seconds since 1970."""

@@ -37,7 +37,7 @@ from viewsphere.model.scene import Matrix4, Scene
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Motion, Thing, TimeStep
 from viewsphere.store import Dataset
-from viewsphere.store.places import here
+from viewsphere.urls import here
 from viewsphere.zoo import build
 
 ENGINE = "cycles"

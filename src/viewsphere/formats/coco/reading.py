@@ -20,8 +20,9 @@ from viewsphere.geometry.mask import rle_of_runs, rle_runs
 from viewsphere.model.sample import Box, Sample
 from viewsphere.store import Category
 from viewsphere.store.foreign import ForeignDataset, ForeignFrame, foreign_object, refuse_broken
-from viewsphere.store.paths import file_inside, is_inside
+from viewsphere.store.paths import file_inside
 from viewsphere.store.texts import parsed
+from viewsphere.urls.inside import is_inside
 
 LARGEST_ID = 2**63
 LARGEST_CATEGORY = 2**31

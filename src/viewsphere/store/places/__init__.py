@@ -1,13 +1,4 @@
-"""Where data sets lie: on a disk, or at a URL of any kind that fsspec knows (`s3://`, `gs://`, `az://`, `memory://`, ...).
-
-A data set's root is a path, and all else is named below it. The root of one on a disk is a `pathlib.Path`; that of one at a URL
-is a `RemotePath`, which has those methods of a Path that read and list, and no others, so that nothing is done to the disk by
-mistake:
-
-    read    path.read_bytes(), path.read_text(), path.open() in blocks; `byte_range` of a file
-    list    path.iterdir(), path.glob(), path.is_file(), path.is_dir(), path.stat(); `files_below` a folder
-    link    `link_file`: hard links on one disk, else a copy
-    local   `here`: a file or folder for programs that need it on this machine
+"""Where data sets are written: on a disk, or at a URL. What reads them is the same for both (`viewsphere.urls`).
 
 What is written goes by a `Place`: it is made in a folder of this machine's that is aside, and put in its place when it is
 whole. A disk does that by a rename. A URL has none: files are uploaded, and the one that tells that a folder is whole comes
@@ -17,19 +8,12 @@ the same shot put the same bytes there. Files of the store are never changed, so
 
 from __future__ import annotations
 
-import os
-import re
-import shutil
-from collections.abc import Generator, Iterator
-from contextlib import AbstractContextManager, contextmanager, suppress
+from collections.abc import Iterator
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Protocol
 
-from viewsphere.aside import temporary
-from viewsphere.store.places.remote_path import RemotePath
-
-_URL = re.compile(r"[A-Za-z][A-Za-z0-9+.:-]+:/")
-"""How a URL begins, also where pathlib has made one slash of two; drives of Windows have but one letter."""
+from viewsphere.urls import RemotePath
 
 
 class Place(Protocol):
@@ -98,20 +82,6 @@ class Place(Protocol):
         ...
 
 
-def located(root: str | os.PathLike[str]) -> Path:
-    """The path of a data set's root: that of a folder, or a `RemotePath` for a URL. Raises UserError for a URL with a password,
-    which would be shown and kept.
-    """
-    if isinstance(root, RemotePath):
-        return root
-    text = os.fspath(root)
-    if not _URL.match(text):
-        return Path(root)
-    if text.startswith("file:"):
-        return Path("/" + text.removeprefix("file:").lstrip("/"))
-    return RemotePath.of(text)
-
-
 def place_of(root: Path) -> Place:
     """What writes below this root."""
     if isinstance(root, RemotePath):
@@ -121,69 +91,3 @@ def place_of(root: Path) -> Place:
     from viewsphere.store.places.local import Local
 
     return Local(root)
-
-
-def files_below(folder: Path) -> Iterator[str]:
-    """Paths, from a folder, of all files in it and below, in an order that does not depend on the disk."""
-    if isinstance(folder, RemotePath):
-        yield from folder.files_below()
-        return
-    for place, folders, names in os.walk(folder):
-        folders.sort()
-        inside = Path(place).relative_to(folder)
-        yield from ((inside / name).as_posix() for name in sorted(names))
-
-
-def byte_range(file: Path, start: int, size: int) -> bytes:
-    """So many bytes of a file from `start` on, fewer where it ends before; raises OSError as reading does."""
-    if isinstance(file, RemotePath):
-        return file.byte_range(start, size)
-    with file.open("rb") as stream:
-        stream.seek(start)
-        return stream.read(min(size, max(0, os.fstat(stream.fileno()).st_size - start)))
-
-
-@contextmanager
-def here(path: Path) -> Generator[Path]:
-    """A file or a folder on this machine, for as long as the block lasts: itself, or a copy of the same name of what lies at a
-    URL.
-    """
-    if not isinstance(path, RemotePath):
-        yield path
-        return
-    with temporary("copy") as folder:
-        copy = folder / path.name
-        if path.is_file():
-            download(path, copy)
-        else:
-            for inside in path.files_below():
-                download(path / inside, copy / inside)
-        yield copy
-
-
-def download(file: Path, destination: Path) -> None:
-    """Copy a file from a URL to a disk, block by block."""
-    destination.parent.mkdir(parents=True, exist_ok=True)
-    with file.open("rb") as read, destination.open("wb") as write:
-        shutil.copyfileobj(read, write)
-
-
-def link_file(source: Path, destination: Path) -> str:
-    """Put a file at `destination` on a disk, which must not exist: as a `hard link`, else a `reflink`, else a `copy`; returns
-    which. What lies at a URL is a `download`.
-    """
-    if isinstance(source, RemotePath):
-        download(source, destination)
-        return "download"
-    with suppress(OSError):
-        os.link(source, destination)
-        return "hard link"
-    try:
-        import fcntl
-
-        with source.open("rb") as read, destination.open("wb") as write:
-            fcntl.ioctl(write.fileno(), 0x40049409, read.fileno())  # FICLONE of linux/fs.h
-        return "reflink"
-    except (ImportError, OSError):
-        shutil.copyfile(source, destination)
-        return "copy"

@@ -14,9 +14,9 @@ from viewsphere.aside import temporary
 from viewsphere.errors import StoreError
 from viewsphere.store.checksums import CHECKSUMS
 from viewsphere.store.manifest import MANIFEST
-from viewsphere.store.places import files_below
 from viewsphere.store.places.local import NEW, disk_errors
-from viewsphere.store.places.remote_path import RemotePath
+from viewsphere.urls import files_below
+from viewsphere.urls.remote_path import RemotePath
 
 AT_ONCE = 16
 """Files that are uploaded or asked for at once: storages answer many requests in the time of one."""

@@ -13,6 +13,7 @@ from typing import IO, TYPE_CHECKING, Any, TypeVar
 
 from viewsphere.errors import MissingExtraError, RemoteError, UserError
 from viewsphere.limits import limits
+from viewsphere.urls.inside import is_inside
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -179,12 +180,25 @@ class RemotePath(Base):
 
     def files_below(self) -> list[str]:
         """Paths of all files below, from here, sorted; none where there is no folder."""
+        return list(self.sizes_below())
 
-        def find(system: Any, path: str) -> list[str]:
+    def sizes_below(self) -> dict[str, int]:
+        """The bytes of all files below, by their paths from here, sorted; none where there is no folder. Raises RemoteError
+        where one of them has a name that would lead out of a folder on a disk.
+        """
+
+        def find(system: Any, path: str) -> dict[str, int]:
             head = path.rstrip("/") + "/"
-            return sorted(str(file).removeprefix(head) for file in system.find(path) if str(file).startswith(head))
+            found: dict[str, dict[str, Any]] = system.find(path, detail=True)
+            return {
+                file.removeprefix(head): int(info.get("size") or 0) for file, info in found.items() if file.startswith(head)
+            }
 
-        return [file for file in self._asked("list", find) if file and not file.endswith("/")]
+        files = {file: size for file, size in sorted(self._asked("list", find).items()) if file and not file.endswith("/")}
+        outside = next((file for file in files if not is_inside(file)), None)
+        if outside is not None:
+            raise RemoteError(f"{self}: expected names without '..', found {outside!r:.200}: rename or remove it")
+        return files
 
     @property
     def is_shared(self) -> bool:

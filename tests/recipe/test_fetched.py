@@ -1,0 +1,116 @@
+"""Recipes at URLs: what they make is what their copies on a disk make."""
+
+from pathlib import Path
+
+import fsspec
+import numpy as np
+import pytest
+
+import viewsphere as vs
+from small import small_recipe, tree_hash
+from viewsphere.caches import cache_of
+from viewsphere.errors import RecipeError, RemoteError
+from viewsphere.recipe.fetched import PREFIX, fetched
+from viewsphere.recipe.recipe import Recipe
+from viewsphere.urls import located, remote_path
+
+TETRAHEDRON = "mtllib t.mtl\nusemtl red\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+BASE = small_recipe(channels=["rgb", "instances"], formats=[]).to_yaml()
+RECIPE = """
+extends: base.yaml
+models: [{source: "models/*.obj", category: thing, scale: {length: 0.3}}]
+"""
+FILES = {
+    "base.yaml": BASE,
+    "recipe.yaml": RECIPE,
+    "models/t.obj": TETRAHEDRON,
+    "models/t.mtl": "newmtl red\nKd 0.8 0.1 0.1\n",
+}
+
+
+@pytest.fixture
+def url(monkeypatch, tmp_path):
+    """The recipe's folder in this process's memory, which is asked again at once."""
+    monkeypatch.setattr(remote_path, "FIRST_WAIT_S", 0.0)
+    monkeypatch.setenv("VIEWSPHERE_CACHE", str(tmp_path / "cache"))
+    memory = fsspec.filesystem("memory")
+    memory.store.clear()
+    memory.pseudo_dirs[:] = [""]
+    for name, text in FILES.items():
+        (located("memory://cars") / name).write_bytes(text.encode())
+    yield "memory://cars/recipe.yaml"
+    memory.store.clear()
+
+
+@pytest.fixture
+def file(tmp_path):
+    """The same on the disk."""
+    for name, text in FILES.items():
+        (tmp_path / "cars" / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / "cars" / name).write_text(text)
+    return tmp_path / "cars/recipe.yaml"
+
+
+@pytest.mark.parametrize("kind", [str, Path, located])
+def test_it_makes_what_its_copy_makes(url, file, tmp_path, kind):
+    assert Recipe.load(kind(url)).digest == Recipe.load(file).digest
+    if kind is str:
+        vs.generate(kind(url), tmp_path / "one")
+        vs.generate(kind(url), tmp_path / "two")
+        vs.generate(file, tmp_path / "here")
+        assert tree_hash(tmp_path / "one") == tree_hash(tmp_path / "two")
+        for one, other in zip(vs.open(tmp_path / "one"), vs.open(tmp_path / "here"), strict=True):
+            assert np.array_equal(one.rgb, other.rgb) and one.rgb.std() > 0
+            assert [o.rle for o in one.objects] == [o.rle for o in other.objects]
+
+
+def test_a_file_on_the_disk_is_read_where_it_is(file):
+    assert fetched(file) == file and Recipe.load(file).folder == file.parent
+
+
+@pytest.mark.slow
+def test_loaders_of_a_remote_recipe_give_each_frame_once_an_epoch(url):
+    data = pytest.importorskip("torch.utils.data")
+    frames = vs.render(url, shuffle=True, epochs=2)
+    loader = data.DataLoader(frames, batch_size=None, num_workers=2, collate_fn=lambda sample: sample.index)
+    given = [sample.index for sample in loader]
+    assert len(given) == 12 and sorted(given) == sorted([*range(6), *range(6)])
+
+
+def test_a_copy_lies_where_its_content_says(url):
+    first = fetched(url)
+    assert fetched(url) == first and first.parent.parent == cache_of("recipes")
+    (located("memory://cars") / "models/t.mtl").write_bytes(b"newmtl red\nKd 0.1 0.8 0.1\n")
+    assert fetched(url) != first and first.is_file()
+    assert not list(cache_of("recipes").glob(f"{PREFIX}*"))
+
+
+def test_a_cache_that_cannot_be_written_is_told(url, monkeypatch, tmp_path):
+    (tmp_path / "file").write_text("")
+    monkeypatch.setenv("VIEWSPHERE_CACHE", str(tmp_path / "file"))
+    with pytest.raises(RecipeError, match=r"file/recipes: expected to keep memory://cars there, found Not a directory"):
+        Recipe.load(url)
+
+
+def test_one_that_is_not_there_is_told(url):
+    with pytest.raises(RecipeError, match=r"memory://cars/other\.yaml: expected a readable recipe file, found none"):
+        Recipe.load("memory://cars/other.yaml")
+
+
+def test_a_folder_of_a_whole_store_is_refused(url, monkeypatch):
+    monkeypatch.setenv("VIEWSPHERE_MAX_FETCHED_BYTES", "300")
+    with pytest.raises(RecipeError, match=r"at most 300 bytes .*MAX_FETCHED_BYTES\), found [1-9]"):
+        Recipe.load(url)
+
+
+@pytest.mark.parametrize("name", ["../../outside", "a/../../../outside"])
+def test_names_that_lead_out_are_refused(url, monkeypatch, name):
+    kind = fsspec.get_filesystem_class("memory")
+    found = kind.find
+
+    def find(self, path, **options):
+        return {**found(self, path, **options), f"/cars/{name}": {"name": f"/cars/{name}", "size": 3}}
+
+    monkeypatch.setattr(kind, "find", find)
+    with pytest.raises(RemoteError, match=r"memory://cars: expected names without '\.\.', found '.*outside'"):
+        Recipe.load(url)
