@@ -46,10 +46,20 @@ def test_growth_is_found(values):
         600 * (1 + 0.2 * (np.arange(COUNT) % 7) / 6),
         600 * rising(-0.2),
         np.where(np.arange(COUNT) % 9 == 0, 25.0, 17.0),
+        np.where(np.arange(COUNT) < 80, 65.0, np.where(np.arange(COUNT) % 5, 95.0, 65.0)),
         np.zeros(COUNT),
         [600.0],
     ],
-    ids=["noise", "little growth in noise", "models that come and go", "less", "a file now and then", "nothing", "one moment"],
+    ids=[
+        "noise",
+        "little growth in noise",
+        "models that come and go",
+        "less",
+        "a file now and then",
+        "larger scenes",
+        "nothing",
+        "one moment",
+    ],
 )
 def test_noise_is_no_growth(values):
     assert soak.growth(values) <= soak.MOST_GROWTH
