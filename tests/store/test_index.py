@@ -1,11 +1,13 @@
 """The index of shots: every sample is in one row, and every way to a row leads to the same one."""
 
 import tracemalloc
+from dataclasses import replace
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from viewsphere.model.share import Share
 from viewsphere.store.index import Block, Index, length, numbers
 
 SUBJECTS = st.text("ab-0+", min_size=1, max_size=4)
@@ -48,6 +50,11 @@ def test_every_way_leads_to_the_same_row(index):
     assert all(index.at(row.first) == index.at(row.first + row.count - 1) == row for row in rows)
     assert len({row.key for row in rows}) == len(rows)
     assert all(index.find(row.key) == row for row in rows)
+    keys = ["", "no-such", *(row.key for row in rows), "a-999999"]
+    assert list(index.found(keys)) == rows
+    assert list(index.held(keys)) == [(row.key, row.subject, row.count) for row in rows]
+    own = replace(index, share=Share(1, 3))
+    assert list(own.held(keys)) == [(row.key, row.subject, row.count) for row in own]
     for subject in index.subjects:
         own = [row for row in rows if row.subject == subject]
         assert list(index.of(subject)) == own

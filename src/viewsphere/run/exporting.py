@@ -49,6 +49,8 @@ def export(
     for entry in entries:  # before the first of them is written
         writable(entry.name)
         entry.arguments()
+    if not entries:
+        return ()
     with ExitStack() as whole:
         if is_own:
             dataset.store.make_ready()

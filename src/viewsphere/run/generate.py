@@ -366,7 +366,8 @@ def _render_shots(work: Missing, crew: Crew, keep_going: bool, tell: Listener, p
 class Missing:
     """The shots of a portion that the store lacks, counted out row by row: those that no model left out is in.
 
-    What is finished is looked for once, with one look at each shot; `skipped` is what is left out, and why.
+    What is finished is looked for once, with one look at each shot; no rows are made of models of which nothing is missing.
+    `skipped` is what is left out, and why.
     """
 
     portion: Portion
@@ -391,14 +392,28 @@ class Missing:
         whole = [name for name in left if not any(member.key in self.skipped for member in cast(name))]
         return sum(index.samples_of(name) for index in indices for name in whole)
 
+    @cached_property
+    def _there(self) -> tuple[Counter[str], int]:
+        """How many shots of each model were finished then, and how many frames these are."""
+        shots, total = Counter[str](), 0
+        for _, subject, frames in chain.from_iterable(index.held(self._finished) for index in self.portion.indices):
+            shots[subject] += 1
+            total += frames
+        return shots, total
+
+    @cached_property
+    def _left(self) -> Counter[str]:
+        """How many shots were missing then of each model that lacks any, in the models' order."""
+        return sum((index.counts for index in self.portion.indices), Counter[str]()) - self._there[0]
+
     @property
     def resumed(self) -> int:
         """Frames of the portion that are there."""
-        return sum(row.count for row in map(self.portion.find, self._finished) if row is not None)
+        return self._there[1]
 
     def lines(self) -> Iterable[tuple[str, int]]:
-        """The models, and how many shots each has."""
-        return sum((index.counts for index in self.portion.indices), Counter[str]()).items()
+        """The models of which shots are missing, and how many."""
+        return self._left.items()
 
     def jobs(self, line: str) -> Iterator[Job]:
         """The shots of a model that are to be rendered."""
@@ -407,7 +422,8 @@ class Missing:
 
     def rows(self) -> Iterator[Row]:
         """All shots that are to be rendered."""
-        return self._lacking(self.portion.rows)
+        whole = set(self.portion.subjects).difference(self._left)
+        return self._lacking(chain.from_iterable(index.without(whole) for index in self.portion.indices))
 
     def _lacking(self, rows: Iterable[Row]) -> Iterator[Row]:
         left = (row for row in rows if row.key not in self._finished)

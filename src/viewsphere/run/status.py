@@ -85,7 +85,7 @@ def status(out: Path | str | os.PathLike[str]) -> Status:
     return Status(
         store.root,
         frames=sum(index.samples for index in plan.all_indices),
-        finished=sum(row.count for row in map(plan.find, done) if row is not None),
+        finished=sum(count for index in plan.all_indices for _, _, count in index.held(done)),
         missing=sum(gap.frames for gap in store.gaps(plan, done)),
         models=tuple(k for k in plan.models if k not in skipped and not (store.model_folder(k) / "model.json").is_file()),
         runs=tuple(_run(told, is_alive) for told, is_alive in store.heartbeats()),

@@ -7,6 +7,7 @@ from bisect import bisect_right
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache, partial
+from itertools import chain
 from pathlib import Path, PurePosixPath
 from typing import Any, Self, overload
 
@@ -98,9 +99,9 @@ class Dataset(Shown, Sequence[Sample]):
     @cached_property
     def rows(self) -> tuple[Row, ...]:
         """The rows of all finished shots, chosen or not, in frame order; without those that add channels to others."""
-        found = (self.plan.find(key) for key in self.store.finished())
-        own = (row for row in found if row is not None and row.part == self.plan.part_of(row.first))
-        return tuple(sorted(own, key=lambda row: row.first))
+        keys = tuple(self.store.finished())
+        found = chain.from_iterable(index.found(keys) for index in self.plan.indices)
+        return tuple(sorted(found, key=lambda row: row.first))
 
     @cached_property
     def _shots(self) -> tuple[list[tuple[str, Sequence[int]]], list[int]]:

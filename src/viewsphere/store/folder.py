@@ -185,16 +185,14 @@ class Store:
         for number, index in enumerate(plan.all_indices):
             alike[index.part, number >= len(plan.indices)].append(index)
         for (part, is_added), indices in alike.items():
-            left_out = [row for row in _found(indices, skipped) if row.subject not in skipped]
-            there = [row for row in _found(indices, finished) if not {row.key, row.subject} & skipped]
+            left_out = {key: count for key, subject, count in _held(indices, skipped) if subject not in skipped}
+            there = {key: count for key, subject, count in _held(indices, finished) if not {key, subject} & skipped}
             shots = sum(len(index) - sum(map(index.count_of, skipped)) for index in indices) - len(left_out)
-            frames = sum(index.samples - sum(map(index.samples_of, skipped)) for index in indices)
-            frames -= sum(row.count for row in left_out)
+            frames = sum(index.samples - sum(map(index.samples_of, skipped)) for index in indices) - sum(left_out.values())
             if len(there) < shots:
-                known = {row.key for row in chain(left_out, there)}
                 rows = chain.from_iterable(index.without(skipped) for index in indices)
-                first = next(row for row in rows if row.key not in known)
-                lost = frames - sum(row.count for row in there)
+                first = next(row for row in rows if row.key not in there and row.key not in left_out)
+                lost = frames - sum(there.values())
                 yield Gap(part, is_added, first, shots - len(there), lost, frames)
 
     def finished(self) -> Iterator[str]:
@@ -447,6 +445,6 @@ def channel_path(channel: str, sample: int, kinds: Files | None = None) -> str:
     return f"{channel}/{sample:08d}{(kinds or Files()).suffix(channels()[channel])}"
 
 
-def _found(indices: Iterable[Index], keys: Iterable[str]) -> list[Row]:
-    """The rows of these keys in some indices."""
-    return [row for index in indices for row in map(index.find, keys) if row is not None]
+def _held(indices: Iterable[Index], keys: Iterable[str]) -> Iterator[tuple[str, str, int]]:
+    """Key, subject and number of samples of the shots of these keys in some indices."""
+    return chain.from_iterable(index.held(keys) for index in indices)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections import Counter, defaultdict
-from collections.abc import Container, Iterator, Sequence
+from collections.abc import Container, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import accumulate
@@ -152,25 +152,55 @@ class Index(Sequence[Row]):
 
     def find(self, key: str) -> Row | None:
         """The row of this key, None if there is none."""
-        if not key.endswith(self.suffix):
+        return next(self.found((key,)), None)
+
+    def found(self, keys: Iterable[str]) -> Iterator[Row]:
+        """The rows of these keys, but for those that it does not have."""
+        return (self._row(*spot) for _, spot in self._spots(keys))
+
+    def held(self, keys: Iterable[str]) -> Iterator[tuple[str, str, int]]:
+        """Key, subject and number of samples of the same rows, which takes a fraction of their time."""
+        for key, (number, subject, chunk) in self._spots(keys):
+            block = self.blocks[number]
+            yield key, block.subjects[subject], (self._edge(number, chunk + 1) - self._edge(number, chunk)) * block.each
+
+    def _spots(self, keys: Iterable[str]) -> Iterator[tuple[str, tuple[int, int, int]]]:
+        """The keys that it has: the block of each, its subject's place there, and which of the subject's chunks it is.
+
+        What ends the key of one subject is found once for all.
+        """
+        ends: dict[tuple[int, str], int | None] = {}
+        for key in keys:
+            subject, _, end = key.rpartition("-")
+            for number, place in self._places.get(subject, ()):
+                if (number, end) not in ends:
+                    ends[number, end] = self._chunk_of(number, end)
+                chunk = ends[number, end]
+                if chunk is not None and (self.share.is_all or chunk in self._own(number, place)):
+                    yield key, (number, place, chunk)
+
+    def _chunk_of(self, number: int, end: str) -> int | None:
+        """The chunk of a block's subjects whose key ends so, None if there is none."""
+        digits = end.removesuffix(self.suffix)
+        if not digits.isdecimal() or end != self._end(int(digits)):
             return None
-        subject, _, digits = key[: len(key) - len(self.suffix)].rpartition("-")
-        for number, place in self._places.get(subject, ()) if digits.isdecimal() else ():
-            offset = _offset(self.blocks[number].positions, int(digits))
-            if offset is not None:
-                block = self.blocks[number]
-                _, _, chunk = self._place_of(self._samples[number] + (place * block.size + offset) * block.each)
-                row = self._row(number, place, chunk)
-                return row if row.key == key and chunk in self._own(number, place) else None
-        return None
+        offset = _offset(self.blocks[number].positions, int(digits))
+        if offset is None:
+            return None
+        chunk = -(-offset * self._chunks(number) // self.blocks[number].size)
+        return chunk if self._edge(number, chunk) == offset else None
+
+    def _end(self, position: int) -> str:
+        """What ends the key of a shot, behind its subject and a hyphen, by its first position."""
+        return f"{position:06d}{self.suffix}"
 
     def _row(self, number: int, subject: int, chunk: int) -> Row:
-        block = self.blocks[number]
-        begin, end = self._edge(number, chunk), self._edge(number, chunk + 1)
+        block, (size, chunks) = self.blocks[number], self._sizes[number]
+        begin, end = chunk * size // chunks, (chunk + 1) * size // chunks
         positions = _cut(block.positions, begin, end)
         name = block.subjects[subject]
-        first = self._samples[number] + (subject * block.size + begin) * block.each
-        key = f"{name}-{positions[0][0]:06d}{self.suffix}"
+        first = self._samples[number] + (subject * size + begin) * block.each
+        key = f"{name}-{self._end(positions[0][0])}"
         return Row(key, name, first, (end - begin) * block.each, self.part, positions)
 
     def _place_of(self, sample: int) -> tuple[int, int, int]:
@@ -203,10 +233,16 @@ class Index(Sequence[Row]):
         return (until - before) * block.each
 
     def _chunks(self, number: int) -> int:
-        return -(-self.blocks[number].size // self.most)
+        return self._sizes[number][1]
 
     def _edge(self, number: int, chunk: int) -> int:
-        return chunk * self.blocks[number].size // self._chunks(number)
+        size, chunks = self._sizes[number]
+        return chunk * size // chunks
+
+    @cached_property
+    def _sizes(self) -> list[tuple[int, int]]:
+        """Positions and chunks of each subject, block by block."""
+        return [(block.size, -(-block.size // self.most)) for block in self.blocks]
 
     @cached_property
     def _rows(self) -> list[int]:
