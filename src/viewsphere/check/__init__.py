@@ -28,7 +28,7 @@ from viewsphere.labels import channel_labels, labels
 from viewsphere.model.sample import Sample
 from viewsphere.recipe.formats import FormatEntry
 from viewsphere.recipe.sequence import TimeEntry
-from viewsphere.run.exporting import Views
+from viewsphere.run.preparing import Views
 from viewsphere.store import Dataset, ModelInfo, PlanRecord, Row
 from viewsphere.store.checksums import damaged_files, written_least, written_options
 from viewsphere.store.credits import credits_problem

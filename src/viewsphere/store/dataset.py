@@ -329,7 +329,8 @@ class Dataset(Shown, Sequence[Sample]):
         """Put a stored file at `destination`: a hard link, else a reflink, else a copy; `link_kinds` says which. Raises
         StoreError for a path that leads out of the data set.
         """
-        destination.parent.mkdir(parents=True, exist_ok=True)
+        if not destination.parent.is_dir():
+            destination.parent.mkdir(parents=True, exist_ok=True)
         file = self.path(relative)
         self.link_kinds.add(link_file(file.resolve() if file.is_symlink() else file, destination))
 

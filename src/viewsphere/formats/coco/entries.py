@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.formats._contents import Expected
-from viewsphere.formats._paper import faces, transformation_matrix
+from viewsphere.formats._paper import faces, json_bytes, transformation_matrix
 from viewsphere.formats.coco.options import Options
 from viewsphere.geometry.mask import mask_polygons
 from viewsphere.model.sample import Box, ObjectAnnotation, Sample
@@ -20,6 +21,21 @@ FOLDER_SIZE = 10_000
 
 Masks = Mapping[int, NDArray[np.bool_]]
 """Masks (H, W) of the visible pixels of a sample's visible objects but imported ones, by the objects' ids."""
+
+
+@dataclass(frozen=True)
+class Entry:
+    """What the instances file of a split has of a sample: its image and its annotations, JSON."""
+
+    split: str
+    image: bytes
+    annotations: tuple[bytes, ...]
+
+
+def entry(dataset: Dataset, sample: Sample, ids: Mapping[int, int], masks: Masks) -> Entry:
+    """A sample's entry; `ids`: COCO's category ids by ours."""
+    annotations = map(json_bytes, _annotations(dataset, sample, ids, masks))
+    return Entry(sample.split, json_bytes(_image(dataset, sample)), tuple(annotations))
 
 
 def seen(sample: Sample) -> Masks:
@@ -38,8 +54,8 @@ def files(dataset: Dataset, sample: Sample, masks: Masks, options: Options) -> I
             yield sample.index, f"{folder}/{_mask_file(dataset, sample, o)}", masks[o.id]
 
 
-def annotations_of(dataset: Dataset, sample: Sample, ids: Mapping[int, int], masks: Masks) -> Iterator[dict[str, Any]]:
-    """COCO's annotations of all visible objects, and of imported ones that have a box; `ids`: COCO's category ids by ours."""
+def _annotations(dataset: Dataset, sample: Sample, ids: Mapping[int, int], masks: Masks) -> Iterator[dict[str, Any]]:
+    """COCO's annotations of all visible objects, and of imported ones that have a box."""
     for o in sample.objects:
         if o.source is not None and (o.area or o.box2d is not None):
             yield _foreign_annotation(dataset, sample, o, ids)
@@ -64,7 +80,7 @@ def _stem(dataset: Dataset, sample: Sample) -> str:
     return f"{inside}{sample.index + 1:012d}"
 
 
-def image(dataset: Dataset, sample: Sample) -> dict[str, Any]:
+def _image(dataset: Dataset, sample: Sample) -> dict[str, Any]:
     """COCO's image entry of a sample, with the paper's keys; of an imported one its own entry with new id and file name."""
     if sample.known_camera is None:
         source = dict(sample.source or {})
