@@ -215,12 +215,12 @@ def test_what_goes_wrong_travels(task, kind, said):
         (
             "no memory",
             WorkerDied,
-            "answer, found that it died: it was refused memory: give it more memory, or ask for fewer workers$",
+            "found that it died: it was refused memory: give it more memory, or ask for fewer workers$",
         ),
         pytest.param(
             "dies",
             WorkerDied,
-            "answer, found that it died: it was killed, as systems do when memory runs out: give",
+            "found that it died: it was killed, as systems do when memory runs out: give",
             marks=pytest.mark.skipif(os.name == "nt", reason="signals"),
         ),
     ],

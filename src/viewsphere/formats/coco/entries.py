@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from pathlib import Path
+from pathlib import PurePosixPath
 from typing import Any
 
 import numpy as np
@@ -49,9 +49,8 @@ def files(dataset: Dataset, sample: Sample, masks: Masks, options: Options) -> I
         return
     folder = options.folder(sample.split)
     yield sample.index, f"{folder}/{_image_file(dataset, sample)}", sample.picture_file
-    for o in sample.objects:
-        if o.source is None and o.area:
-            yield sample.index, f"{folder}/{_mask_file(dataset, sample, o)}", masks[o.id]
+    for number, mask in masks.items():
+        yield sample.index, f"{folder}/{_mask_file(dataset, sample, number)}", mask
 
 
 def _annotations(dataset: Dataset, sample: Sample, ids: Mapping[int, int], masks: Masks) -> Iterator[dict[str, Any]]:
@@ -65,12 +64,12 @@ def _annotations(dataset: Dataset, sample: Sample, ids: Mapping[int, int], masks
 
 def _image_file(dataset: Dataset, sample: Sample) -> str:
     """Name of a frame's image in its split's folder."""
-    return f"{_stem(dataset, sample)}{Path(sample.picture_file or '.png').suffix}"
+    return f"{_stem(dataset, sample)}{PurePosixPath(sample.picture_file or '.png').suffix}"
 
 
-def _mask_file(dataset: Dataset, sample: Sample, annotation: ObjectAnnotation) -> str:
-    """Name of an object's mask in its split's folder."""
-    several = f"_{annotation.id:03d}" if dataset.plan.most_objects(sample.index) > 1 else ""
+def _mask_file(dataset: Dataset, sample: Sample, number: int) -> str:
+    """Name of the mask of an object, by its id, in its split's folder."""
+    several = f"_{number:03d}" if dataset.plan.most_objects(sample.index) > 1 else ""
     return f"MASK/{_stem(dataset, sample)}{several}.png"
 
 
@@ -134,7 +133,7 @@ def _annotation(
         "segmentation": [[int(c) for c in polygon] for polygon in mask_polygons(mask)],
         "width": sample.camera.width,
         "height": sample.camera.height,
-        "path_mask": _mask_file(dataset, sample, o),
+        "path_mask": _mask_file(dataset, sample, o.id),
         "bbox_3D_pxs": faces(o.box3d_pixels),
         "bbox_projected": _corner_and_size(o.box2d_projected),
         "bbox_unclipped": _corner_and_size(o.box2d_unclipped),
