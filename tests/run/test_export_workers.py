@@ -139,6 +139,7 @@ def test_how_workers_link_files_is_told(rendered, monkeypatch, tmp_path):
 
 def test_long_shots_are_cut_and_short_ones_go_together(monkeypatch):
     monkeypatch.setattr(preparing, "LOT", 4)
+    monkeypatch.setattr(preparing, "LONGEST", 4)
     shots = [("a", range(9)), ("b", [1]), ("c", [0, 2]), ("d", range(3)), ("e", range(1))]
     assert list(preparing._lots(iter(shots))) == [
         (("a", range(4)),),

@@ -7,7 +7,7 @@ from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import AbstractContextManager, closing
 from dataclasses import dataclass
 from functools import cache, partial
-from itertools import repeat
+from itertools import chain, repeat
 from pathlib import Path
 from typing import Any
 
@@ -24,8 +24,9 @@ from viewsphere.store import Dataset, Exported
 PATIENCE_S = 2.0
 """Seconds that this process prepares samples before others help, each of which takes half of that to start."""
 
-LOT = 32
-"""Frames that a worker is given at once, at least as long as there are so many."""
+LOT, LONGEST = 32, 256
+"""Frames that a worker is given at once, at least as long as there are so many; and most of one shot, whose records are read
+again for the next."""
 
 Lot = tuple[tuple[str, Sequence[int]], ...]
 """Shots by their keys, and which of their frames."""
@@ -141,15 +142,15 @@ class _Preparation:
 
 
 def _samples(dataset: Dataset, lot: Lot) -> Iterator[Sample]:
-    return (dataset.sample_at(key, place) for key, places in lot for place in places)
+    return chain.from_iterable(dataset.samples_of(key, places) for key, places in lot)
 
 
 def _lots(shots: Iterator[tuple[str, Sequence[int]]]) -> Iterator[Lot]:
-    """The shots in lots of at least `LOT` frames, and fewer than twice as many; long ones are cut."""
+    """The shots in lots of at least `LOT` frames; long ones are cut."""
     lot: list[tuple[str, Sequence[int]]] = []
     for key, places in shots:
-        for at in range(0, len(places), LOT):
-            lot.append((key, places[at : at + LOT]))
+        for at in range(0, len(places), LONGEST):
+            lot.append((key, places[at : at + LONGEST]))
             if sum(len(some) for _, some in lot) >= LOT:
                 yield tuple(lot)
                 lot = []
