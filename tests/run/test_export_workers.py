@@ -51,6 +51,7 @@ def shared(monkeypatch):
     monkeypatch.setattr(preparing, "in_order", noted)
     monkeypatch.setattr(preparing, "LOT", 4)
     monkeypatch.setattr(preparing, "PATIENCE_S", 0.0)
+    monkeypatch.setattr(preparing, "WORTH_S", 0.0)
     return seen
 
 
@@ -132,6 +133,7 @@ def test_how_workers_link_files_is_told(rendered, monkeypatch, tmp_path):
 
     monkeypatch.setattr(preparing, "in_order", copied)
     monkeypatch.setattr(preparing, "PATIENCE_S", 0.0)
+    monkeypatch.setattr(preparing, "WORTH_S", 0.0)
     monkeypatch.setattr(preparing, "LOT", 4)
     notes = export(rendered, ["coco"], output=tmp_path / "exports", workers=2)
     assert notes == (f"{rendered}: files of the exports are made as a copy, hard links do not work here",)

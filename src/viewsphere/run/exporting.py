@@ -33,7 +33,7 @@ def export(
     user. A format is its name, or {name: {option: value}}; options that are not said are those of the export in the data set's
     folder, else its recipe's, else the format's defaults.
 
-    Where that takes more than seconds, so many processes help; fewer than two do not, and more need a `__main__` guard in the
+    Where that takes long, so many processes help; fewer than two do not, and more need a `__main__` guard in the
     calling script. The folders are put in place, and take that of older exports, only when all are whole; an export of all
     frames is not replaced by one of a choice of them. Raises UserError for an unknown format or a choice without output or
     frames, StoreError if `out` is no data set or one of the folders cannot be written, WorkerDied where one of the processes

@@ -21,8 +21,10 @@ from viewsphere.recipe.formats import FormatEntry
 from viewsphere.run.in_order import in_order
 from viewsphere.store import Dataset, Exported
 
-PATIENCE_S = 2.0
-"""Seconds that this process prepares samples before others help, each of which takes half of that to start."""
+PATIENCE_S, WORTH_S = 2.0, 8.0
+"""Seconds after which this process looks how long it would take for what is left; and for how many of them others help, each
+of which takes one or two to start.
+"""
 
 LOT, LONGEST = 32, 256
 """Frames that a worker is given at once, at least as long as there are so many; and most of one shot, whose records are read
@@ -110,10 +112,12 @@ def prepared(dataset: Dataset, formats: Entries, workers: int = 0) -> Generator[
     alone = _Preparation(dataset, formats)
     shared = [(entry, folder) for entry, folder in formats if entry.name in alone.prepared]
     workers = workers if shared and dataset.store.place.is_shared() else 0
-    begun, lots = time.monotonic(), _lots(dataset.shots())
+    begun, lots, done, total = time.monotonic(), _lots(dataset.shots()), 0, len(dataset)
     for lot in lots:
         yield from map(alone.of, _samples(dataset, lot))
-        if workers > 1 and time.monotonic() - begun >= PATIENCE_S:
+        done += sum(len(places) for _, places in lot)
+        spent = time.monotonic() - begun
+        if workers > 1 and spent >= PATIENCE_S and spent * (total - done) / done >= WORTH_S:
             break
     own = _Preparation(dataset, [(entry, folder) for entry, folder in formats if entry.name not in alone.prepared])
     with closing(in_order(workers, partial(_Preparation, dataset, shared), lots)) as made:
