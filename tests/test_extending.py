@@ -18,7 +18,7 @@ from PIL import Image
 
 from sealing import seal_again
 from sequence_recipe import eventful_recipe
-from small import small_recipe
+from small import small_recipe, tree_hash
 from viewsphere import Dataset, generate, labels, plan, plugins, render
 from viewsphere.check import check
 from viewsphere.errors import RecipeError
@@ -154,6 +154,14 @@ def test_a_format_is_one_file(small_dataset, tmp_path):
         assert tuple(float(row[k]) for k in ("x0", "y0", "x1", "y1")) == o.box2d
         assert row["category"] == o.category
         assert np.array_equal(np.asarray(Image.open(folder / row["image"])), sample.rgb)
+
+
+def test_a_format_may_prepare_its_samples(small_dataset, tmp_path, monkeypatch):
+    for example in ("One row an object", "The same table"):
+        install(monkeypatch, "csv_boxes", "viewsphere.formats", EXAMPLES[example])
+        export(small_dataset.root, ["csv_boxes"], output=tmp_path / example)
+    assert len(list((tmp_path / "The same table").rglob("*.png"))) == len(small_dataset)
+    assert tree_hash(tmp_path / "The same table") == tree_hash(tmp_path / "One row an object")
 
 
 @pytest.mark.usefixtures("csv_boxes")

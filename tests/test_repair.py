@@ -229,6 +229,11 @@ def test_a_shot_without_records_is_made_again(small_run, spoilt):
     assert tree_hash(spoilt) == tree_hash(small_run)
 
 
-def test_frames_are_proved_by_several_processes_as_by_one(small_run, monkeypatch):
+def test_frames_and_exports_are_proved_by_several_processes_as_by_one(spoilt, monkeypatch):
+    file = sorted(spoilt.glob("coco/annotations/*.json"))[0]
+    file.write_text(file.read_text().replace('"tilt":0.0', '"tilt":0.5', 1))
     monkeypatch.setattr("viewsphere.check.FEWEST", 3)
-    assert check(Dataset(small_run), workers=2) == check(Dataset(small_run))
+    report = check(Dataset(spoilt), workers=2)
+    assert [finding.check for finding in report.findings] == ["coco", "coco"]
+    assert report.findings[1].frame is not None
+    assert report == check(Dataset(spoilt))

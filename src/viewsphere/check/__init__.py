@@ -28,7 +28,7 @@ from viewsphere.labels import channel_labels, labels
 from viewsphere.model.sample import Sample
 from viewsphere.recipe.formats import FormatEntry
 from viewsphere.recipe.sequence import TimeEntry
-from viewsphere.run.exporting import Views
+from viewsphere.run.preparing import Views
 from viewsphere.store import Dataset, ModelInfo, PlanRecord, Row
 from viewsphere.store.checksums import damaged_files, written_least, written_options
 from viewsphere.store.credits import credits_problem
@@ -112,7 +112,8 @@ def check(
     if owned := sum(info.credit is not None for info in dataset.models):
         checked["credits"] = owned
     notes += _alone(dataset)
-    for found in _frame_reports(dataset, positions, sampled, rays, workers):
+    is_whole, names = len(positions) == len(dataset), exports(dataset)
+    for found in _reports(dataset, positions, sampled, rays, names if is_whole else (), workers):
         findings += found.findings
         notes += [note for note in found.notes if note not in notes]
         checked |= {name: checked.get(name, 0) + count for name, count in found.checked.items()}
@@ -120,16 +121,9 @@ def check(
         findings += _differing(compared, dataset, _spread(positions, against_cycles))
         checked["cycles"] = compared.frames
         notes.append(compared.note())
-    names = exports(dataset)
-    if len(positions) < len(dataset):
+    if not is_whole:
         notes.append(f"{len(positions):,} of {len(dataset):,} frames were read")
         notes += [f"{name}: not checked, that needs all frames" for name in names]
-        return Report(checked, tuple(findings), tuple(notes))
-    views = Views(dataset)
-    for name, module in names.items():
-        checked[name] = len(dataset)
-        proof = _export_proof(views, dataset.root / name, module, sampled, notes)
-        findings += [Finding(name, frame, message) for frame, message in proof]
     return Report(checked, tuple(findings), tuple(notes))
 
 
@@ -155,16 +149,21 @@ def _spread(positions: range, most: int | None) -> range:
     return positions if most is None else positions[:: max(1, -(-len(positions) // most))] if most else positions[:0]
 
 
-def _frame_reports(dataset: Dataset, positions: range, sampled: range, rays: bool | None, workers: int) -> Iterator[Report]:
-    """What is wrong with frames, chunk by chunk."""
+def _reports(
+    dataset: Dataset, positions: range, sampled: range, rays: bool | None, names: Collection[str], workers: int
+) -> Iterator[Report]:
+    """What is wrong with frames, chunk by chunk, and with the exports of these names."""
     size = max(FEWEST, -(-len(positions) // max(2 * workers, 1)))
     chunks = [positions[at : at + size] for at in range(0, len(positions), size)]
-    prove = partial(_frame_proofs, dataset, sampled, rays)
+    prove, prove_export = partial(_frame_proofs, dataset, sampled, rays), partial(_export_report, dataset, sampled)
     if workers < 2 or len(chunks) < 2:
         yield prove(positions)
+        yield from map(prove_export, names)
         return
     with ProcessPoolExecutor(min(workers, len(chunks)), multiprocessing.get_context("spawn")) as pool:
+        exported = [pool.submit(prove_export, name) for name in names]  # each is one long task, so they begin first
         yield from pool.map(prove, chunks)
+        yield from (future.result() for future in exported)
 
 
 def _frame_proofs(dataset: Dataset, sampled: range, rays: bool | None, positions: range) -> Report:
@@ -191,6 +190,14 @@ def _frame_proofs(dataset: Dataset, sampled: range, rays: bool | None, positions
 def exports(dataset: Dataset) -> dict[str, Any]:
     """The formats, by their names, that lie in the data set's folder."""
     return {name: plugins.load("formats", name) for name in plugins.names("formats") if (dataset.root / name).is_dir()}
+
+
+def _export_report(dataset: Dataset, sampled: Collection[int], name: str) -> Report:
+    """What is wrong with an export."""
+    notes: list[str] = []
+    proof = _export_proof(Views(dataset), dataset.root / name, plugins.load("formats", name), sampled, notes)
+    findings = tuple(Finding(name, frame, message) for frame, message in proof)
+    return Report({name: len(dataset)}, findings, tuple(notes))
 
 
 def _export_proof(views: Views, folder: Path, module: Verified, sampled: Collection[int], notes: list[str]) -> Iterator[Remark]:

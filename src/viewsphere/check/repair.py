@@ -112,7 +112,7 @@ class _Mending:
                 self.refused.append(Finding("repair", None, f"export {name} is not written again: {why}"))
                 continue
             try:
-                export(self._dataset.root, [name])
+                export(self._dataset.root, [name], workers=self._mender.workers)
                 self.done.append(f"export {name}: written again")
             except UserError as error:
                 self.refused.append(Finding("repair", None, f"export {name} cannot be written again: {error}"))

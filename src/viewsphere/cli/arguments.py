@@ -86,6 +86,10 @@ Durability = Annotated[
         show_default=False,
     ),
 ]
+Workers = Annotated[
+    int | None,
+    typer.Option(min=0, help="Processes; default: one a core. 0: this one.", show_default=False),
+]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON for scripts.")]
 Formats = Annotated[
     str | None,

@@ -14,6 +14,7 @@ from viewsphere.cli.arguments import (
     DataFolder,
     Durability,
     FormatOptions,
+    Workers,
     asked_formats,
     at,
     cores,
@@ -49,6 +50,7 @@ def export(
         str | None,
         typer.Option(help="Only these frames: numbers from 0 and ranges, such as 0-15,40; needs --output.", show_default=False),
     ] = None,
+    workers: Workers = None,
     durability: Durability = None,
     json_: AsJson = False,
 ) -> None:
@@ -64,7 +66,8 @@ def export(
     if keys == ():
         raise UserError(f"--models: expected keys or patterns; found {models!r}")
     choice = Choice(keys or (), () if frames is None else frame_ranges(frames))
-    notes = write_formats(folder, with_options(names, format_option), output=output, choice=choice)
+    crew = cores() if workers is None else workers
+    notes = write_formats(folder, with_options(names, format_option), output=output, choice=choice, workers=crew)
     if json_:
         dataset = Dataset(folder, choice)
         print_json({"formats": list(names), "frames": len(dataset), "of": dataset.plan.frames, "notes": list(notes)})
@@ -100,10 +103,7 @@ def check(
     mend: Annotated[
         bool, typer.Option("--repair", help="Render damaged shots again, and write damaged models and exports again.")
     ] = False,
-    workers: Annotated[
-        int | None,
-        typer.Option(min=0, help="Processes; default: one a core. 0: this one.", show_default=False),
-    ] = None,
+    workers: Workers = None,
     against_cycles: Annotated[
         int, typer.Option(min=0, metavar="N", help="Compare N frames with Cycles' own pass of object indices; needs Blender.")
     ] = 0,

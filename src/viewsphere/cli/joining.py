@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from viewsphere.cli import completion
-from viewsphere.cli.arguments import AsJson, Durability, FormatOptions, Formats, asked_formats, at, with_options
+from viewsphere.cli.arguments import AsJson, Durability, FormatOptions, Formats, asked_formats, at, cores, with_options
 from viewsphere.cli.terminal import MOST_FINDINGS, ProgressBar, print_json
 from viewsphere.errors import UserError
 
@@ -91,4 +91,4 @@ def _needed(output: Path | None) -> Path:
 def _exported(folder: Path, formats: Sequence[FormatEntry]) -> list[str]:
     from viewsphere.run.exporting import export
 
-    return list(export(folder, formats)) if formats else []
+    return list(export(folder, formats, workers=cores())) if formats else []

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator
@@ -21,24 +21,37 @@ class Format(Protocol):
     """A module that writes a data set in one format: `writer`.
 
     A format may also have: `Options`, a pydantic class of what recipes and the command line may say of it (docs/formats.md has
-    the fields' descriptions), of which `writer` and `verify` are then given one as their last argument; `CHANNELS`, names of
-    all channels that it reads besides pictures that happen to be there: a run that does not keep them is refused before it
-    begins (without it, a format takes whatever is kept); `ANNOTATES = False`, if samples are to have all their
+    the fields' descriptions), of which `writer` and the other functions are then given one as their last argument; `CHANNELS`,
+    names of all channels that it reads besides pictures that happen to be there: a run that does not keep them is refused
+    before it begins (without it, a format takes whatever is kept); `ANNOTATES = False`, if samples are to have all their
     objects, those too that the recipe leaves out of annotations; `CREDITS = False`, if it does not name the models' credits, so
     that it needs not be written again where only these change; `check()`, which raises a UserError where the format cannot be
-    written; `notes(categories, *options)`, with lines for the user of what these options mean for a data set's categories;
-    `verify(dataset, folder, sampled)` of `Verified`, with which `viewsphere check` proves an export;
-    `read(path, *, keep_going) -> ForeignDataset` (`viewsphere.store.foreign`), with which data sets of the format are imported.
+    written; `preparer` of `Prepared`, by which several processes share the work; `notes(categories, *options)`, with lines for
+    the user of what these options mean for a data set's categories; `verify(dataset, folder, sampled)` of `Verified`, with
+    which `viewsphere check` proves an export; `read(path, *, keep_going) -> ForeignDataset` (`viewsphere.store.foreign`), with
+    which data sets of the format are imported.
     """
 
     def writer(
         self, dataset: Dataset, folder: Path, note: Callable[[str], None], *options: Frozen
-    ) -> AbstractContextManager[Callable[[Sample], None]]:
+    ) -> AbstractContextManager[Callable[[Any], None]]:
         """A context manager that writes an export into this empty folder; stored pictures are put there by `dataset.link`.
 
-        Entering the context gives a function that is called with the finished samples, one after another in frame order, and
-        keeps none of them. Leaving the context finishes the export. `note` takes lines for the user; `options` is the format's
-        `Options`, of one that has some.
+        Entering the context gives a function that is called with the finished samples, or with what is prepared of them, one
+        after another in frame order, and keeps none of them. Leaving the context finishes the export. `note` takes lines for
+        the user; `options` is the format's `Options`, of one that has some.
+        """
+        ...
+
+
+class Prepared(Protocol):
+    """A format that makes of a sample what can be made of it anywhere and in any order."""
+
+    def preparer(self, dataset: Dataset, folder: Path, *options: Frozen) -> Callable[[Sample], Any]:
+        """A function that puts a sample's own files into the export's folder, and gives what `writer`'s is called with instead
+        of the sample: something that pickle takes, and no more than a frame's part of the export.
+
+        It is called once for each sample; where many are exported by several processes, in any of these, in any order.
         """
         ...
 

@@ -31,7 +31,8 @@ def put(dataset: Dataset, content: Content, file: Path) -> None:
     if isinstance(content, str):
         dataset.link(content, file)
     else:
-        file.parent.mkdir(parents=True, exist_ok=True)
+        if not file.parent.is_dir():
+            file.parent.mkdir(parents=True, exist_ok=True)
         file.write_bytes(encode_png(content))
 
 

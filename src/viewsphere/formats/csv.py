@@ -49,33 +49,36 @@ LISTS = {
 HEAD = (*OF_SAMPLE, *OF_OBJECT, *OF_VIEW, *(f"{name}_{part}" for name, parts in LISTS.items() for part in parts))
 
 
+def preparer(dataset: Dataset, folder: Path) -> Callable[[Sample], list[list[Any]]]:
+    """Puts a sample's picture in place, and makes its rows."""
+
+    def prepare(sample: Sample) -> list[list[Any]]:
+        for _, name, content in _picture(sample):
+            put(dataset, content, folder / name)
+        return list(_rows(sample))
+
+    return prepare
+
+
 @contextmanager
-def writer(dataset: Dataset, folder: Path, note: Callable[[str], None]) -> Generator[Callable[[Sample], None]]:
-    """Write the table and the pictures."""
+def writer(dataset: Dataset, folder: Path, note: Callable[[str], None]) -> Generator[Callable[[list[list[Any]]], None]]:
+    """Write the table."""
     with _table(folder / TABLE) as append:
-
-        def add(sample: Sample) -> None:
-            append(sample)
-            for _, name, content in _picture(sample):
-                put(dataset, content, folder / name)
-
-        yield add
+        yield append
 
 
 def verify(dataset: Dataset, folder: Path, sampled: Collection[int]) -> Iterator[Remark]:
     """All that is not as it would be exported now."""
     with temporary("csv") as aside:
         with _table(aside / TABLE) as append:
-            yield from check_files(
-                dataset, folder, _expected(dataset, append), _expected(dataset, lambda sample: None), [TABLE]
-            )
+            yield from check_files(dataset, folder, _expected(dataset, append), _expected(dataset, lambda rows: None), [TABLE])
         if (folder / TABLE).is_file():
             yield from _rows_that_differ(aside / TABLE, folder / TABLE)
 
 
-def _expected(dataset: Dataset, append: Callable[[Sample], None]) -> Iterator[Expected]:
+def _expected(dataset: Dataset, append: Callable[[list[list[Any]]], None]) -> Iterator[Expected]:
     for sample in dataset:
-        append(sample)
+        append(list(_rows(sample)))
         yield from _picture(sample)
 
 
@@ -92,12 +95,12 @@ def _name(sample: Sample) -> str:
 
 
 @contextmanager
-def _table(file: Path) -> Generator[Callable[[Sample], None]]:
-    """An open table with its head, and the function that appends a sample's rows."""
+def _table(file: Path) -> Generator[Callable[[list[list[Any]]], None]]:
+    """An open table with its head, and the function that appends rows."""
     with file.open("w", encoding="utf-8", newline="") as out:
         rows = csv.writer(out, lineterminator="\n")
         rows.writerow(HEAD)
-        yield lambda sample: rows.writerows(_rows(sample))
+        yield rows.writerows
 
 
 def _rows(sample: Sample) -> Iterator[list[Any]]:

@@ -125,5 +125,5 @@ def mask_polygons(mask: Mask) -> list[list[float]]:
     padded = np.zeros((y1 - y0 + 2, x1 - x0 + 2), np.bool_)
     padded[1:-1, 1:-1] = mask[y0:y1, x0:x1]
     corners, ends = trace_rings(padded)
-    moved = corners + np.array([x0 - 1.0, y0 - 1.0])
-    return [ring.ravel().tolist() for ring in np.split(moved, ends[:-1])]
+    moved, stops = (corners + np.array([x0 - 1.0, y0 - 1.0])).ravel().tolist(), (2 * ends).tolist()
+    return [moved[start:stop] for start, stop in zip((0, *stops), stops, strict=False)]

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, ExitStack
-from functools import cache, partial
+from collections.abc import Iterator, Mapping
+from contextlib import AbstractContextManager, ExitStack, closing
 from pathlib import Path
 
 from pydantic import JsonValue
@@ -12,13 +11,11 @@ from pydantic import JsonValue
 from viewsphere import plugins
 from viewsphere.errors import UserError
 from viewsphere.formats import Format
-from viewsphere.model.channel import missing
 from viewsphere.model.mistakes import one_of
-from viewsphere.model.rig import CAMERA
-from viewsphere.model.sample import Sample
 from viewsphere.recipe.formats import FormatEntry, Formats, options_of, read_formats
+from viewsphere.run.preparing import Entries, leaves_out, prepared, targets
 from viewsphere.run.progress import Listener, Progress, unheard
-from viewsphere.store import Choice, Dataset, Exported, located, new_folder
+from viewsphere.store import Choice, Dataset, located, new_folder
 from viewsphere.store.checksums import write_checksums, written_credits, written_frames, written_least, written_options
 from viewsphere.store.credits import credits_digest
 
@@ -29,15 +26,18 @@ def export(
     *,
     output: Path | str | None = None,
     choice: Choice | None = None,
+    workers: int = 0,
     listener: Listener | None = None,
 ) -> tuple[str, ...]:
     """Write the finished frames of a data set in these formats, each to OUT/<format>, or OUTPUT/<format>; gives notes for the
     user. A format is its name, or {name: {option: value}}; options that are not said are those of the export in the data set's
     folder, else its recipe's, else the format's defaults.
 
-    All are put in place, and take that of older exports, only when all are whole; an export of all frames is not replaced by
-    one of a choice of them. Raises UserError for an unknown format or a choice without output or frames, StoreError if `out`
-    is no data set or one of the folders cannot be written.
+    Where that takes long, so many processes help; fewer than two do not, and more need a `__main__` guard in the
+    calling script. The folders are put in place, and take that of older exports, only when all are whole; an export of all
+    frames is not replaced by one of a choice of them. Raises UserError for an unknown format or a choice without output or
+    frames, StoreError if `out` is no data set or one of the folders cannot be written, WorkerDied where one of the processes
+    is killed.
     """
     dataset = Dataset(out, choice)
     place = dataset.root if output is None else located(output)
@@ -56,7 +56,7 @@ def export(
             dataset.store.make_ready()
             whole.enter_context(dataset.store.occupied())
         written = [(entry, whole.enter_context(_folder(dataset, place / entry.name, is_own))) for entry in entries]
-        notes = (*write(dataset, written, listener or unheard), *_lacks(dataset))
+        notes = (*write(dataset, written, listener or unheard, workers), *_lacks(dataset))
     kinds = dataset.link_kinds - {"hard link", "download"}
     return tuple(dict.fromkeys(notes)) + tuple(
         f"{dataset.root}: files of the exports are made as a {kind}, hard links do not work here" for kind in sorted(kinds)
@@ -83,52 +83,28 @@ def _known_options(dataset: Dataset, name: str) -> Mapping[str, JsonValue]:
     return written_options(dataset.root / name) or options_of(read_formats(said)).get(name, {})
 
 
-def write(dataset: Dataset, formats: Sequence[tuple[FormatEntry, Path]], tell: Listener = unheard) -> tuple[str, ...]:
-    """Write the data set in formats, each once, into these empty folders; gives notes for the user.
+def write(dataset: Dataset, formats: Entries, tell: Listener = unheard, workers: int = 0) -> tuple[str, ...]:
+    """Write the data set in formats, each once, into these empty folders; gives notes for the user. `workers` as for `export`.
 
     Every sample is read once, and so is each of its channels. At last the digests of all files are listed, with the options.
     """
     if not formats:
         return ()
     notes: list[str] = []
-    total, views = len(dataset), Views(dataset)
-    least = dataset.plan.keep_annotations_above
+    total, least = len(dataset), dataset.plan.keep_annotations_above
     with ExitStack() as stack:
-        adds: list[tuple[str, Format, Dataset, Callable[[Sample], None]]] = []
-        for entry, folder in formats:
-            module = _format(entry.name)
-            view = views.of(module, least)
-            add = stack.enter_context(module.writer(view, folder, notes.append, *entry.arguments()))
-            adds.append((entry.name, module, view, add))
-        for done, sample in enumerate(dataset):
+        adds = {t.entry.name: stack.enter_context(t.writer(notes.append)) for t in targets(dataset, formats)}
+        made = stack.enter_context(closing(prepared(dataset, formats, workers)))
+        for done, parts in enumerate(made):
             tell(Progress("exports", done, total))
-            for name, module, view, add in adds:
-                _check_sensor(dataset, name, module, sample)
-                add(view.shown(sample))
+            for name, add in adds.items():
+                add(parts[name])
     for entry, folder in formats:
-        own = least if _leaves_out(_format(entry.name)) else None
+        own = least if leaves_out(_format(entry.name)) else None
         credited = credits_digest(dataset.models) if _names_credits(_format(entry.name)) else None
         write_checksums(folder, entry.whole().options, own, credited, total)
     tell(Progress("exports", total, total))
     return tuple(notes)
-
-
-class Views:
-    """A data set as formats see it: read once for all that leave the same annotations out."""
-
-    def __init__(self, dataset: Dataset) -> None:
-        self._dataset = dataset
-        self._above = cache(partial(_above, dataset))
-
-    def of(self, module: object, least: float | None) -> Dataset:
-        """The data set without annotations of what is seen no more than `least`, but for a format that writes scenes."""
-        return self._dataset if least is None or not _leaves_out(module) else self._above(least)
-
-
-def _above(dataset: Dataset, least: float) -> Exported:
-    shown = Exported(dataset.root, dataset.choice, least)
-    shown.link_kinds = dataset.link_kinds
-    return shown
 
 
 def is_written(entry: FormatEntry, dataset: Dataset, least: float | None) -> bool:
@@ -143,29 +119,14 @@ def is_out_of_date(name: str, dataset: Dataset, least: float | None) -> bool:
     is seen more than `least`, or names other credits than those that are known now.
     """
     module, folder = _format(name), dataset.root / name
-    if written_frames(folder) not in (None, len(dataset)) or (_leaves_out(module) and written_least(folder) != least):
+    if written_frames(folder) not in (None, len(dataset)) or (leaves_out(module) and written_least(folder) != least):
         return True
     return _names_credits(module) and written_credits(folder) != credits_digest(dataset.models)
-
-
-def _leaves_out(module: object) -> bool:
-    """Whether a format leaves annotations out; one that writes scenes says `ANNOTATES = False`."""
-    return getattr(module, "ANNOTATES", True)
 
 
 def _names_credits(module: object) -> bool:
     """Whether a format may name the models' credits; one that does not says `CREDITS = False`."""
     return getattr(module, "CREDITS", True)
-
-
-def _check_sensor(dataset: Dataset, name: str, module: Format, sample: Sample) -> None:
-    """Raise UserError where a sensor keeps less than all channels, and lacks one that the format needs of every frame."""
-    lacking = missing(getattr(module, "CHANNELS", ()), sample.files)
-    if sample.sensor != CAMERA and lacking:
-        raise UserError(
-            f"{dataset.root}: format {name}: expected channel {lacking[0]} of every frame, found none of sensor "
-            f"{sample.sensor} (frame {sample.index}): leave {name} out, or render that sensor with {lacking[0]}"
-        )
 
 
 def writable_formats() -> tuple[str, ...]:

@@ -134,7 +134,7 @@ def generate(
         left_over = None if share.is_all else status(store.root)
         if left_over is None or left_over.complete:
             wanted = tuple(_due(wanted, portion, rendered > 0, store))
-            notes += export(store.root, wanted, listener=tell)
+            notes += export(store.root, wanted, workers=0 if ray else workers, listener=tell)
             store.forget_failures()
     if left_over is not None and not left_over.complete:
         warnings, notes = _warnings(planned, dataset), (*notes, _left_to_others(portion, left_over))

@@ -347,7 +347,8 @@ class Dataset(Shown, Sequence[Sample]):
         """Put a stored file at `destination`: a hard link, else a reflink, else a copy; `link_kinds` says which. One out of a
         shot's tar is always a copy. Raises StoreError for a path that leads out of the data set.
         """
-        destination.parent.mkdir(parents=True, exist_ok=True)
+        if not destination.parent.is_dir():
+            destination.parent.mkdir(parents=True, exist_ok=True)
         file = self.stored(relative)
         if isinstance(file, Loaded):
             destination.write_bytes(file.data)

@@ -64,7 +64,7 @@ def unsealed(text: str) -> dict[str, Any]:
 def seal_of(file: Path) -> Seal:
     """A file's size and digest, read block by block."""
     found, size = xxhash.xxh3_128(), 0
-    with file.open("rb") as stream:
+    with file.open("rb", buffering=0) as stream:  # blocks are large, and most files smaller
         while block := stream.read(BLOCK):
             found.update(block)
             size += len(block)

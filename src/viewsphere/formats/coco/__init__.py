@@ -17,9 +17,9 @@ from pathlib import Path
 
 from viewsphere.errors import UserError
 from viewsphere.formats._contents import put
-from viewsphere.formats.coco.categories import keeps_ids
+from viewsphere.formats.coco.categories import category_ids, keeps_ids
 from viewsphere.formats.coco.categories import notes as notes
-from viewsphere.formats.coco.entries import files, seen
+from viewsphere.formats.coco.entries import Entry, entry, files, seen
 from viewsphere.formats.coco.instances import instances
 from viewsphere.formats.coco.options import Options as Options
 from viewsphere.formats.coco.proving import verify as verify
@@ -31,11 +31,22 @@ from viewsphere.store import Dataset
 CHANNELS = ("rgb",)
 
 
+def preparer(dataset: Dataset, folder: Path, options: Options) -> Callable[[Sample], Entry]:
+    """Puts a sample's images and masks in place, and makes its entries of the instances JSON."""
+    ids = category_ids(dataset, options)
+
+    def prepare(sample: Sample) -> Entry:
+        masks = seen(sample)
+        for _, name, content in files(dataset, sample, masks, options):
+            put(dataset, content, folder / name)
+        return entry(dataset, sample, ids, masks)
+
+    return prepare
+
+
 @contextmanager
-def writer(
-    dataset: Dataset, folder: Path, note: Callable[[str], None], options: Options
-) -> Generator[Callable[[Sample], None]]:
-    """Write the instances JSON of each split, images, masks and models.
+def writer(dataset: Dataset, folder: Path, note: Callable[[str], None], options: Options) -> Generator[Callable[[Entry], None]]:
+    """Write the instances JSON of each split, and models.
 
     Raises UserError if the data set has no picture: channel `rgb`, or else `rgba`.
     """
@@ -44,12 +55,5 @@ def writer(
     for line in () if keeps_ids(dataset) else notes(dataset.categories, options):
         note(f"note: {line}")
     with instances(dataset, folder / "annotations", options) as append:
-
-        def add(sample: Sample) -> None:
-            masks = seen(sample)
-            append(sample, masks)
-            for _, name, content in files(dataset, sample, masks, options):
-                put(dataset, content, folder / name)
-
-        yield add
+        yield append
     dataset.link_models(folder / "MODELS")

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from pathlib import Path
+from dataclasses import dataclass
+from pathlib import PurePosixPath
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.formats._contents import Expected
-from viewsphere.formats._paper import faces, transformation_matrix
+from viewsphere.formats._paper import faces, json_bytes, transformation_matrix
 from viewsphere.formats.coco.options import Options
 from viewsphere.geometry.mask import mask_polygons
 from viewsphere.model.sample import Box, ObjectAnnotation, Sample
@@ -20,6 +21,21 @@ FOLDER_SIZE = 10_000
 
 Masks = Mapping[int, NDArray[np.bool_]]
 """Masks (H, W) of the visible pixels of a sample's visible objects but imported ones, by the objects' ids."""
+
+
+@dataclass(frozen=True)
+class Entry:
+    """What the instances file of a split has of a sample: its image and its annotations, JSON."""
+
+    split: str
+    image: bytes
+    annotations: tuple[bytes, ...]
+
+
+def entry(dataset: Dataset, sample: Sample, ids: Mapping[int, int], masks: Masks) -> Entry:
+    """A sample's entry; `ids`: COCO's category ids by ours."""
+    annotations = map(json_bytes, _annotations(dataset, sample, ids, masks))
+    return Entry(sample.split, json_bytes(_image(dataset, sample)), tuple(annotations))
 
 
 def seen(sample: Sample) -> Masks:
@@ -33,13 +49,12 @@ def files(dataset: Dataset, sample: Sample, masks: Masks, options: Options) -> I
         return
     folder = options.folder(sample.split)
     yield sample.index, f"{folder}/{_image_file(dataset, sample)}", sample.picture_file
-    for o in sample.objects:
-        if o.source is None and o.area:
-            yield sample.index, f"{folder}/{_mask_file(dataset, sample, o)}", masks[o.id]
+    for number, mask in masks.items():
+        yield sample.index, f"{folder}/{_mask_file(dataset, sample, number)}", mask
 
 
-def annotations_of(dataset: Dataset, sample: Sample, ids: Mapping[int, int], masks: Masks) -> Iterator[dict[str, Any]]:
-    """COCO's annotations of all visible objects, and of imported ones that have a box; `ids`: COCO's category ids by ours."""
+def _annotations(dataset: Dataset, sample: Sample, ids: Mapping[int, int], masks: Masks) -> Iterator[dict[str, Any]]:
+    """COCO's annotations of all visible objects, and of imported ones that have a box."""
     for o in sample.objects:
         if o.source is not None and (o.area or o.box2d is not None):
             yield _foreign_annotation(dataset, sample, o, ids)
@@ -49,12 +64,12 @@ def annotations_of(dataset: Dataset, sample: Sample, ids: Mapping[int, int], mas
 
 def _image_file(dataset: Dataset, sample: Sample) -> str:
     """Name of a frame's image in its split's folder."""
-    return f"{_stem(dataset, sample)}{Path(sample.picture_file or '.png').suffix}"
+    return f"{_stem(dataset, sample)}{PurePosixPath(sample.picture_file or '.png').suffix}"
 
 
-def _mask_file(dataset: Dataset, sample: Sample, annotation: ObjectAnnotation) -> str:
-    """Name of an object's mask in its split's folder."""
-    several = f"_{annotation.id:03d}" if dataset.plan.most_objects(sample.index) > 1 else ""
+def _mask_file(dataset: Dataset, sample: Sample, number: int) -> str:
+    """Name of the mask of an object, by its id, in its split's folder."""
+    several = f"_{number:03d}" if dataset.plan.most_objects(sample.index) > 1 else ""
     return f"MASK/{_stem(dataset, sample)}{several}.png"
 
 
@@ -64,7 +79,7 @@ def _stem(dataset: Dataset, sample: Sample) -> str:
     return f"{inside}{sample.index + 1:012d}"
 
 
-def image(dataset: Dataset, sample: Sample) -> dict[str, Any]:
+def _image(dataset: Dataset, sample: Sample) -> dict[str, Any]:
     """COCO's image entry of a sample, with the paper's keys; of an imported one its own entry with new id and file name."""
     if sample.known_camera is None:
         source = dict(sample.source or {})
@@ -118,7 +133,7 @@ def _annotation(
         "segmentation": [[int(c) for c in polygon] for polygon in mask_polygons(mask)],
         "width": sample.camera.width,
         "height": sample.camera.height,
-        "path_mask": _mask_file(dataset, sample, o),
+        "path_mask": _mask_file(dataset, sample, o.id),
         "bbox_3D_pxs": faces(o.box3d_pixels),
         "bbox_projected": _corner_and_size(o.box2d_projected),
         "bbox_unclipped": _corner_and_size(o.box2d_unclipped),

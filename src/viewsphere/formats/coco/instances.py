@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable, Generator, Iterator, Mapping
+from collections.abc import Callable, Generator, Iterable, Mapping
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from tempfile import TemporaryFile
@@ -11,9 +11,8 @@ from typing import Any
 
 from viewsphere.formats._paper import json_bytes, vehicles
 from viewsphere.formats.coco.categories import category_ids
-from viewsphere.formats.coco.entries import Masks, annotations_of, image
+from viewsphere.formats.coco.entries import Entry
 from viewsphere.formats.coco.options import Options
-from viewsphere.model.sample import Sample
 from viewsphere.store import Dataset
 from viewsphere.store.credits import credited
 
@@ -24,7 +23,7 @@ def file_name(split: str) -> str:
 
 
 @contextmanager
-def instances(dataset: Dataset, folder: Path, options: Options) -> Generator[Callable[[Sample, Masks], None]]:
+def instances(dataset: Dataset, folder: Path, options: Options) -> Generator[Callable[[Entry], None]]:
     """Write the files of all splits into this folder: gives a function that appends a frame to its split's file."""
     folder.mkdir(exist_ok=True)
     ids = category_ids(dataset, options)
@@ -32,23 +31,23 @@ def instances(dataset: Dataset, folder: Path, options: Options) -> Generator[Cal
     with ExitStack() as stack:
         files = {split: stack.enter_context(_instances(folder / file_name(split), head)) for split in dataset.splits}
 
-        def add(sample: Sample, masks: Masks) -> None:
-            files[sample.split](image(dataset, sample), annotations_of(dataset, sample, ids, masks))
+        def add(entry: Entry) -> None:
+            files[entry.split](entry.image, entry.annotations)
 
         yield add
 
 
 @contextmanager
-def _instances(file: Path, head: bytes) -> Generator[Callable[[dict[str, Any], Iterator[dict[str, Any]]], None]]:
+def _instances(file: Path, head: bytes) -> Generator[Callable[[bytes, Iterable[bytes]], None]]:
     """Write one file: annotations wait in a temporary file until the images, which come first, are complete."""
     with file.open("wb") as images, TemporaryFile(dir=file.parent) as waiting:
         images.write(head + b',"images":[')
         separators = {images: b"\n", waiting: b"\n"}
 
-        def append(image: dict[str, Any], annotations: Iterator[dict[str, Any]]) -> None:
+        def append(image: bytes, annotations: Iterable[bytes]) -> None:
             for part, values in ((images, [image]), (waiting, annotations)):
                 for value in values:
-                    part.write(separators[part] + json_bytes(value))
+                    part.write(separators[part] + value)
                     separators[part] = b",\n"
 
         yield append

@@ -11,11 +11,11 @@ from viewsphere.formats import Remark
 from viewsphere.formats._contents import Expected, check_files, models
 from viewsphere.formats._json_proof import check_json
 from viewsphere.formats._json_rows import Where
-from viewsphere.formats.coco.entries import Masks, files, seen
+from viewsphere.formats.coco.categories import category_ids
+from viewsphere.formats.coco.entries import Entry, entry, files, seen
 from viewsphere.formats.coco.instances import file_name, instances
 from viewsphere.formats.coco.options import Options
 from viewsphere.formats.coco.witness import testify
-from viewsphere.model.sample import Sample
 from viewsphere.store import Dataset
 
 OPENED: tuple[Where, ...] = ((), ("categories",), ("models",), ("images",), ("annotations",))
@@ -37,16 +37,17 @@ def verify(dataset: Dataset, folder: Path, sampled: Collection[int], options: Op
             yield from testify(dataset, folder / "annotations" / file_name(split), split, sampled, options)
 
 
-def _expected(dataset: Dataset, append: Callable[[Sample, Masks], None], options: Options) -> Iterator[Expected]:
+def _expected(dataset: Dataset, append: Callable[[Entry], None], options: Options) -> Iterator[Expected]:
     """All files but the instances, for which every frame is appended elsewhere."""
+    ids = category_ids(dataset, options)
     for sample in dataset:
         masks = seen(sample)
-        append(sample, masks)
+        append(entry(dataset, sample, ids, masks))
         yield from files(dataset, sample, masks, options)
     yield from models(dataset)
 
 
-def _nowhere(sample: Sample, masks: Masks) -> None:
+def _nowhere(entry: Entry) -> None:
     """Where frames are appended whose files alone are wanted."""
 
 

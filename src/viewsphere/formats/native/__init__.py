@@ -18,7 +18,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from viewsphere.formats._contents import put
-from viewsphere.formats.native.entries import files, is_of_a_pose
+from viewsphere.formats.native.entries import Entry, entries_of, files
 from viewsphere.formats.native.poses import poses
 from viewsphere.formats.native.proving import verify as verify
 from viewsphere.formats.native.reading import read as read
@@ -26,15 +26,20 @@ from viewsphere.model.sample import Sample
 from viewsphere.store import Dataset
 
 
+def preparer(dataset: Dataset, folder: Path) -> Callable[[Sample], list[Entry]]:
+    """Puts a sample's picture, masks and depth in place, and makes its entries of `dataset1.json`."""
+
+    def prepare(sample: Sample) -> list[Entry]:
+        for _, name, content in files(dataset, sample):
+            put(dataset, content, folder / name)
+        return entries_of(dataset, sample)
+
+    return prepare
+
+
 @contextmanager
-def writer(dataset: Dataset, folder: Path, note: Callable[[str], None]) -> Generator[Callable[[Sample], None]]:
-    """Write `dataset1.json`, pictures, masks and depth by pose, models."""
+def writer(dataset: Dataset, folder: Path, note: Callable[[str], None]) -> Generator[Callable[[list[Entry]], None]]:
+    """Write `dataset1.json`, and models."""
     with poses(dataset, folder) as append:
-
-        def add(sample: Sample) -> None:
-            append(sample)
-            for _, name, content in files(dataset, sample) if is_of_a_pose(sample) else ():
-                put(dataset, content, folder / name)
-
-        yield add
+        yield append
     dataset.link_models(folder / "MODELS")

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from viewsphere.formats._contents import Expected
-from viewsphere.formats._paper import faces, transformation_matrix
+from viewsphere.formats._paper import faces, json_bytes, transformation_matrix
 from viewsphere.model.channel import picture_of
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.store import Dataset
@@ -15,13 +15,35 @@ from viewsphere.store import Dataset
 FOLDER_SIZE = 10_000
 
 
-def is_of_a_pose(sample: Sample) -> bool:
+class Entry(NamedTuple):
+    """An object's entry, JSON: the number of its pose, the pose's keys, and the object's own."""
+
+    pose: int
+    keys: bytes
+    own: bytes
+
+
+def entries_of(dataset: Dataset, sample: Sample) -> list[Entry]:
+    """The entries of a sample's objects; none where the layout has no place for it."""
+    if not _is_of_a_pose(sample):
+        return []
+    number = sample.pose.index
+    keys = json_bytes(str(number)) + b":" + json_bytes({**_pose(dataset, sample), "vehicles_rendered": {}})[:-2]
+    own = ((json_bytes(name), json_bytes(entry)) for name, entry in _objects(dataset, sample))
+    return [Entry(number, keys, name + b":" + entry) for name, entry in own]
+
+
+def _is_of_a_pose(sample: Sample) -> bool:
     """Whether a sample has a known camera and pose, which the layout needs: it sorts everything by pose."""
     return sample.known_camera is not None and sample.known_pose is not None
 
 
 def files(dataset: Dataset, sample: Sample) -> Iterator[Expected]:
-    """The files of a sample: picture, depth and masks, with their paths from the export's folder."""
+    """The files of a sample: picture, depth and masks, with their paths from the export's folder; none where the layout has no
+    place for it.
+    """
+    if not _is_of_a_pose(sample):
+        return
     folder = _pose_folder(dataset, sample)
     names = _shared_files(dataset, sample)
     for channel, kind in ((picture_of(names), "RGB"), ("depth", "DEPTH")):
@@ -31,7 +53,7 @@ def files(dataset: Dataset, sample: Sample) -> Iterator[Expected]:
         yield sample.index, f"{folder}/MASK/{_stem(dataset, sample, o)}.png", o.mask
 
 
-def rendered(dataset: Dataset, sample: Sample) -> Iterator[tuple[str, dict[str, Any]]]:
+def _objects(dataset: Dataset, sample: Sample) -> Iterator[tuple[str, dict[str, Any]]]:
     """Name and JSON entry of every object."""
     files = _shared_files(dataset, sample)
     for o in sample.objects:
@@ -71,7 +93,7 @@ def _group(dataset: Dataset, sample: Sample) -> str:
     return f"{number // FOLDER_SIZE:04d}/" if count > FOLDER_SIZE else ""
 
 
-def pose(dataset: Dataset, sample: Sample) -> dict[str, Any]:
+def _pose(dataset: Dataset, sample: Sample) -> dict[str, Any]:
     """The JSON keys of a sample's pose, but for the list of rendered objects."""
     viewpoint = sample.pose
     return {

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import sqlite3
-from collections.abc import Callable, Generator, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from contextlib import closing, contextmanager
 from pathlib import Path
 from tempfile import TemporaryFile
 from typing import IO
 
 from viewsphere.formats._paper import json_bytes, vehicles
-from viewsphere.formats.native.entries import is_of_a_pose, pose, rendered
-from viewsphere.model.sample import Sample
+from viewsphere.formats.native.entries import Entry
 from viewsphere.store import Dataset
 
 FILE_NAME = "dataset1.json"
@@ -21,8 +20,8 @@ Place = tuple[int, int, int, int]
 
 
 @contextmanager
-def poses(dataset: Dataset, folder: Path) -> Generator[Callable[[Sample], None]]:
-    """Write the file into this folder: gives a function that appends a frame.
+def poses(dataset: Dataset, folder: Path) -> Generator[Callable[[Sequence[Entry]], None]]:
+    """Write the file into this folder: gives a function that appends a frame's entries.
 
     Entries wait in a temporary file, and their positions in an SQLite table, which moves to disk once it is long.
     """
@@ -30,9 +29,8 @@ def poses(dataset: Dataset, folder: Path) -> Generator[Callable[[Sample], None]]
         table.execute("PRAGMA journal_mode = OFF")
         table.execute("CREATE TABLE places (pose INTEGER, head INTEGER, start INTEGER, stop INTEGER)")
 
-        def append(sample: Sample) -> None:
-            if is_of_a_pose(sample):
-                table.executemany("INSERT INTO places VALUES (?, ?, ?, ?)", _entries(dataset, sample, waiting))
+        def append(entries: Sequence[Entry]) -> None:
+            table.executemany("INSERT INTO places VALUES (?, ?, ?, ?)", _places(entries, waiting))
 
         yield append
         with (folder / FILE_NAME).open("wb") as file:
@@ -41,15 +39,12 @@ def poses(dataset: Dataset, folder: Path) -> Generator[Callable[[Sample], None]]
             file.write(b"\n}}\n")
 
 
-def _entries(dataset: Dataset, sample: Sample, waiting: IO[bytes]) -> Iterator[Place]:
+def _places(entries: Sequence[Entry], waiting: IO[bytes]) -> Iterator[Place]:
     """Write a frame's entries, each behind the keys of its pose."""
-    keys = json_bytes({**pose(dataset, sample), "vehicles_rendered": {}})[:-2]
-    for name, entry in rendered(dataset, sample):
+    for entry in entries:
         head = waiting.tell()
-        waiting.write(json_bytes(str(sample.pose.index)) + b":" + keys)
-        start = waiting.tell()
-        waiting.write(json_bytes(name) + b":" + json_bytes(entry))
-        yield sample.pose.index, head, start, waiting.tell()
+        start = head + waiting.write(entry.keys)
+        yield entry.pose, head, start, start + waiting.write(entry.own)
 
 
 def _write_poses(file: IO[bytes], waiting: IO[bytes], places: Iterable[Place]) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Sequence
 from pathlib import Path
 
 from viewsphere.aside import temporary
@@ -10,9 +10,8 @@ from viewsphere.formats import Remark
 from viewsphere.formats._contents import Expected, check_files, models
 from viewsphere.formats._json_proof import check_json
 from viewsphere.formats._json_rows import Where
-from viewsphere.formats.native.entries import files, is_of_a_pose
+from viewsphere.formats.native.entries import Entry, entries_of, files
 from viewsphere.formats.native.poses import FILE_NAME, poses
-from viewsphere.model.sample import Sample
 from viewsphere.store import Dataset
 
 OPENED: tuple[Where, ...] = (
@@ -26,15 +25,14 @@ def verify(dataset: Dataset, folder: Path, sampled: Collection[int]) -> Iterator
     """All that is not as it would be exported now; there is nothing that is proved of the `sampled` frames alone."""
     with temporary("native") as aside:
         with poses(dataset, aside) as append:
-            again = _expected(dataset, lambda sample: None)
+            again = _expected(dataset, lambda entries: None)
             yield from check_files(dataset, folder, _expected(dataset, append), again, [FILE_NAME])
         yield from check_json(aside / FILE_NAME, folder / FILE_NAME, OPENED, lambda where, value: None)
 
 
-def _expected(dataset: Dataset, append: Callable[[Sample], None]) -> Iterator[Expected]:
+def _expected(dataset: Dataset, append: Callable[[Sequence[Entry]], None]) -> Iterator[Expected]:
     """All files but the JSON, for which every frame is appended elsewhere."""
     for sample in dataset:
-        append(sample)
-        if is_of_a_pose(sample):
-            yield from files(dataset, sample)
+        append(entries_of(dataset, sample))
+        yield from files(dataset, sample)
     yield from models(dataset)

@@ -1,35 +1,28 @@
 """Processes of this machine that each do one job at a time, are handed what they have warm, and may die.
 
 `ProcessPoolExecutor` can hang when a worker dies or is replaced (CPython issue 115634) and knows nothing of what a worker has
-warm, hence our own: one pipe a worker, spawn rather than fork.
+warm, hence our own (`_hands`).
 """
 
 from __future__ import annotations
 
 import os
-import signal
-import sys
 import time
-from collections.abc import Callable, Generator, Iterator
-from contextlib import contextmanager, suppress
-from multiprocessing import get_context, parent_process, resource_tracker
+from collections.abc import Callable, Iterator
+from contextlib import suppress
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
-from threading import Thread
 from typing import TYPE_CHECKING, cast
 
 from viewsphere.errors import UserError, ViewsphereError
+from viewsphere.run.executors._hands import OUT_OF_MEMORY, Hand, belong_to_parent, deaf, end_of
 from viewsphere.run.executors._jobs import Job, Outcome, Queue, Work, answer, ignored
 
 if TYPE_CHECKING:
     from viewsphere.run.tasks import Worker
     from viewsphere.sampling.extension import Portion
 
-OUT_OF_MEMORY = 77
-"""Exit code of a worker that was refused memory."""
-
-DYING_S = 10.0
-"""Seconds that a worker whose pipe is closed has to end by itself, so that its exit code is its own."""
+ADVICE = ", the last time while it was alone: give it more memory, or ask for smaller pictures or models"
 
 LEAVING_S = 5.0
 """Seconds that workers have to end when all is done."""
@@ -131,7 +124,7 @@ class LocalCrew:
 
     def _give_to(self, hand: _Hand | None, job: Job, busy: dict[Connection, _Hand]) -> None:
         if hand is None:
-            with _deaf():  # until it is known here, so that it is ended with the others
+            with deaf():  # until it is known here, so that it is ended with the others
                 hand = _Hand(self._root, self._portion)
                 self._hands.append(hand)
         busy[hand.pipe] = hand
@@ -149,9 +142,7 @@ class LocalCrew:
         except (EOFError, OSError):  # it may die in the middle of an answer
             self._end(job, busy, pipe)
             self._hands.remove(hand)
-            hand.process.join(DYING_S)
-            code = hand.stop()
-            if told := queue.again(job, _end_of(code)):
+            if told := queue.again(job, end_of(hand.end(), ADVICE)):
                 yield told
             self._give(None, queue, busy)
             return
@@ -171,60 +162,22 @@ class LocalCrew:
         del busy[pipe]
 
 
-def _end_of(code: int | None) -> str:
-    """How a worker with this exit code came to its end, and what to do."""
-    if code == OUT_OF_MEMORY:
-        how = "it was refused memory"
-    elif code == -getattr(signal, "SIGKILL", 0):
-        how = "it was killed, as systems do when memory runs out"
-    else:
-        return f"exit code {code}"
-    return f"{how}, the last time while it was alone: give it more memory, or ask for smaller pictures or models"
-
-
-class _Hand:
-    """One worker process, seen from here."""
+class _Hand(Hand):
+    """One worker process, and what it has warm."""
 
     def __init__(self, root: Path, portion: Portion) -> None:
-        context = get_context("spawn")
-        self.pipe, theirs = context.Pipe()
-        self.process = context.Process(target=_serve, args=(theirs, root, portion), daemon=True)
-        self.process.start()
-        theirs.close()
+        super().__init__(_serve, root, portion)
         self.line = ""
         self.job: Job | None = None
 
     def give(self, job: Job) -> None:
         self.job, self.line = job, job.line
-        with suppress(OSError):  # a dead worker is noticed when its answer is awaited
-            self.pipe.send(job)
-
-    def stop(self) -> int | None:
-        """End the process; what it had not finished is lost, what it had is not."""
-        self.process.kill()  # which ends one that is stopped, too
-        self.process.join()
-        self.pipe.close()
-        return self.process.exitcode
-
-
-@contextmanager
-def _deaf() -> Generator[None]:
-    """A process started meanwhile does not hear Ctrl-C, not even before `_serve` begins; this one hears it afterwards."""
-    if sys.platform == "win32":  # has no masks to inherit
-        yield
-        return
-    resource_tracker.ensure_running()  # the start of the tracker would unblock the signal again
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        self.tell(job)
 
 
 def _serve(pipe: Connection, root: Path, portion: Portion) -> None:
     """A worker's life: take a job, tell of each of its frames by their number so far, answer, until the other side is gone."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's to handle
-    Thread(target=_end_with_parent, daemon=True).start()
+    belong_to_parent()
     from viewsphere.run.allocator import keep_freed_memory
     from viewsphere.run.tasks import Worker
 
@@ -237,10 +190,3 @@ def _serve(pipe: Connection, root: Path, portion: Portion) -> None:
                 pipe.send(answer(worker, job, pipe.send))
             except MemoryError:
                 os._exit(OUT_OF_MEMORY)
-
-
-def _end_with_parent() -> None:
-    """End this process, whatever it does, as soon as its parent is dead: another run may be at its work already."""
-    if parent := parent_process():
-        wait([parent.sentinel])
-        os._exit(1)

@@ -1,0 +1,83 @@
+"""Worker processes of this machine, as the one that starts them sees them: one pipe a worker, spawn rather than fork."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+from collections.abc import Callable, Generator
+from contextlib import contextmanager, suppress
+from multiprocessing import get_context, parent_process, resource_tracker
+from multiprocessing.connection import wait
+from threading import Thread
+from typing import Any
+
+OUT_OF_MEMORY = 77
+"""Exit code of a worker that was refused memory."""
+
+DYING_S = 10.0
+"""Seconds that a worker whose pipe is closed has to end by itself, so that its exit code is its own."""
+
+
+class Hand:
+    """A worker process that does `serve(pipe, *told)`, to be stopped by who started it."""
+
+    def __init__(self, serve: Callable[..., None], *told: Any) -> None:
+        context = get_context("spawn")
+        self.pipe, theirs = context.Pipe()
+        self.process = context.Process(target=serve, args=(theirs, *told), daemon=True)
+        self.process.start()
+        theirs.close()
+
+    def tell(self, what: object) -> None:
+        """Send it something; that it is dead is noticed when its answer is awaited."""
+        with suppress(OSError):
+            self.pipe.send(what)
+
+    def stop(self) -> int | None:
+        """End the process, and give its exit code; what it had not finished is lost, what it had is not."""
+        self.process.kill()  # which ends one that is stopped, too
+        self.process.join()
+        self.pipe.close()
+        return self.process.exitcode
+
+    def end(self) -> int | None:
+        """The exit code of one whose pipe is closed."""
+        self.process.join(DYING_S)
+        return self.stop()
+
+
+def end_of(code: int | None, advice: str) -> str:
+    """How a worker with this exit code came to its end; where memory may have been what it lacked, with some advice."""
+    if code == OUT_OF_MEMORY:
+        return f"it was refused memory{advice}"
+    if code == -getattr(signal, "SIGKILL", 0):
+        return f"it was killed, as systems do when memory runs out{advice}"
+    return f"exit code {code}"
+
+
+@contextmanager
+def deaf() -> Generator[None]:
+    """A process started meanwhile does not hear Ctrl-C, not even before it serves; this one hears it afterwards."""
+    if sys.platform == "win32":  # has no masks to inherit
+        yield
+        return
+    resource_tracker.ensure_running()  # the start of the tracker would unblock the signal again
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def belong_to_parent() -> None:
+    """Leave Ctrl-C to the process that started this one, and end with it."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    """End this process, whatever it does, as soon as its parent is dead: another run may be at its work already."""
+    if parent := parent_process():
+        wait([parent.sentinel])
+        os._exit(1)

@@ -1,0 +1,97 @@
+"""Work whose pieces processes of this machine do at once, and whose results are wanted in order."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import traceback
+from collections.abc import Callable, Generator, Iterable
+from contextlib import suppress
+from functools import cache
+from multiprocessing.connection import Connection, wait
+from typing import Any, TypeVar, cast
+
+from viewsphere.errors import UserError, ViewsphereError, WorkerDied
+from viewsphere.run.executors._hands import OUT_OF_MEMORY, Hand, belong_to_parent, deaf, end_of
+
+Task = TypeVar("Task")
+Made = TypeVar("Made")
+
+AHEAD = 4
+"""Results a worker that wait for an earlier one, at most, so that memory does not grow where one is slow."""
+
+ADVICE = ": give it more memory, or ask for fewer workers"
+
+
+def in_order(workers: int, make: Callable[[], Callable[[Task], Made]], tasks: Iterable[Task]) -> Generator[tuple[Task, Made]]:
+    """Each task and what is made of it, in the order of the tasks, which are asked for when there is a worker for them.
+
+    `make()`, called in each of so many worker processes, gives the function that does a task; all of it travels by pickle.
+    Raises the first UserError or OSError that a task raises, ViewsphereError with the traceback of anything else, and
+    WorkerDied where a worker dies: no task is done twice. Workers end with the iterator.
+    """
+    left, hands, free = iter(tasks), list[Hand](), list[Hand]()
+    busy, made = dict[Connection, tuple[int, Task, Hand]](), dict[int, tuple[Task, Made]]()
+    given = taken = 0
+    try:
+        while True:
+            while len(busy) < workers and given < taken + AHEAD * workers and (task := next(left, None)) is not None:
+                hand = free.pop() if free else _hired(make, hands)
+                hand.tell(task)
+                busy[hand.pipe] = given, task, hand
+                given += 1
+            if not busy and not made:
+                return
+            while taken in made:
+                yield made.pop(taken)
+                taken += 1
+            for pipe in wait(list(busy)) if busy else ():
+                number, task, hand = busy.pop(cast(Connection, pipe))  # Windows has another class
+                made[number] = task, _answered(hand)
+                free.append(hand)
+    finally:
+        for hand in hands:
+            hand.stop()
+
+
+def _hired(make: Callable[[], Any], hands: list[Hand]) -> Hand:
+    with deaf():  # until it is known here, so that it is ended with the others
+        hands.append(Hand(_serve, make))
+    return hands[-1]
+
+
+def _answered(hand: Hand) -> Any:
+    try:
+        made, error = hand.pipe.recv()
+    except (EOFError, OSError):  # it may die in the middle of an answer
+        raise WorkerDied(f"expected a worker's answer, found that it died: {end_of(hand.end(), ADVICE)}") from None
+    if error is not None:
+        raise error
+    return made
+
+
+def _serve(pipe: Connection, make: Callable[[], Callable[[Any], Any]]) -> None:
+    """A worker's life: take a task, answer, until the other side is gone."""
+    belong_to_parent()
+    from viewsphere.run.allocator import keep_freed_memory
+
+    keep_freed_memory()
+    made = cache(make)
+    with suppress(EOFError, ConnectionError):  # the parent is gone, with or without unread answers
+        while True:
+            task = pipe.recv()
+            pipe.send_bytes(_answer(lambda task=task: made()(task)))
+
+
+def _answer(do: Callable[[], Any]) -> bytes:
+    """What a task comes to, or what it raises, as `_answered` reads it."""
+    try:
+        return pickle.dumps((do(), None))
+    except UserError as error:
+        return pickle.dumps((None, type(error)(str(error))))
+    except OSError as error:
+        return pickle.dumps((None, OSError(error.errno, error.strerror or str(error))))
+    except MemoryError:
+        os._exit(OUT_OF_MEMORY)
+    except Exception:
+        return pickle.dumps((None, ViewsphereError(f"a worker failed\n{traceback.format_exc()}")))

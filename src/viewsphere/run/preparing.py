@@ -1,0 +1,162 @@
+"""Samples as formats want them: read once for all formats, and prepared, where that takes long, by several processes."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Generator, Iterator, Sequence
+from contextlib import AbstractContextManager, closing
+from dataclasses import dataclass
+from functools import cache, partial
+from itertools import chain, repeat
+from pathlib import Path
+from typing import Any
+
+from viewsphere import plugins
+from viewsphere.errors import UserError
+from viewsphere.formats import Format
+from viewsphere.model.channel import missing
+from viewsphere.model.rig import CAMERA
+from viewsphere.model.sample import Sample
+from viewsphere.recipe.formats import FormatEntry
+from viewsphere.run.in_order import in_order
+from viewsphere.store import Dataset, Exported
+
+PATIENCE_S, WORTH_S = 2.0, 8.0
+"""Seconds after which this process looks how long it would take for what is left; and for how many of them others help, each
+of which takes one or two to start.
+"""
+
+LOT, LONGEST = 32, 256
+"""Frames that a worker is given at once, at least as long as there are so many; and most of one shot, whose records are read
+again for the next."""
+
+Lot = tuple[tuple[str, Sequence[int]], ...]
+"""Shots by their keys, and which of their frames."""
+
+Entries = Sequence[tuple[FormatEntry, Path]]
+"""Formats and the folders that they are written into."""
+
+
+def leaves_out(module: object) -> bool:
+    """Whether a format leaves annotations out; one that writes scenes says `ANNOTATES = False`."""
+    return getattr(module, "ANNOTATES", True)
+
+
+class Views:
+    """A data set as formats see it: read once for all that leave the same annotations out."""
+
+    def __init__(self, dataset: Dataset) -> None:
+        self._dataset = dataset
+        self._above = cache(partial(_above, dataset))
+
+    def of(self, module: object, least: float | None) -> Dataset:
+        """The data set without annotations of what is seen no more than `least`, but for a format that writes scenes."""
+        return self._dataset if least is None or not leaves_out(module) else self._above(least)
+
+
+def _above(dataset: Dataset, least: float) -> Exported:
+    shown = Exported(dataset.root, dataset.choice, least)
+    shown.link_kinds = dataset.link_kinds
+    return shown
+
+
+@dataclass(frozen=True, eq=False)
+class Target:
+    """A format that is written into a folder, and the data set as the format sees it."""
+
+    entry: FormatEntry
+    folder: Path
+    module: Format
+    view: Dataset
+
+    def writer(self, note: Callable[[str], None]) -> AbstractContextManager[Callable[[Any], None]]:
+        """What the format writes with: gives a function that is called with what is prepared of each sample."""
+        return self.module.writer(self.view, self.folder, note, *self.entry.arguments())
+
+    @property
+    def prepares(self) -> bool:
+        """Whether the format makes anything of samples before they are added."""
+        return hasattr(self.module, "preparer")
+
+    def preparer(self) -> Callable[[Sample], Any]:
+        """Makes of a sample what the format adds: the sample itself, as the format sees it, where it prepares nothing."""
+        module: Any = self.module
+        make = module.preparer(self.view, self.folder, *self.entry.arguments()) if self.prepares else None
+        return lambda sample: make(self._seen(sample)) if make else self._seen(sample)
+
+    def _seen(self, sample: Sample) -> Sample:
+        """The sample as the format sees it; raises UserError where a sensor keeps less than all channels, and lacks one that
+        the format needs of every frame.
+        """
+        lacking = missing(getattr(self.module, "CHANNELS", ()), sample.files)
+        if sample.sensor != CAMERA and lacking:
+            raise UserError(
+                f"{self.view.root}: format {self.entry.name}: expected channel {lacking[0]} of every frame, found none of "
+                f"sensor {sample.sensor} (frame {sample.index}): leave {self.entry.name} out, or render that sensor with "
+                f"{lacking[0]}"
+            )
+        return self.view.shown(sample)
+
+
+def targets(dataset: Dataset, formats: Entries) -> tuple[Target, ...]:
+    """The formats to be written of a data set."""
+    views, least = Views(dataset), dataset.plan.keep_annotations_above
+    modules = ((entry, folder, plugins.load("formats", entry.name)) for entry, folder in formats)
+    return tuple(Target(entry, folder, module, views.of(module, least)) for entry, folder, module in modules)
+
+
+def prepared(dataset: Dataset, formats: Entries, workers: int = 0) -> Generator[dict[str, Any]]:
+    """For each sample in frame order what each format, by its name, adds of it. Where this takes long, so many processes do
+    what can be done of a sample anywhere; what comes out is the same.
+    """
+    alone = _Preparation(dataset, formats)
+    shared = [(entry, folder) for entry, folder in formats if entry.name in alone.prepared]
+    workers = workers if shared and dataset.store.place.is_shared() else 0
+    begun, lots, done, total = time.monotonic(), _lots(dataset.shots()), 0, len(dataset)
+    for lot in lots:
+        yield from map(alone.of, _samples(dataset, lot))
+        done += sum(len(places) for _, places in lot)
+        spent = time.monotonic() - begun
+        if workers > 1 and spent >= PATIENCE_S and spent * (total - done) / done >= WORTH_S:
+            break
+    own = _Preparation(dataset, [(entry, folder) for entry, folder in formats if entry.name not in alone.prepared])
+    with closing(in_order(workers, partial(_Preparation, dataset, shared), lots)) as made:
+        for lot, (parts, kinds) in made:
+            dataset.link_kinds |= kinds
+            samples = _samples(dataset, lot) if own.preparers else repeat(None)
+            yield from (part | own.of(sample) for part, sample in zip(parts, samples, strict=False))
+
+
+class _Preparation:
+    """Prepares samples for formats."""
+
+    def __init__(self, dataset: Dataset, formats: Entries) -> None:
+        found = targets(dataset, formats)
+        self.prepared = {target.entry.name for target in found if target.prepares}
+        self.preparers = {target.entry.name: target.preparer() for target in found}
+        self._dataset = dataset
+
+    def of(self, sample: Any) -> dict[str, Any]:
+        """What each format adds of a sample."""
+        return {name: prepare(sample) for name, prepare in self.preparers.items()}
+
+    def __call__(self, lot: Lot) -> tuple[list[dict[str, Any]], set[str]]:
+        """What each format adds of each sample of a lot; and how files were linked so far."""
+        return [self.of(sample) for sample in _samples(self._dataset, lot)], self._dataset.link_kinds
+
+
+def _samples(dataset: Dataset, lot: Lot) -> Iterator[Sample]:
+    return chain.from_iterable(dataset.samples_of(key, places) for key, places in lot)
+
+
+def _lots(shots: Iterator[tuple[str, Sequence[int]]]) -> Iterator[Lot]:
+    """The shots in lots of at least `LOT` frames; long ones are cut."""
+    lot: list[tuple[str, Sequence[int]]] = []
+    for key, places in shots:
+        for at in range(0, len(places), LONGEST):
+            lot.append((key, places[at : at + LONGEST]))
+            if sum(len(some) for _, some in lot) >= LOT:
+                yield tuple(lot)
+                lot = []
+    if lot:
+        yield tuple(lot)
