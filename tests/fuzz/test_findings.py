@@ -1,17 +1,21 @@
-"""Values of a data set's records that raised foreign errors once: each is refused in one line."""
+"""Files, and values of a data set's records, that raised foreign errors once: each is refused in one line."""
 
 import json
 import shutil
 
 import pytest
-from targets import _made
+from targets import CAMERAS, COLMAP, NERFSTUDIO, ROS, SEQUENCE, TARGETS, _made
 
 from sealing import seal_again
 from viewsphere.check import check
 from viewsphere.errors import ViewsphereError
 from viewsphere.run.exporting import export
+from viewsphere.run.importing import import_dataset
+from viewsphere.run.status import status
+from viewsphere.sampling.rig_files import read_rig
 from viewsphere.store import Dataset
-from viewsphere.store.manifest import sealed, unsealed
+from viewsphere.store.index import Block, Index
+from viewsphere.store.manifest import MANIFEST, Manifest, digest, sealed, unsealed
 
 
 def part(**changes):
@@ -82,3 +86,108 @@ def test_it_is_refused_in_one_line(pattern, name, change, tmp_path):
     assert "\n" not in str(error.value)
     if file.name != "plan.json":
         assert not check(Dataset(root), sample=0, rays=False).ok
+
+
+def ros(**changes):
+    return json.dumps({**ROS, "camera_matrix": {**ROS["camera_matrix"], **changes}})
+
+
+def nerfstudio(change):
+    value = json.loads(NERFSTUDIO)
+    change(value["frames"])
+    return json.dumps(value)
+
+
+def nested(times):
+    return "[" * times + "]" * times
+
+
+BOX = {"models": ["zoo:car"], "viewpoints": {"distance": 5}}
+FILES = {
+    "an angle of nearly nothing": (
+        "recipe",
+        "recipe.yaml",
+        json.dumps(BOX | {"camera": {"size": [64, 48], "fov_deg": 1e-320}}),
+    ),
+    "a mark of byte order in a name": ("recipe", "recipe.yaml", 'viewpoi\ufeff": {"azimuth": "start": 0}}'),
+    "models by a name of nothing": ("recipe", "recipe.yaml", '{"models": {"": 0}, "viewpoints": {"distance": 5}}'),
+    "a cell of a point that is longer than CSV has": ("recipe", "recipe.yaml", SEQUENCE),
+    "a camera of nearly no height": ("poses", "cameras.txt", CAMERAS.decode().replace("480 420 425", "1e-320 420 425")),
+    "a lens bent without end": ("poses", "cameras.txt", CAMERAS.decode().replace("0.1\n", "1e308\n")),
+    "brackets as deep as are read": (
+        "poses",
+        "transforms.json",
+        nerfstudio(lambda frames: frames.append(json.loads(nested(900)))),
+    ),
+    "a number in a name's place": ("rigs", "rig.yaml", "1: 2\n"),
+    "rows and columns below none": ("rigs", "rig.yaml", ros(rows=-3, cols=-3)),
+}
+
+
+@pytest.mark.parametrize(("target", "name", "text"), FILES.values(), ids=FILES)
+def test_a_file_is_refused_in_one_line(target, name, text, tmp_path):
+    (tmp_path / "images.txt").write_bytes(COLMAP)
+    (tmp_path / "points.csv").write_text("0,1,2" * 100_000)
+    (tmp_path / name).write_text(text, "utf-8")
+    with pytest.raises(ViewsphereError, match="expected") as error:
+        if target == "rigs":
+            read_rig([tmp_path / name])
+        else:
+            TARGETS[target].call(tmp_path / ("images.txt" if name == "cameras.txt" else name))
+    assert "\n" not in str(error.value)
+
+
+WHOLE = 10**400
+"""A whole number beyond all floats."""
+NATIVE = {
+    "a corner of a box": lambda found: next(iter(entry(found)["bbox_3D_pxs"].values())).update({"0": [WHOLE, 0]}),
+    "how much is visible": lambda found: entry(found).update(visibility=WHOLE),
+    "a camera's matrix": lambda found: entry(found)["transformation_matrix"].update(K=[[WHOLE, 0, 0]] * 3),
+    "a true size": lambda found: vehicle(found).update(real_size={"width": WHOLE, "height": 1, "length": 1}),
+    "a time step": lambda found: vehicle(found).update(animation="a.glb", frame=float("inf")),
+}
+
+
+def vehicle(found):
+    return next(iter(found["vehicles"].values()))
+
+
+def entry(found):
+    return next(iter(next(iter(found["poses"].values()))["vehicles_rendered"].values()))
+
+
+@pytest.mark.parametrize("name", NATIVE)
+def test_a_number_beyond_all_floats_is_refused_in_one_line(name, tmp_path):
+    root = shutil.copytree(_made(False) / "native", tmp_path / "native")
+    found = json.loads((root / "dataset1.json").read_text("utf-8"))
+    NATIVE[name](found)
+    (root / "dataset1.json").write_text(json.dumps(found), "utf-8")
+    with pytest.raises(ViewsphereError, match="expected"):
+        import_dataset("native", root, tmp_path / "out")
+
+
+@pytest.mark.parametrize("files", ['{"a":[1e999,"x"]}', f'{{"a":{nested(900)}}}'])
+def test_a_manifest_is_refused_in_one_line(files, tmp_path):
+    text = f'{{"files":{files}'
+    (tmp_path / MANIFEST).write_text(f'{text},"digest":"{digest((text + "}").encode())}"}}')
+    with pytest.raises(ViewsphereError, match="expected the manifest"):
+        Manifest.read(tmp_path)
+
+
+@pytest.mark.parametrize(
+    "changes", [{"pid": "1e999"}, {"done": "1" + "0" * 400}, {"begun": "-1e999"}, {"beat": "1" + "0" * 400}]
+)
+def test_what_is_no_heartbeat_tells_nothing(changes, tmp_path):
+    root = shutil.copytree(_made(True), tmp_path / "out", ignore=shutil.ignore_patterns("coco", "native", "csv", "webdataset"))
+    file = root / "store/failed/1.json"
+    assert len(status(root).failed) == 1
+    value = json.loads(file.read_text()) | dict.fromkeys(changes)
+    text = json.dumps(value)
+    for name, number in changes.items():
+        text = text.replace(f'"{name}": null', f'"{name}": {number}')
+    file.write_text(text)
+    assert status(root).failed == ()
+
+
+def test_a_key_of_more_digits_than_python_reads_is_no_shot():
+    assert Index((Block(("car",), ((0, 9),)),), 0, 1, 0).find("car-" + "9" * 5000) is None

@@ -20,6 +20,7 @@ from viewsphere.model.model_spec import step_key
 from viewsphere.model.notebook import Shown
 from viewsphere.model.rig import CAMERA
 from viewsphere.model.sample import ObjectAnnotation, Sample
+from viewsphere.model.shot import Shot
 from viewsphere.store.channel_files import decode
 from viewsphere.store.choice import Choice
 from viewsphere.store.folder import Store
@@ -257,10 +258,12 @@ class Dataset(Shown, Sequence[Sample]):
                 raise ValueError(f"{len(records)} frames instead of {row and row.count}")
             if any(record.get("index") != row.first + i for i, record in enumerate(records)):
                 raise ValueError(f"other numbers of frames than {row.first} and on")
+            if not all(isinstance(record.get(name, ""), str) for record in records for name in ("sequence", "split")):
+                raise ValueError("a sequence or a split that is no text")
             is_short = any("camera" not in record for record in records)
         except (OSError, TypeError, ValueError) as error:
             raise _damaged(file, error) from None
-        shot = self.store.labelled(key) if is_short else None
+        shot = self.labelled(key) if is_short else None
         if shot is None:
             return _Records(file, records)
         try:
@@ -268,6 +271,14 @@ class Dataset(Shown, Sequence[Sample]):
         except LookupError as error:
             raise _damaged(file.with_name("shot.json"), error) from None
         return _Records(file, records, ShotRecords(shot, self._facts, str(file), str(self.root)), files)
+
+    def labelled(self, key: str) -> Shot | None:
+        """A finished shot as `Store.labelled` gives it; raises StoreError for one of more or fewer samples than are planned."""
+        shot, row = self.store.labelled(key), self.plan.find(key)
+        if shot is not None and row is not None and (found := sum(1 for _ in shot.samples)) != row.count:
+            file = self.store.shot_folder(key) / "shot.json"
+            raise _damaged(file, ValueError(f"{found} samples instead of {row.count}"))
+        return shot
 
     def _model_facts(self, key: str, frame: int | None) -> ModelInfo:
         info = self._info(key)
@@ -370,7 +381,7 @@ class _Records:
     def splits(self) -> list[str]:
         """The split of each sample."""
         if self.shot is None:
-            return [record["split"] for record in self.records]
+            return [record.get("split", "") for record in self.records]
         shot = self.shot.shot
         return [shot.instants[instant].split for _, instant, _ in shot.samples]
 

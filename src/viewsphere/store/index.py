@@ -15,6 +15,9 @@ from typing import overload
 
 from viewsphere.model.share import ALL, Share
 
+MOST_DIGITS = 100
+"""More than a position's number has: a stranger's key may end with more than Python reads."""
+
 Ranges = tuple[tuple[int, int], ...]
 """Numbers, as ranges [first, stop) in order."""
 
@@ -155,7 +158,7 @@ class Index(Sequence[Row]):
         if not key.endswith(self.suffix):
             return None
         subject, _, digits = key[: len(key) - len(self.suffix)].rpartition("-")
-        for number, place in self._places.get(subject, ()) if digits.isdecimal() else ():
+        for number, place in self._places.get(subject, ()) if digits.isdecimal() and len(digits) < MOST_DIGITS else ():
             offset = _offset(self.blocks[number].positions, int(digits))
             if offset is not None:
                 block = self.blocks[number]

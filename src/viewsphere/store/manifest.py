@@ -81,7 +81,7 @@ class Manifest:
             if outside is not None:
                 raise ValueError(f"a path that leads out of it, {outside!r:.200}")
             return Manifest({path: (int(size), str(found)) for path, (size, found) in value.items()})
-        except (OSError, LookupError, TypeError, ValueError, AttributeError) as error:
+        except (OSError, LookupError, TypeError, ValueError, AttributeError, OverflowError) as error:
             problem = (error.strerror if isinstance(error, OSError) else None) or error
             raise StoreError(f"{file}: expected the manifest of a finished folder, found {problem}: {REPAIR}") from None
 

@@ -32,7 +32,7 @@ from viewsphere.store.texts import parsed
 RIGHT_ANGLES = 1e-3
 LONGEST_NAME = 150
 LARGEST_POSE = 10_000_000
-MISTAKES = (LookupError, TypeError, ValueError, AttributeError, OSError)
+MISTAKES = (LookupError, TypeError, ValueError, AttributeError, OSError, OverflowError)
 """Errors raised by reading JSON of another structure than expected."""
 
 
@@ -322,10 +322,7 @@ def _vertices(named: Mapping[str, Mapping[str, list[float] | None]] | None, size
     for face in (named or {}).values():
         for vertex, point in face.items():
             if point is not None:
-                try:
-                    points[int(vertex)] = point
-                except OverflowError as error:  # a whole number beyond all floats
-                    raise ValueError(str(error)) from None
+                points[int(vertex)] = point
     if np.isinf(points).any():
         raise ValueError("found an infinite vertex")
     return points
