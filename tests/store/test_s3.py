@@ -122,11 +122,16 @@ def test_a_missing_bucket_is_told(faults):
         generate(small_recipe(**FEW), "s3://no-such-bucket/out")
 
 
-def test_damage_is_found_and_mended(few, faults):
+@pytest.mark.parametrize("shots", ["files", "tar"])
+def test_damage_is_found_and_mended(shots, few, faults, tmp_path):
+    if shots == "tar":
+        few = tmp_path / "packed"
+        generate(small_recipe(**FEW, files={"shots": "tar"}), few)
     root = located(URL)
     for path, data in contents(few).items():
         (root / path).write_bytes(data)
-    files = [path for path in contents(few) if path.startswith("store/") and path.count("/") > 2][::9]
+    inside = [path for path in contents(few) if path.startswith("store/") and path.count("/") > 2]
+    files = inside[::9] if shots == "files" else [path for path in inside if path.endswith(".tar")]
     for path in files:
         data = bytearray((root / path).read_bytes())
         data[len(data) // 2] ^= 4

@@ -73,7 +73,7 @@ class Again:
             return
         if kept.shape != again.shape:
             return
-        step = depth_step(self._dataset.path(sample.files[name])) if name == "depth" else 0.0
+        step = depth_step(self._dataset.read(sample.files[name])) if name == "depth" else 0.0
         wrong = _beyond(kept, again, step) if step else _unequal(kept, again)
         if wrong.any():
             where = tuple(int(i[0]) for i in np.nonzero(wrong))

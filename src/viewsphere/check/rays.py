@@ -81,7 +81,7 @@ class RayCaster:
         self._build(sample)
         instances, depth = sample.channels["instances"], sample.channels["depth"]
         rays = pixel_rays(sample.camera.intrinsics)
-        step = depth_step(self._dataset.path(sample.files["depth"])) / 2
+        step = depth_step(self._dataset.read(sample.files["depth"])) / 2
         castable = (np.abs(rays[..., 2]) > 1e-3) & ((step == 0) | np.isinf(depth) | (depth < (MOST_STEPS - 0.5) * 2 * step))
         yield from self._off(
             sample, rays, step, castable & (instances > 0) & np.isfinite(depth), "points are not on the exported model"

@@ -14,6 +14,7 @@ from viewsphere.errors import UserError
 from viewsphere.formats import Remark
 from viewsphere.store import Dataset
 from viewsphere.store.checksums import CHECKSUMS
+from viewsphere.store.foreign import Loaded
 
 Content = str | NDArray[np.bool_]
 """A stored file, by its path from the data set's root, or a mask (H, W), which becomes a PNG."""
@@ -66,7 +67,9 @@ def _problem(dataset: Dataset, content: Content, file: Path) -> str | None:
     if not file.is_file():
         return "expected a file, found none"
     if isinstance(content, str):
-        return None if same_bytes(dataset.path(content), file) else f"expected the bytes of {content}, found others"
+        stored = dataset.stored(content)
+        same = file.read_bytes() == stored.data if isinstance(stored, Loaded) else same_bytes(stored, file)
+        return None if same else f"expected the bytes of {content}, found others"
     data = file.read_bytes()
     if data == encode_png(content):
         return None

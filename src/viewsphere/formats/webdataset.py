@@ -10,7 +10,6 @@ arrays (`.depth.npy`), and all the rest of it (`.json`). Equal samples make equa
 from __future__ import annotations
 
 import io
-import tarfile
 from collections.abc import Callable, Collection, Generator, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -21,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from viewsphere.codecs import tar
 from viewsphere.formats import Remark
 from viewsphere.formats._contents import check_files
 from viewsphere.formats._paper import json_bytes
@@ -110,10 +110,9 @@ class _Split:
         return Piece(self.file(len(self.whole)), self.size - len(data), data, what, frame)
 
     def end(self) -> Iterator[Piece]:
-        """The end of the shard that is written, if there is one: two empty blocks, and what fills a record."""
+        """The end of the shard that is written, if there is one."""
         if self.samples:
-            least = self.size + 2 * tarfile.BLOCKSIZE
-            yield self.add(bytes(least + -least % tarfile.RECORDSIZE - self.size), "its end")
+            yield self.add(tar.ending(self.size), "its end")
             self.whole.append((self.samples, self.size))
             self.samples = self.size = 0
 
@@ -143,7 +142,7 @@ class _Shards:
     def add(self, sample: Sample) -> Iterator[Piece]:
         """The bytes of a sample, and before them the end of the shard before it."""
         split = self._splits.setdefault(sample.split, _Split(sample.split))
-        files = [(name, _member(name, data)) for name, data in self._files(sample)]
+        files = [(name, tar.member(name, data)) for name, data in self._files(sample)]
         size, most = sum(len(data) for _, data in files), self._options.bytes_per_shard
         if split.samples == self._options.samples_per_shard or (most and split.size + size > most):
             yield from split.end()
@@ -161,7 +160,7 @@ class _Shards:
         key = f"{sample.index:08d}"
         for channel, stored in sorted(sample.files.items()):
             if channel in PASSES or self._options.arrays == "files":
-                yield f"{key}.{channel}{PurePosixPath(stored).suffix}", self._dataset.path(stored).read_bytes()
+                yield f"{key}.{channel}{PurePosixPath(stored).suffix}", self._dataset.read(stored)
             else:
                 yield f"{key}.{channel}.npy", _npy(sample.channels[channel])
         yield f"{key}.json", json_bytes(_record(sample))
@@ -178,10 +177,3 @@ def _npy(array: NDArray[Any]) -> bytes:
     data = io.BytesIO()
     np.lib.format.write_array(data, np.ascontiguousarray(array), (1, 0), allow_pickle=False)
     return data.getvalue()
-
-
-def _member(name: str, data: bytes) -> bytes:
-    """A file as a tar has it (POSIX ustar); `tarfile` dates it 1970 and gives it to nobody."""
-    info = tarfile.TarInfo(name)
-    info.size = len(data)
-    return info.tobuf(tarfile.USTAR_FORMAT) + data + bytes(-len(data) % tarfile.BLOCKSIZE)

@@ -50,6 +50,12 @@ class Files(Frozen):
         default="tiff", description="file of normals, coordinates, flow, disparity and all else that is exact"
     )
 
+    shots: Literal["files", "tar"] = Field(
+        default="files",
+        description="every channel of a frame in a file of its own, or all of a shot in one tar, so that a store of a million "
+        "frames is not millions of files",
+    )
+
     @model_validator(mode="after")
     def _check(self) -> Files:
         if self.quality is not None and not {self.rgb, self.rgba} & set(LOSSY):

@@ -22,7 +22,7 @@ from viewsphere.run.progress import Listener, Progress
 from viewsphere.sampling.pose_numbers import kept, names_of
 from viewsphere.store import Block, Category, Dataset, ModelInfo, Part, PlanRecord, Row, Store, encode, located
 from viewsphere.store.credits import write_credits
-from viewsphere.store.foreign import ForeignFrame
+from viewsphere.store.foreign import ForeignFrame, Loaded
 from viewsphere.store.index import length
 from viewsphere.store.linking import link_model, link_shot
 from viewsphere.store.paths import files_inside
@@ -291,7 +291,7 @@ def _link_frames(source: _Source, targets: Iterator[Row], store: Store, record: 
         if not store.has_shot(target.key):
             places = zip(source.dataset.samples_of(row.key, range(row.count)), count(target.first), strict=False)
             frames = (_renumbered(source, sample, index) for sample, index in places)
-            link_shot(store, target.key, frames, source.dataset.store.known_of(row.key))
+            link_shot(store, target.key, frames, source.dataset.store.known_of(row.key), source.dataset.kinds[row.part])
         if listener:
             listener(Progress("frames", target.first + target.count, record.frames))
 
@@ -305,9 +305,9 @@ def _renumbered(source: _Source, sample: Sample, index: int) -> ForeignFrame:
         known_pose=pose and pose.model_copy(update={"index": pose.index + source.first_pose}),
         objects=tuple(_moved_object(source, o) for o in sample.objects),
     )
-    files: dict[str, Path | bytes] = {name: source.dataset.path(file) for name, file in sample.files.items()}
+    files = {name: source.dataset.stored(file) for name, file in sample.files.items()}
     if "categories" in files and not source.keeps_categories:
-        files["categories"] = _with_category_ids(source, sample)
+        files["categories"] = Loaded(channels()["categories"].suffix, _with_category_ids(source, sample))
     return ForeignFrame(moved, files)
 
 

@@ -60,7 +60,7 @@ def channel_bytes(store: Store) -> Counter[str]:
     sizes: Counter[str] = Counter()
     for key in islice(store.finished(), MOST_SHOTS):
         with suppress(StoreError):  # `check` is what tells of damage
-            for path, (size, _) in Manifest.read(store.shot_folder(key)).files.items():
+            for path, (size, _) in Manifest.read(store.shot_folder(key)).seals.items():
                 sizes[path.rpartition("/")[0]] += size
     del sizes[""]  # records are no channel
     return sizes

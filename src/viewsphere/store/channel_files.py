@@ -53,17 +53,13 @@ def _steps(depth: NDArray[np.float32], unit: float) -> NDArray[np.uint16]:
     return np.where(np.isfinite(depth) & (depth > 0), steps, 0).astype(np.uint16)
 
 
-def depth_step(file: Path) -> float:
-    """Metres by which neighbouring numbers of a depth file differ; 0 where the file is exact. Errors as for `decode`."""
+def depth_step(data: bytes) -> float:
+    """Metres by which neighbouring numbers in the bytes of a depth file differ; 0 where the file is exact. Raises UserError for
+    a broken one.
+    """
     from viewsphere.codecs import png_tiff
 
-    try:
-        data = file.read_bytes()
-        return (png_tiff.png_unit(data) or 0.0) if data[:4] == b"\x89PNG" else 0.0
-    except RemoteError:
-        raise
-    except (OSError, UserError) as error:
-        raise StoreError(f"{file}: expected a readable file, found: {error}") from None
+    return (png_tiff.png_unit(data) or 0.0) if data[:4] == b"\x89PNG" else 0.0
 
 
 def check_codecs(channels: Container[str], files: Files) -> None:
@@ -97,17 +93,14 @@ def palette() -> NDArray[np.uint8]:
     return np.stack(colors, axis=1).astype(np.uint8)
 
 
-def decode(channel: Channel, file: Path, written: Callable[[bytes], None] | None = None) -> NDArray[Any]:
+def decode(channel: Channel, file: Path, read: Callable[[], bytes] | None = None) -> NDArray[Any]:
     """The array a channel's file holds, with the channel's dtype, whatever kind of file it is.
 
-    Pictures that were imported may be anything that Pillow reads. `written` raises StoreError for bytes that are not those that
-    were written. Raises StoreError if the file is missing or broken, MissingExtraError where its codec is not installed.
+    Pictures that were imported may be anything that Pillow reads. `read` gives the file's bytes where they are to be proved, or
+    lie elsewhere. Raises StoreError if the file is missing or broken, MissingExtraError where its codec is not installed.
     """
     try:
-        data = file.read_bytes()
-        if written:
-            written(data)
-        array = _decoded(channel, data)
+        array = _decoded(channel, (read or file.read_bytes)())
         if np.issubdtype(channel.dtype, np.floating) != np.issubdtype(array.dtype, np.floating):
             raise UserError(f"expected {np.dtype(channel.dtype)}, found {array.dtype}")
     except MissingExtraError as error:

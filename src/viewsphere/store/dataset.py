@@ -24,11 +24,11 @@ from viewsphere.model.shot import Shot
 from viewsphere.store.channel_files import decode
 from viewsphere.store.choice import Choice
 from viewsphere.store.folder import Store
+from viewsphere.store.foreign import Loaded
 from viewsphere.store.index import Row
-from viewsphere.store.linking import link_file
 from viewsphere.store.manifest import MANIFEST, Manifest
 from viewsphere.store.paths import file_inside, files_inside, names
-from viewsphere.store.places import located
+from viewsphere.store.places import link_file, located
 from viewsphere.store.point_tracks import PointTracks, joined
 from viewsphere.store.records import Category, ModelInfo
 from viewsphere.store.sample_records import ShotRecords, from_whole_sample
@@ -323,12 +323,12 @@ class Dataset(Shown, Sequence[Sample]):
             if index.first <= number < index.first + index.samples:
                 key = index.at(number).key
                 if self.store.has_shot(key):
-                    kinds = self._kinds[index.part]
+                    kinds = self.kinds[index.part]
                     files |= {name: self.store.channel_file(key, name, number, kinds) for name in added}
         return files
 
     @cached_property
-    def _kinds(self) -> tuple[Files, ...]:
+    def kinds(self) -> tuple[Files, ...]:
         """The kinds of files that each part has written."""
         return tuple(Files.model_validate(part.recipe.get("files", {})) for part in self.plan.parts)
 
@@ -336,13 +336,34 @@ class Dataset(Shown, Sequence[Sample]):
         """A file of the data set; raises StoreError for a path that leads out of it."""
         return file_inside(self.root, relative)
 
+    def read(self, relative: str) -> bytes:
+        """The bytes of a channel's file, wherever it lies. Raises StoreError where they are not those that were written, or for
+        a path that leads out of the data set; OSError where the file cannot be read.
+        """
+        return _read(self.root, self._manifests, relative)
+
+    def stored(self, relative: str) -> Path | Loaded:
+        """A stored file, or what it would hold where it lies in its shot's tar. Raises StoreError for a path that leads out of
+        the data set.
+        """
+        file = self.path(relative)
+        if relative.startswith("store/shots/"):
+            folder, inside = _parted(relative)
+            if inside in self._manifests(folder).spans:
+                return Loaded(file.suffix, self.read(relative))
+        return file
+
     def link(self, relative: str, destination: Path) -> None:
         """Put a stored file at `destination`: a hard link, else a reflink, else a copy; `link_kinds` says which. Raises
         StoreError for a path that leads out of the data set.
         """
         destination.parent.mkdir(parents=True, exist_ok=True)
-        file = self.path(relative)
-        self.link_kinds.add(link_file(file.resolve() if file.is_symlink() else file, destination))
+        file = self.stored(relative)
+        if isinstance(file, Loaded):
+            destination.write_bytes(file.data)
+            self.link_kinds.add("copy")
+        else:
+            self.link_kinds.add(link_file(file.resolve() if file.is_symlink() else file, destination))
 
     def model_files(self) -> Iterator[tuple[str, str]]:
         """Every finished model's OBJ, GLB, materials and textures: `<key>/<name>`, and the path from the data set's root. A
@@ -406,9 +427,9 @@ class _ChannelFiles(Mapping[str, NDArray[Any]]):
             file = file_inside(self._root, self._files[name])
             if name not in channels():
                 raise StoreError(f"{file}: expected a label that is installed, found {name!r}: install the package that has it")
-            folder, inside = _parted(self._files[name])
-            written = partial(self._manifest_of(folder).check, inside, file=file)
-            self._arrays[name] = decode(channels()[name], file, written)
+            self._arrays[name] = decode(
+                channels()[name], file, partial(_read, self._root, self._manifest_of, self._files[name])
+            )
         return self._arrays[name]
 
     def __iter__(self) -> Iterator[str]:
@@ -424,6 +445,12 @@ ManifestOf = Callable[[str], Manifest]
 
 def _manifest_of(root: Path, folder: str) -> Manifest:
     return Manifest.read(file_inside(root, f"{folder}/{MANIFEST}").parent)
+
+
+def _read(root: Path, manifest_of: ManifestOf, relative: str) -> bytes:
+    """The bytes of a channel's file, which are those that were written."""
+    file, (folder, inside) = file_inside(root, relative), _parted(relative)
+    return manifest_of(folder).content(inside, file)
 
 
 def _parted(file: str) -> tuple[str, str]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 from collections import defaultdict
 from collections.abc import Generator, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
@@ -26,13 +25,14 @@ from viewsphere.model.thing import Thing
 from viewsphere.store.channel_files import encode
 from viewsphere.store.heartbeat import Heartbeat, Pulse
 from viewsphere.store.index import Index, Row
-from viewsphere.store.manifest import MANIFEST, Manifest, Seal, digest, refuse_another, seal_of
+from viewsphere.store.manifest import MANIFEST, Manifest, refuse_another
 from viewsphere.store.moving import move
 from viewsphere.store.paths import file_inside
 from viewsphere.store.places import place_of
 from viewsphere.store.places.local import NEW, disk_errors
 from viewsphere.store.records import ModelInfo, PlanRecord
 from viewsphere.store.sample_records import short_sample, whole_sample
+from viewsphere.store.shot_files import ShotFiles
 from viewsphere.store.texts import parsed
 
 RUN = "run.json"
@@ -352,23 +352,14 @@ class Store:
         target = self.shot_folder(key)
         prefix = target.relative_to(self.root).as_posix()
         records: list[dict[str, Any]] = []
-        made: set[str] = set()
-        told: dict[str, Seal] = {}
         kinds, table = kinds or Files(), channels()
         own = {} if shot is None else {sensor.name: sensor.kept(shot.channels) for sensor in shot.rig.sensors}
-        with self.aside(target, again) as folder:
+        with self.aside(target, again) as folder, ShotFiles(folder, kinds) as put:
             for sample in samples:
                 files: dict[str, str] = {}
                 for name, array in sample.channels.items():
                     inside = channel_path(name, sample.index, kinds)
-                    if name not in made:
-                        (folder / name).mkdir()
-                        made.add(name)
-                    data = encode(table[name], array, kinds)
-                    if inside in told:
-                        raise ValueError(f"shot {key}: expected samples of different numbers, found {sample.index} twice")
-                    told[inside] = len(data), digest(data)
-                    _write(f"{folder}/{inside}", data)
+                    put.add(inside, encode(table[name], array, kinds))
                     files[name] = f"{prefix}/{inside}"
                 short = own.get(sample.sensor) == tuple(files) and shot is not None and shot.files == kinds
                 records.append(short_sample(sample) if short else whole_sample(replace(sample, files=files)))
@@ -381,8 +372,6 @@ class Store:
                 # The other things are in scenery.json, and labels are those of the instant, not of what moves around it.
                 labelled = shot.model_copy(update={"things": shot.objects, "shutter": 0.0, "exposures": ()})
                 (folder / "shot.json").write_text(labelled.model_dump_json(), "utf-8", newline="\n")
-            texts = {path.name: seal_of(path) for path in sorted(folder.glob("*.json"))}
-            Manifest(texts | told).write(folder)
         return len(records)
 
     def labelled(self, key: str) -> Shot | None:
@@ -456,17 +445,6 @@ def new_folder(target: Path) -> AbstractContextManager[Path]:
 def channel_path(channel: str, sample: int, kinds: Files | None = None) -> str:
     """Where a channel of a sample (its number in the data set), written as `kinds` say, lies in its shot's folder."""
     return f"{channel}/{sample:08d}{(kinds or Files()).suffix(channels()[channel])}"
-
-
-def _write(file: str, data: bytes) -> None:
-    """Write a new file; Python's own file objects take as long again as the disk does for a small one."""
-    descriptor = os.open(file, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | getattr(os, "O_BINARY", 0), 0o666)
-    try:
-        left = memoryview(data)
-        while left:
-            left = left[os.write(descriptor, left) :]
-    finally:
-        os.close(descriptor)
 
 
 def _found(indices: Iterable[Index], keys: Iterable[str]) -> list[Row]:

@@ -21,11 +21,19 @@ MOST_SHOWN = 10
 
 
 @dataclass(frozen=True)
+class Loaded:
+    """The bytes of a file, and the ending of its name, with its dot."""
+
+    suffix: str
+    data: bytes
+
+
+@dataclass(frozen=True)
 class ForeignFrame:
-    """A frame whose channels lie in files of another data set, or are given as the bytes of such a file."""
+    """A frame whose channels lie in files of another data set, or are given as the content of such a file."""
 
     sample: Sample
-    files: Mapping[str, Path | bytes]
+    files: Mapping[str, Path | Loaded]
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,10 @@
 
     {"files": {"depth/00000012.tiff": [34180, "6f0c..."], ...}, "digest": "91d2..."}
 
+Where a shot's channels lie in one tar file, it tells where each begins, so that one is read without the others:
+
+    {"files": {"channels.tar": [...], ...}, "spans": {"depth/00000012.tiff": [512, 34180, "6f0c..."], ...}, "digest": "91d2..."}
+
 Digests are XXH3 of 128 bits (https://github.com/Cyan4973/xxHash): they find damage at the speed of memory, and are no proof
 against somebody who wants to deceive.
 """
@@ -10,24 +14,31 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
-from pathlib import Path
+from dataclasses import dataclass, field
+from pathlib import Path, PurePosixPath
 from typing import Any
 
 import xxhash
 
 from viewsphere.errors import StoreError
 from viewsphere.store.paths import file_inside, is_inside
+from viewsphere.store.places import byte_range
 from viewsphere.store.texts import parsed
 
 MANIFEST = "manifest.json"
 """Name of the file in a finished folder."""
+
+SHARD = "channels.tar"
+"""Name of the file that holds all channels of a shot."""
 
 BLOCK = 1 << 20
 """Bytes of a file that are read at once."""
 
 Seal = tuple[int, str]
 """A file's size in bytes and its digest."""
+
+Span = tuple[int, int, str]
+"""Where a file begins in a shard, its size in bytes and its digest."""
 
 
 def digest(data: bytes | memoryview) -> str:
@@ -61,9 +72,10 @@ def seal_of(file: Path) -> Seal:
 
 @dataclass(frozen=True)
 class Manifest:
-    """The files of a folder by their paths in it."""
+    """The files of a folder by their paths in it, and those that lie in its shard, as if they lay in the folder."""
 
     files: Mapping[str, Seal]
+    spans: Mapping[str, Span] = field(default_factory=dict[str, Span])
 
     @staticmethod
     def of(folder: Path) -> Manifest:
@@ -76,24 +88,46 @@ class Manifest:
         """The manifest of a finished folder; raises StoreError where there is none, or it was damaged."""
         file = folder / MANIFEST
         try:
-            value: dict[str, list[Any]] = unsealed(file.read_text("utf-8"))["files"]
-            outside = next((path for path in value if not is_inside(path)), None)
+            value = unsealed(file.read_text("utf-8"))
+            files = {str(path): (int(size), str(found)) for path, (size, found) in value["files"].items()}
+            spans = {str(path): (int(at), int(size), str(found)) for path, (at, size, found) in value.get("spans", {}).items()}
+            outside = next((path for path in (*files, *spans) if not is_inside(path)), None)
             if outside is not None:
                 raise ValueError(f"a path that leads out of it, {outside!r:.200}")
-            return Manifest({path: (int(size), str(found)) for path, (size, found) in value.items()})
+            if any(at < 0 or size < 0 or at + size > files[SHARD][0] for at, size, _ in spans.values()):
+                raise ValueError(f"files beyond the end of {SHARD}")
+            return Manifest(files, spans)
         except (OSError, LookupError, TypeError, ValueError, AttributeError, OverflowError) as error:
             problem = (error.strerror if isinstance(error, OSError) else None) or error
             raise StoreError(f"{file}: expected the manifest of a finished folder, found {problem}: {REPAIR}") from None
 
     def write(self, folder: Path) -> None:
         """Write it into its folder, whose other files are whole."""
-        (folder / MANIFEST).write_text(
-            sealed({"files": {path: list(told) for path, told in self.files.items()}}), "utf-8", newline="\n"
-        )
+        value = {"files": self.files, **({"spans": self.spans} if self.spans else {})}
+        (folder / MANIFEST).write_text(sealed(value), "utf-8", newline="\n")
+
+    @property
+    def seals(self) -> Mapping[str, Seal]:
+        """All files, those of the shard in its place."""
+        own = {path: told for path, told in self.files.items() if path != SHARD}
+        return own | {path: (size, found) for path, (_, size, found) in self.spans.items()}
+
+    def content(self, path: str, file: Path) -> bytes:
+        """The bytes of a file, by its path in the folder, and its whole path; out of the shard where it lies there. Raises
+        StoreError where they are not those that were written, OSError where the file cannot be read.
+        """
+        if path in self.spans:
+            at, size, _ = self.spans[path]
+            shard = file.parents[len(PurePosixPath(path).parts) - 1] / SHARD
+            data = byte_range(shard, at, size)
+        else:
+            data = file.read_bytes()
+        self.check(path, data, file)
+        return data
 
     def check(self, path: str, data: bytes, file: Path) -> None:
         """Raises StoreError where the bytes of a file, by its path in the folder, are not those that were written."""
-        told = self.files.get(path)
+        told = self.spans[path][1:] if path in self.spans else self.files.get(path)
         if told != (len(data), digest(data)):
             raise StoreError(f"{file}: expected {said(told)}, found {said((len(data), digest(data)))}: {REPAIR}")
 

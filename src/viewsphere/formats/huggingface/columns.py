@@ -97,7 +97,7 @@ class Columns:
         """A picture's file as `datasets` has it inside: the store's own, or the default one where Pillow cannot read that."""
         suffix = PurePosixPath(sample.files[name]).suffix
         if suffix in READABLE:
-            data = self._dataset.path(sample.files[name]).read_bytes()
+            data = self._dataset.read(sample.files[name])
         else:
             suffix, data = channels()[name].suffix, encode(channels()[name], sample.channels[name])
         return {"bytes": data, "path": f"{sample.index:08d}{suffix}"}

@@ -6,7 +6,7 @@ mistake:
 
     read    path.read_bytes(), path.read_text(), path.open() in blocks; `byte_range` of a file
     list    path.iterdir(), path.glob(), path.is_file(), path.is_dir(), path.stat(); `files_below` a folder
-    link    `store.linking.link_file`: hard links on one disk, else a copy
+    link    `link_file`: hard links on one disk, else a copy
     local   `here`: a file or folder for programs that need it on this machine
 
 What is written goes by a `Place`: it is made in a folder of this machine's that is aside, and put in its place when it is
@@ -21,7 +21,7 @@ import os
 import re
 import shutil
 from collections.abc import Generator, Iterator
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
 from typing import Protocol
 
@@ -140,7 +140,7 @@ def byte_range(file: Path, start: int, size: int) -> bytes:
         return file.byte_range(start, size)
     with file.open("rb") as stream:
         stream.seek(start)
-        return stream.read(size)
+        return stream.read(min(size, max(0, os.fstat(stream.fileno()).st_size - start)))
 
 
 @contextmanager
@@ -166,3 +166,24 @@ def download(file: Path, destination: Path) -> None:
     destination.parent.mkdir(parents=True, exist_ok=True)
     with file.open("rb") as read, destination.open("wb") as write:
         shutil.copyfileobj(read, write)
+
+
+def link_file(source: Path, destination: Path) -> str:
+    """Put a file at `destination` on a disk, which must not exist: as a `hard link`, else a `reflink`, else a `copy`; returns
+    which. What lies at a URL is a `download`.
+    """
+    if isinstance(source, RemotePath):
+        download(source, destination)
+        return "download"
+    with suppress(OSError):
+        os.link(source, destination)
+        return "hard link"
+    try:
+        import fcntl
+
+        with source.open("rb") as read, destination.open("wb") as write:
+            fcntl.ioctl(write.fileno(), 0x40049409, read.fileno())  # FICLONE of linux/fs.h
+        return "reflink"
+    except (ImportError, OSError):
+        shutil.copyfile(source, destination)
+        return "copy"

@@ -1,0 +1,28 @@
+"""Files in a tar (POSIX ustar): dated 1970 and of nobody, so that the same files are the same bytes."""
+
+from __future__ import annotations
+
+import tarfile
+
+
+def head(name: str, size: int) -> bytes:
+    """What stands before a file of this name and number of bytes; raises ValueError for a name that ustar cannot hold."""
+    info = tarfile.TarInfo(name)
+    info.size = size
+    return info.tobuf(tarfile.USTAR_FORMAT)
+
+
+def filling(size: int) -> bytes:
+    """What stands behind a file of so many bytes."""
+    return bytes(-size % tarfile.BLOCKSIZE)
+
+
+def member(name: str, data: bytes) -> bytes:
+    """A file as a tar has it."""
+    return head(name, len(data)) + data + filling(len(data))
+
+
+def ending(size: int) -> bytes:
+    """What stands behind the last file of a tar of so many bytes: two empty blocks, and what fills a record."""
+    least = size + 2 * tarfile.BLOCKSIZE
+    return bytes(least + -least % tarfile.RECORDSIZE - size)
