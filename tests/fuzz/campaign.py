@@ -25,7 +25,7 @@ from random import Random
 from types import FrameType, TracebackType
 
 SECONDS = 20
-"""Of one input, after which it is a finding."""
+"""Of the processor for one input, after which it is a finding."""
 
 GROWTH = 1 << 30
 """Bytes of memory that one input may need."""
@@ -61,8 +61,8 @@ def run(target: str, seed: int) -> Finding | None:
     with tempfile.TemporaryDirectory(prefix=f"fuzz-{target}-{seed}-") as name:
         opened = make(target, seed, Path(name))
         before = _held_at_most(forget=True)
-        signal.signal(signal.SIGALRM, _alarm)
-        signal.setitimer(signal.ITIMER_REAL, SECONDS)
+        signal.signal(signal.SIGPROF, _alarm)
+        signal.setitimer(signal.ITIMER_PROF, SECONDS)
         try:
             TARGETS[target].run(Path(name), opened)
         except OSError as error:
@@ -76,7 +76,7 @@ def run(target: str, seed: int) -> Finding | None:
                 raise
             return Finding(target, seed, f"{type(error).__name__}: {error}"[:200], _where(error.__traceback__))
         finally:
-            signal.setitimer(signal.ITIMER_REAL, 0)
+            signal.setitimer(signal.ITIMER_PROF, 0)
         grown = _held_at_most() - before
         return Finding(target, seed, f"{grown / 1e9:.1f} GB of memory", "memory") if grown > GROWTH else None
 

@@ -497,10 +497,11 @@ EXPORTS = ("coco", "native", "csv", "webdataset")
 
 
 @cache
-def _made(short: bool) -> Path:
+def _made(short: bool, shots: str = "files") -> Path:
     """A data set of one shot of four small frames, and its exports inside of it."""
     import tempfile
 
+    from viewsphere.model.files import Files as Kinds
     from viewsphere.run.exporting import export
     from viewsphere.store.heartbeat import Heartbeat
     from viewsphere.store.records import NAME_BYTES
@@ -509,7 +510,14 @@ def _made(short: bool) -> Path:
     root = Path(tempfile.mkdtemp(prefix="fuzz-")) / "out"
     channels = ("rgb", "depth", "instances", "normals") if short else ("rgb", "depth", "instances", "rgba")
     dataset = make(
-        root, several=short, channels=channels, intrinsics=lens, ground=True, leave_out=() if short else (1, 2), short=short
+        root,
+        several=short,
+        channels=channels,
+        intrinsics=lens,
+        ground=True,
+        leave_out=() if short else (1, 2),
+        short=short,
+        files=Kinds(shots=shots),
     )
     named = replace(dataset.plan.parts[0], new_poses=len(POSES), pose_names=b64encode(bytes(NAME_BYTES * len(POSES))).decode())
     dataset.store.save(replace(dataset.plan, parts=(named,)))
@@ -602,7 +610,16 @@ def _import(kind: str, root: Path, out: Path) -> None:
 OF_STORES = (
     ("plan.json",) * 2
     + ("shots/*/*/frames.json",) * 3
-    + ("models/*/model.json", "**/*.json", "*.json", "failed/*.json", "shots/*/*/*/*.*", "models/*/*.*")
+    + (
+        "models/*/model.json",
+        "**/*.json",
+        "shots/*/*/manifest.json",
+        "shots/*/*/channels.tar",
+        "*.json",
+        "failed/*.json",
+        "shots/*/*/*/*.*",
+        "models/*/*.*",
+    )
 )
 OF_STORES = tuple(f"store/{pattern}" for pattern in OF_STORES)
 OF_EXPORTS = ("coco/**/*.json", "native/**/*.json", "csv/**/*.*", "webdataset/**/*.*", "coco/**/*.*")
@@ -619,8 +636,8 @@ TARGETS: dict[str, Files | Folders] = {
     "channels": Files(_channel, coded),
     "textures": Files(_model, textures),
     "sky": Files(_environment, skies),
-    "store": Folders(_store, (partial(_made, True), _played), (*OF_STORES, *("store/shots/*/*/shot.json",) * 3), ("store",)),
-    "records": Folders(_store, (partial(_made, False),), OF_STORES, ("store",)),
+    "store": Folders(_store, (partial(_made, True), partial(_made, True, "tar"), _played), (*OF_STORES, *("store/shots/*/*/shot.json",) * 3), ("store",)),
+    "records": Folders(_store, (partial(_made, False), partial(_made, False, "tar")), OF_STORES, ("store",)),
     "exports": Folders(_exports, (partial(_made, False),), OF_EXPORTS, ("store", *EXPORTS)),
     "coco": Folders(partial(_import, "coco"), (partial(_made, False),), OF_COCO, ("coco",)),
     "native": Folders(partial(_import, "native"), (partial(_made, False),), OF_NATIVE, ("native",)),

@@ -4,7 +4,7 @@ import json
 import shutil
 
 import pytest
-from targets import CAMERAS, COLMAP, NERFSTUDIO, ROS, SEQUENCE, TARGETS, _made
+from targets import CAMERAS, COLMAP, FILED, OPENCV, ORBITS, PLY, ROS, SEQUENCE, TARGETS, _made
 
 from sealing import seal_again
 from viewsphere.check import check
@@ -16,6 +16,7 @@ from viewsphere.sampling.rig_files import read_rig
 from viewsphere.store import Dataset
 from viewsphere.store.index import Block, Index
 from viewsphere.store.manifest import MANIFEST, Manifest, digest, sealed, unsealed
+from viewsphere.store.texts import MOST_NESTED, parsed
 
 
 def part(**changes):
@@ -92,17 +93,11 @@ def ros(**changes):
     return json.dumps({**ROS, "camera_matrix": {**ROS["camera_matrix"], **changes}})
 
 
-def nerfstudio(change):
-    value = json.loads(NERFSTUDIO)
-    change(value["frames"])
-    return json.dumps(value)
-
-
 def nested(times):
     return "[" * times + "]" * times
 
 
-BOX = {"models": ["zoo:car"], "viewpoints": {"distance": 5}}
+BOX = {"models": [{"source": "zoo:car"}], "viewpoints": {"distance": 5}}
 FILES = {
     "an angle of nearly nothing": (
         "recipe",
@@ -110,15 +105,18 @@ FILES = {
         json.dumps(BOX | {"camera": {"size": [64, 48], "fov_deg": 1e-320}}),
     ),
     "a mark of byte order in a name": ("recipe", "recipe.yaml", 'viewpoi\ufeff": {"azimuth": "start": 0}}'),
+    "a base whose name is no path": ("recipe", "recipe.yaml", '{"extends": "\\u0000"}'),
+    "a table whose name is no path": ("recipe", "recipe.yaml", FILED.replace("sizes.csv", '"\\0"')),
+    "models without end": (
+        "recipe",
+        "recipe.yaml",
+        json.dumps(BOX | {"models": [{"source": "zoo:car", "count": 2**63}], "scenes": {"count": 1, "objects": 2}}),
+    ),
+    "a unit that is a list": ("recipe", "recipe.yaml", FILED.replace("unit: mm", "unit: [mm]")),
     "models by a name of nothing": ("recipe", "recipe.yaml", '{"models": {"": 0}, "viewpoints": {"distance": 5}}'),
     "a cell of a point that is longer than CSV has": ("recipe", "recipe.yaml", SEQUENCE),
     "a camera of nearly no height": ("poses", "cameras.txt", CAMERAS.decode().replace("480 420 425", "1e-320 420 425")),
     "a lens bent without end": ("poses", "cameras.txt", CAMERAS.decode().replace("0.1\n", "1e308\n")),
-    "brackets as deep as are read": (
-        "poses",
-        "transforms.json",
-        nerfstudio(lambda frames: frames.append(json.loads(nested(900)))),
-    ),
     "a number in a name's place": ("rigs", "rig.yaml", "1: 2\n"),
     "rows and columns below none": ("rigs", "rig.yaml", ros(rows=-3, cols=-3)),
 }
@@ -126,7 +124,8 @@ FILES = {
 
 @pytest.mark.parametrize(("target", "name", "text"), FILES.values(), ids=FILES)
 def test_a_file_is_refused_in_one_line(target, name, text, tmp_path):
-    (tmp_path / "images.txt").write_bytes(COLMAP)
+    for beside, data in {"images.txt": COLMAP, "box.ply": PLY, "rig.yaml": OPENCV, "poses.csv": ORBITS}.items():
+        (tmp_path / beside).write_bytes(data)
     (tmp_path / "points.csv").write_text("0,1,2" * 100_000)
     (tmp_path / name).write_text(text, "utf-8")
     with pytest.raises(ViewsphereError, match="expected") as error:
@@ -144,7 +143,7 @@ NATIVE = {
     "how much is visible": lambda found: entry(found).update(visibility=WHOLE),
     "a camera's matrix": lambda found: entry(found)["transformation_matrix"].update(K=[[WHOLE, 0, 0]] * 3),
     "a true size": lambda found: vehicle(found).update(real_size={"width": WHOLE, "height": 1, "length": 1}),
-    "a time step": lambda found: vehicle(found).update(animation="a.glb", frame=float("inf")),
+    "a time step": lambda found: vehicle(found).update(animation="a.glb", frame=0, seconds=WHOLE),
 }
 
 
@@ -191,3 +190,11 @@ def test_what_is_no_heartbeat_tells_nothing(changes, tmp_path):
 
 def test_a_key_of_more_digits_than_python_reads_is_no_shot():
     assert Index((Block(("car",), ((0, 9),)),), 0, 1, 0).find("car-" + "9" * 5000) is None
+
+
+def test_deep_brackets_are_refused_and_those_in_texts_are_none():
+    for text in (nested(MOST_NESTED + 1), '{"a":' * 300 + "1" + "}" * 300, f'["\\"", {nested(300)}]'):
+        with pytest.raises(ValueError, match="nested too deeply"):
+            parsed(text)
+    for value in (json.loads(nested(MOST_NESTED)), ["[" * 500, '"[{\\' * 300, [[]] * 300]):
+        assert parsed(json.dumps(value)) == value
