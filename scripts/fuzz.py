@@ -29,7 +29,7 @@ from campaign import make  # noqa: E402
 from targets import TARGETS  # noqa: E402
 
 SILENCE = 600
-"""Seconds without a word from a process, which cannot be interrupted in foreign code, or gets no processor, until it is ended."""
+"""Seconds without a word until a process is ended: of foreign code that cannot be interrupted, or has no processor."""
 
 
 def told(target: str, first: int, stop: int) -> Iterator[dict[str, Any] | int]:

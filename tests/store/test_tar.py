@@ -1,6 +1,7 @@
 """Shots whose channels lie in one tar: the same samples and exports as from files, in a fraction of the files."""
 
 import io
+import re
 import shutil
 import tarfile
 
@@ -19,7 +20,7 @@ from viewsphere.errors import StoreError
 from viewsphere.run.exporting import export
 from viewsphere.run.merging import merge
 from viewsphere.store import located
-from viewsphere.store.manifest import SHARD, Manifest
+from viewsphere.store.manifest import SHARD, Manifest, digest
 from viewsphere.store.places import files_below
 
 CHANNELS = ["rgb", "depth", "instances", "normals"]
@@ -122,7 +123,8 @@ def test_no_array_comes_out_of_damage(packed):
         whole = shard.read_bytes()
         for place in (at, at + size // 2, at + size - 1):
             shard.write_bytes(whole[:place] + bytes([whole[place] ^ 1]) + whole[place + 1 :])
-            with pytest.raises(StoreError, match=f"{file}: expected .* bytes with digest"):
+            inside = "/".join(file.split("/")[-2:])
+            with pytest.raises(StoreError, match=f"{SHARD}: {inside}: expected .* bytes with digest"):
                 Dataset(packed)[0].channels[name]
             with pytest.raises(StoreError, match=r"expected .* bytes with digest"):
                 Dataset(packed).link(file, packed / "copy")
@@ -147,6 +149,27 @@ def test_names_that_lead_out_of_a_shard_are_refused(packed, name):
     told = Manifest.read(folder)
     Manifest(told.files, {**told.spans, name: next(iter(told.spans.values()))}).write(folder)
     with pytest.raises(StoreError, match="a path that leads out of it"):
+        Manifest.read(folder)
+
+
+def test_a_shard_that_leads_out_is_not_read(packed, tmp_path):
+    sample = Dataset(packed)[0]
+    shard = packed / sample.files["rgb"].rpartition("/rgb/")[0] / SHARD
+    shard.rename(tmp_path / "elsewhere")
+    shard.symlink_to(tmp_path / "elsewhere")
+    with pytest.raises(StoreError, match="found a link that leads out of it"):
+        sample.channels["rgb"]
+    with pytest.raises(StoreError, match="found a link that leads out of it"):
+        Dataset(packed).link(sample.files["rgb"], packed / "copy")
+
+
+@pytest.mark.parametrize("number", ["1e400", "null", '"x"', "[]"])
+def test_numbers_that_are_none_are_told(packed, number):
+    folder = shards(packed)[0].parent
+    text = (folder / "manifest.json").read_text().rpartition(',"digest"')[0] + "}"
+    text = re.sub(r'("spans":\{"[^"]+":\[)\d+', rf"\g<1>{number}", text)
+    (folder / "manifest.json").write_text(f'{text[:-1]},"digest":"{digest(text.encode())}"}}')
+    with pytest.raises(StoreError, match="expected the manifest of a finished folder"):
         Manifest.read(folder)
 
 

@@ -354,14 +354,13 @@ class Dataset(Shown, Sequence[Sample]):
         return file
 
     def link(self, relative: str, destination: Path) -> None:
-        """Put a stored file at `destination`: a hard link, else a reflink, else a copy; `link_kinds` says which. Raises
-        StoreError for a path that leads out of the data set.
+        """Put a stored file at `destination`: a hard link, else a reflink, else a copy; `link_kinds` says which. One out of a
+        shot's tar is always a copy. Raises StoreError for a path that leads out of the data set.
         """
         destination.parent.mkdir(parents=True, exist_ok=True)
         file = self.stored(relative)
         if isinstance(file, Loaded):
             destination.write_bytes(file.data)
-            self.link_kinds.add("copy")
         else:
             self.link_kinds.add(link_file(file.resolve() if file.is_symlink() else file, destination))
 
@@ -449,8 +448,9 @@ def _manifest_of(root: Path, folder: str) -> Manifest:
 
 def _read(root: Path, manifest_of: ManifestOf, relative: str) -> bytes:
     """The bytes of a channel's file, which are those that were written."""
-    file, (folder, inside) = file_inside(root, relative), _parted(relative)
-    return manifest_of(folder).content(inside, file)
+    folder, inside = _parted(relative)
+    manifest = manifest_of(folder)
+    return manifest.content(inside, file_inside(root, f"{folder}/{manifest.holder(inside)}"))
 
 
 def _parted(file: str) -> tuple[str, str]:

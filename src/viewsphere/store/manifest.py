@@ -15,7 +15,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 from typing import Any
 
 import xxhash
@@ -97,7 +97,7 @@ class Manifest:
             if any(at < 0 or size < 0 or at + size > files[SHARD][0] for at, size, _ in spans.values()):
                 raise ValueError(f"files beyond the end of {SHARD}")
             return Manifest(files, spans)
-        except (OSError, LookupError, TypeError, ValueError, AttributeError, OverflowError) as error:
+        except (OSError, LookupError, TypeError, ValueError, ArithmeticError, AttributeError) as error:
             problem = (error.strerror if isinstance(error, OSError) else None) or error
             raise StoreError(f"{file}: expected the manifest of a finished folder, found {problem}: {REPAIR}") from None
 
@@ -112,22 +112,28 @@ class Manifest:
         own = {path: told for path, told in self.files.items() if path != SHARD}
         return own | {path: (size, found) for path, (_, size, found) in self.spans.items()}
 
-    def content(self, path: str, file: Path) -> bytes:
-        """The bytes of a file, by its path in the folder, and its whole path; out of the shard where it lies there. Raises
-        StoreError where they are not those that were written, OSError where the file cannot be read.
+    def holder(self, path: str) -> str:
+        """The file that holds another, both by their paths in the folder: the shard, or the file itself."""
+        return SHARD if path in self.spans else path
+
+    def content(self, path: str, holder: Path) -> bytes:
+        """The bytes of a file, by its path in the folder, and where its holder lies. Raises StoreError where they are not those
+        that were written, OSError where they cannot be read.
         """
-        if path in self.spans:
-            at, size, _ = self.spans[path]
-            shard = file.parents[len(PurePosixPath(path).parts) - 1] / SHARD
-            data = byte_range(shard, at, size)
-        else:
-            data = file.read_bytes()
-        self.check(path, data, file)
+        if path not in self.spans:
+            data = holder.read_bytes()
+            self.check(path, data, holder)
+            return data
+        at, size, told = self.spans[path]
+        data = byte_range(holder, at, size)
+        if digest(data) != told:
+            found = said((len(data), digest(data)))
+            raise StoreError(f"{holder}: {path}: expected {said((size, told))}, found {found}: {REPAIR}")
         return data
 
     def check(self, path: str, data: bytes, file: Path) -> None:
         """Raises StoreError where the bytes of a file, by its path in the folder, are not those that were written."""
-        told = self.spans[path][1:] if path in self.spans else self.files.get(path)
+        told = self.files.get(path)
         if told != (len(data), digest(data)):
             raise StoreError(f"{file}: expected {said(told)}, found {said((len(data), digest(data)))}: {REPAIR}")
 
