@@ -44,6 +44,9 @@ class Finding:
     where: str = ""
 
 
+SETTINGS = {"VIEWSPHERE_READ_HERE": "1", "VIEWSPHERE_MAX_PICTURE_PIXELS": "20000000"}
+"""Models are read in the same process, and pictures are smaller than by default: those of 100 megapixels take 1.6 GB."""
+
 CLEAR_REFS = Path("/proc/self/clear_refs")
 """What Linux is told to forget the most memory that a process has held."""
 
@@ -129,7 +132,7 @@ def findings(target: str, seeds: range) -> Iterator[Finding | int]:
     from viewsphere.store import checksums
 
     warnings.simplefilter("ignore")
-    os.environ["VIEWSPHERE_READ_HERE"] = "1"
+    os.environ |= SETTINGS
     # Nobody installs plug-ins meanwhile, and looking for them takes long; so do threads of a processor that others keep busy.
     plugins.entry_points, plugins.names = cache(plugins.entry_points), cache(plugins.names)
     checksums.ThreadPoolExecutor = digests.ThreadPoolExecutor = _InTurn

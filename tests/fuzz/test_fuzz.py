@@ -2,7 +2,7 @@
 
 import pytest
 import targets
-from campaign import findings
+from campaign import SETTINGS, findings
 from targets import TARGETS
 
 QUICK = {
@@ -31,7 +31,8 @@ def alone(monkeypatch):
     from viewsphere.check import digests
     from viewsphere.store import checksums
 
-    monkeypatch.setenv("VIEWSPHERE_READ_HERE", "1")
+    for name, value in SETTINGS.items():
+        monkeypatch.setenv(name, value)
     for module, name in (
         (plugins, "entry_points"),
         (plugins, "names"),
