@@ -141,6 +141,7 @@ WHOLE = 10**400
 NATIVE = {
     "a corner of a box": lambda found: next(iter(entry(found)["bbox_3D_pxs"].values())).update({"0": [WHOLE, 0]}),
     "how much is visible": lambda found: entry(found).update(visibility=WHOLE),
+    "a text that Python takes for a number": lambda found: entry(found).update(visibility="nan"),
     "a camera's matrix": lambda found: entry(found)["transformation_matrix"].update(K=[[WHOLE, 0, 0]] * 3),
     "a true size": lambda found: vehicle(found).update(real_size={"width": WHOLE, "height": 1, "length": 1}),
     "a time step": lambda found: vehicle(found).update(animation="a.glb", frame=0, seconds=WHOLE),
@@ -156,7 +157,7 @@ def entry(found):
 
 
 @pytest.mark.parametrize("name", NATIVE)
-def test_a_number_beyond_all_floats_is_refused_in_one_line(name, tmp_path):
+def test_what_is_no_finite_number_is_refused_in_one_line(name, tmp_path):
     root = shutil.copytree(_made(False) / "native", tmp_path / "native")
     found = json.loads((root / "dataset1.json").read_text("utf-8"))
     NATIVE[name](found)
