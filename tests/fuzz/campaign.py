@@ -44,7 +44,8 @@ class Finding:
     where: str = ""
 
 
-SETTINGS = {"VIEWSPHERE_READ_HERE": "1", "VIEWSPHERE_MAX_PICTURE_PIXELS": "20000000"}
+SETTINGS = {"READ_HERE": "1", "MAX_PICTURE_PIXELS": "20000000", "MAX_STORED_PIXELS": "20000000"}
+SETTINGS = {f"VIEWSPHERE_{name}": value for name, value in SETTINGS.items()}
 """Models are read in the same process, and pictures are smaller than by default: those of 100 megapixels take 1.6 GB."""
 
 CLEAR_REFS = Path("/proc/self/clear_refs")

@@ -2,9 +2,10 @@
 
 import json
 import shutil
+import struct
 
 import pytest
-from targets import CAMERAS, COLMAP, FILED, OPENCV, ORBITS, PLY, ROS, SEQUENCE, TARGETS, _made
+from targets import CAMERAS, COLMAP, FILED, OPENCV, ORBITS, PLY, ROS, SEQUENCE, TARGETS, _encoded, _made
 
 from sealing import seal_again
 from viewsphere.check import check
@@ -199,3 +200,13 @@ def test_deep_brackets_are_refused_and_those_in_texts_are_none():
             parsed(text)
     for value in (json.loads(nested(MOST_NESTED)), ["[" * 500, '"[{\\' * 300, [[]] * 300]):
         assert parsed(json.dumps(value)) == value
+
+
+def test_a_tile_beyond_the_limit_of_pillow_is_refused_in_one_line(tmp_path):
+    data = _encoded("TIFF")
+    at = next(data.index(struct.pack("<HHI", 257, kind, 1)) for kind in (3, 4) if struct.pack("<HHI", 257, kind, 1) in data)
+    high = struct.pack("<HHII", 257, 4, 1, 16_777_226)
+    (tmp_path / "rgb-x").write_bytes(data[:at] + high + data[at + len(high) :])
+    with pytest.raises(ViewsphereError, match="exceeds limit") as error:
+        TARGETS["channels"].call(tmp_path / "rgb-x")
+    assert "\n" not in str(error.value)
