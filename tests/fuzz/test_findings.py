@@ -210,3 +210,27 @@ def test_a_tile_beyond_the_limit_of_pillow_is_refused_in_one_line(tmp_path):
     with pytest.raises(ViewsphereError, match="exceeds limit") as error:
         TARGETS["channels"].call(tmp_path / "rgb-x")
     assert "\n" not in str(error.value)
+
+
+def frames_of(root, pattern, change):
+    file = min(root.glob(f"store/shots/*/*/{pattern}"))
+    value = json.loads(file.read_text("utf-8"))
+    change(value)
+    file.write_text(json.dumps(value), "utf-8")
+    return Dataset(root)
+
+
+@pytest.mark.parametrize("name", ["sequence", "split"])
+def test_names_in_records_are_texts(name, tmp_path):
+    root = shutil.copytree(_made(False) / "store", tmp_path / "out/store").parent
+    dataset = frames_of(root, "frames.json", lambda records: records[0].update({name: []}))
+    for asked in (lambda: dataset.sequences, lambda: list(dataset.of_split("train"))):
+        with pytest.raises(ViewsphereError, match="that is no text"):
+            asked()
+
+
+def test_a_shot_has_as_many_samples_as_are_planned(tmp_path):
+    root = shutil.copytree(_made(True) / "store", tmp_path / "out/store").parent
+    dataset = frames_of(root, "shot.json", lambda shot: shot["instants"].pop())
+    with pytest.raises(ViewsphereError, match="3 samples instead of 4"):
+        list(dataset.of_split("train"))
