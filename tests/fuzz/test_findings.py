@@ -5,13 +5,14 @@ import shutil
 import struct
 
 import pytest
-from targets import CAMERAS, COLMAP, FILED, OPENCV, ORBITS, PLY, ROS, SEQUENCE, TARGETS, _encoded, _made
+from targets import CAMERAS, COLMAP, FILED, OPENCV, ORBITS, PLY, ROS, SEQUENCE, TARGETS, _encoded, _made, _played
 
 from sealing import seal_again
 from viewsphere.check import check
 from viewsphere.errors import ViewsphereError
 from viewsphere.run.exporting import export
 from viewsphere.run.importing import import_dataset
+from viewsphere.run.merging import merge
 from viewsphere.run.status import status
 from viewsphere.sampling.rig_files import read_rig
 from viewsphere.store import Dataset
@@ -234,3 +235,17 @@ def test_a_shot_has_as_many_samples_as_are_planned(tmp_path):
     dataset = frames_of(root, "shot.json", lambda shot: shot["instants"].pop())
     with pytest.raises(ViewsphereError, match="3 samples instead of 4"):
         list(dataset.of_split("train"))
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("viewpoints", {"kind": "orbit", "elevation": [1.8e16, 0]}), ("seed", []), ("time", 3), ("files", {"shots": "x"})],
+)
+def test_a_recipe_in_a_plan_is_refused_in_one_line(name, value, tmp_path):
+    root = shutil.copytree(_played() / "store", tmp_path / "out/store").parent
+    plan = unsealed((root / "store/plan.json").read_text("utf-8"))
+    plan["parts"][0]["recipe"][name] = value
+    (root / "store/plan.json").write_text(sealed(plan), "utf-8")
+    with pytest.raises(ViewsphereError, match=r"plan\.json.*expected") as error:
+        merge([root, _made(True)], tmp_path / "merged", mixed=True, keep_going=True)
+    assert "\n" not in str(error.value)

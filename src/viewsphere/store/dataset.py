@@ -11,6 +11,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any, Self, overload
 
 from numpy.typing import NDArray
+from pydantic import TypeAdapter
 
 from viewsphere.errors import StoreError
 from viewsphere.labels import channels
@@ -30,7 +31,7 @@ from viewsphere.store.manifest import MANIFEST, Manifest
 from viewsphere.store.paths import file_inside, files_inside, names
 from viewsphere.store.places import link_file, located
 from viewsphere.store.point_tracks import PointTracks, joined
-from viewsphere.store.records import Category, ModelInfo
+from viewsphere.store.records import Category, ModelInfo, typed
 from viewsphere.store.sample_records import ShotRecords, from_whole_sample
 from viewsphere.store.selection import Selection
 from viewsphere.store.texts import parsed
@@ -329,8 +330,13 @@ class Dataset(Shown, Sequence[Sample]):
 
     @cached_property
     def kinds(self) -> tuple[Files, ...]:
-        """The kinds of files that each part has written."""
-        return tuple(Files.model_validate(part.recipe.get("files", {})) for part in self.plan.parts)
+        """The kinds of files that each part has written; raises StoreError where its recipe says others than there are."""
+        try:
+            return tuple(typed(_FILES, part.recipe.get("files", {})) for part in self.plan.parts)
+        except ValueError as error:
+            raise StoreError(
+                f"{self.store.plan_file}: expected kinds of files, found {error}: render the recipe anew"
+            ) from None
 
     def path(self, relative: str) -> Path:
         """A file of the data set; raises StoreError for a path that leads out of it."""
@@ -437,6 +443,8 @@ class _ChannelFiles(Mapping[str, NDArray[Any]]):
     def __len__(self) -> int:
         return len(self._files)
 
+
+_FILES = TypeAdapter(Files)
 
 ManifestOf = Callable[[str], Manifest]
 """Gives the manifest of a folder, by its path from the data set's root."""
