@@ -249,3 +249,11 @@ def test_a_recipe_in_a_plan_is_refused_in_one_line(name, value, tmp_path):
     with pytest.raises(ViewsphereError, match=r"plan\.json.*expected") as error:
         merge([root, _made(True)], tmp_path / "merged", mixed=True, keep_going=True)
     assert "\n" not in str(error.value)
+
+
+def test_a_model_of_another_category_is_not_merged(tmp_path):
+    root = shutil.copytree(_made(True) / "store", tmp_path / "out/store").parent
+    file = min(root.glob("store/models/*/model.json"))
+    file.write_text(json.dumps(json.loads(file.read_text("utf-8")) | {"category_id": 77}), "utf-8")
+    with pytest.raises(ViewsphereError, match="expected a category of the plan, found 77"):
+        merge([root, _played()], tmp_path / "merged", mixed=True)
