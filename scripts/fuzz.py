@@ -3,8 +3,9 @@
     scripts/fuzz [TARGET ...] [--inputs 1000] [--first 0] [--jobs 1]    # status 1 where there are findings
     scripts/fuzz gltf --keep 1234 FOLDER                                # the files of one input, to look at
 
-Foreign exceptions, crashes, inputs that take over 20 seconds or a gigabyte are findings, told once for each cause with the seed
-that makes them again. Inputs run in processes of their own (Linux); one that dies goes on behind the input that ended it.
+Foreign exceptions, crashes, inputs that take over 20 seconds of the processor or a gigabyte are findings, told once for each
+cause with the seed that makes them again. Inputs run in processes of their own (Linux); one that dies goes on behind the input
+that ended it.
 """
 
 from __future__ import annotations
@@ -27,8 +28,8 @@ sys.path[:0] = [str(TESTS), str(TESTS / "fuzz")]
 from campaign import make  # noqa: E402
 from targets import TARGETS  # noqa: E402
 
-SILENCE = 120
-"""Seconds without a word from a process, which cannot be interrupted in foreign code, until it is ended."""
+SILENCE = 600
+"""Seconds without a word until a process is ended: of foreign code that cannot be interrupted, or has no processor."""
 
 
 def told(target: str, first: int, stop: int) -> Iterator[dict[str, Any] | int]:

@@ -2,8 +2,9 @@
 
 from pathlib import Path
 
+from viewsphere.errors import StoreError
 from viewsphere.store.checksums import CHECKSUMS, write_checksums
-from viewsphere.store.manifest import MANIFEST, Manifest
+from viewsphere.store.manifest import MANIFEST, SHARD, Manifest, Span, digest
 
 
 def seal_again(root: Path) -> None:
@@ -11,4 +12,13 @@ def seal_again(root: Path) -> None:
     for file in Path(root).glob(f"*/{CHECKSUMS}"):
         write_checksums(file.parent)
     for file in Path(root).glob(f"store/**/{MANIFEST}"):
-        Manifest.of(file.parent).write(file.parent)
+        Manifest(Manifest.of(file.parent).files, _spans(file)).write(file.parent)
+
+
+def _spans(file: Path) -> dict[str, Span]:
+    """Where files lie in the folder's tar, as its manifest says, with the digests of what lies there now."""
+    try:
+        known, data = Manifest.read(file.parent).spans, (file.parent / SHARD).read_bytes()
+    except (StoreError, OSError):
+        return {}
+    return {path: (at, size, digest(data[at : at + size])) for path, (at, size, _) in known.items()}

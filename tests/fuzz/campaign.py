@@ -25,10 +25,10 @@ from random import Random
 from types import FrameType, TracebackType
 
 SECONDS = 20
-"""Of one input, after which it is a finding."""
+"""Of the processor for one input, after which it is a finding."""
 
 GROWTH = 1 << 30
-"""Bytes by which one input may raise what the process has needed at most."""
+"""Bytes of memory that one input may need."""
 
 SPACE = 8 << 30
 """Bytes of address space of a process that runs inputs."""
@@ -44,6 +44,14 @@ class Finding:
     where: str = ""
 
 
+SETTINGS = {"READ_HERE": "1", "MAX_PICTURE_PIXELS": "20000000", "MAX_STORED_PIXELS": "20000000"}
+SETTINGS = {f"VIEWSPHERE_{name}": value for name, value in SETTINGS.items()}
+"""Models are read in the same process, and pictures are smaller than by default: those of 100 megapixels take 1.6 GB."""
+
+CLEAR_REFS = Path("/proc/self/clear_refs")
+"""What Linux is told to forget the most memory that a process has held."""
+
+
 class _TooSlow(BaseException):
     """Raised in what takes longer than it may; no ordinary handler catches it."""
 
@@ -56,9 +64,9 @@ def run(target: str, seed: int) -> Finding | None:
 
     with tempfile.TemporaryDirectory(prefix=f"fuzz-{target}-{seed}-") as name:
         opened = make(target, seed, Path(name))
-        before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-        signal.signal(signal.SIGALRM, _alarm)
-        signal.setitimer(signal.ITIMER_REAL, SECONDS)
+        before = _held_at_most(forget=True)
+        signal.signal(signal.SIGPROF, _alarm)
+        signal.setitimer(signal.ITIMER_PROF, SECONDS)
         try:
             TARGETS[target].run(Path(name), opened)
         except OSError as error:
@@ -72,8 +80,8 @@ def run(target: str, seed: int) -> Finding | None:
                 raise
             return Finding(target, seed, f"{type(error).__name__}: {error}"[:200], _where(error.__traceback__))
         finally:
-            signal.setitimer(signal.ITIMER_REAL, 0)
-        grown = 1024 * (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before)
+            signal.setitimer(signal.ITIMER_PROF, 0)
+        grown = _held_at_most() - before
         return Finding(target, seed, f"{grown / 1e9:.1f} GB of memory", "memory") if grown > GROWTH else None
 
 
@@ -82,6 +90,13 @@ def make(target: str, seed: int, folder: Path) -> str:
     from targets import TARGETS
 
     return TARGETS[target].damage(folder, Random(f"{target}:{seed}"))
+
+
+def _held_at_most(forget: bool = False) -> int:
+    """The most bytes of memory that this process has held; `forget`: since now, so that one input hides nothing of the next."""
+    if forget and CLEAR_REFS.exists():
+        CLEAR_REFS.write_text("5")
+    return 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 
 
 def _alarm(number: int, frame: FrameType | None) -> None:
@@ -98,13 +113,30 @@ def _where(trace: TracebackType | None) -> str:
     return own[-1] if own else "elsewhere"
 
 
+class _InTurn:
+    """Stands for a pool of threads: does one thing after another, in the thread that asks."""
+
+    def __init__(self, workers: int) -> None: ...
+
+    def __enter__(self) -> _InTurn:
+        return self
+
+    def __exit__(self, *_: object) -> None: ...
+
+    map = staticmethod(map)
+
+
 def findings(target: str, seeds: range) -> Iterator[Finding | int]:
     """Findings among these inputs, and each input's seed before it runs."""
     from viewsphere import plugins
+    from viewsphere.check import digests
+    from viewsphere.store import checksums
 
     warnings.simplefilter("ignore")
-    os.environ["VIEWSPHERE_READ_HERE"] = "1"
-    plugins.entry_points = cache(plugins.entry_points)  # nobody installs any meanwhile, and looking for them takes longest
+    os.environ |= SETTINGS
+    # Nobody installs plug-ins meanwhile, and looking for them takes long; so do threads of a processor that others keep busy.
+    plugins.entry_points, plugins.names = cache(plugins.entry_points), cache(plugins.names)
+    checksums.ThreadPoolExecutor = digests.ThreadPoolExecutor = _InTurn
     for seed in seeds:
         yield seed
         found = run(target, seed)

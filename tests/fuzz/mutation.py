@@ -199,7 +199,7 @@ def tree(value: Any, rng: Random) -> Any:
             at = rng.randrange(len(old))
             holder[name] = old[:at] + rng.choice(TEXTS) + old[at + 1 :]
         case _:
-            for _ in range(rng.choice((3, 50, 600, 3000))):
+            for _ in range(rng.choice((3, 50, rng.randrange(150, 1000), 3000))):
                 old = [old]
             holder[name] = old
     return value

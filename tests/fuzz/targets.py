@@ -8,9 +8,10 @@ from __future__ import annotations
 import io
 import json
 import shutil
+from base64 import b64encode
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache, partial
 from pathlib import Path
 from random import Random
@@ -18,7 +19,7 @@ from random import Random
 import numpy as np
 from mutation import glb, mutated
 
-from cube_dataset import LENS, MESHES, make
+from cube_dataset import LENS, MESHES, POSES, make
 from pictures import photograph, sunny, write, write_hdr
 from sealing import seal_again
 from viewsphere.errors import ViewsphereError
@@ -49,9 +50,13 @@ class Files:
     def damage(self, folder: Path, rng: Random) -> str:
         """Put a damaged file into an empty folder; returns the name of the file to open."""
         sample = rng.choice(self.corpus())
-        for name, data in sample.beside.items():
-            (folder / name).write_bytes(data)
-        (folder / sample.name).write_bytes(mutated(sample.data, rng, sample.kind))
+        return self.lay(folder, sample, mutated(sample.data, rng, sample.kind))
+
+    def lay(self, folder: Path, sample: Sample, data: bytes) -> str:
+        """Put a sample with this content, and the files beside it, into an empty folder; returns the name of the file to open."""
+        for name, beside in sample.beside.items():
+            (folder / name).write_bytes(beside)
+        (folder / sample.name).write_bytes(data)
         return sample.opened or sample.name
 
     def run(self, folder: Path, opened: str) -> None:
@@ -64,14 +69,19 @@ class Folders:
     """A target that opens a folder of which one file is damaged: `call` is given the folder `in`, and `out` to write to."""
 
     call: Callable[[Path, Path], object]
-    whole: Callable[[], Path]
+    wholes: tuple[Callable[[], Path], ...]
     among: tuple[str, ...]
     """Patterns of the files that are damaged, each as often as the others."""
+    parts: tuple[str, ...]
+    """What lies in the folder and is needed."""
 
     def damage(self, folder: Path, rng: Random) -> str:
         """Put the folder's copy `in` into an empty folder, with one file damaged, its digests mostly made to fit."""
-        root = Path(shutil.copytree(self.whole(), folder / "in"))
-        files = sorted(path for path in root.glob(rng.choice(self.among)) if path.is_file())
+        root = folder / "in"
+        self.lay(root, rng.choice(self.wholes)())
+        files: list[Path] = []
+        while not files:  # not every folder has files of all kinds
+            files = sorted(path for path in root.glob(rng.choice(self.among)) if path.is_file())
         for _ in range(1 if rng.random() < 0.9 else 2):
             file = rng.choice(files)
             data = mutated(file.read_bytes(), rng, _kind(file))
@@ -85,6 +95,11 @@ class Folders:
             if kept:
                 plan.write_bytes(kept)
         return "in"
+
+    def lay(self, root: Path, whole: Path) -> None:
+        """Copy what is needed of a folder."""
+        for part in self.parts:
+            shutil.copytree(whole / part, root / part)
 
     def run(self, folder: Path, opened: str) -> None:
         """Read what was damaged."""
@@ -129,28 +144,58 @@ def recipes() -> Pack:
         for p in sorted([*root.glob("recipes/*.yaml"), *root.glob("src/viewsphere/recipe/starts/*/recipe.yaml")])
     ]
     texts = [text for text in texts if "blend" not in text]
-    texts.append("extends: base.yaml\nmodels: [box.ply, {source: 'zoo:car', count: 2}]\n")
-    texts.append(SEQUENCE)
-    beside = {"base.yaml": BASE, "box.ply": PLY, "credits.csv": CREDITS, "poses.csv": ORBITS, "photo.png": _encoded("PNG")}
+    texts.append("extends: base.yaml\nmodels: [{source: box.ply, category: box}, {source: 'zoo:car', count: 2}]\n")
+    texts += [SEQUENCE, FILED]
+    beside = {
+        "base.yaml": BASE, "box.ply": PLY, "credits.csv": CREDITS, "poses.csv": ORBITS, "photo.png": _encoded("PNG"),
+        "sizes.csv": b"name,width,height,length\nbox,10,20,30\n", "rig.yaml": OPENCV, "points.csv": b"instant,x,y\n0,10,20\n7,3.5,4\n",
+    }  # fmt: skip
     plain = [Sample("recipe.yaml", text.encode(), "text", beside) for text in texts]
     trees = [Sample("recipe.yaml", json.dumps(file.parse(text, "")[0]).encode(), "json", beside) for text in texts]
-    one = b"extends: base.yaml\nmodels: [{source: box.ply, licence: CC0-1.0}]\n"
+    one = b"extends: base.yaml\nmodels: [{source: box.ply, category: box}]\n"
     others = [
-        Sample("credits.csv", CREDITS, "text", {**beside, "recipe.yaml": one}, "recipe.yaml"),
-        Sample("base.yaml", BASE, "text", {**beside, "recipe.yaml": one}, "recipe.yaml"),
+        Sample(
+            name, beside[name], "bytes" if name.endswith("png") else "text", {**beside, "recipe.yaml": recipe}, "recipe.yaml"
+        )
+        for recipe, names in (
+            (one, ("credits.csv", "base.yaml")),
+            (FILED.encode(), ("sizes.csv", "poses.csv", "rig.yaml", "photo.png")),
+            (SEQUENCE.encode(), ("points.csv",)),
+        )
+        for name in names
     ]
     return (*plain, *trees, *trees, *others)
 
 
 SEQUENCE = """
-models: [{source: 'zoo:car', motion: [{keyframes: {times: [0, 1], positions: [[0, 0, 0], [1, 2, 0]]}}, {oscillate: {axis: z, degrees: 20}}]}]
+models:
+  - source: zoo:post_box
+    category: box
+    motion:
+      - {kind: keyframes, keys: [{time: 0, position: [0, 0, 0]}, {time: 1, position: [1, 2, 0], rotation_deg: [0, 0, 40]}], leave: 1.5}
+      - {kind: constant, velocity: [{uniform: [-0.02, 0.02]}, 0, 0]}
+  - {source: zoo:chair, category: chair, motion: {kind: oscillate, position: [0.3, 0, 0], period: {uniform: [1, 3]}}}
 time: {frames: 20, fps: 10, shutter: 0.5}
-viewpoints: {kind: orbit, distance: 5, elevation: 20, seconds: 2}
+viewpoints: {kind: orbit, azimuth: [0, 60], elevation: [18, 30], distance: [3, 2.6], shake: {degrees: 0.4, mm: 6}}
 rig: {kind: stereo, baseline: 0.2}
-scene: {ground: true, lights: [{kind: sun}], distractors: [{source: 'zoo:post_box', count: [1, 3]}]}
-splits: {train: 0.7, val: 0.3}
+scene:
+  ground: true
+  company: {count: 1, draw: per_sequence, motion: {kind: random, position: [0.2, 0.2, 0], rotation_deg: [0, 0, 30], highest_hz: 1}}
+splits: {by: sequence, train: 0.7, val: 0.3}
 channels: [rgb, depth, flow]
 camera: {size: [64, 48], fov_deg: 60}
+tracks: {points: points.csv}
+"""
+FILED = """
+models: [{source: box.ply, real_size: {csv: sizes.csv, unit: mm}, category: box, licence: CC0-1.0}]
+viewpoints: {kind: file, path: poses.csv}
+rig: {file: rig.yaml, rectified: true}
+camera: {size: [64, 48], fov_deg: 40}
+scene:
+  background: {image: photo.png, fit: crop, zoom: [1, 3], place: [[0, 1], [0, 1]], blur: [0, 0.02]}
+  ground: {image: photo.png, tile: [1, 3]}
+  sun: {date: '2026-06-21', time: '14:30+02:00', latitude: 41.2, longitude: -8.6, strength: {log_uniform: [1, 8]}}
+  lights: [{position: [[-2, 2], 0, 3], strength: {normal: {mean: 1, deviation: 0.5, min: 0.2, max: 2}}}]
 """
 
 
@@ -319,13 +364,13 @@ ORBITS = b"azimuth,elevation,distance,tilt\n0,10,2,0\n70,35,2.5,12\n200,60,3,0\n
 VIEW = b"0 10 0 2\n70 35 12 2.5\n200 60 0 3\n"
 TUM = b"# time x y z qx qy qz qw\n0.0 1 2 3 0 0 0 1\n0.1 1 2 3 0.5 0.5 0.5 0.5\n"
 KITTI = b"1 0 0 1 0 1 0 2 0 0 1 3\n0 -1 0 1 1 0 0 2 0 0 1 3\n"
-COLMAP = b"# images\n1 1 0 0 0 0.1 0.2 3 1 a.png\n10 10 -1\n2 0.7 0.7 0 0 0.1 0.2 3 2 b c.png\n\n"
+COLMAP = b"# images\n1 1 0 0 0 0.1 0.2 3 1 a.png\n10 10 -1\n2 0.7 0.7 0 0 0.1 0.2 3 1 b c.png\n\n"
 CAMERAS = b"# cameras\n1 OPENCV 640 480 420 425 315 239 -0.28 0.07 0.0002 0.00002\n2 SIMPLE_RADIAL 640 480 420 320 240 0.1\n"
 NERFSTUDIO = json.dumps(
     {
         "camera_model": "OPENCV", "fl_x": 420.0, "fl_y": 421.0, "cx": 320.0, "cy": 240.0, "w": 640, "h": 480, "k1": 0.01, "k2": 0, "p1": 0,
         "p2": 0, "frames": [{"file_path": "a.png", "transform_matrix": np.eye(4).tolist()},
-                            {"file_path": "b.png", "fl_x": 400, "transform_matrix": [[0, -1, 0, 1], [1, 0, 0, 2], [0, 0, 1, 3], [0, 0, 0, 1]]}],
+                            {"file_path": "b.png", "fl_x": 420.0, "transform_matrix": [[0, -1, 0, 1], [1, 0, 0, 2], [0, 0, 1, 3], [0, 0, 0, 1]]}],
     }
 ).encode()  # fmt: skip
 
@@ -448,21 +493,65 @@ def textures() -> Pack:
 
 # Data sets
 
+EXPORTS = ("coco", "native", "csv", "webdataset")
+
 
 @cache
-def _made(short: bool) -> Path:
+def _made(short: bool, shots: str = "files") -> Path:
     """A data set of one shot of four small frames, and its exports inside of it."""
     import tempfile
 
+    from viewsphere.model.files import Files as Kinds
     from viewsphere.run.exporting import export
+    from viewsphere.store.heartbeat import Heartbeat
+    from viewsphere.store.records import NAME_BYTES
 
     lens = LENS.model_copy(update={"width": 24, "height": 18, "fx": 20.0, "fy": 20.0, "cx": 12.0, "cy": 9.0})
     root = Path(tempfile.mkdtemp(prefix="fuzz-")) / "out"
     channels = ("rgb", "depth", "instances", "normals") if short else ("rgb", "depth", "instances", "rgba")
     dataset = make(
-        root, several=short, channels=channels, intrinsics=lens, ground=True, leave_out=() if short else (1, 2), short=short
+        root,
+        several=short,
+        channels=channels,
+        intrinsics=lens,
+        ground=True,
+        leave_out=() if short else (1, 2),
+        short=short,
+        files=Kinds(shots=shots),
     )
-    export(dataset.root, ["coco", "native", "csv", "webdataset"])
+    named = replace(dataset.plan.parts[0], new_poses=len(POSES), pose_names=b64encode(bytes(NAME_BYTES * len(POSES))).decode())
+    dataset.store.save(replace(dataset.plan, parts=(named,)))
+    export(dataset.root, EXPORTS)
+    dataset.store.write_file("skipped.json", json.dumps({"other": "it was left out"}))
+    (root / "store/failed").mkdir()
+    (root / "store/failed/1.json").write_text(
+        Heartbeat("host", 1, (0, 2), "frames", 1, 4, begun=1.0, beat=9.0, error="x").to_json()
+    )
+    return root
+
+
+@cache
+def _played() -> Path:
+    """A data set of a sequence: three instants of a stereo rig, with points that are followed."""
+    import tempfile
+
+    import yaml
+
+    from viewsphere import Recipe
+    from viewsphere.run.generate import generate
+
+    said = yaml.safe_load(SEQUENCE)
+    said["models"][0]["motion"] = said["models"][0]["motion"][1]
+    changes = {
+        "models": said["models"][:1],
+        "time": {"frames": 3, "fps": 10},
+        "tracks": {"count": 2},
+        "splits": {"train": 1.0},
+        "scene": {"ground": True},
+    }
+    lens = {"camera": {"size": [24, 18], "fov_deg": 60}, "channels": ["rgb", "depth", "instances", "flow", "tracks"]}
+    root = Path(tempfile.mkdtemp(prefix="fuzz-")) / "out"
+    generate(Recipe.model_validate(said | changes | lens), root, formats=())
     return root
 
 
@@ -475,24 +564,29 @@ def _each(*calls: Callable[[], object]) -> None:
 
 def _read(root: Path) -> None:
     from viewsphere.store import Dataset
+    from viewsphere.store.films import films_of
 
     dataset = Dataset(root)
     for sample in dataset:
         _each(lambda sample=sample: [sample.channels[name] for name in sample.channels], lambda sample=sample: sample.objects)
     _each(lambda: dataset.models, lambda: dataset.sequences, lambda: list(dataset.select("index", "objects.box2d")))
+    _each(lambda: films_of(dataset), lambda: [list(dataset.of_split(split)) for split in dataset.splits])
+    _each(lambda: [dataset.tracks(name, "left") for name in dataset.sequences])
 
 
 def _store(root: Path, out: Path) -> None:
     from viewsphere.check import check
     from viewsphere.run.exporting import export
     from viewsphere.run.merging import merge
+    from viewsphere.run.status import status
     from viewsphere.store import Dataset
 
     _each(
+        lambda: status(root).to_json(),
         partial(_read, root),
         lambda: check(Dataset(root), sample=1, rays=False),
         lambda: export(root, ["coco"], output=out / "coco"),
-        lambda: merge([root, _made(True)], out / "merged"),
+        lambda: merge([root, _made(True)], out / "merged", mixed=True, keep_going=True),
     )
 
 
@@ -516,9 +610,20 @@ def _import(kind: str, root: Path, out: Path) -> None:
 OF_STORES = (
     ("plan.json",) * 2
     + ("shots/*/*/frames.json",) * 3
-    + ("models/*/model.json", "**/*.json", "shots/*/*/*/*.*", "models/*/*.*")
+    + (
+        "models/*/model.json",
+        "**/*.json",
+        "shots/*/*/manifest.json",
+        "shots/*/*/channels.tar",
+        "*.json",
+        "failed/*.json",
+        "shots/*/*/*/*.*",
+        "models/*/*.*",
+    )
 )
 OF_STORES = tuple(f"store/{pattern}" for pattern in OF_STORES)
+OF_EXPORTS = ("coco/**/*.json", "native/**/*.json", "csv/**/*.*", "webdataset/**/*.*", "coco/**/*.*")
+OF_COCO = ("coco/annotations/*.json",) * 4 + ("coco/images/*/*.png",)
 OF_NATIVE = ("native/*.json", "native/*.json", "native/**/*.json", "native/Pose-*/**/*.*", "native/MODELS/**/*.*")
 
 TARGETS: dict[str, Files | Folders] = {
@@ -531,9 +636,9 @@ TARGETS: dict[str, Files | Folders] = {
     "channels": Files(_channel, coded),
     "textures": Files(_model, textures),
     "sky": Files(_environment, skies),
-    "store": Folders(_store, lambda: _made(True), (*OF_STORES, *("store/shots/*/*/shot.json",) * 3)),
-    "records": Folders(_store, lambda: _made(False), OF_STORES),
-    "exports": Folders(_exports, lambda: _made(False), ("coco/**/*.json", "native/**/*.json", "csv/**/*.*", "webdataset/**/*.*", "coco/**/*.*")),
-    "coco": Folders(partial(_import, "coco"), lambda: _made(False), ("coco/annotations/*.json",) * 4 + ("coco/images/*/*.png",)),
-    "native": Folders(partial(_import, "native"), lambda: _made(False), OF_NATIVE),
+    "store": Folders(_store, (partial(_made, True), partial(_made, True, "tar"), _played), (*OF_STORES, *("store/shots/*/*/shot.json",) * 3), ("store",)),
+    "records": Folders(_store, (partial(_made, False), partial(_made, False, "tar")), OF_STORES, ("store",)),
+    "exports": Folders(_exports, (partial(_made, False),), OF_EXPORTS, ("store", *EXPORTS)),
+    "coco": Folders(partial(_import, "coco"), (partial(_made, False),), OF_COCO, ("coco",)),
+    "native": Folders(partial(_import, "native"), (partial(_made, False),), OF_NATIVE, ("native",)),
 }  # fmt: skip

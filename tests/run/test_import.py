@@ -293,7 +293,7 @@ HOSTILE = [
     (entry("path_rgb", "../../../secret.png"), r"pose 2, .*found .*secret.png"),
     (entry("path_mask", "../../../secret.png"), r"pose 2, .*found .*secret.png"),
     (entry("render_resolution", [9, 9]), r"pose 2, .*96 x 72 pixels, not 9 x 9"),
-    (entry("visibility", "x"), r"pose 2, .*could not convert"),
+    (entry("visibility", "x"), r"pose 2, .*a finite number is expected"),
     (entry("bbox_3D_pxs", {"front": {"99": [1, 2]}}), r"pose 2, .*out of bounds"),
     (lambda data: data["poses"].update({"8": [1]}), r"pose 8: expected mappings of what was rendered"),
     (lambda data: data["poses"].update({"999999999999": data["poses"].pop("2")}), r"found pose 999999999999"),

@@ -38,4 +38,7 @@ def opened(file: Path | IO[bytes]) -> Generator[Image]:
         Image.MAX_IMAGE_PIXELS = limit
     with image:
         check_size(*image.size)
-        yield image
+        try:
+            yield image
+        except Image.DecompressionBombError as error:  # what Pillow unpacks at once, as a TIFF's tile, has a limit of its own
+            raise ValueError(str(error)) from None

@@ -235,7 +235,13 @@ class _Reader:
                 raise self._error(line, place, f"expected plain YAML; found {shown(text)} with the tag {node.tag!r}")
 
     def _character(self, text: str, node: Node, place: Steps) -> str:
-        """The text; raises RecipeError for halves of pairs, such as `\\ud800` in quotes, which no file can hold."""
+        """The text; raises RecipeError for halves of pairs, such as `\\ud800` in quotes, which no file can hold, and for `\\0`,
+        which no path can.
+        """
+        if "\0" in text:
+            raise self._error(
+                node.start_mark.line + 1, place, f"expected text; found the control character '\\x00' in {text!a:.60}"
+            )
         if not text.isascii() and _HALF.search(text):
             raise self._error(node.start_mark.line + 1, place, f"expected characters; found half of one in {text!a:.60}")
         return text

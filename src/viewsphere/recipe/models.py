@@ -31,7 +31,7 @@ def _one_or_more(value: Any) -> Any:
 
 def _unit(value: Any) -> Any:
     number = isinstance(value, (int, float)) and not isinstance(value, bool)
-    if (number and value > 0) or value in UNITS:
+    if (number and value > 0) or (isinstance(value, str) and value in UNITS):
         return value
     raise ValueError(
         f"expected one of {', '.join(UNITS)} or the metres in one unit; found {shown(value)}{nearest(value, UNITS)}"

@@ -20,9 +20,6 @@ SHOT_FRAMES = 1000
 """Frames that are kept in one folder and written at once."""
 
 
-"""Frames in the order of another data set; how they were chosen nobody knows."""
-
-
 def readable_formats() -> tuple[str, ...]:
     """Names of the formats that can be read, sorted."""
     return tuple(name for name in plugins.names("formats") if hasattr(plugins.load("formats", name), "read"))

@@ -163,6 +163,9 @@ def _reconciled(datasets: Sequence[Dataset]) -> tuple[tuple[Category, ...], tupl
         joined: dict[int, Category] = {}
         for category in dataset.categories:
             joined[category.id] = _joined(categories, category, {c.id for c in joined.values()})
+        for info in dataset.models:
+            if info.category_id not in joined:
+                raise StoreError(f"{dataset.root}: model {info.key}: expected a category of the plan, found {info.category_id}")
         own = (info for info in dataset.models if not info.track)
         model_keys = {info.key: _key_for(contents, info, joined[info.category_id]) for info in own}
         taken = {source.sequences.get(name, name) for source in sources for name in source.dataset.sequences}

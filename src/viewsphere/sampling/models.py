@@ -18,6 +18,7 @@ from typing import Literal
 from viewsphere.assets.inside import split_source
 from viewsphere.assets.load import BLENDER_SUFFIXES
 from viewsphere.errors import RecipeError, each
+from viewsphere.limits import limits
 from viewsphere.model.file_names import is_reserved
 from viewsphere.model.mistakes import nearest, one_of
 from viewsphere.model.model_spec import ModelSpec, Size
@@ -59,7 +60,7 @@ def count_models(recipe: Recipe) -> int:
 
     def count(index: int) -> int:
         families = _families(recipe, index)
-        return len(families) * _count(recipe, recipe.models[index]) if families else len(_files(recipe, index))
+        return len(families) * _count(recipe, index) if families else len(_files(recipe, index))
 
     return sum(each(count, range(len(recipe.models))))
 
@@ -132,10 +133,17 @@ def _families(recipe: Recipe, index: int) -> tuple[str, ...]:
     return recipe.models[index].families
 
 
-def _count(recipe: Recipe, entry: ModelEntry) -> int:
-    """How many models of each of its zoo families an entry means."""
+def _count(recipe: Recipe, index: int) -> int:
+    """How many models of each of its zoo families an entry means; raises RecipeError for more than are made."""
+    entry, most = recipe.models[index], limits.MAX_MODELS
     names = ("models", "count", entry.name or "", *entry.source)
-    return 1 if entry.count is None else drawn(entry.count, lambda path: generator(recipe.lasting_seed, *names, *path))
+    count = 1 if entry.count is None else drawn(entry.count, lambda path: generator(recipe.lasting_seed, *names, *path))
+    if count > most:
+        raise RecipeError(
+            f"models[{index}].count: expected at most {most:,} (limit MAX_MODELS); found {count:,}; set VIEWSPHERE_MAX_MODELS "
+            "higher if it is meant so"
+        )
+    return count
 
 
 def _scale(recipe: Recipe, entry: ModelEntry, key: str) -> Literal["as_is", "real_size"] | float:
@@ -152,7 +160,7 @@ def _category(entry: ModelEntry, source: str) -> str:
 def _found(recipe: Recipe, index: int) -> Iterator[_Found]:
     entry = recipe.models[index]
     for family in _families(recipe, index):
-        for number in range(_count(recipe, entry)):
+        for number in range(_count(recipe, index)):
             yield _Found(index, f"{entry.name or family}_{number:03d}", ZOO + family)
     if not entry.families:
         prefix = f"{entry.name}_" if entry.name else ""

@@ -15,6 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import TypeAdapter
 
+from viewsphere.errors import StoreError
+from viewsphere.model.numbers import Natural
 from viewsphere.recipe.sequence import TimeEntry
 from viewsphere.recipe.viewpoints import Viewpoints
 from viewsphere.sampling.sequence_poses import SequencePoses, TrajectoryPoses, poses_of
@@ -22,11 +24,13 @@ from viewsphere.sampling.time_steps import TimedPoses
 from viewsphere.sampling.viewpoints import ListedPoses, Poses
 from viewsphere.store import Part, PlanRecord
 from viewsphere.store.index import Ranges
+from viewsphere.store.records import typed
 
 Indices = NDArray[np.int64]
 Names = NDArray[np.uint64]
 
 _VIEWPOINTS: TypeAdapter[Viewpoints] = TypeAdapter(Viewpoints)
+_TIME, _SEED = TypeAdapter(TimeEntry), TypeAdapter(Natural)
 
 
 def pose_names(views: Poses) -> Names:
@@ -106,11 +110,17 @@ def as_ranges(numbers: Indices) -> Ranges:
 
 
 def _views(part: Part) -> Poses:
-    """The poses of a part's recipe, one from which they follow."""
+    """The poses of a part's recipe, one from which they follow; raises StoreError where a stranger changed it."""
     recipe: dict[str, Any] = part.recipe
     time = recipe.get("time")
-    viewpoints = _VIEWPOINTS.validate_python(recipe["viewpoints"])
-    return poses_of(viewpoints, time and TimeEntry.model_validate(time), recipe["seed"])
+    try:
+        viewpoints = typed(_VIEWPOINTS, recipe["viewpoints"])
+        return poses_of(viewpoints, time and typed(_TIME, time), typed(_SEED, recipe["seed"]))
+    except (LookupError, ValueError) as error:
+        raise StoreError(
+            f"plan.json: recipe {part.name!r:.100}: expected the viewpoints from which poses follow, found "
+            f"{type(error).__name__}: {error}: render the recipe anew"
+        ) from None
 
 
 def _unknown(wanted: Names, known: Names) -> Names:

@@ -54,13 +54,13 @@ def _grid(step: int, width: int, height: int) -> int:
 def _read(path: Path) -> Iterator[Query]:
     """The queries of a CSV file; a first line of words is a heading."""
     try:
-        lines = path.read_text("utf-8-sig").splitlines()
-    except (OSError, ValueError) as error:
+        rows = list(csv.reader(path.read_text("utf-8-sig").splitlines()))
+    except (OSError, ValueError, csv.Error) as error:
         problem = (error.strerror if isinstance(error, OSError) else None) or error
         raise RecipeError(f"tracks.points: {path}: expected a CSV file of instant, x, y; found: {problem}") from None
-    if len(lines) > MOST_POINTS + 1:
-        raise RecipeError(f"tracks.points: {path}: expected at most {MOST_POINTS:,} points; found {len(lines):,} lines")
-    for number, row in enumerate(csv.reader(lines), 1):
+    if len(rows) > MOST_POINTS + 1:
+        raise RecipeError(f"tracks.points: {path}: expected at most {MOST_POINTS:,} points; found {len(rows):,} lines")
+    for number, row in enumerate(rows, 1):
         if not row or (number == 1 and row[0].strip() == "instant"):
             continue
         try:

@@ -12,6 +12,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any, Self, overload
 
 from numpy.typing import NDArray
+from pydantic import TypeAdapter
 
 from viewsphere.errors import StoreError
 from viewsphere.labels import channels
@@ -21,6 +22,7 @@ from viewsphere.model.model_spec import step_key
 from viewsphere.model.notebook import Shown
 from viewsphere.model.rig import CAMERA
 from viewsphere.model.sample import ObjectAnnotation, Sample
+from viewsphere.model.shot import Shot
 from viewsphere.store.channel_files import decode
 from viewsphere.store.choice import Choice
 from viewsphere.store.folder import Store
@@ -29,7 +31,7 @@ from viewsphere.store.index import Row
 from viewsphere.store.manifest import MANIFEST, Manifest
 from viewsphere.store.paths import file_inside, files_inside, names
 from viewsphere.store.point_tracks import PointTracks, joined
-from viewsphere.store.records import Category, ModelInfo
+from viewsphere.store.records import Category, ModelInfo, typed
 from viewsphere.store.sample_records import ShotRecords, from_whole_sample
 from viewsphere.store.selection import Selection
 from viewsphere.store.texts import parsed
@@ -258,10 +260,12 @@ class Dataset(Shown, Sequence[Sample]):
                 raise ValueError(f"{len(records)} frames instead of {row and row.count}")
             if any(record.get("index") != row.first + i for i, record in enumerate(records)):
                 raise ValueError(f"other numbers of frames than {row.first} and on")
+            if not all(isinstance(record.get(name, ""), str) for record in records for name in ("sequence", "split")):
+                raise ValueError("a sequence or a split that is no text")
             is_short = any("camera" not in record for record in records)
         except (OSError, TypeError, ValueError) as error:
             raise _damaged(file, error) from None
-        shot = self.store.labelled(key) if is_short else None
+        shot = self.labelled(key) if is_short else None
         if shot is None:
             return _Records(file, records)
         try:
@@ -269,6 +273,14 @@ class Dataset(Shown, Sequence[Sample]):
         except LookupError as error:
             raise _damaged(file.with_name("shot.json"), error) from None
         return _Records(file, records, ShotRecords(shot, self._facts, str(file), str(self.root)), files)
+
+    def labelled(self, key: str) -> Shot | None:
+        """A finished shot as `Store.labelled` gives it; raises StoreError for one of more or fewer samples than are planned."""
+        shot, row = self.store.labelled(key), self.plan.find(key)
+        if shot is not None and row is not None and (found := sum(1 for _ in shot.samples)) != row.count:
+            file = self.store.shot_folder(key) / "shot.json"
+            raise _damaged(file, ValueError(f"{found} samples instead of {row.count}"))
+        return shot
 
     def _model_facts(self, key: str, frame: int | None) -> ModelInfo:
         info = self._info(key)
@@ -319,8 +331,13 @@ class Dataset(Shown, Sequence[Sample]):
 
     @cached_property
     def kinds(self) -> tuple[Files, ...]:
-        """The kinds of files that each part has written."""
-        return tuple(Files.model_validate(part.recipe.get("files", {})) for part in self.plan.parts)
+        """The kinds of files that each part has written; raises StoreError where its recipe says others than there are."""
+        try:
+            return tuple(typed(_FILES, part.recipe.get("files", {})) for part in self.plan.parts)
+        except ValueError as error:
+            raise StoreError(
+                f"{self.store.plan_file}: expected kinds of files, found {error}: render the recipe anew"
+            ) from None
 
     def path(self, relative: str) -> Path:
         """A file of the data set; raises StoreError for a path that leads out of it."""
@@ -392,7 +409,7 @@ class _Records:
     def splits(self) -> list[str]:
         """The split of each sample."""
         if self.shot is None:
-            return [record["split"] for record in self.records]
+            return [record.get("split", "") for record in self.records]
         shot = self.shot.shot
         return [shot.instants[instant].split for _, instant, _ in shot.samples]
 
@@ -428,6 +445,8 @@ class _ChannelFiles(Mapping[str, NDArray[Any]]):
     def __len__(self) -> int:
         return len(self._files)
 
+
+_FILES = TypeAdapter(Files)
 
 ManifestOf = Callable[[str], Manifest]
 """Gives the manifest of a folder, by its path from the data set's root."""

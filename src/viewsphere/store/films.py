@@ -73,7 +73,7 @@ def _in_shots(dataset: Dataset) -> Iterator[Seen]:
     for key, places in dataset.shots():
         row = dataset.plan.find(key)
         if row is not None and row.part < len(parts) and parts[row.part].recipe.get("time"):
-            yield from _in_shot(dataset.store.labelled(key), places, start)
+            yield from _in_shot(dataset.labelled(key), places, start)
         start += len(places)
 
 

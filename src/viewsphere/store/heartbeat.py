@@ -27,6 +27,9 @@ SILENT_S = 120.0
 file systems show changes late.
 """
 
+MOST = 2.0**53
+"""Frames and seconds that a run may tell of: larger ones are no numbers of a run."""
+
 
 @dataclass(frozen=True)
 class Heartbeat:
@@ -70,8 +73,10 @@ class Heartbeat:
             begun, beat = float(value["begun"]), float(value["beat"])
             counts = {name: int(value[name]) for name in ("done", "total", "resumed", "under_way")}
             told = Heartbeat(str(value["host"]), int(value["pid"]), (int(number), int(of)), begun=begun, beat=beat)
+            if not all(abs(number) < MOST for number in (begun, beat, *counts.values())):
+                return None
             return replace(told, **counts, phase=str(value["phase"]), working_on=shown, error=str(value["error"]))
-        except (OSError, LookupError, TypeError, ValueError):
+        except (OSError, LookupError, TypeError, ValueError, OverflowError):
             return None
 
 

@@ -15,6 +15,9 @@ from typing import overload
 
 from viewsphere.model.share import ALL, Share
 
+MOST_DIGITS = 100
+"""More than a position's number has: a stranger's key may end with more than Python reads."""
+
 Ranges = tuple[tuple[int, int], ...]
 """Numbers, as ranges [first, stop) in order."""
 
@@ -182,7 +185,7 @@ class Index(Sequence[Row]):
     def _chunk_of(self, number: int, end: str) -> int | None:
         """The chunk of a block's subjects whose key ends so, None if there is none."""
         digits = end.removesuffix(self.suffix)
-        if not digits.isdecimal() or end != self._end(int(digits)):
+        if not digits.isdecimal() or len(digits) >= MOST_DIGITS or end != self._end(int(digits)):
             return None
         offset = _offset(self.blocks[number].positions, int(digits))
         if offset is None:

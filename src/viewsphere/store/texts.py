@@ -7,6 +7,11 @@ import re
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
+
+MOST_NESTED = 200
+"""Lists and objects in one another: more would end what walks through them, and no data set has a tenth of it."""
+
 _HALF = re.compile(r"\\u[dD][89a-fA-F]")
 """What begins half of a pair of UTF-16, which is no character by itself."""
 
@@ -17,13 +22,26 @@ def parsed(text: str | bytes, parse_constant: Callable[[str], Any] | None = None
     """
     if isinstance(text, bytes):
         text = text.decode("utf-8-sig")
+    if _nesting(text) > MOST_NESTED:
+        raise ValueError(f"lists or objects nested too deeply, more than {MOST_NESTED} times")
     try:
         value = json.loads(text, parse_constant=parse_constant)
         if _HALF.search(text):
             json.dumps(value, ensure_ascii=False).encode()
-    except RecursionError:
-        raise ValueError("lists or objects nested too deeply") from None
     except UnicodeEncodeError as error:
         found = ascii(error.object[error.start : error.end])
         raise ValueError(f"half of a UTF-16 pair, {found:.40}, where a character is expected") from None
     return value
+
+
+def _nesting(text: str) -> int:
+    """How deep brackets stand in one another, outside of what is quoted; not counted where they are too few to matter."""
+    if text.count("[") + text.count("{") <= MOST_NESTED:
+        return 0
+    outside = text.replace("\\\\", "").replace('\\"', "").split('"')[::2]
+    brackets = "".join(outside).encode(errors="replace").translate(None, _NO_BRACKETS)
+    steps = np.where(np.frombuffer(brackets, np.uint8) & 4, -1, 1)  # by which "]" and "}" differ from "[" and "{"
+    return int(np.cumsum(steps, dtype=np.int32).max(initial=0))
+
+
+_NO_BRACKETS = bytes(set(range(256)) - set(b"[]{}"))

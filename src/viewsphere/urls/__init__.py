@@ -55,8 +55,9 @@ def byte_range(file: Path, start: int, size: int) -> bytes:
     if isinstance(file, RemotePath):
         return file.byte_range(start, size)
     with file.open("rb") as stream:
-        stream.seek(start)
-        return stream.read(min(size, max(0, os.fstat(stream.fileno()).st_size - start)))
+        held = os.fstat(stream.fileno()).st_size
+        stream.seek(min(start, held))
+        return stream.read(max(0, min(size, held - start)))
 
 
 @contextmanager

@@ -32,7 +32,7 @@ from viewsphere.store.texts import parsed
 RIGHT_ANGLES = 1e-3
 LONGEST_NAME = 150
 LARGEST_POSE = 10_000_000
-MISTAKES = (LookupError, TypeError, ValueError, AttributeError, OSError)
+MISTAKES = (LookupError, TypeError, ValueError, AttributeError, OSError, OverflowError)
 """Errors raised by reading JSON of another structure than expected."""
 
 
@@ -159,11 +159,11 @@ def _model(key: str, file: Path, vehicle: dict[str, Any], category: Category) ->
         glb=glb.name if glb.is_file() else file.name,
         box3d_object=box,
         size=box_size(box),
-        real_size=(float(width), float(height), float(length)) if width and height and length else None,
+        real_size=(_number(width), _number(height), _number(length)) if width and height and length else None,
         parts=(),
         triangles=0,
         digest=hashlib.sha256(file.read_bytes()).hexdigest(),
-        step=TimeStep(frame=int(vehicle["frame"]), seconds=float(vehicle.get("seconds", 0))) if animation else None,
+        step=TimeStep(frame=int(vehicle["frame"]), seconds=_number(vehicle.get("seconds", 0))) if animation else None,
         track=str(vehicle.get("id_track", "")) if animation else "",
         credit=Credit.model_validate(vehicle["credit"]) if "credit" in vehicle else None,
     )
@@ -301,8 +301,15 @@ def _object(number: int, category: Category, key: str, mask: NDArray[np.bool_], 
 def _known(entry: dict[str, Any]) -> tuple[NDArray[np.float64], float | None, float | None]:
     """3D box in pixels (8, 2), visibility and truncation, each if given; raises for malformed values."""
     shares = entry.get("visibility"), entry.get("truncation")
-    visibility, truncation = (None if share is None else float(share) for share in shares)
+    visibility, truncation = (None if share is None else _number(share) for share in shares)
     return _vertices(entry.get("bbox_3D_pxs"), 2), visibility, truncation
+
+
+def _number(value: Any) -> float:
+    """A finite number; raises ValueError or OverflowError for anything else, such as a text that Python would take for one."""
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+        raise ValueError(f"found {value!r:.40} where a finite number is expected")
+    return float(value)
 
 
 def _mask(file: Path, size: tuple[int, int]) -> NDArray[np.bool_]:
@@ -322,10 +329,7 @@ def _vertices(named: Mapping[str, Mapping[str, list[float] | None]] | None, size
     for face in (named or {}).values():
         for vertex, point in face.items():
             if point is not None:
-                try:
-                    points[int(vertex)] = point
-                except OverflowError as error:  # a whole number beyond all floats
-                    raise ValueError(str(error)) from None
+                points[int(vertex)] = point
     if np.isinf(points).any():
         raise ValueError("found an infinite vertex")
     return points

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping
 from pathlib import Path
@@ -18,6 +17,7 @@ from viewsphere.sampling.pose_files.entries import Extrinsics, PoseFile
 from viewsphere.sampling.pose_files.lens import one_lens
 from viewsphere.sampling.pose_files.lines import number, read_text
 from viewsphere.sampling.pose_files.motions import motion
+from viewsphere.store.texts import parsed
 
 NUMBERS = ("w", "h", "fl_x", "fl_y", "cx", "cy", "k1", "k2", "k3", "k4", "p1", "p2", "camera_angle_x")
 LENS_KEYS = (*NUMBERS, "camera_model", "is_fisheye")
@@ -31,8 +31,8 @@ def read_nerfstudio(path: Path) -> PoseFile:
     (https://docs.nerf.studio/quickstart/data_conventions.html); without `w` and `h` there is none.
     """
     try:
-        data = json.loads(read_text(path))
-    except (ValueError, RecursionError) as error:
+        data = parsed(read_text(path))
+    except ValueError as error:
         raise RecipeError(f"{path}: expected JSON; found: {error}") from None
     frames = data.get("frames") if isinstance(data, dict) else None
     if not isinstance(frames, list):

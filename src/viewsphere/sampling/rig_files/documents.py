@@ -53,8 +53,9 @@ def matrix(value: Any, where: str, shape: tuple[int, int] | None = None) -> Floa
         entry = cast("dict[str, Any]", value)
         data = row(entry.get("data"), f"{where}.data")
         rows, columns = entry.get("rows"), entry.get("cols")
-        if not isinstance(rows, int) or not isinstance(columns, int) or rows * columns != len(data):
-            raise RecipeError(f"{where}: expected rows x cols numbers; found {rows} x {columns} and {len(data)} numbers")
+        if not isinstance(rows, int) or not isinstance(columns, int) or rows < 1 or rows * columns != len(data):
+            found = f"{rows!r:.40} x {columns!r:.40} and {len(data)} numbers"
+            raise RecipeError(f"{where}: expected rows x cols numbers; found {found}")
         found = np.array(data, np.float64).reshape(rows, columns)
     elif isinstance(value, list):
         lines = [row(line, where) for line in cast("list[Any]", value)]
