@@ -10,6 +10,7 @@ from targets import CAMERAS, COLMAP, FILED, OPENCV, ORBITS, PLY, ROS, SEQUENCE, 
 from sealing import seal_again
 from viewsphere.check import check
 from viewsphere.errors import ViewsphereError
+from viewsphere.formats._paper import json_bytes
 from viewsphere.run.exporting import export
 from viewsphere.run.importing import import_dataset
 from viewsphere.run.merging import merge
@@ -257,3 +258,19 @@ def test_a_model_of_another_category_is_not_merged(tmp_path):
     file.write_text(json.dumps(json.loads(file.read_text("utf-8")) | {"category_id": 77}), "utf-8")
     with pytest.raises(ViewsphereError, match="expected a category of the plan, found 77"):
         merge([root, _played()], tmp_path / "merged", mixed=True)
+
+
+def test_a_plan_that_names_shots_twice_is_told(tmp_path):
+    root = shutil.copytree(_made(True) / "store", tmp_path / "out/store").parent
+    file = root / "store/plan.json"
+    plan = unsealed(file.read_text())
+    first = plan["parts"][0]["blocks"][0]
+    plan["parts"][0]["blocks"].append({**first, "subjects": first["subjects"][:1]})
+    file.write_text(sealed(plan))
+    with pytest.raises(ViewsphereError, match="expected a plan that names each shot once"):
+        status(root)
+
+
+def test_numbers_beyond_all_floats_are_told_by_an_export():
+    with pytest.raises(ViewsphereError, match="expected finite numbers, found"):
+        json_bytes({"box": [float("inf")]})

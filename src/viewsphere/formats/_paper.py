@@ -11,14 +11,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from viewsphere.errors import StoreError
 from viewsphere.geometry.box import FACES
 from viewsphere.model.camera import Camera
 from viewsphere.store import ModelInfo
 
 
 def json_bytes(value: Any) -> bytes:
-    """Compact JSON, floats to the last digit; raises ValueError for NaN and infinity."""
-    return json.dumps(value, separators=(",", ":"), allow_nan=False).encode("ascii")
+    """Compact JSON, floats to the last digit; raises StoreError for NaN and infinity, which damaged records lead to."""
+    try:
+        return json.dumps(value, separators=(",", ":"), allow_nan=False).encode("ascii")
+    except ValueError as error:
+        raise StoreError(f"labels: expected finite numbers, found {error}: viewsphere check says which frame's") from None
 
 
 def faces(points: NDArray[np.float64]) -> dict[str, dict[str, list[float] | None]]:

@@ -191,7 +191,9 @@ class Store:
             frames = sum(index.samples - sum(map(index.samples_of, skipped)) for index in indices) - sum(left_out.values())
             if len(there) < shots:
                 rows = chain.from_iterable(index.without(skipped) for index in indices)
-                first = next(row for row in rows if row.key not in there and row.key not in left_out)
+                first = next((row for row in rows if row.key not in there and row.key not in left_out), None)
+                if first is None:
+                    raise StoreError(f"{self.plan_file}: expected a plan that names each shot once, found one with some twice")
                 lost = frames - sum(there.values())
                 yield Gap(part, is_added, first, shots - len(there), lost, frames)
 
