@@ -77,12 +77,23 @@ def test_loaders_of_a_remote_recipe_give_each_frame_once_an_epoch(url):
     assert len(given) == 12 and sorted(given) == sorted([*range(6), *range(6)])
 
 
-def test_a_copy_lies_where_its_content_says(url):
+def test_a_copy_is_what_the_url_holds_now(url):
     first = fetched(url)
-    assert fetched(url) == first and first.parent.parent == cache_of("recipes")
+    kept = first.stat().st_ino
+    assert fetched(url) == first and first.stat().st_ino == kept and first.parent.parent == cache_of("recipes")
     (located("memory://cars") / "models/t.mtl").write_bytes(b"newmtl red\nKd 0.1 0.8 0.1\n")
-    assert fetched(url) != first and first.is_file()
+    assert fetched(url) == first and "0.1 0.8" in (first.parent / "models/t.mtl").read_text()
+    first.write_text("name: spoilt here\n")
+    assert "extends" in fetched(url).read_text()
     assert not list(cache_of("recipes").glob(f"{PREFIX}*"))
+
+
+def test_a_data_set_beside_the_recipe_is_not_copied(url):
+    vs.generate(url, "memory://cars/out")
+    before = (located("memory://cars/out") / "store/plan.json").read_bytes()
+    assert not (fetched(url).parent / "out").exists()
+    assert vs.generate(url, "memory://cars/out").rendered == 0
+    assert (located("memory://cars/out") / "store/plan.json").read_bytes() == before
 
 
 def test_a_cache_that_cannot_be_written_is_told(url, monkeypatch, tmp_path):
@@ -99,7 +110,7 @@ def test_one_that_is_not_there_is_told(url):
 
 def test_a_folder_of_a_whole_store_is_refused(url, monkeypatch):
     monkeypatch.setenv("VIEWSPHERE_MAX_FETCHED_BYTES", "300")
-    with pytest.raises(RecipeError, match=r"at most 300 bytes .*MAX_FETCHED_BYTES\), found [1-9]"):
+    with pytest.raises(RecipeError, match=r"at most 300 bytes .*MAX_FETCHED_BYTES\), found more"):
         Recipe.load(url)
 
 

@@ -1,5 +1,6 @@
 """Data sets at URLs: the same bytes as on a disk, whole or absent, whatever goes wrong on the way."""
 
+import errno
 import pickle
 import shutil
 import subprocess
@@ -127,6 +128,19 @@ def test_files_are_read_in_blocks_and_ranges(url, monkeypatch):
     assert file.stat().st_size == 1000
     with here(file) as copy:
         assert copy.name == "file" and copy.read_bytes() == data
+
+
+def test_ranges_of_servers_that_have_none_or_end_before(url, monkeypatch):
+    kind, file = fsspec.get_filesystem_class("memory"), located(url) / "file"
+    file.write_bytes(bytes(range(200)))
+    monkeypatch.setattr(kind, "cat_file", lambda self, path, **_: bytes(range(200)))
+    assert byte_range(file, 7, 20) == bytes(range(7, 27))
+
+    def beyond(self, path, **_):
+        raise OSError(errno.EINVAL, "The requested range is not satisfiable")
+
+    monkeypatch.setattr(kind, "cat_file", beyond)
+    assert byte_range(file, 300, 20) == b""
 
 
 def test_a_rendered_data_set_is_the_same_at_a_url(few, url, monkeypatch):

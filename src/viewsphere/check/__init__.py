@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import multiprocessing
 from bisect import bisect_right
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
-from concurrent.futures import ProcessPoolExecutor
+from contextlib import closing
 from dataclasses import asdict, dataclass
 from functools import partial
 from itertools import accumulate
@@ -28,6 +27,7 @@ from viewsphere.labels import channel_labels, labels
 from viewsphere.model.sample import Sample
 from viewsphere.recipe.formats import FormatEntry
 from viewsphere.recipe.sequence import TimeEntry
+from viewsphere.run.in_order import in_order
 from viewsphere.run.preparing import Views
 from viewsphere.store import Dataset, ModelInfo, PlanRecord, Row
 from viewsphere.store.checksums import damaged_files, written_least, written_options
@@ -155,15 +155,21 @@ def _reports(
     """What is wrong with frames, chunk by chunk, and with the exports of these names."""
     size = max(FEWEST, -(-len(positions) // max(2 * workers, 1)))
     chunks = [positions[at : at + size] for at in range(0, len(positions), size)]
-    prove, prove_export = partial(_frame_proofs, dataset, sampled, rays), partial(_export_report, dataset, sampled)
+    prover = partial(_prover, dataset, sampled, rays)
     if workers < 2 or len(chunks) < 2:
-        yield prove(positions)
-        yield from map(prove_export, names)
+        yield from map(prover(), (positions, *names))
         return
-    with ProcessPoolExecutor(min(workers, len(chunks)), multiprocessing.get_context("spawn")) as pool:
-        exported = [pool.submit(prove_export, name) for name in names]  # each is one long task, so they begin first
-        yield from pool.map(prove, chunks)
-        yield from (future.result() for future in exported)
+    tasks = (*names, *chunks)  # each export is one long task, so they begin first
+    with closing(in_order(min(workers, len(chunks)), prover, tasks)) as made:
+        reports = [report for _, report in made]
+    yield from (*reports[len(names) :], *reports[: len(names)])
+
+
+def _prover(dataset: Dataset, sampled: range, rays: bool | None) -> Callable[[range | str], Report]:
+    """Says what is wrong with the frames at some positions, or with the export of a name."""
+    return lambda asked: (
+        _export_report(dataset, sampled, asked) if isinstance(asked, str) else _frame_proofs(dataset, sampled, rays, asked)
+    )
 
 
 def _frame_proofs(dataset: Dataset, sampled: range, rays: bool | None, positions: range) -> Report:

@@ -1,14 +1,13 @@
 """Recipes at URLs, which are copied to this machine with all that lies beside them.
 
-A copy lies in the user's cache, in a folder whose name follows from what is in it: data sets say where their models came from,
-and so the same recipe makes the same bytes, whichever process fetched it.
+A copy lies in the user's cache, in a folder whose name follows from the URL: data sets say where their models came from, and
+so the same recipe makes the same bytes, whichever process fetched it. Data sets that lie below are not copied.
 """
 
 from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
 
@@ -16,9 +15,11 @@ from viewsphere.aside import aside, sweep
 from viewsphere.caches import cache_of
 from viewsphere.errors import RecipeError
 from viewsphere.limits import limits
-from viewsphere.urls import RemotePath, download, located
+from viewsphere.urls import RemotePath, download, files_below, located
 
 PREFIX = "fetching-"
+PLAN = "store/plan.json"
+"""What every data set has."""
 
 
 def fetched(path: str | os.PathLike[str]) -> Path:
@@ -32,31 +33,50 @@ def fetched(path: str | os.PathLike[str]) -> Path:
         return file
     if not file.is_file():
         raise RecipeError(f"{file}: expected a readable recipe file, found none: correct the URL")
-    sizes, most = file.parent.sizes_below(), limits.MAX_FETCHED_BYTES
-    if sum(sizes.values()) > most:
-        raise RecipeError(
-            f"{file.parent}: expected at most {most:,} bytes in a recipe's folder (limit MAX_FETCHED_BYTES), found "
-            f"{sum(sizes.values()):,}: put the recipe and its models into a folder of their own, or set "
-            "VIEWSPHERE_MAX_FETCHED_BYTES higher"
-        )
-    try:
-        return _copied(file.parent, sizes) / file.name
-    except OSError as error:
-        raise RecipeError(f"{cache_of('recipes')}: expected to keep {file.parent} there, found {error.strerror}") from None
-
-
-def _copied(folder: RemotePath, sizes: Mapping[str, int]) -> Path:
-    """A copy of these files of a folder."""
     place = cache_of("recipes")
-    place.mkdir(parents=True, exist_ok=True)
-    sweep(place, PREFIX)
-    with aside(place, PREFIX) as own:
-        made, digest = own / "new", hashlib.sha256()
-        for inside in sizes:
-            download(folder / inside, made / inside)
-            with (made / inside).open("rb") as stream:
-                digest.update(f"{inside}\0{hashlib.file_digest(stream, 'sha256').hexdigest()}\n".encode())
-        target = place / digest.hexdigest()[:32]
-        with suppress(OSError):  # another process was faster, or an earlier one
-            made.rename(target)
-        return target
+    try:
+        place.mkdir(parents=True, exist_ok=True)
+        sweep(place, PREFIX)
+        with aside(place, PREFIX) as own:
+            _download(file.parent, own / "new")
+            target = place / hashlib.sha256(str(file.parent).encode()).hexdigest()[:32]
+            _replace(target, own)
+    except FileNotFoundError as error:
+        raise RecipeError(f"{file.parent}: expected files that stay while they are copied, found one gone: {error}") from None
+    except OSError as error:
+        raise RecipeError(f"{place}: expected to keep {file.parent} there, found {error.strerror or error}") from None
+    return target / file.name
+
+
+def _download(folder: RemotePath, copy: Path) -> None:
+    """Copy all files of a folder and below, but for data sets."""
+    files = folder.files_below()
+    made = tuple(file.removesuffix(PLAN) or "store/" for file in files if f"/{file}".endswith(f"/{PLAN}"))
+    size, most = 0, limits.MAX_FETCHED_BYTES
+    for file in files:
+        if not file.startswith(made):
+            download(folder / file, copy / file)
+            size += (copy / file).stat().st_size
+        if size > most:
+            raise RecipeError(
+                f"{folder}: expected at most {most:,} bytes in a recipe's folder (limit MAX_FETCHED_BYTES), found more: put "
+                "the recipe and its models into a folder of their own, or set VIEWSPHERE_MAX_FETCHED_BYTES higher"
+            )
+
+
+def _replace(target: Path, own: Path) -> None:
+    """Put what was copied aside in its place, unless the same is there: another process may be reading that."""
+    if target.is_dir() and _digests(target) == _digests(own / "new"):
+        return
+    with suppress(FileNotFoundError):
+        target.rename(own / "old")
+    with suppress(OSError):  # another process was faster
+        (own / "new").rename(target)
+
+
+def _digests(folder: Path) -> dict[str, str]:
+    found: dict[str, str] = {}
+    for inside in files_below(folder):
+        with (folder / inside).open("rb") as stream:
+            found[inside] = hashlib.file_digest(stream, "sha256").hexdigest()
+    return found

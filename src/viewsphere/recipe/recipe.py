@@ -57,6 +57,7 @@ LATER_FIELDS: dict[tuple[str, ...], Any] = {
     ("scene", "company", "orientation"): "upright",
     ("scenes", "orientation"): "upright",
     ("scenes", "balance"): "models",
+    ("files", "shots"): "files",
 }
 """Likewise fields of their parts, with the defaults that are left out."""
 
