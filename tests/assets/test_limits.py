@@ -28,6 +28,8 @@ TESTED = {
     "MAX_RIG_BYTES": "test_rig_files",
     "MAX_REPAIRED_SHOTS": "test_endless_plans",
     "MAX_REMOTE_TRIES": "test_places",
+    "MAX_FETCHED_BYTES": "test_fetched",
+    "MAX_MODELS": "test_models",
     **dict.fromkeys(
         (
             "MAX_FILE_BYTES", "MAX_FILES", "MAX_TRIANGLES", "MAX_VERTICES", "MAX_PICTURE_PIXELS",

@@ -37,6 +37,12 @@ def entry(source, **fields):
     return {"source": source, "category": "car", **fields}
 
 
+def test_models_without_end_are_refused(build, monkeypatch):
+    monkeypatch.setenv("VIEWSPHERE_MAX_MODELS", "3")
+    assert len(keys(build([entry("zoo:car", count=3)]))) == 3
+    assert "models[0].count: expected at most 3 (limit MAX_MODELS); found 4" in error(build([entry("zoo:car", count=4)]))
+
+
 def test_patterns_and_folders_are_sorted_and_hold_models_only(build, tmp_path):
     files = ["m/b.obj", "m/a.GLB", "m/b.mtl", "m/tex.png", "m/sub/c.stl", "m/.hidden/d.obj", "m/__MACOSX/e.obj"]
     assert keys(build([entry("m/*")], files)) == ["a", "b"]

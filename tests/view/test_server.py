@@ -8,7 +8,7 @@ from contextlib import suppress
 
 import pytest
 
-from deadline import DEADLINE
+from deadline import DEADLINE, until
 from viewsphere.errors import UserError
 from viewsphere.view import Address, Live, Server
 
@@ -195,8 +195,11 @@ def test_the_folder_of_a_shot_may_not_lead_out(serve, small_dataset, tmp_path):
     folder.symlink_to(tmp_path / "outside")
     server = serve(small_dataset.root)
     assert get(server, f"/picture?frame={first}&layer=rgb")[0] == 422
-    row = next(row for row in json.loads(get(server, "/rows?first=0&count=12")[2])["rows"] if row["index"] == first)
-    assert "link" in row["problem"]
+
+    def problems():
+        return [row["problem"] for row in json.loads(get(server, "/rows?first=0&count=12")[2])["rows"] if row["index"] == first]
+
+    assert until(problems) and "link" in problems()[0]
 
 
 def test_a_model_may_not_lead_out(serve, small_dataset, tmp_path):

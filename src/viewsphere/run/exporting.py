@@ -93,8 +93,9 @@ def write(dataset: Dataset, formats: Entries, tell: Listener = unheard, workers:
     notes: list[str] = []
     total, least = len(dataset), dataset.plan.keep_annotations_above
     with ExitStack() as stack:
-        adds = {t.entry.name: stack.enter_context(t.writer(notes.append)) for t in targets(dataset, formats)}
-        made = stack.enter_context(closing(prepared(dataset, formats, workers)))
+        found = targets(dataset, formats)
+        adds = {target.entry.name: stack.enter_context(target.writer(notes.append)) for target in found}
+        made = stack.enter_context(closing(prepared(dataset, found, workers)))
         for done, parts in enumerate(made):
             tell(Progress("exports", done, total))
             for name, add in adds.items():

@@ -105,12 +105,12 @@ def targets(dataset: Dataset, formats: Entries) -> tuple[Target, ...]:
     return tuple(Target(entry, folder, module, views.of(module, least)) for entry, folder, module in modules)
 
 
-def prepared(dataset: Dataset, formats: Entries, workers: int = 0) -> Generator[dict[str, Any]]:
+def prepared(dataset: Dataset, found: Sequence[Target], workers: int = 0) -> Generator[dict[str, Any]]:
     """For each sample in frame order what each format, by its name, adds of it. Where this takes long, so many processes do
     what can be done of a sample anywhere; what comes out is the same.
     """
-    alone = _Preparation(dataset, formats)
-    shared = [(entry, folder) for entry, folder in formats if entry.name in alone.prepared]
+    alone, own = _Preparation(dataset, found), _Preparation(dataset, [one for one in found if not one.prepares])
+    shared = [(one.entry, one.folder) for one in found if one.prepares]
     workers = workers if shared and dataset.store.place.is_shared() else 0
     begun, lots, done, total = time.monotonic(), _lots(dataset.shots()), 0, len(dataset)
     for lot in lots:
@@ -119,8 +119,7 @@ def prepared(dataset: Dataset, formats: Entries, workers: int = 0) -> Generator[
         spent = time.monotonic() - begun
         if workers > 1 and spent >= PATIENCE_S and spent * (total - done) / done >= WORTH_S:
             break
-    own = _Preparation(dataset, [(entry, folder) for entry, folder in formats if entry.name not in alone.prepared])
-    with closing(in_order(workers, partial(_Preparation, dataset, shared), lots)) as made:
+    with closing(in_order(workers, partial(_preparation, dataset, shared), lots)) as made:
         for lot, (parts, kinds) in made:
             dataset.link_kinds |= kinds
             samples = _samples(dataset, lot) if own.preparers else repeat(None)
@@ -130,9 +129,7 @@ def prepared(dataset: Dataset, formats: Entries, workers: int = 0) -> Generator[
 class _Preparation:
     """Prepares samples for formats."""
 
-    def __init__(self, dataset: Dataset, formats: Entries) -> None:
-        found = targets(dataset, formats)
-        self.prepared = {target.entry.name for target in found if target.prepares}
+    def __init__(self, dataset: Dataset, found: Sequence[Target]) -> None:
         self.preparers = {target.entry.name: target.preparer() for target in found}
         self._dataset = dataset
 
@@ -143,6 +140,10 @@ class _Preparation:
     def __call__(self, lot: Lot) -> tuple[list[dict[str, Any]], set[str]]:
         """What each format adds of each sample of a lot; and how files were linked so far."""
         return [self.of(sample) for sample in _samples(self._dataset, lot)], self._dataset.link_kinds
+
+
+def _preparation(dataset: Dataset, formats: Entries) -> _Preparation:
+    return _Preparation(dataset, targets(dataset, formats))
 
 
 def _samples(dataset: Dataset, lot: Lot) -> Iterator[Sample]:

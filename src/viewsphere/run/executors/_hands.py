@@ -9,7 +9,8 @@ from collections.abc import Callable, Generator
 from contextlib import contextmanager, suppress
 from multiprocessing import get_context, parent_process, resource_tracker
 from multiprocessing.connection import wait
-from threading import Thread
+from threading import Thread, current_thread, main_thread
+from types import FrameType
 from typing import Any
 
 OUT_OF_MEMORY = 77
@@ -65,9 +66,32 @@ def deaf() -> Generator[None]:
     resource_tracker.ensure_running()  # the start of the tracker would unblock the signal again
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
-        yield
+        with _later():
+            yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+@contextmanager
+def _later() -> Generator[None]:
+    """What this process does at Ctrl-C and SIGTERM waits until the block ends: masks keep signals from one thread, and others
+    may get them.
+    """
+    does = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    heard: list[tuple[Callable[..., Any], int, FrameType | None]] = []
+    if current_thread() is main_thread():  # handlers are its alone, and run in it
+        for number, do in does.items():
+            if callable(do):
+                signal.signal(number, lambda *told, do=do: heard.append((do, *told)))
+    try:
+        yield
+    finally:
+        if current_thread() is main_thread():
+            for number, do in does.items():
+                if callable(do):
+                    signal.signal(number, do)
+    for do, *told in heard[:1]:
+        do(*told)
 
 
 def belong_to_parent() -> None:
