@@ -7,6 +7,7 @@ import signal
 import sys
 from collections.abc import Callable, Generator
 from contextlib import contextmanager, suppress
+from functools import partial
 from multiprocessing import get_context, parent_process, resource_tracker
 from multiprocessing.connection import wait
 from threading import Thread, current_thread, main_thread
@@ -78,11 +79,15 @@ def _later() -> Generator[None]:
     may get them.
     """
     does = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
-    heard: list[tuple[Callable[..., Any], int, FrameType | None]] = []
+    heard: list[Callable[[], Any]] = []
+
+    def note(do: Callable[..., Any], number: int, frame: FrameType | None) -> None:
+        heard.append(partial(do, number, frame))
+
     if current_thread() is main_thread():  # handlers are its alone, and run in it
         for number, do in does.items():
             if callable(do):
-                signal.signal(number, lambda *told, do=do: heard.append((do, *told)))
+                signal.signal(number, partial(note, do))
     try:
         yield
     finally:
@@ -90,8 +95,8 @@ def _later() -> Generator[None]:
             for number, do in does.items():
                 if callable(do):
                     signal.signal(number, do)
-    for do, *told in heard[:1]:
-        do(*told)
+    for do in heard[:1]:
+        do()
 
 
 def belong_to_parent() -> None:
