@@ -29,7 +29,7 @@ from viewsphere.assets.mesh import Mesh
 from viewsphere.engines import Engine, Stage
 from viewsphere.engines.raster import painting, staging
 from viewsphere.geometry.box import box_vertices
-from viewsphere.labels import annotate, observe
+from viewsphere.labels import annotated, observe, sight_of
 from viewsphere.model.camera import Camera
 from viewsphere.model.sample import Sample
 from viewsphere.model.shot import Shot
@@ -203,7 +203,8 @@ def one_frame(clock: Clock, shot: Shot, instant: int, stage: Stage, mesh: Mesh) 
     names = ["depth", "instances", "normals"]
     observed = clock("truth: channels", lambda: observe(geometry, camera, visibility, names))
     observed["rgb"] = clock("colour", lambda: stage.color(instant, 0, visibility, False))
-    objects = clock("annotations", lambda: annotate(shot, instant, camera, geometry, visibility, boxes, ["model.obj"]))
+    known = (shot, instant, camera, geometry, visibility, boxes, ["model.obj"])
+    objects = clock("annotations", lambda: annotated(sight_of(*known)))
     return Sample(now.index, "train", camera, now.viewpoint, objects, observed, {})
 
 

@@ -24,7 +24,7 @@ from viewsphere.blender.interpreter import find_blender
 from viewsphere.engines import Engine
 from viewsphere.engines._blender.staging import CyclesStage
 from viewsphere.geometry.box import box_vertices
-from viewsphere.labels import annotate, observe
+from viewsphere.labels import annotated, observe, sight_of
 from viewsphere.model.shot import Shot
 from viewsphere.run.stages import Stages
 from viewsphere.surroundings.sky import sky_pictures
@@ -108,7 +108,7 @@ def ours(shot: Shot, stages: Stages, pictures: Path | None = None) -> Costs:
         geometry = stage.at(instant)
         visibility = rasterize(geometry, camera)
         observe(geometry, camera, visibility, LABELS)
-        annotate(shot, instant, camera, geometry, visibility, boxes, ["model.obj"])
+        annotated(sight_of(shot, instant, camera, geometry, visibility, boxes, ["model.obj"]))
         labels.append(time.process_time() - before)
         before = spent()
         picture = stage.color(instant, sensor, visibility, False)

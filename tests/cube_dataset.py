@@ -9,7 +9,7 @@ from viewsphere.assets.export import export_glb, export_obj
 from viewsphere.assets.mesh import Mesh
 from viewsphere.geometry.box import FACES, box_vertices
 from viewsphere.geometry.pose_category import pose_category
-from viewsphere.labels import annotate, observe
+from viewsphere.labels import annotated, observe, sight_of
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.channel import PASSES
 from viewsphere.model.files import Files
@@ -79,7 +79,7 @@ def render(shot: Shot):
         alpha = np.where(channels["instances"] > 0, 255, 0).astype(np.uint8)
         channels |= {"rgb": colors, "rgba": np.dstack([colors, alpha])}
         channels = {name: channels[name] for name in shot.channels}
-        objects = annotate(shot, instant, camera, geometry, visibility, boxes, files)
+        objects = annotated(sight_of(shot, instant, camera, geometry, visibility, boxes, files))
         yield Sample(number, now.split, camera, now.viewpoint, objects, channels, {}, instant=now.index)
 
 

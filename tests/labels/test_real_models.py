@@ -11,7 +11,7 @@ from viewsphere.assets.cache import load_normalised
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.instant import Viewpoint
 from viewsphere.model.model_spec import ModelSpec
-from viewsphere.truth.visibility import silhouette
+from viewsphere.truth.visibility import rasterize
 
 MODELS = Path(__file__).parents[2].parent / "shared" / "models"
 NAMES = ("car/NormalCar1.obj", "bicycle/Bicycle.obj", "chair/deck_chair.glb", "boat/Boat.obj")
@@ -34,7 +34,7 @@ def test_labels_of_a_real_model(name, distance, cache):
     for azimuth, elevation in ((35, 20), (200, -10), (0, 90)):
         pose = Viewpoint(index=0, azimuth_deg=azimuth, elevation_deg=elevation, distance=distance)
         (o,), camera, geometry, *_ = scene([mesh], [STILL], pose, LENS, ground=elevation > 0)
-        large = silhouette(geometry, camera, 1, (-320, -240, 640, 480))
+        large = rasterize(geometry, camera, object_id=1, window=(-320, -240, 640, 480)).triangle >= 0
         assert o.visibility == o.area / large.sum()
         assert o.truncation == pytest.approx(1 - large[240:480, 320:640].sum() / large.sum(), abs=1e-15)
         again = coco.decode(coco.merge(coco.frPyObjects(o.polygons, 240, 320)))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Container, Iterator, Mapping
 from functools import lru_cache
 from typing import Any
 
@@ -13,7 +13,7 @@ from viewsphere.assets.exported import read_exported
 from viewsphere.assets.mesh import Mesh
 from viewsphere.check.scenery import Scenery
 from viewsphere.errors import ViewsphereError
-from viewsphere.labels import Placement, Sight, annotated, channel_labels, object_labels
+from viewsphere.labels import Placement, Sight, annotated, channel_labels, labels, labels_of, sample_labels, sample_values
 from viewsphere.model.model_spec import ModelSpec, step_key
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.model.scene import Matrix4
@@ -58,12 +58,14 @@ class Again:
         camera, by_id = sample.camera, {o.id: o for o in sample.objects}
         placed = tuple(self._placement(by_id.get(i + 1), sample, shot) for i in range(geometry.object_count))
         visibility = rasterize(geometry, camera, keeps_exact=True)
-        sight = Sight(geometry, camera, visibility, placed, self._compared(sample, shot, key))
+        sight = Sight(geometry, camera, visibility, placed, self._compared(sample, shot, key), shot.annotations)
         for name, label in channel_labels().items():
             if name in sample.files:
                 yield from ((name, problem) for problem in self._pixels(sample, name, label.compute(sight)))
-        for o, again in zip(sample.objects, annotated(sight), strict=True):
-            yield from _fields(o, again)
+        objects = annotated(sight)
+        for o, again in zip(sample.objects, objects, strict=True):
+            yield from _fields(o, again, shot.annotations)
+        yield from _of_picture(sample.more, sample_values(sight, objects))
 
     def _pixels(self, sample: Sample, name: str, again: NDArray[Any]) -> Iterator[str]:
         """Where a channel is not what it should be; what cannot be read, or has another size, is said elsewhere."""
@@ -115,8 +117,8 @@ class Again:
 
         Points are picked here, before any label asks for triangles, which would be written over.
         """
-        known = channel_labels()
-        needs = [known[name].needs for name in sample.files if name in known]
+        known = labels()
+        needs = [known[name].needs for name in (*sample.files, *shot.annotations) if name in known]
         if not any(need.is_some for need in needs):
             return None
         if self._views[0] != key:
@@ -196,8 +198,16 @@ def _beyond(kept: NDArray[Any], again: NDArray[Any], step: float) -> NDArray[np.
     return np.where(seen, kept != (rounded * step).astype(np.float32), np.isfinite(kept))
 
 
-def _fields(o: ObjectAnnotation, again: ObjectAnnotation) -> Findings:
-    for label in object_labels():
+def _of_picture(kept: Mapping[str, Any], again: Mapping[str, Any]) -> Findings:
+    for label in sample_labels().values():
+        for field in label.fields:
+            if field.name in again and not field.equals(kept[field.name], again[field.name]):
+                expected, found = again[field.name], kept[field.name]
+                yield label.name, f"expected {field.name} {expected!r} of the exported models, found {found!r}"
+
+
+def _fields(o: ObjectAnnotation, again: ObjectAnnotation, asked: Container[str]) -> Findings:
+    for label in labels_of(asked):
         for known in label.fields:
             kept, computed = getattr(o, known.name), getattr(again, known.name)
             if not known.equals(kept, computed):

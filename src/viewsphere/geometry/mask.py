@@ -78,23 +78,21 @@ def _code(height: int, width: int, counts: str) -> Any:
     return {"size": [height, width], "counts": code}
 
 
-def rle_of_id(ids: NDArray[np.int32], wanted: int, box: tuple[int, int, int, int]) -> str:
-    """`encode_rle(ids == wanted)`, reading only the half-open box (x0, y0, x1, y1), in which all such pixels must lie."""
+def rle_of_part(height: int, width: int, part: Mask, x0: int, y0: int) -> str:
+    """`encode_rle` of a (height, width) mask whose pixels all lie in a part of it (h, w), which begins at column x0, row y0."""
     from pycocotools import mask as coco
 
-    height, width = ids.shape
-    runs = np.diff(_ends(ids, wanted, box), prepend=0, append=height * width)
+    runs = np.diff(_ends(height, width, part, x0, y0), prepend=0, append=height * width)
     code: Any = coco.frPyObjects({"size": [height, width], "counts": runs.tolist()}, height, width)
     return code["counts"].decode("ascii")
 
 
-def _ends(ids: NDArray[np.int32], wanted: int, box: tuple[int, int, int, int]) -> NDArray[np.intp]:
-    """Indices in column-major order at which `ids == wanted` begins and ends to hold; all such pixels lie in the box."""
-    height, width = ids.shape
-    x0, y0, x1, y1 = box
-    rows = y1 - y0 if (y0, y1) == (0, height) else y1 - y0 + 1  # a gap between columns unless they touch
-    inside = np.zeros((x1 - x0, rows), np.bool_)
-    inside[:, : y1 - y0] = (ids[y0:y1, x0:x1] == wanted).T
+def _ends(height: int, width: int, part: Mask, x0: int, y0: int) -> NDArray[np.intp]:
+    """Indices in column-major order at which the mask begins and ends to hold."""
+    own, columns = part.shape
+    rows = own if own == height else own + 1  # a gap between columns unless they touch
+    inside = np.zeros((columns, rows), np.bool_)
+    inside[:, :own] = part.T
     x, y = np.divmod(np.flatnonzero(np.diff(inside.ravel(), prepend=False, append=False)), max(rows, 1))
     ends = (x0 + x) * height + y0 + y
     return ends[ends < height * width]

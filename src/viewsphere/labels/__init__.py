@@ -1,12 +1,13 @@
 """Labels: everything computed about a picture from truth's triangles; each label is one file, which defines `LABEL`.
 
-`ChannelLabel`s are arrays of pixels, computed if a recipe's `channels` name them; `ObjectLabel`s are fields of objects, and
-always computed. Third parties add a label by an entry point of the group `viewsphere.labels` that names such a module.
+`ChannelLabel`s are arrays of pixels, computed if a recipe's `channels` name them. `ObjectLabel`s are fields of objects,
+`SampleLabel`s of whole pictures; those that are on request are computed if a recipe's `annotations` name them. Third parties
+add a label by an entry point of the group `viewsphere.labels` that names such a module.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -15,9 +16,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere import plugins
-from viewsphere.labels._label import TAIL, ChannelLabel, Color, Drawing, Extent, Field, Label, ModelFacts, Needs, ObjectLabel
+from viewsphere.labels._field import Field
+from viewsphere.labels._label import (
+    TAIL,
+    ChannelLabel,
+    Color,
+    Drawing,
+    Extent,
+    Label,
+    ModelFacts,
+    Needs,
+    ObjectLabel,
+    SampleLabel,
+)
 from viewsphere.labels._placement import Placement
-from viewsphere.labels._record import annotation_of, finite, from_short_record, from_whole_record, short_record, whole_record
+from viewsphere.labels._record import Makers, computed, finite, from_short_record, from_whole_record, short_record, whole_record
 from viewsphere.labels._sight import Around, Sight
 from viewsphere.model.camera import Camera
 from viewsphere.model.channel import DEFAULT_CHANNELS, PASSES, Channel
@@ -36,13 +49,15 @@ __all__ = [
     "Extent",
     "Field",
     "Label",
+    "Makers",
     "ModelFacts",
     "Needs",
     "ObjectLabel",
     "Placement",
+    "SampleLabel",
     "Sight",
-    "annotate",
     "annotated",
+    "annotations",
     "channel_labels",
     "channels",
     "drawings",
@@ -50,9 +65,14 @@ __all__ = [
     "from_short_record",
     "from_whole_record",
     "labels",
+    "labels_of",
+    "makers",
     "object_labels",
     "observe",
+    "sample_labels",
+    "sample_values",
     "short_record",
+    "sight_of",
     "whole_record",
 ]
 
@@ -76,8 +96,37 @@ def channel_labels() -> dict[str, ChannelLabel]:
 
 @cache
 def object_labels() -> tuple[ObjectLabel, ...]:
-    """Labels of objects."""
+    """Labels of objects, those on request among them."""
     return tuple(label for label in labels().values() if isinstance(label, ObjectLabel))
+
+
+def labels_of(asked: Container[str]) -> tuple[ObjectLabel, ...]:
+    """The labels of objects that data sets have where these were asked for."""
+    return tuple(label for label in object_labels() if not label.on_request or label.name in asked)
+
+
+@cache
+def sample_labels() -> dict[str, SampleLabel]:
+    """Labels of whole pictures by name."""
+    return {name: label for name, label in labels().items() if isinstance(label, SampleLabel)}
+
+
+@cache
+def annotations() -> dict[str, ObjectLabel | SampleLabel]:
+    """All labels that a recipe's `annotations` may name."""
+    return {label.name: label for label in object_labels() if label.on_request} | sample_labels()
+
+
+@cache
+def makers() -> dict[str, ObjectLabel]:
+    """Labels of objects by the names of their fields."""
+    return {field.name: label for label in object_labels() for field in label.fields}
+
+
+@cache
+def _following() -> dict[str, ObjectLabel]:
+    """Labels on request that are there whether they were asked for or not, by the names of their fields."""
+    return {name: label for name, label in makers().items() if label.on_request and label.follows}
 
 
 @cache
@@ -107,7 +156,7 @@ def observe(
     return {name: known[name].compute(sight) for name in names}
 
 
-def annotate(
+def sight_of(
     shot: Shot,
     instant: int,
     camera: Camera,
@@ -116,18 +165,18 @@ def annotate(
     boxes: Sequence[NDArray[np.float64]],
     models: Sequence[str],
     real_sizes: Sequence[Size | None] | None = None,
-) -> tuple[ObjectAnnotation, ...]:
-    """Annotations of all objects (things with an id) present at an instant (counted from 0 in the shot), visible or not, in the
-    order of their ids.
+    around: Around | None = None,
+) -> Sight:
+    """What a camera sees of a shot at an instant (counted from 0 there), with the places of its objects.
 
     `boxes[i]` is the 3D box (8, 3) of object i + 1's model then in the object's axes, `models[i]` the path of that model in the
     data set and `real_sizes[i]` its true size (by default the one its spec gives in numbers); `geometry` is the shot's stage
-    and `visibility` what this camera sees of it. An object that covers no pixel has an empty mask, no `box2d` and visibility 0.
+    and `visibility` what this camera sees of it.
     """
     objects = shot.objects
     if not len(objects) == len(boxes) == len(models) == geometry.object_count:
         raise ValueError(
-            f"annotate: shot {shot.key}: expected {geometry.object_count} objects, boxes and models, "
+            f"sight_of: shot {shot.key}: expected {geometry.object_count} objects, boxes and models, "
             f"got {len(objects)}, {len(boxes)}, {len(models)}"
         )
     sizes = real_sizes or [None if isinstance(thing.model.real_size, str) else thing.model.real_size for thing in objects]
@@ -135,12 +184,12 @@ def annotate(
         Rendered(model, box, size, thing.model.category, thing.model.category_id, _track(thing, instant))
         for thing, box, model, size in zip(objects, boxes, models, sizes, strict=True)
     ]
-    placed = tuple(
+    places = tuple(
         None if pose is None else Placement(thing.model, pose, camera, shot.category_deg, lambda known=known: known, step)
         for thing, known in zip(objects, facts, strict=True)
         for pose, step in ((thing.motion.at(instant), thing.motion.step_at(instant)),)
     )
-    return annotated(Sight(geometry, camera, visibility, placed))
+    return Sight(geometry, camera, visibility, places, around, shot.annotations)
 
 
 def _track(thing: Thing, instant: int) -> str:
@@ -149,11 +198,28 @@ def _track(thing: Thing, instant: int) -> str:
 
 
 def annotated(sight: Sight) -> tuple[ObjectAnnotation, ...]:
-    """Annotations of the objects that are placed in a sight."""
-    known = object_labels()
-    return tuple(
-        annotation_of(i + 1, [label.compute(sight, i) for label in known]) for i, place in enumerate(sight.placements) if place
-    )
+    """Annotations of the objects that are placed in a sight, visible or not, in the order of their ids. An object that covers
+    no pixel has an empty mask, no `box2d` and visibility 0.
+    """
+    known = labels_of(sight.asked)
+    return tuple(_annotated(sight, i, place, known) for i, place in enumerate(sight.placements) if place)
+
+
+def _annotated(sight: Sight, i: int, place: Placement, known: Sequence[ObjectLabel]) -> ObjectAnnotation:
+    found = computed(i + 1, [label.compute(sight, i) for label in known if label.compute], place, _following())
+    for label in known:
+        if label.compute is None:
+            found.more.update(label.restore(None, place, found))
+    return found
+
+
+def sample_values(sight: Sight, objects: Sequence[ObjectAnnotation]) -> Mapping[str, Any]:
+    """The fields of the labels of whole pictures that were asked for; `objects` are `annotated(sight)`."""
+    found: dict[str, Any] = {}
+    for name, label in sample_labels().items():
+        if name in sight.asked:
+            found |= label.compute(sight, objects)
+    return found
 
 
 @dataclass(frozen=True, eq=False)

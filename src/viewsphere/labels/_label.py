@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -11,9 +10,11 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from viewsphere.errors import ViewsphereError
+from viewsphere.labels._field import Field
 from viewsphere.labels._placement import ModelFacts, Placement
 from viewsphere.labels._sight import Sight
 from viewsphere.model.channel import Channel
+from viewsphere.model.frozen import Frozen
 from viewsphere.model.sample import ObjectAnnotation, Sample
 
 if TYPE_CHECKING:
@@ -122,95 +123,6 @@ class ChannelLabel(Label):
         return Channel(self.name, self.dtype, self.components, self.unit, self.empty, self.encoding, self.meaning)
 
 
-@dataclass(frozen=True)
-class Field:
-    """One field of an object: a number, a text or a plain dataclass of these (`shape` is empty), a tuple of numbers, or an
-    array. `optional`: None says that the object has no such value.
-    """
-
-    name: str
-    meaning: str
-    type: Any
-    shape: tuple[int, ...] = ()
-    unit: str = ""
-    axes: str = ""
-    is_array: bool = False
-    optional: bool = False
-
-    def plain(self, value: Any) -> Any:
-        """The value as plain JSON data; NaN becomes null."""
-        if hasattr(value, "__dataclass_fields__"):
-            return {name: _without_nan(part) for name, part in value.__dict__.items()}
-        if isinstance(value, np.ndarray):
-            return _without_nan(value.tolist())
-        return _without_nan(list(value) if isinstance(value, tuple) else value)
-
-    def value(self, plain: Any) -> Any:
-        """The value that `plain` was made of, to the last bit."""
-        if self.is_array:
-            value = np.array(plain, self.type)
-        elif plain is None:
-            value = None if self.optional else math.nan
-        elif self.shape:
-            value = tuple(map(_number, plain))
-        elif hasattr(self.type, "__dataclass_fields__"):
-            value = self.type(**{name: _number(part) for name, part in plain.items()})
-        else:
-            value = plain
-        self.check(value)
-        return value
-
-    def check(self, value: Any) -> None:
-        """Raise ValueError for a value that the field cannot have; NaN stands for numbers that are not known."""
-        if value is None and self.optional:
-            return
-        if isinstance(value, np.ndarray):
-            is_right = value.shape == self.shape and not np.isinf(value).any()
-        elif self.shape:
-            is_right = isinstance(value, tuple) and len(value) == self.shape[0] and all(map(_is_number, value))
-        elif isinstance(value, str):
-            is_right = self.type is str
-        elif hasattr(self.type, "__dataclass_fields__"):
-            types = {name: str(field.type) for name, field in self.type.__dataclass_fields__.items()}
-            is_right = all(
-                isinstance(getattr(value, n), str) if t == "str" else _is_number(getattr(value, n)) for n, t in types.items()
-            )
-        else:
-            is_right = self.type in {int, float} and _is_number(value)
-        if not is_right:
-            raise ValueError(f"{self.name}: expected {self.type.__name__} {self.shape or ''}, found {value!r:.60}")
-
-    def equals(self, one: Any, other: Any) -> bool:
-        """Whether two values are the same number for number; NaN equals itself."""
-        return np.array_equal(one, other, equal_nan=True) if self.is_array and self.type is not bool else _plainly(one, other)
-
-
-def _number(value: Any) -> Any:
-    return math.nan if value is None else value
-
-
-def _is_number(value: Any) -> bool:
-    return (
-        isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool) and not abs(value) > _GREATEST
-    )
-
-
-_GREATEST = 1e300
-"""A number above it is a mistake."""
-
-
-def _without_nan(value: Any) -> Any:
-    if isinstance(value, list):
-        return [_without_nan(v) for v in value]
-    return None if isinstance(value, float) and math.isnan(value) else value
-
-
-def _plainly(one: Any, other: Any) -> bool:
-    if isinstance(one, np.ndarray):
-        return np.array_equal(one, other)
-    return bool(one == other)
-
-
 def nothing(annotation: ObjectAnnotation) -> None:
     """The `keep` of labels that follow from the shot and its models: nothing is stored."""
     return
@@ -220,15 +132,25 @@ def nothing(annotation: ObjectAnnotation) -> None:
 class ObjectLabel(Label):
     """A label of objects: one field or several that are computed together.
 
-    `compute(sight, i)` gives the fields of the object of id i + 1. `keep` gives, as JSON, the part of them that does not follow
-    from the shot and its models, None if everything follows. `restore(kept, placement, annotation)` computes all fields from
-    this part again, equal to the last bit; other labels' fields are available as attributes of the annotation.
+    `compute(sight, i)` gives the fields of the object of id i + 1; without it `restore` does. `keep` gives, as JSON, the part
+    of them that does not follow from the shot and its models, None if everything follows. `restore(kept, placement,
+    annotation)` computes all fields from this part again, equal to the last bit; other labels' fields are available as
+    attributes of the annotation.
+
+    A label that is `on_request` is computed only where a recipe's `annotations` name it, with the options that `options` reads.
     """
 
     fields: tuple[Field, ...]
-    compute: Callable[[Sight, int], Mapping[str, Any]]
+    compute: Callable[[Sight, int], Mapping[str, Any]] | None = None
     restore: Callable[[Any, Placement, ObjectAnnotation], Mapping[str, Any]]
     keep: Callable[[ObjectAnnotation], Any] = nothing
+    on_request: bool = False
+    options: type[Frozen] | None = None
+
+    @property
+    def follows(self) -> bool:
+        """Whether it follows from what every data set has: it is there whether it was asked for or not."""
+        return self.keep is nothing and self.options is None and not self.needs.is_some
 
     @staticmethod
     def derived(
@@ -240,6 +162,7 @@ class ObjectLabel(Label):
         prove: Proof = trusted,
         axes: str = "",
         drawing: Drawing | None = None,
+        on_request: bool = False,
     ) -> ObjectLabel:
         """A label computed from the poses of object and camera and from the model alone: nothing of it is stored."""
         return ObjectLabel(
@@ -251,7 +174,20 @@ class ObjectLabel(Label):
             restore=lambda kept, placement, o: of(placement),
             prove=prove,
             drawing=drawing,
+            on_request=on_request,
         )
+
+
+@dataclass(frozen=True, kw_only=True)
+class SampleLabel(Label):
+    """A label of a whole picture, computed where a recipe's `annotations` name it, with the options that `options` reads.
+
+    `compute(sight, objects)` gives its fields. The store keeps them as they are.
+    """
+
+    fields: tuple[Field, ...]
+    compute: Callable[[Sight, Sequence[ObjectAnnotation]], Mapping[str, Any]]
+    options: type[Frozen] | None = None
 
 
 def rendered(sample: Sample) -> list[ObjectAnnotation]:

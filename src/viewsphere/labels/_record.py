@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import fields
+from collections.abc import Container, Iterable, Mapping, Sequence
+from dataclasses import dataclass, fields
 from typing import Any
 
 from viewsphere.errors import StoreError
-from viewsphere.labels._label import Field, ObjectLabel, nothing
+from viewsphere.labels._field import Field
+from viewsphere.labels._label import ObjectLabel, nothing
 from viewsphere.labels._placement import Placement
 from viewsphere.model.sample import ObjectAnnotation
 
@@ -24,6 +25,35 @@ def annotation_of(object_id: int, values: Iterable[Mapping[str, Any]], source: M
         return ObjectAnnotation(id=object_id, source=source, **own)
     more = {name: own.pop(name) for name in own.keys() - _OWN}
     return ObjectAnnotation(id=object_id, source=source, more=more, **own)
+
+
+def computed(
+    object_id: int, values: Iterable[Mapping[str, Any]], placement: Placement, makers: Mapping[str, ObjectLabel]
+) -> ObjectAnnotation:
+    """The annotation with these fields. Those of `makers`, labels by the names of their fields, are computed when they are
+    first asked for.
+    """
+    made: ObjectAnnotation = annotation_of(object_id, values)
+    object.__setattr__(made, "more", _More(made, placement, makers))
+    return made
+
+
+class _More(dict[str, Any]):
+    """Fields of an annotation, and those that follow from them and are computed when they are first asked for."""
+
+    def __init__(self, o: ObjectAnnotation, placement: Placement, makers: Mapping[str, ObjectLabel]) -> None:
+        super().__init__(o.more)
+        self._of, self._known = (o, placement, makers), dict[str, Any]()
+
+    def __missing__(self, name: str) -> Any:
+        o, placement, makers = self._of
+        if name not in self._known:
+            self._known.update(makers[name].restore(None, placement, o))
+        return self._known[name]
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Other processes get what was computed, without the shot that it follows from."""
+        return dict, (dict(self),)
 
 
 def whole_record(o: ObjectAnnotation, labels: Sequence[ObjectLabel]) -> dict[str, Any]:
@@ -52,20 +82,37 @@ def _fields(labels: Sequence[ObjectLabel]) -> Iterable[Field]:
     return (field for label in labels for field in label.fields)
 
 
-def short_record(o: ObjectAnnotation, labels: Sequence[ObjectLabel]) -> dict[str, Any]:
+def short_record(o: ObjectAnnotation, labels: Iterable[ObjectLabel]) -> dict[str, Any]:
     """The parts of a rendered object that labels keep, by the labels' names."""
     kept = {label.name: label.keep(o) for label in labels}
     return {"id": o.id, **{name: value for name, value in kept.items() if value is not None}}
 
 
-def from_short_record(
-    record: Mapping[str, Any], placement: Placement, makers: Mapping[str, ObjectLabel], where: str
-) -> ObjectAnnotation:
-    """The object that a short record was made of; a field is restored when it is first asked for. `makers` are the
-    labels by the names of their fields; `where` names the record in messages.
+@dataclass(frozen=True)
+class Makers:
+    """The labels that short records are restored by: by the names of fields, and those that were asked for."""
+
+    of: Mapping[str, ObjectLabel]
+    asked: Container[str]
+    where: str
+
+    def has(self, field: str) -> bool:
+        """Whether an object is told to have a field."""
+        label = self.of[field]
+        return not label.on_request or label.name in self.asked
+
+    def label(self, field: str) -> ObjectLabel | None:
+        """The label that restores a field; None for a field that is not known, or that nobody asked for and does not follow."""
+        label = self.of.get(field)
+        return label if label and (label.follows or self.has(field)) else None
+
+
+def from_short_record(record: Mapping[str, Any], placement: Placement, makers: Makers) -> ObjectAnnotation:
+    """The object that a short record was made of; a field is restored when it is first asked for. `makers.where` names the
+    record in messages.
     """
     made = object.__new__(_Restored)
-    made.__dict__.update(id=record["id"], source=None, _record=record, _placement=placement, _makers=makers, _where=where)
+    made.__dict__.update(id=record["id"], source=None, _record=record, _placement=placement, _makers=makers)
     return made
 
 
@@ -74,7 +121,7 @@ class _Restored(ObjectAnnotation):
 
     def __getattr__(self, name: str) -> Any:
         own = self.__dict__
-        label = own["_makers"].get(name) if "_makers" in own else None
+        label = own["_makers"].label(name) if "_makers" in own else None
         if label is None:
             return self._other(name)
         try:
@@ -86,14 +133,15 @@ class _Restored(ObjectAnnotation):
             return own[name]
         except (LookupError, TypeError, ValueError, AttributeError, ArithmeticError) as error:
             raise StoreError(
-                f"{own['_where']}: object {own['id']}: expected what {label.name} is made of, found "
+                f"{own['_makers'].where}: object {own['id']}: expected what {label.name} is made of, found "
                 f"{type(error).__name__}: {error}"
             ) from None
 
     def _other(self, name: str) -> Any:
         if name != "more":
             return super().__getattr__(name)
-        beyond = [field for field in self.__dict__.get("_makers", {}) if field not in _OWN]
+        makers: Makers | None = self.__dict__.get("_makers")
+        beyond = [field for field in makers.of if field not in _OWN and makers.has(field)] if makers else []
         self.__dict__["more"] = {}
         self.__dict__["more"] = {field: getattr(self, field) for field in beyond}
         return self.__dict__["more"]

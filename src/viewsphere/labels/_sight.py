@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
@@ -11,7 +12,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.geometry.box import Bounds, projected_bounds
+from viewsphere.geometry.box import Bounds, overlap, projected_bounds
 from viewsphere.geometry.camera import inverse_camera_matrix
 from viewsphere.labels._placement import Placement
 from viewsphere.model.camera import Camera
@@ -19,7 +20,7 @@ from viewsphere.truth.correspondence import Match
 from viewsphere.truth.geometry import Geometry
 from viewsphere.truth.shot_views import Followed
 from viewsphere.truth.view import View
-from viewsphere.truth.visibility import Instances, Visibility, homogeneous, lens_rays
+from viewsphere.truth.visibility import Instances, Visibility, homogeneous, lens_rays, rasterize
 
 
 class Around(Protocol):
@@ -40,10 +41,40 @@ class Around(Protocol):
         ...
 
 
+EVERYWHERE = (-math.inf, -math.inf, math.inf, math.inf)
+
+
+@dataclass(frozen=True, eq=False)
+class Alone:
+    """An object as the camera would see it alone, on a canvas of three times the image's width and height: 1/s (h, w) float32
+    of `truth.visibility`, 0 where a pixel does not show it, from the pixel (left, top) on.
+    """
+
+    left: int
+    top: int
+    inverse_depth: NDArray[np.float32]
+
+    def in_image(self, width: int, height: int) -> Alone:
+        """The part of it that lies in the image."""
+        x, y = max(-self.left, 0), max(-self.top, 0)
+        return Alone(
+            max(self.left, 0),
+            max(self.top, 0),
+            self.inverse_depth[y : max(height - self.top, 0), x : max(width - self.left, 0)],
+        )
+
+    @property
+    def box(self) -> tuple[int, int, int, int]:
+        """The half-open box (x0, y0, x1, y1) that it fills, or more."""
+        rows, columns = self.inverse_depth.shape
+        return self.left, self.top, self.left + columns, self.top + rows
+
+
 @dataclass(frozen=True, eq=False)
 class Sight:
     """A camera's view of a geometry: `visibility` is `rasterize(geometry, camera)`. `placements` belong to the objects 1, 2,
-    ...; an absent object's is None; labels of pixels need no placements. `around`: what the picture is compared with.
+    ...; an absent object's is None; labels of pixels need no placements. `around`: what the picture is compared with; `asked`:
+    the labels that were asked for, and their options.
     """
 
     geometry: Geometry
@@ -51,6 +82,8 @@ class Sight:
     visibility: Visibility
     placements: Sequence[Placement | None] = ()
     around: Around | None = None
+    asked: Mapping[str, Mapping[str, Any]] = field(default_factory=dict[str, Mapping[str, Any]])
+    _alone: dict[int, Alone] = field(default_factory=dict[int, "Alone"], repr=False)
     _matches: dict[tuple[int, str | None], Match | None] = field(
         default_factory=dict[tuple[int, str | None], "Match | None"], repr=False
     )
@@ -115,6 +148,36 @@ class Sight:
             projected_bounds(self.camera, g.vertices, g.triangles, part, corners, g.is_used)
             for part, corners in zip(parts, points, strict=True)
         )
+
+    def is_unobstructed(self, i: int) -> bool:
+        """Whether nothing can hide any part of the object of id i + 1: its 2D box meets no other object's box, there is no
+        scenery, and the ground cannot lie before it.
+        """
+        geometry = self.geometry
+        if geometry.has_scenery:
+            return False  # a street's box meets all others: to look at scenery's boxes would cost more than it saves
+        own = self.projected[i][0]
+        for j, (other, whole) in enumerate(self.projected):
+            if j != i and own and other and (not whole or overlap(own, other)):
+                return False
+        return geometry.ground_z is None or float(self.camera.center[2]) > geometry.ground_z
+
+    def alone(self, i: int) -> Alone:
+        """What the camera would see if the object of id i + 1 were alone; drawn once."""
+        if i not in self._alone:
+            self._alone[i] = self._drawn_alone(i)
+        return self._alone[i]
+
+    def _drawn_alone(self, i: int) -> Alone:
+        width, height = self.camera.width, self.camera.height
+        own, whole = self.projected[i]
+        x0, y0, x1, y1 = own if own and whole else EVERYWHERE
+        left, top = math.floor(max(x0, -width)), math.floor(max(y0, -height))
+        right, bottom = math.ceil(min(x1, 2 * width)), math.ceil(min(y1, 2 * height))
+        if right <= left or bottom <= top:
+            return Alone(0, 0, np.zeros((0, 0), np.float32))
+        window = (left, top, right, bottom)
+        return Alone(left, top, rasterize(self.geometry, self.camera, object_id=i + 1, window=window).inverse_depth)
 
     def placement(self, i: int) -> Placement:
         """Placement of the object of id i + 1; raises ValueError for an absent object."""

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from viewsphere.geometry.mask import mask_polygons, rle_area, rle_of_id, rle_runs
+from viewsphere.geometry.mask import mask_polygons, rle_area, rle_of_part, rle_runs
 from viewsphere.labels._label import Drawing, Field, Models, ObjectLabel, Picture, channel_of
 from viewsphere.labels._paint import color_of
 from viewsphere.labels._placement import Placement
@@ -20,7 +20,8 @@ def compute(sight: Sight, i: int) -> Mapping[str, Any]:
     seen, camera = sight.instances, sight.camera
     area = int(seen.area[i + 1])
     x0, y0, x1, y1 = seen.box[i + 1].tolist() if area else (0, 0, 0, 0)
-    return {"rle": Rle(camera.height, camera.width, rle_of_id(seen.ids, i + 1, (x0, y0, x1, y1))), "area": area}
+    counts = rle_of_part(camera.height, camera.width, seen.ids[y0:y1, x0:x1] == i + 1, x0, y0)
+    return {"rle": Rle(camera.height, camera.width, counts), "area": area}
 
 
 def restore(counts: str, placement: Placement, o: ObjectAnnotation) -> Mapping[str, Any]:

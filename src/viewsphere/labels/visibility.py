@@ -2,20 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from viewsphere.geometry.box import Bounds, overlap
+from viewsphere.geometry.box import overlap
 from viewsphere.labels._label import Field, Models, ObjectLabel, rendered
-from viewsphere.labels._sight import Sight
+from viewsphere.labels._sight import EVERYWHERE, Sight
 from viewsphere.model.sample import Sample
-from viewsphere.truth.visibility import silhouette
-
-EVERYWHERE = (-math.inf, -math.inf, math.inf, math.inf)
 
 
 def compute(sight: Sight, i: int) -> Mapping[str, Any]:
@@ -42,39 +37,19 @@ def _shares(sight: Sight, i: int, area: int) -> tuple[float, float]:
     inside = whole and own[0] >= 0 and own[1] >= 0 and own[2] <= width and own[3] <= height
     if inside and not area:
         return 0.0, 0.0
-    if inside and _is_unobstructed(sight, i):
+    if inside and sight.is_unobstructed(i):
         return 1.0, 0.0
-    total, kept = _pixels_alone(sight, i, own if whole else EVERYWHERE)
+    total, kept = _pixels_alone(sight, i)
     if total == 0:
         return 0.0, 0.0 if overlap(own, image) else 1.0
     return area / total, (total - kept) / total
 
 
-def _is_unobstructed(sight: Sight, i: int) -> bool:
-    """Whether nothing can hide any part of the object: its 2D box meets no other object's box, there is no scenery, and the
-    ground cannot lie before it.
-    """
-    geometry = sight.geometry
-    if geometry.has_scenery:
-        return False  # a street's box meets all others: to look at scenery's boxes would cost more than it saves
-    own = sight.projected[i][0]
-    for j, (other, whole) in enumerate(sight.projected):
-        if j != i and own and other and (not whole or overlap(own, other)):
-            return False
-    return geometry.ground_z is None or float(sight.camera.center[2]) > geometry.ground_z
-
-
-def _pixels_alone(sight: Sight, i: int, own: Bounds) -> tuple[int, int]:
+def _pixels_alone(sight: Sight, i: int) -> tuple[int, int]:
     """Number of pixels that the object alone would cover on the large canvas, and how many of these lie in the image."""
-    width, height = sight.camera.width, sight.camera.height
-    x0, y0, x1, y1 = own
-    left, top = math.floor(max(x0, -width)), math.floor(max(y0, -height))
-    right, bottom = math.ceil(min(x1, 2 * width)), math.ceil(min(y1, 2 * height))
-    if right <= left or bottom <= top:
-        return 0, 0
-    alone: NDArray[np.bool_] = silhouette(sight.geometry, sight.camera, i + 1, (left, top, right, bottom))
-    in_image = alone[max(-top, 0) : max(height - top, 0), max(-left, 0) : max(width - left, 0)]
-    return int(np.count_nonzero(alone)), int(np.count_nonzero(in_image))
+    alone = sight.alone(i)
+    inside = alone.in_image(sight.camera.width, sight.camera.height)
+    return int(np.count_nonzero(alone.inverse_depth)), int(np.count_nonzero(inside.inverse_depth))
 
 
 def prove(sample: Sample, models: Models) -> Iterator[str]:

@@ -71,7 +71,8 @@ class ObjectAnnotation:
     An imported object has `source`, its annotation in the imported data set; values that the annotation lacks are NaN, and
     key and model may be empty. If it lacks a mask, the mask is empty, but `box2d` and `area` are the annotation's.
 
-    `more` holds the fields of labels that other packages bring; these fields are attributes, too.
+    `more` holds the fields of labels that were asked for, and of those that other packages bring; these fields are attributes,
+    too. So are those of labels that follow from what every data set has, asked for or not.
     """
 
     id: int
@@ -109,7 +110,9 @@ class ObjectAnnotation:
         try:
             return self.__dict__["more"][name]
         except KeyError:
-            raise AttributeError(f"an object has no {name!r}, or its data set does not keep it") from None
+            raise AttributeError(
+                f"an object has no {name!r}, or its data set does not keep it: add it to the recipe's annotations"
+            ) from None
 
     def __dir__(self) -> list[str]:
         """All attributes, the fields in `more` among them."""
@@ -175,6 +178,8 @@ class Sample(Shown):
     instant: int = 0  # counted from 0 in the sequence, or, for still pictures, in the data set
     time: float = 0.0  # seconds from the sequence's first instant
     taken: Taken | None = None  # None: nobody knows what was there
+    asked: tuple[str, ...] = ()  # labels of objects and of pictures that were asked for
+    more: Mapping[str, Any] = field(default_factory=dict[str, Any])  # fields of labels of pictures
 
     def __repr__(self) -> str:
         size = f"{self.width} x {self.height} pixels"
@@ -222,16 +227,19 @@ class Sample(Shown):
         return self.files.get(picture_of(self.files) or "")
 
     def __dir__(self) -> list[str]:
-        """All attributes, the channels among them."""
-        return sorted({*object.__dir__(self), *self.channels})
+        """All attributes, the channels and the fields of labels among them."""
+        return sorted({*object.__dir__(self), *self.channels, *self.more})
 
-    def __getattr__(self, name: str) -> NDArray[Any]:
-        """Any channel by name: `sample.rgb`, `sample.depth`, `sample.instances`, ..."""
+    def __getattr__(self, name: str) -> Any:
+        """Any channel by name, and any field of a label of pictures: `sample.rgb`, `sample.depth`, `sample.captions`, ..."""
         if name.startswith("_") or "channels" not in self.__dict__:
             raise AttributeError(f"Sample has no attribute {name!r}")
+        if name in self.more:
+            return self.more[name]
         try:
             return self.channels[name]
         except KeyError:
             raise AttributeError(
-                f"this sample has no channel {name!r}; it has {', '.join(self.channels)}: add it to the recipe's channels"
+                f"this sample has no channel {name!r}; it has {', '.join((*self.channels, *self.more))}: add it to the "
+                f"recipe's channels, or annotations"
             ) from None

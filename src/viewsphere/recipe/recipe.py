@@ -9,7 +9,7 @@ from collections.abc import Generator, Mapping
 from contextlib import contextmanager
 from os import PathLike
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal, Self, TypeVar
 
 from pydantic import (
     AfterValidator,
@@ -22,6 +22,7 @@ from pydantic import (
     Tag,
     ValidationError,
     ValidationInfo,
+    WithJsonSchema,
     field_validator,
     model_validator,
 )
@@ -37,6 +38,7 @@ from viewsphere.model.notebook import Shown
 from viewsphere.model.numbers import Count, Natural, Number
 from viewsphere.recipe.formats import FormatEntry, FormatField
 from viewsphere.recipe.models import ModelEntry
+from viewsphere.recipe.named import FORM, Named, named
 from viewsphere.recipe.rig import RigField
 from viewsphere.recipe.scene import CameraEntry, EngineEntry, SceneEntry, engine_entry
 from viewsphere.recipe.scenes import ScenesField
@@ -58,6 +60,7 @@ LATER_FIELDS: dict[tuple[str, ...], Any] = {
     ("scenes", "orientation"): "upright",
     ("scenes", "balance"): "models",
     ("files", "shots"): "files",
+    ("annotations",): [],
 }
 """Likewise fields of their parts, with the defaults that are left out."""
 
@@ -120,9 +123,15 @@ def _distinct(names: tuple[str, ...]) -> tuple[str, ...]:
     return names
 
 
-def _distinct_formats(entries: tuple[FormatEntry, ...]) -> tuple[FormatEntry, ...]:
+NamedT = TypeVar("NamedT", bound=Named)
+
+
+def _distinct_names(entries: tuple[NamedT, ...]) -> tuple[NamedT, ...]:
     _distinct(tuple(entry.name for entry in entries))
     return entries
+
+
+AnnotationField = Annotated[Named, BeforeValidator(named("a label")), WithJsonSchema(FORM)]
 
 
 class Recipe(Shown, Frozen):
@@ -177,8 +186,13 @@ class Recipe(Shown, Frozen):
     channels: Annotated[tuple[str, ...], AfterValidator(_distinct)] = Field(
         default=DEFAULT_CHANNELS, min_length=1, validate_default=True, description="what to keep of every frame"
     )
+    annotations: Annotated[tuple[AnnotationField, ...], AfterValidator(_distinct_names)] = Field(
+        default=(),
+        description="labels of objects and of whole pictures beside those that every data set has, by name or with options: "
+        "[amodal, occluders]",
+    )
     files: Files = Field(default=Files(), description="how each channel is written: lossless PNG and TIFF by default")
-    formats: Annotated[tuple[FormatField, ...], AfterValidator(_distinct_formats)] = Field(
+    formats: Annotated[tuple[FormatField, ...], AfterValidator(_distinct_names)] = Field(
         default=(FormatEntry(name="native"), FormatEntry(name="coco")),
         description="formats to write when all is rendered, by name or with options: {coco: {category_ids: coco}}",
     )

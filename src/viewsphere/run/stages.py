@@ -17,7 +17,7 @@ from viewsphere.assets.repaint import repaint_stamps
 from viewsphere.errors import ModelError, RecipeError
 from viewsphere.geometry.box import box_size, box_vertices
 from viewsphere.geometry.rotation import transform
-from viewsphere.labels import annotate, channel_labels, observe
+from viewsphere.labels import annotated, channel_labels, observe, sample_values, sight_of
 from viewsphere.model.channel import PASSES
 from viewsphere.model.model_spec import ModelSpec, Size, step_key
 from viewsphere.model.sample import Float, Sample, Taken
@@ -256,14 +256,16 @@ def render_sample(
     _arrange(views, instant, sensor, names)
     view, geometry = views.view(instant, sensor), stage.at(instant)
     now, camera, labelled, visibility = shot.instants[instant], view.camera, view.geometry, view.visibility
-    observed = observe(labelled, camera, visibility, names, views.around(instant, sensor))
+    around = views.around(instant, sensor)
+    observed = observe(labelled, camera, visibility, names, around)
     pictures = [name for name in PASSES if name in kept]
     painted = with_ground(geometry, camera, visibility) if pictures and labelled is not geometry else visibility
     for name in pictures:
         observed[name] = stage.color(instant, sensor, painted, name == "rgba")
     steps = [thing.motion.step_at(instant) for thing in shot.objects]
     files = [model_files(p.model.key, step and step.frame)[0] for p, step in zip(shot.objects, steps, strict=True)]
-    objects = annotate(shot, instant, camera, labelled, visibility, boxes, files, sizes)
+    sight = sight_of(shot, instant, camera, labelled, visibility, boxes, files, sizes, around)
+    objects = annotated(sight)
     return Sample(
         index=number,
         split=now.split,
@@ -277,6 +279,8 @@ def render_sample(
         instant=now.index,
         time=now.seconds,
         taken=Taken(instant, sensor, shot),
+        asked=tuple(shot.annotations),
+        more=sample_values(sight, objects),
     )
 
 

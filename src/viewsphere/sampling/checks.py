@@ -7,10 +7,11 @@ from fnmatch import fnmatchcase
 
 from viewsphere import plugins
 from viewsphere.errors import RecipeError
-from viewsphere.labels import Needs, channel_labels, channels
-from viewsphere.model.mistakes import nearest, one_of
+from viewsphere.labels import Needs, annotations, channels, labels
+from viewsphere.model.mistakes import nearest, one_of, read_options
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.recipe.draws import alternatives, span
+from viewsphere.recipe.named import Named
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.scenes import ScenesEntry
 from viewsphere.recipe.surface import GroundEntry
@@ -56,12 +57,26 @@ def check_names(recipe: Recipe) -> None:
         if name not in channels():
             raise RecipeError(f"channels[{i}]: {one_of(name, tuple(channels()))}")
         _check_needs(recipe, f"channels[{i}]", name)
+    for i, entry in enumerate(recipe.annotations):
+        _check_annotation(recipe, f"annotations[{i}]", entry)
+
+
+def _check_annotation(recipe: Recipe, where: str, entry: Named) -> None:
+    if entry.name not in annotations():
+        always = f": every data set has {entry.name}" if entry.name in labels() and entry.name not in channels() else ""
+        other = f": {entry.name} is one of channels" if entry.name in channels() else always
+        raise RecipeError(f"{where}: {one_of(entry.name, tuple(annotations()))}{other}")
+    options = annotations()[entry.name].options
+    if options is None and entry.options:
+        raise RecipeError(f"{where}: expected no options, {entry.name} has none; found {', '.join(entry.options)}")
+    if options is not None:
+        read_options(options, entry.options, f"{where}.{entry.name}")
+    _check_needs(recipe, where, entry.name)
 
 
 def _check_needs(recipe: Recipe, where: str, name: str) -> None:
     """A label that compares pictures needs these."""
-    label = channel_labels().get(name)
-    needs = label.needs if label else Needs()
+    needs = labels()[name].needs if name in labels() else Needs()
     for field, what, is_lacking in (
         ("time", "whose instants are compared", bool(needs.instants) and recipe.time is None),
         ("rig", "with a sensor that is rectified with its own", needs.rectified and recipe.rig is None),

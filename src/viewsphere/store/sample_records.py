@@ -6,8 +6,8 @@ from the shot and the models. An imported sample is kept by a whole record.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property, partial
 from typing import Any
 
@@ -16,12 +16,16 @@ from numpy.typing import NDArray
 from pydantic import ConfigDict, PositiveInt, TypeAdapter
 
 from viewsphere.labels import (
+    Makers,
     ModelFacts,
     Placement,
     finite,
     from_short_record,
     from_whole_record,
+    labels_of,
+    makers,
     object_labels,
+    sample_labels,
     short_record,
     whole_record,
 )
@@ -39,8 +43,20 @@ Facts = Callable[[str, int | None], ModelFacts]
 
 def short_sample(sample: Sample) -> dict[str, Any]:
     """The short record of a sample whose shot is stored, too, as `json.dumps(..., allow_nan=False)` takes it."""
-    labels = object_labels()
-    return {"index": sample.index, "objects": [short_record(o, labels) for o in sample.objects]}
+    labels = labels_of(sample.asked)
+    return {"index": sample.index, "objects": [short_record(o, labels) for o in sample.objects], **_plain_more(sample)}
+
+
+def _plain_more(sample: Sample) -> dict[str, Any]:
+    """The fields of the labels of whole pictures as JSON; none without any."""
+    fields = {field.name: field for label in sample_labels().values() for field in label.fields}
+    return {"more": {name: fields[name].plain(value) for name, value in sample.more.items()}} if sample.more else {}
+
+
+def _more(asked: Sequence[str], plain: Mapping[str, Any]) -> dict[str, Any]:
+    """The fields that `_plain_more` wrote, of the labels that were asked for."""
+    labels = [label for name, label in sample_labels().items() if name in asked]
+    return {field.name: field.value(plain[field.name]) for label in labels for field in label.fields}
 
 
 def whole_sample(sample: Sample) -> dict[str, Any]:
@@ -64,6 +80,8 @@ def whole_sample(sample: Sample) -> dict[str, Any]:
         **({"source": dict(sample.source)} if sample.source is not None else {}),
         "objects": [whole_record(o, labels) for o in sample.objects],
         "files": dict(sample.files),
+        **({"asked": list(sample.asked)} if sample.asked else {}),
+        **_plain_more(sample),
     }
 
 
@@ -82,6 +100,8 @@ class _Picture:
     time: float = 0.0
     size: tuple[PositiveInt, PositiveInt] | None = None
     source: dict[str, Any] | None = None
+    asked: tuple[str, ...] = ()
+    more: dict[str, Any] = field(default_factory=dict[str, Any])
 
 
 _PICTURE = TypeAdapter(_Picture)
@@ -110,6 +130,8 @@ def from_whole_sample(record: Mapping[str, Any], channels: Channels, files: Mapp
         sensor=picture.sensor,
         instant=picture.instant,
         time=picture.time,
+        asked=picture.asked,
+        more=_more(picture.asked, picture.more),
     )
 
 
@@ -136,8 +158,8 @@ class ShotRecords:
         return tuple(self.shot.samples)
 
     @cached_property
-    def _makers(self) -> dict[str, Any]:
-        return {field.name: label for label in object_labels() for field in label.fields}
+    def _makers(self) -> Makers:
+        return Makers(makers(), self.shot.annotations, self.where)
 
     def kept(self, place: int) -> tuple[str, ...]:
         """The channels of the shot's that the sample at a place has, counted from 0."""
@@ -165,6 +187,8 @@ class ShotRecords:
             instant=now.index,
             time=now.seconds,
             taken=Taken(instant, sensor, None, self.root, self.shot.key),
+            asked=tuple(self.shot.annotations),
+            more=_more(tuple(self.shot.annotations), record.get("more", {})),
         )
 
     def _objects(self, records: list[dict[str, Any]], instant: int, camera: Camera) -> Iterator[ObjectAnnotation]:
@@ -178,4 +202,4 @@ class ShotRecords:
                 raise ValueError(f"object {record['id']}: expected one that is there")
             facts = partial(self.facts, spec.key, step and step.frame)
             placement = Placement(spec, pose, camera, self.shot.category_deg, facts, step)
-            yield from_short_record(record, placement, self._makers, self.where)
+            yield from_short_record(record, placement, self._makers)

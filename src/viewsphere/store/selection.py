@@ -66,8 +66,8 @@ def _value(sample: Sample, name: str) -> Any:
 
 def _of_objects() -> dict[str, Field]:
     """The fields of objects that arrays or texts can hold."""
-    fields = {field.name: field for label in object_labels() for field in label.fields}
-    plain = {name: field for name, field in fields.items() if field.type in (float, int, bool, str, ObjectView)}
+    fields = (field for label in object_labels() for field in label.fields if field.is_regular)
+    plain = {field.name: field for field in fields if field.type in (float, int, bool, str, ObjectView)}
     return {"id": Field("id", "", int), "mask": Field("mask", "", bool), **plain}
 
 

@@ -80,8 +80,9 @@ def rasterize(
 
     `subdivision` 2 gives the (2H, 2W) buffer of the centres of a pixel's 2 x 2 quarters (edge anti-aliasing). With an
     `object_id` only that object is drawn, without scenery and ground. `window` replaces the image by another rectangle of
-    pixels, which may lie outside the image. `corners`: `homogeneous` of all vertices, where it is known. `keeps_exact`: keep
-    1/s before it was rounded, too, which labels that compare pictures need; still pictures are spared its memory.
+    pixels, which may lie outside the image; nothing is seen where the lens has no ray for a pixel. `corners`: `homogeneous` of
+    all vertices, where it is known. `keeps_exact`: keep 1/s before it was rounded, too, which labels that compare pictures
+    need; still pictures are spared its memory.
     """
     everything = (0, _last_drawn(geometry, camera), 0, len(geometry.vertices))
     part = _range(geometry, object_id) if object_id else everything
@@ -112,15 +113,6 @@ def is_edge_on(geometry: Geometry, camera: Camera) -> bool:
 def _last_drawn(geometry: Geometry, camera: Camera) -> int:
     """The end of the triangles that are drawn: the ground, which comes last, is not where it is seen edge-on."""
     return geometry.triangle_start[-1] if is_edge_on(geometry, camera) else len(geometry.triangles)
-
-
-def silhouette(geometry: Geometry, camera: Camera, object_id: int, window: Window) -> NDArray[np.bool_]:
-    """Pixels whose ray would meet this object if nothing else were there: (y1 - y0, x1 - x0) bool over the window.
-
-    The window may reach outside the image; False where the lens has no ray for a pixel.
-    """
-    part = _range(geometry, object_id)
-    return _draw(geometry, camera, 1, part, window, homogeneous(geometry, camera, *part[2:]))[1] >= 0
 
 
 def _range(geometry: Geometry, object_id: int) -> tuple[int, int, int, int]:

@@ -256,6 +256,7 @@ class Stock(Sendable):
             engine=self.recipe.engine.name,
             engine_options=engine_options(self.recipe),
             channels=self.recipe.channels,
+            annotations={entry.name: entry.options for entry in self.recipe.annotations},
             files=self.recipe.files,
             label_alpha=self.recipe.label_alpha,
             category_deg=self.recipe.viewpoints.bins,

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence, Set
 from dataclasses import replace
 
 from viewsphere.errors import RecipeError
-from viewsphere.labels import channel_labels
+from viewsphere.labels import labels
 from viewsphere.model.instant import Instant
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Floor, Matrix4
@@ -144,8 +144,9 @@ def _instant(stock: Stock, own: Course, subject: str, pose: int, box_of: BoxOf) 
 
 def _needed(stock: Stock, taken: Set[int]) -> set[int]:
     """The instants that labels of those that are taken need besides."""
-    known = channel_labels()
+    known = labels()
     names = {name for sensor in stock.rig.sensors for name in sensor.kept(stock.recipe.channels)}
+    names |= {entry.name for entry in stock.recipe.annotations}
     offsets = {offset for name in names if name in known for offset in known[name].needs.instants}
     count = time_of(stock).count
     compared = {number + offset for number in taken for offset in offsets if 0 <= number + offset < count}

@@ -1,0 +1,71 @@
+"""Convex hulls in a plane, and the smallest rectangles around them."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Float = NDArray[np.float64]
+
+
+def convex_hull(points: Float) -> Float:
+    """The corners (K, 2) of the convex hull of points (N, 2), in the turn from x to y, clockwise as seen where y points down.
+    The first corner has the lowest x, and of these the lowest y; none lies on a side. One point where all points are one,
+    the two ends where they lie on a line.
+
+    By A. M. Andrew, Another efficient algorithm for convex hulls in two dimensions, Information Processing Letters 9 (1979).
+    """
+    found = np.unique(points, axis=0)
+    if len(found) < 3:
+        return found
+    lower, upper = _chain(found), _chain(found[::-1])
+    return np.array(lower[:-1] + upper[:-1])
+
+
+def _chain(points: Float) -> list[tuple[float, float]]:
+    chain: list[tuple[float, float]] = []
+    for x, y in points.tolist():
+        while len(chain) > 1 and _turn(chain[-2], chain[-1], (x, y)) <= 0:
+            chain.pop()
+        chain.append((x, y))
+    return chain
+
+
+def _turn(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]) -> float:
+    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+
+
+def smallest_rectangle(hull: Float) -> Float:
+    """The corners (4, 2) of the rectangle of least area around a convex hull (K, 2), in the hull's turn, from the one with the
+    lowest y, of these with the lowest x.
+
+    One side lies along a side of the hull (H. Freeman and R. Shapira, Determining the minimum-area encasing rectangle for an
+    arbitrary closed curve, CACM 18 (1975)); of equal ones that along the first such side is taken.
+    """
+    sides = np.roll(hull, -1, axis=0) - hull
+    lengths = np.hypot(*sides.T)
+    along = sides[lengths > 0] / lengths[lengths > 0, None] if (lengths > 0).any() else np.array([[1.0, 0.0]])
+    across = np.stack([-along[:, 1], along[:, 0]], axis=1)
+    u, v = hull @ along.T, hull @ across.T
+    areas = np.ptp(u, axis=0) * np.ptp(v, axis=0)
+    best = int(np.flatnonzero(areas <= areas.min() * (1 + EQUAL))[0])
+    low, high = (u[:, best].min(), v[:, best].min()), (u[:, best].max(), v[:, best].max())
+    placed = np.array([low, (high[0], low[1]), high, (low[0], high[1])])
+    corners = placed @ np.stack([along[best], across[best]])
+    first = min(range(4), key=lambda i: (round(float(corners[i, 1]), 9), float(corners[i, 0])))
+    return np.roll(corners, -first, axis=0)
+
+
+EQUAL = 1e-12
+"""Share by which areas may differ that count as equal."""
+
+
+def mask_outline(part: NDArray[np.bool_], x0: int = 0, y0: int = 0) -> Float:
+    """Pixel corners (N, 2) of a mask's outermost pixels, row by row: what its convex hull is made of. `part` (h, w) begins at
+    column x0, row y0.
+    """
+    rows = np.flatnonzero(part.any(axis=1))
+    own = part[rows]
+    left, right = own.argmax(axis=1), part.shape[1] - own[:, ::-1].argmax(axis=1)
+    corners = [(x, y) for x in (left, right) for y in (rows, rows + 1)]
+    return np.concatenate([np.stack([x + x0, y + y0], axis=1) for x, y in corners]).astype(np.float64)

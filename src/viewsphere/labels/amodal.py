@@ -1,0 +1,97 @@
+"""amodal: all the pixels of an object that lie in the image, those that others hide among them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from viewsphere.geometry.mask import decode_rle, mask_box, rle_box, rle_of_part
+from viewsphere.labels._field import Field
+from viewsphere.labels._label import Drawing, Models, ObjectLabel, rendered
+from viewsphere.labels._paint import color_of
+from viewsphere.labels._placement import Placement
+from viewsphere.labels._sight import Sight
+from viewsphere.model.sample import ObjectAnnotation, Rle, Sample
+
+if TYPE_CHECKING:
+    from PIL.ImageDraw import ImageDraw
+
+
+def compute(sight: Sight, i: int) -> Mapping[str, Any]:
+    """The pixels that would show the object if it were alone, and their tight box.
+
+    Y. Zhu et al., Semantic Amodal Segmentation (https://arxiv.org/abs/1509.01329), cut off at the image's border, as in COCOA
+    and KINS.
+    """
+    width, height = sight.camera.width, sight.camera.height
+    if sight.is_unobstructed(i):
+        x0, y0, x1, y1 = sight.instances.box[i + 1].tolist() if sight.instances.area[i + 1] else (0, 0, 0, 0)
+        part = sight.instances.ids[y0:y1, x0:x1] == i + 1
+    else:
+        alone = sight.alone(i).in_image(width, height)
+        x0, y0, part = alone.left, alone.top, alone.inverse_depth > 0
+    return _fields(height, width, rle_of_part(height, width, part, x0, y0))
+
+
+def restore(counts: str, placement: Placement, o: ObjectAnnotation) -> Mapping[str, Any]:
+    """Both fields, from the run-length code that is kept."""
+    return _fields(placement.camera.height, placement.camera.width, counts)
+
+
+def _fields(height: int, width: int, counts: str) -> Mapping[str, Any]:
+    tight = rle_box(height, width, counts)
+    return {"amodal": Rle(height, width, counts), "box2d_amodal": tight and tuple(map(float, tight))}
+
+
+def prove(sample: Sample, models: Models) -> Iterator[str]:
+    """The mask holds the visible one, which is as large a share of it as visibility and truncation say; the box is tight."""
+    for o in rendered(sample):
+        amodal = decode_rle(o.amodal.height, o.amodal.width, o.amodal.counts)
+        if amodal.shape != (sample.height, sample.width):
+            yield f"object {o.id}: expected an amodal mask of the image's size, found {amodal.shape}"
+            continue
+        seen, inside = o.mask, int(amodal.sum())
+        if (seen & ~amodal).any():
+            yield f"object {o.id}: expected the visible pixels among the amodal ones, found {(seen & ~amodal).sum()} others"
+        if o.box2d_amodal != mask_box(amodal):
+            yield f"object {o.id}: expected box2d_amodal {mask_box(amodal)}, found {o.box2d_amodal}"
+        shown = int(seen.sum())
+        if shown and abs(o.visibility * inside - shown * (1 - o.truncation)) > 1e-6 * inside:
+            yield (
+                f"object {o.id}: expected {shown * (1 - o.truncation) / o.visibility:.1f} amodal pixels, as visibility and "
+                f"truncation say; found {inside}"
+            )
+
+
+def draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
+    """The hidden pixels of each object hatched in its colour, and the box of all its pixels."""
+    for o in sample.objects:
+        if o.box2d_amodal is None:
+            continue
+        color = color_of(o.id)
+        hidden = decode_rle(o.amodal.height, o.amodal.width, o.amodal.counts) & ~o.mask
+        y, x = np.nonzero(hidden)
+        for px, py in zip(x.tolist(), y.tolist(), strict=True):
+            if (px + py) % 4 < 2:
+                pen.rectangle((px * scale, py * scale, (px + 1) * scale - 1, (py + 1) * scale - 1), fill=(*color, 150))
+        x0, y0, x1, y1 = (v * scale for v in o.box2d_amodal)
+        pen.rectangle((x0, y0, x1 - 1, y1 - 1), outline=color, width=1)
+
+
+LABEL = ObjectLabel(
+    name="amodal",
+    meaning="all its pixels in the image, hidden ones too",
+    axes="image",
+    on_request=True,
+    fields=(
+        Field("amodal", "COCO's compressed run-length code of the pixels that it alone would cover", Rle),
+        Field("box2d_amodal", "their half-open corners (x0, y0, x1, y1), None without any", float, (4,), "px", optional=True),
+    ),
+    compute=compute,
+    keep=lambda o: o.amodal.counts,
+    restore=restore,
+    prove=prove,
+    drawing=Drawing("amodal", lines=draw, key=(("amodal: hidden parts are hatched", None),)),
+)

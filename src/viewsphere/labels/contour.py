@@ -1,0 +1,77 @@
+"""contour: the outlines of an object's visible pixels, and their convex hull."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from viewsphere.geometry.hull import convex_hull, mask_outline
+from viewsphere.labels._field import Field
+from viewsphere.labels._label import Drawing, Models, ObjectLabel, rendered
+from viewsphere.labels._paint import color_of
+from viewsphere.labels._placement import Placement
+from viewsphere.model.sample import ObjectAnnotation, Sample
+
+if TYPE_CHECKING:
+    from PIL.ImageDraw import ImageDraw
+
+
+def restore(kept: None, placement: Placement, o: ObjectAnnotation) -> Mapping[str, Any]:
+    """Both, of the mask's pixel corners."""
+    mask = o.mask
+    hull = convex_hull(mask_outline(mask)) if mask.any() else np.empty((0, 2))
+    return {"contour": tuple(np.array(ring).reshape(-1, 2) for ring in o.polygons), "hull": hull}
+
+
+def prove(sample: Sample, models: Models) -> Iterator[str]:
+    """Outlines enclose as much as the mask has pixels; the hull is convex, encloses no less, and reaches to the box's sides."""
+    for o in rendered(sample):
+        enclosed = sum(_area(ring) for ring in o.contour)
+        if abs(enclosed - o.area) > 1e-6:
+            yield f"object {o.id}: expected outlines around {o.area} pixels, found {enclosed:.6g}"
+        if not len(o.hull):
+            if o.area:
+                yield f"object {o.id}: expected the hull of {o.area} pixels, found none"
+            continue
+        before, after = o.hull - np.roll(o.hull, 1, axis=0), np.roll(o.hull, -1, axis=0) - o.hull
+        if (before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0] <= 0).any() or _area(o.hull) < o.area - 1e-6:
+            yield f"object {o.id}: expected a convex hull around {o.area} pixels, found {o.hull.tolist()!r:.80}"
+        if o.box2d != (*o.hull.min(axis=0).tolist(), *o.hull.max(axis=0).tolist()):
+            yield f"object {o.id}: expected a hull that reaches to {o.box2d}, found another"
+
+
+def _area(ring: Any) -> float:
+    x, y = ring.T
+    return float(x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2
+
+
+def draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
+    """Outlines in the colours of their objects, hulls thinner."""
+    for o in sample.objects:
+        for ring, width in (*((ring, 2) for ring in o.contour), (o.hull, 1)):
+            points = [tuple(p) for p in (ring * scale).tolist()]
+            if points:
+                pen.line((*points, points[0]), fill=color_of(o.id), width=width)
+
+
+LABEL = ObjectLabel(
+    name="contour",
+    meaning="the outlines of its visible pixels, and their convex hull",
+    axes="image",
+    on_request=True,
+    fields=(
+        Field(
+            "contour",
+            "closed outlines along pixel corners, clockwise as seen, one for each connected part; holes are joined to them",
+            *(float, (-1, 2), "px"),
+            is_array=True,
+            many=True,
+        ),
+        Field("hull", "corners of the convex hull, clockwise as seen", float, (-1, 2), "px", is_array=True),
+    ),
+    restore=restore,
+    prove=prove,
+    drawing=Drawing("contours", lines=draw),
+)

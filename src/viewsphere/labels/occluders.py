@@ -1,0 +1,75 @@
+"""occluders: what hides an object, and how much of it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from viewsphere.labels._field import Field
+from viewsphere.labels._label import Models, ObjectLabel, rendered
+from viewsphere.labels._placement import Placement
+from viewsphere.labels._sight import Sight
+from viewsphere.model.sample import ObjectAnnotation, Sample
+
+
+@dataclass(frozen=True)
+class Occluder:
+    """What is seen in place of an object: id of another object, 0 for scenery and ground, and the share of the object's pixels
+    in the image at which that is so.
+    """
+
+    id: int
+    share: float
+
+
+def compute(sight: Sight, i: int) -> Mapping[str, Any]:
+    """What the hidden pixels of the object show; where several things lie before it, the nearest one counts."""
+    if sight.is_unobstructed(i):
+        return {"occluders": ()}
+    alone = sight.alone(i).in_image(sight.camera.width, sight.camera.height)
+    x0, y0, x1, y1 = alone.box
+    own = alone.inverse_depth > 0
+    shown = np.bincount(sight.instances.ids[y0:y1, x0:x1][own], minlength=i + 2).tolist()
+    total = sum(shown)
+    found = [Occluder(id, pixels / total) for id, pixels in enumerate(shown) if pixels and id != i + 1]
+    return {"occluders": tuple(sorted(found, key=lambda one: (-one.share, one.id)))}
+
+
+def restore(kept: Any, placement: Placement, o: ObjectAnnotation) -> Mapping[str, Any]:
+    """The field, from pairs of id and share."""
+    return {"occluders": tuple(Occluder(id, share) for id, share in kept or ())}
+
+
+def prove(sample: Sample, models: Models) -> Iterator[str]:
+    """Shares are those of the image's pixels, so with the visible share they are 1; ids are those of other objects, once."""
+    known = {0, *(o.id for o in sample.objects)}
+    for o in rendered(sample):
+        ids = [one.id for one in o.occluders]
+        if len(set(ids)) < len(ids) or o.id in ids or not known.issuperset(ids):
+            yield f"object {o.id}: expected different occluders of {sorted(known - {o.id})}, found {ids}"
+        shares = [one.share for one in o.occluders]
+        if not all(0 < share <= 1 for share in shares) or shares != sorted(shares, reverse=True):
+            yield f"object {o.id}: expected shares above 0 in falling order, found {shares}"
+        hidden = 1 - o.visibility / (1 - o.truncation) if o.truncation < 1 else math.fsum(shares)
+        if (o.visibility or shares) and abs(math.fsum(shares) - hidden) > 1e-9:
+            yield f"object {o.id}: expected occluders of {hidden:.6f} of it, found {math.fsum(shares):.6f}"
+
+
+LABEL = ObjectLabel(
+    name="occluders",
+    meaning="what hides it",
+    on_request=True,
+    fields=(
+        Field(
+            "occluders", "id (0: scenery or ground) and share of its pixels in the image, largest first", Occluder, many=True
+        ),
+    ),
+    compute=compute,
+    keep=lambda o: [[one.id, one.share] for one in o.occluders] or None,
+    restore=restore,
+    prove=prove,
+)
