@@ -25,7 +25,7 @@ from typer.models import ArgumentInfo
 
 from viewsphere import plugins
 from viewsphere.cli.commands import app
-from viewsphere.labels import Field, channels, object_labels
+from viewsphere.labels import Field, ObjectLabel, SampleLabel, annotations, channels, object_labels
 from viewsphere.limits import table
 from viewsphere.recipe.file import schema
 
@@ -105,9 +105,25 @@ def channels_page() -> str:
         "| field | type | unit | axes | what it is |\n|---|---|---|---|---|\n"
     )
     for label in object_labels():
-        for f in label.fields:
-            text += f"| `{f.name}` | {field_type(f)} | {f.unit} | {f.axes or label.axes} | {f.meaning} |\n"
+        if not label.on_request:
+            text += "".join(f"| {field_row(label, f)}" for f in label.fields)
+    text += (
+        "\n## Annotations on request\n\nThese are computed where a recipe's `annotations` name them: "
+        "`annotations: [amodal, occluders]`. A label that nobody asks for costs nothing; those marked * follow from what every "
+        "data set has, and are attributes of its objects in any case. Each is one file in `src/viewsphere/labels/`.\n\n"
+        "| label | of | field | type | unit | axes | what it is |\n|---|---|---|---|---|---|---|\n"
+    )
+    for name, label in annotations().items():
+        follows = "*" if isinstance(label, ObjectLabel) and label.follows else ""
+        of = "objects" if isinstance(label, ObjectLabel) else "pictures"
+        text += "".join(f"| `{name}`{follows} | {of} | {field_row(label, f)}" for f in label.fields)
     return text
+
+
+def field_row(label: ObjectLabel | SampleLabel, field: Field) -> str:
+    """The end of a table's row on a field of a label."""
+    axes = field.axes or label.axes
+    return f"`{field.name}` | {field_type(field)} | {field.unit} | {axes} | {field.meaning} |\n"
 
 
 OPTIONS = re.compile(r"(<!-- options of (\w+), written by scripts/docs -->\n).*?(?=\n<!-- end -->)", re.DOTALL)
@@ -164,8 +180,9 @@ def field_type(field: Field) -> str:
     """A field's type in words."""
     names = {str: "text", int: "number", float: "float64" if field.is_array else "number", bool: "bool"}
     kind = names.get(field.type, f"`{field.type.__name__}`")
-    shape = f" {field.shape[0] if len(field.shape) == 1 else field.shape}" if field.shape else ""
-    return f"{kind}{shape}" + (" or None" if field.optional else "")
+    sizes = ", ".join("N" if size < 0 else str(size) for size in field.shape)
+    shape = f" {sizes if len(field.shape) == 1 else f'({sizes})'}" if field.shape else ""
+    return ("tuple of " if field.many else "") + f"{kind}{shape}" + (" or None" if field.optional else "")
 
 
 def limits_page() -> str:

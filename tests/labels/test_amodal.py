@@ -9,6 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from test_object_labels import LENS, UNIT, at, block, scene
 
+import viewsphere as vs
+from viewsphere.errors import RecipeError
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.geometry.mask import decode_rle
 from viewsphere.labels import annotations, object_labels
@@ -97,7 +99,7 @@ def test_a_leaning_bar_has_an_oriented_box():
         long = sides[lengths.argmax()]
         near = 125 / 3.99  # pixels a metre at the bar's front
         assert abs(lengths.max() - 2 * near) < slack + 0.4 and abs(lengths.min() - 0.2 * near) < slack + 0.4
-        assert abs(abs(np.degrees(np.arctan2(long[1], long[0]))) % 180 - 150) < 1
+        assert abs(long[1] / long[0] + np.tan(angle)) < 0.02  # y points down
     assert proofs(sample_of(found)) == []
 
 
@@ -205,3 +207,37 @@ def test_proofs_notice_what_was_changed(name):
     far = sample.objects[1]
     changed = replace(far, more={**far.more, **TAMPERED[name](far)})
     assert list(annotations()[name].prove(replace(sample, objects=(sample.objects[0], changed)), {}))
+
+
+def recipe(*annotations):
+    return {
+        "models": [{"source": "zoo:chair", "category": "chair"}],
+        "viewpoints": {"azimuth": [0], "elevation": [20], "distance": 3},
+        "annotations": list(annotations),
+    }
+
+
+@pytest.mark.parametrize(
+    ("entry", "message"),
+    [
+        ("amodl", r"annotations\[0\]: expected one of .*; found 'amodl'; did you mean 'amodal'"),
+        ("depth", r"annotations\[0\]: expected one of .*: depth is one of channels"),
+        ("pose", r"annotations\[0\]: expected one of .*: every data set has pose"),
+        ({"amodal": {"size": 3}}, r"annotations\[0\]: expected no options, amodal has none; found size"),
+        ({"amodal": {}, "obb": {}}, r"annotations\[0\]: expected a label's name, or \{name: \{option: value\}\}"),
+        (3, r"annotations\[0\]: expected a label's name"),
+    ],
+)
+def test_a_label_that_cannot_be_asked_for_is_told_before_rendering(entry, message):
+    with pytest.raises(RecipeError, match=message):
+        vs.plan(vs.Recipe(**recipe(entry)))
+
+
+def test_a_label_is_asked_for_once():
+    with pytest.raises(RecipeError, match="expected distinct names; found 'amodal' twice"):
+        vs.Recipe(**recipe("amodal", "amodal"))
+
+
+def test_what_nobody_asks_for_changes_no_digest():
+    assert vs.Recipe(**recipe()).digest == vs.Recipe(**{k: v for k, v in recipe().items() if k != "annotations"}).digest
+    assert vs.Recipe(**recipe("amodal")).digest != vs.Recipe(**recipe()).digest

@@ -312,8 +312,8 @@ def _asked(recipe: Mapping[str, Any]) -> set[str]:
 def _proofs(models: Mapping[str, ModelInfo], sample: Sample) -> Iterator[tuple[str, list[str]]]:
     """Every check of one frame against itself and what it found; a proof that cannot be carried out counts as failed."""
     proofs: dict[str, Callable[[], Iterable[str]]] = {name: partial(proof, sample) for name, proof in FRAME_PROOFS.items()}
-    without = (channel_labels().keys() | annotations().keys()) - {*sample.files, *sample.asked}
-    kept = {name: label for name, label in labels().items() if name not in without}
+    following = annotations().keys() - sample.asked  # of these nothing is kept, so nothing can be wrong
+    kept = {name: label for name, label in labels().items() if name not in following and label.is_in(sample)}
     proofs |= {name: partial(label.prove, sample, models) for name, label in kept.items()}
     for name, proof in proofs.items():
         yield name, _carried_out(proof)

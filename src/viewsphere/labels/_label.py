@@ -103,6 +103,10 @@ class Label:
     prove: Proof = trusted
     drawing: Drawing | None = None
 
+    def is_in(self, sample: Sample) -> bool:
+        """Whether a sample has it."""
+        return self.name in sample.asked
+
 
 @dataclass(frozen=True, kw_only=True)
 class ChannelLabel(Label):
@@ -116,6 +120,10 @@ class ChannelLabel(Label):
     unit: str = "1"
     empty: float = 0
     encoding: Any = "tiff"
+
+    def is_in(self, sample: Sample) -> bool:
+        """Whether the sample keeps the channel."""
+        return self.name in sample.channels
 
     @property
     def channel(self) -> Channel:
@@ -151,6 +159,10 @@ class ObjectLabel(Label):
     def follows(self) -> bool:
         """Whether it follows from what every data set has: it is there whether it was asked for or not."""
         return self.keep is nothing and self.options is None and not self.needs.is_some
+
+    def is_in(self, sample: Sample) -> bool:
+        """Whether the sample's objects have it: it was asked for, or did not have to be."""
+        return not self.on_request or self.name in sample.asked or (self.follows and sample.taken is not None)
 
     @staticmethod
     def derived(

@@ -48,12 +48,12 @@ def _area(ring: Any) -> float:
 
 
 def draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
-    """Outlines in the colours of their objects, hulls thinner."""
+    """Outlines and hulls in the colours of their objects."""
     for o in sample.objects:
-        for ring, width in (*((ring, 2) for ring in o.contour), (o.hull, 1)):
+        for ring in (*o.contour, o.hull):
             points = [tuple(p) for p in (ring * scale).tolist()]
             if points:
-                pen.line((*points, points[0]), fill=color_of(o.id), width=width)
+                pen.line((*points, points[0]), fill=color_of(o.id), width=1)
 
 
 LABEL = ObjectLabel(

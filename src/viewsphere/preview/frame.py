@@ -35,25 +35,22 @@ def nothing(sample: Sample) -> Sequence[Sample]:
 
 
 def check_drawn(samples: Sequence[Sample], draw: Sequence[str]) -> None:
-    """Raise StoreError for what nobody can draw: names of no drawing, and of channels that none of the samples has."""
+    """Raise StoreError for what nobody can draw: names of no drawing, and of labels that none of the samples has."""
     known = {label.drawing.name: label for label in labels().values() if label.drawing}
     for name in draw:
         if name not in known:
             raise StoreError(f"--draw: {one_of(name, sorted(known))}")
         label = known[name]
-        if samples and isinstance(label, ChannelLabel) and not any(label.name in sample.channels for sample in samples):
-            kept = ", ".join(samples[0].channels)
-            raise StoreError(f"--draw: expected the channel {label.name}, to draw {name}; found pictures that have {kept}")
+        if samples and not any(map(label.is_in, samples)):
+            what = "channel" if isinstance(label, ChannelLabel) else "annotation"
+            kept = ", ".join((*samples[0].channels, *samples[0].asked))
+            raise StoreError(f"--draw: expected the {what} {label.name}, to draw {name}; found pictures that have {kept}")
 
 
 def drawn(sample: Sample, draw: Sequence[str]) -> list[Drawing]:
     """The chosen drawings of what a sample has."""
     found = (label for _, label in sorted(labels().items()) if label.drawing and label.drawing.name in draw)
-    return [
-        label.drawing
-        for label in found
-        if label.drawing and (not isinstance(label, ChannelLabel) or label.name in sample.channels)
-    ]
+    return [label.drawing for label in found if label.drawing and label.is_in(sample)]
 
 
 def extents(samples: Sequence[Sample], draw: Sequence[str]) -> Extents:

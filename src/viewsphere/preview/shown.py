@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from viewsphere.errors import each
-from viewsphere.labels import ChannelLabel, labels
+from viewsphere.labels import ChannelLabel, annotations, labels
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.channel import picture_of
 from viewsphere.model.model_spec import ModelSpec
@@ -18,6 +18,7 @@ from viewsphere.model.rig import Rig
 from viewsphere.model.sample import Sample
 from viewsphere.model.shot import Shot
 from viewsphere.model.tracks import Tracks
+from viewsphere.recipe.named import Named
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.run.framing import Framing
 from viewsphere.run.opening import prepare
@@ -42,7 +43,7 @@ def preview_samples(
     if recipe.time is not None:
         yield from _instants(recipe, count, width, draw, row)
         return
-    planned = prepare(_with_channels(recipe, recipe.channels, draw))
+    planned = prepare(_drawable(recipe, recipe.channels, draw))
     stages, chosen = Stages(), _spread(planned, count)
     _check(stages, planned, [subject for subject, _ in chosen])
     for subject, groups in chosen:
@@ -53,7 +54,7 @@ def preview_samples(
 def _instants(recipe: Recipe, count: int, width: int, draw: Sequence[str], row: int) -> Iterator[Sample]:
     """The labels that nobody draws are not computed: they compare instants, of which a preview shows few."""
     pictures = [name for name in recipe.channels if name == picture_of(recipe.channels)]
-    planned = prepare(_with_channels(recipe, pictures or ["rgb"], draw))
+    planned = prepare(_drawable(recipe, pictures or ["rgb"], draw))
     stages, instants = Stages(), recipe.time.count if recipe.time else 1
     starts = [(subject, first) for block in planned.blocks for subject in block.subjects for first, _ in block.positions]
     films = min(len(starts), max(1, count // row))
@@ -88,11 +89,13 @@ def _rendered(stages: Stages, planned: Plan, subject: str, poses: Sequence[int],
     return stages.render(shot.model_copy(update=_scaled(shot, width) | {"channels": channels}))
 
 
-def _with_channels(recipe: Recipe, channels: Sequence[str], draw: Sequence[str]) -> Recipe:
-    """The recipe with these channels, and with those that are drawn."""
-    wanted = (label for label in labels().values() if isinstance(label, ChannelLabel))
-    named = (label.name for label in wanted if label.drawing and label.drawing.name in draw)
-    return recipe.model_copy(update={"channels": tuple(dict.fromkeys((*channels, *named)))})
+def _drawable(recipe: Recipe, channels: Sequence[str], draw: Sequence[str]) -> Recipe:
+    """The recipe with these channels, and with the labels that are drawn, and no others that have to be asked for."""
+    wanted = [label for label in labels().values() if label.drawing and label.drawing.name in draw]
+    named = (label.name for label in wanted if isinstance(label, ChannelLabel))
+    asked = {entry.name: entry for entry in recipe.annotations}
+    kept = (asked.get(label.name, Named(name=label.name)) for label in wanted if label.name in annotations())
+    return recipe.model_copy(update={"channels": tuple(dict.fromkeys((*channels, *named))), "annotations": tuple(kept)})
 
 
 def dataset_samples(dataset: Dataset, count: int = 12, row: int = ROW, films: Sequence[Film] = ()) -> list[Sample]:

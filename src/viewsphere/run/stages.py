@@ -17,7 +17,7 @@ from viewsphere.assets.repaint import repaint_stamps
 from viewsphere.errors import ModelError, RecipeError
 from viewsphere.geometry.box import box_size, box_vertices
 from viewsphere.geometry.rotation import transform
-from viewsphere.labels import annotated, channel_labels, observe, sample_values, sight_of
+from viewsphere.labels import annotated, labels, observe, sample_values, sight_of
 from viewsphere.model.channel import PASSES
 from viewsphere.model.model_spec import ModelSpec, Size, step_key
 from viewsphere.model.sample import Float, Sample, Taken
@@ -253,7 +253,7 @@ def render_sample(
     shot, (number, instant, sensor) = views.shot, sample
     kept = shot.kept(sensor)
     names = [name for name in kept if name not in PASSES]
-    _arrange(views, instant, sensor, names)
+    _arrange(views, instant, sensor, [*names, *shot.annotations])
     view, geometry = views.view(instant, sensor), stage.at(instant)
     now, camera, labelled, visibility = shot.instants[instant], view.camera, view.geometry, view.visibility
     around = views.around(instant, sensor)
@@ -289,7 +289,7 @@ def _arrange(views: ShotViews, instant: int, sensor: int, names: Sequence[str]) 
 
     Before that the points that the sensor follows are picked: at so many instants that these triangles would be written over.
     """
-    needs = [channel_labels()[name].needs for name in names]
+    needs = [labels()[name].needs for name in names]
     if any(need.tracks for need in needs):
         views.followed(sensor)
     offsets = {offset for need in needs for offset in need.instants}
