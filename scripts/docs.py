@@ -25,7 +25,7 @@ from typer.models import ArgumentInfo
 
 from viewsphere import plugins
 from viewsphere.cli.commands import app
-from viewsphere.labels import Field, ObjectLabel, SampleLabel, annotations, channels, object_labels
+from viewsphere.labels import Field, ObjectLabel, SampleLabel, channels, object_labels, on_request
 from viewsphere.limits import table
 from viewsphere.recipe.file import schema
 
@@ -113,7 +113,7 @@ def channels_page() -> str:
         "data set has, and are attributes of its objects in any case. Each is one file in `src/viewsphere/labels/`.\n\n"
         "| label | of | field | type | unit | axes | what it is |\n|---|---|---|---|---|---|---|\n"
     )
-    for name, label in annotations().items():
+    for name, label in on_request().items():
         follows = "*" if isinstance(label, ObjectLabel) and label.follows else ""
         of = "objects" if isinstance(label, ObjectLabel) else "pictures"
         text += "".join(f"| `{name}`{follows} | {of} | {field_row(label, f)}" for f in label.fields)

@@ -13,7 +13,7 @@ import viewsphere as vs
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.geometry.mask import decode_rle
-from viewsphere.labels import annotations, object_labels
+from viewsphere.labels import object_labels, on_request
 from viewsphere.model.camera import Distortion
 from viewsphere.model.instant import Viewpoint
 from viewsphere.model.sample import Sample
@@ -38,7 +38,7 @@ def sample_of(found):
 
 
 def proofs(sample):
-    return [f"{name}: {message}" for name in ASKED for message in annotations()[name].prove(sample, {})]
+    return [f"{name}: {message}" for name in ASKED for message in on_request()[name].prove(sample, {})]
 
 
 def test_a_cube_behind_a_cube():
@@ -206,7 +206,7 @@ def test_proofs_notice_what_was_changed(name):
     sample = sample_of(found)
     far = sample.objects[1]
     changed = replace(far, more={**far.more, **TAMPERED[name](far)})
-    assert list(annotations()[name].prove(replace(sample, objects=(sample.objects[0], changed)), {}))
+    assert list(on_request()[name].prove(replace(sample, objects=(sample.objects[0], changed)), {}))
 
 
 def recipe(*annotations):

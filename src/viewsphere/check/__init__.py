@@ -23,7 +23,7 @@ from viewsphere.check.scenery import Scenery
 from viewsphere.check.shots import contradictions
 from viewsphere.errors import MissingExtraError, ViewsphereError
 from viewsphere.formats import Remark, Verified
-from viewsphere.labels import annotations, channel_labels, labels
+from viewsphere.labels import channel_labels, labels, on_request
 from viewsphere.model.sample import Sample
 from viewsphere.recipe.formats import FormatEntry
 from viewsphere.recipe.sequence import TimeEntry
@@ -300,8 +300,8 @@ def _alone(dataset: Dataset) -> Iterator[str]:
 
 
 def _is_kept(dataset: Dataset, name: str) -> bool:
-    asked = name in annotations() and any(name in _asked(part.recipe) for part in dataset.plan.parts)
-    return name in dataset.plan.channels or asked or (name not in channel_labels() and name not in annotations())
+    asked = name in on_request() and any(name in _asked(part.recipe) for part in dataset.plan.parts)
+    return name in dataset.plan.channels or asked or (name not in channel_labels() and name not in on_request())
 
 
 def _asked(recipe: Mapping[str, Any]) -> set[str]:
@@ -312,7 +312,7 @@ def _asked(recipe: Mapping[str, Any]) -> set[str]:
 def _proofs(models: Mapping[str, ModelInfo], sample: Sample) -> Iterator[tuple[str, list[str]]]:
     """Every check of one frame against itself and what it found; a proof that cannot be carried out counts as failed."""
     proofs: dict[str, Callable[[], Iterable[str]]] = {name: partial(proof, sample) for name, proof in FRAME_PROOFS.items()}
-    following = annotations().keys() - sample.asked  # of these nothing is kept, so nothing can be wrong
+    following = on_request().keys() - sample.asked  # of these nothing is kept, so nothing can be wrong
     kept = {name: label for name, label in labels().items() if name not in following and label.is_in(sample)}
     proofs |= {name: partial(label.prove, sample, models) for name, label in kept.items()}
     for name, proof in proofs.items():

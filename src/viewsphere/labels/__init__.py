@@ -57,7 +57,6 @@ __all__ = [
     "SampleLabel",
     "Sight",
     "annotated",
-    "annotations",
     "channel_labels",
     "channels",
     "drawings",
@@ -69,6 +68,7 @@ __all__ = [
     "makers",
     "object_labels",
     "observe",
+    "on_request",
     "sample_labels",
     "sample_values",
     "short_record",
@@ -112,7 +112,7 @@ def sample_labels() -> dict[str, SampleLabel]:
 
 
 @cache
-def annotations() -> dict[str, ObjectLabel | SampleLabel]:
+def on_request() -> dict[str, ObjectLabel | SampleLabel]:
     """All labels that a recipe's `annotations` may name."""
     return {label.name: label for label in object_labels() if label.on_request} | sample_labels()
 
@@ -201,16 +201,12 @@ def annotated(sight: Sight) -> tuple[ObjectAnnotation, ...]:
     """Annotations of the objects that are placed in a sight, visible or not, in the order of their ids. An object that covers
     no pixel has an empty mask, no `box2d` and visibility 0.
     """
-    known = labels_of(sight.asked)
-    return tuple(_annotated(sight, i, place, known) for i, place in enumerate(sight.placements) if place)
-
-
-def _annotated(sight: Sight, i: int, place: Placement, known: Sequence[ObjectLabel]) -> ObjectAnnotation:
-    found = computed(i + 1, [label.compute(sight, i) for label in known if label.compute], place, _following())
-    for label in known:
-        if label.compute is None:
-            found.more.update(label.restore(None, place, found))
-    return found
+    known, following = labels_of(sight.asked), _following()
+    return tuple(
+        computed(i + 1, [label.compute(sight, i) for label in known], place, known, following)
+        for i, place in enumerate(sight.placements)
+        if place
+    )
 
 
 def sample_values(sight: Sight, objects: Sequence[ObjectAnnotation]) -> Mapping[str, Any]:

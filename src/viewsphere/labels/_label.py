@@ -131,6 +131,11 @@ class ChannelLabel(Label):
         return Channel(self.name, self.dtype, self.components, self.unit, self.empty, self.encoding, self.meaning)
 
 
+def later(sight: Sight, i: int) -> Mapping[str, Any]:
+    """The `compute` of labels that follow from others: `restore` gives their fields."""
+    return {}
+
+
 def nothing(annotation: ObjectAnnotation) -> None:
     """The `keep` of labels that follow from the shot and its models: nothing is stored."""
     return
@@ -140,7 +145,7 @@ def nothing(annotation: ObjectAnnotation) -> None:
 class ObjectLabel(Label):
     """A label of objects: one field or several that are computed together.
 
-    `compute(sight, i)` gives the fields of the object of id i + 1; without it `restore` does. `keep` gives, as JSON, the part
+    `compute(sight, i)` gives the fields of the object of id i + 1; `later`: `restore` does. `keep` gives, as JSON, the part
     of them that does not follow from the shot and its models, None if everything follows. `restore(kept, placement,
     annotation)` computes all fields from this part again, equal to the last bit; other labels' fields are available as
     attributes of the annotation.
@@ -149,7 +154,7 @@ class ObjectLabel(Label):
     """
 
     fields: tuple[Field, ...]
-    compute: Callable[[Sight, int], Mapping[str, Any]] | None = None
+    compute: Callable[[Sight, int], Mapping[str, Any]] = later
     restore: Callable[[Any, Placement, ObjectAnnotation], Mapping[str, Any]]
     keep: Callable[[ObjectAnnotation], Any] = nothing
     on_request: bool = False

@@ -9,7 +9,7 @@ from typing import Any
 
 from viewsphere.errors import StoreError
 from viewsphere.labels._field import Field
-from viewsphere.labels._label import ObjectLabel, nothing
+from viewsphere.labels._label import ObjectLabel, later, nothing
 from viewsphere.labels._placement import Placement
 from viewsphere.model.sample import ObjectAnnotation
 
@@ -28,27 +28,35 @@ def annotation_of(object_id: int, values: Iterable[Mapping[str, Any]], source: M
 
 
 def computed(
-    object_id: int, values: Iterable[Mapping[str, Any]], placement: Placement, makers: Mapping[str, ObjectLabel]
+    object_id: int,
+    values: Iterable[Mapping[str, Any]],
+    placement: Placement,
+    labels: Iterable[ObjectLabel],
+    following: Mapping[str, ObjectLabel],
 ) -> ObjectAnnotation:
-    """The annotation with these fields. Those of `makers`, labels by the names of their fields, are computed when they are
-    first asked for.
+    """The annotation with these fields, and with those of `labels` that follow from them. The fields of labels that nobody
+    asked for, but that follow, too, are computed when they are first asked for.
     """
     made: ObjectAnnotation = annotation_of(object_id, values)
-    object.__setattr__(made, "more", _More(made, placement, makers))
+    more = _More(made, placement, following)
+    object.__setattr__(made, "more", more)
+    for label in labels:
+        if label.compute is later:
+            more.update(label.restore(None, placement, made))
     return made
 
 
 class _More(dict[str, Any]):
     """Fields of an annotation, and those that follow from them and are computed when they are first asked for."""
 
-    def __init__(self, o: ObjectAnnotation, placement: Placement, makers: Mapping[str, ObjectLabel]) -> None:
+    def __init__(self, o: ObjectAnnotation, placement: Placement, following: Mapping[str, ObjectLabel]) -> None:
         super().__init__(o.more)
-        self._of, self._known = (o, placement, makers), dict[str, Any]()
+        self._of, self._known = (o, placement, following), dict[str, Any]()
 
     def __missing__(self, name: str) -> Any:
-        o, placement, makers = self._of
+        o, placement, following = self._of
         if name not in self._known:
-            self._known.update(makers[name].restore(None, placement, o))
+            self._known.update(following[name].restore(None, placement, o))
         return self._known[name]
 
     def __reduce__(self) -> tuple[Any, ...]:

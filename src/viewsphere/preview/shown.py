@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from viewsphere.errors import each
-from viewsphere.labels import ChannelLabel, annotations, labels
+from viewsphere.labels import ChannelLabel, labels, on_request
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.channel import picture_of
 from viewsphere.model.model_spec import ModelSpec
@@ -94,7 +94,7 @@ def _drawable(recipe: Recipe, channels: Sequence[str], draw: Sequence[str]) -> R
     wanted = [label for label in labels().values() if label.drawing and label.drawing.name in draw]
     named = (label.name for label in wanted if isinstance(label, ChannelLabel))
     asked = {entry.name: entry for entry in recipe.annotations}
-    kept = (asked.get(label.name, Named(name=label.name)) for label in wanted if label.name in annotations())
+    kept = (asked.get(label.name, Named(name=label.name)) for label in wanted if label.name in on_request())
     return recipe.model_copy(update={"channels": tuple(dict.fromkeys((*channels, *named))), "annotations": tuple(kept)})
 
 

@@ -7,7 +7,7 @@ from fnmatch import fnmatchcase
 
 from viewsphere import plugins
 from viewsphere.errors import RecipeError
-from viewsphere.labels import Needs, annotations, channels, labels
+from viewsphere.labels import Needs, channels, labels, on_request
 from viewsphere.model.mistakes import nearest, one_of, read_options
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.recipe.draws import alternatives, span
@@ -62,11 +62,11 @@ def check_names(recipe: Recipe) -> None:
 
 
 def _check_annotation(recipe: Recipe, where: str, entry: Named) -> None:
-    if entry.name not in annotations():
+    if entry.name not in on_request():
         always = f": every data set has {entry.name}" if entry.name in labels() and entry.name not in channels() else ""
         other = f": {entry.name} is one of channels" if entry.name in channels() else always
-        raise RecipeError(f"{where}: {one_of(entry.name, tuple(annotations()))}{other}")
-    options = annotations()[entry.name].options
+        raise RecipeError(f"{where}: {one_of(entry.name, tuple(on_request()))}{other}")
+    options = on_request()[entry.name].options
     if options is None and entry.options:
         raise RecipeError(f"{where}: expected no options, {entry.name} has none; found {', '.join(entry.options)}")
     if options is not None:
