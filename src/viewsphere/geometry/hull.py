@@ -46,12 +46,12 @@ def smallest_rectangle(hull: Float) -> Float:
     lengths = np.hypot(*sides.T)
     along = sides[lengths > 0] / lengths[lengths > 0, None] if (lengths > 0).any() else np.array([[1.0, 0.0]])
     across = np.stack([-along[:, 1], along[:, 0]], axis=1)
-    u, v = hull @ along.T, hull @ across.T
+    u, v = (hull[:, :1] * axes[:, 0] + hull[:, 1:] * axes[:, 1] for axes in (along, across))  # no BLAS, as in geometry.rotation
     areas = np.ptp(u, axis=0) * np.ptp(v, axis=0)
     best = int(np.flatnonzero(areas <= areas.min() * (1 + EQUAL))[0])
     low, high = (u[:, best].min(), v[:, best].min()), (u[:, best].max(), v[:, best].max())
     placed = np.array([low, (high[0], low[1]), high, (low[0], high[1])])
-    corners = placed @ np.stack([along[best], across[best]])
+    corners = placed[:, :1] * along[best] + placed[:, 1:] * across[best]
     first = min(range(4), key=lambda i: (round(float(corners[i, 1]), 9), float(corners[i, 0])))
     return np.roll(corners, -first, axis=0)
 

@@ -94,6 +94,16 @@ def quaternion_product(a: ArrayLike, b: ArrayLike) -> Float:
     )
 
 
+def rotation_vector(matrix: ArrayLike) -> Float:
+    """The vector (3,) about which a rotation (3, 3) turns, counterclockwise seen from its tip, as long as the angle, at most pi
+    radians; rounded to 1e-12, because the last digits of angles differ between processors.
+    """
+    w, x, y, z = quaternion_from_matrix(matrix)
+    sine = math.sqrt(x * x + y * y + z * z)
+    factor = 2 * math.atan2(sine, w) / sine if sine else 2.0
+    return np.array([round(factor * value, 12) + 0.0 for value in (x, y, z)])
+
+
 def slerp(start: ArrayLike, end: ArrayLike, share: float) -> Float:
     """The unit quaternion (4,) at a share of the way from one unit quaternion (w, x, y, z) to another, the shorter way around:
     the angle turned grows evenly with the share. Shoemake 1985.

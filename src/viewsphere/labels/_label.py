@@ -38,18 +38,20 @@ def trusted(sample: Sample, models: Models) -> Iterator[str]:
 
 @dataclass(frozen=True)
 class Needs:
-    """The inputs of a label besides its own instant and sensor: offsets of instants (-1 is the one before), whether a sensor
-    that is rectified with its own, and whether points that are followed.
+    """The inputs of a label besides its own instant and sensor: offsets of instants (-1 is the one before), of those of which
+    poses are enough, whether a sensor that is rectified with its own, whether any others, and whether points that are followed.
     """
 
     instants: tuple[int, ...] = ()
+    poses: tuple[int, ...] = ()
     rectified: bool = False
+    rig: bool = False
     tracks: bool = False
 
     @property
     def is_some(self) -> bool:
         """Whether still pictures of one sensor do not have the label."""
-        return bool(self.instants or self.rectified or self.tracks)
+        return bool(self.instants or self.poses or self.rectified or self.rig or self.tracks)
 
 
 TAIL = 8

@@ -18,7 +18,7 @@ from viewsphere.labels._placement import Placement
 from viewsphere.model.camera import Camera
 from viewsphere.truth.correspondence import Match
 from viewsphere.truth.geometry import Geometry
-from viewsphere.truth.shot_views import Followed
+from viewsphere.truth.shot_views import Followed, Moment
 from viewsphere.truth.view import View
 from viewsphere.truth.visibility import Instances, Visibility, homogeneous, lens_rays, rasterize
 
@@ -33,6 +33,10 @@ class Around(Protocol):
 
     def view(self, instants: int, sensor: str | None) -> View | None:
         """That of a sensor, None for the picture's own, so many instants later; None without such a sensor or instant."""
+        ...
+
+    def moment(self, instants: int) -> Moment | None:
+        """Where all is so many instants later, None where the shot does not have that instant."""
         ...
 
     @property
@@ -91,6 +95,10 @@ class Sight:
     def neighbour(self, instants: int = 0, sensor: str | None = None) -> View | None:
         """What a sensor, by default the own one, may see so many instants later; None without such a sensor or instant."""
         return self.around.view(instants, sensor) if self.around else None
+
+    def moment(self, instants: int = 0) -> Moment | None:
+        """Where all is so many instants later; None without such an instant."""
+        return self.around.moment(instants) if self.around else None
 
     def match(self, instants: int = 0, sensor: str | None = None) -> Match | None:
         """Where the picture's points are in a neighbour; kept, so that labels share it."""

@@ -34,23 +34,27 @@ class BirdsEye:
 def of(placement: Placement) -> Mapping[str, Any]:
     """The rectangle along the object's heading around its box, whose edges may lean; and its corners."""
     pose = placement.world_from_object
-    yaw = math.atan2(*_front(pose)[::-1])
-    along = np.array([math.cos(yaw), math.sin(yaw)])
-    axes = np.stack([along, [-along[1], along[0]]])
-    flat = transform(pose, placement.box)[:, :2] @ axes.T
-    low, high = flat.min(axis=0), flat.max(axis=0)
-    (x, y), (length, width) = ((low + high) / 2 @ axes).tolist(), (high - low).tolist()
-    signs = np.array([[1, 1], [1, -1], [-1, -1], [-1, 1]])
-    corners = np.array([x, y]) + (signs * (high - low) / 2) @ axes
-    return {"birds_eye": BirdsEye(x, y, length, width, math.degrees(yaw)), "birds_eye_corners": corners}
+    cos, sin = _heading(pose)
+    x, y = transform(pose, placement.box)[:, :2].T
+    along, across = x * cos + y * sin, y * cos - x * sin
+    (back, front), (right, left) = ((float(reach.min()), float(reach.max())) for reach in (along, across))
+    ends = ((front, left), (front, right), (back, right), (back, left))
+    corners = np.array([(a * cos - b * sin, a * sin + b * cos) for a, b in ends])
+    a, b = (front + back) / 2, (left + right) / 2
+    yaw = round(math.degrees(math.atan2(sin, cos)), 9) + 0.0
+    told = BirdsEye(a * cos - b * sin, a * sin + b * cos, front - back, left - right, yaw)
+    return {"birds_eye": told, "birds_eye_corners": corners}
 
 
-def _front(pose: Any) -> tuple[float, float]:
-    """The direction of an object's front, -Y, on the ground; of one that faces up or down that of its top."""
+def _heading(pose: Any) -> tuple[float, float]:
+    """The direction of an object's front, -Y, on the ground; of one that faces up or down the way in which its front came
+    there: its bottom's, its top's.
+    """
     x, y = (-pose[:2, 1]).tolist()
-    if math.hypot(x, y) > TOLERANCE:
-        return x, y
-    return pose[0, 2].item() * -pose[2, 1].item(), pose[1, 2].item() * -pose[2, 1].item()
+    if math.hypot(x, y) <= TOLERANCE:
+        x, y = (pose[:2, 2] * pose[2, 1]).tolist()
+    length = math.hypot(x, y)
+    return x / length, y / length
 
 
 def prove(sample: Sample, models: Models) -> Iterator[str]:

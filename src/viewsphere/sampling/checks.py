@@ -78,7 +78,8 @@ def _check_needs(recipe: Recipe, where: str, name: str) -> None:
     """A label that compares pictures needs these."""
     needs = labels()[name].needs if name in labels() else Needs()
     for field, what, is_lacking in (
-        ("time", "whose instants are compared", bool(needs.instants) and recipe.time is None),
+        ("time", "whose instants are compared", bool(needs.instants or needs.poses) and recipe.time is None),
+        ("rig", "whose sensors are compared", needs.rig and recipe.rig is None),
         ("rig", "with a sensor that is rectified with its own", needs.rectified and recipe.rig is None),
         ("tracks", "which say what is followed", needs.tracks and recipe.tracks is None),
     ):

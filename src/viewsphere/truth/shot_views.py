@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.assets.mesh import Mesh
+from viewsphere.model.camera import Camera
+from viewsphere.model.scene import Matrix4
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
 from viewsphere.model.tracks import TRACK, Tracks
@@ -158,6 +160,23 @@ def _drawn(view: View, count: int, on_objects: bool, rng: np.random.Generator) -
 
 
 @dataclass(frozen=True, eq=False)
+class Moment:
+    """Where all is at an instant: seconds of the sequence, world from each of the objects 1, 2, ... (None: it is not there),
+    the cameras of all sensors in the rig's order, and which of them is the picture's own.
+    """
+
+    seconds: float
+    poses: tuple[Matrix4 | None, ...]
+    cameras: tuple[Camera, ...]
+    sensor: int
+
+    @property
+    def camera(self) -> Camera:
+        """The camera of the picture's own sensor."""
+        return self.cameras[self.sensor]
+
+
+@dataclass(frozen=True, eq=False)
 class SampleViews:
     """The views beside that of one sample: of a sensor at an instant of a shot."""
 
@@ -169,6 +188,15 @@ class SampleViews:
     def partner(self) -> tuple[str, float] | None:
         """Name of a sensor that is rectified with the sample's own, and the metres between them; None without one."""
         return self.views.shot.rig.partner(self.sensor)
+
+    def moment(self, instants: int) -> Moment | None:
+        """Where all is so many instants later, None where the shot does not have that instant."""
+        shot, instant = self.views.shot, self.views.shot.instant_after(self.instant, instants)
+        if instant is None:
+            return None
+        cameras = tuple(shot.camera(instant, sensor) for sensor in range(len(shot.rig.sensors)))
+        poses = tuple(thing.motion.at(instant) for thing in shot.objects)
+        return Moment(shot.instants[instant].seconds, poses, cameras, self.sensor)
 
     def view(self, instants: int, sensor: str | None) -> View | None:
         """That of a sensor, None for the sample's own, so many instants later; None without such a sensor or instant."""

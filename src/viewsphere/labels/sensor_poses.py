@@ -1,0 +1,53 @@
+"""sensor_poses: where the other sensors of the rig are, as the picture's own camera sees them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from viewsphere.geometry.rotation import compose, rigid
+from viewsphere.labels._field import Field
+from viewsphere.labels._label import Models, Needs, SampleLabel
+from viewsphere.labels._sight import Sight
+from viewsphere.model.sample import ObjectAnnotation, Sample
+
+TOLERANCE = 1e-9
+
+
+def compute(sight: Sight, objects: Sequence[ObjectAnnotation]) -> Mapping[str, Any]:
+    """The poses of all sensors at the picture's instant, its own among them."""
+    now = sight.moment()
+    if now is None:
+        raise ValueError("sensor_poses: expected a sample of a rig, found none")
+    own = rigid(sight.camera.R, sight.camera.t)
+    return {"camera_from_sensors": np.stack([compose(own, rigid(one.R.T, one.center)) for one in now.cameras])}
+
+
+def prove(sample: Sample, models: Models) -> Iterator[str]:
+    """All are rigid, and the picture's own is the identity."""
+    poses = sample.camera_from_sensors
+    turns = poses[:, :3, :3]
+    if np.abs(turns @ turns.transpose(0, 2, 1) - np.eye(3)).max() > TOLERANCE:
+        yield "expected rigid poses, found others"
+    if np.abs(poses - np.eye(4)).max(axis=(1, 2)).min() > TOLERANCE * (1 + np.abs(poses).max()):
+        yield "expected the identity, the picture's own sensor, among the poses; found none"
+
+
+LABEL = SampleLabel(
+    name="sensor_poses",
+    meaning="where the rig's sensors are",
+    axes="camera",
+    needs=Needs(rig=True),
+    fields=(
+        Field(
+            "camera_from_sensors",
+            "rigid, from each sensor's axes to the picture's own, in the rig's order",
+            *(float, (-1, 4, 4), "m"),
+            is_array=True,
+        ),
+    ),
+    compute=compute,
+    prove=prove,
+)

@@ -1,0 +1,78 @@
+"""velocity: how fast an object moves, turns and speeds up."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.geometry.rotation import product, rotation_vector, transform
+from viewsphere.labels._field import Field
+from viewsphere.labels._label import Models, Needs, ObjectLabel, rendered
+from viewsphere.labels._placement import Placement
+from viewsphere.labels._sight import Sight
+from viewsphere.model.sample import ObjectAnnotation, Sample
+
+Float = NDArray[np.float64]
+
+FIELDS = ("velocity", "angular_velocity", "acceleration")
+
+
+def compute(sight: Sight, i: int) -> Mapping[str, Any]:
+    """Differences of the poses at the instants next to this one, of the middle of the object's box: central ones; at a
+    sequence's ends, and where the object comes or goes, one-sided ones without an acceleration.
+    """
+    placement, now = sight.placement(i), sight.moment()
+    middle = (placement.box[2] + placement.box[4]) / 2
+    known = [(m.seconds, np.array(m.poses[i])) for m in (sight.moment(-1), now, sight.moment(1)) if m and m.poses[i]]
+    if len(known) < 2:
+        return dict.fromkeys(FIELDS)
+    (start, before), (end, after) = known[0], known[-1]
+    moved = transform(after, middle) - transform(before, middle)
+    turned = rotation_vector(product(after[:3, :3], before[:3, :3].T))
+    time, acceleration = end - start, None
+    if len(known) == 3:
+        places = [transform(pose, middle) for _, pose in known]
+        acceleration = (places[2] - 2 * places[1] + places[0]) / (time * time / 4)
+    return dict(zip(FIELDS, (moved / time, turned / time, acceleration), strict=True))
+
+
+def keep(o: ObjectAnnotation) -> Any:
+    """All three, None where they are not known."""
+    kept = [None if getattr(o, name) is None else getattr(o, name).tolist() for name in FIELDS]
+    return kept if any(kept) else None
+
+
+def restore(kept: Any, placement: Placement, o: ObjectAnnotation) -> Mapping[str, Any]:
+    """The fields, from lists of numbers."""
+    return {
+        name: None if value is None else np.array(value, np.float64)
+        for name, value in zip(FIELDS, kept or (None,) * 3, strict=True)
+    }
+
+
+def prove(sample: Sample, models: Models) -> Iterator[str]:
+    """An object that turns or speeds up has a velocity, and no number is infinite."""
+    for o in rendered(sample):
+        if (o.velocity is None) != (o.angular_velocity is None) or (o.velocity is None and o.acceleration is not None):
+            yield f"object {o.id}: expected velocity and angular velocity together, found {o.velocity}, {o.angular_velocity}"
+
+
+LABEL = ObjectLabel(
+    name="velocity",
+    meaning="how it moves",
+    axes="world",
+    on_request=True,
+    needs=Needs(poses=(-1, 1)),
+    fields=(
+        Field("velocity", "of the middle of its box; None where only one instant has it", float, (3,), "m/s", "", True, True),
+        Field("angular_velocity", "along the axis about which it turns", float, (3,), "rad/s", "", True, True),
+        Field("acceleration", "None at a sequence's ends, too", float, (3,), "m/s^2", "", True, True),
+    ),
+    compute=compute,
+    keep=keep,
+    restore=restore,
+    prove=prove,
+)
