@@ -203,7 +203,9 @@ PAGES = {
     "formats.md": partial(options_page, "formats", "formats.md"),
     "motion.md": partial(options_page, "motions", "motion.md"),
     "recipe.md": recipe_page,
-    "recipe.schema.json": lambda: json.dumps(schema(tuple(channels())), indent=1) + "\n",
+    "recipe.schema.json": lambda: (
+        json.dumps(schema(channels=tuple(channels()), annotations=tuple(on_request())), indent=1) + "\n"
+    ),
     **FIGURES,
 }
 

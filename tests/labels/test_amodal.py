@@ -223,14 +223,24 @@ def recipe(*annotations):
         ("amodl", r"annotations\[0\]: expected one of .*; found 'amodl'; did you mean 'amodal'"),
         ("depth", r"annotations\[0\]: expected one of .*: depth is one of channels"),
         ("pose", r"annotations\[0\]: expected one of .*: every data set has pose"),
-        ({"amodal": {"size": 3}}, r"annotations\[0\]: expected no options, amodal has none; found size"),
-        ({"amodal": {}, "obb": {}}, r"annotations\[0\]: expected a label's name, or \{name: \{option: value\}\}"),
-        (3, r"annotations\[0\]: expected a label's name"),
     ],
 )
 def test_a_label_that_cannot_be_asked_for_is_told_before_rendering(entry, message):
     with pytest.raises(RecipeError, match=message):
         vs.plan(vs.Recipe(**recipe(entry)))
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"amodal": {"size": 3}}, r"labels\.amodal: expected no options, amodal has none; found size"),
+        ({"obb": {}}, r"labels: expected one of amodal; found 'obb'.*: name it in channels or annotations, too"),
+        ({"amodal": 3}, r"labels\.amodal: expected a mapping"),
+    ],
+)
+def test_options_that_no_label_has_are_told_before_rendering(options, message):
+    with pytest.raises(RecipeError, match=message):
+        vs.plan(vs.Recipe(**recipe("amodal"), channels=["rgb"], labels=options))
 
 
 def test_a_label_is_asked_for_once():

@@ -53,7 +53,7 @@ def scene(meshes, motions, pose=None, intrinsics=LENS, ground=False, category_de
     things = tuple(
         Thing(id=i + 1, model=s, motion=Motion.still(m)) for i, (s, m) in enumerate(zip(specs, motions, strict=True))
     )
-    shot = still_shot(things, intrinsics, [pose], category_deg=category_deg, annotations={name: {} for name in asked})
+    shot = still_shot(things, intrinsics, [pose], category_deg=category_deg, annotations=asked)
     geometry = build_geometry(things, meshes, ground, 0.01)
     visibility = rasterize(geometry, camera)
     boxes = [box_vertices(*m.bounds) for m in meshes]

@@ -300,13 +300,9 @@ def _alone(dataset: Dataset) -> Iterator[str]:
 
 
 def _is_kept(dataset: Dataset, name: str) -> bool:
-    asked = name in on_request() and any(name in _asked(part.recipe) for part in dataset.plan.parts)
-    return name in dataset.plan.channels or asked or (name not in channel_labels() and name not in on_request())
-
-
-def _asked(recipe: Mapping[str, Any]) -> set[str]:
-    """The names of a recipe's annotations, which may have options."""
-    return {name for entry in recipe.get("annotations", ()) for name in ([entry] if isinstance(entry, str) else entry)}
+    if name in on_request():
+        return any(name in part.recipe.get("annotations", ()) for part in dataset.plan.parts)
+    return name in dataset.plan.channels or name not in channel_labels()
 
 
 def _proofs(models: Mapping[str, ModelInfo], sample: Sample) -> Iterator[tuple[str, list[str]]]:

@@ -58,7 +58,7 @@ class Again:
         camera, by_id = sample.camera, {o.id: o for o in sample.objects}
         placed = tuple(self._placement(by_id.get(i + 1), sample, shot) for i in range(geometry.object_count))
         visibility = rasterize(geometry, camera, keeps_exact=True)
-        sight = Sight(geometry, camera, visibility, placed, self._compared(sample, shot, key), shot.annotations)
+        sight = Sight(geometry, camera, visibility, placed, self._compared(sample, shot, key), shot.annotations, shot.labels)
         for name, label in channel_labels().items():
             if name in sample.files:
                 yield from ((name, problem) for problem in self._pixels(sample, name, label.compute(sight)))

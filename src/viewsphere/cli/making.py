@@ -64,10 +64,10 @@ def schema() -> None:
     """Print the recipe's JSON schema, for editors."""
     import json
 
-    from viewsphere.labels import channels
+    from viewsphere.labels import channels, on_request
     from viewsphere.recipe.file import schema as recipe_schema
 
-    typer.echo(json.dumps(recipe_schema(tuple(channels())), indent=2))
+    typer.echo(json.dumps(recipe_schema(channels=tuple(channels()), annotations=tuple(on_request())), indent=2))
 
 
 def inspect(

@@ -189,7 +189,7 @@ def sight_of(
         for thing, known in zip(objects, facts, strict=True)
         for pose, step in ((thing.motion.at(instant), thing.motion.step_at(instant)),)
     )
-    return Sight(geometry, camera, visibility, places, around, shot.annotations)
+    return Sight(geometry, camera, visibility, places, around, shot.annotations, shot.labels)
 
 
 def _track(thing: Thing, instant: int) -> str:

@@ -93,7 +93,8 @@ class Drawing:
 
 @dataclass(frozen=True, kw_only=True)
 class Label:
-    """The properties of all labels: `name` (that of their file), `meaning`, and `axes`, their frame of reference.
+    """The properties of all labels: `name` (that of their file), `meaning`, `axes`, their frame of reference, and `options`,
+    the class of those that a recipe's `labels` may give.
 
     `prove` compares a stored sample with itself, which is quick; besides, `check` computes every label again.
     """
@@ -102,6 +103,7 @@ class Label:
     meaning: str
     axes: str = ""
     needs: Needs = Needs()
+    options: type[Frozen] | None = None
     prove: Proof = trusted
     drawing: Drawing | None = None
 
@@ -152,7 +154,7 @@ class ObjectLabel(Label):
     annotation)` computes all fields from this part again, equal to the last bit; other labels' fields are available as
     attributes of the annotation.
 
-    A label that is `on_request` is computed only where a recipe's `annotations` name it, with the options that `options` reads.
+    A label that is `on_request` is computed only where a recipe's `annotations` name it.
     """
 
     fields: tuple[Field, ...]
@@ -160,7 +162,6 @@ class ObjectLabel(Label):
     restore: Callable[[Any, Placement, ObjectAnnotation], Mapping[str, Any]]
     keep: Callable[[ObjectAnnotation], Any] = nothing
     on_request: bool = False
-    options: type[Frozen] | None = None
 
     @property
     def follows(self) -> bool:
@@ -199,14 +200,13 @@ class ObjectLabel(Label):
 
 @dataclass(frozen=True, kw_only=True)
 class SampleLabel(Label):
-    """A label of a whole picture, computed where a recipe's `annotations` name it, with the options that `options` reads.
+    """A label of a whole picture, computed where a recipe's `annotations` name it.
 
     `compute(sight, objects)` gives its fields. The store keeps them as they are.
     """
 
     fields: tuple[Field, ...]
     compute: Callable[[Sight, Sequence[ObjectAnnotation]], Mapping[str, Any]]
-    options: type[Frozen] | None = None
 
 
 def rendered(sample: Sample) -> list[ObjectAnnotation]:

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,7 @@ from viewsphere.geometry.box import Bounds, overlap, projected_bounds
 from viewsphere.geometry.camera import inverse_camera_matrix
 from viewsphere.labels._placement import Placement
 from viewsphere.model.camera import Camera
+from viewsphere.model.frozen import Frozen
 from viewsphere.truth.correspondence import Match
 from viewsphere.truth.geometry import Geometry
 from viewsphere.truth.shot_views import Followed, Moment
@@ -44,6 +45,8 @@ class Around(Protocol):
         """The points that the picture's sensor follows."""
         ...
 
+
+OptionsT = TypeVar("OptionsT", bound=Frozen)
 
 EVERYWHERE = (-math.inf, -math.inf, math.inf, math.inf)
 
@@ -78,7 +81,7 @@ class Alone:
 class Sight:
     """A camera's view of a geometry: `visibility` is `rasterize(geometry, camera)`. `placements` belong to the objects 1, 2,
     ...; an absent object's is None; labels of pixels need no placements. `around`: what the picture is compared with; `asked`:
-    the labels that were asked for, and their options.
+    the annotations that were asked for; `options`: those of labels, by their names.
     """
 
     geometry: Geometry
@@ -86,7 +89,8 @@ class Sight:
     visibility: Visibility
     placements: Sequence[Placement | None] = ()
     around: Around | None = None
-    asked: Mapping[str, Mapping[str, Any]] = field(default_factory=dict[str, Mapping[str, Any]])
+    asked: tuple[str, ...] = ()
+    options: Mapping[str, Mapping[str, Any]] = field(default_factory=dict[str, Mapping[str, Any]])
     _alone: dict[int, Alone] = field(default_factory=dict[int, "Alone"], repr=False)
     _matches: dict[tuple[int, str | None], Match | None] = field(
         default_factory=dict[tuple[int, str | None], "Match | None"], repr=False
@@ -106,6 +110,10 @@ class Sight:
             own, other = self.neighbour(), self.neighbour(instants, sensor)
             self._matches[instants, sensor] = Match(own, self.visibility, other) if own and other else None
         return self._matches[instants, sensor]
+
+    def options_of(self, name: str, kind: type[OptionsT]) -> OptionsT:
+        """The options of a label, as their class reads them."""
+        return kind.model_validate(self.options.get(name, {}))
 
     @property
     def baseline(self) -> float | None:

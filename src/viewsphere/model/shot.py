@@ -44,7 +44,8 @@ class Shot(Frozen):
     engine: str = "raster"
     engine_options: dict[str, JsonValue] = Field(default_factory=dict)
     channels: tuple[str, ...]
-    annotations: dict[str, dict[str, JsonValue]] = Field(default_factory=dict)  # options of labels that were asked for
+    annotations: tuple[str, ...] = ()  # labels of objects and of pictures that were asked for
+    labels: dict[str, dict[str, JsonValue]] = Field(default_factory=dict)  # options of labels
     files: Files = Files()
     label_alpha: float = 0.01
     category_deg: float = Field(default=45.0, gt=0)  # angular resolution of the pose categories
@@ -82,12 +83,13 @@ class Shot(Frozen):
 
     @model_serializer(mode="wrap")
     def _as_ever(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Without shutter and exposures where there is no shutter, and without annotations that nobody asked for, so that
-        records of such shots are what they were before.
+        """Without shutter and exposures where there is no shutter, and without annotations and options that nobody asked for,
+        so that records of such shots are what they were before.
         """
         found: dict[str, Any] = handler(self)
-        if not self.annotations:
-            found.pop("annotations", None)
+        for name in ("annotations", "labels"):
+            if not getattr(self, name):
+                found.pop(name, None)
         if not self.shutter:
             found.pop("shutter", None)
             found.pop("exposures", None)

@@ -18,7 +18,6 @@ from viewsphere.model.rig import Rig
 from viewsphere.model.sample import Sample
 from viewsphere.model.shot import Shot
 from viewsphere.model.tracks import Tracks
-from viewsphere.recipe.named import Named
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.run.framing import Framing
 from viewsphere.run.opening import prepare
@@ -93,9 +92,10 @@ def _drawable(recipe: Recipe, channels: Sequence[str], draw: Sequence[str]) -> R
     """The recipe with these channels, and with the labels that are drawn, and no others that have to be asked for."""
     wanted = [label for label in labels().values() if label.drawing and label.drawing.name in draw]
     named = (label.name for label in wanted if isinstance(label, ChannelLabel))
-    asked = {entry.name: entry for entry in recipe.annotations}
-    kept = (asked.get(label.name, Named(name=label.name)) for label in wanted if label.name in on_request())
-    return recipe.model_copy(update={"channels": tuple(dict.fromkeys((*channels, *named))), "annotations": tuple(kept)})
+    kept = tuple(label.name for label in wanted if label.name in on_request())
+    options = {label.name: recipe.labels[label.name] for label in wanted if label.name in recipe.labels}
+    drawable = {"channels": tuple(dict.fromkeys((*channels, *named))), "annotations": kept, "labels": options}
+    return recipe.model_copy(update=drawable)
 
 
 def dataset_samples(dataset: Dataset, count: int = 12, row: int = ROW, films: Sequence[Film] = ()) -> list[Sample]:

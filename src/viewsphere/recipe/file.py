@@ -262,13 +262,15 @@ def dump(data: dict[str, Any]) -> str:
     return yaml.dump(data, Dumper=_Dumper, sort_keys=False, default_flow_style=None, allow_unicode=True, width=110)
 
 
-def schema(channels: Sequence[str] = ()) -> dict[str, Any]:
-    """JSON schema (draft 2020-12) of recipe files, with a description of every field; `channels`: all valid ones, if given."""
+def schema(**names: Sequence[str]) -> dict[str, Any]:
+    """JSON schema (draft 2020-12) of recipe files, with a description of every field; `names`: all valid names that the fields
+    `channels` and `annotations` list, if given.
+    """
     from viewsphere.recipe.recipe import Recipe
 
     whole = Recipe.model_json_schema()
-    if channels:
-        whole["properties"]["channels"]["items"]["enum"] = list(channels)
+    for field, known in names.items():
+        whole["properties"][field]["items"]["enum"] = list(known)
     path = {"type": "string", "minLength": 1}
     extends = {
         "anyOf": [path, {"type": "array", "items": path}],

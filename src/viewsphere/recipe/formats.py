@@ -5,17 +5,30 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Annotated, Any
 
-from pydantic import BeforeValidator, JsonValue, TypeAdapter, ValidationError, WithJsonSchema
+from pydantic import BeforeValidator, Field, JsonValue, TypeAdapter, ValidationError, WithJsonSchema, model_serializer
 
 from viewsphere import plugins
 from viewsphere.errors import RecipeError
 from viewsphere.model.frozen import Frozen
-from viewsphere.model.mistakes import read_options, report
-from viewsphere.recipe.named import FORM, Named, named
+from viewsphere.model.mistakes import read_options, report, shown
+
+FORM = {
+    "anyOf": [
+        {"type": "string"},
+        {"type": "object", "additionalProperties": {"type": "object"}, "minProperties": 1, "maxProperties": 1},
+    ]
+}
 
 
-class FormatEntry(Named):
-    """A format by its name, and options that the format itself checks."""
+class FormatEntry(Frozen):
+    """A format by its name, and options that the format itself checks; written `coco`, or `{coco: {category_ids: coco}}`."""
+
+    name: str = Field(min_length=1)
+    options: dict[str, JsonValue] = Field(default={})
+
+    @model_serializer
+    def _as_written(self) -> Any:
+        return {self.name: self.options} if self.options else self.name
 
     def over(self, options: Mapping[str, JsonValue]) -> FormatEntry:
         """This entry with these options where it has no others."""
@@ -47,7 +60,19 @@ class FormatEntry(Named):
             yield from said(categories, *self.arguments())
 
 
-FormatField = Annotated[FormatEntry, BeforeValidator(named("a format")), WithJsonSchema(FORM)]
+def _entry(value: Any) -> Any:
+    if isinstance(value, str):
+        return {"name": value}
+    if isinstance(value, Mapping) and len(value) == 1:
+        ((name, options),) = value.items()
+        if isinstance(name, str) and isinstance(options, Mapping | None):
+            return {"name": name, "options": options or {}}
+    if isinstance(value, FormatEntry):
+        return value
+    raise ValueError(f"expected a format's name, or {{name: {{option: value}}}}; found {shown(value)}")
+
+
+FormatField = Annotated[FormatEntry, BeforeValidator(_entry), WithJsonSchema(FORM)]
 _FIELDS = TypeAdapter(tuple[FormatField, ...])
 
 Formats = str | Sequence[str | Mapping[str, Mapping[str, Any]] | FormatEntry]

@@ -9,7 +9,7 @@ from collections.abc import Generator, Mapping
 from contextlib import contextmanager
 from os import PathLike
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self, TypeVar
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import (
     AfterValidator,
@@ -17,12 +17,12 @@ from pydantic import (
     ConfigDict,
     Discriminator,
     Field,
+    JsonValue,
     ModelWrapValidatorHandler,
     PrivateAttr,
     Tag,
     ValidationError,
     ValidationInfo,
-    WithJsonSchema,
     field_validator,
     model_validator,
 )
@@ -38,7 +38,6 @@ from viewsphere.model.notebook import Shown
 from viewsphere.model.numbers import Count, Natural, Number
 from viewsphere.recipe.formats import FormatEntry, FormatField
 from viewsphere.recipe.models import ModelEntry
-from viewsphere.recipe.named import FORM, Named, named
 from viewsphere.recipe.rig import RigField
 from viewsphere.recipe.scene import CameraEntry, EngineEntry, SceneEntry, engine_entry
 from viewsphere.recipe.scenes import ScenesField
@@ -61,6 +60,7 @@ LATER_FIELDS: dict[tuple[str, ...], Any] = {
     ("scenes", "balance"): "models",
     ("files", "shots"): "files",
     ("annotations",): [],
+    ("labels",): {},
 }
 """Likewise fields of their parts, with the defaults that are left out."""
 
@@ -123,15 +123,9 @@ def _distinct(names: tuple[str, ...]) -> tuple[str, ...]:
     return names
 
 
-NamedT = TypeVar("NamedT", bound=Named)
-
-
-def _distinct_names(entries: tuple[NamedT, ...]) -> tuple[NamedT, ...]:
+def _distinct_formats(entries: tuple[FormatEntry, ...]) -> tuple[FormatEntry, ...]:
     _distinct(tuple(entry.name for entry in entries))
     return entries
-
-
-AnnotationField = Annotated[Named, BeforeValidator(named("a label")), WithJsonSchema(FORM)]
 
 
 class Recipe(Shown, Frozen):
@@ -186,13 +180,14 @@ class Recipe(Shown, Frozen):
     channels: Annotated[tuple[str, ...], AfterValidator(_distinct)] = Field(
         default=DEFAULT_CHANNELS, min_length=1, validate_default=True, description="what to keep of every frame"
     )
-    annotations: Annotated[tuple[AnnotationField, ...], AfterValidator(_distinct_names)] = Field(
-        default=(),
-        description="labels of objects and of whole pictures beside those that every data set has, by name or with options: "
-        "[amodal, occluders]",
+    annotations: Annotated[tuple[str, ...], AfterValidator(_distinct)] = Field(
+        default=(), description="labels of objects and of whole pictures to compute beside those that every data set has"
+    )
+    labels: dict[str, dict[str, JsonValue]] = Field(
+        default={}, description="options of labels that the recipe names, by their names: {captions: {count: 5}}"
     )
     files: Files = Field(default=Files(), description="how each channel is written: lossless PNG and TIFF by default")
-    formats: Annotated[tuple[FormatField, ...], AfterValidator(_distinct_names)] = Field(
+    formats: Annotated[tuple[FormatField, ...], AfterValidator(_distinct_formats)] = Field(
         default=(FormatEntry(name="native"), FormatEntry(name="coco")),
         description="formats to write when all is rendered, by name or with options: {coco: {category_ids: coco}}",
     )

@@ -279,7 +279,7 @@ def render_sample(
         instant=now.index,
         time=now.seconds,
         taken=Taken(instant, sensor, shot),
-        asked=tuple(shot.annotations),
+        asked=shot.annotations,
         more=sample_values(sight, objects),
     )
 

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from fnmatch import fnmatchcase
+
+from pydantic import JsonValue
 
 from viewsphere import plugins
 from viewsphere.errors import RecipeError
@@ -11,7 +14,6 @@ from viewsphere.labels import Needs, channels, labels, on_request
 from viewsphere.model.mistakes import nearest, one_of, read_options
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.recipe.draws import alternatives, span
-from viewsphere.recipe.named import Named
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.scenes import ScenesEntry
 from viewsphere.recipe.surface import GroundEntry
@@ -57,21 +59,33 @@ def check_names(recipe: Recipe) -> None:
         if name not in channels():
             raise RecipeError(f"channels[{i}]: {one_of(name, tuple(channels()))}")
         _check_needs(recipe, f"channels[{i}]", name)
-    for i, entry in enumerate(recipe.annotations):
-        _check_annotation(recipe, f"annotations[{i}]", entry)
+    for i, name in enumerate(recipe.annotations):
+        _check_annotation(recipe, f"annotations[{i}]", name)
+    for name, given in recipe.labels.items():
+        _check_options(recipe, name, given)
 
 
-def _check_annotation(recipe: Recipe, where: str, entry: Named) -> None:
-    if entry.name not in on_request():
-        always = f": every data set has {entry.name}" if entry.name in labels() and entry.name not in channels() else ""
-        other = f": {entry.name} is one of channels" if entry.name in channels() else always
-        raise RecipeError(f"{where}: {one_of(entry.name, tuple(on_request()))}{other}")
-    options = on_request()[entry.name].options
-    if options is None and entry.options:
-        raise RecipeError(f"{where}: expected no options, {entry.name} has none; found {', '.join(entry.options)}")
-    if options is not None:
-        read_options(options, entry.options, f"{where}.{entry.name}")
-    _check_needs(recipe, where, entry.name)
+def _check_annotation(recipe: Recipe, where: str, name: str) -> None:
+    """A label that can be asked for, with what it needs."""
+    if name not in on_request():
+        told = (
+            f": {name} is one of channels" if name in channels() else f": every data set has {name}" if name in labels() else ""
+        )
+        raise RecipeError(f"{where}: {one_of(name, tuple(on_request()))}{told}")
+    _check_needs(recipe, where, name)
+
+
+def _check_options(recipe: Recipe, name: str, given: Mapping[str, JsonValue]) -> None:
+    """Options of a label that the recipe names."""
+    asked = tuple(label for label in (*recipe.channels, *recipe.annotations) if label in labels())
+    if name not in asked:
+        raise RecipeError(f"labels: {one_of(name, asked)}: name it in channels or annotations, too")
+    options = labels()[name].options
+    if options is None:
+        raise RecipeError(
+            f"labels.{name}: expected no options, {name} has none; found {', '.join(given) or 'an empty mapping'}"
+        )
+    read_options(options, given, f"labels.{name}")
 
 
 def _check_needs(recipe: Recipe, where: str, name: str) -> None:

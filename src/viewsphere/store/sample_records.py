@@ -187,8 +187,8 @@ class ShotRecords:
             instant=now.index,
             time=now.seconds,
             taken=Taken(instant, sensor, None, self.root, self.shot.key),
-            asked=tuple(self.shot.annotations),
-            more=_more(tuple(self.shot.annotations), record.get("more", {})),
+            asked=self.shot.annotations,
+            more=_more(self.shot.annotations, record.get("more", {})),
         )
 
     def _objects(self, records: list[dict[str, Any]], instant: int, camera: Camera) -> Iterator[ObjectAnnotation]:

@@ -146,7 +146,7 @@ def _needed(stock: Stock, taken: Set[int]) -> set[int]:
     """The instants that labels of those that are taken need besides."""
     known = labels()
     names = {name for sensor in stock.rig.sensors for name in sensor.kept(stock.recipe.channels)}
-    names |= {entry.name for entry in stock.recipe.annotations}
+    names.update(stock.recipe.annotations)
     offsets = {offset for name in names if name in known for offset in (*known[name].needs.instants, *known[name].needs.poses)}
     count = time_of(stock).count
     compared = {number + offset for number in taken for offset in offsets if 0 <= number + offset < count}
