@@ -9,7 +9,7 @@ from viewsphere.assets.export import export_glb, export_obj
 from viewsphere.assets.mesh import Mesh
 from viewsphere.geometry.box import FACES, box_vertices
 from viewsphere.geometry.pose_category import pose_category
-from viewsphere.labels import annotated, observe, sight_of
+from viewsphere.labels import annotated, observe, sample_values, sight_of
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.channel import PASSES
 from viewsphere.model.files import Files
@@ -79,11 +79,14 @@ def render(shot: Shot):
         alpha = np.where(channels["instances"] > 0, 255, 0).astype(np.uint8)
         channels |= {"rgb": colors, "rgba": np.dstack([colors, alpha])}
         channels = {name: channels[name] for name in shot.channels}
-        objects = annotated(sight_of(shot, instant, camera, geometry, visibility, boxes, files))
-        yield Sample(number, now.split, camera, now.viewpoint, objects, channels, {}, instant=now.index)
+        sight = sight_of(shot, instant, camera, geometry, visibility, boxes, files)
+        objects = annotated(sight)
+        more = sample_values(sight, objects)
+        told = {"instant": now.index, "asked": shot.annotations, "more": more}
+        yield Sample(number, now.split, camera, now.viewpoint, objects, channels, {}, **told)
 
 
-def shots(several: bool, channels: tuple[str, ...], intrinsics: Intrinsics, ground: bool, files: Files) -> list[Shot]:
+def shots(several: bool, channels: tuple[str, ...], intrinsics: Intrinsics, ground: bool, files: Files, **more) -> list[Shot]:
     """Three models by four poses, or four frames of three boxes, one of them always out of sight."""
     scenes = [{0: (0, 0, 0), 1: (0.5, 0.8, 0), 2: (0, 50, 0)}] if several else [{m: (0, 0, 0)} for m in range(3)]
     names, made = subjects(several), []
@@ -95,7 +98,7 @@ def shots(several: bool, channels: tuple[str, ...], intrinsics: Intrinsics, grou
             Shot(
                 key=f"{names[s]}-000000", things=placed(offsets), rig=Rig.of(intrinsics), channels=channels, first=first,
                 instants=tuple(instants),
-                scene=Scene(ground=Ground() if ground else None), files=files,
+                scene=Scene(ground=Ground() if ground else None), files=files, **more,
             )
         )  # fmt: skip
     return made
@@ -106,20 +109,29 @@ def subjects(several: bool) -> tuple[str, ...]:
 
 
 def make(
-    root: Path, several=False, channels=CHANNELS, intrinsics=LENS, ground=False, leave_out=(), short=True, files=PLAIN
+    root: Path,
+    several=False,
+    channels=CHANNELS,
+    intrinsics=LENS,
+    ground=False,
+    leave_out=(),
+    short=True,
+    files=PLAIN,
+    annotations=(),
 ) -> Dataset:
     """Write the data set; shots whose number is in `leave_out` stay unfinished. Records are `short`, or whole without shots."""
-    planned = shots(several, channels, intrinsics, ground, files)
+    planned = shots(several, channels, intrinsics, ground, files, annotations=annotations)
+    recipe = {"annotations": annotations} if annotations else {}
     frames = sum(len(s.instants) for s in planned)
     store = Store(root)
     store.open_for(
         PlanRecord(
-            version="1", digest="d", name="blocks", recipe={}, categories=CATEGORIES, splits=("train", "val"),
+            version="1", digest="d", name="blocks", recipe=recipe, categories=CATEGORIES, splits=("train", "val"),
             channels=channels, models=tuple(f"block-{i}" for i in range(3)), poses=len(POSES),
             frames=frames, max_objects=3 if several else 1,
             parts=(
                 Part(
-                    "d", "1", "blocks", {}, channels, 0, frames, 3 if several else 1,
+                    "d", "1", "blocks", recipe, channels, 0, frames, 3 if several else 1,
                     blocks=(Block(subjects(several), ((0, len(POSES)),)),), sampler="scenes" if several else PRODUCT,
                     shot_frames=len(POSES), settings={"recipe": "d"},  # imported parts have none
                 ),

@@ -15,7 +15,7 @@ from viewsphere.check.digests import damaged
 from viewsphere.check.frames import FRAME_PROOFS
 from viewsphere.errors import MissingExtraError
 from viewsphere.geometry.mask import decode_rle, encode_rle
-from viewsphere.labels import Needs, channel_labels, channels, labels, object_labels
+from viewsphere.labels import Needs, channel_labels, channels, labels, labels_of, object_labels, on_request
 from viewsphere.labels._label import nothing
 from viewsphere.model.camera import Distortion
 from viewsphere.model.files import Files
@@ -80,13 +80,14 @@ def test_a_whole_data_set_passes(whole):
     report = check(whole)
     assert report.ok, report.findings
     assert report.notes == ()
-    names = ["files", "ids", "camera", "shot", *(name for name in labels() if labels()[name].needs == Needs()), "surface"]
+    names = ["files", "ids", "camera", "shot", *PLAIN, "surface"]
     assert report.checked.pop("digests") > 12 * len(whole.plan.channels)
     assert report.checked.pop("models") == 3
     assert report.checked == dict.fromkeys(names, 12)
     assert json.loads(json.dumps(report.to_json()))["ok"] is True
 
 
+PLAIN = [name for name, label in labels().items() if label.needs == Needs() and name not in on_request()]
 STILL = [name for name, label in channel_labels().items() if label.needs == Needs()]
 LENSES = {
     "brown_conrady": Distortion(model="brown_conrady", coefficients=(-0.2, 0.05, 0.001, 0.0, 0.0)),
@@ -359,7 +360,7 @@ def test_background_without_depth(dataset):
     assert failures(dataset) == {("depth", 5), ("depth_ray", 5), ("surface", 5)}
 
 
-KEPT = [label.name for label in object_labels() if label.keep is not nothing]
+KEPT = [label.name for label in object_labels() if label.keep is not nothing and not label.on_request]
 
 
 @pytest.mark.parametrize("name", KEPT)
@@ -516,7 +517,7 @@ def merged(whole, whole_records, tmp_path_factory):
 
 def missed_leaves(dataset, frame, places):
     """Places in a frame's record where another value is not found, although digests are made to fit."""
-    file = dataset.store.shot_folder(f"block-{frame // 4}-000000") / "frames.json"
+    file = records_file(dataset, frame)
     text, missed = file.read_text(), []
     for where in places:
         records = json.loads(text)
@@ -530,9 +531,12 @@ def missed_leaves(dataset, frame, places):
     return missed
 
 
+def records_file(dataset, frame):
+    return dataset.store.shot_folder(dataset.plan.row_at(frame).key) / "frames.json"
+
+
 def record_of(dataset, frame):
-    file = dataset.store.shot_folder(f"block-{frame // 4}-000000") / "frames.json"
-    return json.loads(file.read_text())[frame % 4]
+    return json.loads(records_file(dataset, frame).read_text())[frame % 4]
 
 
 @pytest.mark.parametrize("kind", ["short", pytest.param("merged", marks=pytest.mark.slow)])
@@ -542,7 +546,7 @@ def test_every_field_of_every_record_is_proved(whole, merged, tmp_path, kind):
     dataset = Dataset(shutil.copytree(source.root, tmp_path / "out"))
     record = record_of(dataset, 6)
     if kind == "merged":
-        assert {field.name for label in object_labels() for field in label.fields} <= record["objects"][0].keys()
+        assert {field.name for label in labels_of(()) for field in label.fields} <= record["objects"][0].keys()
     first = {where[:3]: where for where in leaves(record)}
     assert missed_leaves(dataset, 6, first.values()) == []
 
@@ -563,3 +567,35 @@ def test_frames_of_another_split_than_the_plan_dealt(tmp_path):
 
     edit_json(file, change)
     assert {name for name, _ in failures(Dataset(tmp_path), rays=False)} == {"shot"}
+
+
+ASKED = tuple(name for name, label in on_request().items() if label.needs == Needs())
+
+
+@pytest.fixture(scope="module")
+def annotated(tmp_path_factory):
+    return make(tmp_path_factory.mktemp("annotated") / "set", several=True, annotations=ASKED)
+
+
+def test_labels_on_request_are_proved_where_they_were_asked_for(annotated):
+    report = check(annotated, rays=False)
+    assert report.ok, report.findings
+    assert {name: report.checked[name] for name in ASKED} == dict.fromkeys(ASKED, 4)
+
+
+@pytest.mark.parametrize("kind", ["short", "merged"])
+def test_every_leaf_of_labels_on_request_is_proved(annotated, tmp_path, kind):
+    """In a frame of objects that hide one another; records that say everything have their shots beside them."""
+    dataset = Dataset(shutil.copytree(annotated.root, tmp_path / "out"))
+    if kind == "merged":
+        whole = make(tmp_path / "whole", several=True, annotations=ASKED, short=False)
+        shot = annotated.store.shot_folder("several-000000") / "shot.json"
+        shutil.copy(shot, whole.store.shot_folder("several-000000"))
+        seal_again(whole.root)
+        dataset = Dataset(whole.root)
+    assert check(dataset, rays=False).ok
+    record = record_of(dataset, 1)
+    fields = {*ASKED, *(field.name for name in ASKED for field in on_request()[name].fields)}
+    found = [where for where in leaves(record) if fields.intersection(where)]
+    assert {where[2] for where in found if where[0] == "objects"} >= {"amodal", "occluders"}
+    assert missed_leaves(dataset, 1, found) == []

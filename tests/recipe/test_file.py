@@ -230,7 +230,7 @@ def test_the_schema_refuses_what_the_recipe_refuses(fields):
 def test_the_schema_knows_the_channels_it_is_told():
     data = {"models": [{"source": "zoo:car"}], "viewpoints": {"distance": 5}, "channels": ["rgb", "rgbb"]}
     assert not list(validator().iter_errors(data))
-    assert list(jsonschema.Draft202012Validator(schema(("rgb", "depth"))).iter_errors(data))
+    assert list(jsonschema.Draft202012Validator(schema(channels=("rgb", "depth"))).iter_errors(data))
 
 
 BLOCKS = re.findall(r"```yaml\n(.*?)```", (ROOT / "docs" / "recipe.md").read_text("utf-8"), re.DOTALL)

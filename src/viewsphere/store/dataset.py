@@ -439,6 +439,10 @@ class _ChannelFiles(Mapping[str, NDArray[Any]]):
             )
         return self._arrays[name]
 
+    def __contains__(self, name: object) -> bool:
+        """Without reading the file."""
+        return name in self._files
+
     def __iter__(self) -> Iterator[str]:
         return iter(self._files)
 
