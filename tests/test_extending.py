@@ -50,7 +50,7 @@ def csv_boxes(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture
 def labelled(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[str, str], None]]:
     """Installs a label; what is kept of the table of labels is forgotten before and after."""
-    tables = (labels.labels, labels.channel_labels, labels.object_labels, labels.channels)
+    tables = [table for table in vars(labels).values() if hasattr(table, "cache_clear")]
 
     def forget() -> None:
         for table in tables:

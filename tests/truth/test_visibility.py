@@ -4,17 +4,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from truth_scenes import LENSES, cast, cube, lens, mesh_of, orbit_camera, placed, random_soup, sphere
+from truth_scenes import LENSES, cast, cube, lens, mesh_of, orbit_camera, placed, random_soup, silhouette, sphere
 
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.model.camera import Camera
 from viewsphere.truth.visibility import rasterize
 
 EXACT = settings(max_examples=12, derandomize=True, deadline=None, database=None)
-
-
-def silhouette(geometry, camera, object_id, window):
-    return rasterize(geometry, camera, object_id=object_id, window=window).triangle >= 0
 
 
 def depth_of(visibility):

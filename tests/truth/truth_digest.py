@@ -13,12 +13,12 @@ import time
 from itertools import pairwise
 
 import numpy as np
-from truth_scenes import LENSES, cube, lens, orbit_camera, placed, random_soup, sphere
+from truth_scenes import LENSES, cube, lens, orbit_camera, placed, random_soup, silhouette, sphere
 
 import viewsphere as vs
 from viewsphere.kernels.kernel_cache import IS_STOCK, NUMBA
 from viewsphere.labels import channel_labels, observe
-from viewsphere.truth.visibility import rasterize, silhouette
+from viewsphere.truth.visibility import rasterize
 
 LABELS = [name for name, label in channel_labels().items() if not label.needs.is_some]
 """Those that still pictures of one sensor have."""

@@ -13,6 +13,7 @@ from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.thing import Motion, Thing
 from viewsphere.truth.cutouts import ENDLESS
 from viewsphere.truth.geometry import Geometry, build_geometry
+from viewsphere.truth.visibility import rasterize
 
 BARREL = Distortion(model="brown_conrady", coefficients=(-0.21, 0.06, 0.001, -0.002, -0.004))
 RATIONAL = Distortion(model="brown_conrady", coefficients=(0.4, 0.05, -0.001, 0.0007, 0.01, 0.6, 0.12, 0.02))
@@ -82,6 +83,11 @@ def cube(half: float = 0.5) -> Mesh:
             triangles += [[s, s + 1, s + 2], [s, s + 2, s + 3]]
             normals += [n] * 4
     return mesh_of(corners, triangles, normals, parts=np.repeat(np.arange(6), 2))
+
+
+def silhouette(geometry: Geometry, camera: Camera, object_id: int, window):
+    """Pixels of a window whose ray would meet an object if nothing else were there, (h, w) bool."""
+    return rasterize(geometry, camera, object_id=object_id, window=window).triangle >= 0
 
 
 def least_weight(geometry: Geometry, u, v):
