@@ -30,6 +30,23 @@ def depths(inverse, rays, out):
 
 
 @njit
+def positions(inverse, rays, world_from_ray, center, out):
+    """center + world_from_ray ray / inverse, the seen point in world axes; NaN where nothing is seen."""
+    height, width = inverse.shape
+    table = rays.shape[0] > 0
+    m = world_from_ray
+    for y in range(height):
+        for x in range(width):
+            if not inverse[y, x] > 0:
+                out[y, x, 0], out[y, x, 1], out[y, x, 2] = np.nan, np.nan, np.nan
+                continue
+            s = 1.0 / np.float64(inverse[y, x])
+            px, py, pz = (rays[y, x, 0], rays[y, x, 1], rays[y, x, 2]) if table else (x + 0.5, y + 0.5, 1.0)
+            for k in range(3):
+                out[y, x, k] = center[k] + s * (m[k, 0] * px + m[k, 1] * py + m[k, 2] * pz)
+
+
+@njit
 def labels(seen, table, empty, out):
     """table[triangle] for each pixel, or `empty` where no triangle is seen."""
     height, width = seen.shape
