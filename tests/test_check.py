@@ -88,7 +88,7 @@ def test_a_whole_data_set_passes(whole):
 
 
 STILL = [name for name, label in channel_labels().items() if label.needs == Needs()]
-LIFTED = ["position"]
+LIFTED = ["nocs", "position"]
 """Labels that are proved by depth, where that is exact, and by object coordinates."""
 
 LENSES = {

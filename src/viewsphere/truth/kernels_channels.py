@@ -156,6 +156,46 @@ def coordinates(seen, triangles, objects, q, rays, values, out):
 
 
 @njit
+def unit_spaces(values, is_used, vertex_start, area, spaces):
+    """For each object i of which anything is seen (area[i] pixels) the centre of the box of its used vertices, and 1 over the
+    box's diagonal: spaces (count + 1, 4).
+    """
+    for i in range(1, spaces.shape[0]):
+        if area[i] == 0:
+            continue
+        square = 0.0
+        for k in range(3):
+            low, high = np.float32(np.inf), np.float32(-np.inf)
+            for v in range(vertex_start[i - 1], vertex_start[i]):
+                if is_used[v]:
+                    low, high = min(low, values[v, k]), max(high, values[v, k])
+            side = np.float64(high) - np.float64(low)
+            spaces[i, k] = (np.float64(low) + np.float64(high)) / 2
+            square += side * side
+        spaces[i, 3] = 1.0 / math.sqrt(square)
+
+
+@njit
+def nocs(seen, triangles, objects, q, rays, values, spaces, out):
+    """`coordinates` from the centre of each object's space, times its factor, plus a half; NaN where no object is seen."""
+    height, width = seen.shape
+    table = rays.shape[0] > 0
+    for y in range(height):
+        for x in range(width):
+            t = seen[y, x]
+            if t < 0 or objects[t] == 0:
+                out[y, x, 0], out[y, x, 1], out[y, x, 2] = np.nan, np.nan, np.nan
+                continue
+            i = np.uintp(objects[t])
+            px, py, pz = (rays[y, x, 0], rays[y, x, 1], rays[y, x, 2]) if table else (x + 0.5, y + 0.5, 1.0)
+            i0, i1, i2 = np.uintp(triangles[t, 0]), np.uintp(triangles[t, 1]), np.uintp(triangles[t, 2])
+            b0, b1, b2 = weights_at(q, i0, i1, i2, px, py, pz)
+            for k in range(3):
+                value = b0 * values[i0, k] + b1 * values[i1, k] + b2 * values[i2, k]
+                out[y, x, k] = 0.5 + (value - spaces[i, k]) * spaces[i, 3]
+
+
+@njit
 def normals_geometric(seen, triangle_normals, rays, camera_from_p, rotation, out):
     """The triangle's normal in camera axes, towards the camera; 0 where nothing is seen or the triangle is degenerate."""
     height, width = seen.shape
