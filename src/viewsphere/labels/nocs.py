@@ -27,10 +27,11 @@ def compute(sight: Sight) -> NDArray[np.float32]:
     from viewsphere.truth import kernels_channels as kernels
 
     out, g = sight.empty(np.float32, 3), sight.geometry
-    spaces = np.zeros((g.object_count + 1, 4))
-    kernels.unit_spaces(g.coordinates, g.is_used, np.array(g.vertex_start, np.int64), sight.instances.area, spaces)
-    seen, values = sight.visibility.triangle, g.coordinates
-    kernels.nocs(seen, g.triangles, g.triangle_object, sight.corners, sight.rays, values, spaces, out)
+    boxes = np.zeros((g.object_count + 1, 2, 3))
+    kernels.own_boxes(g.coordinates, g.is_used, np.array(g.vertex_start, np.int64), sight.instances.area, boxes)
+    middle, (x, y, z) = (boxes[:, 0] + boxes[:, 1]) / 2, (boxes[:, 1] - boxes[:, 0]).T
+    seen, diagonal = sight.visibility.triangle, np.sqrt(x * x + y * y + z * z)
+    kernels.nocs(seen, g.triangles, g.triangle_object, sight.corners, sight.rays, g.coordinates, middle, diagonal, out)
     return out
 
 
@@ -65,7 +66,7 @@ def _of_object(sample: Sample, o: ObjectAnnotation, shares: Array, own: NDArray[
         away = np.abs(o.camera_from_object[:3, 3]).max() + np.abs(placed).max(axis=1, initial=0.0)
         wrong = misplaced(sample, placed, own, slack + 2 * ROUNDING * away)
         if wrong.any():
-            yield f"object {o.id}: expected what is seen in its pixels, and at its depth; found other points at {wrong.sum()} pixels"
+            yield f"object {o.id}: expected what its pixels show, at their depth; found other points at {wrong.sum()} pixels"
 
 
 def picture(shares: NDArray[np.float32]) -> Picture:

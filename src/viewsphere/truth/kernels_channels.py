@@ -156,28 +156,27 @@ def coordinates(seen, triangles, objects, q, rays, values, out):
 
 
 @njit
-def unit_spaces(values, is_used, vertex_start, area, spaces):
-    """For each object i of which anything is seen (area[i] pixels) the centre of the box of its used vertices, and 1 over the
-    box's diagonal: spaces (count + 1, 4).
+def own_boxes(values, is_used, vertex_start, area, boxes):
+    """The lowest and the highest of the used vertices of each object i of which anything is seen (area[i] pixels), in
+    boxes (count + 1, 2, 3).
     """
-    for i in range(1, spaces.shape[0]):
+    for i in range(1, boxes.shape[0]):
         if area[i] == 0:
             continue
-        square = 0.0
-        for k in range(3):
-            low, high = np.float32(np.inf), np.float32(-np.inf)
-            for v in range(vertex_start[i - 1], vertex_start[i]):
-                if is_used[v]:
-                    low, high = min(low, values[v, k]), max(high, values[v, k])
-            side = np.float64(high) - np.float64(low)
-            spaces[i, k] = (np.float64(low) + np.float64(high)) / 2
-            square += side * side
-        spaces[i, 3] = 1.0 / math.sqrt(square)
+        left, front, bottom = np.float32(np.inf), np.float32(np.inf), np.float32(np.inf)
+        right, back, top = -left, -front, -bottom
+        for v in range(np.uintp(vertex_start[i - 1]), np.uintp(vertex_start[i])):
+            if is_used[v]:
+                x, y, z = values[v, np.uintp(0)], values[v, np.uintp(1)], values[v, np.uintp(2)]
+                left, front, bottom = min(left, x), min(front, y), min(bottom, z)
+                right, back, top = max(right, x), max(back, y), max(top, z)
+        boxes[i, 0, 0], boxes[i, 0, 1], boxes[i, 0, 2] = left, front, bottom
+        boxes[i, 1, 0], boxes[i, 1, 1], boxes[i, 1, 2] = right, back, top
 
 
 @njit
-def nocs(seen, triangles, objects, q, rays, values, spaces, out):
-    """`coordinates` from the centre of each object's space, times its factor, plus a half; NaN where no object is seen."""
+def nocs(seen, triangles, objects, q, rays, values, middle, diagonal, out):
+    """`coordinates` from the middle (N + 1, 3) of each object's box, over its diagonal (N + 1,), plus a half; else NaN."""
     height, width = seen.shape
     table = rays.shape[0] > 0
     for y in range(height):
@@ -192,7 +191,7 @@ def nocs(seen, triangles, objects, q, rays, values, spaces, out):
             b0, b1, b2 = weights_at(q, i0, i1, i2, px, py, pz)
             for k in range(3):
                 value = b0 * values[i0, k] + b1 * values[i1, k] + b2 * values[i2, k]
-                out[y, x, k] = 0.5 + (value - spaces[i, k]) * spaces[i, 3]
+                out[y, x, k] = 0.5 + (value - middle[i, k]) / diagonal[i]
 
 
 @njit
