@@ -359,7 +359,8 @@ def test_channels_that_are_wrong_all_over(dataset, name, told):
 
 def test_background_without_depth(dataset):
     edit_channel(dataset, 5, "depth", lambda a: a.__setitem__(dataset[5].instances == 0, np.inf))
-    assert failures(dataset) == {("depth", 5), ("depth_ray", 5), ("position", 5), ("surface", 5)}
+    names = ("depth", "depth_ray", "panoptic", "position", "semantic", "surface")
+    assert failures(dataset) == {(name, 5) for name in names}
 
 
 KEPT = [label.name for label in object_labels() if label.keep is not nothing]

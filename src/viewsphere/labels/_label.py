@@ -106,7 +106,11 @@ class Label:
 @dataclass(frozen=True, kw_only=True)
 class ChannelLabel(Label):
     """A label of pixels, stored as a separate file: (height, width) or (height, width, components); `empty` where nothing is
-    seen. `encoding` is the default kind of file: png16 for ids, tiff for whatever has to be exact.
+    seen. `encoding` is the default kind of file: png16 for ids, tiff for whatever has to be exact; `colors` are those of the
+    first ids in files with a palette.
+
+    `renumbered(array, ids)` gives the array of a data set whose categories have other ids, by their old ones; None: it has no
+    ids of categories.
     """
 
     compute: Callable[[Sight], Array]
@@ -115,11 +119,20 @@ class ChannelLabel(Label):
     unit: str = "1"
     empty: float = 0
     encoding: Any = "tiff"
+    colors: tuple[Color, ...] = ()
+    renumbered: Callable[[Array, Mapping[int, int]], Array] | None = None
 
     @property
     def channel(self) -> Channel:
         """The channel that describes the label's file."""
-        return Channel(self.name, self.dtype, self.components, self.unit, self.empty, self.encoding, self.meaning)
+        return Channel(self.name, self.dtype, self.components, self.unit, self.empty, self.encoding, self.meaning, self.colors)
+
+
+def by_table(array: Array, ids: Mapping[int, int]) -> Array:
+    """The array with other ids for those that have one."""
+    table = np.arange(max([int(array.max(initial=0)), *ids]) + 1, dtype=array.dtype)
+    table[list(ids)] = list(ids.values())
+    return table[array]
 
 
 @dataclass(frozen=True)
