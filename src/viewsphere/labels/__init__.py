@@ -166,3 +166,4 @@ class Rendered:
     category: str
     category_id: int
     track: str
+    materials: tuple[str, ...] = ()

@@ -73,6 +73,8 @@ class ModelInfo:
 
     `box3d_object` (8, 3) metres in the object's axes; sizes are (width, height, length) in metres. A model that deforms has the
     same of each of its `steps`, ascending, whose `track` is its key; its own fields are those of its file's first frame.
+
+    `parts` and `materials` are names: those of the numbers 1, 2, ... in maps of parts and of materials.
     """
 
     __pydantic_config__ = _STRICTLY
@@ -94,6 +96,7 @@ class ModelInfo:
     track: str = ""
     steps: tuple[ModelInfo, ...] = ()
     credit: Credit | None = None
+    materials: tuple[str, ...] = ()
 
     @property
     def node(self) -> str | None:
@@ -125,6 +128,8 @@ class ModelInfo:
             del value["credit"]
         else:
             value["credit"] = self.credit.model_dump(exclude_none=True)
+        if not self.materials:  # of models that were exported elsewhere, or before they had names here
+            del value["materials"]
         return value
 
     @staticmethod
