@@ -38,17 +38,18 @@ def trusted(sample: Sample, models: Models) -> Iterator[str]:
 @dataclass(frozen=True)
 class Needs:
     """The inputs of a label besides its own instant and sensor: offsets of instants (-1 is the one before), whether a sensor
-    that is rectified with its own, and whether points that are followed.
+    that is rectified with its own, whether points that are followed, and whether points on the objects' surfaces.
     """
 
     instants: tuple[int, ...] = ()
     rectified: bool = False
     tracks: bool = False
+    surface: bool = False
 
     @property
     def is_some(self) -> bool:
-        """Whether still pictures of one sensor do not have the label."""
-        return bool(self.instants or self.rectified or self.tracks)
+        """Whether the label does not follow from what the picture's own camera sees at its instant."""
+        return bool(self.instants or self.rectified or self.tracks or self.surface)
 
 
 TAIL = 8

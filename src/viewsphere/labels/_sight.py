@@ -17,6 +17,7 @@ from viewsphere.labels._placement import Placement
 from viewsphere.model.camera import Camera
 from viewsphere.truth.correspondence import Match
 from viewsphere.truth.geometry import Geometry
+from viewsphere.truth.points import SurfacePoints
 from viewsphere.truth.shot_views import Followed
 from viewsphere.truth.view import View
 from viewsphere.truth.visibility import Instances, Visibility, homogeneous, lens_rays
@@ -37,6 +38,11 @@ class Around(Protocol):
     @property
     def followed(self) -> Followed:
         """The points that the picture's sensor follows."""
+        ...
+
+    @property
+    def surface(self) -> SurfacePoints:
+        """The points that are drawn on the objects."""
         ...
 
 

@@ -18,6 +18,7 @@ from viewsphere.model.frozen import Frozen
 from viewsphere.model.instant import Instant, Viewpoint, viewpoint_of
 from viewsphere.model.rig import Rig
 from viewsphere.model.scene import IDENTITY, Finish, Scene
+from viewsphere.model.surface_samples import DEFAULT
 from viewsphere.model.thing import Motion, Thing
 from viewsphere.model.tracks import Tracks
 
@@ -41,6 +42,7 @@ class Shot(Frozen):
     first: int = 0
     sequence: str = ""  # of still pictures none
     tracks: Tracks | None = None
+    surface_samples: int = Field(default=DEFAULT, ge=1)  # points on each object, where `channels` ask for them
     engine: str = "raster"
     engine_options: dict[str, JsonValue] = Field(default_factory=dict)
     channels: tuple[str, ...]
@@ -81,8 +83,12 @@ class Shot(Frozen):
 
     @model_serializer(mode="wrap")
     def _unexposed_as_ever(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Without shutter and exposures where there is no shutter, so that records of such shots are what they were before."""
+        """Without shutter and exposures where there is no shutter, and without the usual number of samples, so that records of
+        such shots are what they were before.
+        """
         found: dict[str, Any] = handler(self)
+        if self.surface_samples == DEFAULT:
+            found.pop("surface_samples", None)
         if not self.shutter:
             found.pop("shutter", None)
             found.pop("exposures", None)

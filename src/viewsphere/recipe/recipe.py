@@ -35,6 +35,7 @@ from viewsphere.model.frozen import Frozen
 from viewsphere.model.mistakes import Marks, report, shown
 from viewsphere.model.notebook import Shown
 from viewsphere.model.numbers import Count, Natural, Number
+from viewsphere.model.surface_samples import DEFAULT, MOST
 from viewsphere.recipe.formats import FormatEntry, FormatField
 from viewsphere.recipe.models import ModelEntry
 from viewsphere.recipe.rig import RigField
@@ -48,7 +49,7 @@ from viewsphere.recipe.viewpoints import Viewpoints
 BEFORE_RENDERING = {"name", "formats", "max_frames", "shot_frames", "keep_annotations_above"}
 """Fields of a recipe that change neither a picture nor a label, as the credits of its models do not."""
 
-LATER = {"scenes", "time", "rig", "tracks", "min_visibility", "empty"}
+LATER = {"scenes", "time", "rig", "tracks", "surface_samples", "min_visibility", "empty"}
 """Fields that recipes once did not have: without them a recipe has the digest that it had then."""
 
 LATER_FIELDS: dict[tuple[str, ...], Any] = {
@@ -156,6 +157,10 @@ class Recipe(Shown, Frozen):
         default=None,
         description="points that are followed through each sequence: {grid: 16}, {count: 1024, on: objects}, or {points: file}",
     )
+    surface_samples: Annotated[Count, Field(le=MOST)] | None = Field(
+        default=None,
+        description=f"points on each object, with normals: the channel surface_samples, which has {DEFAULT} by default",
+    )
     scene: SceneEntry = Field(default=SceneEntry(), description="light, ground, background, effects, what stands around")
     min_visibility: Annotated[Number, Field(gt=0, le=1)] | None = Field(
         default=None,
@@ -213,10 +218,10 @@ class Recipe(Shown, Frozen):
     @field_validator("channels")
     @classmethod
     def _as_meant(cls, value: tuple[str, ...], info: ValidationInfo) -> tuple[str, ...]:
-        """With what other fields ask for: tracks, and pictures with alpha."""
+        """With what other fields ask for: tracks, samples of surfaces, and pictures with alpha."""
         scene: SceneEntry | None = info.data.get("scene")
-        if info.data.get("tracks") is not None:
-            value = tuple(dict.fromkeys((*value, "tracks")))
+        asked = (name for name in ("tracks", "surface_samples") if info.data.get(name) is not None)
+        value = tuple(dict.fromkeys((*value, *asked)))
         if scene is None or not any(entry.transparent for entry in scene.backgrounds):
             return value
         return tuple(dict.fromkeys("rgba" if name == "rgb" else name for name in value))

@@ -20,7 +20,7 @@ FITTING = "appended frames have to fit those that are there; choose another outp
 RIG = "rig"
 """Name of the setting that only recipes with several sensors have."""
 
-SHOWN = ("min_visibility", "empty")
+SHOWN = ("min_visibility", "empty", "surface_samples")
 """Names of the settings that say what pictures show of their models; only recipes that ask for it have them."""
 
 LOOK = "the engine's program"

@@ -16,6 +16,7 @@ from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.rig import Rig
 from viewsphere.model.scene import Finish, Scene, Vector
 from viewsphere.model.shot import Shot
+from viewsphere.model.surface_samples import DEFAULT
 from viewsphere.model.thing import Thing, TimeStep
 from viewsphere.model.tracks import Tracks
 from viewsphere.recipe.draws import drawn
@@ -256,6 +257,7 @@ class Stock(Sendable):
             engine=self.recipe.engine.name,
             engine_options=engine_options(self.recipe),
             channels=self.recipe.channels,
+            surface_samples=self.recipe.surface_samples or DEFAULT,
             files=self.recipe.files,
             label_alpha=self.recipe.label_alpha,
             category_deg=self.recipe.viewpoints.bins,
