@@ -36,7 +36,7 @@ def prove(sample: Sample, models: Models) -> Iterator[str]:
     points = channel_of(sample, "position")
     if points is None:
         return
-    seen: NDArray[np.bool_] = np.isfinite(points).all(axis=-1)
+    seen: NDArray[np.bool_] = np.logical_and.reduce(np.isfinite(points), axis=-1)
     if (seen != np.isfinite(points).any(axis=-1)).any():
         yield "expected all three numbers or none; found some of them"
     depth, instances = exact_depth(sample), channel_of(sample, "instances")
