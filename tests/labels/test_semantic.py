@@ -10,10 +10,22 @@ from PIL import Image
 from cube_dataset import make
 from label_scenes import changed, embree, proof, random_sample, rows_of
 from truth_scenes import LENSES, cube, lens, mesh_of, orbit_camera
+from viewsphere.codecs.palette import palette
 from viewsphere.geometry.rotation import rigid
 from viewsphere.labels import channels, observe
 from viewsphere.labels.semantic import LABEL, renumbered
-from viewsphere.model.classes import FIRST_THING, GROUND, SCENERY, SKY, STUFF, STUFF_IDS, STUFF_OF, classes_of, stuff_of
+from viewsphere.model.classes import (
+    FIRST_THING,
+    GROUND,
+    SCENERY,
+    SKY,
+    STUFF,
+    STUFF_IDS,
+    STUFF_OF,
+    class_colors,
+    classes_of,
+    stuff_of,
+)
 from viewsphere.model.files import Files
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.thing import Motion, Thing
@@ -118,6 +130,11 @@ def test_its_proof_notices_other_classes(name):
 def test_other_ids_of_categories_change_things_alone():
     array = np.array([[1, 13, 32, 33, 40]], np.int32)
     assert renumbered(array, {1: 2, 2: 1, 9: 9}).tolist() == [[1, 13, 33, 32, 40]]
+
+
+def test_things_have_the_colours_of_their_categories():
+    assert class_colors()[32:].tolist() == palette()[1:225].tolist()
+    assert class_colors(300)[32 + 255].tolist() == palette()[1].tolist() and len(class_colors(5)) == 5
 
 
 def test_a_file_with_a_palette_has_the_colours_of_the_classes():
