@@ -81,7 +81,7 @@ def thing_class(category_id: int) -> int:
 
 
 def class_colors(count: int = MOST_COLORS) -> NDArray[np.uint8]:
-    """The colours (count, 3) of classes 0, 1, ...: a thing's is PASCAL VOC's of its category's id; they begin anew after 255."""
+    """The colours (count, 3) of classes 0, 1, ...: a thing's is PASCAL VOC's of its category's id, or of that less 255s."""
     things = np.resize(palette()[1:], (max(count - FIRST_THING, 0), 3))
     stuff = np.zeros((FIRST_THING, 3), np.uint8)
     stuff[1 : 1 + len(STUFF)] = list(STUFF.values())
