@@ -13,13 +13,13 @@ import viewsphere
 from small import small_recipe
 from viewsphere import Dataset, Recipe, generate
 from viewsphere.check import check
+from viewsphere.codecs.palette import palette
 from viewsphere.errors import MissingExtraError, RecipeError, StoreError
 from viewsphere.labels import channels
 from viewsphere.model.files import Files
 from viewsphere.run.importing import import_dataset
 from viewsphere.run.merging import merge
 from viewsphere.store import check_codecs, decode, depth_step, encode
-from viewsphere.store.channel_files import palette
 
 MASKS, GEOMETRY = ("instances", "categories", "parts"), ("normals", "coordinates", "triangles", "barycentrics")
 LOSSLESS = [

@@ -89,6 +89,9 @@ def test_a_whole_data_set_passes(whole):
 
 PLAIN = [name for name, label in labels().items() if label.needs == Needs() and name not in on_request()]
 STILL = [name for name, label in channel_labels().items() if label.needs == Needs()]
+LIFTED = ["nocs", "position"]
+"""Labels that are proved by depth, where that is exact, and by object coordinates."""
+
 LENSES = {
     "brown_conrady": Distortion(model="brown_conrady", coefficients=(-0.2, 0.05, 0.001, 0.0, 0.0)),
     "fisheye": Distortion(model="fisheye", coefficients=(0.02, 0.05, 0.001, 0.0)),
@@ -332,8 +335,8 @@ def test_a_wrong_view(spelled):
 
 def test_depth_that_is_not_the_models(dataset):
     edit_channel(dataset, 7, "depth", lambda a: a.__imul__(np.float32(1.001)))
-    assert failures(dataset) == {("surface", 7), ("depth", 7)}
-    assert failures(dataset, rays=False) == {("depth", 7)}
+    assert failures(dataset) == {("surface", 7), ("depth", 7), *((name, 7) for name in LIFTED)}
+    assert failures(dataset, rays=False) == {("depth", 7), *((name, 7) for name in LIFTED)}
 
 
 def nudged(array):
@@ -349,15 +352,16 @@ def test_every_label_of_pixels_is_computed_again_to_the_last_bit(dataset, name):
     assert (name, 5) in failures(dataset, rays=False)
 
 
-@pytest.mark.parametrize("name", ["normals", "coordinates"])
-def test_channels_that_are_wrong_all_over(dataset, name):
+@pytest.mark.parametrize(("name", "told"), [("normals", ()), ("coordinates", LIFTED)])
+def test_channels_that_are_wrong_all_over(dataset, name, told):
     edit_channel(dataset, 5, name, lambda a: a.__imul__(-1) if name == "normals" else a.__iadd__(0.1))
-    assert failures(dataset, rays=False) == {(name, 5)}
+    assert failures(dataset, rays=False) == {(other, 5) for other in (name, *told)}
 
 
 def test_background_without_depth(dataset):
     edit_channel(dataset, 5, "depth", lambda a: a.__setitem__(dataset[5].instances == 0, np.inf))
-    assert failures(dataset) == {("depth", 5), ("depth_ray", 5), ("surface", 5)}
+    names = ("depth", "depth_ray", "panoptic", "position", "semantic", "surface")
+    assert failures(dataset) == {(name, 5) for name in names}
 
 
 KEPT = [label.name for label in object_labels() if label.keep is not nothing and not label.on_request]

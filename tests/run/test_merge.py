@@ -20,7 +20,8 @@ COCOS_OWN = Options(category_ids="coco")
 
 
 def recipe(**changes):
-    return small_recipe(**{"channels": ["rgb", "depth", "instances", "categories"], "formats": ["coco"], **changes})
+    channels = ["rgb", "depth", "instances", "categories", "semantic", "panoptic"]
+    return small_recipe(**{"channels": channels, "formats": ["coco"], **changes})
 
 
 BIN = {"source": "zoo:wheelie_bin", "category": "bin", "scale": {"length": 0.2}}
@@ -69,6 +70,10 @@ def test_categories_are_one_by_name_and_the_pixels_say_so(merged):
     for sample in joined:
         by_id = np.array([0, *(ids[o.category] for o in sample.objects)])
         assert np.array_equal(sample.categories, by_id[sample.instances])
+        things = sample.instances > 0
+        assert np.array_equal(sample.semantic[things], 31 + sample.categories[things])
+        assert (sample.semantic[~things] <= 2).all()
+        assert np.array_equal(sample.panoptic, sample.semantic << 16 | sample.instances)
 
 
 def test_models_of_one_key_and_other_content_are_two(sources, merged):

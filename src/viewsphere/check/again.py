@@ -74,6 +74,8 @@ class Again:
         except ViewsphereError:
             return
         if kept.shape != again.shape:
+            if kept.dtype.names:  # of rows nothing else says how many there are
+                yield f"expected {len(again):,} rows, found {len(kept):,}"
             return
         step = depth_step(self._dataset.read(sample.files[name])) if name == "depth" else 0.0
         wrong = _beyond(kept, again, step) if step else _unequal(kept, again)

@@ -74,7 +74,9 @@ def _library(obj: Path, name: str) -> str | None:
 
 
 def _facts(info: ModelInfo, mesh: Mesh) -> Iterator[str]:
-    box = box_vertices(*mesh.bounds)
+    box, materials = box_vertices(*mesh.bounds), tuple(material.name for material in mesh.materials)
+    if info.materials not in ((), materials):
+        yield f"expected the materials {', '.join(materials)} of the GLB, found {', '.join(info.materials)}"
     if info.triangles != len(mesh.triangles):
         yield f"expected {len(mesh.triangles)} triangles, as the GLB has, found {info.triangles}"
     if not np.array_equal(info.box3d_object, box):

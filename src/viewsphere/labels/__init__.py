@@ -228,3 +228,4 @@ class Rendered:
     category: str
     category_id: int
     track: str
+    materials: tuple[str, ...] = ()

@@ -39,7 +39,8 @@ def trusted(sample: Sample, models: Models) -> Iterator[str]:
 @dataclass(frozen=True)
 class Needs:
     """The inputs of a label besides its own instant and sensor: offsets of instants (-1 is the one before), of those of which
-    poses are enough, whether a sensor that is rectified with its own, whether any others, and whether points that are followed.
+    poses are enough, whether a sensor that is rectified with its own, whether any others, whether points that are followed, and
+    whether points on the objects' surfaces.
     """
 
     instants: tuple[int, ...] = ()
@@ -47,11 +48,12 @@ class Needs:
     rectified: bool = False
     rig: bool = False
     tracks: bool = False
+    surface: bool = False
 
     @property
     def is_some(self) -> bool:
-        """Whether still pictures of one sensor do not have the label."""
-        return bool(self.instants or self.poses or self.rectified or self.rig or self.tracks)
+        """Whether the label does not follow from what the picture's own camera sees at its instant."""
+        return bool(self.instants or self.poses or self.rectified or self.rig or self.tracks or self.surface)
 
 
 TAIL = 8
@@ -115,7 +117,11 @@ class Label:
 @dataclass(frozen=True, kw_only=True)
 class ChannelLabel(Label):
     """A label of pixels, stored as a separate file: (height, width) or (height, width, components); `empty` where nothing is
-    seen. `encoding` is the default kind of file: png16 for ids, tiff for whatever has to be exact.
+    seen. `encoding` is the default kind of file: png16 for ids, tiff for whatever has to be exact; `colors` are those of the
+    first ids in files with a palette.
+
+    `renumbered(array, ids)` gives the array of a data set whose categories have other ids, by their old ones; None: it has no
+    ids of categories.
     """
 
     compute: Callable[[Sight], Array]
@@ -124,6 +130,8 @@ class ChannelLabel(Label):
     unit: str = "1"
     empty: float = 0
     encoding: Any = "tiff"
+    colors: tuple[Color, ...] = ()
+    renumbered: Callable[[Array, Mapping[int, int]], Array] | None = None
 
     def is_in(self, sample: Sample) -> bool:
         """Whether the sample keeps the channel."""
@@ -132,7 +140,14 @@ class ChannelLabel(Label):
     @property
     def channel(self) -> Channel:
         """The channel that describes the label's file."""
-        return Channel(self.name, self.dtype, self.components, self.unit, self.empty, self.encoding, self.meaning)
+        return Channel(self.name, self.dtype, self.components, self.unit, self.empty, self.encoding, self.meaning, self.colors)
+
+
+def by_table(array: Array, ids: Mapping[int, int]) -> Array:
+    """The array with other ids for those that have one."""
+    table = np.arange(max([int(array.max(initial=0)), *ids]) + 1, dtype=array.dtype)
+    table[list(ids)] = list(ids.values())
+    return table[array]
 
 
 def later(sight: Sight, i: int) -> Mapping[str, Any]:

@@ -23,7 +23,7 @@ Float = NDArray[np.float64]
 
 class ModelFacts(Protocol):
     """Facts about a normalised model: its OBJ file (relative to the data set's root), its box (8, 3) in its own axes, its
-    true size if known (metres), its category, and of a time step the key of the animated model.
+    true size if known (metres), its category, names of its materials, and of a time step the key of the animated model.
     """
 
     @property
@@ -36,6 +36,8 @@ class ModelFacts(Protocol):
     def category(self) -> str: ...
     @property
     def category_id(self) -> int: ...
+    @property
+    def materials(self) -> tuple[str, ...]: ...
     @property
     def track(self) -> str: ...
 

@@ -19,6 +19,7 @@ from viewsphere.model.camera import Camera
 from viewsphere.model.frozen import Frozen
 from viewsphere.truth.correspondence import Match
 from viewsphere.truth.geometry import Geometry
+from viewsphere.truth.points import SurfacePoints
 from viewsphere.truth.shot_views import Followed, Moment
 from viewsphere.truth.view import View
 from viewsphere.truth.visibility import Instances, Visibility, homogeneous, lens_rays, rasterize
@@ -43,6 +44,11 @@ class Around(Protocol):
     @property
     def followed(self) -> Followed:
         """The points that the picture's sensor follows."""
+        ...
+
+    @property
+    def surface(self) -> SurfacePoints:
+        """The points that are drawn on the objects."""
         ...
 
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from viewsphere.labels._label import ChannelLabel, Models, channel_of
+from viewsphere.labels._label import ChannelLabel, Models, by_table, channel_of
 from viewsphere.model.sample import Sample
 
 
@@ -31,4 +31,5 @@ LABEL = ChannelLabel(
     encoding="png16",
     compute=lambda sight: sight.per_triangle(sight.geometry.triangle_category, 0),
     prove=prove,
+    renumbered=by_table,
 )

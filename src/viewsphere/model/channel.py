@@ -13,7 +13,7 @@ from numpy.typing import DTypeLike, NDArray
 @dataclass(frozen=True)
 class Channel:
     """One array of pixels: (height, width) + (components,) if components > 1; `encoding` is its default file. With no
-    components it is no picture but rows, as many as there are.
+    components it is no picture but rows, as many as there are. `colors`, sRGB: of the first ids, in files with a palette.
     """
 
     name: str
@@ -23,6 +23,7 @@ class Channel:
     empty: float
     encoding: Literal["png", "png16", "tiff", "npz"]
     meaning: str
+    colors: tuple[tuple[int, int, int], ...] = ()
 
     @property
     def suffix(self) -> str:

@@ -44,7 +44,8 @@ class Files(Frozen):
         default=None, description="metres in a step of a png16 depth; default 0.001; 0 is nothing, 65535 all beyond"
     )
     masks: Literal["png16", "png8"] = Field(
-        default="png16", description="file of instances, categories and parts: 16-bit grey, or a palette of distinct colours"
+        default="png16",
+        description="file of instances, categories, semantic, parts and other ids: 16-bit grey, or a palette of colours",
     )
     geometry: Literal["tiff", "exr", "npz"] = Field(
         default="tiff", description="file of normals, coordinates, flow, disparity and all else that is exact"

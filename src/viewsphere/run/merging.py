@@ -11,10 +11,8 @@ from itertools import count, islice
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from viewsphere.errors import StoreError, UserError
-from viewsphere.labels import channels
+from viewsphere.labels import channel_labels, channels
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.credit import Credit
 from viewsphere.model.sample import MERGED, ObjectAnnotation, Sample
@@ -309,8 +307,8 @@ def _renumbered(source: _Source, sample: Sample, index: int) -> ForeignFrame:
         objects=tuple(_moved_object(source, o) for o in sample.objects),
     )
     files = {name: source.dataset.stored(file) for name, file in sample.files.items()}
-    if "categories" in files and not source.keeps_categories:
-        files["categories"] = Loaded(channels()["categories"].suffix, _with_category_ids(source, sample))
+    if not source.keeps_categories:
+        files |= dict(_with_category_ids(source, sample))
     return ForeignFrame(moved, files)
 
 
@@ -328,11 +326,10 @@ def _of(category: Category) -> dict[str, Any]:
     return {"category": category.name, "supercategory": category.supercategory, "category_id": category.id}
 
 
-def _with_category_ids(source: _Source, sample: Sample) -> bytes:
-    """The `categories` channel with the ids of the merged data set, encoded."""
-    array = sample.channels["categories"]
-    table = np.arange(int(array.max(initial=0)) + 1, dtype=array.dtype)
-    for old, new in source.categories.items():
-        if old < len(table):
-            table[old] = new.id
-    return encode(channels()["categories"], table[array])
+def _with_category_ids(source: _Source, sample: Sample) -> Iterator[tuple[str, Loaded]]:
+    """The channels that hold ids of categories, with those of the merged data set, encoded."""
+    ids = {old: new.id for old, new in source.categories.items()}
+    for name, label in channel_labels().items():
+        if name in sample.files and label.renumbered:
+            data = encode(label.channel, label.renumbered(sample.channels[name], ids))
+            yield name, Loaded(label.channel.suffix, data)

@@ -139,6 +139,7 @@ class Models:
             digest=mesh_digest(mesh),
             warnings=mesh.warnings,
             step=step,
+            materials=tuple(material.name for material in mesh.materials),
         )
 
     def _compare(self, spec: ModelSpec, known: ModelInfo, wanted: Steps) -> None:

@@ -101,8 +101,9 @@ def _small(shot: Shot) -> Shot:
     things = tuple(Thing(id=i, model=spec) for i in (1, 2))
     above = Viewpoint(index=0, azimuth_deg=0, elevation_deg=20, distance=2)
     first = looking(above, (0.0, 0.0, 0.0), index=0, finish=shot.finish(0))
-    alike = {"key": "", "first": 0, "sequence": "", "rig": Rig(sensors=tuple(sensors)), "things": things, "instants": (first,)}
-    return shot.model_copy(update=alike | (_sequence(shot, first, things) if shot.sequence else {}))
+    alike = {"key": "", "first": 0, "sequence": "", "rig": Rig(sensors=tuple(sensors)), "labels": {}}
+    shown = {"things": things, "instants": (first,)} | (_sequence(shot, first, things) if shot.sequence else {})
+    return shot.model_copy(update=alike | shown)
 
 
 def _sequence(shot: Shot, first: Instant, things: tuple[Thing, ...]) -> dict[str, Any]:

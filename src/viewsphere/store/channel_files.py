@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from viewsphere.codecs.palette import MOST_COLORS, palette
 from viewsphere.errors import MissingExtraError, RemoteError, StoreError, UserError
 from viewsphere.model.channel import Channel
 from viewsphere.model.files import Files
 
 MOST_STEPS = 65535
-MOST_COLORS = 256
 
 
 def encode(channel: Channel, array: NDArray[Any], files: Files | None = None) -> bytes:
@@ -78,19 +78,10 @@ def _masks(channel: Channel, array: NDArray[np.int32], indexed: bool) -> bytes:
     if most > MOST_STEPS:
         raise StoreError(f"channel {channel.name}: expected ids in 0..65535, found {array.min()}..{array.max()}")
     if indexed and most < MOST_COLORS:
-        return png_tiff.encode_png(array.astype(np.uint8), palette=palette())
+        colors = palette()
+        colors[: len(channel.colors)] = channel.colors or colors[:0]
+        return png_tiff.encode_png(array.astype(np.uint8), palette=colors)
     return png_tiff.encode_png(array.astype(np.uint16))
-
-
-def palette() -> NDArray[np.uint8]:
-    """The 256 distinct colours (256, 3) of PASCAL VOC, id 0 being black.
-
-    The lowest three bits of an id become the highest bits of red, green and blue, the next three bits the next highest ones.
-    """
-    ids = np.arange(MOST_COLORS)
-    bits = ids[:, None] >> np.arange(8) & 1
-    colors = [sum(bits[:, 3 * k + c] << (7 - k) for k in range(3) if 3 * k + c < 8) for c in range(3)]
-    return np.stack(colors, axis=1).astype(np.uint8)
 
 
 def decode(channel: Channel, file: Path, read: Callable[[], bytes] | None = None) -> NDArray[Any]:

@@ -16,6 +16,7 @@ from pydantic import TypeAdapter
 
 from viewsphere.errors import StoreError
 from viewsphere.labels import channels
+from viewsphere.model.classes import SemanticClass
 from viewsphere.model.files import Files
 from viewsphere.model.mistakes import one_of
 from viewsphere.model.model_spec import step_key
@@ -77,6 +78,11 @@ class Dataset(Shown, Sequence[Sample]):
     def categories(self) -> tuple[Category, ...]:
         """All categories of the plan."""
         return self.plan.categories
+
+    @property
+    def classes(self) -> tuple[SemanticClass, ...]:
+        """What the numbers of `semantic` and `panoptic` maps mean, stuff first; `plan.json` lists them, too."""
+        return self.plan.classes
 
     @property
     def splits(self) -> tuple[str, ...]:

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ConfigDict, PlainValidator, TypeAdapter, ValidationError
 
+from viewsphere.model.classes import SemanticClass, classes_of
 from viewsphere.model.credit import Credit
 from viewsphere.model.mistakes import first_of
 from viewsphere.model.model_spec import Size, step_key
@@ -72,6 +73,8 @@ class ModelInfo:
 
     `box3d_object` (8, 3) metres in the object's axes; sizes are (width, height, length) in metres. A model that deforms has the
     same of each of its `steps`, ascending, whose `track` is its key; its own fields are those of its file's first frame.
+
+    `parts` and `materials` are names: those of the numbers 1, 2, ... in maps of parts and of materials.
     """
 
     __pydantic_config__ = _STRICTLY
@@ -93,6 +96,7 @@ class ModelInfo:
     track: str = ""
     steps: tuple[ModelInfo, ...] = ()
     credit: Credit | None = None
+    materials: tuple[str, ...] = ()
 
     @property
     def node(self) -> str | None:
@@ -124,6 +128,8 @@ class ModelInfo:
             del value["credit"]
         else:
             value["credit"] = self.credit.model_dump(exclude_none=True)
+        if not self.materials:  # of models that were exported elsewhere, or before they had names here
+            del value["materials"]
         return value
 
     @staticmethod
@@ -203,6 +209,9 @@ class Part:
         return self
 
 
+CLASSED = frozenset({"semantic", "panoptic"})
+"""Channels whose numbers mean classes, which the text of the plan then lists."""
+
 NAME_BYTES = 8
 """Of a pose's name in `Part.pose_names`; zeros are that of no pose a recipe can mean."""
 
@@ -228,6 +237,11 @@ class PlanRecord:
     max_objects: int
     parts: tuple[Part, ...] = ()
     __pydantic_config__ = _STRICTLY
+
+    @property
+    def classes(self) -> tuple[SemanticClass, ...]:
+        """What the numbers of semantic and panoptic maps mean: names, colours, things and stuff."""
+        return classes_of((category.id, category.name) for category in self.categories)
 
     @property
     def keep_annotations_above(self) -> float | None:
@@ -339,6 +353,8 @@ class PlanRecord:
             "categories": [c.__dict__ for c in self.categories],
             "parts": [vars(part) | {"blocks": [vars(block) for block in part.blocks]} for part in self.parts],
         }
+        if CLASSED & set(self.channels):
+            value["classes"] = [vars(one) for one in self.classes]
         return sealed(value)
 
     @staticmethod
@@ -349,6 +365,7 @@ class PlanRecord:
             raise ValueError(f"a store of version {found}, where this viewsphere reads {STORE_VERSION}: render the recipe anew")
         value = unsealed(text)
         del value["store"]
+        value.pop("classes", None)  # for other readers: they follow from the categories
         record = typed(_PLAN, value)
         for number, part in enumerate(map(Part.checked, record.parts)):
             if any(not 0 <= other < number for other, _ in part.supplies):

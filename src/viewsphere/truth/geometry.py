@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from viewsphere.assets.deforming import Load
 from viewsphere.assets.mesh import Mesh
+from viewsphere.model.classes import GROUND, stuff_of, thing_class
 from viewsphere.model.scene import Floor
 from viewsphere.model.thing import Thing
 from viewsphere.truth.cutouts import ENDLESS, NO_CUTOUTS, Cutouts, mesh_cutouts, stack_cutouts
@@ -24,7 +25,15 @@ GROUND_REACH = 1000.0
 """Scene sizes from the middle to the ground's corners: as far as a renderer without endless planes has to draw it."""
 
 OF_VERTICES = ("vertices", "normals", "coordinates", "is_used")
-OF_TRIANGLES = ("triangle_normals", "triangle_side", "triangle_object", "triangle_part", "triangle_category")
+OF_TRIANGLES = (
+    "triangle_normals",
+    "triangle_side",
+    "triangle_object",
+    "triangle_part",
+    "triangle_category",
+    "triangle_class",
+    "triangle_material",
+)
 STACKED = (*OF_VERTICES, *OF_TRIANGLES, "bounds")
 """Arrays of a geometry that are those of its parts, one after another."""
 
@@ -40,8 +49,9 @@ class Geometry:
 
     triangle_normals (T, 3) float32 world, unit, by winding (zero for a degenerate triangle); triangle_side (T,) int8: 1 where
     the mean of the vertex normals agrees with the winding, -1 where it opposes it, 2 or -2 likewise where all three equal the
-    triangle's own; triangle_object, triangle_part, triangle_category (T,) int32, 0 for scenery and ground; triangle_cutout
-    (T,) int32: -1 all surface, -2 never seen, -3 and -4 `cutouts.ENDLESS`, else a row of `cutouts.corners`.
+    triangle's own; triangle_object, triangle_part, triangle_category, triangle_material (T,) int32, 0 for scenery and ground;
+    triangle_class (T,) int32: of things and stuff, see `model.classes`; triangle_cutout (T,) int32: -1 all surface, -2 never
+    seen, -3 and -4 `cutouts.ENDLESS`, else a row of `cutouts.corners`.
 
     is_used (V,): whether a vertex is a triangle's corner; bounds (N, 2, 3) float64: of each thing, world metres, the lowest and
     the highest of its used vertices, infinite where it has none.
@@ -62,6 +72,8 @@ class Geometry:
     triangle_object: NDArray[np.int32]
     triangle_part: NDArray[np.int32]
     triangle_category: NDArray[np.int32]
+    triangle_class: NDArray[np.int32]
+    triangle_material: NDArray[np.int32]
     triangle_cutout: NDArray[np.int32]
     cutouts: Cutouts
     is_used: NDArray[np.bool_]
@@ -157,7 +169,7 @@ def with_blended_colors(geometry: Geometry, meshes: Sequence[Mesh]) -> Geometry:
 def _placed(things: tuple[Thing, ...], meshes: tuple[Mesh, ...], label_alpha: float) -> Geometry:
     vertex_start = (0, *accumulate(len(m.vertices) for m in meshes))
     triangles = _joined([m.triangles + s for m, s in zip(meshes, vertex_start, strict=False)], np.int32)
-    labels = _joined([_labels(p, m) for p, m in zip(things, meshes, strict=True)], np.int32)
+    labels = _joined([_labels(p, m) for p, m in zip(things, meshes, strict=True)], np.int32, 5)
     cutouts, rows = stack_cutouts([mesh_cutouts(m, label_alpha) for m in meshes])
     is_used = np.zeros(vertex_start[-1], np.bool_)
     is_used[triangles] = True
@@ -171,6 +183,8 @@ def _placed(things: tuple[Thing, ...], meshes: tuple[Mesh, ...], label_alpha: fl
         triangle_object=labels[:, 0],
         triangle_part=labels[:, 1],
         triangle_category=labels[:, 2],
+        triangle_class=labels[:, 3],
+        triangle_material=labels[:, 4],
         triangle_cutout=rows,
         cutouts=cutouts,
         is_used=is_used,
@@ -206,9 +220,14 @@ def _stacked(parts: Sequence[Geometry]) -> Geometry:
 
 
 def _labels(thing: Thing, mesh: Mesh) -> NDArray[np.int32]:
-    labels = np.full((len(mesh.triangles), 3), BACKGROUND, np.int32)
+    """Object, part, category, class and material of each triangle, (T, 5)."""
+    labels = np.full((len(mesh.triangles), 5), BACKGROUND, np.int32)
     if thing.id:
         labels[:, 0], labels[:, 1], labels[:, 2] = thing.id, mesh.triangle_part + 1, thing.model.category_id
+        labels[:, 3], labels[:, 4] = thing_class(thing.model.category_id), mesh.triangle_material + 1
+    else:
+        stuff = [stuff_of(thing.model.category, part) for part in mesh.parts]
+        labels[:, 3] = np.array(stuff, np.int32)[mesh.triangle_part]
     return labels
 
 
@@ -226,6 +245,8 @@ def _ground(bounds: NDArray[np.float64], floor: Floor | None) -> Geometry:
         triangle_object=background,
         triangle_part=background,
         triangle_category=background,
+        triangle_class=np.full(2, GROUND, np.int32),
+        triangle_material=background,
         triangle_cutout=np.array(ENDLESS, np.int32),
         cutouts=NO_CUTOUTS,
         is_used=np.ones(4, np.bool_),
@@ -262,9 +283,9 @@ def _face(geometry: Geometry, first: int, stop: int) -> None:
     kernels.face(geometry.vertices, geometry.normals, geometry.triangles[own], normals, side)
 
 
-def _joined(arrays: Sequence[NDArray[Any]], dtype: type) -> NDArray[Any]:
-    """Rows of three numbers, one after another."""
-    return np.ascontiguousarray(np.concatenate([np.zeros((0, 3), dtype), *arrays]), dtype)
+def _joined(arrays: Sequence[NDArray[Any]], dtype: type, width: int = 3) -> NDArray[Any]:
+    """Rows of so many numbers, one after another."""
+    return np.ascontiguousarray(np.concatenate([np.zeros((0, width), dtype), *arrays]), dtype)
 
 
 def _read_only(array: NDArray[np.float32]) -> NDArray[np.float32]:

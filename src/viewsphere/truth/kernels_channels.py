@@ -30,6 +30,23 @@ def depths(inverse, rays, out):
 
 
 @njit
+def positions(inverse, rays, world_from_ray, center, out):
+    """center + world_from_ray ray / inverse, the seen point in world axes; NaN where nothing is seen."""
+    height, width = inverse.shape
+    table = rays.shape[0] > 0
+    m = world_from_ray
+    for y in range(height):
+        for x in range(width):
+            if not inverse[y, x] > 0:
+                out[y, x, 0], out[y, x, 1], out[y, x, 2] = np.nan, np.nan, np.nan
+                continue
+            s = 1.0 / np.float64(inverse[y, x])
+            px, py, pz = (rays[y, x, 0], rays[y, x, 1], rays[y, x, 2]) if table else (x + 0.5, y + 0.5, 1.0)
+            for k in range(3):
+                out[y, x, k] = center[k] + s * (m[k, 0] * px + m[k, 1] * py + m[k, 2] * pz)
+
+
+@njit
 def labels(seen, table, empty, out):
     """table[triangle] for each pixel, or `empty` where no triangle is seen."""
     height, width = seen.shape
@@ -136,6 +153,45 @@ def coordinates(seen, triangles, objects, q, rays, values, out):
             b0, b1, b2 = weights_at(q, i0, i1, i2, px, py, pz)
             for k in range(3):
                 out[y, x, k] = b0 * values[i0, k] + b1 * values[i1, k] + b2 * values[i2, k]
+
+
+@njit
+def own_boxes(values, is_used, vertex_start, area, boxes):
+    """The lowest and the highest of the used vertices of each object i of which anything is seen (area[i] pixels), in
+    boxes (count + 1, 2, 3).
+    """
+    for i in range(1, boxes.shape[0]):
+        if area[i] == 0:
+            continue
+        left, front, bottom = np.float32(np.inf), np.float32(np.inf), np.float32(np.inf)
+        right, back, top = -left, -front, -bottom
+        for v in range(np.uintp(vertex_start[i - 1]), np.uintp(vertex_start[i])):
+            if is_used[v]:
+                x, y, z = values[v, np.uintp(0)], values[v, np.uintp(1)], values[v, np.uintp(2)]
+                left, front, bottom = min(left, x), min(front, y), min(bottom, z)
+                right, back, top = max(right, x), max(back, y), max(top, z)
+        boxes[i, 0, 0], boxes[i, 0, 1], boxes[i, 0, 2] = left, front, bottom
+        boxes[i, 1, 0], boxes[i, 1, 1], boxes[i, 1, 2] = right, back, top
+
+
+@njit
+def nocs(seen, triangles, objects, q, rays, values, middle, diagonal, out):
+    """`coordinates` from the middle (N + 1, 3) of each object's box, over its diagonal (N + 1,), plus a half; else NaN."""
+    height, width = seen.shape
+    table = rays.shape[0] > 0
+    for y in range(height):
+        for x in range(width):
+            t = seen[y, x]
+            if t < 0 or objects[t] == 0:
+                out[y, x, 0], out[y, x, 1], out[y, x, 2] = np.nan, np.nan, np.nan
+                continue
+            i = np.uintp(objects[t])
+            px, py, pz = (rays[y, x, 0], rays[y, x, 1], rays[y, x, 2]) if table else (x + 0.5, y + 0.5, 1.0)
+            i0, i1, i2 = np.uintp(triangles[t, 0]), np.uintp(triangles[t, 1]), np.uintp(triangles[t, 2])
+            b0, b1, b2 = weights_at(q, i0, i1, i2, px, py, pz)
+            for k in range(3):
+                value = b0 * values[i0, k] + b1 * values[i1, k] + b2 * values[i2, k]
+                out[y, x, k] = 0.5 + (value - middle[i, k]) / diagonal[i]
 
 
 @njit

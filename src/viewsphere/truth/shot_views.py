@@ -12,16 +12,20 @@ from numpy.typing import NDArray
 
 from viewsphere.assets.mesh import Mesh
 from viewsphere.model.camera import Camera
+from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Matrix4
 from viewsphere.model.shot import Shot
-from viewsphere.model.thing import Thing
+from viewsphere.model.surface_samples import SurfaceSamples
+from viewsphere.model.thing import Thing, TimeStep
 from viewsphere.model.tracks import TRACK, Tracks
 from viewsphere.truth.geometry import Geometry, without_ground
 from viewsphere.truth.moving import ROOMS, Ring, shot_floor
 from viewsphere.truth.points import SurfacePoints, points_seen
+from viewsphere.truth.surface_draws import Drawn, points_on_model
 from viewsphere.truth.view import View
 
 Float = NDArray[np.float64]
+NO_POINTS: Drawn = np.zeros(0, np.int64), np.zeros((0, 3))
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +57,9 @@ class ShotViews:
     _geometries: dict[int, tuple[Geometry, Geometry]] = field(default_factory=dict[int, "tuple[Geometry, Geometry]"])
     _views: dict[tuple[int, int], View] = field(default_factory=dict[tuple[int, int], View])
     _followed: dict[int, Followed] = field(default_factory=dict[int, Followed])
+    _drawn: dict[tuple[ModelSpec, TimeStep | None], Drawn] = field(
+        default_factory=dict[tuple[ModelSpec, "TimeStep | None"], Drawn]
+    )
 
     def labelled(self, instant: int) -> Geometry:
         """The triangles that labels know at an instant: a shadow catcher may not be there for them."""
@@ -86,6 +93,10 @@ class ShotViews:
         """How many instants' views are there at once: still pictures are not compared with those of other instants."""
         return ROOMS if self.shot.sequence else 1
 
+    @cached_property
+    def _samples(self) -> int:
+        return SurfaceSamples.model_validate(self.shot.labels.get("surface_samples", {})).count
+
     @property
     def _sensors(self) -> int:
         return len(self.shot.rig.sensors)
@@ -103,6 +114,22 @@ class ShotViews:
         if sensor not in self._followed:
             self._followed[sensor] = self._picked(sensor)
         return self._followed[sensor]
+
+    def surface(self, instant: int, sensor: int) -> SurfacePoints:
+        """Points on each object that is there at an instant, as many as options say; drawn once for each model."""
+        view = self.view(instant, sensor)
+        things, drawn = list[int](), list[Drawn]()
+        for i, thing in enumerate(view.things[: view.geometry.object_count]):
+            key = thing.model, thing.step
+            if thing.is_there and key not in self._drawn:
+                self._drawn[key] = points_on_model(view, i, self._samples)
+            if thing.is_there:
+                things.append(i)
+                drawn.append(self._drawn[key])
+        triangle, weights = np.concatenate([NO_POINTS[0], *(t for t, _ in drawn)]), [w for _, w in drawn]
+        on = np.repeat(np.array(things, np.int32), [len(t) for t, _ in drawn])
+        joined = np.concatenate([NO_POINTS[1], *weights])
+        return SurfacePoints.of(view, on, triangle.astype(np.int32), joined, np.zeros_like(joined))
 
     def _picked(self, sensor: int) -> Followed:
         tracks = self.shot.tracks
@@ -210,3 +237,8 @@ class SampleViews:
     def followed(self) -> Followed:
         """The points that the sample's sensor follows."""
         return self.views.followed(self.sensor)
+
+    @property
+    def surface(self) -> SurfacePoints:
+        """The points that are drawn on the objects."""
+        return self.views.surface(self.instant, self.sensor)

@@ -12,6 +12,9 @@ from viewsphere.truth.points import SurfacePoints
 from viewsphere.truth.view import View
 
 Float = NDArray[np.float64]
+Drawn = tuple[NDArray[np.int64], Float]
+"""Triangles (n,) and barycentrics (n, 3) of points."""
+
 ROUNDS = 100
 """How often as many points are drawn as are wanted, until enough of them are on surface, not in the gaps of cut-outs."""
 
@@ -21,10 +24,45 @@ def points_on(view: View, count: int, rng: np.random.Generator, things: Sequence
 
     Raises ValueError where these have no surface, or next to none.
     """
-    triangles, total = _surface(view, range(view.geometry.object_count) if things is None else things)
-    if not len(total) or total[-1] <= 0.0:
-        raise ValueError("points_on: expected things that have a surface, found none")
+    triangles = _triangles(view, range(view.geometry.object_count) if things is None else things)
+    picked, weights = _evenly(view, triangles, view.geometry.vertices, count, rng)
+    if len(picked) < count:
+        found = f"{len(picked)} of {count * ROUNDS} points on it" if len(picked) else "none"
+        raise ValueError(f"points_on: expected things that have a surface, found {found}")
+    thing = view.owners[picked]
+    triangle = (picked - np.array(view.geometry.triangle_start)[thing]).astype(np.int32)
+    return SurfacePoints.of(view, thing, triangle, weights, np.zeros((count, 3)))
+
+
+def points_on_model(view: View, i: int, count: int) -> Drawn:
+    """Points drawn evenly, by area in its own axes, on the model of thing i: wherever it stands, and on all instances, the
+    same. Triangles are counted from the thing's first. None where it has no surface, or next to none.
+    """
+    triangles = _triangles(view, [i])
+    picked, weights = _evenly(view, triangles, view.geometry.coordinates, count, np.random.default_rng(0))
+    if len(picked) < count:
+        return np.zeros(0, np.int64), np.zeros((0, 3))
+    return picked - view.geometry.triangle_start[i], weights
+
+
+def _triangles(view: View, things: Sequence[int]) -> NDArray[np.int64]:
+    """Those of things that may be seen."""
+    geometry = view.geometry
+    spans = [np.arange(geometry.triangle_start[i], geometry.triangle_start[i + 1]) for i in things]
+    triangles = np.concatenate([np.zeros(0, np.int64), *spans])
+    return triangles[geometry.triangle_cutout[triangles] != NEVER]
+
+
+def _evenly(
+    view: View, triangles: NDArray[np.int64], places: NDArray[np.floating], count: int, rng: np.random.Generator
+) -> Drawn:
+    """So many points on triangles whose vertices are at these places; fewer where they have no surface, or next to none."""
     picked, weights = np.zeros(0, np.int64), np.zeros((0, 3))
+    corners = places[view.geometry.triangles[triangles]].astype(np.float64)
+    x, y, z = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]).T
+    total = np.cumsum(np.sqrt(x * x + y * y + z * z))
+    if not len(total) or total[-1] <= 0.0:
+        return picked, weights
     for _ in range(ROUNDS):
         drawn, barycentrics = _drawn(triangles, total, count, rng)
         is_surface = _is_surface(view, drawn, barycentrics)
@@ -32,28 +70,11 @@ def points_on(view: View, count: int, rng: np.random.Generator, things: Sequence
         weights = np.concatenate((weights, barycentrics[is_surface]))[:count]
         if len(picked) == count:
             break
-    else:
-        raise ValueError(
-            f"points_on: expected things that have a surface, found {len(picked)} of {count * ROUNDS} points on it"
-        )
-    thing = view.owners[picked]
-    triangle = (picked - np.array(view.geometry.triangle_start)[thing]).astype(np.int32)
-    return SurfacePoints.of(view, thing, triangle, weights, np.zeros((count, 3)))
+    return picked, weights
 
 
-def _surface(view: View, things: Sequence[int]) -> tuple[NDArray[np.int64], Float]:
-    """Triangles of the things that may be seen, and the sums of their areas so far."""
-    geometry = view.geometry
-    spans = [np.arange(geometry.triangle_start[i], geometry.triangle_start[i + 1]) for i in things]
-    triangles = np.concatenate([np.zeros(0, np.int64), *spans])
-    triangles = triangles[geometry.triangle_cutout[triangles] != NEVER]
-    corners = geometry.vertices[geometry.triangles[triangles]]
-    x, y, z = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]).T
-    return triangles, np.cumsum(np.sqrt(x * x + y * y + z * z))
-
-
-def _drawn(triangles: NDArray[np.int64], total: Float, count: int, rng: np.random.Generator) -> tuple[NDArray[np.int64], Float]:
-    """Triangles (count,) and barycentrics (count, 3), evenly by area (Turk 1990, "Generating random points in triangles")."""
+def _drawn(triangles: NDArray[np.int64], total: Float, count: int, rng: np.random.Generator) -> Drawn:
+    """Points on triangles of these areas, summed up (Turk 1990, "Generating random points in triangles")."""
     at = np.searchsorted(total, rng.random(count) * total[-1], side="right")
     root, share = np.sqrt(rng.random(count)), rng.random(count)
     weights = np.column_stack((1.0 - root, root * (1.0 - share), root * share))

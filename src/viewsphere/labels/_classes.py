@@ -1,0 +1,49 @@
+"""What maps of classes share: colours, other ids, and what contradicts them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+
+from viewsphere.labels._label import Array, Picture, by_table
+from viewsphere.labels._lifting import exact_depth
+from viewsphere.model.classes import FIRST_THING, SKY, STUFF, STUFF_IDS, class_colors, thing_class
+from viewsphere.model.sample import Sample
+
+KEY = tuple(STUFF.items())
+"""What the colours of stuff mean."""
+
+
+def class_names() -> str:
+    """The names of stuff with their ids, in words."""
+    return ", ".join(f"{i} {name}" for name, i in STUFF_IDS.items())
+
+
+def with_classes(classes: Array, ids: Mapping[int, int]) -> Array:
+    """Classes where categories have other ids."""
+    return by_table(classes, {thing_class(old): thing_class(new) for old, new in ids.items()})
+
+
+def wrong_classes(sample: Sample, classes: Array, instances: Array) -> Iterator[str]:
+    """What is wrong with a map of classes of a sample whose objects are seen where a map of instances says."""
+    by_id = np.zeros(max([0, *(o.id for o in sample.objects), int(instances.max(initial=0))]) + 1, np.int64)
+    for o in sample.objects:
+        by_id[o.id] = thing_class(o.category_id)
+    things = instances > 0
+    wrong = things & (classes != by_id[instances])
+    if wrong.any():
+        yield f"expected the classes of the objects seen; found others at {wrong.sum()} pixels"
+    wrong = ~things & ((classes < 1) | (classes > len(STUFF)) | (classes >= FIRST_THING))
+    if wrong.any():
+        yield f"expected stuff where no object is seen; found other classes at {wrong.sum()} pixels"
+    depth = exact_depth(sample)
+    if depth is not None:
+        wrong = np.isinf(depth) != (classes == SKY)
+        if wrong.any():
+            yield f"expected sky where depth is infinite, and nowhere else; found otherwise at {wrong.sum()} pixels"
+
+
+def colored(classes: Array) -> Picture:
+    """A map of classes as a picture (H, W, 3) uint8."""
+    return class_colors(int(classes.max(initial=0)) + 1)[classes]

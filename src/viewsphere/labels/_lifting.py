@@ -1,0 +1,35 @@
+"""What labels of places share: which points are not seen in their pixels, or not at their depth."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.geometry.camera import pixel_rays
+from viewsphere.labels._label import Array, channel_of
+from viewsphere.model.sample import Sample
+
+Float = NDArray[np.float64]
+
+ROUNDING = 4e-7
+"""Share of the numbers that a point was computed from by which float32 may move it."""
+
+
+def exact_depth(sample: Sample) -> Array | None:
+    """The depth of a sample, None where it is not kept, or is kept in whole steps: only PNG files do that."""
+    return None if sample.files.get("depth", "").endswith(".png") else channel_of(sample, "depth")
+
+
+def misplaced(sample: Sample, points: Float, pixels: NDArray[np.bool_], slack: Float) -> NDArray[np.bool_]:
+    """Which of the points (N, 3) of a camera's axes, metres, are not on the rays of these pixels (H, W), N of which are True,
+    or not at their depth, where that is exact; `slack` (N,) are the metres that are nothing but rounding.
+    """
+    rays = pixel_rays(sample.camera.intrinsics)[pixels]
+    rays /= np.sqrt((rays * rays).sum(axis=1, keepdims=True))
+    along = (points * rays).sum(axis=1)
+    aside = points - along[:, None] * rays
+    wrong = ~((along > 0) & ((aside * aside).sum(axis=1) <= slack * slack))
+    depth = exact_depth(sample)
+    if depth is not None:
+        wrong |= ~(np.abs(points[:, 2] - depth[pixels]) <= slack)
+    return wrong

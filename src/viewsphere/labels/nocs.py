@@ -1,0 +1,92 @@
+"""nocs: where on its object the seen point is, as a share of the object's size."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.geometry.rotation import transform
+from viewsphere.labels._label import Array, ChannelLabel, Drawing, Models, Picture, channel_of, rendered
+from viewsphere.labels._lifting import ROUNDING, misplaced
+from viewsphere.labels._sight import Sight
+from viewsphere.model.sample import ObjectAnnotation, Sample
+
+TOLERANCE = 1e-6
+"""By how much float32 may lie outside of 0 to 1."""
+
+
+def compute(sight: Sight) -> NDArray[np.float32]:
+    """Normalised object coordinates (H, W, 3), 0 to 1 in the object's axes; NaN on scenery, ground and where nothing is seen.
+
+    Wang et al. 2019, "Normalized Object Coordinate Space for Category-Level 6D Object Pose and Size Estimation": the diagonal
+    of the object's tight box has the length 1, and the box's centre is (0.5, 0.5, 0.5). The box is that of the model as it is
+    then, `box3d_object`; the axes are the model's own (front -Y, up +Z). The paper's files keep z as 1 - z.
+    """
+    from viewsphere.truth import kernels_channels as kernels
+
+    out, g = sight.empty(np.float32, 3), sight.geometry
+    boxes = np.zeros((g.object_count + 1, 2, 3))
+    kernels.own_boxes(g.coordinates, g.is_used, np.array(g.vertex_start, np.int64), sight.instances.area, boxes)
+    middle, (x, y, z) = (boxes[:, 0] + boxes[:, 1]) / 2, (boxes[:, 1] - boxes[:, 0]).T
+    seen, diagonal = sight.visibility.triangle, np.sqrt(x * x + y * y + z * z)
+    kernels.nocs(seen, g.triangles, g.triangle_object, sight.corners, sight.rays, g.coordinates, middle, diagonal, out)
+    return out
+
+
+def prove(sample: Sample, models: Models) -> Iterator[str]:
+    """The points that shares of the objects' boxes stand for are `coordinates`, and seen in their pixels, at their depth."""
+    shares, instances = channel_of(sample, "nocs"), channel_of(sample, "instances")
+    if shares is None:
+        return
+    seen = np.isfinite(shares).all(axis=-1)
+    if (seen != ~np.isnan(shares).any(axis=-1)).any() or (np.abs(shares[seen] - 0.5) > 0.5 + TOLERANCE).any():
+        yield "expected shares of 0 to 1, or NaN; found others"
+    if instances is None:
+        return
+    if (seen != (instances > 0)).any():
+        yield f"expected shares where an object is seen, NaN elsewhere; found {(seen != (instances > 0)).sum()} others"
+    for o in rendered(sample):
+        yield from _of_object(sample, o, shares, np.logical_and(instances == o.id, seen))
+
+
+def _of_object(sample: Sample, o: ObjectAnnotation, shares: Array, own: NDArray[np.bool_]) -> Iterator[str]:
+    low, high = o.box3d_object.min(axis=0), o.box3d_object.max(axis=0)
+    diagonal, middle = float(np.sqrt(((high - low) ** 2).sum())), (low + high) / 2
+    points = middle + (shares[own].astype(np.float64) - 0.5) * diagonal
+    slack = np.full(len(points), ROUNDING * (2 * diagonal + np.abs(middle).max()))
+    coordinates = channel_of(sample, "coordinates")
+    if coordinates is not None:
+        wrong = ~(np.abs(points - coordinates[own]).max(axis=1, initial=0.0) <= slack)
+        if wrong.any():
+            yield f"object {o.id}: expected shares of its coordinates, found others at {wrong.sum()} pixels"
+    if sample.known_camera is not None:
+        placed = transform(o.camera_from_object, points)
+        away = np.abs(o.camera_from_object[:3, 3]).max() + np.abs(placed).max(axis=1, initial=0.0)
+        wrong = misplaced(sample, placed, own, slack + 2 * ROUNDING * away)
+        if wrong.any():
+            yield f"object {o.id}: expected what its pixels show, at their depth; found other points at {wrong.sum()} pixels"
+
+
+def picture(shares: NDArray[np.float32]) -> Picture:
+    """Shares as a picture (H, W, 3) uint8, as NOCS maps are shown: x is red, y green, z blue; black where there are none."""
+    known = np.isfinite(shares).all(axis=-1, keepdims=True)
+    return (np.clip(np.where(known, shares, 0.0), 0, 1) * 255).round().astype(np.uint8)
+
+
+LABEL = ChannelLabel(
+    name="nocs",
+    meaning="the seen point in its object's box, whose diagonal is 1 and whose centre is 0.5",
+    axes="object",
+    dtype=np.float32,
+    components=3,
+    empty=np.nan,
+    compute=compute,
+    prove=prove,
+    drawing=Drawing(
+        "nocs",
+        beside=lambda sample: picture(sample.channels["nocs"]),
+        key=(("nocs: red goes with the object's x, green with y, blue with z", None),),
+    ),
+)

@@ -1,0 +1,85 @@
+"""panoptic: class and object in one number, things and stuff."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.errors import StoreError
+from viewsphere.labels._classes import KEY, colored, with_classes, wrong_classes
+from viewsphere.labels._label import Array, ChannelLabel, Drawing, Models, Picture, channel_of
+from viewsphere.labels._paint import color_of
+from viewsphere.labels._sight import Sight
+from viewsphere.model.classes import SKY
+from viewsphere.model.sample import Sample
+
+BITS = 16
+"""Of an object's id; the class is above them."""
+
+MOST = (1 << BITS) - 1, (1 << (31 - BITS)) - 1
+"""The greatest id of an object, and of a class."""
+
+
+def compute(sight: Sight) -> NDArray[np.int32]:
+    """class * 65536 + object id, (H, W): the class is that of `semantic`, the id that of `instances`, 0 of stuff.
+
+    So it has the segments of Kirillov et al. 2019, "Panoptic Segmentation". Raises StoreError for more than 65535 objects, or
+    classes above 32767, which the number has no room for.
+    """
+    classes = sight.geometry.triangle_class
+    found = sight.geometry.object_count, int(classes.max(initial=0))
+    if found[0] > MOST[0] or found[1] > MOST[1]:
+        raise StoreError(f"channel panoptic: expected objects of 0..{MOST[0]}, classes of 0..{MOST[1]}; found {found}")
+    out = sight.per_triangle(classes, SKY)
+    out <<= BITS
+    out |= sight.instances.ids
+    return out
+
+
+def class_of(codes: Array) -> Array:
+    """The classes in a map."""
+    return codes >> BITS
+
+
+def object_of(codes: Array) -> Array:
+    """The objects' ids in a map, 0 of stuff."""
+    return codes & MOST[0]
+
+
+def prove(sample: Sample, models: Models) -> Iterator[str]:
+    """The objects are those of `instances`, and their classes those of their categories."""
+    codes, instances = channel_of(sample, "panoptic"), channel_of(sample, "instances")
+    if codes is None or instances is None:
+        return
+    wrong = object_of(codes) != instances
+    if wrong.any():
+        yield f"expected the objects seen; found others at {wrong.sum()} pixels"
+    yield from wrong_classes(sample, class_of(codes), instances)
+
+
+def renumbered(codes: Array, ids: Mapping[int, int]) -> Array:
+    """The map where categories have other ids."""
+    return with_classes(class_of(codes), ids) << BITS | object_of(codes)
+
+
+def picture(codes: NDArray[np.int32]) -> Picture:
+    """A map as a picture (H, W, 3) uint8: stuff in the colour of its class, each thing in its own."""
+    colors, objects = colored(class_of(codes)), object_of(codes)
+    for i in np.unique(objects[objects > 0]).tolist():
+        colors[objects == i] = color_of(i)
+    return colors
+
+
+LABEL = ChannelLabel(
+    name="panoptic",
+    meaning="class * 65536 + object id: the class as in `semantic`, the id 0 of stuff",
+    dtype=np.int32,
+    unit="class and object id",
+    empty=SKY << BITS,
+    compute=compute,
+    prove=prove,
+    renumbered=renumbered,
+    drawing=Drawing("panoptic", beside=lambda sample: picture(sample.channels["panoptic"]), key=KEY),
+)

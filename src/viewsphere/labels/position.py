@@ -1,0 +1,100 @@
+"""position: where in the world the seen point is."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.geometry.rotation import inverse, product, transform
+from viewsphere.labels._label import ChannelLabel, Drawing, Models, Picture, channel_of, rendered
+from viewsphere.labels._lifting import ROUNDING, Float, exact_depth, misplaced
+from viewsphere.labels._sight import Sight
+from viewsphere.model.sample import Sample
+
+STRIPES = 2
+"""Colours of a picture begin anew so often in a metre, divided by two."""
+
+
+def compute(sight: Sight) -> NDArray[np.float32]:
+    """The seen point in the world's axes, (H, W, 3) metres: of objects, scenery and ground; NaN where nothing is seen.
+
+    It is the pixel's ray from the camera's centre, times 1/s of `truth.visibility`: it lies on that ray and at `depth`.
+    """
+    from viewsphere.truth import kernels_channels as kernels
+
+    out, world_from_camera = sight.empty(np.float32, 3), inverse(sight.camera.R)
+    center = -transform(world_from_camera, sight.camera.t)
+    world_from_ray = product(world_from_camera, sight.camera_from_ray)
+    kernels.positions(sight.visibility.inverse_depth, sight.rays, world_from_ray, center, out)
+    return out
+
+
+def prove(sample: Sample, models: Models) -> Iterator[str]:
+    """Points are seen in their pixels, at their depth, and are the object's coordinates, moved by its pose."""
+    points = channel_of(sample, "position")
+    if points is None:
+        return
+    seen: NDArray[np.bool_] = np.logical_and.reduce(np.isfinite(points), axis=-1)
+    if (seen != np.isfinite(points).any(axis=-1)).any():
+        yield "expected all three numbers or none; found some of them"
+    depth, instances = exact_depth(sample), channel_of(sample, "instances")
+    if depth is not None and (seen != np.isfinite(depth)).any():
+        yield f"expected points where depth is finite, NaN elsewhere; found {(seen != np.isfinite(depth)).sum()} others"
+    if instances is not None and (~seen & (instances > 0)).any():
+        yield f"expected points where an object is seen; found NaN at {(~seen & (instances > 0)).sum()} pixels"
+    if sample.known_camera is None:
+        return
+    world = points[seen].astype(np.float64)
+    off = misplaced(sample, transform(sample.camera.R, world) + sample.camera.t, seen, _slack(sample, world))
+    if off.any():
+        yield f"expected points that are seen in their pixels, and at their depth; found {off.sum()} others"
+    yield from _against_coordinates(sample, points)
+
+
+def _against_coordinates(sample: Sample, points: NDArray[np.float32]) -> Iterator[str]:
+    coordinates, instances = channel_of(sample, "coordinates"), channel_of(sample, "instances")
+    if coordinates is None or instances is None:
+        return
+    for o in rendered(sample):
+        own = np.logical_and(instances == o.id, np.isfinite(points).all(axis=-1))
+        world = points[own].astype(np.float64)
+        moved = transform(o.world_from_object, coordinates[own].astype(np.float64))
+        wrong = ~(
+            np.abs(moved - world).max(axis=1, initial=0.0)
+            <= _slack(sample, world) + ROUNDING * np.abs(moved).max(axis=1, initial=0.0)
+        )
+        if wrong.any():
+            yield f"object {o.id}: expected its coordinates, moved by its pose; found other points at {wrong.sum()} pixels"
+
+
+def _slack(sample: Sample, world: Float) -> Float:
+    """Metres by which rounding may move points (N, 3): a share of how far they are from the camera and from the origin."""
+    away = np.abs(world - sample.camera.center).max(axis=1, initial=0.0)
+    return ROUNDING * (2 * away + np.abs(world).max(axis=1, initial=0.0))
+
+
+def striped(points: NDArray[np.float32]) -> Picture:
+    """Points as a picture (H, W, 3) uint8: red goes with x, green with y, blue with z, up and down again in each metre."""
+    seen = np.isfinite(points).all(axis=-1, keepdims=True)
+    share = np.abs((np.where(seen, points, 0.0) * STRIPES / 2) % 1 * 2 - 1)
+    return np.where(seen, 60 + 195 * (1 - share), 0).round().astype(np.uint8)
+
+
+LABEL = ChannelLabel(
+    name="position",
+    meaning="the seen point in the world, of scenery and ground, too",
+    axes="world",
+    dtype=np.float32,
+    components=3,
+    unit="m",
+    empty=np.nan,
+    compute=compute,
+    prove=prove,
+    drawing=Drawing(
+        "position",
+        beside=lambda sample: striped(sample.channels["position"]),
+        key=(("position: red goes with x, green with y, blue with z, up and down again in each metre", None),),
+    ),
+)

@@ -1,0 +1,39 @@
+"""semantic: the class of what is seen, things and stuff."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+
+from viewsphere.labels._classes import KEY, class_names, colored, with_classes, wrong_classes
+from viewsphere.labels._label import Array, ChannelLabel, Drawing, Models, channel_of
+from viewsphere.model.classes import SKY, class_colors
+from viewsphere.model.sample import Sample
+
+
+def prove(sample: Sample, models: Models) -> Iterator[str]:
+    """Objects are of their categories' classes, all else is stuff, and where nothing is seen is sky."""
+    classes, instances = channel_of(sample, "semantic"), channel_of(sample, "instances")
+    if classes is not None and instances is not None:
+        yield from wrong_classes(sample, classes, instances)
+
+
+def renumbered(classes: Array, ids: Mapping[int, int]) -> Array:
+    """The classes where categories have other ids."""
+    return with_classes(classes, ids)
+
+
+LABEL = ChannelLabel(
+    name="semantic",
+    meaning=f"class of what is seen: stuff below 32 ({class_names()}), things 31 + their category's id",
+    dtype=np.int32,
+    unit="class id",
+    empty=SKY,
+    encoding="png16",
+    colors=tuple(map(tuple, class_colors().tolist())),
+    compute=lambda sight: sight.per_triangle(sight.geometry.triangle_class, SKY),
+    prove=prove,
+    renumbered=renumbered,
+    drawing=Drawing("semantic", beside=lambda sample: colored(sample.channels["semantic"]), key=KEY),
+)
