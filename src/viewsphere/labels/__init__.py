@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from viewsphere import plugins
 from viewsphere.labels._label import TAIL, ChannelLabel, Color, Drawing, Extent, Field, Label, ModelFacts, Needs, ObjectLabel
+from viewsphere.labels._passes import DRAWINGS
 from viewsphere.labels._placement import Placement
 from viewsphere.labels._record import annotation_of, finite, from_short_record, from_whole_record, short_record, whole_record
 from viewsphere.labels._sight import Around, Sight
@@ -45,6 +46,7 @@ __all__ = [
     "annotated",
     "channel_labels",
     "channels",
+    "drawable",
     "drawings",
     "finite",
     "from_short_record",
@@ -86,9 +88,16 @@ def channels() -> dict[str, Channel]:
     return PASSES | {name: label.channel for name, label in channel_labels().items()}
 
 
+@cache
+def drawable() -> dict[str, Drawing]:
+    """The drawings of all labels and passes that have one, by the name of the label or pass, in alphabetical order."""
+    found = {name: label.drawing for name, label in labels().items() if label.drawing}
+    return dict(sorted((found | DRAWINGS).items()))
+
+
 def drawings() -> tuple[Drawing, ...]:
-    """The drawings of all labels that have one, in the order of the labels' names."""
-    return tuple(label.drawing for _, label in sorted(labels().items()) if label.drawing)
+    """What `drawable` lists."""
+    return tuple(drawable().values())
 
 
 def observe(

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
 from viewsphere.errors import StoreError
-from viewsphere.labels import ChannelLabel, Drawing, Extent, labels
+from viewsphere.labels import Drawing, Extent, channels, drawable
 from viewsphere.model.channel import picture_of
 from viewsphere.model.mistakes import one_of
 from viewsphere.model.sample import Sample
@@ -36,23 +36,22 @@ def nothing(sample: Sample) -> Sequence[Sample]:
 
 def check_drawn(samples: Sequence[Sample], draw: Sequence[str]) -> None:
     """Raise StoreError for what nobody can draw: names of no drawing, and of channels that none of the samples has."""
-    known = {label.drawing.name: label for label in labels().values() if label.drawing}
+    known = {drawing.name: source for source, drawing in drawable().items()}
     for name in draw:
         if name not in known:
             raise StoreError(f"--draw: {one_of(name, sorted(known))}")
-        label = known[name]
-        if samples and isinstance(label, ChannelLabel) and not any(label.name in sample.channels for sample in samples):
+        source = known[name]
+        if samples and source in channels() and not any(source in sample.channels for sample in samples):
             kept = ", ".join(samples[0].channels)
-            raise StoreError(f"--draw: expected the channel {label.name}, to draw {name}; found pictures that have {kept}")
+            raise StoreError(f"--draw: expected the channel {source}, to draw {name}; found pictures that have {kept}")
 
 
 def drawn(sample: Sample, draw: Sequence[str]) -> list[Drawing]:
     """The chosen drawings of what a sample has."""
-    found = (label for _, label in sorted(labels().items()) if label.drawing and label.drawing.name in draw)
     return [
-        label.drawing
-        for label in found
-        if label.drawing and (not isinstance(label, ChannelLabel) or label.name in sample.channels)
+        drawing
+        for source, drawing in drawable().items()
+        if drawing.name in draw and (source not in channels() or source in sample.channels)
     ]
 
 

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from viewsphere.errors import each
-from viewsphere.labels import ChannelLabel, labels
+from viewsphere.labels import channels as known
+from viewsphere.labels import drawable
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.channel import picture_of
 from viewsphere.model.model_spec import ModelSpec
@@ -90,8 +91,7 @@ def _rendered(stages: Stages, planned: Plan, subject: str, poses: Sequence[int],
 
 def _with_channels(recipe: Recipe, channels: Sequence[str], draw: Sequence[str]) -> Recipe:
     """The recipe with these channels, and with those that are drawn."""
-    wanted = (label for label in labels().values() if isinstance(label, ChannelLabel))
-    named = (label.name for label in wanted if label.drawing and label.drawing.name in draw)
+    named = (source for source, drawing in drawable().items() if drawing.name in draw and source in known())
     return recipe.model_copy(update={"channels": tuple(dict.fromkeys((*channels, *named)))})
 
 

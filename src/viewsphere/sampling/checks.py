@@ -8,6 +8,7 @@ from fnmatch import fnmatchcase
 from viewsphere import plugins
 from viewsphere.errors import RecipeError
 from viewsphere.labels import Needs, channel_labels, channels
+from viewsphere.model.channel import MATERIAL_PASSES, PASSES, PICTURES
 from viewsphere.model.mistakes import nearest, one_of
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.recipe.draws import alternatives, span
@@ -56,6 +57,7 @@ def check_names(recipe: Recipe) -> None:
         if name not in channels():
             raise RecipeError(f"channels[{i}]: {one_of(name, tuple(channels()))}")
         _check_needs(recipe, f"channels[{i}]", name)
+        _check_painted(recipe, f"channels[{i}]", name)
 
 
 def _check_needs(recipe: Recipe, where: str, name: str) -> None:
@@ -69,6 +71,21 @@ def _check_needs(recipe: Recipe, where: str, name: str) -> None:
     ):
         if is_lacking:
             raise RecipeError(f"{where}: expected {field} beside {name}, {what}; found none: set {field}")
+
+
+def _check_painted(recipe: Recipe, where: str, name: str) -> None:
+    """A pass needs an engine that paints it, and what surfaces are made of needs materials that viewsphere made."""
+    paints = _engine_says(recipe, "PAINTS", PICTURES)
+    if name in PASSES and name not in paints:
+        raise RecipeError(
+            f"{where}: expected a label, or what engine: {recipe.engine.name} paints ({', '.join(paints)}); found {name}: "
+            "leave it out, or take engine: raster or cycles"
+        )
+    if name in MATERIAL_PASSES and recipe.scene.blend is not None:
+        raise RecipeError(
+            f"{where}: expected no {name} with scene.blend, whose materials may be any nodes; found it: leave it out, or take "
+            "the file's meshes alone by scene.place"
+        )
 
 
 def check_blend(recipe: Recipe) -> None:
