@@ -15,6 +15,7 @@ from shots import with_camera
 from viewsphere import Recipe, plan, zoo
 from viewsphere.assets.mesh import Image, Material, Texture
 from viewsphere.engines import raster
+from viewsphere.engines._passes import shading_of
 from viewsphere.engines.raster import kernels_split
 from viewsphere.engines.raster.painting import paint
 from viewsphere.errors import RecipeError
@@ -254,3 +255,11 @@ def test_engines_that_do_not_paint_a_pass_say_so_before_rendering(engine):
         match=rf"channels\[1\]: expected a label, or what engine: {engine} paints \(rgb, rgba\); found albedo: leave",
     ):
         plan(recipe)
+
+
+def test_shading_where_the_albedo_lacks_colours():
+    albedo, diffuse = (
+        np.float32([[[0.5, 0.0, 0.25], [0, 0, 0], [1, 1, 1]]]),
+        np.float32([[[1.0, 0.0, 1.0], [0, 0, 0], [3, 2, 1]]]),
+    )
+    np.testing.assert_array_equal(shading_of(albedo, diffuse), np.float32([[[2, 3, 4], [0, 0, 0], [3, 2, 1]]]))

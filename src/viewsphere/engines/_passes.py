@@ -14,6 +14,9 @@ def shading_of(albedo: Float32, diffuse: Float32) -> Float32:
     Where the albedo has no red, green or blue, that of the shading is the mean of the others; where the albedo is 0, all are.
     """
     has = albedo > 0
-    quotient = np.where(has, diffuse / np.where(has, albedo, np.float32(1)), np.float32(0))
-    mean = quotient.sum(axis=-1, keepdims=True) / np.maximum(has.sum(axis=-1, keepdims=True), 1).astype(np.float32)
-    return np.where(has, quotient, mean).astype(np.float32)
+    shading = np.divide(diffuse, albedo, out=np.zeros(albedo.shape, np.float32), where=has)
+    some = ~has.all(axis=-1)
+    known = has[some]
+    mean = shading[some].sum(axis=-1, keepdims=True) / np.maximum(known.sum(axis=-1, keepdims=True), 1).astype(np.float32)
+    shading[some] = np.where(known, shading[some], mean)
+    return shading

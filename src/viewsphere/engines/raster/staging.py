@@ -80,10 +80,14 @@ class RasterStage:
         painted: dict[str, NDArray[Any]] = {}
         if not set(names).isdisjoint(LIGHT_PASSES):
             painted |= self._light(instant, sensor, visibility, names)
+            picture = picture_of(names)
+            if picture and Blur(self.arrangements, instant, sensor).count(self.at(instant), visibility) == 1:
+                painted[picture] = self._finished(instant, sensor, visibility, picture)  # of the light that was parted
         if not set(names).isdisjoint(MATERIAL_PASSES):
             made = materials(self.baked(instant), self.shot.camera(instant, sensor), visibility)
             painted |= dict(zip(MATERIAL_PASSES, made.T.reshape(2, *visibility.triangle.shape).copy(), strict=True))
-        painted |= {name: self._picture(instant, sensor, visibility, name == "rgba") for name in PICTURES if name in names}
+        left = [name for name in PICTURES if name in names and name not in painted]
+        painted |= {name: self._picture(instant, sensor, visibility, name) for name in left}
         return {name: painted[name] for name in names}
 
     def _light(self, instant: int, sensor: int, visibility: Visibility, names: Collection[str]) -> dict[str, Float32]:
@@ -102,13 +106,20 @@ class RasterStage:
         residual = np.maximum(radiance[:, :3].reshape(shape) - albedo * shading, np.float32(0))
         return {"albedo": albedo, "shading": shading, "residual": residual, "emission": emission}
 
-    def _picture(self, instant: int, sensor: int, visibility: Visibility, transparent: bool) -> NDArray[np.uint8]:
-        """(H, W, 3) uint8 sRGB; with `transparent` (H, W, 4) with straight alpha."""
-        camera, finish = self.shot.camera(instant, sensor), self.shot.finish(instant).with_background(transparent)
+    def _picture(self, instant: int, sensor: int, visibility: Visibility, name: str) -> NDArray[np.uint8]:
+        """`rgb` or `rgba`."""
+        camera, background = (
+            self.shot.camera(instant, sensor),
+            self.shot.finish(instant).with_background(name == "rgba").background,
+        )
+        self._paint(instant, sensor, visibility, shows_sky(background), self._canvas(camera.width * camera.height))
+        return self._finished(instant, sensor, visibility, name)
+
+    def _finished(self, instant: int, sensor: int, visibility: Visibility, name: str) -> NDArray[np.uint8]:
+        """`rgb` or `rgba`, of the light that was painted last."""
+        camera, finish = self.shot.camera(instant, sensor), self.shot.finish(instant).with_background(name == "rgba")
         background = display_background(finish.background, camera.width, camera.height)
-        has_sky = background is None and not transparent
         radiance = self._canvas(camera.width * camera.height)
-        self._paint(instant, sensor, visibility, has_sky, radiance)
         shape, focus = (camera.height, camera.width, 4), np.array(self.shot.instants[instant].focus)
         owner = self.at(instant).triangle_object
         seen = partial(seen_by, camera, focus, visibility.inverse_depth, visibility.triangle, owner)
