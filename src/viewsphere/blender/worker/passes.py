@@ -70,28 +70,34 @@ def materials(found):
 
 
 @contextmanager
-def centred(scene, least):
-    """Cycles looks once through the middle of each pixel, past what is less opaque than `least`; None changes nothing."""
-    if least is None:
-        yield
-        return
-    layer, cycles = bpy.context.view_layer, scene.cycles
-    wanted = [
-        *((cycles, name, value) for name, value in {"samples": 1, "use_denoising": False, "max_bounces": 0}.items()),
-        (cycles, "use_adaptive_sampling", False),
-        (cycles, "pixel_filter_type", "GAUSSIAN"),
-        (cycles, "filter_width", 0.01),
-        (layer, "pass_alpha_threshold", least),
-    ]
+def sampled(scene, names, least):
+    """Change how Cycles samples meanwhile, for some passes: for `objects` the ground is not seen, and nothing is lit; for
+    `materials` it looks once through the middle of each pixel, past what is less opaque than `least`.
+    """
+    wanted = []
+    if "objects" in names:
+        wanted += _unlit(scene) + [(one, "visible_camera", False) for one in scene.objects if one.is_shadow_catcher]
+    if "materials" in names:
+        wanted += _unlit(scene) + _centred(scene, least)
     before = [(owner, name, getattr(owner, name)) for owner, name, _ in wanted]
-    for owner, name, value in wanted:
-        setattr(owner, name, value)
+    try:
+        for owner, name, value in wanted:
+            setattr(owner, name, value)
+        yield
+    finally:
+        for owner, name, value in reversed(before):
+            setattr(owner, name, value)
+
+
+def _unlit(scene):
+    return [(scene.cycles, "use_denoising", False), (scene.cycles, "max_bounces", 0)]
+
+
+def _centred(scene, least):
+    """What is to be set, by owner and name; nodes that say how opaque a surface has to be are set at once."""
     for material in bpy.data.materials:
         node = material.node_tree.nodes.get(LEAST) if material.node_tree is not None else None
         if node is not None and node.outputs[0].default_value != least:
             node.outputs[0].default_value = least
-    try:
-        yield
-    finally:
-        for owner, name, value in before:
-            setattr(owner, name, value)
+    cycles = {"samples": 1, "use_adaptive_sampling": False, "pixel_filter_type": "GAUSSIAN", "filter_width": 0.01}
+    return [(bpy.context.view_layer, "pass_alpha_threshold", least), *((scene.cycles, *each) for each in cycles.items())]

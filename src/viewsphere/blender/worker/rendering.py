@@ -42,8 +42,8 @@ def render(told):
     """Write (H, W, 4) float32 to `out`: scene-linear, premultiplied, the first row on top; empty outside of the border.
 
     With `blur`, see `blurring.exposed`, what moves is blurred. Each of the `passes` is written beside the colours, such as
-    `picture.index.npy` beside `picture.npy`: index and depth (H, W, 1), light (H, W, 12) as `passes.light` has it, materials
-    (H, W, 2). With `centred`, see `passes.centred`, only the middles of the pixels are seen.
+    `picture.index.npy` beside `picture.npy`: index and depth (H, W, 1), light (H, W, 12) as `passes.light` has it, objects
+    (H, W, 3), their albedo without the ground's, and materials (H, W, 2). See `passes.sampled` for what the last two change.
     """
     scene = bpy.context.scene
     view = told["camera"]
@@ -57,7 +57,7 @@ def render(told):
     begun, cpu = time.monotonic(), time.process_time()
     file = Path(told["out"]).with_suffix(".exr")
     composed = file if compositing.is_used(scene) else None
-    with exposed(scene, told.get("blur")), passes.centred(scene, told.get("centred")):
+    with exposed(scene, told.get("blur")), passes.sampled(scene, told["passes"], told.get("least")):
         found = _drawn(scene, file) if renderers.is_drawn(scene) else _rendered(_needed(told), composed)
     for name, pixels in _chosen(found, told).items():
         np.save(wanted[name], _whole(pixels, told["border"], view))
@@ -69,7 +69,7 @@ def _switched(layer, told):
     wanted, has_more = {"picture": told["out"]}, False
     for name in told["passes"]:
         wanted[name] = told["out"].replace(".npy", f".{name}.npy")
-        if name == "light":
+        if name in ("light", "objects"):
             has_more |= passes.ask_for_light(layer)
         elif name == "materials":
             has_more |= passes.ask_for_materials(layer)
@@ -80,7 +80,7 @@ def _switched(layer, told):
 
 def _needed(told):
     """Names, of any version of Blender, of what the requested pictures are made of."""
-    parts = {"light": passes.NAMES, "materials": passes.MATERIALS}
+    parts = {"light": passes.NAMES, "objects": passes.NAMES, "materials": passes.MATERIALS}
     return {"Combined"}.union(*(parts[name] if name in parts else PASSES[name][1] for name in told["passes"]))
 
 
@@ -90,6 +90,8 @@ def _chosen(found, told):
     for name in told["passes"]:
         if name == "light":
             chosen[name] = passes.light(found, told["transparent"])
+        elif name == "objects":
+            chosen[name] = passes.light(found, True)[..., :3]
         elif name == "materials":
             chosen[name] = passes.materials(found)
         else:

@@ -56,9 +56,10 @@ SPARE = 4.0
 AROUND = 2
 """Pixels by which Blender's pixel filter spreads a surface."""
 
-COMPONENTS = {"picture": 4, "light": 12, "materials": 2}
+COMPONENTS = {"picture": 4, "light": 12, "objects": 3, "materials": 2}
 """What a render gives, and how many numbers of each pixel: radiance and alpha; albedo, diffuse light, all other light and
-emission; and, of a render of the pixels' centres alone, roughness and metallic.
+emission; of a render that does not show the ground, the albedo; and, of one that sees the pixels' centres alone, roughness and
+metallic.
 """
 
 Float32 = NDArray[np.float32]
@@ -208,7 +209,7 @@ class CyclesStage:
                 background = self.shot.finish(instant).with_background(picture_of(names) == "rgba").background
                 camera, is_open = self.shot.camera(instant, sensor), not shows_sky(background)
                 painted |= self.arrangement(instant).rendered(camera, is_open, wanted=("light",))
-            painted |= self._light(instant, visibility, painted["light"])
+            painted |= self._light(instant, sensor, visibility, painted["light"])
         if not set(names).isdisjoint(MATERIAL_PASSES):
             painted |= self._materials(instant, sensor, visibility)
         return {name: painted[name] for name in names}
@@ -226,13 +227,17 @@ class CyclesStage:
         seen = partial(seen_by, camera, focus, visibility.inverse_depth, visibility.triangle, owner)
         return rendered | {name: finished(rendered["picture"], background, finish, seen)}
 
-    def _light(self, instant: int, visibility: Visibility, light: Float32) -> dict[str, Float32]:
-        """All `LIGHT_PASSES`, of the light that was rendered."""
+    def _light(self, instant: int, sensor: int, visibility: Visibility, light: Float32) -> dict[str, Float32]:
+        """All `LIGHT_PASSES`, of the light that was rendered. Cycles counts a shadow catcher in the albedo: it is left out."""
         albedo, diffuse, residual, emission = np.split(light, 4, axis=-1)
-        if self.shot.scene.ground is not None:
-            # Where the ground fades into the sky, it sends the sky's light; a shadow catcher is none of the passes'.
-            is_ground = visibility.triangle >= self.at(instant).triangle_start[-1]
-            emission = np.where(is_ground[..., None], np.float32(0), emission)
+        ground = self.shot.scene.ground
+        if ground is not None:
+            # Where the ground fades, it sends the light of the sky.
+            is_far = (visibility.triangle < 0) | (visibility.triangle >= self.at(instant).triangle_start[-1])
+            emission = np.where(is_far[..., None], np.float32(0), emission)
+        if ground is not None and ground.catcher:
+            camera = self.shot.camera(instant, sensor)
+            albedo = self.arrangement(instant).rendered(camera, True, wanted=("objects",))["objects"]
         return {"albedo": albedo, "shading": shading_of(albedo, diffuse), "residual": residual, "emission": emission}
 
     def _materials(self, instant: int, sensor: int, visibility: Visibility) -> dict[str, Float32]:
@@ -334,8 +339,8 @@ class Arrangement:
             return {name: np.zeros((*shape, COMPONENTS[name]), np.float32) for name in ("picture", *wanted)}
         out = process.folder / "picture.npy"
         request = FileFrame.of(self.shot.scene.blend).camera(camera_request(camera, clip))
-        centred = self.shot.label_alpha if "materials" in wanted else None
-        told: Request = {"transparent": is_open, "border": border, "passes": list(wanted), "blur": blur, "centred": centred}
+        told: Request = {"transparent": is_open, "border": border, "passes": list(wanted), "blur": blur}
+        told["least"] = self.shot.label_alpha
         try:
             process.ask("render", FRAME_SECONDS, camera=request, out=str(out), **told)
         except BlenderError as error:

@@ -22,7 +22,6 @@ from viewsphere.engines.raster.kernels_block import (
     RED,
     ROUGH,
     ROWS,
-    T0,
     UNLIT,
 )  # fmt: skip
 from viewsphere.engines.raster.kernels_gather import gather, gather_ground, locate
@@ -70,12 +69,14 @@ def _part_matte(b, p):
 
 @inner(fastmath=FAST)
 def _lay(start, count, is_ground, slots, b, p, out):
-    """Lay the parts over what is behind them, as `kernels_paint.lay` lays the light."""
+    """Lay the parts over what is behind them, as `kernels_light.lay` lays the light; but what coloured glass tints beyond its
+    grey share is none of the parts of what is behind it.
+    """
     for i in range(U(count)):
         q = U(slots[U(start) + i])
+        under = f4(0) if is_ground else f4(1) - b[U(ALPHA) + i]
+        shown = f4(1) - b[U(FADE) + i] if is_ground else f4(1)
         for k in range(U(out.shape[1])):
-            under = f4(0) if is_ground else f4(1) - b[U(ALPHA) + i] + b[U(T0) + (k % U(3)) * U(BLOCK) + i]
-            shown = f4(1) - b[U(FADE) + i] if is_ground else f4(1)
             out[q, k] = max(out[q, k] * under + p[k * U(BLOCK) + i] * shown, f4(0))
 
 
