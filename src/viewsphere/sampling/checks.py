@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from fnmatch import fnmatchcase
+from typing import TypeVar
 
 from viewsphere import plugins
 from viewsphere.errors import RecipeError
@@ -18,6 +19,8 @@ from viewsphere.recipe.surface import GroundEntry
 from viewsphere.recipe.viewpoints import Jitter, Normal, Sphere
 from viewsphere.sampling.models import count_models
 from viewsphere.sampling.viewpoints import Poses
+
+Said = TypeVar("Said")
 
 
 def check_redraws(recipe: Recipe) -> None:
@@ -109,7 +112,7 @@ def check_catcher(recipe: Recipe) -> None:
         )
 
 
-def _engine_says(recipe: Recipe, name: str, default: bool) -> bool:
+def _engine_says(recipe: Recipe, name: str, default: Said) -> Said:
     return getattr(plugins.load("engines", recipe.engine.name), name, default)
 
 
