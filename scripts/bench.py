@@ -202,7 +202,7 @@ def one_frame(clock: Clock, shot: Shot, instant: int, stage: Stage, mesh: Mesh) 
     geometry, visibility = clock("truth: raster", lambda: drawn(stage, instant, camera))
     names = ["depth", "instances", "normals"]
     observed = clock("truth: channels", lambda: observe(geometry, camera, visibility, names))
-    observed["rgb"] = clock("colour", lambda: stage.color(instant, 0, visibility, False))
+    observed["rgb"] = clock("colour", lambda: stage.paint(instant, 0, visibility, ("rgb",))["rgb"])
     known = (shot, instant, camera, geometry, visibility, boxes, ["model.obj"])
     objects = clock("annotations", lambda: annotated(sight_of(*known)))
     return Sample(now.index, "train", camera, now.viewpoint, objects, observed, {})

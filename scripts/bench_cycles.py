@@ -111,7 +111,7 @@ def ours(shot: Shot, stages: Stages, pictures: Path | None = None) -> Costs:
         annotated(sight_of(shot, instant, camera, geometry, visibility, boxes, ["model.obj"]))
         labels.append(time.process_time() - before)
         before = spent()
-        picture = stage.color(instant, sensor, visibility, False)
+        picture = stage.paint(instant, sensor, visibility, ("rgb",))["rgb"]
         color.append(spent() - before)
         if pictures is not None:
             save(pictures / f"{number}.png", picture)

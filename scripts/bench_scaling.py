@@ -102,7 +102,7 @@ def frame_cost(mesh: Mesh, side: tuple[int, int] = (640, 480), copies: int = 1) 
         visibility = rasterize(geometry, camera)
         observe(geometry, camera, visibility, ["depth", "instances", "normals"])
         middle = time.process_time()
-        stage.color(instant, 0, visibility, False)
+        stage.paint(instant, 0, visibility, ("rgb",))
         times["truth"].append(1e3 * (middle - begun))
         times["colour"].append(1e3 * (time.process_time() - middle))
     return {name: float(np.median(values)) for name, values in times.items()}

@@ -170,7 +170,7 @@ def picture(case: Case) -> np.ndarray[Any, Any]:
     shot, meshes = shot_of(case)
     engine: Engine = plugins.load("engines", "raster")
     stage = engine.stage(shot, lambda spec: meshes[spec.key])
-    return stage.color(0, 0, rasterize(stage.at(0), shot.camera(0)), False)
+    return stage.paint(0, 0, rasterize(stage.at(0), shot.camera(0)), ("rgb",))["rgb"]
 
 
 def developed(file: Path) -> np.ndarray[Any, Any]:

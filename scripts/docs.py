@@ -91,8 +91,8 @@ def channels_page() -> str:
     text = NOTE + (
         "# Channels and annotations\n\nA recipe's `channels` name what is kept of each frame. Arrays have the image's height "
         "and width; channels of several components have them last. The files are the default ones, and lossless; a recipe's "
-        "`files` choose others, see [formats.md](formats.md#files). Each but the pictures is one file in "
-        "`src/viewsphere/labels/`.\n\n"
+        "`files` choose others, see [formats.md](formats.md#files). Engines paint those up to `metallic` "
+        "([pictures.md](pictures.md#light-in-parts)); each of the others is one file in `src/viewsphere/labels/`.\n\n"
         "| channel | type | components | unit | empty | file | what it is |\n|---|---|---|---|---|---|---|\n"
     )
     for c in channels().values():

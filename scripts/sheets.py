@@ -99,7 +99,7 @@ def tile(mesh: Mesh, scene: Scene, azimuth_deg: float = 35, elevation_deg: float
     shot = Shot(key="sheet", things=(thing,), rig=Rig.of(LENS), instants=instants, scene=scene, channels=("rgb",))
     engine: Engine = plugins.load("engines", "raster")
     stage = engine.stage(shot, lambda spec: mesh)
-    return Image.fromarray(stage.color(0, 0, rasterize(stage.at(0), shot.camera(0)), False))
+    return Image.fromarray(stage.paint(0, 0, rasterize(stage.at(0), shot.camera(0)), ("rgb",))["rgb"])
 
 
 def main() -> None:

@@ -42,4 +42,5 @@ def with_camera(shot: Shot, camera: Camera, finish: Finish | None = None) -> Sho
 def painted(stage, camera: Camera, finish: Finish | None = None, transparent: bool = False) -> np.ndarray:
     """What a camera sees on a stage of any engine."""
     own = stage.of(with_camera(stage.shot, camera, finish))
-    return own.color(0, 0, rasterize(own.at(0), own.shot.camera(0)), transparent)
+    name = "rgba" if transparent else "rgb"
+    return own.paint(0, 0, rasterize(own.at(0), own.shot.camera(0)), (name,))[name]

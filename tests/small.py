@@ -9,11 +9,11 @@ ROOT = Path(__file__).parent.parent
 
 
 def still_channels() -> tuple[str, ...]:
-    """Names of the channels that need no other picture."""
-    from viewsphere.labels import Needs, channel_labels, channels
+    """Names of the pictures, and of the labels of pixels that need no other picture."""
+    from viewsphere.labels import Needs, channel_labels
+    from viewsphere.model.channel import PICTURES
 
-    labels = channel_labels()
-    return tuple(name for name in channels() if name not in labels or labels[name].needs == Needs())
+    return (*PICTURES, *(name for name, label in channel_labels().items() if label.needs == Needs()))
 
 
 def small_recipe(**changes):

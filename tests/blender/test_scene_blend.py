@@ -16,6 +16,7 @@ from viewsphere.engines import cycles
 from viewsphere.engines._blender.file_frame import FileFrame
 from viewsphere.engines._blender.staging import camera_request
 from viewsphere.errors import RecipeError, UserError
+from viewsphere.imaging.view import develop
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.run.stages import Stages
 from viewsphere.truth.visibility import rasterize
@@ -395,3 +396,21 @@ def test_data_sets_are_made_resumed_checked_and_the_same_whatever_the_workers(ma
     for file in files:
         if "log" not in file.name:
             assert (tmp_path / "one" / file).read_bytes() == (tmp_path / "two" / file).read_bytes(), file
+
+
+@pytest.mark.slow
+def test_the_light_of_a_file_comes_in_parts(made):
+    """The sky, lamps and materials are the file's own; composed its light is the picture, within a byte's rounding."""
+    names = ["rgb", "albedo", "shading", "residual", "emission"]
+    engine = ENGINE | {"samples": 8}
+    sample = next(iter(render(street(made, engine=engine, channels=names, viewpoints={"azimuth": [0], "distance": 7}))))
+    light = np.dstack([sample.albedo * sample.shading + sample.residual, np.ones((72, 96), np.float32)])
+    composed = develop(light, None, sample.taken.shot.finish(0).view)
+    assert np.abs(composed.astype(int) - sample.rgb).max() <= 1
+    assert sample.albedo.max() > 0.5
+    assert (sample.albedo * sample.shading).max() > 0.05
+
+
+@pytest.mark.parametrize("name", ["roughness", "metallic"])
+def test_what_a_file_s_materials_are_made_of_is_not_known(made, name):
+    assert refusal(street(made, channels=["rgb", name])).startswith(f"channels[1]: expected no {name} with scene.blend")

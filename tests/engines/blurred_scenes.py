@@ -116,7 +116,7 @@ def load(known):
 
 def picture(shot: Shot, known) -> np.ndarray:
     stage = raster.stage(shot, load(known))
-    return stage.color(0, 0, rasterize(stage.at(0), shot.camera(0)), False)
+    return stage.paint(0, 0, rasterize(stage.at(0), shot.camera(0)), ("rgb",))["rgb"]
 
 
 def sharp(shot: Shot, *moments: float) -> Shot:
@@ -142,7 +142,7 @@ def averaged(shot: Shot, known, count: int = 64) -> np.ndarray:
     many = sharp(shot, *(((k + 0.5) / count - 0.5) * shot.shutter for k in range(count)))
     stage = raster.stage(many, load(known))
     for k in range(count):
-        shown = stage.color(k, 0, rasterize(stage.at(k), many.camera(k)), False)
+        shown = stage.paint(k, 0, rasterize(stage.at(k), many.camera(k)), ("rgb",))["rgb"]
         total += linear(shown / 255.0)
     return encoded(total / count) * 255.0
 

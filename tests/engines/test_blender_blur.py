@@ -22,7 +22,7 @@ def small(shot: Shot, engine: str) -> Shot:
 
 
 def painted(stage) -> np.ndarray:
-    return stage.color(0, 0, rasterize(stage.at(0), stage.shot.camera(0)), False).astype(float)
+    return stage.paint(0, 0, rasterize(stage.at(0), stage.shot.camera(0)), ("rgb",))["rgb"].astype(float)
 
 
 def stage_of(shot: Shot, known):

@@ -232,7 +232,7 @@ def stage_with(mesh: Mesh, distances, **engine):
 
 def pictures(stage) -> list[bytes]:
     cameras = map(stage.shot.camera, range(len(stage.shot.instants)))
-    return [stage.color(i, 0, rasterize(stage.at(i), camera), False).tobytes() for i, camera in enumerate(cameras)]
+    return [stage.paint(i, 0, rasterize(stage.at(i), camera), ("rgb",))["rgb"].tobytes() for i, camera in enumerate(cameras)]
 
 
 class TestInBlender:

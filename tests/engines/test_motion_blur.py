@@ -101,7 +101,7 @@ def cut(shot: Shot, first: int, stop: int) -> Shot:
 
 
 def shown(stage, i):
-    return stage.color(i, 0, rasterize(stage.at(i), stage.shot.camera(i)), False)
+    return stage.paint(i, 0, rasterize(stage.at(i), stage.shot.camera(i)), ("rgb",))["rgb"]
 
 
 @pytest.mark.slow
@@ -144,7 +144,7 @@ def test_what_deforms_blurs_too():
     middle = mesh_of(box((-0.4, -0.3, 0.0), (0.4, 0.3, 1.0)))
     by_step = [BLOCK, middle, BENT]
     stage = raster.stage(shot, lambda spec, step=None: by_step[step.frame if step else 1])
-    alpha = stage.color(0, 0, rasterize(stage.at(0), shot.camera(0)), True)[:, 48, 3] / 255
+    alpha = stage.paint(0, 0, rasterize(stage.at(0), shot.camera(0)), ("rgba",))["rgba"][:, 48, 3] / 255
     row = (36 - 90 * (np.array([0.5, 0.8, 0.9, 1.0, 1.1, 1.35]) - 0.7) / 3.7).astype(int)
     np.testing.assert_allclose(alpha[row], [1.0, 1.0, 0.75, 0.5, 0.25, 0.0], atol=0.17)
 

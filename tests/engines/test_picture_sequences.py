@@ -62,7 +62,8 @@ def stage_of(shot):
 
 
 def picture(stage, i, transparent=False):
-    return stage.color(i, 0, rasterize(stage.at(i), stage.shot.camera(i)), transparent)
+    name = "rgba" if transparent else "rgb"
+    return stage.paint(i, 0, rasterize(stage.at(i), stage.shot.camera(i)), (name,))[name]
 
 
 def cut(shot, first, stop):
@@ -88,7 +89,7 @@ def test_an_instant_looks_as_if_it_were_built_alone(scene, has_scenery, moves):
         visible = rasterize(stage.at(i), shot.camera(i))
         stage.at((i + 1) % COUNT)
         stage.at((i - 1) % COUNT)
-        assert np.array_equal(stage.color(i, 0, visible, False), alone[i]), i
+        assert np.array_equal(stage.paint(i, 0, visible, ("rgb",))["rgb"], alone[i]), i
     for first, stop in ((0, 3), (3, 4), (4, 7)):
         part = stage_of(cut(shot, first, stop))
         for i in range(first, stop):

@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from truth.truth_scenes import LENSES, cube, least_weight, lens, mesh_of, orbit_camera, placed, random_soup, sphere
+from truth_scenes import LENSES, cube, least_weight, lens, mesh_of, orbit_camera, placed, random_soup, sphere
 from viewsphere.assets.mesh import Image, Material, Texture
 from viewsphere.engines.raster.kernels_paint import BRIGHT, GLINT, average_samples, shared_samples
 from viewsphere.engines.raster.kernels_samples import TIE

@@ -5,20 +5,24 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from pathlib import PurePosixPath
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from viewsphere.errors import ViewsphereError
 from viewsphere.geometry.camera import orbit_center, orbit_rotation
 from viewsphere.labels import channels
+from viewsphere.model.channel import PASSES, PICTURES
 from viewsphere.model.sample import Sample
 
 METRE_TOLERANCE = 1e-9
 ANGLE_TOLERANCE = 1e-6
+SHARE_TOLERANCE = 1e-4
 
 
 def files(sample: Sample) -> Iterator[str]:
-    """Every channel's file is that of the frame, is there and holds an array of the image's size."""
+    """Every channel's file is that of the frame, is there and holds an array of the image's size; passes hold what they may."""
     height, width = sample.height, sample.width
     for name, file in sample.files.items():
         if file.split("/")[-2:] != [name, f"{sample.index:08d}{PurePosixPath(file).suffix}"]:
@@ -31,6 +35,18 @@ def files(sample: Sample) -> Iterator[str]:
         channel = channels()[name]
         if not channel.fits(array, height, width):
             yield f"{file}: expected {channel.expected(height, width)}, found {array.shape} {array.dtype}"
+        elif name in PASSES and name not in PICTURES:
+            yield from _passes(sample, name, array)
+
+
+def _passes(sample: Sample, name: str, array: NDArray[Any]) -> Iterator[str]:
+    """Light is a number and not negative; shares are at most 1, but for the colours of a user's own .blend scene."""
+    is_own = sample.taken is not None and sample.taken.shot is not None and sample.taken.shot.scene.blend is not None
+    most = np.inf if PASSES[name].unit != "1" or is_own else 1 + SHARE_TOLERANCE
+    wrong = ~(np.isfinite(array) & (array >= 0) & (array <= most))
+    if wrong.any():
+        expected = "light, 0 or more" if PASSES[name].unit != "1" else "shares of 0 to 1"
+        yield f"{name}: expected {expected}; found {array[wrong].flat[0]:g} among {wrong.sum()} other numbers"
 
 
 def ids(sample: Sample) -> Iterator[str]:

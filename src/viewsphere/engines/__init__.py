@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Protocol, Self
+from typing import TYPE_CHECKING, Any, Protocol, Self
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Collection, Mapping
 
-    import numpy as np
     from numpy.typing import NDArray
     from pydantic import JsonValue
 
@@ -24,11 +23,14 @@ class Stage(Protocol):
         """The world-space triangles at an instant."""
         ...
 
-    def color(self, instant: int, sensor: int, visibility: Visibility, transparent: bool) -> NDArray[np.uint8]:
-        """The picture of a sensor at an instant, (H, W, 3) uint8 sRGB; `visibility` is truth's buffer of `at(instant)`.
+    def paint(self, instant: int, sensor: int, visibility: Visibility, names: Collection[str]) -> dict[str, NDArray[Any]]:
+        """The named passes (`model.channel.PASSES`) of a sensor at an instant, of those that the engine's `PAINTS` lists;
+        `visibility` is truth's buffer of `at(instant)`.
 
-        With `transparent`, (H, W, 4) with straight alpha and no background: black where nothing is seen. Laid over
-        a plain background, this picture equals the one painted with that background.
+        `rgb` is (H, W, 3) uint8 sRGB; `rgba` (H, W, 4) with straight alpha and no background: black where nothing is seen.
+        Laid over a plain background, it equals the `rgb` with that background. All others are float32, (H, W, 3) or (H, W), of
+        the shutter's centre and a pinhole as labels are, and without the finish. Where the picture shows the sky, `residual`
+        does, too.
         """
         ...
 
@@ -39,7 +41,8 @@ class Stage(Protocol):
 
 class Engine(Protocol):
     """A module that paints pictures: `check` its options, `stage` a shot. Only with `OPENS_SCENES = True` it is given shots
-    whose scene is a .blend file (`scene.blend`); with `CATCHES_SHADOWS = False` none whose ground is a shadow catcher.
+    whose scene is a .blend file (`scene.blend`); with `CATCHES_SHADOWS = False` none whose ground is a shadow catcher. `PAINTS`
+    lists the passes that it paints; without it these are the pictures, `rgb` and `rgba`.
     """
 
     def check(self, options: Mapping[str, JsonValue]) -> None:

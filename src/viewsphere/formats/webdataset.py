@@ -24,7 +24,7 @@ from viewsphere.codecs import tar
 from viewsphere.formats import Remark
 from viewsphere.formats._contents import check_files
 from viewsphere.formats._paper import json_bytes
-from viewsphere.model.channel import PASSES
+from viewsphere.model.channel import PICTURES
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.sample import Sample
 from viewsphere.store import Dataset
@@ -159,7 +159,7 @@ class _Shards:
     def _files(self, sample: Sample) -> Iterator[tuple[str, bytes]]:
         key = f"{sample.index:08d}"
         for channel, stored in sorted(sample.files.items()):
-            if channel in PASSES or self._options.arrays == "files":
+            if channel in PICTURES or self._options.arrays == "files":
                 yield f"{key}.{channel}{PurePosixPath(stored).suffix}", self._dataset.read(stored)
             else:
                 yield f"{key}.{channel}.npy", _npy(sample.channels[channel])

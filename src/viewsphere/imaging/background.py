@@ -39,13 +39,18 @@ SMALLEST = 48
 _ORIENTATION = 0x0112  # EXIF's tag; from 5 on, width and height are swapped
 
 
+def shows_sky(background: Background) -> bool:
+    """Whether the sky is seen where nothing else is."""
+    return not background.transparent and background.color is None and background.image is None
+
+
 def display_background(background: Background, width: int, height: int) -> Float32 | None:
     """The background as (height * width, 3) display-linear, exact in sRGB bytes; None for the sky, and for no background.
 
     Where a picture is clear the background's colour is seen, else white. The array is kept for the next frame and must not be
     written to. Raises RecipeError for a picture that cannot be read or has more pixels than `limits` allows.
     """
-    if background.transparent or (background.color is None and background.image is None):
+    if background.transparent or shows_sky(background):
         return None
     stamp = 0 if background.image is None else _stamp(background.image)
     return _painted(background.model_dump_json(), stamp, width, height)

@@ -29,13 +29,14 @@ from viewsphere.labels._label import (
     ObjectLabel,
     SampleLabel,
 )
+from viewsphere.labels._passes import DRAWINGS
 from viewsphere.labels._placement import Placement
 from viewsphere.labels._record import Makers, computed, finite, from_short_record, from_whole_record, short_record, whole_record
 from viewsphere.labels._sight import Around, Sight
 from viewsphere.model.camera import Camera
 from viewsphere.model.channel import DEFAULT_CHANNELS, PASSES, Channel
 from viewsphere.model.model_spec import Size
-from viewsphere.model.sample import ObjectAnnotation
+from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
 from viewsphere.truth.geometry import Geometry
@@ -59,10 +60,12 @@ __all__ = [
     "annotated",
     "channel_labels",
     "channels",
+    "drawable",
     "drawings",
     "finite",
     "from_short_record",
     "from_whole_record",
+    "is_in",
     "labels",
     "labels_of",
     "makers",
@@ -135,9 +138,21 @@ def channels() -> dict[str, Channel]:
     return PASSES | {name: label.channel for name, label in channel_labels().items()}
 
 
+@cache
+def drawable() -> dict[str, Drawing]:
+    """The drawings of all labels and passes that have one, by the name of the label or pass, in alphabetical order."""
+    found = {name: label.drawing for name, label in labels().items() if label.drawing}
+    return dict(sorted((found | DRAWINGS).items()))
+
+
+def is_in(source: str, sample: Sample) -> bool:
+    """Whether a sample has a label or pass of `drawable`."""
+    return labels()[source].is_in(sample) if source in labels() else source in sample.channels
+
+
 def drawings() -> tuple[Drawing, ...]:
-    """The drawings of all labels that have one, in the order of the labels' names."""
-    return tuple(label.drawing for _, label in sorted(labels().items()) if label.drawing)
+    """What `drawable` lists."""
+    return tuple(drawable().values())
 
 
 def observe(

@@ -49,16 +49,31 @@ PASSES: dict[str, Channel] = {
     for c in (
         Channel("rgb", np.uint8, 3, "sRGB", 0, "png", "colour picture"),
         Channel("rgba", np.uint8, 4, "sRGB", 0, "png", "colour picture without its background; straight alpha"),
+        Channel("albedo", np.float32, 3, "1", 0, "tiff", "share of the light that the surface scatters to all sides"),
+        Channel("shading", np.float32, 3, "scene-linear", 0, "tiff", "scattered light without the surface's colour"),
+        Channel("residual", np.float32, 3, "scene-linear", 0, "tiff", "all other light: mirrored, let through, emitted, sky"),
+        Channel("emission", np.float32, 3, "scene-linear", 0, "tiff", "light that the surface sends out; part of residual"),
+        Channel("roughness", np.float32, 1, "1", 0, "tiff", "perceptual roughness of the seen surface: 0 mirrors, 1 is matt"),
+        Channel("metallic", np.float32, 1, "1", 0, "tiff", "how much of the seen surface is metal, 0 to 1"),
     )
 }
-"""Channels that an engine paints; all others are labels. The first pass that a data set keeps is its samples' picture."""
+"""Channels that an engine paints; all others are labels. All but the pictures are arrays, docs/pictures.md says of what."""
+
+PICTURES = ("rgb", "rgba")
+"""The passes that are pictures, which every engine paints. The first that a data set keeps is its samples' picture."""
+
+LIGHT_PASSES = ("albedo", "shading", "residual", "emission")
+"""What a picture's light is made of, sampled as the picture is: albedo x shading + residual is the picture before exposure."""
+
+MATERIAL_PASSES = ("roughness", "metallic")
+"""What the surface is made of that labels see, at the pixels' centres."""
 
 DEFAULT_CHANNELS = ("rgb", "depth", "instances", "normals")
 
 
 def picture_of(kept: Container[str]) -> str | None:
-    """The channel that serves as a sample's picture, None if no pass is kept."""
-    return next((name for name in PASSES if name in kept), None)
+    """The channel that serves as a sample's picture, None if none is kept."""
+    return next((name for name in PICTURES if name in kept), None)
 
 
 def missing(needed: Iterable[str], kept: Container[str]) -> tuple[str, ...]:

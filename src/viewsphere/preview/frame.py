@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
 from viewsphere.errors import StoreError
-from viewsphere.labels import ChannelLabel, Drawing, Extent, labels
+from viewsphere.labels import Drawing, Extent, channels, drawable, is_in
 from viewsphere.model.channel import picture_of
 from viewsphere.model.mistakes import one_of
 from viewsphere.model.sample import Sample
@@ -35,22 +35,21 @@ def nothing(sample: Sample) -> Sequence[Sample]:
 
 
 def check_drawn(samples: Sequence[Sample], draw: Sequence[str]) -> None:
-    """Raise StoreError for what nobody can draw: names of no drawing, and of labels that none of the samples has."""
-    known = {label.drawing.name: label for label in labels().values() if label.drawing}
+    """Raise StoreError for what nobody can draw: names of no drawing, and of what none of the samples has."""
+    known = {drawing.name: source for source, drawing in drawable().items()}
     for name in draw:
         if name not in known:
             raise StoreError(f"--draw: {one_of(name, sorted(known))}")
-        label = known[name]
-        if samples and not any(map(label.is_in, samples)):
-            what = "channel" if isinstance(label, ChannelLabel) else "annotation"
+        source = known[name]
+        if samples and not any(is_in(source, sample) for sample in samples):
+            what = "channel" if source in channels() else "annotation"
             kept = ", ".join((*samples[0].channels, *samples[0].asked))
-            raise StoreError(f"--draw: expected the {what} {label.name}, to draw {name}; found pictures that have {kept}")
+            raise StoreError(f"--draw: expected the {what} {source}, to draw {name}; found pictures that have {kept}")
 
 
 def drawn(sample: Sample, draw: Sequence[str]) -> list[Drawing]:
     """The chosen drawings of what a sample has."""
-    found = (label for _, label in sorted(labels().items()) if label.drawing and label.drawing.name in draw)
-    return [label.drawing for label in found if label.drawing and label.is_in(sample)]
+    return [drawing for source, drawing in drawable().items() if drawing.name in draw and is_in(source, sample)]
 
 
 def extents(samples: Sequence[Sample], draw: Sequence[str]) -> Extents:

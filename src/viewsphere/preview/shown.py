@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from viewsphere.errors import each
-from viewsphere.labels import ChannelLabel, labels, on_request
+from viewsphere.labels import channels as known
+from viewsphere.labels import drawable, on_request
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.channel import picture_of
 from viewsphere.model.model_spec import ModelSpec
@@ -89,13 +90,12 @@ def _rendered(stages: Stages, planned: Plan, subject: str, poses: Sequence[int],
 
 
 def _drawable(recipe: Recipe, channels: Sequence[str], draw: Sequence[str]) -> Recipe:
-    """The recipe with these channels, and with the labels that are drawn, and no others that have to be asked for."""
-    wanted = [label for label in labels().values() if label.drawing and label.drawing.name in draw]
-    named = (label.name for label in wanted if isinstance(label, ChannelLabel))
-    kept = tuple(label.name for label in wanted if label.name in on_request())
-    options = {label.name: recipe.labels[label.name] for label in wanted if label.name in recipe.labels}
-    drawable = {"channels": tuple(dict.fromkeys((*channels, *named))), "annotations": kept, "labels": options}
-    return recipe.model_copy(update=drawable)
+    """The recipe with these channels, and with what is drawn, and without annotations that nobody draws."""
+    wanted = [source for source, drawing in drawable().items() if drawing.name in draw]
+    seen = tuple(dict.fromkeys((*channels, *(source for source in wanted if source in known()))))
+    asked = tuple(source for source in wanted if source in on_request())
+    options = {name: given for name, given in recipe.labels.items() if name in (*seen, *asked)}
+    return recipe.model_copy(update={"channels": seen, "annotations": asked, "labels": options})
 
 
 def dataset_samples(dataset: Dataset, count: int = 12, row: int = ROW, films: Sequence[Film] = ()) -> list[Sample]:

@@ -16,6 +16,8 @@ from PIL import Image
 
 from viewsphere.errors import UserError
 from viewsphere.labels import Extent
+from viewsphere.labels._passes import DRAWINGS
+from viewsphere.labels._passes import picture as pass_colors
 from viewsphere.labels._state import picture as state_colors
 from viewsphere.labels._wheel import longest_of
 from viewsphere.labels._wheel import picture as flow_colors
@@ -216,6 +218,10 @@ def _motion_boundaries(sample: Sample, scale: Scale, within: Mapping[str, Extent
     return Layer(webp(_rgba(np.full((*lines.shape, 3), BOUNDARY, np.uint8), lines), 60))
 
 
+def _pass(name: str, sample: Sample, scale: Scale, within: Mapping[str, Extent]) -> Layer:
+    return Layer(webp(pass_colors(name, _thinned(sample.channels[name], scale.layer_width)), 75))
+
+
 PAINTERS: dict[str, Painter] = {
     "rgb": _rgb,
     "depth": _depth,
@@ -226,6 +232,7 @@ PAINTERS: dict[str, Painter] = {
     "disparity": _disparity,
     "flow_state": _flow_state,
     "motion_boundaries": _motion_boundaries,
+    **{name: partial(_pass, name) for name in DRAWINGS},
 }
 
 

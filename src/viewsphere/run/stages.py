@@ -258,10 +258,10 @@ def render_sample(
     now, camera, labelled, visibility = shot.instants[instant], view.camera, view.geometry, view.visibility
     around = views.around(instant, sensor)
     observed = observe(labelled, camera, visibility, names, around)
-    pictures = [name for name in PASSES if name in kept]
-    painted = with_ground(geometry, camera, visibility) if pictures and labelled is not geometry else visibility
-    for name in pictures:
-        observed[name] = stage.color(instant, sensor, painted, name == "rgba")
+    passes = [name for name in PASSES if name in kept]
+    if passes:
+        painted = visibility if labelled is geometry else with_ground(geometry, camera, visibility)
+        observed |= stage.paint(instant, sensor, painted, passes)
     steps = [thing.motion.step_at(instant) for thing in shot.objects]
     files = [model_files(p.model.key, step and step.frame)[0] for p, step in zip(shot.objects, steps, strict=True)]
     sight = sight_of(shot, instant, camera, labelled, visibility, boxes, files, sizes, around)

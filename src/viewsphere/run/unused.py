@@ -10,7 +10,7 @@ from itertools import islice
 
 from viewsphere import plugins
 from viewsphere.errors import StoreError
-from viewsphere.model.channel import PASSES
+from viewsphere.model.channel import PICTURES
 from viewsphere.store import Store
 from viewsphere.store.manifest import Manifest
 
@@ -69,4 +69,4 @@ def channel_bytes(store: Store) -> Counter[str]:
 def _is_used(channel: str, formats: Iterable[str]) -> bool:
     """Whether it is a picture, or one of the formats needs it, or does not say what it needs: such a format takes all."""
     needed = (getattr(plugins.load("formats", name), "CHANNELS", None) for name in formats)
-    return channel in PASSES or any(names is None or channel in names for names in needed)
+    return channel in PICTURES or any(names is None or channel in names for names in needed)

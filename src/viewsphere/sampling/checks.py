@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from fnmatch import fnmatchcase
+from typing import TypeVar
 
 from pydantic import JsonValue
 
 from viewsphere import plugins
 from viewsphere.errors import RecipeError
 from viewsphere.labels import Needs, channels, labels, on_request
+from viewsphere.model.channel import MATERIAL_PASSES, PASSES, PICTURES
 from viewsphere.model.mistakes import nearest, one_of, read_options
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.recipe.draws import alternatives, span
@@ -20,6 +22,8 @@ from viewsphere.recipe.surface import GroundEntry
 from viewsphere.recipe.viewpoints import Jitter, Normal, Sphere
 from viewsphere.sampling.models import count_models
 from viewsphere.sampling.viewpoints import Poses
+
+Said = TypeVar("Said")
 
 
 def check_redraws(recipe: Recipe) -> None:
@@ -59,6 +63,7 @@ def check_names(recipe: Recipe) -> None:
         if name not in channels():
             raise RecipeError(f"channels[{i}]: {one_of(name, tuple(channels()))}")
         _check_needs(recipe, f"channels[{i}]", name)
+        _check_painted(recipe, f"channels[{i}]", name)
     for i, name in enumerate(recipe.annotations):
         _check_annotation(recipe, f"annotations[{i}]", name)
     for name, given in recipe.labels.items():
@@ -68,9 +73,8 @@ def check_names(recipe: Recipe) -> None:
 def _check_annotation(recipe: Recipe, where: str, name: str) -> None:
     """A label that can be asked for, with what it needs."""
     if name not in on_request():
-        told = (
-            f": {name} is one of channels" if name in channels() else f": every data set has {name}" if name in labels() else ""
-        )
+        always = f": every data set has {name}" if name in labels() else ""
+        told = f": {name} is one of channels" if name in channels() else always
         raise RecipeError(f"{where}: {one_of(name, tuple(on_request()))}{told}")
     _check_needs(recipe, where, name)
 
@@ -101,6 +105,21 @@ def _check_needs(recipe: Recipe, where: str, name: str) -> None:
             raise RecipeError(f"{where}: expected {field} beside {name}, {what}; found none: set {field}")
 
 
+def _check_painted(recipe: Recipe, where: str, name: str) -> None:
+    """A pass needs an engine that paints it, and what surfaces are made of needs materials that viewsphere made."""
+    paints = _engine_says(recipe, "PAINTS", PICTURES)
+    if name in PASSES and name not in paints:
+        raise RecipeError(
+            f"{where}: expected a label, or what engine: {recipe.engine.name} paints ({', '.join(paints)}); found {name}: "
+            "leave it out, or take engine: raster or cycles"
+        )
+    if name in MATERIAL_PASSES and recipe.scene.blend is not None:
+        raise RecipeError(
+            f"{where}: expected no {name} with scene.blend, whose materials may be any nodes; found it: leave it out, or take "
+            "the file's meshes alone by scene.place"
+        )
+
+
 def check_blend(recipe: Recipe) -> None:
     """A .blend file as the scene needs an engine that renders it."""
     if recipe.scene.blend is not None and not _engine_says(recipe, "OPENS_SCENES", False):
@@ -122,7 +141,7 @@ def check_catcher(recipe: Recipe) -> None:
         )
 
 
-def _engine_says(recipe: Recipe, name: str, default: bool) -> bool:
+def _engine_says(recipe: Recipe, name: str, default: Said) -> Said:
     return getattr(plugins.load("engines", recipe.engine.name), name, default)
 
 

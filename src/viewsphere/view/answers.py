@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from viewsphere.errors import UserError, ViewsphereError
 from viewsphere.labels import channel_labels
-from viewsphere.model.channel import picture_of
+from viewsphere.model.channel import PASSES, PICTURES, picture_of
 from viewsphere.report import conventions, model_data
 from viewsphere.report.facts import facts
 from viewsphere.report.frames import frame_data
@@ -189,7 +189,7 @@ class Answers:
 def _layer_names(channels: Sequence[str]) -> list[str]:
     """The layers that frames with these channels may have."""
     have = {*channels}
-    drawn = [name for name in channel_labels() if name in have]
+    drawn = [name for name in PASSES | channel_labels() if name in have and name not in PICTURES]
     return [*(["rgb"] if picture_of(channels) else []), *drawn]
 
 

@@ -22,6 +22,7 @@ from typing import Any
 
 import bpy
 
+from . import passes
 from .graph import Graph
 from .meshes import COLORS
 from .textures import Textures
@@ -80,10 +81,22 @@ def fill_material(material, told, images, has_uv, has_colors, is_traced=True):
         material.cycles.emission_sampling = "NONE"
         surface = _veiled(graph, alpha, _unlit(graph, color))
     else:
-        surface = _lit(graph, told, _look(graph, textures, told, has_colors), is_traced)
+        look = _look(graph, textures, told, has_colors)
+        surface = _lit(graph, told, look, is_traced)
+        if is_traced:
+            _tell(graph, told, look)
         if told["transmission"] > 0 and not is_traced:
             material.surface_render_method = "BLENDED"
     graph.node("ShaderNodeOutputMaterial", {"Surface": surface})
+
+
+def _tell(graph, told, look):
+    """Fill the passes of materials where the surface counts as seen; nobody evaluates these nodes unless they are asked for."""
+    seen = 1.0
+    if look.alpha != 1 and told["transmission"] == 0:
+        seen = graph.complement(_is_less(graph, look.alpha, graph.node("ShaderNodeValue", name=passes.LEAST).outputs[0]))
+    for name, value in zip(passes.MATERIALS, (look.roughness, look.metallic), strict=True):
+        graph.node("ShaderNodeOutputAOV", {"Value": graph.product(seen, value)}, aov_name=name)
 
 
 def build_plain(told, images, has_uv):
@@ -136,7 +149,7 @@ def _limited(graph, value):
 
 
 def _is_less(graph, value, limit):
-    if isinstance(value, bpy.types.NodeSocket):
+    if any(isinstance(one, bpy.types.NodeSocket) for one in (value, limit)):
         return graph.math("LESS_THAN", value, limit)
     return float(value < limit)
 

@@ -13,7 +13,7 @@ import bpy
 import cycles
 import numpy as np
 
-from . import compositing, ground, renderers
+from . import compositing, ground, passes, renderers
 from .blurring import exposed
 from .posing import camera_matrix
 
@@ -41,8 +41,9 @@ PASSES = {"index": ("use_pass_object_index", ("Object Index", "IndexOB")), "dept
 def render(told):
     """Write (H, W, 4) float32 to `out`: scene-linear, premultiplied, the first row on top; empty outside of the border.
 
-    With `blur`, see `blurring.exposed`, what moves is blurred. Each of the `passes` is written beside the colours, (H, W, 1):
-    beside `picture.npy`, for one, `picture.index.npy`.
+    With `blur`, see `blurring.exposed`, what moves is blurred. Each of the `passes` is written beside the colours, such as
+    `picture.index.npy` beside `picture.npy`: index and depth (H, W, 1), light (H, W, 12) as `passes.light` has it, objects
+    (H, W, 3), their albedo without the ground's, and materials (H, W, 2). See `passes.sampled` for what the last two change.
     """
     scene = bpy.context.scene
     view = told["camera"]
@@ -56,21 +57,46 @@ def render(told):
     begun, cpu = time.monotonic(), time.process_time()
     file = Path(told["out"]).with_suffix(".exr")
     composed = file if compositing.is_used(scene) else None
-    with exposed(scene, told.get("blur")):
-        found = _drawn(scene, file) if renderers.is_drawn(scene) else _rendered(wanted, composed)
-    for name, pixels in found.items():
+    with exposed(scene, told.get("blur")), passes.sampled(scene, told["passes"], told.get("least")):
+        found = _drawn(scene, file) if renderers.is_drawn(scene) else _rendered(_needed(told), composed)
+    for name, pixels in _chosen(found, told).items():
         np.save(wanted[name], _whole(pixels, told["border"], view))
     return {"seconds": time.monotonic() - begun, "cpu_seconds": time.process_time() - cpu}
 
 
 def _switched(layer, told):
-    """Switch on the requested passes; returns the output file for each possible name of a pass, and whether any was off."""
-    wanted, has_more = {"Combined": told["out"]}, False
-    for name, (switch, names) in PASSES.items():
-        if name in told["passes"]:
-            has_more |= _switch(layer, switch, True)
-            wanted |= dict.fromkeys(names, told["out"].replace(".npy", f".{name}.npy"))
+    """Switch on the requested passes; returns the output file of each, and whether any was off."""
+    wanted, has_more = {"picture": told["out"]}, False
+    for name in told["passes"]:
+        wanted[name] = told["out"].replace(".npy", f".{name}.npy")
+        if name in ("light", "objects"):
+            has_more |= passes.ask_for_light(layer)
+        elif name == "materials":
+            has_more |= passes.ask_for_materials(layer)
+        else:
+            has_more |= _switch(layer, PASSES[name][0], True)
     return wanted, has_more
+
+
+def _needed(told):
+    """Names, of any version of Blender, of what the requested pictures are made of."""
+    parts = {"light": passes.NAMES, "objects": passes.NAMES, "materials": passes.MATERIALS}
+    return {"Combined"}.union(*(parts[name] if name in parts else PASSES[name][1] for name in told["passes"]))
+
+
+def _chosen(found, told):
+    """The requested pictures by the names of requests, from those that the renderer gives."""
+    chosen = {"picture": found["Combined"]}
+    for name in told["passes"]:
+        if name == "light":
+            chosen[name] = passes.light(found, told["transparent"])
+        elif name == "objects":
+            chosen[name] = passes.light(found, True)[..., :3]
+        elif name == "materials":
+            chosen[name] = passes.materials(found)
+        else:
+            chosen[name] = next(found[one] for one in PASSES[name][1] if one in found)
+    return chosen
 
 
 def _switch(owner, name, value):
@@ -118,8 +144,8 @@ def _set_border(scene, border, view):
 
 
 def _rendered(names, composed):
-    """Cycles' passes of one render by name, (H, W, C) float32 each, the first row on top; if the compositor is used, the
-    colours come from the file `composed`, which the compositor writes.
+    """These passes of one render of Cycles' by name, (H, W, C) float32 each, the first row on top; if a compositor is used, the
+    colours come from the file `composed`, which it writes.
     """
     found = {}
     original = cycles.CyclesRender.render

@@ -85,14 +85,16 @@ def _view(camera: Camera, face: Float, pixels: NDArray[np.int64], rays: Float) -
     return PinholeView(Camera(pinhole, face @ camera.R, face @ camera.t), pixels, x - left, y - top)
 
 
-def resampled(camera: Camera, views: Sequence[PinholeView], pictures: Sequence[Float32]) -> Float32:
-    """The lens's picture (H, W, 4) float32, bilinear; empty where it has no ray."""
-    out = np.zeros((camera.height * camera.width, 4), np.float32)
+def resampled(camera: Camera, views: Sequence[PinholeView], pictures: Sequence[Float32], mixed: bool = True) -> Float32:
+    """The lens's picture (H, W, C) float32, bilinear, or not `mixed` the nearest pixels; empty where it has no ray."""
+    channels = pictures[0].shape[2]
+    out = np.zeros((camera.height * camera.width, channels), np.float32)
     for view, picture in zip(views, pictures, strict=True):
         if view.pixels is None or view.x is None or view.y is None:
             return picture
-        out[view.pixels] = _bilinear(picture, view.x - 0.5, view.y - 0.5)
-    return out.reshape(camera.height, camera.width, 4)
+        nearest = np.floor(view.y).astype(int), np.floor(view.x).astype(int)
+        out[view.pixels] = _bilinear(picture, view.x - 0.5, view.y - 0.5) if mixed else picture[nearest]
+    return out.reshape(camera.height, camera.width, channels)
 
 
 def _bilinear(picture: Float32, x: Float, y: Float) -> NDArray[Any]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property, partial
 from pathlib import Path
@@ -25,11 +25,13 @@ from viewsphere.engines._blender.requests import Request, kinds_of, materials_re
 from viewsphere.engines._blender.scripts import script_request
 from viewsphere.engines._blender.sweeping import Sweeping
 from viewsphere.engines._blender.texels import Kind, Levels
+from viewsphere.engines._passes import shading_of
 from viewsphere.errors import BlenderDied, BlenderError, ModelError, RecipeError, UserError
-from viewsphere.imaging.background import display_background
+from viewsphere.imaging.background import display_background, shows_sky
 from viewsphere.imaging.finish import finished
 from viewsphere.imaging.seen import seen_by
 from viewsphere.model.camera import Camera
+from viewsphere.model.channel import LIGHT_PASSES, MATERIAL_PASSES, PICTURES, picture_of
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
 from viewsphere.truth.geometry import Geometry
@@ -53,6 +55,12 @@ SPARE = 4.0
 
 AROUND = 2
 """Pixels by which Blender's pixel filter spreads a surface."""
+
+COMPONENTS = {"picture": 4, "light": 12, "objects": 3, "materials": 2}
+"""What a render gives, and how many numbers of each pixel: radiance and alpha; albedo, diffuse light, all other light and
+emission; of a render that does not show the ground, the albedo; and, of one that sees the pixels' centres alone, roughness and
+metallic.
+"""
 
 Float32 = NDArray[np.float32]
 
@@ -184,20 +192,61 @@ class CyclesStage:
             )
         return self._arranged[now.geometry]
 
-    def color(self, instant: int, sensor: int, visibility: Visibility, transparent: bool) -> NDArray[np.uint8]:
-        """The picture of a sensor at an instant, (H, W, 3) uint8 sRGB; with `transparent` (H, W, 4) with straight alpha.
+    def paint(self, instant: int, sensor: int, visibility: Visibility, names: Collection[str]) -> dict[str, NDArray[Any]]:
+        """The named passes of a sensor at an instant, see `engines.Stage`.
 
-        A Blender that dies or hangs is started again, once. Raises ModelError when it dies again, UserError for an
-        unreadable background image.
+        The light of a sharp picture is parted as it is rendered; beside a blurred one it is rendered again. A Blender that dies
+        or hangs is started again, once. Raises ModelError when it dies again, UserError for an unreadable background image.
         """
+        sweeping, painted = Sweeping(self.shot, instant, sensor), dict[str, NDArray[Any]]()
+        is_lit = not set(names).isdisjoint(LIGHT_PASSES)
+        for name in PICTURES:
+            if name in names:
+                wanted = ("light",) if is_lit and "light" not in painted and sweeping.is_still else ()
+                painted |= self._picture(instant, sensor, visibility, name, wanted)
+        if is_lit:
+            if "light" not in painted:
+                background = self.shot.finish(instant).with_background(picture_of(names) == "rgba").background
+                camera, is_open = self.shot.camera(instant, sensor), not shows_sky(background)
+                painted |= self.arrangement(instant).rendered(camera, is_open, wanted=("light",))
+            painted |= self._light(instant, sensor, visibility, painted["light"])
+        if not set(names).isdisjoint(MATERIAL_PASSES):
+            painted |= self._materials(instant, sensor, visibility)
+        return {name: painted[name] for name in names}
+
+    def _picture(
+        self, instant: int, sensor: int, visibility: Visibility, name: str, wanted: Sequence[str]
+    ) -> dict[str, NDArray[Any]]:
+        """`rgb` or `rgba`, and what else is wanted of its render (see `COMPONENTS`)."""
         camera, arranged = self.shot.camera(instant, sensor), self.arrangement(instant)
-        finish = self.shot.finish(instant).with_background(transparent)
+        finish = self.shot.finish(instant).with_background(name == "rgba")
         background = display_background(finish.background, camera.width, camera.height)
-        sweeping = Sweeping(self.shot, instant, sensor)
-        radiance = arranged.radiance(camera, background is not None or transparent, visibility, sweeping)
+        is_open = not shows_sky(finish.background)
+        rendered = arranged.painted(camera, is_open, visibility, Sweeping(self.shot, instant, sensor), wanted)
         focus, owner = np.array(self.shot.instants[instant].focus), arranged.geometry.triangle_object
         seen = partial(seen_by, camera, focus, visibility.inverse_depth, visibility.triangle, owner)
-        return finished(radiance, background, finish, seen)
+        return rendered | {name: finished(rendered["picture"], background, finish, seen)}
+
+    def _light(self, instant: int, sensor: int, visibility: Visibility, light: Float32) -> dict[str, Float32]:
+        """All `LIGHT_PASSES`, of the light that was rendered. Cycles counts a shadow catcher in the albedo: it is left out."""
+        albedo, diffuse, residual, emission = np.split(light, 4, axis=-1)
+        ground = self.shot.scene.ground
+        if ground is not None:
+            # Where the ground fades, it sends the light of the sky.
+            is_far = (visibility.triangle < 0) | (visibility.triangle >= self.at(instant).triangle_start[-1])
+            emission = np.where(is_far[..., None], np.float32(0), emission)
+        if ground is not None and ground.catcher:
+            camera = self.shot.camera(instant, sensor)
+            albedo = self.arrangement(instant).rendered(camera, True, wanted=("objects",))["objects"]
+        return {"albedo": albedo, "shading": shading_of(albedo, diffuse), "residual": residual, "emission": emission}
+
+    def _materials(self, instant: int, sensor: int, visibility: Visibility) -> dict[str, Float32]:
+        """Roughness and metallic at the pixels' centres."""
+        made = self.arrangement(instant).rendered(self.shot.camera(instant, sensor), True, wanted=("materials",))["materials"]
+        ground = self.shot.scene.ground
+        if ground is not None and ground.catcher:
+            made = np.where((visibility.triangle >= self.at(instant).triangle_start[-1])[..., None], np.float32(0), made)
+        return {name: np.ascontiguousarray(made[..., i]) for i, name in enumerate(MATERIAL_PASSES)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -219,11 +268,15 @@ class Arrangement:
             return None
         return (Path(blend.file).resolve().parent,) if blend.confined else (Path("/"),)
 
-    def radiance(self, camera: Camera, is_open: bool, visibility: Visibility, sweeping: Sweeping) -> Float32:
-        """Scene-linear, premultiplied, (H, W, 4) float32; with `is_open` the background is left empty."""
+    def painted(
+        self, camera: Camera, is_open: bool, visibility: Visibility, sweeping: Sweeping, wanted: Sequence[str] = ()
+    ) -> dict[str, Float32]:
+        """A `picture`, scene-linear, premultiplied, (H, W, 4) float32, and what else is wanted of it (see `COMPONENTS`); with
+        `is_open` the background is left empty.
+        """
         if self.options.draws:
-            return self._drawn(camera, is_open, visibility, sweeping)
-        return self._radiance(camera, is_open, sweeping=sweeping)
+            return {"picture": self._drawn(camera, is_open, visibility, sweeping)}
+        return self.rendered(camera, is_open, sweeping=sweeping, wanted=wanted)
 
     def _drawn(self, camera: Camera, is_open: bool, visibility: Visibility, sweeping: Sweeping) -> Float32:
         """The picture of a renderer that draws: with a tight clipping range, as the depth buffer has a limited precision."""
@@ -244,7 +297,18 @@ class Arrangement:
         self, camera: Camera, is_open: bool, clip: Clip = (NEAREST, FARTHEST), sweeping: Sweeping | None = None
     ) -> Float32:
         """Scene-linear, premultiplied, (H, W, 4) float32; a Blender that dies is started again, once."""
-        return self.keeper.insist(partial(self._rendered, camera, is_open, clip, sweeping), self.named)
+        return self.rendered(camera, is_open, clip, sweeping)["picture"]
+
+    def rendered(
+        self,
+        camera: Camera,
+        is_open: bool,
+        clip: Clip = (NEAREST, FARTHEST),
+        sweeping: Sweeping | None = None,
+        wanted: Sequence[str] = (),
+    ) -> dict[str, Float32]:
+        """A `picture`, and what else is wanted of its render; a Blender that dies is started again, once."""
+        return self.keeper.insist(partial(self._rendered, camera, is_open, clip, sweeping, wanted), self.named)
 
     @property
     def named(self) -> str:
@@ -252,26 +316,36 @@ class Arrangement:
         blend = self.shot.scene.blend
         return ", ".join(sorted({p.model.key for p in self.things})) if blend is None else blend.file
 
-    def _rendered(self, camera: Camera, is_open: bool, clip: Clip, sweeping: Sweeping | None) -> Float32:
+    def _rendered(
+        self, camera: Camera, is_open: bool, clip: Clip, sweeping: Sweeping | None, wanted: Sequence[str]
+    ) -> dict[str, Float32]:
         views = views_of(camera)
         process = self.keeper.process_for(self, self._levels([view.camera for view in views]))
         swept = (sweeping and sweeping.request(i) for i in range(len(views)))
-        pictures = [self._picture(process, view.camera, is_open, clip, sweep) for view, sweep in zip(views, swept, strict=True)]
-        return resampled(camera, views, pictures)
+        both = zip(views, swept, strict=True)
+        pictures = [self._pictures(process, view.camera, is_open, clip, sweep, wanted) for view, sweep in both]
+        return {
+            name: resampled(camera, views, [each[name] for each in pictures], mixed=name != "materials")
+            for name in ("picture", *wanted)
+        }
 
-    def _picture(self, process: BlenderProcess, camera: Camera, is_open: bool, clip: Clip, blur: Request | None) -> Float32:
+    def _pictures(
+        self, process: BlenderProcess, camera: Camera, is_open: bool, clip: Clip, blur: Request | None, wanted: Sequence[str]
+    ) -> dict[str, Float32]:
         is_empty = is_open and blur is None and self.shot.scene.ground is None and self.shot.scene.blend is None
         border = border_of(self.geometry, camera) if is_empty else None
         if border is not None and (border[0] >= border[2] or border[1] >= border[3]):
-            return np.zeros((camera.height, camera.width, 4), np.float32)
-        out = str(process.folder / "picture.npy")
+            shape = camera.height, camera.width
+            return {name: np.zeros((*shape, COMPONENTS[name]), np.float32) for name in ("picture", *wanted)}
+        out = process.folder / "picture.npy"
         request = FileFrame.of(self.shot.scene.blend).camera(camera_request(camera, clip))
-        told: Request = {"transparent": is_open, "border": border, "passes": [], "blur": blur}
+        told: Request = {"transparent": is_open, "border": border, "passes": list(wanted), "blur": blur}
+        told["least"] = self.shot.label_alpha
         try:
-            process.ask("render", FRAME_SECONDS, camera=request, out=out, **told)
+            process.ask("render", FRAME_SECONDS, camera=request, out=str(out), **told)
         except BlenderError as error:
             raise ModelError(f"{self.named}: {str(error).partition(': ')[2]}") from error
-        return np.load(out)
+        return {"picture": np.load(out)} | {name: np.load(out.with_suffix(f".{name}.npy")) for name in wanted}
 
     @cached_property
     def kinds(self) -> tuple[Kind, ...]:

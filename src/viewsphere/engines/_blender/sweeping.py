@@ -24,6 +24,11 @@ class Sweeping:
     instant: int
     sensor: int
 
+    @property
+    def is_still(self) -> bool:
+        """Whether nothing moves, so that the picture is sharp."""
+        return self.request(0) is None
+
     def request(self, view: int) -> dict[str, Any] | None:
         """For the worker's `render` of one of the `views_of` the sensor's camera: matrices of objects that move, by their
         places among all, and the camera's rotations and centres; None where nothing moves.

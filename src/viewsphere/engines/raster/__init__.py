@@ -5,12 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
+from viewsphere.model.channel import PASSES
+
 if TYPE_CHECKING:
     from pydantic import JsonValue
 
     from viewsphere.assets.deforming import Load
     from viewsphere.engines.raster.staging import RasterStage
     from viewsphere.model.shot import Shot
+
+PAINTS = tuple(PASSES)
+"""The passes that this engine paints: all."""
 
 
 def check(options: Mapping[str, JsonValue]) -> None:

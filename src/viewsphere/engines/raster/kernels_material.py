@@ -105,11 +105,8 @@ SECOND_SET = U1 - U0  # from a row of the first uv set to that of the second
 
 
 @inner(fastmath=FAST, _nrt=True)
-def material(count, view, surfaces, textures, b, which):
-    """Fill the rows that say what the samples are made of; smooth normals become those of the normal maps.
-
-    `which` are the samples' materials. Reads rows V, N, PIXEL, uv, vertex colour in RED to ALPHA, and AX to SIDE if textured.
-    """
+def look_up(count, view, surfaces, textures, b, which):
+    """`material` as factors and textures say, whose products may still leave their ranges; normals of any length."""
     c = np.empty(CHUNK_ROWS * CHUNK, np.float32)
     q = np.empty(QUAD_ROWS * QUADS, np.float32)
     places = np.empty(PLACE_ROWS * QUADS, np.int32)
@@ -143,6 +140,15 @@ def material(count, view, surfaces, textures, b, which):
                             mix(textures.texels, size, plane, mode[5], q, places, c)
                         _apply(size, plane, mode, look, c, own)
         begin = stop
+
+
+@inner(fastmath=FAST, _nrt=True)
+def material(count, view, surfaces, textures, b, which):
+    """Fill the rows that say what the samples are made of; smooth normals become those of the normal maps.
+
+    `which` are the samples' materials. Reads rows V, N, PIXEL, uv, vertex colour in RED to ALPHA, and AX to SIDE if textured.
+    """
+    look_up(count, view, surfaces, textures, b, which)
     _finish(count, b)
 
 

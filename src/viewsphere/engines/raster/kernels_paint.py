@@ -138,7 +138,7 @@ def _finish_matte(b):
 
 
 @lanewise
-def _start_matte(floor, b):
+def start_matte(floor, b):
     """Ground that only scatters: its colour, and its slabs' shade, which is the same in RED, GREEN and BLUE."""
     for k, row in enumerate((BASE_R, BASE_G, BASE_B)):
         b[row] = b[RED] * floor.one(5 + k)
@@ -187,7 +187,7 @@ def shade(view, surfaces, textures, floor, surrounding, lights, occlusion, is_gr
         else:
             gather(surfaces, count, triangle, b, own, which)
         if is_matte:
-            _start_matte(count, floor, b)
+            start_matte(count, floor, b)
         else:
             material(count, view, surfaces, textures, b, which)
             weigh(count, surrounding.albedo, b)

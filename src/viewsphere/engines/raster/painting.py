@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.engines.raster import kernels_paint
+from viewsphere.engines.raster import kernels_paint, kernels_split
 from viewsphere.engines.raster.environment import Surrounding, sky_behind
 from viewsphere.engines.raster.lights import Lights
 from viewsphere.engines.raster.occlusion import Occlusion
@@ -20,6 +20,7 @@ from viewsphere.truth.visibility import Visibility, lens_rays
 
 _NO_RAYS = np.zeros((0, 3), np.float32)
 _NO_PLACES = np.zeros((0, 2), np.float32)
+NO_SPLIT = np.zeros((0, 0), np.float32)
 _AROUND = np.array([[-1, -1, -1, 0, 0, 1, 1, 1], [-1, 0, 1, -1, 1, -1, 0, 1]], np.int32)[..., None]
 
 
@@ -48,15 +49,29 @@ class Baked:
     see_through: NDArray[np.bool_]
     blended: Geometry
 
+    @property
+    def catches(self) -> bool:
+        """Whether the ground is a shadow catcher."""
+        return bool(self.floor[4] == 2)
 
-def paint(baked: Baked, camera: Camera, visibility: Visibility, antialias: bool, has_sky: bool, radiance: Float32) -> None:
+
+def paint(
+    baked: Baked,
+    camera: Camera,
+    visibility: Visibility,
+    antialias: bool,
+    has_sky: bool,
+    radiance: Float32,
+    split: Float32 = NO_SPLIT,
+) -> None:
     """Fill `radiance` (H * W, 4) float32: scene-linear, premultiplied; alpha is the covered share of the pixel.
 
-    Edge pixels are the mean of four samples. Uncovered pixels show the sky if `has_sky`, else 0.
+    Edge pixels are the mean of four samples. Uncovered pixels show the sky if `has_sky`, else 0. `split`, if it is not empty,
+    is filled with the parts of this light, (H * W, 6 or 9) float32 as `kernels_split` has them; it must be 0 before.
     """
     view = view_of(baked, camera)
     triangle, depth = visibility.triangle.reshape(-1), visibility.inverse_depth.reshape(-1)
-    stack = _shade(baked, camera, view, visibility, triangle, depth, radiance)
+    stack = _shade(baked, camera, view, visibility, triangle, depth, radiance, split)
     if has_sky:
         sky_behind(view, baked.surrounding, radiance)
     if not antialias:
@@ -64,11 +79,31 @@ def paint(baked: Baked, camera: Camera, visibility: Visibility, antialias: bool,
     behind = differs_behind(visibility, stack, baked.owner, baked.geometry.triangle_normals, radiance)
     samples = edge_samples(baked.geometry, camera, visibility, baked.owner, behind)
     if samples is not None:
-        _smooth(baked, camera, visibility, samples, behind, has_sky, radiance)
+        _smooth(baked, camera, visibility, samples, behind, has_sky, radiance, split)
+
+
+def materials(baked: Baked, camera: Camera, visibility: Visibility) -> Float32:
+    """Roughness and metallic of what a camera's pixel centres see, (H * W, 2) float32; 0 for nothing and a shadow catcher."""
+    view, out = view_of(baked, camera), np.zeros((visibility.triangle.size, 2), np.float32)
+    triangle, depth = visibility.triangle.reshape(-1), visibility.inverse_depth.reshape(-1)
+    is_floor = baked.kind[triangle] == kernels_paint.FLOOR
+    for is_ground, shown in ((False, (triangle >= 0) & ~is_floor), (True, is_floor)):
+        slots = np.flatnonzero(shown).astype(np.int32)
+        if len(slots) and not (is_ground and baked.catches):
+            surfaces = baked.surfaces, baked.textures, baked.floor
+            kernels_split.substance(view, *surfaces, is_ground, slots, triangle, depth, out)
+    return out
 
 
 def _smooth(
-    baked: Baked, camera: Camera, visibility: Visibility, samples: Samples, behind: Marks, has_sky: bool, radiance: Float32
+    baked: Baked,
+    camera: Camera,
+    visibility: Visibility,
+    samples: Samples,
+    behind: Marks,
+    has_sky: bool,
+    radiance: Float32,
+    split: Float32,
 ) -> None:
     """Set edge pixels to the mean of their samples. Samples are shaded only if they look like no centre of a pixel around, or
     lie in pixels marked in `behind`.
@@ -86,11 +121,13 @@ def _smooth(
         samples.inverse_depth[at],
     )
     view = view_of(baked, camera, own)
-    colors = np.empty((len(at), 4), np.float32)
-    _shade(baked, camera, view, visibility, own.triangle, own.inverse_depth, colors, own)
+    colors, parts = np.empty((len(at), 4), np.float32), np.zeros((len(at) if len(split) else 0, split.shape[1]), np.float32)
+    _shade(baked, camera, view, visibility, own.triangle, own.inverse_depth, colors, parts, own)
     if has_sky:
         colors[~is_own, 3] = 1  # the sky need not be looked up for these
         sky_behind(view, baked.surrounding, colors)
+    if len(split):
+        kernels_split.average_split(samples.pixels, like, colors, radiance, parts, split)
     glints, means = kernels_paint.average_samples(samples.pixels, like, colors, radiance)
     brighten_lines(samples.pixels[glints], means, camera.width, radiance)
 
@@ -123,14 +160,17 @@ def _shade(
     triangle: Int32,
     depth: Float32,
     radiance: Float32,
+    split: Float32,
     samples: Samples | None = None,
 ) -> list[Layer]:
-    """Fill `radiance` (S, 4) with what the samples show, surfaces behind see-through ones first. Returns the layers."""
+    """Fill `radiance` (S, 4) with what the samples show, surfaces behind see-through ones first, and `split` with its parts,
+    if it is not empty. Returns the layers.
+    """
     solid, ground = np.empty((2, len(triangle)), np.int32)
     materials = baked.surfaces.material, np.zeros(len(baked.surfaces.looks) + 1, np.uint64)
     solids, grounds = kernels_paint.sorted_samples(triangle, baked.kind, *materials, radiance, solid, ground)
-    _shade_some(baked, view, solid[:solids], False, triangle, depth, radiance)
-    _shade_some(baked, view, ground[:grounds], True, triangle, depth, radiance)
+    _shade_some(baked, view, solid[:solids], False, triangle, depth, radiance, split)
+    _shade_some(baked, view, ground[:grounds], True, triangle, depth, radiance, split)
     # Layers are listed also where a solid surface is in front: a decal may lie on that surface.
     pixels = None if samples is None else samples.pixels
     stack = layers(baked.blended, camera, triangle, depth, baked.see_through, pixels, visibility.corners)
@@ -139,20 +179,30 @@ def _shade(
         behind[layer.slot], behind_depth[layer.slot] = layer.triangle, layer.inverse_depth
         is_ground = baked.kind[layer.triangle] == kernels_paint.FLOOR
         for which in (False, True):
-            _shade_some(baked, view, layer.slot[is_ground == which], which, behind, behind_depth, radiance)
+            _shade_some(baked, view, layer.slot[is_ground == which], which, behind, behind_depth, radiance, split)
     return stack
 
 
 def _shade_some(
-    baked: Baked, view: PictureRays, slots: Int32, is_ground: bool, triangle: Int32, depth: Float32, radiance: Float32
+    baked: Baked,
+    view: PictureRays,
+    slots: Int32,
+    is_ground: bool,
+    triangle: Int32,
+    depth: Float32,
+    radiance: Float32,
+    split: Float32,
 ) -> None:
     if len(slots) == 0:
         return
     light, seen = (baked.surrounding, baked.lights, baked.occlusion), (slots, triangle, depth)
-    if is_ground and baked.floor[4] == 2:
+    if is_ground and baked.catches:
         kernels_paint.catch(view, baked.floor, *light, *seen, radiance)
-    else:
-        kernels_paint.shade(view, baked.surfaces, baked.textures, baked.floor, *light, is_ground, *seen, radiance)
+        return
+    given = view, baked.surfaces, baked.textures, baked.floor, *light, is_ground, *seen
+    kernels_paint.shade(*given, radiance)
+    if len(split):
+        kernels_split.split(*given, split)
 
 
 def view_of(baked: Baked, camera: Camera, samples: Samples | None = None) -> PictureRays:

@@ -2,25 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.assets.deforming import Load
 from viewsphere.engines._arranged import Arranged, Arrangements
+from viewsphere.engines._passes import shading_of
 from viewsphere.engines.raster.baking import Packed, bake, pack, sequence_lengths, still_lengths
 from viewsphere.engines.raster.blurring import Blur
 from viewsphere.engines.raster.options import Options, parse_options
-from viewsphere.engines.raster.painting import Baked, paint
+from viewsphere.engines.raster.painting import Baked, materials, paint
 from viewsphere.engines.raster.records import Float32
 from viewsphere.engines.raster.surface import Lengths
 from viewsphere.engines.raster.thing_occlusion import TargetShades
-from viewsphere.imaging.background import display_background
+from viewsphere.imaging.background import display_background, shows_sky
 from viewsphere.imaging.finish import finished
 from viewsphere.imaging.seen import seen_by
 from viewsphere.model.camera import Camera
+from viewsphere.model.channel import LIGHT_PASSES, MATERIAL_PASSES, PICTURES, picture_of
 from viewsphere.model.shot import Shot
 from viewsphere.truth.geometry import Geometry
 from viewsphere.truth.visibility import Visibility
@@ -69,16 +73,53 @@ class RasterStage:
     def _lengths(self) -> Lengths:
         return sequence_lengths(self.arrangements.meshes)
 
-    def color(self, instant: int, sensor: int, visibility: Visibility, transparent: bool) -> NDArray[np.uint8]:
-        """The picture of a sensor at an instant, (H, W, 3) uint8 sRGB; with `transparent` (H, W, 4) with straight alpha.
-
-        `visibility` is truth's buffer of this instant and camera. Raises UserError for an unreadable background image.
+    def paint(self, instant: int, sensor: int, visibility: Visibility, names: Collection[str]) -> dict[str, NDArray[Any]]:
+        """The named passes of a sensor at an instant, see `engines.Stage`; `visibility` is truth's buffer of this instant and
+        camera. Raises UserError for an unreadable background image.
         """
-        camera, finish = self.shot.camera(instant, sensor), self.shot.finish(instant).with_background(transparent)
-        background = display_background(finish.background, camera.width, camera.height)
-        has_sky = background is None and not transparent
+        painted: dict[str, NDArray[Any]] = {}
+        if not set(names).isdisjoint(LIGHT_PASSES):
+            painted |= self._light(instant, sensor, visibility, names)
+            picture = picture_of(names)
+            if picture and Blur(self.arrangements, instant, sensor).count(self.at(instant), visibility) == 1:
+                painted[picture] = self._finished(instant, sensor, visibility, picture)  # of the light that was parted
+        if not set(names).isdisjoint(MATERIAL_PASSES):
+            made = materials(self.baked(instant), self.shot.camera(instant, sensor), visibility)
+            painted |= dict(zip(MATERIAL_PASSES, made.T.reshape(2, *visibility.triangle.shape).copy(), strict=True))
+        left = [name for name in PICTURES if name in names and name not in painted]
+        painted |= {name: self._picture(instant, sensor, visibility, name) for name in left}
+        return {name: painted[name] for name in names}
+
+    def _light(self, instant: int, sensor: int, visibility: Visibility, names: Collection[str]) -> dict[str, Float32]:
+        """All `LIGHT_PASSES`, with the sky where the picture has it; (H, W, 3) each."""
+        camera, is_lit = self.shot.camera(instant, sensor), "shading" in names or "residual" in names
+        finish = self.shot.finish(instant).with_background(picture_of(names) == "rgba")
+        has_sky = shows_sky(finish.background)
         radiance = self._canvas(camera.width * camera.height)
-        self._paint(instant, sensor, visibility, has_sky, radiance)
+        split = np.zeros((len(radiance), 9 if is_lit else 6), np.float32)
+        paint(self.baked(instant), camera, visibility, self.options.antialias == 4, has_sky, radiance, split)
+        shape = camera.height, camera.width, 3
+        albedo, emission = (split[:, k : k + 3].reshape(shape) for k in (0, 3))
+        if not is_lit:
+            return {"albedo": albedo, "emission": emission}
+        shading = shading_of(albedo, split[:, 6:].reshape(shape))
+        residual = np.maximum(radiance[:, :3].reshape(shape) - albedo * shading, np.float32(0))
+        return {"albedo": albedo, "shading": shading, "residual": residual, "emission": emission}
+
+    def _picture(self, instant: int, sensor: int, visibility: Visibility, name: str) -> NDArray[np.uint8]:
+        """`rgb` or `rgba`."""
+        camera, background = (
+            self.shot.camera(instant, sensor),
+            self.shot.finish(instant).with_background(name == "rgba").background,
+        )
+        self._paint(instant, sensor, visibility, shows_sky(background), self._canvas(camera.width * camera.height))
+        return self._finished(instant, sensor, visibility, name)
+
+    def _finished(self, instant: int, sensor: int, visibility: Visibility, name: str) -> NDArray[np.uint8]:
+        """`rgb` or `rgba`, of the light that was painted last."""
+        camera, finish = self.shot.camera(instant, sensor), self.shot.finish(instant).with_background(name == "rgba")
+        background = display_background(finish.background, camera.width, camera.height)
+        radiance = self._canvas(camera.width * camera.height)
         shape, focus = (camera.height, camera.width, 4), np.array(self.shot.instants[instant].focus)
         owner = self.at(instant).triangle_object
         seen = partial(seen_by, camera, focus, visibility.inverse_depth, visibility.triangle, owner)

@@ -7,7 +7,7 @@ from typing import Any
 
 from viewsphere.formats.huggingface.arrow import arrow
 from viewsphere.labels import channels
-from viewsphere.model.channel import PASSES, picture_of
+from viewsphere.model.channel import PICTURES, picture_of
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.store import Dataset, encode
 
@@ -46,7 +46,7 @@ class Columns:
         self._dataset = dataset
         self._classes = {category.id: number for number, category in enumerate(dataset.categories)}
         self._picture = picture_of(kept)
-        self._pictures = [name for name in kept if name in PASSES or channels()[name].components == 1]
+        self._pictures = [name for name in kept if name in PICTURES or channels()[name].components == 1]
         self.left_out = [name for name in kept if name not in self._pictures]
         self.features: Feature = {
             "index": value("int64"),

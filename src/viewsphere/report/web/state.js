@@ -12,6 +12,12 @@ export const LAYERS = [
   { name: "flow_state", label: "Seen next", key: "s", surface: true },
   { name: "disparity", label: "Disparity", key: "i", surface: true },
   { name: "motion_boundaries", label: "Motion boundaries", key: "o", surface: true },
+  { name: "albedo", label: "Albedo", key: "a", surface: true },
+  { name: "shading", label: "Shading", key: "h", surface: true },
+  { name: "residual", label: "Other light", key: "l", surface: true },
+  { name: "emission", label: "Emission", key: "e", surface: true },
+  { name: "roughness", label: "Roughness", key: "r", surface: true },
+  { name: "metallic", label: "Metal", key: "k", surface: true },
   { name: "tracks", label: "Tracks", key: "t" },
 ];
 

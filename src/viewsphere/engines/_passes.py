@@ -1,0 +1,22 @@
+"""How engines part a picture's light, so that albedo x shading + residual is all of it."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Float32 = NDArray[np.float32]
+
+
+def shading_of(albedo: Float32, diffuse: Float32) -> Float32:
+    """Diffuse light (H, W, 3) over albedo: the same light from a white surface.
+
+    Where the albedo has no red, green or blue, that of the shading is the mean of the others; where the albedo is 0, all are.
+    """
+    has = albedo > 0
+    shading = np.divide(diffuse, albedo, out=np.zeros(albedo.shape, np.float32), where=has)
+    some = ~has.all(axis=-1)
+    known = has[some]
+    mean = shading[some].sum(axis=-1, keepdims=True) / np.maximum(known.sum(axis=-1, keepdims=True), 1).astype(np.float32)
+    shading[some] = np.where(known, shading[some], mean)
+    return shading

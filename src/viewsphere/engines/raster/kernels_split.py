@@ -1,0 +1,177 @@
+"""What a picture's light is made of, and its surfaces: as `kernels_paint.shade`, sample by sample, but kept apart.
+
+Columns of a split (S, 6) or (S, 9): albedo, emitted light, and, where there is room, diffuse light; premultiplied.
+"""
+
+from __future__ import annotations
+
+import numba as nb
+import numpy as np
+
+from viewsphere.engines.raster.kernels_arrive import arrive
+from viewsphere.engines.raster.kernels_block import (
+    ALPHA,
+    BASE_R,
+    BLOCK,
+    BLUE,
+    DR,
+    ER,
+    FADE,
+    GREEN,
+    METAL,
+    RED,
+    ROUGH,
+    ROWS,
+    UNLIT,
+)  # fmt: skip
+from viewsphere.engines.raster.kernels_gather import gather, gather_ground, locate
+from viewsphere.engines.raster.kernels_light import (
+    UNEXPOSED,
+    add_light,
+    add_light_matte,
+    ambient,
+    ambient_matte,
+    compose,
+    weigh,
+)
+from viewsphere.engines.raster.kernels_material import look_up, material
+from viewsphere.engines.raster.kernels_occlusion import occlude
+from viewsphere.engines.raster.kernels_paint import GLINT, start_matte
+from viewsphere.kernels.jit import inner, njit
+from viewsphere.kernels.lanes import FAST, clamp, lanewise, least
+
+f4 = nb.float32
+U = nb.uintp
+ALBEDO, EMITTED, DIFFUSE = 0, 3 * BLOCK, 6 * BLOCK
+COLUMNS = 9
+
+
+@lanewise
+def _part(b, p):
+    """The parts of samples that are lit, but not composed yet; nothing lights an unlit surface, which sends its colour."""
+    alpha, unlit = clamp(b[ALPHA]), b[UNLIT]
+    share = alpha * (1 - unlit)
+    shown = least(alpha * 8, 1) * (1 - unlit)
+    for k, base in enumerate(b.get(RED, GREEN, BLUE)):
+        row = k * BLOCK
+        p[ALBEDO + row] = b[BASE_R + row] * share
+        p[DIFFUSE + row] = b[DR + row] * share
+        p[EMITTED + row] = b[ER + row] * shown + unlit * base * alpha * UNEXPOSED
+
+
+@lanewise
+def _part_matte(b, p):
+    for row in range(0, 3 * BLOCK, BLOCK):
+        p[ALBEDO + row] = b[BASE_R + row]
+        p[DIFFUSE + row] = b[DR + row]
+        p[EMITTED + row] = 0
+
+
+@inner(fastmath=FAST)
+def _lay(start, count, is_ground, slots, b, p, out):
+    """Lay the parts over what is behind them, as `kernels_light.lay` lays the light; but what coloured glass tints beyond its
+    grey share is none of the parts of what is behind it.
+    """
+    for i in range(U(count)):
+        q = U(slots[U(start) + i])
+        under = f4(0) if is_ground else f4(1) - b[U(ALPHA) + i]
+        shown = f4(1) - b[U(FADE) + i] if is_ground else f4(1)
+        for k in range(U(out.shape[1])):
+            out[q, k] = max(out[q, k] * under + p[k * U(BLOCK) + i] * shown, f4(0))
+
+
+@inner(fastmath=FAST)
+def _light(count, is_matte, surrounding, lights, occlusion, b):
+    """Add all light that arrives at the samples."""
+    occlude(count, occlusion, b)
+    for k in range(lights.kind.shape[0]):
+        arrive(count, lights, k, b)
+        if is_matte:
+            add_light_matte(count, b)
+        else:
+            add_light(count, b)
+    if is_matte:
+        ambient_matte(count, surrounding, b)
+    else:
+        ambient(count, surrounding, b)
+
+
+@njit(fastmath=FAST, _nrt=True)
+def split(view, surfaces, textures, floor, surrounding, lights, occlusion, is_ground, slots, triangle, depth, out):
+    """Lay the parts of the samples in `slots` (N,) int32 over `out` (S, 6 or 9) float32; arguments as in `shade`."""
+    b, p = np.zeros(ROWS * BLOCK, np.float32), np.zeros((COLUMNS + 1) * BLOCK, np.float32)
+    own, which = np.empty(BLOCK, np.int32), np.empty(BLOCK, np.int32)
+    is_matte, is_lit = is_ground and floor[4] == f4(1), out.shape[1] == COLUMNS
+    for start in range(0, slots.shape[0], BLOCK):
+        count = min(slots.shape[0] - start, BLOCK)
+        locate(view, start, count, slots, depth, b, own)
+        if is_ground:
+            gather_ground(view, floor, count, b, which)
+        else:
+            gather(surfaces, count, triangle, b, own, which)
+        if is_matte:
+            start_matte(count, floor, b)
+        else:
+            material(count, view, surfaces, textures, b, which)
+            weigh(count, surrounding.albedo, b)
+        if is_lit:
+            _light(count, is_matte, surrounding, lights, occlusion, b)
+        if is_matte:
+            _part_matte(count, b, p)
+        else:
+            _part(count, b, p)
+            compose(count, b)
+        _lay(start, count, is_ground, slots, b, p, out)
+
+
+@njit(fastmath=FAST, _nrt=True)
+def average_split(pixels, like, samples, radiance, parts, out):
+    """Set each pixel to the mean of its four samples' parts; `samples` and `radiance` are their colours, as
+    `kernels_paint.average_samples` is given them, which dims the glints of light in the same way.
+    """
+    means = np.zeros((pixels.shape[0], out.shape[1]), np.float32)
+    for i in range(pixels.shape[0]):
+        least_light = f4(1e9)
+        for k in range(4):
+            least_light = min(least_light, _level(like[4 * i + k], samples, radiance))
+        for k in range(4):
+            j = like[4 * i + k]
+            dimmed = min(max(least_light, f4(GLINT)) / max(_level(j, samples, radiance), f4(1e-6)), f4(1))
+            own = out[U(j)] if j >= 0 else parts[U(~j)]
+            for c in range(out.shape[1]):
+                means[i, c] += own[c] * f4(0.25) * (dimmed if c >= 3 else f4(1))
+    for i in range(pixels.shape[0]):
+        for c in range(out.shape[1]):
+            out[U(pixels[i]), c] = means[i, c]
+
+
+@inner(fastmath=FAST)
+def _level(j, samples, radiance):
+    own = radiance[U(j)] if j >= 0 else samples[U(~j)]
+    return max(own[0], own[1], own[2])
+
+
+@lanewise
+def _keep(b):
+    """Roughness without that of bumps too small to see, and metallic, both 0 where nothing lights the surface."""
+    lit = 1 - b[UNLIT]
+    b[ROUGH], b[METAL] = clamp(b[ROUGH]) * lit, clamp(b[METAL]) * lit
+
+
+@njit(fastmath=FAST, _nrt=True)
+def substance(view, surfaces, textures, floor, is_ground, slots, triangle, depth, out):
+    """Set rows `slots` of `out` (S, 2) float32 to the roughness and metallic of what the samples show."""
+    b = np.zeros(ROWS * BLOCK, np.float32)
+    own, which = np.empty(BLOCK, np.int32), np.empty(BLOCK, np.int32)
+    for start in range(0, slots.shape[0], BLOCK):
+        count = min(slots.shape[0] - start, BLOCK)
+        locate(view, start, count, slots, depth, b, own)
+        if is_ground:
+            gather_ground(view, floor, count, b, which)
+        else:
+            gather(surfaces, count, triangle, b, own, which)
+        look_up(count, view, surfaces, textures, b, which)
+        _keep(count, b)
+        for i in range(U(count)):
+            q = U(slots[U(start) + i])
+            out[q, U(0)], out[q, U(1)] = b[U(ROUGH) + i], b[U(METAL) + i]
