@@ -18,6 +18,7 @@ from viewsphere.check.failure import failure
 from viewsphere.codecs.png_tiff import decode_png
 from viewsphere.errors import UserError
 from viewsphere.geometry.box import box_size, box_vertices
+from viewsphere.geometry.diameter import diameter
 from viewsphere.store import Category, Dataset, ModelInfo
 
 PRECISION = 1e-12
@@ -81,6 +82,8 @@ def _facts(info: ModelInfo, mesh: Mesh) -> Iterator[str]:
         yield "expected the 3D box of the GLB, found another"
     if info.size != box_size(box):
         yield f"expected size {box_size(box)} of the GLB, found {info.size}"
+    if info.diameter is not None and info.diameter != (found := diameter(mesh.corners)):
+        yield f"expected a diameter of {found} m, as the GLB has, found {info.diameter}"
 
 
 def _compared(wanted: Path, found: Path) -> Iterator[str]:

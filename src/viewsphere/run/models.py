@@ -15,6 +15,7 @@ from viewsphere.assets.export import export_deforming, export_glb, export_obj
 from viewsphere.assets.mesh import Mesh
 from viewsphere.errors import StoreError
 from viewsphere.geometry.box import box_size, box_vertices
+from viewsphere.geometry.diameter import diameter
 from viewsphere.model.credit import Credit
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.thing import TimeStep
@@ -139,6 +140,7 @@ class Models:
             digest=mesh_digest(mesh),
             warnings=mesh.warnings,
             step=step,
+            diameter=diameter(mesh.corners),
         )
 
     def _compare(self, spec: ModelSpec, known: ModelInfo, wanted: Steps) -> None:

@@ -70,7 +70,8 @@ class Category:
 class ModelInfo:
     """A normalised model of the data set; paths are relative to its root.
 
-    `box3d_object` (8, 3) metres in the object's axes; sizes are (width, height, length) in metres. A model that deforms has the
+    `box3d_object` (8, 3) metres in the object's axes; sizes are (width, height, length) in metres; `diameter` is the largest
+    distance between two vertices, metres, None where older versions made the record. A model that deforms has the
     same of each of its `steps`, ascending, whose `track` is its key; its own fields are those of its file's first frame.
     """
 
@@ -93,6 +94,7 @@ class ModelInfo:
     track: str = ""
     steps: tuple[ModelInfo, ...] = ()
     credit: Credit | None = None
+    diameter: float | None = None
 
     @property
     def node(self) -> str | None:
@@ -120,10 +122,11 @@ class ModelInfo:
             del value["step"], value["steps"], value["track"]
         else:
             value |= {"step": self.step.model_dump(mode="json"), "steps": [one.to_plain() for one in self.steps]}
-        if self.credit is None:
-            del value["credit"]
-        else:
+        if self.credit is not None:
             value["credit"] = self.credit.model_dump(exclude_none=True)
+        for name in ("credit", "diameter"):
+            if value[name] is None:
+                del value[name]
         return value
 
     @staticmethod
