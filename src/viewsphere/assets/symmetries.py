@@ -126,7 +126,7 @@ def _turned(surface: Surface, lines: Sequence[Line]) -> Symmetries:
     if len(lines) > 1:
         return Symmetries(continuous=tuple(Continuous(axis=_plain(own), offset=offset) for own in np.eye(3)))
     least = np.eye(3)[np.abs(line.axis).argmin()]
-    axis = _nice(np.cross(np.cross(line.axis, least), line.axis))
+    axis = _nice(least - line.axis * float((least * line.axis).sum()))
     places = (line.offset, _middle(surface, line))
     across = min((Line(axis, place, 2) for place in places), key=lambda one: _misfit(surface, one, math.pi))
     flips = _rotations(surface, [across]) if _is_one(surface, across, [math.pi]) else ()
@@ -314,7 +314,8 @@ def _slopes(surface: Surface, line: Line, angle: float, points: Float, limit: fl
 
 def _across(axis: Float) -> tuple[Float, Float]:
     """Two directions at right angles to an axis, and to one another."""
-    first = _unit(np.cross(axis, np.eye(3)[np.abs(axis).argmin()]))
+    own = np.eye(3)[np.abs(axis).argmin()]
+    first = _unit(own - axis * float((own * axis).sum()))
     return first, np.cross(axis, first)
 
 

@@ -4,27 +4,48 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import Annotated
+from typing import Annotated, Any, cast
 
 import numpy as np
-from pydantic import AfterValidator
+from numpy.typing import ArrayLike
+from pydantic import AfterValidator, BeforeValidator, Field
 
-from viewsphere.geometry.rotation import Float, compose, rigid, rotation_about
+from viewsphere.geometry.rotation import Float, compose, rigid, rotation_about, transform
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.mistakes import shown
-from viewsphere.model.scene import IDENTITY, Matrix4, Vector
+from viewsphere.model.numbers import Number
+from viewsphere.model.scene import IDENTITY, Vector
+
+MOST = 1000
+"""Symmetries of one model."""
 
 RIGID = 1e-4
 """How far scalar products of a motion's rows may be from 0 and 1, and the length of an axis from 1."""
 
 
-def _motion(matrix: Matrix4) -> Matrix4:
+def _rows(value: Any) -> Any:
+    """Four rows, also of 16 numbers, row after row."""
+    flat = isinstance(value, (list, tuple)) and len(cast("list[Any]", value)) == 16
+    return [value[i : i + 4] for i in range(0, 16, 4)] if flat else value
+
+
+def _motion(matrix: Matrix) -> Matrix:
     rotation = np.array(matrix)[:3, :3]
-    if matrix[3] != IDENTITY[3] or np.abs(rotation @ rotation.T - np.eye(3)).max() > RIGID or np.linalg.det(rotation) < 0:
-        raise ValueError("expected a rotation and a translation, 4 rows of 4 numbers whose last is [0, 0, 0, 1]; found others")
+    if matrix[3] != IDENTITY[3]:
+        raise ValueError(f"expected [0, 0, 0, 1] as the last row; found {shown(matrix[3])}")
+    if np.abs((rotation[:, None] * rotation).sum(axis=2) - np.eye(3)).max() > RIGID:
+        raise ValueError("expected rows of a rotation, each of length 1 and at right angles to the others; found others")
+    if float((np.cross(rotation[0], rotation[1]) * rotation[2]).sum()) < 0:
+        raise ValueError("expected a rotation; found a mirror image, which no motion makes of a model")
     if np.abs(np.array(matrix) - np.eye(4)).max() <= RIGID:
         raise ValueError("expected a motion; found the identity, which is a symmetry of every model")
     return matrix
+
+
+Row = tuple[Number, Number, Number, Number]
+Matrix = tuple[Row, Row, Row, Row]
+Motion = Annotated[Matrix, AfterValidator(_motion), BeforeValidator(_rows)]
+"""A rigid motion that is not the identity, 4 rows of 4 numbers, or all 16 as BOP has them."""
 
 
 def _unit(axis: Vector) -> Vector:
@@ -37,8 +58,8 @@ def _unit(axis: Vector) -> Vector:
 class Continuous(Frozen):
     """A model stays as it is, turned by any angle around the line through `offset` along the unit vector `axis`."""
 
-    axis: Annotated[Vector, AfterValidator(_unit)]
-    offset: Vector = (0.0, 0.0, 0.0)
+    axis: Annotated[tuple[Number, Number, Number], AfterValidator(_unit)]
+    offset: tuple[Number, Number, Number] = (0.0, 0.0, 0.0)
 
     def turned(self, angle: float) -> Float:
         """The motion (4, 4) by an angle in radians, counterclockwise seen from the axis's tip."""
@@ -54,8 +75,8 @@ class Symmetries(Frozen):
     which stand for all rotations. Mirror images are no motions.
     """
 
-    discrete: tuple[Annotated[Matrix4, AfterValidator(_motion)], ...] = ()
-    continuous: tuple[Continuous, ...] = ()
+    discrete: tuple[Motion, ...] = Field(default=(), max_length=MOST)
+    continuous: tuple[Continuous, ...] = Field(default=(), max_length=MOST)
 
     def motions(self, steps: int) -> Iterator[Float]:
         """All symmetries (4, 4), the identity first, with `steps` turns around each continuous axis."""
@@ -63,3 +84,22 @@ class Symmetries(Frozen):
         for discrete in (IDENTITY, *self.discrete):
             yield np.array(discrete)
             yield from (compose(turn, discrete) for turn in turns)
+
+    def moved(self, similarity: ArrayLike) -> Symmetries:
+        """The same symmetries in other axes: `similarity` (4, 4) takes points of these there, and may scale them."""
+        m = np.asarray(similarity, np.float64)
+        scale = math.sqrt(float((m[0, :3] ** 2).sum()))
+        turn = m[:3, :3] / scale
+
+        def motion(matrix: Matrix) -> Any:
+            own = np.array(matrix)
+            rotation = transform(turn, transform(turn, own[:3, :3]).T).T
+            place = transform(m, own[:3, 3]) - transform(rotation, m[:3, 3])
+            return rigid(rotation, place).tolist()
+
+        discrete = [motion(matrix) for matrix in self.discrete]
+        continuous = [
+            {"axis": (*transform(turn, c.axis).tolist(),), "offset": (*transform(m, c.offset).tolist(),)}
+            for c in self.continuous
+        ]
+        return Symmetries.model_validate({"discrete": discrete, "continuous": continuous})

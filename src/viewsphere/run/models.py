@@ -8,6 +8,7 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass, fields, replace
 from itertools import chain
 from pathlib import Path
+from textwrap import shorten
 
 from viewsphere.assets.cache import frame_of, read_ahead
 from viewsphere.assets.deforming import DeformingMesh
@@ -15,7 +16,6 @@ from viewsphere.assets.export import export_deforming, export_glb, export_obj
 from viewsphere.assets.mesh import Mesh
 from viewsphere.errors import StoreError
 from viewsphere.geometry.box import box_size, box_vertices
-from viewsphere.geometry.diameter import diameter
 from viewsphere.model.credit import Credit
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.thing import TimeStep
@@ -123,7 +123,7 @@ class Models:
 
     def _info(self, spec: ModelSpec, mesh: Mesh, step: TimeStep | None = None) -> ModelInfo:
         """What there is to know of a model, or of one of its time steps."""
-        frame, box = step and step.frame, box_vertices(*mesh.bounds)
+        frame, box, traits = step and step.frame, box_vertices(*mesh.bounds), self.stages.traits(spec, step)
         obj, glb = model_files(spec.key, frame)
         return ModelInfo(
             key=spec.key_at(frame),
@@ -140,7 +140,9 @@ class Models:
             digest=mesh_digest(mesh),
             warnings=mesh.warnings,
             step=step,
-            diameter=diameter(mesh.corners),
+            diameter=traits.diameter,
+            symmetries=traits.symmetries,
+            keypoints=traits.keypoints,
         )
 
     def _compare(self, spec: ModelSpec, known: ModelInfo, wanted: Steps) -> None:
@@ -157,12 +159,20 @@ class Models:
                 "supercategory": spec.supercategory,
                 "real_size": self.stages.real_size(spec, step),
             }
+            if info.diameter is not None:
+                traits = self.stages.traits(spec, step)
+                now |= {"symmetries": traits.symmetries, "keypoints": traits.keypoints}
             for name, value in now.items():
                 if getattr(info, name) != value:
                     raise StoreError(
-                        f"{self.store.root}: expected {name} {getattr(info, name)!r} of model {info.key!r}, as the data set "
-                        f"has; found {value!r}: keep it, or choose another output folder"
+                        f"{self.store.root}: expected {name} {_short(getattr(info, name))} of model {info.key!r}, as the data "
+                        f"set has; found {_short(value)}: keep it, or choose another output folder"
                     )
+
+
+def _short(value: object) -> str:
+    """A value in a message: what models say of themselves may be long."""
+    return repr(value) if value is None or isinstance(value, (str, tuple)) else shorten(str(value), 100, placeholder=" ...")
 
 
 def _changed(store: Store, spec: ModelSpec) -> StoreError:

@@ -1,0 +1,70 @@
+"""Named points of a model."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection
+from itertools import chain
+from typing import Annotated, TypeVar
+
+from pydantic import AfterValidator, Field, model_validator
+
+from viewsphere.model.frozen import Frozen
+from viewsphere.model.mistakes import nearest, shown
+from viewsphere.model.numbers import Number
+
+MOST_POINTS = 1000
+"""Points of one model."""
+
+
+def _name(text: str) -> str:
+    if not text.isprintable() or text != text.strip():
+        raise ValueError(f"expected a name of printable text, without spaces around it; found {shown(text)}")
+    return text
+
+
+T = TypeVar("T")
+PointName = Annotated[str, Field(min_length=1, max_length=100), AfterValidator(_name)]
+Pair = tuple[PointName, PointName]
+Place = tuple[Number, Number, Number]
+
+
+class Keypoints(Frozen):
+    """Points of a model's own axes, metres, by their names, in their order.
+
+    `skeleton` are lines between two of them, and `flips` those that change places in a mirror image, left before right.
+    """
+
+    points: dict[PointName, Place] = Field(min_length=1, max_length=MOST_POINTS)
+    skeleton: tuple[Pair, ...] = ()
+    flips: tuple[Pair, ...] = ()
+
+    @model_validator(mode="after")
+    def _check(self) -> Keypoints:
+        for field, pairs in (("skeleton", self.skeleton), ("flips", self.flips)):
+            for one, other in pairs:
+                for name in (one, other):
+                    if name not in self.points:
+                        raise ValueError(
+                            f"expected {field} of names in points; found {shown(name)}{nearest(name, self.points)}"
+                        )
+                if one == other:
+                    raise ValueError(f"expected two points in each pair of {field}; found {shown(one)} twice")
+        _once([frozenset(pair) for pair in self.skeleton], "line of skeleton", lambda pair: " - ".join(sorted(pair)))
+        _once([*chain.from_iterable(self.flips)], "point of flips", lambda name: name)
+        return self
+
+    def only(self, names: Collection[str]) -> Keypoints | None:
+        """Those of these names, with the pairs of them; None if there are none."""
+        points = {name: place for name, place in self.points.items() if name in names}
+        skeleton, flips = (tuple(pair for pair in pairs if points.keys() >= {*pair}) for pairs in (self.skeleton, self.flips))
+        return Keypoints(points=points, skeleton=skeleton, flips=flips) if points else None
+
+    def moved(self, move: Callable[[Place], Place]) -> Keypoints:
+        """The same points elsewhere."""
+        return self.model_copy(update={"points": {name: move(place) for name, place in self.points.items()}})
+
+
+def _once(values: list[T], what: str, words: Callable[[T], str]) -> None:
+    again = next((value for i, value in enumerate(values) if value in values[:i]), None)
+    if again is not None:
+        raise ValueError(f"expected every {what} once; found {words(again)} again")
