@@ -20,7 +20,6 @@ from viewsphere.assets.surface import Surface
 from viewsphere.assets.symmetries import find, lacking
 from viewsphere.errors import ModelError
 from viewsphere.geometry.diameter import diameter
-from viewsphere.geometry.rotation import transform
 from viewsphere.model.keypoints import Keypoints, Place
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.symmetries import Symmetries
@@ -101,18 +100,15 @@ def _in_object_axes(said: Sidecar, facts: FileFacts) -> Sidecar:
     if said.axes == "object":
         return said
     symmetries = said.symmetries and said.symmetries.moved(facts.object_from_file)
-    return said.model_copy(update={"symmetries": symmetries, "keypoints": said.keypoints and _moved(said.keypoints, facts)})
-
-
-def _moved(keypoints: Keypoints, facts: FileFacts) -> Keypoints:
-    return keypoints.moved(lambda place: cast("Place", tuple(transform(facts.object_from_file, place).tolist())))
+    keypoints = said.keypoints and said.keypoints.moved(facts.object_from_file)
+    return said.model_copy(update={"symmetries": symmetries, "keypoints": keypoints})
 
 
 def _own(mesh: Mesh, across: float, facts: FileFacts) -> Keypoints | None:
     """The points that the model's file names, but for those far outside of it."""
     if facts.keypoints is None:
         return None
-    found = _moved(facts.keypoints, facts)
+    found = facts.keypoints.moved(facts.object_from_file)
     far = {line.split(": ", 1)[0].removeprefix("points.") for line in far_points(mesh, across, found)}
     return found.only(found.points.keys() - far)
 

@@ -6,8 +6,10 @@ from collections.abc import Callable, Collection
 from itertools import chain
 from typing import Annotated, TypeVar
 
+from numpy.typing import ArrayLike
 from pydantic import AfterValidator, Field, model_validator
 
+from viewsphere.geometry.rotation import transform
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.mistakes import nearest, shown
 from viewsphere.model.numbers import Number
@@ -59,9 +61,10 @@ class Keypoints(Frozen):
         skeleton, flips = (tuple(pair for pair in pairs if points.keys() >= {*pair}) for pairs in (self.skeleton, self.flips))
         return Keypoints(points=points, skeleton=skeleton, flips=flips) if points else None
 
-    def moved(self, move: Callable[[Place], Place]) -> Keypoints:
-        """The same points elsewhere."""
-        return self.model_copy(update={"points": {name: move(place) for name, place in self.points.items()}})
+    def moved(self, similarity: ArrayLike) -> Keypoints:
+        """The same points in other axes, to which `similarity` (4, 4) takes points of these."""
+        places = transform(similarity, [*self.points.values()]).tolist()
+        return self.model_copy(update={"points": {name: tuple(place) for name, place in zip(self.points, places, strict=True)}})
 
 
 def _once(values: list[T], what: str, words: Callable[[T], str]) -> None:
