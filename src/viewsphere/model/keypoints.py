@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+import re
+from collections.abc import Callable, Collection, Iterable
 from itertools import chain
 from typing import Annotated, TypeVar
 
@@ -17,15 +18,41 @@ from viewsphere.model.numbers import Number
 MOST_POINTS = 1000
 """Points of one model."""
 
+LONGEST_NAME = 100
+"""Characters of a point's name."""
+
+
+_SIDE = re.compile(r"left|right|(?<![a-z])[lr](?![a-z])", re.IGNORECASE)
+_OTHER = {"left": "right", "right": "left", "l": "r", "r": "l"}
+
+
+def left_and_right(names: Iterable[str]) -> tuple[Pair, ...]:
+    """The pairs among names that say left and right, in words or as a letter of its own: `hand_left`, `LeftHand`, `hand.L`."""
+    names = list(names)
+    others = {name: _SIDE.sub(_turned, name) for name in names}
+    is_left = {name: (side := _SIDE.search(name)) is not None and side[0].lower() in ("left", "l") for name in names}
+    return tuple((name, others[name]) for name in names if is_left[name] and others[name] in others)
+
+
+def _turned(side: re.Match[str]) -> str:
+    said = side[0]
+    other = _OTHER[said.lower()]
+    return other.upper() if said.isupper() else other.capitalize() if said[0].isupper() else other
+
+
+def is_name(text: str) -> bool:
+    """Whether a point may be called so."""
+    return 0 < len(text) <= LONGEST_NAME and text.isprintable() and text == text.strip()
+
 
 def _name(text: str) -> str:
-    if not text.isprintable() or text != text.strip():
+    if not is_name(text):
         raise ValueError(f"expected a name of printable text, without spaces around it; found {shown(text)}")
     return text
 
 
 T = TypeVar("T")
-PointName = Annotated[str, Field(min_length=1, max_length=100), AfterValidator(_name)]
+PointName = Annotated[str, Field(min_length=1, max_length=LONGEST_NAME), AfterValidator(_name)]
 Pair = tuple[PointName, PointName]
 Place = tuple[Number, Number, Number]
 
