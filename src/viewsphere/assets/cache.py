@@ -18,6 +18,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+from viewsphere import plugins
 from viewsphere.aside import aside, sweep, temporary
 from viewsphere.assets.inside import split_source
 from viewsphere.assets.isolated import read_apart
@@ -25,6 +26,7 @@ from viewsphere.assets.load import check_source
 from viewsphere.assets.mesh import Mesh
 from viewsphere.assets.mesh_file import read_mesh
 from viewsphere.assets.normalise import normalise, placed
+from viewsphere.assets.part_points import part_points
 from viewsphere.assets.parts import taken
 from viewsphere.assets.primitive import FileFacts, extents
 from viewsphere.caches import cache_of
@@ -163,8 +165,10 @@ def load_zoo(spec: ModelSpec, build: Callable[[ModelSpec], Mesh] | None) -> tupl
     """A procedural model and its facts; ModelError when there is nothing to build it with."""
     if build is None:
         raise ModelError(f"{spec.source}: no builder for procedural models was given")
-    mesh = build(spec)
-    return mesh, FileFacts(Path(spec.source), "zoo", "+z", "-y", 1.0, size=extents(mesh))
+    mesh, family = build(spec), spec.source.removeprefix(ZOO)
+    known = plugins.family(family) if family in plugins.families() else None
+    points = part_points(mesh, getattr(known, "KEYPOINTS", {}), getattr(known, "SKELETON", ()))
+    return mesh, FileFacts(Path(spec.source), "zoo", "+z", "-y", 1.0, size=extents(mesh), keypoints=points)
 
 
 def cache_folder() -> Path:
