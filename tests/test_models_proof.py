@@ -81,7 +81,7 @@ def test_what_is_known_of_a_model_is_compared_with_its_glb(textured, tmp_path):
     known = json.loads(whole)
     others = {
         "category": "tree", "supercategory": "plants", "category_id": 2, "obj": known["glb"], "parts": ["other"],
-        "triangles": known["triangles"] + 1, "size": [1.0, 1.0, 1.0],
+        "triangles": known["triangles"] + 1, "diameter": known["diameter"] * 1.01, "size": [1.0, 1.0, 1.0],
         "box3d_object": (np.array(known["box3d_object"]) * 1.01).tolist(),
     }  # fmt: skip
     for name, other in others.items():

@@ -92,7 +92,7 @@ def test_settings_and_readers_are_part_of_the_key(spec, counted, monkeypatch, tm
     load_normalised(spec, folder=folder)
     tall = load_normalised(spec.model_copy(update={"scale": 2.0}), folder=folder)
     assert np.ptp(tall.bounds, axis=0)[1] == pytest.approx(2)
-    monkeypatch.setattr(cache, "_readers_digest", lambda: "other readers")
+    monkeypatch.setattr(cache, "readers_digest", lambda: "other readers")
     load_normalised(spec, folder=folder)
     assert len(counted) == 3
 

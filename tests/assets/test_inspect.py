@@ -1,6 +1,8 @@
 """The report of a model file says what a user must know."""
 
+import numpy as np
 import pytest
+import trimesh
 
 from animated import leaf
 from viewsphere.assets.inspect import describe
@@ -33,6 +35,35 @@ def test_settings_are_obeyed(write):
     report = describe(spec)
     assert report.size == pytest.approx((0.2, 1, 3))
     assert report.suggestions == ()
+
+
+@pytest.mark.parametrize("sides", [(3, 5, 9), (4, 4, 9), "can"])
+def test_proposed_symmetries_are_those_of_the_file_when_they_are_pasted(tmp_path, sides):
+    mesh = trimesh.creation.cylinder(3, 9, sections=48) if sides == "can" else trimesh.creation.box(sides)
+    mesh.apply_transform(trimesh.transformations.rotation_matrix(0.7, (1, 2, 3)))
+    mesh.apply_translation((70, -20, 5))
+    path = tmp_path / "a.obj"
+    mesh.export(path)
+    spec = ModelSpec(key="a", source=str(path), category="x", category_id=1, up="+x", forward="+z", unit=0.01)
+    report = describe(spec)
+    lines = [*report_lines(report)]
+    assert not report.declares and report.sidecar == "a.obj.viewsphere.yaml"
+    (tmp_path / report.sidecar).write_text("\n".join(lines[lines.index("symmetries:") :]))
+    again = describe(spec)
+    assert again.declares and "symmetries:" not in [*report_lines(again)]
+    for field in ("discrete", "continuous"):
+        assert len(again.symmetries[field]) == len(report.symmetries[field])
+    assert len(report.symmetries["continuous"]) == (sides == "can")
+    assert len(report.symmetries["discrete"]) == {(3, 5, 9): 3, (4, 4, 9): 7, "can": 1}[sides]
+    np.testing.assert_allclose(again.symmetries["discrete"], report.symmetries["discrete"], atol=1e-6)
+
+
+def test_named_points_are_shown_as_the_file_has_them(write):
+    path = write("a.obj", WIDE + "f 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n")
+    write("a.obj.viewsphere.yaml", "keypoints: {points: {tip: [0, 20, 0]}}")
+    lines = [*report_lines(describe(path))]
+    assert "  keypoints  1 (the file's axes and unit)" in lines and "    tip: [0, 20, 0]" in lines
+    assert "  symmetric  no (by its shape)" in lines and "  diameter   316.2 m" in lines
 
 
 def test_a_bad_file_is_one_error(write):

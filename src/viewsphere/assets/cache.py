@@ -18,13 +18,15 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+from viewsphere import plugins
 from viewsphere.aside import aside, sweep, temporary
 from viewsphere.assets.inside import split_source
 from viewsphere.assets.isolated import read_apart
 from viewsphere.assets.load import check_source
 from viewsphere.assets.mesh import Mesh
 from viewsphere.assets.mesh_file import read_mesh
-from viewsphere.assets.normalise import normalise
+from viewsphere.assets.normalise import normalise, placed
+from viewsphere.assets.part_points import part_points
 from viewsphere.assets.parts import taken
 from viewsphere.assets.primitive import FileFacts, extents
 from viewsphere.caches import cache_of
@@ -70,7 +72,7 @@ def load(
         return taken(whole, spec, step), facts
     if spec.source.startswith(ZOO):
         raw, facts = load_zoo(spec, build)
-        return normalise(raw, facts, spec), facts
+        return normalise(raw, facts, spec), placed(raw, facts, spec)
     path, inside = split_source(Path(spec.source))
     folder = folder or cache_folder()
     check_source(path)
@@ -123,20 +125,22 @@ def kept(path: Path, about: str, ask: Callable[[], tuple[Any, Iterable[Path]]]) 
             own = hashlib.file_digest(file, "sha256").hexdigest()
     except OSError:
         return ask()[0]
-    entry = folder / f"{hashlib.sha256(f'{_readers_digest()} {about} {path.name} {own}'.encode()).hexdigest()}.json"
+    entry = folder / f"{hashlib.sha256(f'{readers_digest()} {about} {path.name} {own}'.encode()).hexdigest()}.json"
     with suppress(OSError, ValueError, TypeError, KeyError):
         held = json.loads(entry.read_text(encoding="utf-8"))
         if held["state"] == _second_digest(own, path, held["files"]):
             return held["told"]
     told, files = ask()
-    with suppress(OSError), _aside(folder) as place:
-        names = _names(path, files)
-        aside = place / "told.json"
-        aside.write_text(
-            json.dumps({"told": told, "files": names, "state": _second_digest(own, path, names)}), "utf-8", newline="\n"
-        )
-        aside.replace(entry)
+    names = _names(path, files)
+    keep(entry, json.dumps({"told": told, "files": names, "state": _second_digest(own, path, names)}))
     return told
+
+
+def keep(entry: Path, text: str) -> None:
+    """Write an entry of the cache, which appears whole or not at all; a cache that cannot be written is no error."""
+    with suppress(OSError), _aside(entry.parent) as place:
+        (place / "told.json").write_text(text, "utf-8", newline="\n")
+        (place / "told.json").replace(entry)
 
 
 def _batches(frames: Sequence[int]) -> Iterable[Sequence[int]]:
@@ -161,8 +165,10 @@ def load_zoo(spec: ModelSpec, build: Callable[[ModelSpec], Mesh] | None) -> tupl
     """A procedural model and its facts; ModelError when there is nothing to build it with."""
     if build is None:
         raise ModelError(f"{spec.source}: no builder for procedural models was given")
-    mesh = build(spec)
-    return mesh, FileFacts(Path(spec.source), "zoo", "+z", "-y", 1.0, size=extents(mesh))
+    mesh, family = build(spec), spec.source.removeprefix(ZOO)
+    known = plugins.family(family) if family in plugins.families() else None
+    points = part_points(mesh, getattr(known, "KEYPOINTS", {}), getattr(known, "SKELETON", ()))
+    return mesh, FileFacts(Path(spec.source), "zoo", "+z", "-y", 1.0, size=extents(mesh), keypoints=points)
 
 
 def cache_folder() -> Path:
@@ -173,7 +179,7 @@ def cache_folder() -> Path:
 def _first_digest(path: Path, inside: tuple[str, ...], spec: ModelSpec, frame: int | None) -> str:
     if not path.is_file() or path.stat().st_size > limits.MAX_FILE_BYTES:
         raise FileNotFoundError(path)
-    digest = hashlib.sha256(_readers_digest().encode())
+    digest = hashlib.sha256(readers_digest().encode())
     digest.update(f"{frame} {spec.model_dump_json(include=set(SETTINGS))}".encode())
     digest.update(path.suffix.lower().encode() + path.name.encode() + b"\0".join(text.encode() for text in inside))
     with path.open("rb") as file:
@@ -181,7 +187,7 @@ def _first_digest(path: Path, inside: tuple[str, ...], spec: ModelSpec, frame: i
     return digest.hexdigest()
 
 
-def _readers_digest() -> str:
+def readers_digest() -> str:
     """Digest of this package's and Blender's worker's sources, and the versions of the libraries that parse for it."""
     digest = hashlib.sha256()
     for library in ("numpy", "trimesh", "pycollada", "pillow"):

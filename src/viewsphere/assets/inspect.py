@@ -15,8 +15,10 @@ from viewsphere.assets.mesh import Material, Mesh
 from viewsphere.assets.normalise import axes
 from viewsphere.assets.primitive import FileFacts
 from viewsphere.assets.timeline import Timeline, animation_of
+from viewsphere.assets.traits import found_symmetries, traits_of
 from viewsphere.errors import ModelError
 from viewsphere.model.model_spec import Axis, ModelSpec, Size
+from viewsphere.recipe.sidecar import ENDING
 
 
 @dataclass(frozen=True)
@@ -27,6 +29,11 @@ class ModelReport:
     `raw_size` is the file's own, along its own x, y and z. `parts` are names and triangle counts; `materials`
     names and the fields that are not the default; `textures` names and (width, height) in pixels. `animation` is None
     where nothing moves, or where Blender cannot say when, which is then among the `suggestions`.
+
+    `diameter` is the largest distance between two vertices, metres. `symmetries` (as a sidecar has them) are those that the
+    model declares, if it `declares` any, else those of its surface, and `keypoints` its named points, both in the `axes` that
+    are told: those of the file with its own unit, for a model of the zoo those of the object. `sidecar` is the name of the file
+    beside the model that says or may say this, empty for the zoo.
     """
 
     source: str
@@ -44,6 +51,12 @@ class ModelReport:
     textures: tuple[tuple[str, tuple[int, int]], ...]
     has_uv: bool
     has_colors: bool
+    diameter: float
+    symmetries: dict[str, Any]
+    declares: bool
+    keypoints: dict[str, Any] | None
+    axes: str
+    sidecar: str
     animation: Timeline | None
     warnings: tuple[str, ...]
     suggestions: tuple[str, ...]
@@ -59,6 +72,10 @@ def describe(source: Path | ModelSpec, build: Callable[[ModelSpec], Mesh] | None
     low, high = mesh.bounds
     width, length, height = (float(x) for x in high - low)
     animation, problems = _animation(spec)
+    traits = traits_of(spec, mesh, facts)
+    is_file = not spec.source.startswith(ZOO)
+    back = np.linalg.inv(facts.object_from_file) if is_file else np.eye(4)
+    symmetries = found_symmetries(mesh) if traits.symmetries is None else traits.symmetries
     counts = np.bincount(mesh.triangle_part, minlength=len(mesh.parts))
     return ModelReport(
         source=spec.source,
@@ -79,6 +96,12 @@ def describe(source: Path | ModelSpec, build: Callable[[ModelSpec], Mesh] | None
         textures=tuple((image.name, (image.pixels.shape[1], image.pixels.shape[0])) for image in mesh.images),
         has_uv=mesh.uv0 is not None,
         has_colors=mesh.colors is not None,
+        diameter=traits.diameter,
+        symmetries=symmetries.moved(back).model_dump(),
+        declares=traits.symmetries is not None,
+        keypoints=traits.keypoints and traits.keypoints.moved(back).model_dump(),
+        axes="file" if is_file else "object",
+        sidecar=Path(spec.source).name + ENDING if is_file else "",
         animation=animation,
         warnings=mesh.warnings,
         suggestions=(*_suggestions(spec, facts, (width, height, length)), *problems),

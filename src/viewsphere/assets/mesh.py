@@ -147,7 +147,12 @@ class Mesh:
     @property
     def bounds(self) -> NDArray[np.float64]:
         """Lowest and highest corner of the vertices that triangles use, (2, 3) float64."""
+        corners = self.corners
+        return np.array([corners.min(axis=0), corners.max(axis=0)])
+
+    @property
+    def corners(self) -> NDArray[np.float64]:
+        """The vertices that triangles use, (N, 3) float64."""
         used = np.zeros(len(self.vertices), bool)
         used[self.triangles] = True
-        corners = self.vertices[used].astype(np.float64)
-        return np.array([corners.min(axis=0), corners.max(axis=0)])
+        return self.vertices[used].astype(np.float64)

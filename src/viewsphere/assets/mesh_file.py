@@ -11,9 +11,10 @@ import numpy as np
 
 from viewsphere.assets.mesh import Image, Material, Mesh, Texture
 from viewsphere.assets.primitive import TEXTURE_FIELDS, FileFacts
+from viewsphere.model.keypoints import Keypoints
 
 ARRAYS = ("vertices", "triangles", "normals", "triangle_material", "triangle_part", "uv0", "uv1", "colors")
-FACTS = ("format", "up", "forward", "unit", "origin", "size")
+FACTS = ("format", "up", "forward", "unit", "origin", "size", "object_from_file")
 
 
 def write_mesh(path: Path, mesh: Mesh, facts: FileFacts) -> None:
@@ -26,6 +27,7 @@ def write_mesh(path: Path, mesh: Mesh, facts: FileFacts) -> None:
         "images": [image.name for image in mesh.images],
         "warnings": mesh.warnings,
         "facts": {name: getattr(facts, name) for name in FACTS},
+        "keypoints": None if facts.keypoints is None else facts.keypoints.model_dump(),
     }
     arrays["header"] = np.frombuffer(json.dumps(header).encode(), np.uint8)
     np.savez(path, **arrays)
@@ -44,7 +46,8 @@ def read_mesh(path: Path, source: Path) -> tuple[Mesh, FileFacts]:
         images=tuple(Image(name, array) for name, array in zip(header["images"], pixels, strict=True)),
         warnings=tuple(header["warnings"]),
     )
-    return mesh, FileFacts(source, **{name: _tupled(value) for name, value in header["facts"].items()})
+    points = None if header["keypoints"] is None else Keypoints.model_validate(header["keypoints"])
+    return mesh, FileFacts(source, **{name: _tupled(value) for name, value in header["facts"].items()}, keypoints=points)
 
 
 def _material(fields: dict[str, Any]) -> Material:
@@ -56,4 +59,4 @@ def _material(fields: dict[str, Any]) -> Material:
 
 
 def _tupled(value: Any) -> Any:
-    return tuple(cast("list[Any]", value)) if isinstance(value, list) else value
+    return tuple(map(_tupled, cast("list[Any]", value))) if isinstance(value, list) else value

@@ -10,8 +10,10 @@ import numpy as np
 from viewsphere.assets.mesh import Mesh
 from viewsphere.assets.primitive import FileFacts, Float, face_normals, unit_normals
 from viewsphere.errors import ModelError
+from viewsphere.geometry.rotation import rigid, transform
 from viewsphere.limits import limits
 from viewsphere.model.model_spec import Axis, ModelSpec, Size
+from viewsphere.model.scene import Matrix4
 
 PROPORTION_TOLERANCE = 0.1
 
@@ -30,9 +32,8 @@ def normalise(mesh: Mesh, facts: FileFacts, spec: ModelSpec, first: tuple[Mesh, 
     file's order. `first`, the mesh and facts of an animation's first frame, sets scale and centre for all frames, so that
     motion is kept. Raises ModelError for parallel axes and for a result smaller or larger than `limits` allows.
     """
-    turn = rotation(*axes(spec, facts), str(facts.path))
-    still, origin = (mesh, facts.origin) if first is None else (first[0], first[1].origin)
-    factor, center, warnings = _placing(still, turn, facts, spec)
+    turn, factor, center, warnings = _placing_of(mesh, facts, spec, first)
+    origin = facts.origin if first is None else first[1].origin
     shift = factor * (np.subtract(facts.origin, origin) @ turn.T) - center
     stored = (factor * (mesh.vertices.astype(np.float64) @ turn.T) + shift).astype(np.float32)
     order = np.lexsort((mesh.triangle_material, mesh.triangle_part))
@@ -46,6 +47,22 @@ def normalise(mesh: Mesh, facts: FileFacts, spec: ModelSpec, first: tuple[Mesh, 
         triangle_part=mesh.triangle_part[order],
         warnings=mesh.warnings + warnings,
     )
+
+
+def placed(mesh: Mesh, facts: FileFacts, spec: ModelSpec, first: tuple[Mesh, FileFacts] | None = None) -> FileFacts:
+    """The facts with where the file's coordinates are in the normalised mesh; arguments and errors as for `normalise`."""
+    turn, factor, center, _ = _placing_of(mesh, facts, spec, first)
+    origin = facts.origin if first is None else first[1].origin
+    matrix = rigid(factor * turn, -factor * transform(turn, origin) - center).tolist()
+    return replace(facts, object_from_file=cast("Matrix4", tuple(map(tuple, matrix))))
+
+
+def _placing_of(
+    mesh: Mesh, facts: FileFacts, spec: ModelSpec, first: tuple[Mesh, FileFacts] | None
+) -> tuple[Float, float, Float, tuple[str, ...]]:
+    """How the file's axes are turned (3, 3), and what `_placing` says of its first frame."""
+    turn = rotation(*axes(spec, facts), str(facts.path))
+    return turn, *_placing(mesh if first is None else first[0], turn, facts, spec)
 
 
 def _placing(mesh: Mesh, turn: Float, facts: FileFacts, spec: ModelSpec) -> tuple[float, Float, tuple[str, ...]]:

@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 
 from viewsphere.assets.folder import ModelFolder
 from viewsphere.assets.mesh import Image, Material, Mesh, Texture
+from viewsphere.model.keypoints import Keypoints
 from viewsphere.model.model_spec import Axis
+from viewsphere.model.scene import IDENTITY, Matrix4
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
@@ -32,7 +34,8 @@ class FileFacts:
 
     `unit` is metres in one unit of the file. The raw mesh's vertices plus `origin` are the file's
     coordinates: it is zero unless the model lies so far away that float32 would lose its shape. `size` are the
-    extents along the file's own x, y and z, in its unit. `files` are all files read or looked for.
+    extents along the file's own x, y and z, in its unit. `files` are all files read or looked for. `keypoints` are points that
+    the file names, in its coordinates. `object_from_file` takes the file's coordinates to the object's, once it is normalised.
     """
 
     path: Path
@@ -43,6 +46,8 @@ class FileFacts:
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
     size: tuple[float, float, float] = (0.0, 0.0, 0.0)
     files: tuple[Path, ...] = ()
+    keypoints: Keypoints | None = None
+    object_from_file: Matrix4 = IDENTITY
 
 
 @dataclass(frozen=True, eq=False)

@@ -84,18 +84,18 @@ def _read_model(spec: ModelSpec, job: Job) -> Sequence[Path]:
     """Write the mesh, or one for each frame; returns the files that the model named."""
     from viewsphere.assets.load import load_frames, load_model
     from viewsphere.assets.mesh_file import write_mesh
-    from viewsphere.assets.normalise import normalise
+    from viewsphere.assets.normalise import normalise, placed
 
     folder, source = Path(job.folder), Path(spec.source)
     if not job.frames:
         raw, facts = load_model(source, confined=spec.confined, shown=spec.shown)
-        write_mesh(folder / MESH, normalise(raw, facts, spec), facts)
+        write_mesh(folder / MESH, normalise(raw, facts, spec), placed(raw, facts, spec))
         return facts.files
     found = load_frames(source, job.frames, confined=spec.confined, shown=spec.shown, clip=spec.clip, fps=spec.fps)
     first = next(found)
     files = dict.fromkeys(first[1].files)
     for number, (raw, facts) in enumerate(found):
-        write_mesh(folder / mesh_name(number), normalise(raw, facts, spec, first), facts)
+        write_mesh(folder / mesh_name(number), normalise(raw, facts, spec, first), placed(raw, facts, spec, first))
         files |= dict.fromkeys(facts.files)
     return tuple(files)
 

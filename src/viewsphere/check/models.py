@@ -14,10 +14,14 @@ from viewsphere.aside import temporary
 from viewsphere.assets.export import export_obj
 from viewsphere.assets.exported import read_exported
 from viewsphere.assets.mesh import Mesh
+from viewsphere.assets.surface import Surface
+from viewsphere.assets.symmetries import lacking
+from viewsphere.assets.traits import far_points
 from viewsphere.check.failure import failure
 from viewsphere.codecs.png_tiff import decode_png
 from viewsphere.errors import UserError
 from viewsphere.geometry.box import box_size, box_vertices
+from viewsphere.geometry.diameter import diameter
 from viewsphere.store import Category, Dataset, ModelInfo
 
 PRECISION = 1e-12
@@ -83,6 +87,14 @@ def _facts(info: ModelInfo, mesh: Mesh) -> Iterator[str]:
         yield "expected the 3D box of the GLB, found another"
     if info.size != box_size(box):
         yield f"expected size {box_size(box)} of the GLB, found {info.size}"
+    if info.diameter is None:
+        return
+    if info.diameter != (across := diameter(mesh.corners)):
+        yield f"expected a diameter of {across} m, as the GLB has, found {info.diameter}"
+    if info.symmetries is not None:
+        yield from lacking(Surface.of(mesh), info.symmetries)
+    if info.keypoints is not None:
+        yield from (f"keypoints.{problem}" for problem in far_points(mesh, across, info.keypoints))
 
 
 def _compared(wanted: Path, found: Path) -> Iterator[str]:

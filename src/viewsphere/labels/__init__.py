@@ -7,7 +7,7 @@ add a label by an entry point of the group `viewsphere.labels` that names such a
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable, Mapping, Sequence
+from collections.abc import Callable, Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -35,10 +35,13 @@ from viewsphere.labels._record import Makers, computed, finite, from_short_recor
 from viewsphere.labels._sight import Around, Sight
 from viewsphere.model.camera import Camera
 from viewsphere.model.channel import DEFAULT_CHANNELS, PASSES, Channel
+from viewsphere.model.keypoints import Keypoints
 from viewsphere.model.model_spec import Size
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.model.shot import Shot
+from viewsphere.model.symmetries import Symmetries
 from viewsphere.model.thing import Thing
+from viewsphere.model.traits import Traits
 from viewsphere.truth.geometry import Geometry
 from viewsphere.truth.visibility import Visibility
 
@@ -181,12 +184,13 @@ def sight_of(
     models: Sequence[str],
     real_sizes: Sequence[Size | None] | None = None,
     around: Around | None = None,
+    traits: Sequence[Callable[[], Traits]] | None = None,
 ) -> Sight:
     """What a camera sees of a shot at an instant (counted from 0 there), with the places of its objects.
 
     `boxes[i]` is the 3D box (8, 3) of object i + 1's model then in the object's axes, `models[i]` the path of that model in the
-    data set and `real_sizes[i]` its true size (by default the one its spec gives in numbers); `geometry` is the shot's stage
-    and `visibility` what this camera sees of it.
+    data set, `real_sizes[i]` its true size (by default the one its spec gives in numbers), and `traits[i]` gives what it says
+    of itself to labels that ask for it; `geometry` is the shot's stage and `visibility` what this camera sees of it.
     """
     objects = shot.objects
     if not len(objects) == len(boxes) == len(models) == geometry.object_count:
@@ -196,8 +200,8 @@ def sight_of(
         )
     sizes = real_sizes or [None if isinstance(thing.model.real_size, str) else thing.model.real_size for thing in objects]
     facts = [
-        Rendered(model, box, size, thing.model.category, thing.model.category_id, _track(thing, instant))
-        for thing, box, model, size in zip(objects, boxes, models, sizes, strict=True)
+        Rendered(model, box, size, thing.model.category, thing.model.category_id, _track(thing, instant), said)
+        for thing, box, model, size, said in zip(objects, boxes, models, sizes, traits or [_unsaid] * len(objects), strict=True)
     ]
     places = tuple(
         None if pose is None else Placement(thing.model, pose, camera, shot.category_deg, lambda known=known: known, step)
@@ -205,6 +209,10 @@ def sight_of(
         for pose, step in ((thing.motion.at(instant), thing.motion.step_at(instant)),)
     )
     return Sight(geometry, camera, visibility, places, around, shot.annotations, shot.labels)
+
+
+def _unsaid() -> Traits:
+    raise ValueError("expected what the model says of itself; sight_of() was not given it")
 
 
 def _track(thing: Thing, instant: int) -> str:
@@ -243,4 +251,20 @@ class Rendered:
     category: str
     category_id: int
     track: str
+    traits: Callable[[], Traits]
     materials: tuple[str, ...] = ()
+
+    @property
+    def diameter(self) -> float:
+        """The largest distance between two vertices, metres."""
+        return self.traits().diameter
+
+    @property
+    def symmetries(self) -> Symmetries | None:
+        """Motions that leave the model as it is."""
+        return self.traits().symmetries
+
+    @property
+    def keypoints(self) -> Keypoints | None:
+        """Named points."""
+        return self.traits().keypoints

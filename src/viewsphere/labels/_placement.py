@@ -13,9 +13,11 @@ from numpy.typing import NDArray
 
 from viewsphere.geometry.rotation import compose, rigid
 from viewsphere.model.camera import Camera
+from viewsphere.model.keypoints import Keypoints
 from viewsphere.model.model_spec import ModelSpec, Size
 from viewsphere.model.sample import ObjectView
 from viewsphere.model.scene import Matrix4
+from viewsphere.model.symmetries import Symmetries
 from viewsphere.model.thing import TimeStep
 
 Float = NDArray[np.float64]
@@ -23,7 +25,8 @@ Float = NDArray[np.float64]
 
 class ModelFacts(Protocol):
     """Facts about a normalised model: its OBJ file (relative to the data set's root), its box (8, 3) in its own axes, its
-    true size if known (metres), its category, names of its materials, and of a time step the key of the animated model.
+    true size if known (metres), its category, names of its materials, and of a time step the key of the animated model; and as
+    `Traits` has them, its diameter (None in data sets of older versions), symmetries and named points.
     """
 
     @property
@@ -40,6 +43,12 @@ class ModelFacts(Protocol):
     def materials(self) -> tuple[str, ...]: ...
     @property
     def track(self) -> str: ...
+    @property
+    def diameter(self) -> float | None: ...
+    @property
+    def symmetries(self) -> Symmetries | None: ...
+    @property
+    def keypoints(self) -> Keypoints | None: ...
 
 
 @dataclass(frozen=True, eq=False)

@@ -34,7 +34,7 @@ class ModelSpec(Brief):
     its file's first frame; which time step it shows, and when, its thing's motion says.
     """
 
-    UNSAID = ("fps",)
+    UNSAID = ("fps", "sidecar", "symmetries", "keypoints")
 
     key: str  # unique and stable in the data set: also the name of its folder
     source: str
@@ -54,6 +54,9 @@ class ModelSpec(Brief):
     clip: str | None = None  # name of the animation that is played, where the file has several
     shown: tuple[str, ...] = ()  # objects of a .blend file that are read although renders do not show them
     parts: Parts | None = None  # what is taken of it, when it is read and normalised
+    sidecar: str | None = None  # absolute path of the file that says symmetries and keypoints, where it is not beside its own
+    symmetries: Literal["found"] | None = None  # whether they are looked for where none are declared
+    keypoints: int | None = None  # how many are spread over its surface where none are named
 
     def key_at(self, frame: int | None) -> str:
         """The key of the model as it is at a frame of its file; None: its own."""

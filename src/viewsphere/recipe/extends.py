@@ -23,6 +23,7 @@ PATHS: tuple[tuple[str, ...], ...] = (
     ("models", "*", "source"),
     ("models", "*", "source", "*"),
     ("models", "*", "real_size"),
+    ("models", "*", "sidecar"),
     ("models", "*", "real_size", "csv"),
     ("viewpoints", "path"),
     *(("scene", "background", name) for name in pictures_of(Background)),

@@ -86,12 +86,14 @@ _use_yaml_12(_Loader)
 _use_yaml_12(_Dumper)
 
 
-def read(path: Path) -> tuple[Any, Marks]:
-    """Plain data of one recipe file, and the place of every value in it; raises RecipeError naming file and line."""
+def read(path: Path, fields: str = "name, models, viewpoints") -> tuple[Any, Marks]:
+    """Plain data of one recipe file, or of another with these fields, and the place of every value in it; raises RecipeError
+    naming file and line.
+    """
     data, marks = parse(_text(path), str(path))
     if not isinstance(data, dict):
         found = "an empty file" if data is None else shown(data)
-        raise RecipeError(f"{path}:1: expected a mapping of name, models, viewpoints, ...; found {found}")
+        raise RecipeError(f"{path}:1: expected a mapping of {fields}, ...; found {found}")
     return data, marks
 
 

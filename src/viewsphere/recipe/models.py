@@ -11,9 +11,10 @@ from viewsphere import plugins
 from viewsphere.model.brief import Brief
 from viewsphere.model.credit import Attribution, Credit, Licence, SourceUrl
 from viewsphere.model.frozen import Frozen
+from viewsphere.model.keypoints import MOST_POINTS
 from viewsphere.model.mistakes import nearest, shown
 from viewsphere.model.model_spec import Axis
-from viewsphere.model.numbers import Positive
+from viewsphere.model.numbers import Count, Positive
 from viewsphere.recipe.draws import CountDrawn, Drawn, is_random
 from viewsphere.recipe.motion import MOTION, MotionField, has_clip
 from viewsphere.recipe.time import RATE, STEPS, Frames, Rate, Steps
@@ -89,7 +90,7 @@ Scale = Annotated[
 class ModelEntry(Brief):
     """Some models of one category, treated alike."""
 
-    UNSAID = ("motion", "fps")
+    UNSAID = ("motion", "fps", "sidecar", "symmetries", "keypoints")
 
     source: Annotated[
         tuple[Annotated[str, Field(min_length=1)], ...],
@@ -143,6 +144,18 @@ class ModelEntry(Brief):
         "(its path, or {csv, unit}), or file: the size the file has. The default for the zoo is file",
     )
     scale: Scale = Field(default="as_is", description="as_is, real_size, or {length: 1.8}: metres to scale the model to")
+    sidecar: Annotated[str, Field(min_length=1)] | None = Field(
+        default=None,
+        description="a file that says symmetries and keypoints of the models; by default, of each model the file beside it, "
+        "such as mug.glb.viewsphere.yaml",
+    )
+    symmetries: Literal["declared", "found"] | None = Field(
+        default=None,
+        description="found: of models that declare none, those of the surface; declared (the default): none of these",
+    )
+    keypoints: Annotated[Count, Field(le=MOST_POINTS)] | None = Field(
+        default=None, description="of models that name none, so many points that lie far apart on the surface"
+    )
     confined: bool = Field(
         default=True, strict=True, description="whether paths inside model files have to stay in the model's folder"
     )
@@ -188,6 +201,8 @@ class ModelEntry(Brief):
             raise ValueError(f"expected up and forward along different axes; found {self.up} and {self.forward}")
         if families and self.frames is not None:
             raise ValueError("expected a file for frames; found the zoo, whose models do not move")
+        if families and self.sidecar is not None:
+            raise ValueError("expected a file for sidecar; found the zoo, whose models say what there is to say")
         if families and has_clip(self.motion):
             raise ValueError("expected a file for the motion clip; found the zoo, whose models have no clips")
         if self.frames is None and self.poses != "each":

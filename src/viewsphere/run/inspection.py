@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import cast, get_args
 
@@ -71,6 +71,7 @@ def report_lines(report: ModelReport) -> Iterator[str]:
     yield f"  size       width {width:.4g} m, height {height:.4g} m, length {length:.4g} m (in the file: {raw})"
     yield f"  axes       up {report.up}, forward {report.forward}; 1 unit = {report.unit:g} m"
     yield f"  triangles  {report.triangles:,} ({report.vertices:,} vertices)"
+    yield f"  diameter   {report.diameter:.4g} m"
     attributes = [name for name, has in (("uv", report.has_uv), ("vertex colours", report.has_colors)) if has]
     if attributes:
         yield f"  carries    {', '.join(attributes)}"
@@ -84,11 +85,48 @@ def report_lines(report: ModelReport) -> Iterator[str]:
         yield f"    {name or '(unnamed)'}: {_values(values) or 'plain'}"
     for name, (w, h) in report.textures:
         yield f"  texture    {name}: {w} x {h}"
+    yield from _keypoints(report)
+    yield from _symmetries(report)
     yield from _animation(report.animation)
     for warning in report.warnings:
         yield f"  warning    {warning}"
     for suggestion in report.suggestions:
         yield f"  hint       {suggestion}"
+
+
+def _keypoints(report: ModelReport) -> Iterator[str]:
+    if report.keypoints is None:
+        return
+    points: dict[str, Sequence[float]] = report.keypoints["points"]
+    unit = "m, object's axes" if report.axes == "object" else "the file's axes and unit"
+    yield f"  keypoints  {len(points)} ({unit})"
+    for name, place in [*points.items()][:20]:
+        yield f"    {name}: {_numbers(place)}"
+    if len(points) > 20:
+        yield f"    and {len(points) - 20} more"
+
+
+def _symmetries(report: ModelReport) -> Iterator[str]:
+    """How many there are; those that are found, as a sidecar has them."""
+    discrete, continuous = report.symmetries["discrete"], report.symmetries["continuous"]
+    kinds = [f"{len(discrete)} rotation{'s' if len(discrete) > 1 else ''}"] if discrete else []
+    kinds += [f"round about {len(continuous)} {'axes' if len(continuous) > 1 else 'axis'}"] if continuous else []
+    yield f"  symmetric  {' and '.join(kinds) or 'no'} ({'as declared' if report.declares else 'by its shape'})"
+    if report.declares or not kinds or not report.sidecar:
+        return
+    yield f"  hint       if they are meant, and no texture says otherwise, put these lines into {report.sidecar} beside it:"
+    yield "symmetries:"
+    if discrete:
+        yield "  discrete:"
+        yield from (f"  - [{', '.join(map(_numbers, rows))}]" for rows in discrete)
+    if continuous:
+        yield "  continuous:"
+        yield from (f"  - {{axis: {_numbers(line['axis'])}, offset: {_numbers(line['offset'])}}}" for line in continuous)
+
+
+def _numbers(values: Sequence[float]) -> str:
+    """Numbers as YAML, to nine digits."""
+    return f"[{', '.join(f'{round(value, 9) + 0.0:.9g}' for value in values)}]"
 
 
 def _animation(line: Timeline | None) -> Iterator[str]:

@@ -8,6 +8,7 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass, fields, replace
 from itertools import chain
 from pathlib import Path
+from textwrap import shorten
 
 from viewsphere.assets.cache import frame_of, read_ahead
 from viewsphere.assets.deforming import DeformingMesh
@@ -122,7 +123,7 @@ class Models:
 
     def _info(self, spec: ModelSpec, mesh: Mesh, step: TimeStep | None = None) -> ModelInfo:
         """What there is to know of a model, or of one of its time steps."""
-        frame, box = step and step.frame, box_vertices(*mesh.bounds)
+        frame, box, traits = step and step.frame, box_vertices(*mesh.bounds), self.stages.traits(spec, step)
         obj, glb = model_files(spec.key, frame)
         return ModelInfo(
             key=spec.key_at(frame),
@@ -140,6 +141,9 @@ class Models:
             warnings=mesh.warnings,
             step=step,
             materials=tuple(material.name for material in mesh.materials),
+            diameter=traits.diameter,
+            symmetries=traits.symmetries,
+            keypoints=traits.keypoints,
         )
 
     def _compare(self, spec: ModelSpec, known: ModelInfo, wanted: Steps) -> None:
@@ -156,12 +160,20 @@ class Models:
                 "supercategory": spec.supercategory,
                 "real_size": self.stages.real_size(spec, step),
             }
+            if info.diameter is not None:
+                traits = self.stages.traits(spec, step)
+                now |= {"symmetries": traits.symmetries, "keypoints": traits.keypoints}
             for name, value in now.items():
                 if getattr(info, name) != value:
                     raise StoreError(
-                        f"{self.store.root}: expected {name} {getattr(info, name)!r} of model {info.key!r}, as the data set "
-                        f"has; found {value!r}: keep it, or choose another output folder"
+                        f"{self.store.root}: expected {name} {_short(getattr(info, name))} of model {info.key!r}, as the data "
+                        f"set has; found {_short(value)}: keep it, or choose another output folder"
                     )
+
+
+def _short(value: object) -> str:
+    """A value in a message: what models say of themselves may be long."""
+    return repr(value) if value is None or isinstance(value, (str, tuple)) else shorten(str(value), 100, placeholder=" ...")
 
 
 def _changed(store: Store, spec: ModelSpec) -> StoreError:

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from viewsphere import plugins
-from viewsphere.assets.cache import frame_of, load_normalised, read_ahead
+from viewsphere.assets.cache import frame_of, load, read_ahead
 from viewsphere.assets.mesh import Mesh
 from viewsphere.assets.opaque import Stamp
 from viewsphere.assets.parts import taken
+from viewsphere.assets.primitive import FileFacts
 from viewsphere.assets.repaint import repaint_stamps
+from viewsphere.assets.traits import traits_of
 from viewsphere.errors import ModelError, RecipeError
 from viewsphere.geometry.box import box_size, box_vertices
 from viewsphere.geometry.rotation import transform
@@ -23,6 +27,7 @@ from viewsphere.model.model_spec import ModelSpec, Size, step_key
 from viewsphere.model.sample import Float, Sample, Taken
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing, TimeStep
+from viewsphere.model.traits import Traits
 from viewsphere.sampling.camera import inside_box
 from viewsphere.store import ModelInfo, Store
 from viewsphere.surroundings.ground import ground_stamps
@@ -79,6 +84,8 @@ class Stages:
     _models: dict[str, Mesh] = field(default_factory=dict[str, Mesh])
     _boxes: dict[str, Float] = field(default_factory=dict[str, Float])
     _sizes: dict[str, Size] = field(default_factory=dict[str, Size])
+    _facts: dict[str, FileFacts] = field(default_factory=dict[str, FileFacts])
+    _traits: dict[str, Traits] = field(default_factory=dict[str, Traits])
 
     def model(self, spec: ModelSpec, step: TimeStep | None = None) -> Mesh:
         """The normalised model at a time step (None: as it rests); raises ModelError if its file cannot be used."""
@@ -95,7 +102,8 @@ class Stages:
     def _loaded(self, spec: ModelSpec, step: TimeStep | None) -> Mesh:
         """Many may be parts of one model, which is loaded once."""
         if spec.parts is None:
-            return load_normalised(spec, build_zoo_model, step=step)
+            mesh, self._facts[_name(spec, step)] = load(spec, build_zoo_model, step=step)
+            return mesh
         frame = frame_of(spec, step)
         return taken(self.model(spec.whole, None if frame is None else TimeStep(frame=frame)), spec, step)
 
@@ -105,6 +113,15 @@ class Stages:
         if name not in self._boxes:
             self.model(spec, step)
         return self._boxes[name]
+
+    def traits(self, spec: ModelSpec, step: TimeStep | None = None) -> Traits:
+        """What the model says of itself at a time step; raises ModelError as `model` and `traits_of` do."""
+        name = _name(spec, step)
+        if name not in self._traits:
+            mesh = self.model(spec, step)
+            facts = self._facts.get(name) or FileFacts(Path(spec.source), "parts", "+z", "-y", 1.0)
+            self._traits[name] = traits_of(spec, mesh, facts, step)
+        return self._traits[name]
 
     def real_size(self, spec: ModelSpec, step: TimeStep | None = None) -> Size | None:
         """The model's true (width, height, length) in metres, None if nobody said."""
@@ -214,15 +231,16 @@ class Stages:
         self._check_shot(shot)
         views = ShotViews(shot, stage.at)
         shown: tuple[TimeStep | None, ...] | None = None
-        boxes, sizes = list[Float](), list[Size | None]()
+        boxes, sizes, traits = list[Float](), list[Size | None](), list[Callable[[], Traits]]()
         for sample in shot.samples:
             steps = tuple(thing.motion.step_at(sample[1]) for thing in shot.objects)
             if steps != shown:
                 both = list(zip(shot.objects, steps, strict=True))
                 boxes = [self.box(thing.model, step) for thing, step in both]
                 sizes = [self.real_size(thing.model, step) for thing, step in both]
+                traits = [partial(self.traits, thing.model, step) for thing, step in both]
                 shown = steps
-            yield render_sample(views, sample, stage, boxes, sizes)
+            yield render_sample(views, sample, stage, boxes, sizes, traits)
 
 
 def _name(spec: ModelSpec, step: TimeStep | None) -> str:
@@ -243,12 +261,18 @@ def _size(mesh: Mesh) -> int:
 
 
 def render_sample(
-    views: ShotViews, sample: tuple[int, int, int], stage: Stage, boxes: Sequence[Float], sizes: Sequence[Size | None]
+    views: ShotViews,
+    sample: tuple[int, int, int],
+    stage: Stage,
+    boxes: Sequence[Float],
+    sizes: Sequence[Size | None],
+    traits: Sequence[Callable[[], Traits]],
 ) -> Sample:
     """One of the samples of the views' shot: colour from the engine, every label from truth, for which a shadow catcher may not
     be there.
 
-    `boxes` and `sizes`: each object's 3D box then in its own axes, and its real size if known.
+    `boxes`, `sizes` and `traits`: each object's 3D box then in its own axes, its real size if known, and what gives what its
+    model says of itself.
     """
     shot, (number, instant, sensor) = views.shot, sample
     kept = shot.kept(sensor)
@@ -264,7 +288,7 @@ def render_sample(
         observed |= stage.paint(instant, sensor, painted, passes)
     steps = [thing.motion.step_at(instant) for thing in shot.objects]
     files = [model_files(p.model.key, step and step.frame)[0] for p, step in zip(shot.objects, steps, strict=True)]
-    sight = sight_of(shot, instant, camera, labelled, visibility, boxes, files, sizes, around)
+    sight = sight_of(shot, instant, camera, labelled, visibility, boxes, files, sizes, around, traits)
     objects = annotated(sight)
     return Sample(
         index=number,

@@ -29,6 +29,7 @@ from viewsphere.model.scene import IDENTITY, Matrix4
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Motion, Thing
 from viewsphere.model.tracks import Tracks
+from viewsphere.model.traits import Traits
 from viewsphere.run.stages import render_sample
 from viewsphere.sampling.camera import looking
 from viewsphere.sampling.engine_digest import engine_digest
@@ -154,7 +155,7 @@ def _render(shot: Shot) -> None:
     boxes = [box_vertices(*card.bounds)] * len(shot.things)
     views = ShotViews(shot, stage.at)
     for number in shot.samples:
-        sample = render_sample(views, number, stage, boxes, [None] * len(boxes))
+        sample = render_sample(views, number, stage, boxes, [None] * len(boxes), [lambda: Traits(1.0)] * len(boxes))
         for name, array in sample.channels.items():
             encode(channels()[name], array, shot.files)
 

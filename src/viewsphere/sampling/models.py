@@ -100,6 +100,9 @@ def numbered_specs(recipe: Recipe) -> tuple[tuple[ModelSpec, int], ...]:
             scale=_scale(recipe, entry, found.key),
             real_size=_real_size(recipe, found, table),
             confined=entry.confined,
+            sidecar=_sidecar(recipe, found.entry),
+            symmetries="found" if entry.symmetries == "found" else None,
+            keypoints=entry.keypoints,
         )
         return spec, found.entry
 
@@ -151,6 +154,19 @@ def _scale(recipe: Recipe, entry: ModelEntry, key: str) -> Literal["as_is", "rea
     if not isinstance(entry.scale, Length):
         return entry.scale
     return drawn(entry.scale.length, lambda path: generator(recipe.lasting_seed, "models", "scale", key, *path))
+
+
+def _sidecar(recipe: Recipe, index: int) -> str | None:
+    """The path of the sidecar that an entry names; raises RecipeError where there is no such file."""
+    name = recipe.models[index].sidecar
+    if name is None:
+        return None
+    path = _path(recipe.folder, name)
+    if not path.is_file():
+        raise RecipeError(
+            f"models[{index}].sidecar: expected a file of symmetries and keypoints; found no {name!r} in {recipe.folder}"
+        )
+    return Path(os.path.normpath(path)).as_posix()
 
 
 def _category(entry: ModelEntry, source: str) -> str:

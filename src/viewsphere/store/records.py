@@ -18,8 +18,10 @@ from pydantic import ConfigDict, PlainValidator, TypeAdapter, ValidationError
 
 from viewsphere.model.classes import SemanticClass, classes_of
 from viewsphere.model.credit import Credit
+from viewsphere.model.keypoints import Keypoints
 from viewsphere.model.mistakes import first_of
 from viewsphere.model.model_spec import Size, step_key
+from viewsphere.model.symmetries import Symmetries
 from viewsphere.model.thing import TimeStep
 from viewsphere.store.index import Block, Index, Row
 from viewsphere.store.manifest import sealed, unsealed
@@ -71,8 +73,10 @@ class Category:
 class ModelInfo:
     """A normalised model of the data set; paths are relative to its root.
 
-    `box3d_object` (8, 3) metres in the object's axes; sizes are (width, height, length) in metres. A model that deforms has the
-    same of each of its `steps`, ascending, whose `track` is its key; its own fields are those of its file's first frame.
+    `box3d_object` (8, 3) metres in the object's axes; sizes are (width, height, length) in metres; `diameter` is the largest
+    distance between two vertices, metres, None where older versions made the record; `symmetries` and `keypoints` are those
+    that it says of itself, or that were found (`Traits`). A model that deforms has the same of each of its `steps`, ascending,
+    whose `track` is its key; its own fields are those of its file's first frame.
 
     `parts` and `materials` are names: those of the numbers 1, 2, ... in maps of parts and of materials.
     """
@@ -97,6 +101,9 @@ class ModelInfo:
     steps: tuple[ModelInfo, ...] = ()
     credit: Credit | None = None
     materials: tuple[str, ...] = ()
+    diameter: float | None = None
+    symmetries: Symmetries | None = None
+    keypoints: Keypoints | None = None
 
     @property
     def node(self) -> str | None:
@@ -124,12 +131,15 @@ class ModelInfo:
             del value["step"], value["steps"], value["track"]
         else:
             value |= {"step": self.step.model_dump(mode="json"), "steps": [one.to_plain() for one in self.steps]}
-        if self.credit is None:
-            del value["credit"]
-        else:
+        if self.credit is not None:
             value["credit"] = self.credit.model_dump(exclude_none=True)
         if not self.materials:  # of models that were exported elsewhere, or before they had names here
             del value["materials"]
+        for name in ("symmetries", "keypoints"):
+            value[name] = value[name] and value[name].model_dump(mode="json")
+        for name in ("credit", "diameter", "symmetries", "keypoints"):
+            if value[name] is None:
+                del value[name]
         return value
 
     @staticmethod

@@ -1,7 +1,8 @@
 """Procedural models that ship with the tool, in metres, front -Y, up +Z, standing on z = 0.
 
 A family is one module of this package, named as its file: `NAME(...)` builds a Mesh from parameters and `NAME_random(rng)`
-draws the parameters. Sub-packages hold the parts that families are built from.
+draws the parameters. `KEYPOINTS` of a family are its named points by its parts, and `SKELETON` lines between them. Sub-packages
+hold the parts that families are built from.
 """
 
 from __future__ import annotations

@@ -7,9 +7,24 @@ from dataclasses import dataclass
 import numpy as np
 
 from viewsphere.assets.mesh import Material, Mesh
+from viewsphere.assets.part_points import sided
 from viewsphere.zoo.shapes.assembly import Piece, assemble
 from viewsphere.zoo.shapes.paint import Color, coated, linear
 from viewsphere.zoo.shapes.solids import Solid, join, moved, rounded_box, tube, turned
+
+KEYPOINTS = {
+    **sided("seat_front", "seat", (1, -1, 1)),
+    **sided("seat_rear", "seat", (1, 1, 1)),
+    **sided("back_top", "back", (1, 0, 1)),
+}
+SKELETON = (
+    ("seat_front_left", "seat_front_right"),
+    ("seat_rear_left", "seat_rear_right"),
+    ("seat_front_left", "seat_rear_left"),
+    ("seat_front_right", "seat_rear_right"),
+    ("seat_rear_left", "back_top_left"),
+    ("seat_rear_right", "back_top_right"),
+)
 
 
 @dataclass(frozen=True)

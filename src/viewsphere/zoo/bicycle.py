@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from viewsphere.assets.mesh import Mesh
+from viewsphere.assets.part_points import At, sided
 from viewsphere.zoo.cycle import brakes, fittings, luggage
 from viewsphere.zoo.cycle.coats import Coats, coats
 from viewsphere.zoo.cycle.cockpit import clamp, cockpit_pieces
@@ -22,6 +23,29 @@ from viewsphere.zoo.cycle.wheels import Hub, wheel_pieces
 from viewsphere.zoo.shapes.assembly import Piece, assemble
 from viewsphere.zoo.shapes.rods import between, shifted, unit
 from viewsphere.zoo.shapes.solids import Float, moved, turned
+
+KEYPOINTS = {
+    "wheel_front": At("wheel_front_hub"),
+    "wheel_rear": At("wheel_rear_hub"),
+    "saddle": At("saddle", (0, 0, 1)),
+    "headset": At("headset"),
+    "bottom_bracket": At("bottom_bracket"),
+    **sided("grip", "grip_{}", (1, 0, 0)),
+    **sided("pedal", "pedal_{}"),
+    "light_front": At("light_front", (0, -1, 0)),
+    "light_rear": At("light_rear", (0, 1, 0)),
+}
+SKELETON = (
+    ("wheel_front", "headset"),
+    ("headset", "grip_left"),
+    ("headset", "grip_right"),
+    ("headset", "bottom_bracket"),
+    ("bottom_bracket", "saddle"),
+    ("bottom_bracket", "wheel_rear"),
+    ("bottom_bracket", "pedal_left"),
+    ("bottom_bracket", "pedal_right"),
+    ("saddle", "wheel_rear"),
+)
 
 __all__ = ["STYLES", "Bicycle", "Style", "bicycle", "bicycle_random", "draw"]
 

@@ -8,6 +8,7 @@ from typing import TypeVar
 import numpy as np
 
 from viewsphere.assets.mesh import Mesh
+from viewsphere.assets.part_points import At, sided
 from viewsphere.zoo.shapes.assembly import Piece, assemble
 from viewsphere.zoo.shapes.paint import Color
 from viewsphere.zoo.shapes.solids import moved
@@ -17,6 +18,24 @@ from viewsphere.zoo.shipyard.fittings import Flag
 from viewsphere.zoo.shipyard.motor import MotorBoat, motor_boat
 from viewsphere.zoo.shipyard.rowing import RowingBoat, rowing_boat
 from viewsphere.zoo.shipyard.sailing import SailingBoat, sailing_boat
+
+KEYPOINTS = {
+    "bow": At("hull", (0, -1, 1)),
+    **sided("beam", "hull", (1, 0, 1)),
+    **sided("stern", "transom|hull", (1, 1, 1)),
+    "masthead": At("mast", (0, 0, 1)),
+    "propeller": At("propeller"),
+    "rudder": At("rudder", (0, 1, -1)),
+    **sided("oar_blade", "oar_blade_{}"),
+    **sided("side_light", "side_light_{}"),
+}
+SKELETON = (
+    ("bow", "beam_left"),
+    ("bow", "beam_right"),
+    ("beam_left", "stern_left"),
+    ("beam_right", "stern_right"),
+    ("stern_left", "stern_right"),
+)
 
 T = TypeVar("T")
 Boat = RowingBoat | MotorBoat | SailingBoat

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from viewsphere.assets.mesh import Mesh
+from viewsphere.assets.part_points import At, sided
 from viewsphere.zoo.coachwork import fittings, lights, structure
 from viewsphere.zoo.coachwork.coats import Coats, coats
 from viewsphere.zoo.coachwork.lights import Grille, Lamps
@@ -15,6 +16,29 @@ from viewsphere.zoo.coachwork.wheels import Wheel
 from viewsphere.zoo.shapes.assembly import Piece, assemble
 from viewsphere.zoo.shapes.paint import Color
 from viewsphere.zoo.shapes.solids import both_sides
+
+KEYPOINTS = {
+    **sided("wheel_front", "wheel_front_{}_rim", (1, 0, 0)),
+    **sided("wheel_rear", "wheel_rear_{}_rim", (1, 0, 0)),
+    **sided("headlight", "headlight_{}", (0, -1, 0)),
+    **sided("taillight", "taillight_{}", (0, 1, 0)),
+    **sided("mirror", "mirror_{}"),
+    **sided("door_handle_front", "door_handle_front_{}", (1, 0, 0)),
+    **sided("bumper_front", "bumper_front", (1, 0, 0)),
+    **sided("bumper_rear", "bumper_rear", (1, 0, 0)),
+    "grille": At("grille", (0, -1, 0)),
+    "roof": At("roof", (0, 0, 1)),
+}
+SKELETON = (
+    ("wheel_front_left", "wheel_rear_left"),
+    ("wheel_front_right", "wheel_rear_right"),
+    ("headlight_left", "headlight_right"),
+    ("taillight_left", "taillight_right"),
+    ("headlight_left", "mirror_left"),
+    ("headlight_right", "mirror_right"),
+    ("mirror_left", "taillight_left"),
+    ("mirror_right", "taillight_right"),
+)
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from viewsphere.assets.mesh import Mesh
+from viewsphere.assets.part_points import sided
 from viewsphere.zoo.joinery import armchair, dining, folding, office, stool, windsor
 from viewsphere.zoo.joinery.armchair import Armchair
 from viewsphere.zoo.joinery.dining import Dining
@@ -14,6 +15,28 @@ from viewsphere.zoo.joinery.stool import Stool
 from viewsphere.zoo.joinery.windsor import Shell, Windsor
 from viewsphere.zoo.shapes.assembly import Piece, assemble
 from viewsphere.zoo.shapes.solids import moved
+
+KEYPOINTS = {
+    **sided("seat_front", "seat_pad|seat_cushion|seat|seat_slat", (1, -1, 1)),
+    **sided("seat_rear", "seat_pad|seat_cushion|seat|seat_slat", (1, 1, 1)),
+    **sided("back_top", "crest_rail|backrest|back_pad|back|back_slat", (1, 0, 1)),
+    **sided("foot_front", "leg_front", (1, -1, -1)),
+    **sided("foot_rear", "leg_rear", (1, 1, -1)),
+    **sided("armrest", "armrest", (1, -1, 1)),
+}
+SKELETON = (
+    ("seat_front_left", "seat_front_right"),
+    ("seat_rear_left", "seat_rear_right"),
+    ("seat_front_left", "seat_rear_left"),
+    ("seat_front_right", "seat_rear_right"),
+    ("seat_rear_left", "back_top_left"),
+    ("seat_rear_right", "back_top_right"),
+    ("back_top_left", "back_top_right"),
+    ("seat_front_left", "foot_front_left"),
+    ("seat_front_right", "foot_front_right"),
+    ("seat_rear_left", "foot_rear_left"),
+    ("seat_rear_right", "foot_rear_right"),
+)
 
 Chair = Dining | Windsor | Shell | Office | Armchair | Stool | Folding
 """Parameters of a chair, by its style; lengths in metres, colours sRGB 0..1."""

@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 
 from viewsphere.assets.mesh import Material, Mesh
+from viewsphere.assets.part_points import At
 from viewsphere.zoo.shapes.assembly import Piece, assemble
 from viewsphere.zoo.shapes.paint import Color, Finish, coated, linear, metal
 from viewsphere.zoo.shapes.solids import (
@@ -24,6 +25,17 @@ from viewsphere.zoo.shapes.solids import (
     superellipse,
     tube,
     turned,
+)
+
+KEYPOINTS = {
+    "nozzle": At("nozzle", (0, -1, 0)),
+    "inlet": At("grille", (0, 1, 0)),
+    "switch": At("switch"),
+    "handle": At("handle", (0, 0, -1)),
+}
+SKELETON = (
+    ("nozzle", "inlet"),
+    ("inlet", "handle"),
 )
 
 Style = Literal["pistol", "ring"]

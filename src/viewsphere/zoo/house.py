@@ -8,10 +8,21 @@ from typing import Literal
 import numpy as np
 
 from viewsphere.assets.mesh import Mesh
+from viewsphere.assets.part_points import At, sided
 from viewsphere.zoo.shapes.paint import Color
 from viewsphere.zoo.townscape import building
 from viewsphere.zoo.townscape.masonry import Bars
 from viewsphere.zoo.townscape.surfaces import finished
+
+KEYPOINTS = {
+    **sided("wall_front", "wall", (1, -1, -1)),
+    **sided("wall_rear", "wall", (1, 1, -1)),
+    **sided("eaves_front", "roof", (1, -1, -1)),
+    **sided("eaves_rear", "roof", (1, 1, -1)),
+    "roof": At("roof", (0, 0, 1)),
+    "door": At("door", (0, -1, 0)),
+    "chimney": At("chimney", (0, 0, 1)),
+}
 
 Roof = Literal["gable", "front_gable", "hip", "flat"]
 Wall = Literal["brick", "plaster", "boards"]

@@ -8,10 +8,17 @@ from typing import Literal
 import numpy as np
 
 from viewsphere.assets.mesh import Material, Mesh
+from viewsphere.assets.part_points import At
 from viewsphere.zoo.shapes.assembly import Piece, assemble
 from viewsphere.zoo.shapes.paint import Color, coated, lamp, metal
 from viewsphere.zoo.shapes.solids import join, lathe, loft, moved, rounded_box, tube, turned
 from viewsphere.zoo.townscape.surfaces import cuboid
+
+KEYPOINTS = {
+    "foot": At("base|column", (0, 0, -1)),
+    "lamp": At("lens|lamp"),
+}
+SKELETON = (("foot", "lamp"),)
 
 Style = Literal["arm", "swan_neck", "lantern", "globe"]
 

@@ -8,9 +8,17 @@ from typing import Literal
 import numpy as np
 
 from viewsphere.assets.mesh import Material, Mesh
+from viewsphere.assets.part_points import At
 from viewsphere.zoo.shapes.assembly import Piece, assemble
 from viewsphere.zoo.shapes.paint import Color, coated, linear
 from viewsphere.zoo.shapes.solids import grid, join, lathe, moved, rounded_box
+
+KEYPOINTS = {
+    "slot": At("slot", (0, -1, 0)),
+    "door": At("door", (0, -1, 0)),
+    "top": At("body", (0, 0, 1)),
+    "foot": At("base", (0, 0, -1)),
+}
 
 
 @dataclass(frozen=True)

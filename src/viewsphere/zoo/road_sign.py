@@ -8,10 +8,17 @@ from typing import Literal
 import numpy as np
 
 from viewsphere.assets.mesh import Material, Mesh
+from viewsphere.assets.part_points import At
 from viewsphere.zoo.shapes.assembly import Piece, assemble
 from viewsphere.zoo.shapes.paint import Color, linear, metal
 from viewsphere.zoo.shapes.solids import Float, Solid, join, lathe, moved
 from viewsphere.zoo.townscape.surfaces import cuboid, prism
+
+KEYPOINTS = {
+    "plate": At("plate", (0, -1, 0)),
+    "foot": At("pole", (0, 0, -1)),
+}
+SKELETON = (("plate", "foot"),)
 
 Kind = Literal["limit", "stop", "give_way", "crossing", "parking"]
 

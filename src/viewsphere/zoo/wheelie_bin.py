@@ -7,9 +7,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from viewsphere.assets.mesh import Material, Mesh
+from viewsphere.assets.part_points import sided
 from viewsphere.zoo.shapes.assembly import Piece, assemble
 from viewsphere.zoo.shapes.paint import Color, coated, linear
 from viewsphere.zoo.shapes.solids import Solid, both_sides, join, lathe, loft, moved, rounded_box, superellipse, tube, turned
+
+KEYPOINTS = {
+    **sided("wheel", "wheel", (1, 0, 0)),
+    **sided("handle", "handle", (1, 1, 0)),
+    **sided("lid_front", "lid", (1, -1, 1)),
+    **sided("lid_rear", "lid", (1, 1, 1)),
+}
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -17,12 +18,11 @@ from viewsphere.geometry.rotation import compose
 TRIANGLES, STRIP, FAN = 4, 5, 6
 
 
-def read_pieces(document: Document, below: str | None = None) -> list[Primitive]:
-    """The triangles of the default scene, or of what is `below` a node of a name, node by node, transforms applied.
+def read_pieces(document: Document, worlds: Mapping[int, Float]) -> list[Primitive]:
+    """The triangles of nodes, whose `worlds` are as `world_matrices` gives them, node by node, transforms applied.
 
     What is scaled to nothing is not drawn (glTF 2.0, section 3.5.3).
     """
-    worlds = _world_matrices(document, below)
     pieces: list[Primitive] = []
     parts: dict[str, int] = {}
     meshes: dict[int, list[Primitive]] = {}  # read once without morphing or skinning, for instances
@@ -59,7 +59,7 @@ def _unused(name: str, taken: dict[str, int]) -> str:
     return unique
 
 
-def _world_matrices(document: Document, below: str | None) -> dict[int, Float]:
+def world_matrices(document: Document, below: str | None = None) -> dict[int, Float]:
     """Node-to-world matrices (4, 4) of the default scene, parents first, in file order; or those of what is `below` a node of a
     name, which is the world then.
     """
@@ -164,7 +164,7 @@ def _primitives(document: Document, mesh: Field, weights: tuple[float, ...], joi
     return pieces
 
 
-def _joints(document: Document, node: Field, worlds: dict[int, Float]) -> Float | None:
+def _joints(document: Document, node: Field, worlds: Mapping[int, Float]) -> Float | None:
     """Matrices (J, 4, 4) from the bind pose to the world of a node's skin, None if it has none."""
     if "skin" not in node:
         return None

@@ -1,0 +1,145 @@
+"""Distances of points from triangles that lie in the cells of a grid.
+
+A grid is a tuple: corners of the triangles (T, 3, 3), starts of the cells (X * Y * Z + 1,) in the members, triangles by cells;
+the grid's lowest corner (3,), the side of a cell, and the numbers of cells (X, Y, Z). It covers all triangles.
+"""
+
+import math
+
+from viewsphere.kernels.jit import inner, njit
+
+
+@njit
+def into_cells(corners, low, cell, counts, members, fills):
+    """Count in (X, Y, Z) int64 the triangles (T, 3, 3) that each cell may hold some of; or, where `fills`, write their numbers
+    before the places in `counts`, which move to the first of them.
+    """
+    for t in range(len(corners)):
+        _visit(corners, t, low, cell, counts, members, fills)
+
+
+@inner
+def _visit(corners, t, low, cell, counts, members, fills):
+    """Count or write a triangle in each cell of its box that its plane goes through."""
+    ax, ay, az = corners[t, 0, 0], corners[t, 0, 1], corners[t, 0, 2]
+    bx, by, bz = corners[t, 1, 0], corners[t, 1, 1], corners[t, 1, 2]
+    cx, cy, cz = corners[t, 2, 0], corners[t, 2, 1], corners[t, 2, 2]
+    ux, uy, uz, vx, vy, vz = bx - ax, by - ay, bz - az, cx - ax, cy - ay, cz - az
+    nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+    reach = 0.5 * cell * (abs(nx) + abs(ny) + abs(nz)) * (1 + 1e-9)
+    i0, i1 = _between(min(ax, bx, cx), max(ax, bx, cx), low[0], cell, counts.shape[0])
+    j0, j1 = _between(min(ay, by, cy), max(ay, by, cy), low[1], cell, counts.shape[1])
+    k0, k1 = _between(min(az, bz, cz), max(az, bz, cz), low[2], cell, counts.shape[2])
+    for i in range(i0, i1):
+        dx = (low[0] + (i + 0.5) * cell - ax) * nx
+        for j in range(j0, j1):
+            dy = dx + (low[1] + (j + 0.5) * cell - ay) * ny
+            for k in range(k0, k1):
+                if abs(dy + (low[2] + (k + 0.5) * cell - az) * nz) <= reach:
+                    if fills:
+                        counts[i, j, k] -= 1
+                        members[counts[i, j, k]] = t
+                    else:
+                        counts[i, j, k] += 1
+
+
+@inner
+def _between(low, high, start, cell, count):
+    """The first cell of a row that a range meets, and the one after the last."""
+    first = max(math.floor((low - start) / cell), 0)
+    end = min(math.floor((high - start) / cell) + 1, count)
+    return first, end
+
+
+@njit
+def all_near(points, motions, grid, limit, near):
+    """For each motion (M, 3, 4) whether it moves all points (N, 3) to within `limit` of a triangle."""
+    for m in range(len(motions)):
+        near[m] = True
+        for p in range(len(points)):
+            x, y, z = _moved(motions[m], points[p])
+            if _nearest(x, y, z, grid, limit, limit)[0] > limit * limit:
+                near[m] = False
+                break
+
+
+@njit
+def closest(points, motion, grid, limit, found):
+    """For each point, moved, the square of its distance from the nearest triangle within `limit`, else infinity; the point
+    there and the triangle's unit normal: found (N, 7).
+    """
+    for p in range(len(points)):
+        x, y, z = _moved(motion, points[p])
+        found[p, 0], t, found[p, 1], found[p, 2], found[p, 3] = _nearest(x, y, z, grid, limit, 0.0)
+        a, b, c = grid[0][t]
+        ux, uy, uz, vx, vy, vz = b[0] - a[0], b[1] - a[1], b[2] - a[2], c[0] - a[0], c[1] - a[1], c[2] - a[2]
+        nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+        length = math.sqrt(nx * nx + ny * ny + nz * nz)
+        found[p, 4], found[p, 5], found[p, 6] = nx / length, ny / length, nz / length
+
+
+@inner
+def _moved(m, p):
+    x = m[0, 0] * p[0] + m[0, 1] * p[1] + m[0, 2] * p[2] + m[0, 3]
+    y = m[1, 0] * p[0] + m[1, 1] * p[1] + m[1, 2] * p[2] + m[1, 3]
+    z = m[2, 0] * p[0] + m[2, 1] * p[1] + m[2, 2] * p[2] + m[2, 3]
+    return x, y, z
+
+
+@inner
+def _nearest(x, y, z, grid, limit, enough):
+    """The square of the distance to the nearest triangle within `limit` (infinity without one), which triangle that is, and
+    the point there; the first triangle within `enough` will do.
+    """
+    best, triangle, fx, fy, fz = math.inf, 0, x, y, z
+    corners, starts, members, low, cell, (width, depth, height) = grid
+    i0, i1 = _between(x - limit, x + limit, low[0], cell, width)
+    j0, j1 = _between(y - limit, y + limit, low[1], cell, depth)
+    k0, k1 = _between(z - limit, z + limit, low[2], cell, height)
+    for i in range(i0, i1):
+        for j in range(j0, j1):
+            for k in range(k0, k1):
+                number = (i * depth + j) * height + k
+                for place in range(starts[number], starts[number + 1]):
+                    t = members[place]
+                    qx, qy, qz = _on_triangle(corners[t], x, y, z)
+                    square = (x - qx) * (x - qx) + (y - qy) * (y - qy) + (z - qz) * (z - qz)
+                    if square < best and square <= limit * limit:
+                        best, triangle, fx, fy, fz = square, t, qx, qy, qz
+                        if square <= enough * enough:
+                            return best, triangle, fx, fy, fz
+    return best, triangle, fx, fy, fz
+
+
+@inner
+def _on_triangle(corners, x, y, z):
+    """The point of a triangle that is nearest to a point: Ericson, Real-Time Collision Detection, 5.1.5."""
+    ax, ay, az = corners[0, 0], corners[0, 1], corners[0, 2]
+    ux, uy, uz = corners[1, 0] - ax, corners[1, 1] - ay, corners[1, 2] - az
+    vx, vy, vz = corners[2, 0] - ax, corners[2, 1] - ay, corners[2, 2] - az
+    px, py, pz = x - ax, y - ay, z - az
+    d1, d2 = ux * px + uy * py + uz * pz, vx * px + vy * py + vz * pz
+    if d1 <= 0 and d2 <= 0:
+        return ax, ay, az
+    uu, uv, vv = ux * ux + uy * uy + uz * uz, ux * vx + uy * vy + uz * vz, vx * vx + vy * vy + vz * vz
+    d3, d4 = d1 - uu, d2 - uv
+    if d3 >= 0 and d4 <= d3:
+        return ax + ux, ay + uy, az + uz
+    vc = d1 * d4 - d3 * d2
+    if vc <= 0 and d1 >= 0 and d3 <= 0:
+        s = d1 / (d1 - d3)
+        return ax + s * ux, ay + s * uy, az + s * uz
+    d5, d6 = d1 - uv, d2 - vv
+    if d6 >= 0 and d5 <= d6:
+        return ax + vx, ay + vy, az + vz
+    vb = d5 * d2 - d1 * d6
+    if vb <= 0 and d2 >= 0 and d6 <= 0:
+        s = d2 / (d2 - d6)
+        return ax + s * vx, ay + s * vy, az + s * vz
+    va = d3 * d6 - d5 * d4
+    if va <= 0 and d4 - d3 >= 0 and d5 - d6 >= 0:
+        s = (d4 - d3) / ((d4 - d3) + (d5 - d6))
+        return ax + ux + s * (vx - ux), ay + uy + s * (vy - uy), az + uz + s * (vz - uz)
+    total = va + vb + vc
+    s, r = vb / total, vc / total
+    return ax + s * ux + r * vx, ay + s * uy + r * vy, az + s * uz + r * vz

@@ -1,0 +1,47 @@
+"""Named points of models that are known by the names of their parts: those of the zoo."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import cast
+
+import numpy as np
+
+from viewsphere.assets.mesh import Mesh
+from viewsphere.model.keypoints import Keypoints, Pair, Place, left_and_right
+from viewsphere.model.scene import Vector
+
+
+@dataclass(frozen=True)
+class At:
+    """A place in the box around a part: its centre, or by `where` (x, y, z) from -1 to 1 towards its sides. Of several `parts`,
+    `seat_pad|seat`, the first that a model has counts.
+    """
+
+    parts: str
+    where: Vector = (0.0, 0.0, 0.0)
+
+
+def sided(name: str, parts: str, where: Vector = (0.0, 0.0, 0.0)) -> dict[str, At]:
+    """The points `name_left` and `name_right`: `{}` in `parts` is left or right, and `where` is that of the left, at +X."""
+    x, y, z = where
+    return {f"{name}_left": At(parts.format("left"), where), f"{name}_right": At(parts.format("right"), (-x, y, z))}
+
+
+def part_points(mesh: Mesh, places: Mapping[str, At], skeleton: Sequence[Pair] = ()) -> Keypoints | None:
+    """The points of a mesh, in its axes: those whose parts it has, and the lines between them; None without any."""
+    found = {name: place for name, at in places.items() if (place := _place(mesh, at)) is not None}
+    if not found:
+        return None
+    lines = tuple(pair for pair in skeleton if found.keys() >= {*pair})
+    return Keypoints(points=found, skeleton=lines, flips=left_and_right(found))
+
+
+def _place(mesh: Mesh, at: At) -> Place | None:
+    part = next((mesh.parts.index(name) for name in at.parts.split("|") if name in mesh.parts), None)
+    if part is None:
+        return None
+    corners = mesh.vertices[mesh.triangles[mesh.triangle_part == part]].astype(np.float64).reshape(-1, 3)
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    return cast("Place", tuple(((low + high) / 2 + np.array(at.where) * (high - low) / 2).tolist()))

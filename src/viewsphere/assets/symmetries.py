@@ -1,0 +1,332 @@
+"""Symmetries of a model's surface, found from its triangles, and declared ones that it does not have.
+
+Only geometry counts: a surface that looks different after a turn, by its texture or materials, is symmetric here. What lies
+inside of a model, where nobody sees it, counts as well.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import cast
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from viewsphere.assets.surface import Surface
+from viewsphere.geometry.rotation import product, rotation_about, transform
+from viewsphere.model.scene import Matrix4, Vector
+from viewsphere.model.symmetries import Continuous, Symmetries
+
+Float = NDArray[np.float64]
+
+TOLERANCE = 0.01
+"""Share of the diameter by which a symmetry may move a point of the surface away from the surface."""
+
+ORDERS = tuple(range(2, 17))
+"""How often a turn may be repeated until the model is as it was. A prism of more sides is round, as far as `TOLERANCE` goes."""
+
+PRIMES = (13, 11, 7, 5, 3, 2)
+"""An axis of any of these orders has a turn of one of these, which is what is searched for."""
+
+GOLDEN = math.pi * (3 - math.sqrt(5))
+"""Radians: multiples of this angle come near to every angle."""
+
+TURNS = 16
+"""Turns by multiples of `GOLDEN` that are tried of an axis around which every turn may be a symmetry."""
+
+ALIKE = 0.1
+"""Share of the largest moment by which two moments of the surface differ at most where an axis between theirs may be one."""
+
+COARSE = 3.0
+"""Tolerances by which turns around lines may be off that are only near to the one sought."""
+
+AXES = 40_000
+"""Directions of half a ball, about 0.01 radians apart."""
+
+APART = 0.09
+"""Radians by which an axis is at most off another that stands for it."""
+
+FIT = 0.1
+"""Tolerances by which orders of an axis may fit worse than the best."""
+
+NICE = 1e-3
+"""Radians by which an axis may be off one of the object's own, which then takes its place."""
+
+FEW = 600
+"""Points that lines are fitted to."""
+
+
+@dataclass(frozen=True, eq=False)
+class Line:
+    """A line along `axis` (3,), of length 1, through `offset` (3,), metres; and how often a turn around it is repeated until
+    all is as it was: 0 if every turn leaves it so.
+    """
+
+    axis: Float
+    offset: Float
+    order: int = 0
+
+
+def find(surface: Surface) -> Symmetries:
+    """All symmetries of a surface (within `TOLERANCE`), in object axes and metres.
+
+    A ball has the three axes of the object as continuous ones; anything else that is round has one, and one half turn if its
+    ends are alike. All else has its rotations, by axes.
+    """
+    usual, lines = _usual(surface), list[Line]()
+    round_ones = list(_around(surface, usual, [GOLDEN * i for i in (1, 2, 3)], lines, _as_round))
+    if round_ones:
+        return _turned(surface, round_ones)
+    for order, candidates in _candidates(surface, usual):
+        for line in _around(surface, candidates, [2 * math.pi / order], lines, _as_it_is):
+            if not line.order:
+                return _turned(surface, [line])
+            lines.append(line)
+            if order == line.order == 2 and sum(one.order > 2 for one in lines) == 1:  # a prism, whose others follow
+                return Symmetries(discrete=tuple(_rotations(surface, _whole(lines))))
+    return Symmetries(discrete=tuple(_rotations(surface, _whole(lines))))
+
+
+def lacking(surface: Surface, declared: Symmetries) -> Iterator[str]:
+    """What a model lacks of declared symmetries: the fields, and what was found instead."""
+    limit = TOLERANCE * surface.diameter
+    for name, values in (("discrete", declared.discrete), ("continuous", declared.continuous)):
+        for i, value in enumerate(values):
+            motions = [value.turned(angle) for angle in _angles()] if isinstance(value, Continuous) else [np.array(value)]
+            if not surface.are_near([*motions, *map(np.linalg.inv, motions)], limit).all():
+                off = max(_off(surface, motion) for motion in motions)
+                yield (
+                    f"symmetries.{name}[{i}]: expected what takes the surface to itself within {limit:.3g} m ({TOLERANCE:.0%} "
+                    f"of the diameter); found points that it moves about {off:.2g} m off"
+                )
+
+
+def _off(surface: Surface, motion: Float) -> float:
+    """About how far a motion takes a point of the surface away from all others."""
+    points = surface.points[:: max(len(surface.points) // 1000, 1)]
+    return max(math.sqrt(((points - moved) ** 2).sum(axis=1).min()) for moved in transform(motion, points))
+
+
+def _whole(lines: Sequence[Line]) -> Sequence[Line]:
+    """The lines; of a prism, those that follow from the one along it and one across."""
+    along = max(lines, key=lambda one: one.order, default=None)
+    across = [one for one in lines if one is not along]
+    if along is None or along.order == 2 or any(one.order > 2 for one in across):
+        return lines
+    half_steps = (rotation_about(along.axis * (math.pi * i / along.order)) for i in range(along.order))
+    return [along, *(replace(one, axis=transform(turn, one.axis)) for turn in half_steps for one in across[:1])]
+
+
+def _turned(surface: Surface, lines: Sequence[Line]) -> Symmetries:
+    """What is round around one line, or around more than one and so around all."""
+    line = lines[0]
+    offset = _metres(surface, surface.center if len(lines) > 1 else line.offset)
+    if len(lines) > 1:
+        return Symmetries(continuous=tuple(Continuous(axis=_plain(own), offset=offset) for own in np.eye(3)))
+    least = np.eye(3)[np.abs(line.axis).argmin()]
+    axis = _nice(least - line.axis * float((least * line.axis).sum()))
+    places = (line.offset, _middle(surface, line))
+    across = min((Line(axis, place, 2) for place in places), key=lambda one: _misfit(surface, one, math.pi))
+    flips = _rotations(surface, [across]) if _is_one(surface, across, [math.pi]) else ()
+    return Symmetries(discrete=tuple(flips), continuous=(Continuous(axis=_plain(line.axis), offset=offset),))
+
+
+def _middle(surface: Surface, line: Line) -> Float:
+    """The point of a line in the middle between the ends of the surface along it."""
+    along = (surface.corners * line.axis).sum(axis=2)
+    return line.offset + line.axis * ((along.min() + along.max()) / 2 - float((line.offset * line.axis).sum()))
+
+
+def _rotations(surface: Surface, lines: Iterable[Line]) -> Iterator[Matrix4]:
+    """The rotations about lines of these orders, without the identity."""
+    for line in lines:
+        for i in range(1, line.order):
+            motion = _motion(line, 2 * math.pi * i / line.order)
+            places = _metres(surface, motion[:3, 3])
+            yield cast("Matrix4", (*((*_plain(motion[k, :3]), places[k]) for k in range(3)), (0.0, 0.0, 0.0, 1.0)))
+
+
+def _plain(numbers: ArrayLike, digits: int = 9) -> Vector:
+    """Numbers that are equal on all processors, without a minus before zero."""
+    return cast("Vector", tuple((np.asarray(numbers, np.float64).round(digits) + 0.0).tolist()))
+
+
+def _metres(surface: Surface, numbers: ArrayLike) -> Vector:
+    """Lengths to a millionth of the diameter, or finer."""
+    return _plain(numbers, 6 - math.floor(math.log10(surface.diameter)))
+
+
+def _motion(line: Line, angle: float) -> Float:
+    """The turn (4, 4) around a line."""
+    return _motions(line.axis[None], line.offset, angle)[0]
+
+
+def _motions(axes: Float, offset: Float, angle: float) -> Float:
+    """The turns (N, 4, 4) around axes (N, 3) through one point: Rodrigues' formula."""
+    x, y, z = axes.T
+    cross = np.array([[0 * x, -z, y], [z, 0 * x, -x], [-y, x, 0 * x]]).transpose(2, 0, 1)
+    turns = np.eye(3) + math.sin(angle) * cross + (1 - math.cos(angle)) * product(cross, cross)
+    motions = np.tile(np.eye(4), (len(axes), 1, 1))
+    motions[:, :3, :3], motions[:, :3, 3] = turns, offset - (turns * offset).sum(axis=2)
+    return motions
+
+
+def _angles() -> list[float]:
+    return [GOLDEN * i for i in range(1, TURNS + 1)]
+
+
+def _is_one(surface: Surface, line: Line, angles: Iterable[float]) -> bool:
+    """Whether all turns by these angles, and back, are symmetries."""
+    motions = [_motion(line, sign * angle) for angle in angles for sign in (1, -1)]
+    return bool(surface.are_near(motions, TOLERANCE * surface.diameter).all())
+
+
+def _as_round(surface: Surface, line: Line) -> Line | None:
+    """The line, if every turn around it is a symmetry."""
+    return replace(line, order=0) if _is_one(surface, line, _angles()) else None
+
+
+def _as_it_is(surface: Surface, line: Line) -> Line | None:
+    """The line with its order, None if it has none: the largest that fits as well as any. Of many sides, numbers near to theirs
+    are within the tolerance.
+    """
+    limit = TOLERANCE * surface.diameter
+    off = {n: _misfit(surface, line, 2 * math.pi / n) for n in ORDERS if _is_one(surface, line, [2 * math.pi / n])}
+    if not off:
+        return None
+    return _as_round(surface, line) or replace(line, order=max(n for n in off if off[n] <= min(off.values()) + FIT * limit))
+
+
+def _misfit(surface: Surface, line: Line, angle: float) -> float:
+    """The root mean square of distances of points, turned, from the surface, metres, each counted up to the tolerance."""
+    limit = TOLERANCE * surface.diameter
+    squares = surface.closest(surface.points[:FEW], _motion(line, angle), limit)[0]
+    return math.sqrt(float(np.minimum(squares, limit * limit).mean()))
+
+
+def _usual(surface: Surface) -> Float:
+    """The object's own axes, and those of the surface's moments, (6, 3)."""
+    return np.array([*np.eye(3), *map(_nice, np.linalg.eigh(surface.spread)[1].T)])
+
+
+def _candidates(surface: Surface, usual: Float) -> Iterator[tuple[int, Float]]:
+    """Orders, and axes (N, 3) of which some is near to each axis of that order.
+
+    A symmetry leaves the moments of the surface as they are. So its axis is one of theirs; where two are alike it may also be
+    anywhere between these, but then of a half turn; where all are, anywhere.
+    """
+    values, vectors = np.linalg.eigh(surface.spread)
+    low, high = np.diff(values) <= ALIKE * values[2]
+    if low and high:
+        yield from ((order, np.concatenate([usual, _half_ball()])) for order in PRIMES)
+        return
+    yield from ((order, usual) for order in PRIMES)
+    if low or high:
+        one, other = vectors.T[:2] if low else vectors.T[1:]
+        angles = np.arange(0, math.pi, 0.01)[:, None]
+        yield 2, np.cos(angles) * one + np.sin(angles) * other
+
+
+def _half_ball() -> Float:
+    """Directions (N, 3) spread evenly over half a ball, in a spiral."""
+    z = (np.arange(AXES) + 0.5) / AXES
+    angle, level = GOLDEN * np.arange(AXES), np.sqrt(1 - z * z)
+    return np.stack([level * np.cos(angle), level * np.sin(angle), z], axis=1)
+
+
+def _around(
+    surface: Surface,
+    candidates: Float,
+    angles: Sequence[float],
+    known: Sequence[Line],
+    proved: Callable[[Surface, Line], Line | None],
+) -> Iterator[Line]:
+    """The lines around which turns by these angles are symmetries, near to candidates (N, 3) for their axes, as `proved` has
+    them; but for those near to known ones.
+    """
+    limit, left, found = COARSE * TOLERANCE * surface.diameter, candidates, [line.axis for line in known]
+    for axis in found:
+        left = left[~_near(left, axis)]
+    for angle in angles:
+        left = left[surface.are_near(_motions(left, surface.center, angle), limit)]
+    while len(left):
+        line = _fitting(surface, Line(left[0], surface.center), angles)
+        left = left[~_near(left, left[0])]
+        is_new = not (found and _near(np.array(found), line.axis).any())
+        if is_new and (line := proved(surface, line)):
+            left = left[~_near(left, line.axis)]
+            found.append(line.axis)
+            yield line
+
+
+def _near(axes: Float, axis: Float) -> NDArray[np.bool_]:
+    """Which of the axes (N, 3) are about the same line's."""
+    return np.abs((axes * axis).sum(axis=1)) > math.cos(APART)
+
+
+def _fitting(surface: Surface, line: Line, angles: Sequence[float]) -> Line:
+    """The line near to this one that fits best; itself, if it is one of the surface's moments and hardly fits worse."""
+    settled, limit = _settled(surface, line, angles), TOLERANCE * surface.diameter
+    if not (np.abs(_usual(surface) - line.axis).max(axis=1) == 0).any():
+        return settled
+    usual, best = (sum(_misfit(surface, one, angle) for angle in angles) for one in (line, settled))
+    return line if usual <= best + FIT * limit * len(angles) else settled
+
+
+def _settled(surface: Surface, line: Line, angles: Sequence[float]) -> Line:
+    """The line near to this one around which turns take points best to planes of the surface: Gauss-Newton's method.
+
+    Its offset is the point nearest to the surface's centroid.
+    """
+    points, limit = surface.points[:FEW], 2 * COARSE * TOLERANCE * surface.diameter
+    for _ in range(10):
+        slopes, off = zip(*(_slopes(surface, line, angle, points, limit) for angle in angles), strict=True)
+        slope, rest = np.concatenate(slopes, axis=1), np.concatenate(off)
+        squares = np.array([[float((a * b).sum()) for b in slope] for a in slope])
+        squares += np.eye(4) * (1e-9 * squares.trace() + np.finfo(float).tiny)
+        u, v, s, t = np.linalg.solve(squares, (slope * rest).sum(axis=1)).tolist()
+        turn = min(1.0, APART / max(math.hypot(u, v), 1e-12))
+        first, second = _across(line.axis)
+        line = Line(
+            _unit(line.axis + turn * (u * first + v * second)), line.offset + surface.diameter * (s * first + t * second)
+        )
+        if max(abs(u), abs(v), abs(s), abs(t)) < 1e-11:
+            break
+    axis, center = _nice(line.axis), surface.center
+    return Line(axis, line.offset + axis * float(((center - line.offset) * axis).sum()))
+
+
+def _slopes(surface: Surface, line: Line, angle: float, points: Float, limit: float) -> tuple[Float, Float]:
+    """How points that are turned move off the surface (4, N) when the line tilts and shifts across, and how far they are off it
+    (N,); both are 0 beyond the limit.
+    """
+    motion, step = _motion(line, angle), 1e-6
+    squares, there, normals = surface.closest(points, motion, limit)
+    normals = normals * np.isfinite(squares)[:, None]
+    moved = transform(motion, points)
+    others = [Line(_unit(line.axis + step * way), line.offset) for way in _across(line.axis)]
+    others += [Line(line.axis, line.offset + step * surface.diameter * way) for way in _across(line.axis)]
+    slopes = [((transform(_motion(other, angle), points) - moved) * normals).sum(axis=1) / step for other in others]
+    return np.array(slopes), ((there - moved) * normals).sum(axis=1)
+
+
+def _across(axis: Float) -> tuple[Float, Float]:
+    """Two directions at right angles to an axis, and to one another."""
+    own = np.eye(3)[np.abs(axis).argmin()]
+    first = _unit(own - axis * float((own * axis).sum()))
+    return first, np.cross(axis, first)
+
+
+def _nice(axis: Float) -> Float:
+    """The axis with its longest side positive; or that of the object that it hardly differs from."""
+    axis = _unit(axis)
+    longest = np.abs(axis).argmax()
+    own = np.eye(3)[longest]
+    axis = axis * np.sign(axis[longest])
+    return own if np.abs(axis - own).max() < NICE else _unit(axis.round(9))
+
+
+def _unit(vector: Float) -> Float:
+    return vector / math.sqrt((vector * vector).sum())

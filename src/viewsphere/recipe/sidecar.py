@@ -1,0 +1,41 @@
+"""What a user says of one model in a file beside it: `mug.glb.viewsphere.yaml` of `mug.glb`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Literal
+
+from pydantic import Field, ValidationError
+
+from viewsphere.errors import RecipeError
+from viewsphere.model.frozen import Frozen
+from viewsphere.model.keypoints import Keypoints
+from viewsphere.model.mistakes import report
+from viewsphere.model.symmetries import Symmetries
+from viewsphere.recipe.file import read
+
+ENDING = ".viewsphere.yaml"
+"""Follows the whole name of the model's file."""
+
+
+class Sidecar(Frozen):
+    """Symmetries and named points of a model."""
+
+    axes: Literal["file", "object"] = Field(
+        default="file",
+        description="what its numbers are in: the model file's own axes, origin and unit; or the object's: metres, +Z up, "
+        "front -Y, the origin where `centring` puts it",
+    )
+    symmetries: Symmetries | None = Field(
+        default=None, description="rigid motions that leave the model as it is; {} says that there are none"
+    )
+    keypoints: Keypoints | None = Field(default=None, description="named points")
+
+
+def read_sidecar(path: Path) -> Sidecar:
+    """The sidecar in a file; raises RecipeError in a line a mistake, which names file, line and field."""
+    data, marks = read(path, "axes, symmetries, keypoints")
+    try:
+        return Sidecar.model_validate(data)
+    except ValidationError as error:
+        raise RecipeError(report(error, data, marks)) from None

@@ -1,0 +1,78 @@
+"""The zoo's named points: of every member, on it, left at +X, mirrored where the names say so."""
+
+import numpy as np
+import pytest
+
+from viewsphere import plugins
+from viewsphere.assets.cache import load
+from viewsphere.assets.mesh import Mesh
+from viewsphere.assets.part_points import At, part_points, sided
+from viewsphere.assets.traits import traits_of
+from viewsphere.model.model_spec import ModelSpec
+from viewsphere.zoo import build_zoo_model
+
+NAMED = {
+    "bench": {"seat_front_left", "seat_rear_right"},
+    "bicycle": {"wheel_front", "wheel_rear", "saddle", "grip_left", "pedal_right"},
+    "boat": {"bow", "stern_left"},
+    "car": {"wheel_front_left", "wheel_rear_right", "headlight_left", "taillight_right"},
+    "chair": set(),
+    "hair_drier": {"nozzle", "inlet", "handle", "switch"},
+    "house": {"door", "roof", "eaves_front_left"},
+    "lamp_post": {"lamp", "foot"},
+    "post_box": {"slot", "door", "top"},
+    "road_sign": {"plate", "foot"},
+    "wheelie_bin": {"wheel_left", "handle_right"},
+}
+"""Points that every member of a family has."""
+
+
+def traits(family, seed, **settings):
+    spec = ModelSpec(key="a", source=f"zoo:{family}", seed=seed, category="a", category_id=1, **settings)
+    mesh, facts = load(spec, build_zoo_model)
+    return mesh, traits_of(spec, mesh, facts)
+
+
+def test_families_with_named_points():
+    known = {name for name in plugins.families() if hasattr(plugins.family(name), "KEYPOINTS")}
+    assert known == NAMED.keys()
+
+
+@pytest.mark.parametrize("family", NAMED)
+def test_named_points_of_a_family(family):
+    module = plugins.family(family)
+    assert {name for pair in getattr(module, "SKELETON", ()) for name in pair} <= module.KEYPOINTS.keys()
+    mesh, found = traits(family, 2, centring="box", scale=2.0)
+    low, high = mesh.bounds
+    points = {name: np.array(place) for name, place in found.keypoints.points.items()}
+    assert points.keys() >= NAMED[family]
+    for name, place in points.items():
+        assert (place >= low - 1e-5).all() and (place <= high + 1e-5).all(), name
+    for left, right in found.keypoints.flips:
+        assert points[left][0] > points[right][0], left
+    sides = {name for name in points if "_left" in name or "_right" in name}
+    assert sides == {name for pair in found.keypoints.flips for name in pair}
+
+
+def test_a_cars_wheels_are_below_its_lights_and_its_front_faces_minus_y():
+    points = traits("car", 1)[1].keypoints.points
+    assert points["headlight_left"][1] < points["wheel_front_left"][1] < 0 < points["wheel_rear_left"][1]
+    assert points["wheel_front_left"][2] < points["headlight_left"][2]
+    np.testing.assert_allclose(points["wheel_front_left"], np.multiply(points["wheel_front_right"], (-1, 1, 1)), atol=1e-4)
+
+
+def test_places_in_boxes_around_parts():
+    corners = np.array([(0, 0, 0), (2, 0, 0), (0, 4, 6), (9, 9, 9), (8, 9, 9), (9, 9, 8)], np.float32)
+    mesh = Mesh(
+        corners, np.array([[0, 1, 2], [3, 4, 5]], np.int32), np.tile(np.float32([0, 0, 1]), (6, 1)),
+        np.zeros(2, np.int32), np.array([0, 1], np.int32), parts=("seat", "lamp_left"),
+    )  # fmt: skip
+    places = {
+        "middle": At("pad|seat"), **sided("corner", "seat", (1, -1, 1)), **sided("lamp", "lamp_{}"), "none": At("roof"),
+    }  # fmt: skip
+    found = part_points(mesh, places, [("middle", "lamp_left"), ("middle", "none")])
+    assert found.points == {
+        "middle": (1, 2, 3), "corner_left": (2, 0, 6), "corner_right": (0, 0, 6), "lamp_left": (8.5, 9, 8.5),
+    }  # fmt: skip
+    assert found.skeleton == (("middle", "lamp_left"),) and found.flips == (("corner_left", "corner_right"),)
+    assert part_points(mesh, {"none": At("roof")}) is None
