@@ -197,6 +197,20 @@ def posed():
         bpy.ops.export_scene.fbx(filepath=str(FOLDER / f"{name}.fbx"))
 
 
+def pointed():
+    """Empties that are points: of a name, with a property, below one another; and one that is none."""
+    anew()
+    body = put("body", mesh())
+    nose = put("keypoint:nose", None, at(0, 1, 0))
+    eye = put("any name", None)
+    eye["keypoint"], eye.parent, eye.location = "eye.L", nose, (0, 0, 2)
+    other = put("eye.R", None)
+    other["keypoint"], other.parent, other.location = True, nose, (1, 0, 2)
+    put("no point", None, at(5)).parent = body
+    save("pointed.blend")
+    bpy.ops.export_scene.gltf(filepath=str(FOLDER / "pointed.glb"), export_extras=True)
+
+
 def painted():
     """Materials, a grid each."""
     anew()
@@ -377,7 +391,7 @@ def bad():
     bpy.ops.wm.save_as_mainfile(filepath=str(FOLDER / "later.blend"), check_existing=False, compress=False)
 
 
-for make in (exchange, evaluated, posed, painted, occluded, linked, bad):
+for make in (exchange, evaluated, posed, pointed, painted, occluded, linked, bad):
     make()
 print(json.dumps(sorted(file.name for file in FOLDER.iterdir())), flush=True)
 sys.stdout.flush()

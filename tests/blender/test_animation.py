@@ -87,6 +87,14 @@ def test_every_format_moves_from_where_it_stands_at_the_first_frame(files, kind)
     np.testing.assert_array_equal(load(spec)[0].vertices, load(spec, step=at(1))[0].vertices)
 
 
+def test_bones_are_named_points_at_each_frame(files):
+    stages, spec = Stages(), spec_of(files / "bend.blend")
+    points = [stages.traits(spec, TimeStep(frame=frame)).keypoints.points for frame in FRAMES]
+    assert [[*one] for one in points] == [["bone"]] * 3
+    np.testing.assert_allclose([one["bone"][2] - points[0]["bone"][2] for one in points], (0, 0.5, 1), atol=0.02)
+    assert [one["bone"][:2] for one in points] == [points[0]["bone"][:2]] * 3
+
+
 def test_frames_are_read_at_once_and_each_is_the_same_alone(files, tmp_path, monkeypatch):
     spec = spec_of(files / "bend.blend")
     alone = load_normalised(spec, folder=tmp_path / "other", step=at(13))

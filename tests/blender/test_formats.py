@@ -155,6 +155,25 @@ def test_armatures_stand_as_at_the_first_frame(made, suffix):
     np.testing.assert_allclose(box(load_model(made / f"resting.{suffix}")[0], "body")[0], (0, 0, 0), atol=1e-5)
 
 
+@pytest.mark.parametrize("name", ["acting.blend", "acting.fbx", "resting.blend"])
+def test_bones_are_named_points(made, name):
+    mesh, facts = load_model(made / name)
+    assert next(iter(facts.keypoints.points)) == "bone"  # FBX also has where it ends
+    foot = facts.keypoints.points["bone"]
+    np.testing.assert_allclose(foot, box(mesh, "body")[0], atol=1e-5)
+
+
+@pytest.mark.parametrize("name", ["pointed.blend", "pointed.glb"])
+def test_empties_are_named_points(made, name):
+    found = load_model(made / name)[1].keypoints
+    y_up = np.array([[1, 0, 0], [0, 0, 1], [0, -1, 0]]) if name.endswith("glb") else np.eye(3)
+    expected = {"nose": (0, 1, 0), "eye.L": (0, 1, 2), "eye.R": (1, 1, 2)}
+    assert found.points.keys() == expected.keys()
+    for point, place in expected.items():
+        np.testing.assert_allclose(found.points[point], y_up @ place, atol=1e-6)
+    assert {*found.skeleton} == {("nose", "eye.L"), ("nose", "eye.R")} and found.flips == (("eye.L", "eye.R"),)
+
+
 def test_the_same_file_gives_the_same_bytes(made, tmp_path):
     specs = [spec_of(made / name) for name in ("evaluated.blend", "painted.blend")]
     for folder in ("one", "two"):

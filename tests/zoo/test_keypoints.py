@@ -68,11 +68,15 @@ def test_places_in_boxes_around_parts():
         np.zeros(2, np.int32), np.array([0, 1], np.int32), parts=("seat", "lamp_left"),
     )  # fmt: skip
     places = {
-        "middle": At("pad|seat"), **sided("corner", "seat", (1, -1, 1)), **sided("lamp", "lamp_{}"), "none": At("roof"),
-    }  # fmt: skip
+        "middle": At("pad|seat"),
+        **sided("corner", "seat", (1, -1, -1)),
+        **sided("lamp", "lamp_{}"),
+        "top": At("seat", (0, 0, 1)),
+        "none": At("roof"),
+    }
     found = part_points(mesh, places, [("middle", "lamp_left"), ("middle", "none")])
     assert found.points == {
-        "middle": (1, 2, 3), "corner_left": (2, 0, 6), "corner_right": (0, 0, 6), "lamp_left": (8.5, 9, 8.5),
+        "middle": (1, 2, 3), "corner_left": (2, 0, 0), "corner_right": (0, 0, 0), "lamp_left": (8.5, 9, 8.5), "top": (1, 2, 6),
     }  # fmt: skip
     assert found.skeleton == (("middle", "lamp_left"),) and found.flips == (("corner_left", "corner_right"),)
     assert part_points(mesh, {"none": At("roof")}) is None

@@ -15,8 +15,8 @@ from viewsphere.model.scene import Vector
 
 @dataclass(frozen=True)
 class At:
-    """A place in the box around a part: its centre, or by `where` (x, y, z) from -1 to 1 towards its sides. Of several `parts`,
-    `seat_pad|seat`, the first that a model has counts.
+    """A place in the box around a part: its centre, or by `where` (x, y, z) from -1 to 1 towards its sides; for an edge or a
+    corner of the box the part's nearest vertex. Of several `parts`, `seat_pad|seat`, the first that a model has counts.
     """
 
     parts: str
@@ -44,4 +44,7 @@ def _place(mesh: Mesh, at: At) -> Place | None:
         return None
     corners = mesh.vertices[mesh.triangles[mesh.triangle_part == part]].astype(np.float64).reshape(-1, 3)
     low, high = corners.min(axis=0), corners.max(axis=0)
-    return cast("Place", tuple(((low + high) / 2 + np.array(at.where) * (high - low) / 2).tolist()))
+    place = (low + high) / 2 + np.array(at.where) * (high - low) / 2
+    if np.count_nonzero(at.where) > 1:
+        place = corners[((corners - place) ** 2).sum(axis=1).argmin()]
+    return cast("Place", tuple(place.tolist()))

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from viewsphere.assets.kernels_near import all_near, closest, into_cells
 from viewsphere.assets.mesh import Mesh
 from viewsphere.assets.primitive import face_normals
 from viewsphere.geometry.diameter import diameter
@@ -87,6 +86,8 @@ class Surface:
         """For each motion (M, 4, 4) whether it moves all points (by default the surface's own) to within `limit` metres of the
         surface.
         """
+        from viewsphere.assets.kernels_near import all_near  # numba, which what starts workers does without
+
         motions = np.ascontiguousarray(np.asarray(motions, np.float64)[:, :3])
         near = np.zeros(len(motions), np.bool_)
         all_near(self.points if points is None else points, motions, self._grid, limit, near)
@@ -96,6 +97,8 @@ class Surface:
         """For points (N, 3) that are moved by (4, 4): squares (N,) of their distances from the surface, infinite beyond
         `limit`; the nearest points (N, 3) of the surface and its unit normals (N, 3) there.
         """
+        from viewsphere.assets.kernels_near import closest
+
         found = np.zeros((len(points), 7))
         closest(points, np.ascontiguousarray(motion[:3]), self._grid, limit, found)
         return found[:, 0], found[:, 1:4], found[:, 4:]
@@ -103,6 +106,8 @@ class Surface:
     @cached_property
     def _grid(self) -> tuple[Any, ...]:
         """The triangles in cells, as kernels ask for them."""
+        from viewsphere.assets.kernels_near import into_cells
+
         low, high = self.corners.min(axis=(0, 1)), self.corners.max(axis=(0, 1))
         cell = float((high - low).max()) / FINEST or 1.0
         shape = tuple(math.floor(side) + 1 for side in ((high - low) / cell).tolist())

@@ -38,8 +38,10 @@ def traits_of(spec: ModelSpec, mesh: Mesh, facts: FileFacts, step: TimeStep | No
     outside of its box; RecipeError for a sidecar that cannot be read.
     """
     across = diameter(mesh.corners)
-    if spec.parts is not None or (step is not None and step.frame != frame_of(spec, None)):
+    if spec.parts is not None:
         return Traits(across)
+    if step is not None and step.frame != frame_of(spec, None):
+        return Traits(across, keypoints=_own(mesh, across, facts))
     path = sidecar_of(spec)
     said = Sidecar() if path is None else _in_object_axes(read_sidecar(path), facts)
     if said.symmetries is not None and (problem := next(lacking(Surface.of(mesh), said.symmetries), None)):

@@ -22,13 +22,16 @@ from viewsphere.assets import endings
 from viewsphere.assets.alpha import SOLID, with_alpha_modes
 from viewsphere.assets.folder import SHARPEST, ModelFolder, reduced
 from viewsphere.assets.mesh import Image, Material, Mesh
+from viewsphere.assets.named_points import NamedPoint, named_points
 from viewsphere.assets.nodes import Painter, Picture, images_of
 from viewsphere.assets.primitive import FileFacts, Float, Primitive, assemble
 from viewsphere.assets.transform import moved
 from viewsphere.blender.interpreter import find_blender
 from viewsphere.blender.process import BlenderProcess
 from viewsphere.errors import BlenderDied, BlenderError, MissingExtraError, UserError
+from viewsphere.geometry.rotation import transform
 from viewsphere.limits import limits
+from viewsphere.model.keypoints import Keypoints
 
 NAMES = {
     "abc": "Alembic",
@@ -222,7 +225,17 @@ def _built(
     if not pieces:
         why = f" ({folder.warnings[0].partition(': ')[2]})" if folder.warnings else ""
         raise folder.error(f"no triangles found that a render would show{why}; export the model as a mesh of faces")
+    facts = replace(facts, keypoints=_points(folder, told["points"], turn))
     return assemble(folder, pieces, _with_modes(pieces, materials, folder.images), facts)
+
+
+def _points(folder: ModelFolder, told: Sequence[Mapping[str, Any]], turn: NDArray[np.float64] | None) -> Keypoints | None:
+    """The points that the file names, in the axes of its mesh."""
+
+    def place(one: Mapping[str, Any]) -> Float:
+        return np.array(one["place"], np.float64) if turn is None else transform(turn, one["place"])
+
+    return named_points(folder, {i: NamedPoint(one["name"], place(one), one["above"]) for i, one in enumerate(told)})
 
 
 def _piece(told: Mapping[str, Any], material: int) -> Primitive:

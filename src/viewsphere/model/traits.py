@@ -13,7 +13,7 @@ class Traits:
     """Facts about a model in its own axes, metres: the largest distance between two of its vertices; its symmetries, None where
     nobody has said or looked, which is not the same as none; its named points, None without any.
 
-    Of a model that deforms, symmetries and named points are known as it rests.
+    Of a model that deforms, symmetries are known as it rests, and points that its file does not move.
     """
 
     diameter: float

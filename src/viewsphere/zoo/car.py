@@ -24,8 +24,8 @@ KEYPOINTS = {
     **sided("taillight", "taillight_{}", (0, 1, 0)),
     **sided("mirror", "mirror_{}"),
     **sided("door_handle_front", "door_handle_front_{}", (1, 0, 0)),
-    **sided("bumper_front", "bumper_front", (1, 0, 0)),
-    **sided("bumper_rear", "bumper_rear", (1, 0, 0)),
+    **sided("bumper_front", "bumper_front", (1, -1, 0)),
+    **sided("bumper_rear", "bumper_rear", (1, 1, 0)),
     "grille": At("grille", (0, -1, 0)),
     "roof": At("roof", (0, 0, 1)),
 }

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Mapping
 from typing import Any, cast
 
 from viewsphere.assets.gltf.document import Document
+from viewsphere.assets.named_points import NamedPoint, named_points
 from viewsphere.assets.primitive import Float
-from viewsphere.model.keypoints import MOST_POINTS, Keypoints, Pair, Place, is_name, left_and_right
-from viewsphere.model.numbers import LARGEST
+from viewsphere.model.keypoints import Keypoints
 
 PREFIX = "keypoint:"
 """Begins the name of a node that is a point; the rest is the point's name."""
@@ -30,15 +30,9 @@ def read_keypoints(document: Document, worlds: Mapping[int, Float]) -> Keypoints
             joint for skin in document.root.items("skins") for joint in _numbers(skin.mapping().get("joints"))
         )
         names = {i: nodes[i].text("name") for i in joints if i in worlds}
-    names = {i: name for i, name in _named(names) if abs(worlds[i][:3, 3]).max() < LARGEST}
-    if len(names) > MOST_POINTS:
-        document.folder.warn(f"{len(names):,} named points: expected at most {MOST_POINTS:,}, none is kept")
-        return None
-    points = {name: cast("Place", tuple(worlds[i][:3, 3].tolist())) for i, name in names.items()}
-    if not points:
-        return None
     parents = {child: i for i in worlds for child in _numbers(nodes[i].mapping().get("children"))}
-    return Keypoints(points=points, skeleton=tuple(_lines(names, parents)), flips=left_and_right(points))
+    points = {i: NamedPoint(name, worlds[i][:3, 3], _above(i, parents, names)) for i, name in names.items()}
+    return named_points(document.folder, points)
 
 
 def _said(node: Mapping[str, Any]) -> str:
@@ -50,24 +44,12 @@ def _said(node: Mapping[str, Any]) -> str:
     return said or (name.removeprefix(PREFIX) if name.startswith(PREFIX) else "")
 
 
-def _named(names: Mapping[int, str]) -> Iterator[tuple[int, str]]:
-    """Each with a name of its own that a point may have."""
-    taken = set[str]()
-    for i, said in names.items():
-        whole = said.strip()[:90]
-        name = whole if is_name(whole) else f"node{i}"
-        unique = next(other for k in range(1, len(names) + 2) if (other := name if k == 1 else f"{name}_{k}") not in taken)
-        taken.add(unique)
-        yield i, unique
-
-
-def _lines(names: Mapping[int, str], parents: Mapping[int, int]) -> Iterator[Pair]:
-    for i, name in names.items():
-        above = parents.get(i)
-        while above is not None and above not in names:
-            above = parents.get(above)
-        if above is not None:
-            yield names[above], name
+def _above(node: int, parents: Mapping[int, int], chosen: Collection[int]) -> int | None:
+    """The next of the chosen nodes above one."""
+    above = parents.get(node)
+    while above is not None and above not in chosen:
+        above = parents.get(above)
+    return above
 
 
 def _numbers(value: Any) -> list[int]:

@@ -14,6 +14,7 @@ from .evaluated import Gathering, listed
 from .opening import choose, open_file
 from .pictures import Pictures
 from .playing import clips, go_to, timeline
+from .points import Points
 from .scene_file import reveal
 from .weight import check_weight
 
@@ -40,7 +41,8 @@ def read(told):
     go_to(scene, frame, told.get("after"))
     pictures = Pictures(told["folder"], told["root"])
     gathering = Gathering(told["folder"], pictures, wanted, told["most"])
-    evaluate(scene, gathering)
+    points = Points(wanted)
+    evaluate(scene, gathering, points)
     return {
         "frame": frame,
         "unit": unit,
@@ -48,6 +50,7 @@ def read(told):
         "placed": gathering.placed,
         "materials": gathering.materials,
         "images": pictures.told,
+        "points": points.found,
         "opened": warnings,
         "warnings": gathering.warnings + _choices(told),
         "files": [str(Path(file).resolve()) for file in bpy.utils.blend_paths(absolute=True)],
@@ -62,8 +65,8 @@ def _choices(told):
     return [f"has {len(names)} animations, of which the first is played: choose one by clip: {listed(names)}"]
 
 
-def evaluate(scene, gathering):
-    """Give the scene as it is rendered to `gathering`, whose `take` is called with the depsgraph."""
+def evaluate(scene, *takers):
+    """Give the scene as it is rendered to `takers`, whose `take` is called with the depsgraph."""
     failed = []
 
     class Taker(bpy.types.RenderEngine):
@@ -72,7 +75,8 @@ def evaluate(scene, gathering):
 
         def render(self, depsgraph):
             try:
-                gathering.take(depsgraph)
+                for taker in takers:
+                    taker.take(depsgraph)
             except Exception as error:
                 failed.append(error)
 
