@@ -1,5 +1,6 @@
 """A small data set of boxes, made without recipe and engine: labels from truth, pictures from the ids."""
 
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -8,6 +9,7 @@ from small import still_channels
 from viewsphere.assets.export import export_glb, export_obj
 from viewsphere.assets.mesh import Mesh
 from viewsphere.geometry.box import FACES, box_vertices
+from viewsphere.geometry.diameter import diameter
 from viewsphere.geometry.pose_category import pose_category
 from viewsphere.labels import annotated, observe, sample_values, sight_of
 from viewsphere.model.camera import Intrinsics
@@ -20,6 +22,7 @@ from viewsphere.model.sample import Sample
 from viewsphere.model.scene import Ground, Scene
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Motion, Thing
+from viewsphere.model.traits import Traits
 from viewsphere.sampling.camera import looking
 from viewsphere.store import Block, Category, Dataset, ModelInfo, Part, PlanRecord, Store
 from viewsphere.store.records import PRODUCT
@@ -79,7 +82,8 @@ def render(shot: Shot):
         alpha = np.where(channels["instances"] > 0, 255, 0).astype(np.uint8)
         channels |= {"rgb": colors, "rgba": np.dstack([colors, alpha])}
         channels = {name: channels[name] for name in shot.channels}
-        sight = sight_of(shot, instant, camera, geometry, visibility, boxes, files)
+        traits = [partial(Traits, diameter(mesh.vertices)) for mesh in meshes]
+        sight = sight_of(shot, instant, camera, geometry, visibility, boxes, files, traits=traits)
         objects = annotated(sight)
         more = sample_values(sight, objects)
         told = {"instant": now.index, "asked": shot.annotations, "more": more}
@@ -147,7 +151,7 @@ def make(
             info = ModelInfo(
                 s.key, s.category, s.supercategory, s.category_id, f"store/models/{s.key}/{s.key}.obj",
                 f"store/models/{s.key}/{s.key}.glb", box_vertices(low, high), (width, height, length), s.real_size,
-                mesh.parts, len(mesh.triangles), "d",
+                mesh.parts, len(mesh.triangles), "d", diameter=diameter(mesh.vertices),
             )  # fmt: skip
             store.write_model_info(folder, info)
     for i, shot in enumerate(planned):

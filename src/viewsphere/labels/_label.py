@@ -40,7 +40,7 @@ def trusted(sample: Sample, models: Models) -> Iterator[str]:
 class Needs:
     """The inputs of a label besides its own instant and sensor: offsets of instants (-1 is the one before), of those of which
     poses are enough, whether a sensor that is rectified with its own, whether any others, whether points that are followed, and
-    whether points on the objects' surfaces.
+    whether points on objects, which are looked up in the picture.
     """
 
     instants: tuple[int, ...] = ()
@@ -48,12 +48,12 @@ class Needs:
     rectified: bool = False
     rig: bool = False
     tracks: bool = False
-    surface: bool = False
+    points: bool = False
 
     @property
     def is_some(self) -> bool:
         """Whether the label does not follow from what the picture's own camera sees at its instant."""
-        return bool(self.instants or self.poses or self.rectified or self.rig or self.tracks or self.surface)
+        return bool(self.instants or self.poses or self.rectified or self.rig or self.tracks or self.points)
 
 
 TAIL = 8

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
@@ -53,6 +53,7 @@ class Around(Protocol):
 
 
 OptionsT = TypeVar("OptionsT", bound=Frozen)
+Made = TypeVar("Made")
 
 EVERYWHERE = (-math.inf, -math.inf, math.inf, math.inf)
 
@@ -98,9 +99,16 @@ class Sight:
     asked: tuple[str, ...] = ()
     options: Mapping[str, Mapping[str, Any]] = field(default_factory=dict[str, Mapping[str, Any]])
     _alone: dict[int, Alone] = field(default_factory=dict[int, "Alone"], repr=False)
+    _made: dict[str, Any] = field(default_factory=dict[str, Any], repr=False)
     _matches: dict[tuple[int, str | None], Match | None] = field(
         default_factory=dict[tuple[int, str | None], "Match | None"], repr=False
     )
+
+    def once(self, name: str, make: Callable[[], Made]) -> Made:
+        """What a label computes for all objects together, made when the first of them is labelled."""
+        if name not in self._made:
+            self._made[name] = make()
+        return self._made[name]
 
     def neighbour(self, instants: int = 0, sensor: str | None = None) -> View | None:
         """What a sensor, by default the own one, may see so many instants later; None without such a sensor or instant."""

@@ -129,7 +129,7 @@ LABEL = ChannelLabel(
     meaning="points on each object's surface, a row each, with normals, in the object, in the world and in the picture, and "
     "whether it is seen",
     axes="object, world, image",
-    needs=Needs(surface=True),
+    needs=Needs(points=True),
     options=SurfaceSamples,
     dtype=SURFACE_SAMPLE,
     components=0,
