@@ -50,3 +50,16 @@ def test_it_looks_as_on_raster(engine, scene, blender):
 def test_workbench_cannot(blender):
     with pytest.raises(RecipeError, match=r"time\.shutter: expected 0 with engine: workbench"):
         stage_of(small(SCENES["pan"](20.0), "workbench"), meshes())
+
+
+@pytest.mark.slow
+def test_passes_beside_a_blurred_picture_are_sharp(blender):
+    """They are those of the shutter's centre, and leave the picture as it is."""
+    known, shot = meshes(), SCENES["car"](120.0)
+    stage, names = stage_of(small(shot, "cycles"), known), ("rgb", "albedo", "residual", "roughness")
+    seen = rasterize(stage.at(0), stage.shot.camera(0))
+    found, alone = stage.paint(0, 0, seen, names), stage.paint(0, 0, seen, ("rgb",))
+    still = stage_of(small(sharp(shot), "cycles"), known).paint(0, 0, seen, names)
+    assert found["rgb"].tobytes() == alone["rgb"].tobytes() != still["rgb"].tobytes()
+    for name in names[1:]:
+        np.testing.assert_allclose(found[name], still[name], atol=1e-5, err_msg=name)
