@@ -6,7 +6,8 @@ import pytest
 from deadline import until
 from seen import differs, equals, looks, pixels
 
-LAYERS = ("boxes", "boxes3d", "masks", "depth", "normals", "coordinates", "parts")
+MAPS = ("coordinates", "nocs", "position", "semantic", "panoptic", "parts", "materials")
+LAYERS = ("boxes", "boxes3d", "masks", "depth", "normals", *MAPS)
 
 
 @pytest.mark.slow

@@ -25,7 +25,18 @@ from viewsphere.run.stages import Stages
 from viewsphere.store import Choice, Store
 
 FRAMES = (1, 13, TORN)
-LABELS = ["instances", "depth", "parts", "coordinates", "normals"]
+LABELS = [
+    "instances",
+    "depth",
+    "parts",
+    "materials",
+    "coordinates",
+    "nocs",
+    "position",
+    "panoptic",
+    "normals",
+    "surface_samples",
+]
 
 
 @pytest.fixture

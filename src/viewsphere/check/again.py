@@ -123,10 +123,11 @@ class Again:
         needs = [known[name].needs for name in (*sample.files, *shot.annotations) if name in known]
         if not any(need.is_some for need in needs):
             return None
+        names = {o.id: o.track or o.key for o in sample.objects}
         if self._views[0] != key:
-            self._keys.clear()
+            self._keys = names  # before the views are made, which ask for meshes
             self._views = key, self._shot_views(shot, key)
-        self._keys.update({o.id: o.track or o.key for o in sample.objects})
+        self._keys.update(names)
         views, (instant, sensor) = self._views[1], self._scenery.taken(sample, shot)
         if views and any(need.tracks for need in needs):
             views.followed(sensor)

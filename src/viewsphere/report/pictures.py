@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from viewsphere.errors import UserError
-from viewsphere.labels import Extent
+from viewsphere.labels import Extent, channel_labels
 from viewsphere.labels._passes import DRAWINGS
 from viewsphere.labels._passes import picture as pass_colors
 from viewsphere.labels._state import picture as state_colors
@@ -192,6 +192,24 @@ def _parts(sample: Sample, scale: Scale, within: Mapping[str, Extent]) -> Layer:
     return Layer(webp(part_colors(_thinned(sample.channels["parts"], scale.layer_width)), 60))
 
 
+def _materials(sample: Sample, scale: Scale, within: Mapping[str, Extent]) -> Layer:
+    return Layer(webp(part_colors(_thinned(sample.channels["materials"], scale.layer_width)), 60))
+
+
+def _beside(name: str) -> Painter:
+    """The painter of a channel that is shown as `preview` shows it, clear where it has no value."""
+
+    def paint(sample: Sample, scale: Scale, within: Mapping[str, Extent]) -> Layer:
+        drawing, array = channel_labels()[name].drawing, sample.channels[name]
+        picture = drawing and drawing.picture(sample)
+        assert picture is not None
+        known = np.isfinite(array) if array.ndim == 2 else np.isfinite(array[..., 0])
+        thin, shown = _thinned(picture, scale.layer_width), _thinned(known, scale.layer_width)
+        return Layer(webp(_rgba(thin, shown), 75))
+
+    return paint
+
+
 def _flow(sample: Sample, scale: Scale, within: Mapping[str, Extent]) -> Layer:
     flow = sample.channels["flow"]
     longest = within["flow"][1] if "flow" in within else longest_of(flow)
@@ -227,7 +245,12 @@ PAINTERS: dict[str, Painter] = {
     "depth": _depth,
     "normals": _normals,
     "coordinates": _coordinates,
+    "nocs": _beside("nocs"),
+    "position": _beside("position"),
+    "semantic": _beside("semantic"),
+    "panoptic": _beside("panoptic"),
     "parts": _parts,
+    "materials": _materials,
     "flow": _flow,
     "disparity": _disparity,
     "flow_state": _flow_state,

@@ -98,6 +98,7 @@ export function legend(frame) {
     normals: ["red: right, green: up, blue: towards the camera"],
     coordinates: ["in the object's box: red to its left, green to its back, blue up"],
     parts: ["a colour for each named part"],
+    materials: ["a colour for each material"],
   }[layer] ?? [];
 }
 
