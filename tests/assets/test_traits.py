@@ -11,7 +11,7 @@ from viewsphere.assets import traits
 from viewsphere.assets.cache import load
 from viewsphere.assets.spread_points import spread_points
 from viewsphere.assets.traits import sidecar_of, traits_of
-from viewsphere.errors import ModelError, RecipeError
+from viewsphere.errors import ModelError
 from viewsphere.model.keypoints import Keypoints
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.symmetries import Continuous, Symmetries
@@ -137,7 +137,7 @@ MISTAKES = {
 
 @pytest.mark.parametrize("text", MISTAKES)
 def test_mistakes_are_told_in_one_line(model, text):
-    with pytest.raises(RecipeError) as caught:
+    with pytest.raises(ModelError) as caught:
         read(model(text))
     assert MISTAKES[text] in str(caught.value) and "\n" not in str(caught.value)
     assert str(caught.value).count("box.stl.viewsphere.yaml:1") or "yaml:" in str(caught.value)

@@ -94,7 +94,7 @@ def test_mistakes_are_told_before_anything_is_rendered(recipe, tmp_path):
         generate(recipe(), tmp_path / "out")
     assert not list((tmp_path / "out").glob("store/shots/*"))
     sidecar.write_text("keypoints: {points: {top: [0, 0, .nan]}}")
-    with pytest.raises(RecipeError, match=r"yaml:1: keypoints\.points\.top\[2\]: expected"):
+    with pytest.raises(ModelError, match=r"yaml:1: keypoints\.points\.top\[2\]: expected"):
         generate(recipe(), tmp_path / "out")
     with pytest.raises(RecipeError, match=r"models\[0\].sidecar: expected a file .* found no 'no.yaml'"):
         generate(recipe(sidecar="no.yaml"), tmp_path / "out")

@@ -18,7 +18,7 @@ from viewsphere.assets.primitive import FileFacts
 from viewsphere.assets.spread_points import spread_points
 from viewsphere.assets.surface import Surface
 from viewsphere.assets.symmetries import find, lacking
-from viewsphere.errors import ModelError
+from viewsphere.errors import ModelError, RecipeError
 from viewsphere.geometry.diameter import diameter
 from viewsphere.model.keypoints import Keypoints, Place
 from viewsphere.model.model_spec import ModelSpec
@@ -34,8 +34,8 @@ BEYOND = 0.1
 def traits_of(spec: ModelSpec, mesh: Mesh, facts: FileFacts, step: TimeStep | None = None) -> Traits:
     """What a normalised model says of itself at a time step (None: as it rests), `facts` being its file's.
 
-    Raises ModelError, which names the sidecar and the field, for a symmetry that the surface does not have and for points far
-    outside of its box; RecipeError for a sidecar that cannot be read.
+    Raises ModelError, which names the sidecar and the field, for one that cannot be read, for a symmetry that the surface does
+    not have, and for points far outside of its box.
     """
     across = diameter(mesh.corners)
     if spec.parts is not None:
@@ -43,7 +43,7 @@ def traits_of(spec: ModelSpec, mesh: Mesh, facts: FileFacts, step: TimeStep | No
     if step is not None and step.frame != frame_of(spec, None):
         return Traits(across, keypoints=_own(mesh, across, facts))
     path = sidecar_of(spec)
-    said = Sidecar() if path is None else _in_object_axes(read_sidecar(path), facts)
+    said = Sidecar() if path is None else _in_object_axes(_read(path), facts)
     if said.symmetries is not None and (problem := next(lacking(Surface.of(mesh), said.symmetries), None)):
         raise ModelError(f"{path}: {problem}")
     if said.keypoints is not None and (problem := next(far_points(mesh, across, said.keypoints), None)):
@@ -52,6 +52,13 @@ def traits_of(spec: ModelSpec, mesh: Mesh, facts: FileFacts, step: TimeStep | No
     if symmetries is None and spec.symmetries == "found":
         symmetries = found_symmetries(mesh)
     return Traits(across, symmetries, said.keypoints or _own(mesh, across, facts) or _spread(spec, mesh))
+
+
+def _read(path: Path) -> Sidecar:
+    try:
+        return read_sidecar(path)
+    except RecipeError as error:
+        raise ModelError(str(error)) from None
 
 
 def sidecar_of(spec: ModelSpec) -> Path | None:
