@@ -39,7 +39,8 @@ def trusted(sample: Sample, models: Models) -> Iterator[str]:
 @dataclass(frozen=True)
 class Needs:
     """The inputs of a label besides its own instant and sensor: offsets of instants (-1 is the one before), of those of which
-    poses are enough, whether a sensor that is rectified with its own, whether any others, and whether points that are followed.
+    poses are enough, whether a sensor that is rectified with its own, whether any others, whether points that are followed,
+    and whether how a LiDAR measures.
     """
 
     instants: tuple[int, ...] = ()
@@ -47,11 +48,12 @@ class Needs:
     rectified: bool = False
     rig: bool = False
     tracks: bool = False
+    lidar: bool = False
 
     @property
     def is_some(self) -> bool:
         """Whether still pictures of one sensor do not have the label."""
-        return bool(self.instants or self.poses or self.rectified or self.rig or self.tracks)
+        return bool(self.instants or self.poses or self.rectified or self.rig or self.tracks or self.lidar)
 
 
 TAIL = 8

@@ -16,6 +16,7 @@ from viewsphere.geometry.box import Bounds, overlap, projected_bounds
 from viewsphere.geometry.camera import inverse_camera_matrix
 from viewsphere.labels._placement import Placement
 from viewsphere.model.camera import Camera
+from viewsphere.model.rig import Sensor
 from viewsphere.truth.correspondence import Match
 from viewsphere.truth.geometry import Geometry
 from viewsphere.truth.shot_views import Followed, Moment
@@ -42,6 +43,16 @@ class Around(Protocol):
     @property
     def followed(self) -> Followed:
         """The points that the picture's sensor follows."""
+        ...
+
+    @property
+    def sensor(self) -> Sensor:
+        """The picture's own sensor."""
+        ...
+
+    @property
+    def drawn_as(self) -> tuple[str, ...]:
+        """What randomness in the picture's labels follows from besides a seed."""
         ...
 
 

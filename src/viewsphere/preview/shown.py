@@ -138,11 +138,13 @@ def _grouped(steps: Sequence[Ranges], places: Sequence[int]) -> list[list[int]]:
 
 
 def _scaled(shot: Shot, width: int) -> dict[str, Any]:
-    """The same cameras with narrower pictures, and all channels of each, as a shot's fields; points that are followed are
-    picked at the same places.
+    """The same cameras with narrower pictures, and all channels of each, as a shot's fields; LiDARs as they are. Points that
+    are followed are picked at the same places.
     """
-    narrow = ({"intrinsics": _narrowed(sensor.intrinsics, width), "channels": None} for sensor in shot.rig.sensors)
-    sensors = tuple(sensor.model_copy(update=more) for sensor, more in zip(shot.rig.sensors, narrow, strict=True))
+    sensors = tuple(
+        sensor.model_copy(update={} if sensor.lidar else {"intrinsics": _narrowed(sensor.intrinsics, width), "channels": None})
+        for sensor in shot.rig.sensors
+    )
     zooms = ({"intrinsics": now.intrinsics and _narrowed(now.intrinsics, width)} for now in shot.instants)
     instants = tuple(now.model_copy(update=more) for now, more in zip(shot.instants, zooms, strict=True))
     share = min(1.0, width / shot.rig.sensors[0].intrinsics.width)

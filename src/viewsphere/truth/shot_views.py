@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from viewsphere.assets.mesh import Mesh
 from viewsphere.model.camera import Camera
+from viewsphere.model.rig import Sensor
 from viewsphere.model.scene import Matrix4
 from viewsphere.model.shot import Shot
 from viewsphere.model.thing import Thing
@@ -182,12 +183,12 @@ class SampleViews:
 
     views: ShotViews
     instant: int
-    sensor: int
+    sensor_number: int
 
     @property
     def partner(self) -> tuple[str, float] | None:
         """Name of a sensor that is rectified with the sample's own, and the metres between them; None without one."""
-        return self.views.shot.rig.partner(self.sensor)
+        return self.views.shot.rig.partner(self.sensor_number)
 
     def moment(self, instants: int) -> Moment | None:
         """Where all is so many instants later, None where the shot does not have that instant."""
@@ -196,7 +197,7 @@ class SampleViews:
             return None
         cameras = tuple(shot.camera(instant, sensor) for sensor in range(len(shot.rig.sensors)))
         poses = tuple(thing.motion.at(instant) for thing in shot.objects)
-        return Moment(shot.instants[instant].seconds, poses, cameras, self.sensor)
+        return Moment(shot.instants[instant].seconds, poses, cameras, self.sensor_number)
 
     def view(self, instants: int, sensor: str | None) -> View | None:
         """That of a sensor, None for the sample's own, so many instants later; None without such a sensor or instant."""
@@ -204,9 +205,22 @@ class SampleViews:
         names = [one.name for one in self.views.shot.rig.sensors]
         if instant is None or (sensor is not None and sensor not in names):
             return None
-        return self.views.view(instant, self.sensor if sensor is None else names.index(sensor))
+        return self.views.view(instant, self.sensor_number if sensor is None else names.index(sensor))
+
+    @property
+    def sensor(self) -> Sensor:
+        """The sample's own sensor."""
+        return self.views.shot.rig.sensors[self.sensor_number]
+
+    @property
+    def drawn_as(self) -> tuple[str, ...]:
+        """What randomness in the sample's labels follows from besides a seed: its shot, its sensor, and its instant, which is
+        named by its time and by where the rig is then.
+        """
+        shot, now = self.views.shot, self.views.shot.instants[self.instant]
+        return shot.sequence or shot.key, self.sensor.name, repr(now.seconds), repr(now.world_from_rig)
 
     @property
     def followed(self) -> Followed:
         """The points that the sample's sensor follows."""
-        return self.views.followed(self.sensor)
+        return self.views.followed(self.sensor_number)
