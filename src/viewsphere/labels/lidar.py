@@ -27,7 +27,7 @@ def compute(sight: Sight) -> NDArray[np.void]:
     sensor is no LiDAR.
     """
     around = sight.around
-    lidar = around and around.sensor.lidar
+    lidar = None if around is None else around.sensor.lidar
     if around is None or lidar is None:
         raise ValueError("lidar: expected a sample of a LiDAR, found a camera's")
     seen = sight.visibility
