@@ -5,6 +5,9 @@ import pytest
 
 import viewsphere as vs
 from viewsphere.errors import RecipeError
+from viewsphere.labels._paint import color_of
+from viewsphere.preview.frame import draw_sample
+from viewsphere.preview.tiles import contact_sheet
 
 ROTATED = [5.0, 20.0, -3.0]
 
@@ -131,6 +134,20 @@ def test_noise_follows_from_the_seed_and_the_pose():
     assert not np.array_equal(first, other)
     others = [s.channels["lidar"] for s in vs.render(recipe(noisy, viewpoints=two)) if s.sensor == "top"]
     np.testing.assert_array_equal(others[1], first)
+
+
+def test_points_are_drawn_from_above():
+    """Ahead at the top; a preview shows them beside the camera's picture."""
+    said = recipe({"azimuth_step": 1, "elevation": [-40, -2]}, channels=["rgb"])
+    front, top = vs.render(said)
+    picture = draw_sample(top, width=200)
+    assert picture.shape == (200, 200, 3)
+    rows, columns = np.nonzero((picture == color_of(1)).all(axis=2))
+    own = top.channels["lidar"]["xyz"][top.channels["lidar"]["instance"] == 1]
+    assert len(rows) > 10
+    assert (rows < 100).mean() > 0.9
+    assert ((columns < 100).mean() > 0.5) == ((own[:, 1] > 0).mean() > 0.5)
+    assert contact_sheet([front, top], width=200).shape[0] > 200
 
 
 @pytest.mark.parametrize(

@@ -74,7 +74,7 @@ class Drawing:
     `trails` are lines that show what was before, too: they are given what the sensor's samples so far are, the sample itself
     last, none of them more than `labels.TAIL` instants before it. Instead of `beside`, `within` gives a picture that tells
     apart the values of an extent, and `extent` a sample's own, so that all pictures of a sequence may have the same colours.
-    `key` says what colours mean, None: words alone.
+    `alone` stands for the picture of a sample that has none, at this size. `key` says what colours mean, None: words alone.
     """
 
     name: str
@@ -84,6 +84,7 @@ class Drawing:
     beside: Callable[[Sample], Picture] | None = None
     extent: Callable[[Sample], Extent] | None = None
     within: Callable[[Sample, Extent], Picture] | None = None
+    alone: Callable[[Sample, int], Picture] | None = None
     key: tuple[tuple[str, Color | None], ...] = ()
 
     def picture(self, sample: Sample, extent: Extent | None = None) -> Picture | None:

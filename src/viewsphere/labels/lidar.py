@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.geometry.camera import pixel_rays
-from viewsphere.labels._label import ChannelLabel, Models, Needs, channel_of
+from viewsphere.labels._from_above import from_above
+from viewsphere.labels._label import ChannelLabel, Drawing, Models, Needs, channel_of
 from viewsphere.labels._sight import Sight
 from viewsphere.model.lidar import POINT, Lidar
 from viewsphere.model.sample import Sample
@@ -138,4 +139,5 @@ LABEL = ChannelLabel(
     encoding="npz",
     compute=compute,
     prove=prove,
+    drawing=Drawing("lidar", alone=from_above, key=(("LiDAR from above: objects in their colours, else high is light", None),)),
 )

@@ -18,6 +18,7 @@ from viewsphere.model.rig import Rig
 from viewsphere.model.sample import Sample
 from viewsphere.model.shot import Shot
 from viewsphere.model.tracks import Tracks
+from viewsphere.preview.frame import is_shown
 from viewsphere.recipe.named import Named
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.run.framing import Framing
@@ -108,7 +109,7 @@ def dataset_samples(dataset: Dataset, count: int = 12, row: int = ROW, films: Se
         return [dataset[place] for film in chosen for i in film.spread(_each(count, rows, row)) for place in film.places[i]]
     picks = np.unique(np.linspace(0, len(dataset) - 1, min(count, len(dataset))).round().astype(int))
     found = [dataset[int(i)] for i in picks]
-    return [sample for sample in found if sample.picture_file] or found  # some sensors may keep labels alone
+    return [sample for sample in found if is_shown(sample.files)] or found  # some sensors may keep labels alone
 
 
 def _spread(planned: Plan, count: int) -> list[tuple[str, list[list[int]]]]:
