@@ -136,6 +136,32 @@ def test_noise_follows_from_the_seed_and_the_pose():
     np.testing.assert_array_equal(others[1], first)
 
 
+def moving(sweep, **changes):
+    """A car that passes a sensor which goes around it."""
+    motion = {"kind": "constant", "velocity": [0, -8, 0]}
+    model = {"source": "zoo:car", "category": "car", "scale": {"length": 1.8}, "motion": motion}
+    said = {
+        "models": [model],
+        "viewpoints": {"kind": "orbit", "azimuth": [20, 60], "elevation": [15, 20], "distance": [8, 7]},
+        "time": {"frames": 3, "fps": 10},
+        "splits": {"by": "sequence", "train": 1},
+    }
+    return recipe({"sweep": sweep, "azimuth_step": 1}, **{**said, **changes})
+
+
+def test_a_sweep_does_not_depend_on_how_sequences_are_cut():
+    cut, whole = ([s.channels["lidar"] for s in vs.render(moving(0.1, shot_frames=n)) if s.sensor == "top"] for n in (1, 3))
+    still = [s.channels["lidar"] for s in vs.render(moving(0)) if s.sensor == "top"]
+    for one, other, at_once in zip(cut, whole, still, strict=True):
+        np.testing.assert_array_equal(one, other)
+        np.testing.assert_allclose(one["time"], (one["column"] + 0.5) / 360 * 0.1 - 0.05, atol=1e-8)
+        assert not at_once["time"].any()
+        then, now = matched(one, at_once)
+        assert np.abs(then["range"] - now["range"]).max() > 0.01
+        middle = np.abs(then["column"] - 180.0) < 1  # of the sweep: the instant itself
+        np.testing.assert_allclose(then["range"][middle], now["range"][middle], rtol=2e-3)
+
+
 def test_points_are_drawn_from_above():
     """Ahead at the top; a preview shows them beside the camera's picture."""
     said = recipe({"azimuth_step": 1, "elevation": [-40, -2]}, channels=["rgb"])
@@ -168,6 +194,7 @@ def test_points_are_drawn_from_above():
         ({"range": [-1, 5]}, "range"),
         ({"reference_range": 0}, "reference_range"),
         ({"sigma": -0.1}, "sigma"),
+        ({"sweep": -1}, "sweep"),
         ({"sigma": float("nan")}, "sigma"),
         ({"dropout": 1.5}, "dropout"),
         ({"dropout_by_range": [[5, 0.1], [1, 0.2]]}, "expected pairs whose first numbers ascend"),
@@ -191,6 +218,15 @@ TOP = {"lidar": {"rings": 4, "elevation": [-10, 0]}}
             "a LiDAR takes no pictures; found rgb",
         ),
         ({"rig": {"sensors": {"front": {"channels": ["lidar"]}, "top": TOP}}}, "expected what a camera sees; found lidar"),
+        ({"rig": {"sensors": {"top": {"lidar": TOP["lidar"] | {"sweep": 0.1}}}}}, "sweep: expected time beside it"),
+        (
+            {
+                "rig": {"sensors": {"top": {"lidar": TOP["lidar"] | {"sweep": 0.2}}}},
+                "time": {"frames": 2, "fps": 10},
+                "splits": {"by": "sequence", "train": 1},
+            },
+            "sweep: expected at most the 0.1 seconds between two instants; found 0.2",
+        ),
         ({"rig": None, "channels": ["lidar"]}, "expected rig beside lidar, with a LiDAR among its sensors; found none"),
         ({"rig": {"kind": "stereo", "baseline": 0.1}, "channels": ["lidar"]}, "with a LiDAR among its sensors; found none"),
         (

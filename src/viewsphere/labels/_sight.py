@@ -20,6 +20,7 @@ from viewsphere.model.rig import Sensor
 from viewsphere.truth.correspondence import Match
 from viewsphere.truth.geometry import Geometry
 from viewsphere.truth.shot_views import Followed, Moment
+from viewsphere.truth.sweeping import Turning
 from viewsphere.truth.view import View
 from viewsphere.truth.visibility import Instances, Visibility, homogeneous, lens_rays, rasterize
 
@@ -48,6 +49,10 @@ class Around(Protocol):
     @property
     def sensor(self) -> Sensor:
         """The picture's own sensor."""
+        ...
+
+    def turning(self, seconds: float) -> Turning:
+        """How all moves while the columns of the picture are measured one after another, within so many seconds."""
         ...
 
     @property

@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.labels._from_above import from_above
 from viewsphere.labels._label import ChannelLabel, Drawing, Models, Needs, channel_of
-from viewsphere.labels._sight import Sight
+from viewsphere.labels._sight import Around, Sight
 from viewsphere.model.lidar import POINT, Lidar
 from viewsphere.model.sample import Sample
+from viewsphere.truth.sweeping import Hits, still_hits, swept_hits
 
 Float = NDArray[np.float64]
 Rays = tuple[NDArray[np.intp], NDArray[np.intp]]
@@ -31,36 +32,33 @@ def compute(sight: Sight) -> NDArray[np.void]:
     lidar = None if around is None else around.sensor.lidar
     if around is None or lidar is None:
         raise ValueError("lidar: expected a sample of a LiDAR, found a camera's")
-    seen = sight.visibility
-    ring, column = np.nonzero(seen.inverse_depth > 0)
-    distance = 1.0 / seen.inverse_depth[ring, column].astype(np.float64)
-    triangle, rays = seen.triangle[ring, column], sight.rays[ring, column]
-    incidence = _incidence(sight, triangle, rays)
-    intensity = _intensity(lidar, distance, incidence)
-    draw = partial(_drawn, lidar.seed, around.drawn_as, seen.triangle.shape, (ring, column))
+    hits, width = _hits(sight, around, lidar), sight.camera.width
+    ring, column, distance = hits.ring, hits.column, hits.distance
+    intensity = _intensity(lidar, distance, hits.cosine)
+    draw = partial(_drawn, lidar.seed, around.drawn_as, sight.visibility.triangle.shape, (ring, column))
     returns = _returns(lidar, distance, intensity, draw)
     distance = distance + lidar.sigma * draw("range", np.random.Generator.standard_normal) if lidar.sigma else distance
     out = np.empty(len(ring), POINT)
-    out["range"], out["incidence"], out["intensity"] = distance, incidence, intensity
-    out["xyz"] = in_lidar_axes(rays) * distance[:, None]
-    out["instance"], out["category"] = sight.geometry.triangle_object[triangle], sight.geometry.triangle_category[triangle]
+    out["range"], out["incidence"], out["intensity"] = distance, hits.incidence, intensity
+    out["xyz"] = in_lidar_axes(sight.rays[ring, column]) * distance[:, None]
+    out["time"] = ((column + 0.5) / width - 0.5) * lidar.sweep
+    out["instance"] = sight.geometry.triangle_object[hits.triangle]
+    out["category"] = sight.geometry.triangle_category[hits.triangle]
     out["ring"], out["column"] = ring, column
     low, high = lidar.range
     return out[returns & (out["range"] > 0) & (out["range"] >= low) & (out["range"] <= high)]
 
 
-def _incidence(sight: Sight, triangle: NDArray[np.int32], rays: Float) -> Float:
-    from viewsphere.truth import kernels_lidar as kernels
-
-    out = np.empty(len(triangle))
-    kernels.incidence(triangle, rays, sight.geometry.triangle_normals, sight.camera.R, out)
-    return out
+def _hits(sight: Sight, around: Around, lidar: Lidar) -> Hits:
+    if lidar.sweep:
+        return swept_hits(sight.geometry, sight.camera, around.turning(lidar.sweep))
+    return still_hits(sight.geometry, sight.camera, sight.visibility)
 
 
-def _intensity(lidar: Lidar, distance: Float, incidence: Float) -> Float:
+def _intensity(lidar: Lidar, distance: Float, cosine: Float) -> Float:
     """Lambert's cosine, weakened by the square of the distance where the sensor does not make up for it."""
     near = lidar.reference_range
-    return np.cos(incidence) * (1.0 if near is None else (near / distance) ** 2)
+    return cosine if near is None else cosine * (near / distance) ** 2
 
 
 Draw = Callable[[str, Callable[..., Float]], Float]
@@ -129,12 +127,12 @@ def _of_objects(sample: Sample, rows: NDArray[np.void]) -> Iterator[str]:
 
 LABEL = ChannelLabel(
     name="lidar",
-    meaning="points that a LiDAR returns, a row each: place, range, intensity, incidence, object, category, ring, column",
+    meaning="points that a LiDAR returns, a row each: place, range, intensity, incidence, time, object, category, ring, column",
     axes="LiDAR: x ahead, y left, z up",
     needs=Needs(lidar=True),
     dtype=POINT,
     components=0,
-    unit="m, rad",
+    unit="m, rad, s",
     empty=np.nan,
     encoding="npz",
     compute=compute,

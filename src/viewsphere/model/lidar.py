@@ -19,6 +19,7 @@ POINT = np.dtype(
         ("range", "<f4"),
         ("intensity", "<f4"),
         ("incidence", "<f4"),
+        ("time", "<f4"),
         ("instance", "<i4"),
         ("category", "<i4"),
         ("ring", "<u2"),
@@ -26,8 +27,8 @@ POINT = np.dtype(
     ]
 )
 """One point: where it is in the LiDAR's axes (x ahead, y left, z up), metres; its distance along the ray, metres; the power
-that comes back; the angle between ray and surface normal, 0 to pi/2; object and category, 0 for none; its ring, counted from
-the highest, and its column, counted from the left.
+that comes back; the angle between ray and surface normal, 0 to pi/2; seconds from the instant to when it is measured; object
+and category, 0 for none; its ring, counted from the highest, and its column, counted from the left.
 """
 
 Curve = tuple[tuple[Annotated[float, Field(ge=0)], Portion], ...]
@@ -40,6 +41,8 @@ class Lidar(Frozen):
 
     `sigma` (metres) is the standard deviation of measured ranges; `dropout` the probability that a point does not return, by
     its true range and by its intensity besides. `seed` is what draws follow from.
+
+    The columns are measured one after another, from the left, within `sweep` seconds, with the instant in the middle.
     """
 
     range: tuple[Annotated[float, Field(ge=0)], Length]
@@ -48,4 +51,5 @@ class Lidar(Frozen):
     dropout: Portion = 0.0
     dropout_by_range: Curve = ()
     dropout_by_intensity: Curve = ()
+    sweep: Annotated[float, Field(ge=0)] = 0.0
     seed: Natural = 0

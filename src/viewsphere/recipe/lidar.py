@@ -70,6 +70,12 @@ class LidarEntry(Frozen):
         default=None, description="the same by intensity, besides: [[intensity, probability], ...], linear in between"
     )
 
+    sweep: Annotated[Number, Field(ge=0)] = Field(
+        default=0.0,
+        description="seconds in which the columns are measured one after another, with the instant in the middle: at most "
+        "those between two instants; 0: all at once",
+    )
+
     @model_validator(mode="after")
     def _one_set_of_rings(self) -> LidarEntry:
         if self.elevations is not None:
@@ -128,5 +134,6 @@ class LidarEntry(Frozen):
             dropout=self.dropout,
             dropout_by_range=self.dropout_by_range or (),
             dropout_by_intensity=self.dropout_by_intensity or (),
+            sweep=self.sweep,
             seed=seed,
         )

@@ -72,11 +72,29 @@ def _mounted(sensors: Mapping[str, tuple[Intrinsics, Float]]) -> Rig:
 def _listed(recipe: Recipe, entry: SensorList, lens: Intrinsics) -> Rig:
     rig = _mounted({name: (_lens(name, one, recipe.camera, lens), _pose(name, one)) for name, one in entry.sensors.items()})
     kept = zip(rig.sensors, entry.sensors.items(), strict=True)
-    more = ((sensor, _measuring(recipe, one) | {"channels": _channels(recipe, name, one)}) for sensor, (name, one) in kept)
+    more = (
+        (sensor, _measuring(recipe, name, one) | {"channels": _channels(recipe, name, one)}) for sensor, (name, one) in kept
+    )
     return Rig(sensors=tuple(sensor.model_copy(update=update) for sensor, update in more))
 
 
-def _measuring(recipe: Recipe, entry: SensorEntry) -> dict[str, Lidar]:
+def _check_sweep(recipe: Recipe, name: str, entry: SensorEntry) -> None:
+    sweep = 0.0 if entry.lidar is None else entry.lidar.sweep
+    if not sweep:
+        return
+    if recipe.time is None:
+        raise RecipeError(
+            f"rig.sensors.{name}.lidar.sweep: expected time beside it, as all moves meanwhile; found none: set time"
+        )
+    if recipe.time.count > 1 and sweep > recipe.time.at(1) * (1 + 1e-9):
+        raise RecipeError(
+            f"rig.sensors.{name}.lidar.sweep: expected at most the {recipe.time.at(1):g} seconds between two instants; found "
+            f"{sweep:g}"
+        )
+
+
+def _measuring(recipe: Recipe, name: str, entry: SensorEntry) -> dict[str, Lidar]:
+    _check_sweep(recipe, name, entry)
     return {} if entry.lidar is None else {"lidar": entry.lidar.measuring(recipe.seed)}
 
 
