@@ -87,7 +87,8 @@ def projected_bounds(
     is_used: NDArray[np.bool_] | None = None,
 ) -> tuple[Bounds | None, bool]:
     """The 2D box (x0, y0, x1, y1) in pixels of triangles [faces) whose corners are world vertices [points), and whether the
-    camera sees all of the triangles. `is_used`, if known: of all vertices, whether a triangle has them.
+    camera sees all of the triangles. `is_used`, if known: of all vertices, whether a triangle has them. Of a scan the box goes
+    all around where triangles do, or cross its first and last column.
 
     Triangles that cross the plane z = NEAR of the camera (or the limit of a distorted lens) are cut there.
     None if no part of them is in front of the camera. Under lens distortion straight edges bend; the box is
@@ -103,6 +104,8 @@ def projected_bounds(
         is_used[triangles[faces[0] : faces[1]]] = True
     base, stop = points
     used = is_used[base:stop]
+    if camera.distortion is not None and camera.distortion.model == "scan":
+        return _scanned(camera, vertices[base:stop], used, triangles[faces[0] : faces[1]] - np.int32(base)), True
     if camera.distortion is not None:
         lens, rim = _bent_lens(camera.distortion, camera.K)
         room = np.empty((stop - base, 6))
@@ -115,6 +118,19 @@ def projected_bounds(
         return (float(u.min()), float(v.min()), float(u.max()), float(v.max())), True
     x0, y0, x1, y1, whole = kernels.cut_bounds(vertices, triangles, *faces, *points, camera.K, camera.R, camera.t, NEAR)
     return ((x0, y0, x1, y1) if x0 <= x1 else None), bool(whole)
+
+
+def _scanned(camera: Camera, vertices: Float, used: NDArray[np.bool_], triangles: NDArray[np.int32]) -> Bounds:
+    """The 2D box of triangles (n, 3) of vertices (v, 3) in a scan."""
+    from viewsphere.geometry import kernels_scan
+    from viewsphere.geometry.camera import coefficients
+
+    assert camera.distortion is not None
+    room = np.empty((len(vertices), 5))
+    u0, v0, u1, v1 = kernels_scan.bounds(vertices, used, triangles, camera.R, camera.t, coefficients(camera.distortion), room)
+    (fx, skew, cx), (_, fy, cy), _ = camera.K.tolist()
+    assert skew == 0
+    return fx * u0 + cx, fy * v0 + cy, fx * u1 + cx, fy * v1 + cy
 
 
 def _bent_lens(lens: Distortion, matrix: Float) -> tuple[tuple[Any, ...], Float]:

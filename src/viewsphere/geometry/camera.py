@@ -88,8 +88,9 @@ def inverse_camera_matrix(intrinsics: Intrinsics) -> Float:
 def pixel_rays(intrinsics: Intrinsics, subdivision: int = 1, window: Window | None = None) -> Float:
     """Rays through sample centres in camera axes, (H, W, 3): `subdivision` x `subdivision` samples a pixel.
 
-    z is 1 for a pinhole and for Brown-Conrady; a fisheye's rays are unit vectors and may look sideways or back. NaN where the
-    lens model has no ray for a pixel. `window` (x0, y0, x1, y1) replaces the image by other pixels, which may lie outside it.
+    z is 1 for a pinhole and for Brown-Conrady; the rays of a fisheye and of a scan are unit vectors and may look sideways or
+    back. NaN where the lens model has no ray for a pixel. `window` (x0, y0, x1, y1) replaces the image by other pixels, which
+    may lie outside it.
     """
     x0, y0, x1, y1 = (subdivision * e for e in window or (0, 0, intrinsics.width, intrinsics.height))
     rays = np.empty((y1 - y0, x1 - x0, 3))
@@ -104,7 +105,7 @@ def pixel_rays(intrinsics: Intrinsics, subdivision: int = 1, window: Window | No
     from viewsphere.geometry import kernels_lens as kernels
 
     k, limit = coefficients(lens), lens_limit(lens)
-    cast = kernels.rays_fisheye if lens.model == "fisheye" else kernels.rays_brown
+    cast = {"fisheye": kernels.rays_fisheye, "scan": kernels.rays_scan, "brown_conrady": kernels.rays_brown}[lens.model]
     cast(k, limit, i.K, x0, y0, subdivision, rays)
     return rays
 
@@ -113,7 +114,8 @@ def project(intrinsics: Intrinsics, points: ArrayLike) -> tuple[Float, NDArray[n
     """Pixels at which points (..., 3) in camera axes appear.
 
     Returns pixels (..., 2) float64, NaN where the lens does not show the point (behind a pinhole, folded back by Brown-Conrady,
-    beyond a fisheye's largest angle), and in_front (...) bool, z > 0. A fisheye may show points that are not in front.
+    beyond a fisheye's largest angle, straight above or below a scan), and in_front (...) bool, z > 0. A fisheye and a scan may
+    show points that are not in front.
     """
     points = np.asarray(points, np.float64)
     in_front = points[..., 2] > 0
@@ -126,15 +128,21 @@ def project(intrinsics: Intrinsics, points: ArrayLike) -> tuple[Float, NDArray[n
         from viewsphere.geometry import kernels_lens as kernels
 
         out = np.empty((len(flat), 2))
-        distort = kernels.distort_fisheye if lens.model == "fisheye" else kernels.distort_brown
-        distort(coefficients(lens), lens_limit(lens), flat, out)
+        maps = {"fisheye": kernels.distort_fisheye, "scan": kernels.distort_scan, "brown_conrady": kernels.distort_brown}
+        maps[lens.model](coefficients(lens), lens_limit(lens), flat, out)
         x, y = out.T
     pixels = np.stack([i.fx * x + i.skew * y + i.cx, i.fy * y + i.cy], axis=-1)
     return pixels.reshape(*points.shape[:-1], 2), in_front
 
 
+def has_unit_rays(lens: Distortion | None) -> bool:
+    """Whether a lens' rays are unit vectors, which may look anywhere, instead of vectors of z = 1."""
+    return lens is not None and lens.model != "brown_conrady"
+
+
 def lens_limit(lens: Distortion) -> float:
-    """Where the lens map stops being one-to-one: a radius r/z for Brown-Conrady (may be infinite), an angle for a fisheye.
+    """Where the lens map stops being one-to-one: a radius r/z for Brown-Conrady (may be infinite), an angle for a fisheye; a
+    scan has no limit.
 
     Beyond this limit a distortion polynomial folds the picture back on itself, as no real lens does. A fisheye's radius must
     rise with the angle. Brown-Conrady's Jacobian is symmetric (the map is the gradient of a potential); inside the limit it
@@ -145,6 +153,8 @@ def lens_limit(lens: Distortion) -> float:
 
 @lru_cache(maxsize=64)
 def _limit(model: str, k: tuple[float, ...]) -> float:
+    if model == "scan":
+        return math.inf
     if model == "fisheye":
         slope = np.array([9 * k[3], 7 * k[2], 5 * k[1], 3 * k[0], 1.0])
         return min(math.pi, math.sqrt(_first_positive_root(slope)))
@@ -196,7 +206,10 @@ def _first_positive_root(polynomial: Float) -> float:
 
 
 def coefficients(lens: Distortion) -> Float:
-    """The lens' coefficients, padded with zeros to the model's full length."""
+    """The lens' coefficients, padded with zeros to the model's full length; a scan's in radians, of two rings at least."""
+    if lens.model == "scan":
+        lone = (lens.coefficients[-1] - 1.0,) if len(lens.coefficients) == 2 else ()
+        return np.array([math.radians(angle) for angle in (*lens.coefficients, *lone)])
     k = np.zeros(4 if lens.model == "fisheye" else 8)
     k[: len(lens.coefficients)] = lens.coefficients
     return k

@@ -136,6 +136,67 @@ def rays_fisheye(k, limit, matrix, x0, y0, samples, out):
 
 
 @njit
+def elevation_at(k, y):
+    """Elevation, radians, at row y of a scan; k: the azimuth of its middle, then the elevations of its rings."""
+    count = k.shape[0] - 1
+    row = y - 0.5
+    ring = int(min(max(math.floor(row), 0.0), count - 1.0))
+    following = ring + 1 if ring + 1 < count else ring
+    return k[1 + ring] + (row - ring) * (k[1 + following] - k[following])
+
+
+@njit
+def row_of(k, elevation):
+    """The row of a scan at which an elevation is: the inverse of `elevation_at`."""
+    low, high = 0, k.shape[0] - 3  # the ring above the elevation, unless it is above or below all of them
+    while low < high:
+        middle = (low + high + 1) // 2
+        if k[1 + middle] >= elevation:
+            low = middle
+        else:
+            high = middle - 1
+    return low + (k[1 + low] - elevation) / (k[1 + low] - k[2 + low]) + 0.5
+
+
+@njit
+def scan_ray(k, u, v):
+    """Unit ray at azimuth u from a scan's middle and row v; NaN beyond a whole turn, and beyond straight up and down."""
+    elevation = elevation_at(k, v)
+    if abs(u) > math.pi or abs(elevation) > 0.5 * math.pi:
+        return np.nan, np.nan, np.nan
+    level = math.cos(elevation)
+    return level * math.sin(u + k[0]), -math.sin(elevation), level * math.cos(u + k[0])
+
+
+@njit
+def rays_scan(k, limit, matrix, x0, y0, samples, out):
+    """Unit rays of the sample centres; NaN beyond a whole turn around the scan's middle, and beyond straight up and down."""
+    for j in range(out.shape[0]):
+        for i in range(out.shape[1]):
+            v = ((j + y0 + 0.5) / samples - matrix[1, 2]) / matrix[1, 1]
+            u = ((i + x0 + 0.5) / samples - matrix[0, 2] - matrix[0, 1] * v) / matrix[0, 0]
+            out[j, i, 0], out[j, i, 1], out[j, i, 2] = scan_ray(k, u, v)
+
+
+@njit
+def azimuth_from(turn, x, z):
+    """Azimuth of a direction to the right of `turn`, within half a turn."""
+    angle = math.atan2(x, z) - turn
+    return angle - 2.0 * math.pi * math.floor((angle + math.pi) / (2.0 * math.pi))
+
+
+@njit
+def distort_scan(k, limit, points, out):
+    """Azimuth from a scan's middle, and row, of camera points (N, 3); NaN straight above and below, and at the centre."""
+    for i in range(points.shape[0]):
+        x, y, z = points[i, 0], points[i, 1], points[i, 2]
+        level = math.sqrt(x * x + z * z)
+        out[i, 0] = out[i, 1] = np.nan
+        if level > 0.0:
+            out[i, 0], out[i, 1] = azimuth_from(k[0], x, z), row_of(k, math.atan2(-y, level))
+
+
+@njit
 def distort_brown(k, limit, points, out):
     """Distorted (x, y) of camera points (N, 3); NaN where z <= 0 or beyond the unfolded range."""
     for i in range(points.shape[0]):

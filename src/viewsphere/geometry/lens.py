@@ -13,10 +13,12 @@ Float = NDArray[np.float64]
 
 
 class Distortion(Protocol):
-    """OpenCV's standard model (Brown and Conrady) or its fisheye model, and their coefficients in OpenCV's order."""
+    """OpenCV's standard model (Brown and Conrady) or its fisheye model, and their coefficients in OpenCV's order; or a scan,
+    whose coefficients are the azimuth of its middle and the elevations of its rings, degrees.
+    """
 
     @property
-    def model(self) -> Literal["brown_conrady", "fisheye"]: ...
+    def model(self) -> Literal["brown_conrady", "fisheye", "scan"]: ...
     @property
     def coefficients(self) -> tuple[float, ...]: ...
 

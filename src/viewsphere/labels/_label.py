@@ -39,8 +39,8 @@ def trusted(sample: Sample, models: Models) -> Iterator[str]:
 @dataclass(frozen=True)
 class Needs:
     """The inputs of a label besides its own instant and sensor: offsets of instants (-1 is the one before), of those of which
-    poses are enough, whether a sensor that is rectified with its own, whether any others, whether points that are followed, and
-    whether points on objects, which are looked up in the picture.
+    poses are enough, whether a sensor that is rectified with its own, whether any others, whether points that are followed,
+    whether points on objects, which are looked up in the picture, and whether how a LiDAR measures.
     """
 
     instants: tuple[int, ...] = ()
@@ -49,11 +49,13 @@ class Needs:
     rig: bool = False
     tracks: bool = False
     points: bool = False
+    lidar: bool = False
 
     @property
     def is_some(self) -> bool:
         """Whether the label does not follow from what the picture's own camera sees at its instant."""
-        return bool(self.instants or self.poses or self.rectified or self.rig or self.tracks or self.points)
+        beside = self.rectified or self.rig or self.tracks or self.points or self.lidar
+        return bool(self.instants or self.poses or beside)
 
 
 TAIL = 8
@@ -74,7 +76,7 @@ class Drawing:
     `trails` are lines that show what was before, too: they are given what the sensor's samples so far are, the sample itself
     last, none of them more than `labels.TAIL` instants before it. Instead of `beside`, `within` gives a picture that tells
     apart the values of an extent, and `extent` a sample's own, so that all pictures of a sequence may have the same colours.
-    `key` says what colours mean, None: words alone.
+    `alone` stands for the picture of a sample that has none, at this size. `key` says what colours mean, None: words alone.
     """
 
     name: str
@@ -84,6 +86,7 @@ class Drawing:
     beside: Callable[[Sample], Picture] | None = None
     extent: Callable[[Sample], Extent] | None = None
     within: Callable[[Sample, Extent], Picture] | None = None
+    alone: Callable[[Sample, int], Picture] | None = None
     key: tuple[tuple[str, Color | None], ...] = ()
 
     def picture(self, sample: Sample, extent: Extent | None = None) -> Picture | None:

@@ -17,10 +17,12 @@ from viewsphere.geometry.camera import inverse_camera_matrix
 from viewsphere.labels._placement import Placement
 from viewsphere.model.camera import Camera
 from viewsphere.model.frozen import Frozen
+from viewsphere.model.rig import Sensor
 from viewsphere.truth.correspondence import Match
 from viewsphere.truth.geometry import Geometry
 from viewsphere.truth.points import SurfacePoints
 from viewsphere.truth.shot_views import Followed, Moment
+from viewsphere.truth.sweeping import Turning
 from viewsphere.truth.view import View
 from viewsphere.truth.visibility import Instances, Visibility, homogeneous, lens_rays, rasterize
 
@@ -49,6 +51,20 @@ class Around(Protocol):
     @property
     def surface(self) -> SurfacePoints:
         """The points that are drawn on the objects."""
+        ...
+
+    @property
+    def sensor(self) -> Sensor:
+        """The picture's own sensor."""
+        ...
+
+    def turning(self, seconds: float) -> Turning:
+        """How all moves while the columns of the picture are measured one after another, within so many seconds."""
+        ...
+
+    @property
+    def drawn_as(self) -> tuple[str, ...]:
+        """What randomness in the picture's labels follows from besides a seed."""
         ...
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Annotated, Literal, Self
 
 import numpy as np
@@ -34,6 +35,36 @@ class Distortion(Frozen):
         return self
 
 
+Degrees = Annotated[float, Field(ge=-90, le=90)]
+
+
+class Scan(Frozen):
+    """The rays of a LiDAR: every ring, a row of the picture, has one elevation, every column one azimuth.
+
+    A direction's azimuth is counted to the right from that of the picture's middle, `turn_deg` to the right of the z axis; K
+    takes it (radians) to columns, and a ring's number + 0.5 to rows. Between rings, and beyond the outermost by the step next
+    to them, elevations go on evenly; a lone ring's rows are a degree apart.
+    """
+
+    model: Literal["scan"] = "scan"
+    elevations_deg: tuple[Degrees, ...] = Field(
+        min_length=1, description="of each ring above the sensor's level, highest first"
+    )
+    turn_deg: float = Field(default=0.0, ge=-360, le=360, description="azimuth of the picture's middle, to the right")
+
+    @model_validator(mode="after")
+    def _falling(self) -> Self:
+        for above, below in pairwise(self.elevations_deg):
+            if above <= below:
+                raise ValueError(f"expected elevations that fall from ring to ring; found {above:g}, then {below:g}")
+        return self
+
+    @property
+    def coefficients(self) -> tuple[float, ...]:
+        """`turn_deg`, then the elevations, degrees."""
+        return (self.turn_deg, *self.elevations_deg)
+
+
 class Intrinsics(Frozen):
     """Image size in pixels and the pinhole matrix K; pixel coordinates have their origin at the image's corner."""
 
@@ -44,7 +75,7 @@ class Intrinsics(Frozen):
     cx: float
     cy: float
     skew: float = 0.0
-    distortion: Distortion | None = None
+    distortion: Annotated[Distortion | Scan, Field(discriminator="model")] | None = None
 
     @property
     def K(self) -> NDArray[np.float64]:
@@ -87,6 +118,6 @@ class Camera:
         return self.intrinsics.height
 
     @property
-    def distortion(self) -> Distortion | None:
+    def distortion(self) -> Distortion | Scan | None:
         """Lens distortion, None for a pinhole."""
         return self.intrinsics.distortion

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from bisect import bisect_right
+from typing import Any
 
 import numpy as np
 from pydantic import Field, model_validator
 
-from viewsphere.geometry.rotation import matrix_from_quaternion, quaternion_from_matrix, rigid
+from viewsphere.geometry.rotation import matrix_from_quaternion, product, quaternion_from_matrix, rigid
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.scene import Matrix4
 from viewsphere.model.thing import Motion, TimeStep
@@ -67,5 +68,14 @@ def _between(start: Matrix4, end: Matrix4, share: float) -> Matrix4:
     q = q if float((p * q).sum()) >= 0 else -q
     turned = matrix_from_quaternion((1 - share) * p + share * q)
     rows = rigid(turned, (1 - share) * a[:3, 3] + share * b[:3, 3]).tolist()
+    first, second, third, last = (tuple(row) for row in rows)
+    return first, second, third, last
+
+
+def beyond(now: Matrix4, other: Matrix4) -> Matrix4:
+    """The pose as far from `now` as another, on its other side: straight on, and turned on by as much."""
+    a, b = np.array(now), np.array(other)
+    turned = product(product(a[:3, :3], b[:3, :3].T), a[:3, :3])
+    rows: Any = rigid(turned, 2 * a[:3, 3] - b[:3, 3]).tolist()
     first, second, third, last = (tuple(row) for row in rows)
     return first, second, third, last

@@ -12,6 +12,7 @@ from viewsphere.geometry.rotation import transform
 from viewsphere.model.brief import Brief
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.frozen import Frozen
+from viewsphere.model.lidar import LIDAR, Lidar
 from viewsphere.model.scene import IDENTITY, Matrix4
 
 CAMERA = "camera"
@@ -19,21 +20,25 @@ CAMERA = "camera"
 
 
 class Sensor(Brief):
-    """A camera of a rig: its lens, and where it is mounted. `rig_from_sensor` is rigid, OpenCV axes on both sides, metres.
-    `channels` are those of the shot's that it keeps, None: all.
+    """A camera or a LiDAR of a rig: its lens, and where it is mounted. `rig_from_sensor` is rigid, OpenCV axes on both sides,
+    metres. `channels` are those of the shot's that it keeps, None: a camera all but points, a LiDAR these alone. `lidar`: how
+    it measures; None: it is a camera.
     """
 
-    UNSAID = ("channels",)
+    UNSAID = ("channels", "lidar")
 
     intrinsics: Intrinsics
     name: str = Field(default=CAMERA, pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$", max_length=64)
     rig_from_sensor: Matrix4 = IDENTITY
     channels: tuple[str, ...] | None = None
+    lidar: Lidar | None = None
 
     def kept(self, channels: tuple[str, ...]) -> tuple[str, ...]:
         """Those of a shot's channels that the sensor keeps, in the shot's order."""
         own = self.channels
-        return channels if own is None else tuple(name for name in channels if name in own)
+        if own is None:
+            return tuple(name for name in channels if (name == LIDAR) == (self.lidar is not None))
+        return tuple(name for name in channels if name in own)
 
 
 class Pair(NamedTuple):

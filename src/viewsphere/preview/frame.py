@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Container, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
 from viewsphere.errors import StoreError
-from viewsphere.labels import Drawing, Extent, channels, drawable, is_in
+from viewsphere.labels import Drawing, Extent, channel_labels, channels, drawable, is_in
 from viewsphere.model.channel import picture_of
 from viewsphere.model.mistakes import one_of
 from viewsphere.model.sample import Sample
@@ -18,6 +18,9 @@ Picture = NDArray[np.uint8]
 
 INK = (30, 32, 36)
 PAPER = (250, 250, 248)
+SIZE = 640
+"""Pixels of what stands for a picture, where nobody says."""
+
 GAP = 4
 """Pixels between the sensors of an instant."""
 
@@ -70,7 +73,8 @@ def draw_sample(
     within: Extents | None = None,
 ) -> Picture:
     """One frame with labels as they are drawn (`labels.drawings`): masks, 3D boxes (front face filled), 2D boxes and tracks
-    over the picture, depth and flow beside it; (H, W, 3) uint8 sRGB. What the sample does not have is not drawn.
+    over the picture, depth and flow beside it; (H, W, 3) uint8 sRGB. What the sample does not have is not drawn; without a
+    picture what stands for it is (a LiDAR's points from above).
 
     `before` gives what its sensor saw before it, for trails; `within`: what pictures beside it tell apart.
     """
@@ -98,6 +102,8 @@ def _pictures(sample: Sample, draw: Sequence[str], width: int | None, before: Be
     """The picture, and what is drawn beside it, all of one size."""
     chosen = drawn(sample, draw)
     if picture_of(sample.channels) is None:
+        if (alone := _alone(sample.channels)) is not None:
+            return [alone(sample, width or SIZE)]
         raise StoreError(
             "preview: expected pictures (rgb or rgba), found a data set that keeps neither: preview its recipe instead"
         )
@@ -116,6 +122,17 @@ def _pictures(sample: Sample, draw: Sequence[str], width: int | None, before: Be
     beside = (drawing.picture(sample, within.get(drawing.name)) for drawing in chosen)
     others = [Image.fromarray(other).resize(size, Image.Resampling.BILINEAR) for other in beside if other is not None]
     return [np.asarray(picture), *map(np.asarray, others)]
+
+
+def is_shown(channels: Container[str]) -> bool:
+    """Whether samples with these channels have a picture, or something that stands for it."""
+    return picture_of(channels) is not None or _alone(channels) is not None
+
+
+def _alone(channels: Container[str]) -> Callable[[Sample, int], Picture] | None:
+    """What stands for the picture of a sample that has none, None where nothing does."""
+    found = (label.drawing and label.drawing.alone for name, label in channel_labels().items() if name in channels)
+    return next(filter(None, found), None)
 
 
 def _on_paper(picture: Picture) -> Picture:

@@ -19,6 +19,7 @@ from viewsphere.model.rig import Rig
 from viewsphere.model.sample import Sample
 from viewsphere.model.shot import Shot
 from viewsphere.model.tracks import Tracks
+from viewsphere.preview.frame import is_shown
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.run.framing import Framing
 from viewsphere.run.opening import prepare
@@ -108,7 +109,7 @@ def dataset_samples(dataset: Dataset, count: int = 12, row: int = ROW, films: Se
         return [dataset[place] for film in chosen for i in film.spread(_each(count, rows, row)) for place in film.places[i]]
     picks = np.unique(np.linspace(0, len(dataset) - 1, min(count, len(dataset))).round().astype(int))
     found = [dataset[int(i)] for i in picks]
-    return [sample for sample in found if sample.picture_file] or found  # some sensors may keep labels alone
+    return [sample for sample in found if is_shown(sample.files)] or found  # some sensors may keep labels alone
 
 
 def _spread(planned: Plan, count: int) -> list[tuple[str, list[list[int]]]]:
@@ -138,11 +139,13 @@ def _grouped(steps: Sequence[Ranges], places: Sequence[int]) -> list[list[int]]:
 
 
 def _scaled(shot: Shot, width: int) -> dict[str, Any]:
-    """The same cameras with narrower pictures, and all channels of each, as a shot's fields; points that are followed are
-    picked at the same places.
+    """The same cameras with narrower pictures, and all channels of each, as a shot's fields; LiDARs as they are. Points that
+    are followed are picked at the same places.
     """
-    narrow = ({"intrinsics": _narrowed(sensor.intrinsics, width), "channels": None} for sensor in shot.rig.sensors)
-    sensors = tuple(sensor.model_copy(update=more) for sensor, more in zip(shot.rig.sensors, narrow, strict=True))
+    sensors = tuple(
+        sensor.model_copy(update={} if sensor.lidar else {"intrinsics": _narrowed(sensor.intrinsics, width), "channels": None})
+        for sensor in shot.rig.sensors
+    )
     zooms = ({"intrinsics": now.intrinsics and _narrowed(now.intrinsics, width)} for now in shot.instants)
     instants = tuple(now.model_copy(update=more) for now, more in zip(shot.instants, zooms, strict=True))
     share = min(1.0, width / shot.rig.sensors[0].intrinsics.width)

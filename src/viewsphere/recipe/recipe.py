@@ -33,12 +33,13 @@ from viewsphere.model.credit import Credit
 from viewsphere.model.file_names import is_reserved
 from viewsphere.model.files import Files
 from viewsphere.model.frozen import Frozen
+from viewsphere.model.lidar import LIDAR
 from viewsphere.model.mistakes import Marks, report, shown
 from viewsphere.model.notebook import Shown
 from viewsphere.model.numbers import Count, Natural, Number
 from viewsphere.recipe.formats import FormatEntry, FormatField
 from viewsphere.recipe.models import ModelEntry
-from viewsphere.recipe.rig import RigField
+from viewsphere.recipe.rig import RigField, SensorList
 from viewsphere.recipe.scene import CameraEntry, EngineEntry, SceneEntry, engine_entry
 from viewsphere.recipe.scenes import ScenesField
 from viewsphere.recipe.sequence import TimeEntry
@@ -222,10 +223,13 @@ class Recipe(Shown, Frozen):
     @field_validator("channels")
     @classmethod
     def _as_meant(cls, value: tuple[str, ...], info: ValidationInfo) -> tuple[str, ...]:
-        """With what other fields ask for: tracks, and pictures with alpha."""
+        """With what other fields ask for: tracks, points of LiDARs, and pictures with alpha."""
         scene: SceneEntry | None = info.data.get("scene")
         if info.data.get("tracks") is not None:
             value = tuple(dict.fromkeys((*value, "tracks")))
+        rig = info.data.get("rig")
+        if isinstance(rig, SensorList) and rig.has_lidar:
+            value = tuple(dict.fromkeys((*value, LIDAR)))
         if scene is None or not any(entry.transparent for entry in scene.backgrounds):
             return value
         return tuple(dict.fromkeys("rgba" if name == "rgb" else name for name in value))

@@ -11,6 +11,7 @@ from viewsphere.model.camera import Distortion
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.mistakes import shown
 from viewsphere.model.numbers import Count, Length, Metres, Number, Positive
+from viewsphere.recipe.lidar import LidarEntry
 from viewsphere.recipe.scene import CameraEntry, CameraMatrix, PictureSize, Row
 from viewsphere.recipe.values import OrShort, pair
 
@@ -55,8 +56,12 @@ class SensorEntry(Frozen):
     distortion: Distortion | None = Field(
         default=None, description="as in camera, whose own is left out where a sensor has a lens of its own"
     )
+    lidar: LidarEntry | None = Field(
+        default=None, description="instead of a lens: a LiDAR, its rings and columns of rays, and how it measures"
+    )
     channels: Annotated[tuple[str, ...], Field(min_length=1)] | None = Field(
-        default=None, description="those of the recipe's channels that this sensor keeps; default: all"
+        default=None,
+        description="those of the recipe's channels that this sensor keeps; default: all but lidar, of a LiDAR lidar alone",
     )
 
     @model_validator(mode="after")
@@ -72,6 +77,8 @@ class SensorEntry(Frozen):
         given = [name for name in OWN_LENSES if getattr(self, name) is not None]
         if len(given) > 1:
             raise ValueError(f"expected one of {', '.join(OWN_LENSES)}; found {' and '.join(given)}")
+        if self.lidar is not None and self.has_lens:
+            raise ValueError(f"expected none of {', '.join(LENS_FIELDS)} beside lidar, which says its rays; found one")
         if self.fov_axis and not self.fov_deg:
             raise ValueError("expected fov_axis beside fov_deg; found it alone")
         return self
@@ -119,6 +126,11 @@ class SensorList(Frozen):
             if (other := seen.setdefault(name.casefold(), name)) != name:
                 raise ValueError(f"expected names that differ in more than capitals; found {name!r} beside {other!r}")
         return value
+
+    @property
+    def has_lidar(self) -> bool:
+        """Whether one of them is a LiDAR."""
+        return any(entry.lidar is not None for entry in self.sensors.values())
 
 
 class StereoRig(Frozen):

@@ -114,7 +114,9 @@ def generate(
     wanted += _others(wanted, store) if portion.number else ()
     with recipe.located():
         for entry, sensor in product(wanted, planned.rig.sensors):
-            _check_channels(entry.name, sensor.kept(portion.record.channels), "" if sensor.channels is None else sensor.name)
+            _check_channels(
+                entry.name, sensor.kept(portion.record.channels), sensor.name if sensor.channels or sensor.lidar else ""
+            )
     with recipe.located(), _at_work(portion, store) as pulse:
         tell = heard(pulse, listener or unheard)
         notes: tuple[str, ...] = ()

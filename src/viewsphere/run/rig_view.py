@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from viewsphere.assets.mesh import Material, Mesh
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.geometry.rotation import transform
-from viewsphere.model.camera import Intrinsics
+from viewsphere.model.camera import Intrinsics, Scan
 from viewsphere.model.rig import Rig, Sensor
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.sampling.rigs import rig_of
@@ -87,10 +87,15 @@ def _facts(sensor: Sensor, color: str) -> SensorFacts:
 
 
 def _fov(own: Intrinsics) -> tuple[float, float]:
-    """Angles of view across and down, degrees, through the principal point; of bent lenses between the outermost pixels."""
+    """Angles of view across and down, degrees, through the principal point; of bent lenses between the outermost pixels;
+    of a LiDAR all columns, and from the lowest to the highest ring.
+    """
     if own.distortion is None:
         across = math.atan(own.cx / own.fx) + math.atan((own.width - own.cx) / own.fx)
         return math.degrees(across), math.degrees(math.atan(own.cy / own.fy) + math.atan((own.height - own.cy) / own.fy))
+    if isinstance(own.distortion, Scan):
+        rings = own.distortion.elevations_deg
+        return math.degrees(own.width / own.fx), rings[0] - rings[-1]
     column, row = (int(np.clip(v, 0, most - 1)) for v, most in ((own.cx, own.width), (own.cy, own.height)))
     strips = (0, row, own.width, row + 1), (column, 0, column + 1, own.height)
     angles = (_off_axis(pixel_rays(own, 1, strip).reshape(-1, 3)) for strip in strips)

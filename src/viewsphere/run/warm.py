@@ -93,9 +93,9 @@ def load_kernels(shot: Shot) -> None:
 
 def _small(shot: Shot) -> Shot:
     tiny = Intrinsics(width=SIZE, height=SIZE, fx=SIZE, fy=SIZE, cx=SIZE / 2, cy=SIZE / 2)
-    lenses = dict.fromkeys(sensor.intrinsics.distortion for sensor in shot.rig.sensors)
-    bent = (tiny.model_copy(update={"distortion": lens}) for lens in lenses)
-    sensors = [Sensor(name=f"{i}", intrinsics=lens) for i, lens in enumerate(bent)]
+    kinds = dict.fromkeys((sensor.intrinsics.distortion, sensor.lidar) for sensor in shot.rig.sensors)
+    bent = ((tiny.model_copy(update={"distortion": lens}), lidar) for lens, lidar in kinds)
+    sensors = [Sensor(name=f"{i}", intrinsics=lens, lidar=lidar) for i, (lens, lidar) in enumerate(bent)]
     if len(shot.rig.sensors) > 1:
         sensors.append(Sensor(name="beside", intrinsics=sensors[0].intrinsics, rig_from_sensor=BESIDE))
     spec = ModelSpec(key="card", source="card", category="card", category_id=1)

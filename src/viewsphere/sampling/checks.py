@@ -17,6 +17,7 @@ from viewsphere.model.mistakes import nearest, one_of, read_options
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.recipe.draws import alternatives, span
 from viewsphere.recipe.recipe import Recipe
+from viewsphere.recipe.rig import SensorList
 from viewsphere.recipe.scenes import ScenesEntry
 from viewsphere.recipe.surface import GroundEntry
 from viewsphere.recipe.viewpoints import Jitter, Normal, Sphere
@@ -94,11 +95,12 @@ def _check_options(recipe: Recipe, name: str, given: Mapping[str, JsonValue]) ->
 
 def _check_needs(recipe: Recipe, where: str, name: str) -> None:
     """A label that compares pictures needs these."""
-    needs = labels()[name].needs if name in labels() else Needs()
+    needs, rig = labels()[name].needs if name in labels() else Needs(), recipe.rig
     for field, what, is_lacking in (
         ("time", "whose instants are compared", bool(needs.instants or needs.poses) and recipe.time is None),
         ("rig", "whose sensors are compared", needs.rig and recipe.rig is None),
         ("rig", "with a sensor that is rectified with its own", needs.rectified and recipe.rig is None),
+        ("rig", "with a LiDAR among its sensors", needs.lidar and not (isinstance(rig, SensorList) and rig.has_lidar)),
         ("tracks", "which say what is followed", needs.tracks and recipe.tracks is None),
     ):
         if is_lacking:

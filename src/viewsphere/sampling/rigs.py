@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.rotation import compose, rigid, transform
 from viewsphere.model.camera import Intrinsics
+from viewsphere.model.channel import PASSES
+from viewsphere.model.lidar import LIDAR, Lidar
 from viewsphere.model.mistakes import one_of, told_of
 from viewsphere.model.rig import Rig, Sensor
 from viewsphere.model.scene import IDENTITY, Matrix4
@@ -45,6 +47,11 @@ def rig_of(recipe: Recipe, lens: Intrinsics) -> Rig | None:
         case RigFile():
             rig = _calibrated(recipe, recipe.rig, lens)
     _check_disparity(recipe, rig)
+    if rig.sensors[0].lidar and (recipe.camera.is_random or recipe.camera.of_viewpoints):
+        raise RecipeError(
+            f"rig.sensors: expected a camera as the first sensor, as the camera's lens is drawn or its file's; found the LiDAR "
+            f"{rig.sensors[0].name}: list it after a camera"
+        )
     return rig
 
 
@@ -65,10 +72,35 @@ def _mounted(sensors: Mapping[str, tuple[Intrinsics, Float]]) -> Rig:
 def _listed(recipe: Recipe, entry: SensorList, lens: Intrinsics) -> Rig:
     rig = _mounted({name: (_lens(name, one, recipe.camera, lens), _pose(name, one)) for name, one in entry.sensors.items()})
     kept = zip(rig.sensors, entry.sensors.items(), strict=True)
-    return Rig(sensors=tuple(s.model_copy(update={"channels": _channels(recipe, name, one)}) for s, (name, one) in kept))
+    more = (
+        (sensor, _measuring(recipe, name, one) | {"channels": _channels(recipe, name, one)}) for sensor, (name, one) in kept
+    )
+    return Rig(sensors=tuple(sensor.model_copy(update=update) for sensor, update in more))
+
+
+def _check_sweep(recipe: Recipe, name: str, entry: SensorEntry) -> None:
+    sweep = 0.0 if entry.lidar is None else entry.lidar.sweep
+    if not sweep:
+        return
+    if recipe.time is None:
+        raise RecipeError(
+            f"rig.sensors.{name}.lidar.sweep: expected time beside it, as all moves meanwhile; found none: set time"
+        )
+    if recipe.time.count > 1 and sweep > recipe.time.at(1) * (1 + 1e-9):
+        raise RecipeError(
+            f"rig.sensors.{name}.lidar.sweep: expected at most the {recipe.time.at(1):g} seconds between two instants; found "
+            f"{sweep:g}"
+        )
+
+
+def _measuring(recipe: Recipe, name: str, entry: SensorEntry) -> dict[str, Lidar]:
+    _check_sweep(recipe, name, entry)
+    return {} if entry.lidar is None else {"lidar": entry.lidar.measuring(recipe.seed)}
 
 
 def _lens(name: str, entry: SensorEntry, camera: CameraEntry, lens: Intrinsics) -> Intrinsics:
+    if entry.lidar is not None:
+        return entry.lidar.intrinsics
     if not entry.has_lens:
         return lens
     try:
@@ -85,10 +117,21 @@ def _channels(recipe: Recipe, name: str, entry: SensorEntry) -> tuple[str, ...] 
                 f"rig.sensors.{name}.channels[{i}]: {one_of(channel, recipe.channels)}: add it to the recipe's channels, of "
                 "which a sensor keeps all or some"
             )
+        if (wrong := _not_measured(channel, entry)) is not None:
+            raise RecipeError(f"rig.sensors.{name}.channels[{i}]: {wrong}: leave it out")
     if entry.channels is None:
         return None
     own = {"rgba" if channel == "rgb" and "rgba" in recipe.channels else channel for channel in entry.channels}
     return tuple(channel for channel in recipe.channels if channel in own)
+
+
+def _not_measured(channel: str, entry: SensorEntry) -> str | None:
+    """What is wrong with a channel that a sensor cannot have."""
+    if entry.lidar is not None and channel in PASSES:
+        return f"expected labels, as a LiDAR takes no pictures; found {channel}"
+    if entry.lidar is None and channel == LIDAR:
+        return f"expected what a camera sees; found {channel}, the points of a LiDAR"
+    return None
 
 
 def _pose(name: str, entry: SensorEntry) -> Float:

@@ -143,7 +143,7 @@ class Match:
 
         rays, near = np.empty((*self._inverse.shape, 3)), np.empty(self._inverse.shape)
         matrices = self._maps.matrices(product(self._maps.turn, self.view.camera_from_ray))
-        kernels.as_rays(*self._pixels, matrices, self.other.is_fisheye, rays.reshape(-1), near.reshape(-1))
+        kernels.as_rays(*self._pixels, matrices, self.other.has_unit_rays, rays.reshape(-1), near.reshape(-1))
         xy, _ = project(self.other.camera.intrinsics, rays)
         still = self._shows(STILL)
         xy[still] = pixel_centers(self._inverse.shape)[still]

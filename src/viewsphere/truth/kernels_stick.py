@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from viewsphere.geometry.kernels_lens import invert_radial, undistort_brown
+from viewsphere.geometry.kernels_lens import invert_radial, scan_ray, undistort_brown
 from viewsphere.kernels.jit import njit
 from viewsphere.truth.kernels_channels import weights_at
 from viewsphere.truth.kernels_draw import NEVER, hits_surface
@@ -67,3 +67,12 @@ def rays_fisheye(k, limit, matrix, xy, out):
         theta = invert_radial(k, True, radius, limit) if radius > 0.0 else 0.0
         sine = math.sin(theta) / radius if radius > 0.0 else 0.0
         out[i, 0], out[i, 1], out[i, 2] = u * sine, v * sine, math.cos(theta)
+
+
+@njit
+def rays_scan(k, limit, matrix, xy, out):
+    """Unit rays (N, 3) through the pixels xy (N, 2) of a scan; NaN where it has none."""
+    for i in range(xy.shape[0]):
+        v = (xy[i, 1] - matrix[1, 2]) / matrix[1, 1]
+        u = (xy[i, 0] - matrix[0, 2] - matrix[0, 1] * v) / matrix[0, 0]
+        out[i, 0], out[i, 1], out[i, 2] = scan_ray(k, u, v)

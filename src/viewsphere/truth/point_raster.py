@@ -31,7 +31,7 @@ meets surface other than its own triangle, nearer by more than `GAP` of its dept
 
 GAP = 1e-6
 FACES = ((0, 1, 2, 1.0), (0, 1, 2, -1.0), (1, 2, 0, 1.0), (1, 2, 0, -1.0), (2, 0, 1, 1.0), (2, 0, 1, -1.0))
-"""Sides of the cube around a fisheye: the axes that are right and down in it, the axis it faces, and which way."""
+"""Sides of the cube around a fisheye or a scan: the axes that are right and down in it, the axis it faces, and which way."""
 
 LARGEST_SIDE = 1024  # pixels of a side of the cube
 
@@ -66,7 +66,7 @@ def placed_at(view: View, points: Float, own: Callable[[], Whole]) -> Placed:
 def pixels_at(view: View, points: Float) -> tuple[Float, Float, Float | None]:
     """Where the same points are in the view's picture: xy, near and rays as `Placed` has them."""
     xy, _ = project(view.camera.intrinsics, points)
-    if view.is_fisheye:
+    if view.has_unit_rays:
         x, y, z = points.T
         s = np.sqrt(x * x + y * y + z * z)
     else:
@@ -171,7 +171,7 @@ def _pinholes(view: View, rays: Float, near: Float) -> Iterator[tuple[Float, tup
     that it shows, their pixels and their 1/z there.
     """
     side = 1.0
-    if view.is_fisheye:
+    if view.has_unit_rays:
         axis = np.argmax(np.abs(rays), axis=1)
         count = min(max(math.ceil(math.sqrt(len(near))), 16), LARGEST_SIDE)
         for right, down, ahead, sign in FACES:

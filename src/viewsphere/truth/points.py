@@ -181,7 +181,7 @@ class Tracked:
         xy, _ = project(self.view.camera.intrinsics, directions)
         placed.xy[sky], placed.near[sky] = xy, 0.0
         if placed.rays is not None:
-            placed.rays[sky] = directions if self.view.is_fisheye else directions / directions[:, 2:]
+            placed.rays[sky] = directions if self.view.has_unit_rays else directions / directions[:, 2:]
 
     @property
     def _is_sky(self) -> NDArray[np.bool_]:

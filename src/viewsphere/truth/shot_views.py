@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -11,17 +11,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.assets.mesh import Mesh
+from viewsphere.geometry.rotation import compose, inverse, product, rigid, transform
 from viewsphere.model.camera import Camera
+from viewsphere.model.exposure import Sweep, beyond
 from viewsphere.model.model_spec import ModelSpec
+from viewsphere.model.rig import Sensor
 from viewsphere.model.scene import Matrix4
 from viewsphere.model.shot import Shot
 from viewsphere.model.surface_samples import SurfaceSamples
-from viewsphere.model.thing import Thing, TimeStep
+from viewsphere.model.thing import Motion, Thing, TimeStep
 from viewsphere.model.tracks import TRACK, Tracks
 from viewsphere.truth.geometry import Geometry, without_ground
 from viewsphere.truth.moving import ROOMS, Ring, shot_floor
 from viewsphere.truth.points import SurfacePoints, points_seen
 from viewsphere.truth.surface_draws import Drawn, points_on_model
+from viewsphere.truth.sweeping import Turning
 from viewsphere.truth.view import View
 
 Float = NDArray[np.float64]
@@ -203,18 +207,24 @@ class Moment:
         return self.cameras[self.sensor]
 
 
+def _back(pose: Float) -> Float:
+    """The inverse of a rigid pose (4, 4)."""
+    turned = inverse(pose[:3, :3])
+    return rigid(turned, -transform(turned, pose[:3, 3]))
+
+
 @dataclass(frozen=True, eq=False)
 class SampleViews:
     """The views beside that of one sample: of a sensor at an instant of a shot."""
 
     views: ShotViews
     instant: int
-    sensor: int
+    sensor_number: int
 
     @property
     def partner(self) -> tuple[str, float] | None:
         """Name of a sensor that is rectified with the sample's own, and the metres between them; None without one."""
-        return self.views.shot.rig.partner(self.sensor)
+        return self.views.shot.rig.partner(self.sensor_number)
 
     def moment(self, instants: int) -> Moment | None:
         """Where all is so many instants later, None where the shot does not have that instant."""
@@ -223,7 +233,7 @@ class SampleViews:
             return None
         cameras = tuple(shot.camera(instant, sensor) for sensor in range(len(shot.rig.sensors)))
         poses = tuple(thing.motion.at(instant) for thing in shot.objects)
-        return Moment(shot.instants[instant].seconds, poses, cameras, self.sensor)
+        return Moment(shot.instants[instant].seconds, poses, cameras, self.sensor_number)
 
     def view(self, instants: int, sensor: str | None) -> View | None:
         """That of a sensor, None for the sample's own, so many instants later; None without such a sensor or instant."""
@@ -231,14 +241,62 @@ class SampleViews:
         names = [one.name for one in self.views.shot.rig.sensors]
         if instant is None or (sensor is not None and sensor not in names):
             return None
-        return self.views.view(instant, self.sensor if sensor is None else names.index(sensor))
+        return self.views.view(instant, self.sensor_number if sensor is None else names.index(sensor))
+
+    @property
+    def sensor(self) -> Sensor:
+        """The sample's own sensor."""
+        return self.views.shot.rig.sensors[self.sensor_number]
+
+    def turning(self, seconds: float) -> Turning:
+        """How things and the sensor move while its columns are measured one after another, within so many seconds around the
+        instant: straight on between instants, as while a shutter is open; before the first and after the last as they went.
+        """
+        shot, width = self.views.shot, self.sensor.intrinsics.width
+        moments = ((np.arange(width) + 0.5) / width - 0.5) * seconds
+        rig = self._poses([now.world_from_rig for now in shot.instants], moments)
+        placed = np.stack([compose(pose, self.sensor.rig_from_sensor) for pose in rig])
+        rotation = np.ascontiguousarray(placed[:, :3, :3].swapaxes(1, 2))
+        moved = dict[int, Float]()
+        for i, thing in enumerate(shot.things):
+            poses = [thing.motion.at(instant) for instant in range(len(shot.instants))]
+            now = poses[self.instant]
+            if now is not None and any(pose not in (None, now) for pose in poses):
+                back = _back(np.array(now))
+                moved[i] = np.stack([compose(pose, back) for pose in self._poses(poses, moments)])
+        return Turning(rotation, -product(rotation, placed[:, :3, 3:])[..., 0], moved)
+
+    def _poses(self, poses: Sequence[Matrix4 | None], moments: Float) -> Float:
+        """Poses (n, 4, 4) at moments (n,), seconds from the instant, of what has these at the shot's instants."""
+        shot, now = self.views.shot, poses[self.instant]
+        assert now is not None
+        known = {offset: shot.instant_after(self.instant, offset) for offset in (-1, 1)}
+        around = {offset: (shot.instants[at].seconds, poses[at]) for offset, at in known.items() if at is not None}
+        here = shot.instants[self.instant].seconds
+        found = {offset: (time - here, pose) for offset, (time, pose) in around.items() if pose is not None}
+        if not found:
+            return np.tile(np.array(now), (len(moments), 1, 1))
+        for missing in {-1, 1} - found.keys():
+            time, pose = found[-missing]
+            found[missing] = -time, beyond(now, pose)
+        (before, first), (after, last) = found[-1], found[1]
+        path = Sweep(moments=(before, 0.0, after), motion=Motion(poses=(first, now, last)))
+        return np.stack([np.array(path.pose(moment)) for moment in moments.tolist()])
+
+    @property
+    def drawn_as(self) -> tuple[str, ...]:
+        """What randomness in the sample's labels follows from besides a seed: its shot, its sensor, and its instant, which is
+        named by its time and by where the rig is then.
+        """
+        shot, now = self.views.shot, self.views.shot.instants[self.instant]
+        return shot.sequence or shot.key, self.sensor.name, repr(now.seconds), repr(now.world_from_rig)
 
     @property
     def followed(self) -> Followed:
         """The points that the sample's sensor follows."""
-        return self.views.followed(self.sensor)
+        return self.views.followed(self.sensor_number)
 
     @property
     def surface(self) -> SurfacePoints:
         """The points that are drawn on the objects."""
-        return self.views.surface(self.instant, self.sensor)
+        return self.views.surface(self.instant, self.sensor_number)

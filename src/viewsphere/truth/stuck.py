@@ -21,7 +21,7 @@ def rays_through(view: View, xy: Float) -> Float:
     if lens is None:
         return np.column_stack((xy, np.ones(len(xy))))
     rays = np.empty((len(xy), 3))
-    cast = kernels.rays_fisheye if view.is_fisheye else kernels.rays_brown
+    cast = {"fisheye": kernels.rays_fisheye, "scan": kernels.rays_scan, "brown_conrady": kernels.rays_brown}[lens.model]
     cast(coefficients(lens), lens_limit(lens), view.camera.K, np.ascontiguousarray(xy), rays)
     return rays
 

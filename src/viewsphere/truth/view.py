@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.geometry.camera import inverse_camera_matrix
+from viewsphere.geometry.camera import has_unit_rays, inverse_camera_matrix
 from viewsphere.geometry.rotation import inverse, transform
 from viewsphere.model.camera import Camera
 from viewsphere.model.thing import Thing
@@ -122,10 +122,9 @@ class View:
         return self.camera.distortion is None
 
     @property
-    def is_fisheye(self) -> bool:
+    def has_unit_rays(self) -> bool:
         """Whether s is measured along rays of length 1, see `truth.visibility.Visibility`."""
-        lens = self.camera.distortion
-        return lens is not None and lens.model == "fisheye"
+        return has_unit_rays(self.camera.distortion)
 
     @property
     def owners(self) -> NDArray[np.int32]:

@@ -9,11 +9,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.geometry.camera import Window, pixel_rays
+from viewsphere.geometry.camera import Window, has_unit_rays, pixel_rays
 from viewsphere.model.camera import Camera, Intrinsics
 from viewsphere.truth.geometry import Geometry
 
 LARGEST_AROUND = 4_000_000  # pixels of a ray table that reaches beyond the image (100 MB)
+
+SCAN_CELLS = 128
+"""Cells along a side of the cube around a scan: smaller ones are slower, as rows of rays are sparse."""
 
 EDGE_ON = 1e-9
 """A camera's height above the ground, as a share of its distance from the origin and a metre, that is nothing but rounding."""
@@ -35,7 +38,7 @@ class Visibility:
     """triangle (H, W) int32: the one seen, -1 where none is; inverse_depth (H, W) float32: 1/s, 0 where no triangle is seen.
 
     The seen point is `center + R.T @ (s * ray)`, ray from `geometry.camera.pixel_rays`: its z is 1 (so s is z-depth) for a
-    pinhole and for Brown-Conrady, and its length is 1 for a fisheye, whose rays may look sideways or back.
+    pinhole and for Brown-Conrady, and its length is 1 for a fisheye and a scan, whose rays may look sideways or back.
     """
 
     triangle: NDArray[np.int32]
@@ -201,9 +204,11 @@ def index_rays(intrinsics: Intrinsics, rays: NDArray[np.float64], samples: int) 
 
     rays.setflags(write=False)
     levels = kernels.tree_levels(rays.shape[0], rays.shape[1])
-    fisheye = intrinsics.distortion is not None and intrinsics.distortion.model == "fisheye"
+    lens = intrinsics.distortion
     size = min(max(int(intrinsics.fx * samples), 16), 512)  # cells of about two pixels
-    cells = kernels.build_faces(rays, 6 if fisheye else 1, size)
+    if lens is not None and lens.model == "scan":
+        size = SCAN_CELLS
+    cells = kernels.build_faces(rays, 6 if has_unit_rays(lens) else 1, size)
     return RayTable(rays, levels, kernels.build_tree(rays, levels), cells)
 
 
@@ -234,7 +239,7 @@ def _draw(
         canvas = _canvas(camera, window)
         t = _ray_table(camera.intrinsics.model_dump_json(), samples, canvas)
         origin = (x0 - samples * canvas[0], y0 - samples * canvas[1])
-        table, unit = t.arrays, camera.distortion.model == "fisheye"
+        table, unit = t.arrays, has_unit_rays(camera.distortion)
         kernels_rays.draw(q, geometry.triangles, span, table, origin, unit, *cut, nearest, seen)
         return nearest, seen
     cell = np.empty((stop - base, 4), np.int32)

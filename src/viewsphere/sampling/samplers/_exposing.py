@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
 
 import numpy as np
 
-from viewsphere.geometry.rotation import product, rigid
-from viewsphere.model.exposure import Exposure, Sweep
+from viewsphere.model.exposure import Exposure, Sweep, beyond
 from viewsphere.model.scene import Matrix4
 from viewsphere.model.thing import Motion
 from viewsphere.recipe.sequence import TimeEntry
@@ -52,15 +50,6 @@ def _rig(at: int, count: int, rig_at: RigAt) -> Sweep | None:
     if count == 1:
         return None
     now = rig_at(at)
-    before = rig_at(at - 1) if at else _beyond(now, rig_at(at + 1))
-    after = rig_at(at + 1) if at < count - 1 else _beyond(now, before)
+    before = rig_at(at - 1) if at else beyond(now, rig_at(at + 1))
+    after = rig_at(at + 1) if at < count - 1 else beyond(now, before)
     return None if before == now == after else Sweep(moments=AROUND, motion=Motion(poses=(before, now, after)))
-
-
-def _beyond(now: Matrix4, other: Matrix4) -> Matrix4:
-    """The pose as far from `now` as another, on its other side: straight on, and turned on by as much."""
-    a, b = np.array(now), np.array(other)
-    turned = product(product(a[:3, :3], b[:3, :3].T), a[:3, :3])
-    rows: Any = rigid(turned, 2 * a[:3, 3] - b[:3, 3]).tolist()
-    first, second, third, last = (tuple(row) for row in rows)
-    return first, second, third, last

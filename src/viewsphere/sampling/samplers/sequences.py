@@ -148,6 +148,7 @@ def _needed(stock: Stock, taken: Set[int]) -> set[int]:
     names = {name for sensor in stock.rig.sensors for name in sensor.kept(stock.recipe.channels)}
     names.update(stock.recipe.annotations)
     offsets = {offset for name in names if name in known for offset in (*known[name].needs.instants, *known[name].needs.poses)}
+    offsets |= {-1, 1} if any(sensor.lidar and sensor.lidar.sweep for sensor in stock.rig.sensors) else set()
     count = time_of(stock).count
     compared = {number + offset for number in taken for offset in offsets if 0 <= number + offset < count}
     return compared if stock.tracks is None else compared | set(stock.tracks.at)

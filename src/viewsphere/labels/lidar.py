@@ -1,0 +1,141 @@
+"""lidar: the points that a LiDAR returns."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
+from hashlib import blake2b
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.geometry.camera import pixel_rays
+from viewsphere.labels._from_above import from_above
+from viewsphere.labels._label import ChannelLabel, Drawing, Models, Needs, channel_of
+from viewsphere.labels._sight import Around, Sight
+from viewsphere.model.lidar import POINT, Lidar
+from viewsphere.model.sample import Sample
+from viewsphere.truth.sweeping import Hits, still_hits, swept_hits
+
+Float = NDArray[np.float64]
+Rays = tuple[NDArray[np.intp], NDArray[np.intp]]
+
+ROUNDED = 1e-6
+"""Share of a point's distance by which float32 may move it."""
+
+
+def compute(sight: Sight) -> NDArray[np.void]:
+    """One row a point that returns, (N,) of `viewsphere.model.lidar.POINT`, ring by ring. Raises ValueError where the sample's
+    sensor is no LiDAR.
+    """
+    around = sight.around
+    lidar = None if around is None else around.sensor.lidar
+    if around is None or lidar is None:
+        raise ValueError("lidar: expected a sample of a LiDAR, found a camera's")
+    hits, width = _hits(sight, around, lidar), sight.camera.width
+    ring, column, distance = hits.ring, hits.column, hits.distance
+    intensity = _intensity(lidar, distance, hits.cosine)
+    draw = partial(_drawn, lidar.seed, around.drawn_as, sight.visibility.triangle.shape, (ring, column))
+    returns = _returns(lidar, distance, intensity, draw)
+    distance = distance + lidar.sigma * draw("range", np.random.Generator.standard_normal) if lidar.sigma else distance
+    out = np.empty(len(ring), POINT)
+    out["range"], out["incidence"], out["intensity"] = distance, hits.incidence, intensity
+    out["xyz"] = in_lidar_axes(sight.rays[ring, column]) * distance[:, None]
+    out["time"] = ((column + 0.5) / width - 0.5) * lidar.sweep
+    out["instance"] = sight.geometry.triangle_object[hits.triangle]
+    out["category"] = sight.geometry.triangle_category[hits.triangle]
+    out["ring"], out["column"] = ring, column
+    low, high = lidar.range
+    return out[returns & (out["range"] > 0) & (out["range"] >= low) & (out["range"] <= high)]
+
+
+def _hits(sight: Sight, around: Around, lidar: Lidar) -> Hits:
+    if lidar.sweep:
+        return swept_hits(sight.geometry, sight.camera, around.turning(lidar.sweep))
+    return still_hits(sight.geometry, sight.camera, sight.visibility)
+
+
+def _intensity(lidar: Lidar, distance: Float, cosine: Float) -> Float:
+    """Lambert's cosine, weakened by the square of the distance where the sensor does not make up for it."""
+    near = lidar.reference_range
+    return cosine if near is None else cosine * (near / distance) ** 2
+
+
+Draw = Callable[[str, Callable[..., Float]], Float]
+"""Draws a number for each of the points, for a purpose and by a method of numpy's generators."""
+
+
+def _drawn(
+    seed: int, names: Sequence[str], size: tuple[int, ...], rays: Rays, purpose: str, method: Callable[..., Float]
+) -> Float:
+    """A number for each of some rays (ring, column) of a scan: every ray has its own, whether others are asked for or not."""
+    digest = blake2b("\0".join((*names, purpose)).encode(), digest_size=16).digest()
+    words = np.frombuffer(digest, "<u4").tolist()
+    return method(np.random.default_rng(np.random.SeedSequence(seed, spawn_key=words)), size)[rays]
+
+
+def _returns(lidar: Lidar, distance: Float, intensity: Float, draw: Draw) -> NDArray[np.bool_]:
+    """Which points return: those that none of the causes of drop-out takes."""
+    chance = np.full(len(distance), 1.0 - lidar.dropout)
+    for curve, values in ((lidar.dropout_by_range, distance), (lidar.dropout_by_intensity, intensity)):
+        if curve:
+            at, lost = np.array(curve).T
+            chance *= 1.0 - np.interp(values, at, lost)
+    return np.ones(len(chance), np.bool_) if (chance == 1.0).all() else draw("dropout", np.random.Generator.random) < chance
+
+
+def in_lidar_axes(vectors: Float) -> Float:
+    """Vectors (..., 3) of camera axes (right, down, ahead) in a LiDAR's: ahead, left, up."""
+    return np.stack([vectors[..., 2], -vectors[..., 0], -vectors[..., 1]], axis=-1)
+
+
+def prove(sample: Sample, models: Models) -> Iterator[str]:
+    """Each point lies on the ray of its ring and column, as far away as it says, on a known object; a ray has one point."""
+    rows = channel_of(sample, "lidar")
+    if rows is None:
+        return
+    ring, column, distance = rows["ring"].astype(np.int64), rows["column"].astype(np.int64), rows["range"]
+    if (ring >= sample.height).any() or (column >= sample.width).any():
+        yield f"expected rings below {sample.height} and columns below {sample.width}; found others"
+        return
+    if (np.diff(ring * sample.width + column) <= 0).any():
+        yield "expected at most one point of each ray, ring by ring; found others"
+    if not (np.isfinite(distance) & (distance > 0)).all():
+        yield "expected ranges above 0 m; found others"
+        return
+    expected = in_lidar_axes(pixel_rays(sample.camera.intrinsics)[ring, column]) * distance[:, None].astype(np.float64)
+    off = np.abs(rows["xyz"] - expected).max(axis=1, initial=0.0) > ROUNDED * distance
+    if not np.isfinite(rows["xyz"]).all() or off.any():
+        yield f"expected points on the rays of their rings and columns; found {off.sum()} elsewhere"
+    yield from _of_objects(sample, rows)
+    if not ((rows["incidence"] >= 0) & (rows["incidence"] <= np.float32(np.pi / 2))).all():
+        yield "expected incidences of 0 to pi/2; found others"
+    if not (rows["intensity"] >= 0).all():
+        yield "expected intensities of 0 or more; found others"
+
+
+def _of_objects(sample: Sample, rows: NDArray[np.void]) -> Iterator[str]:
+    known = {0: 0} | {o.id: o.category_id for o in sample.objects}
+    for instance in np.unique(rows["instance"]).tolist():
+        found = rows["category"][rows["instance"] == instance]
+        expected = known.get(instance)
+        if expected is None:
+            yield f"expected points on objects of the sample; found {len(found)} on object {instance}"
+        elif (found != expected).any():
+            yield f"expected category {expected} of object {instance}; found others at {(found != expected).sum()} points"
+
+
+LABEL = ChannelLabel(
+    name="lidar",
+    meaning="points that a LiDAR returns, a row each: place, range, intensity, incidence, time, object, category, ring, column",
+    axes="LiDAR: x ahead, y left, z up",
+    needs=Needs(lidar=True),
+    dtype=POINT,
+    components=0,
+    unit="m, rad, s",
+    empty=np.nan,
+    encoding="npz",
+    compute=compute,
+    prove=prove,
+    drawing=Drawing("lidar", alone=from_above, key=(("LiDAR from above: objects in their colours, else high is light", None),)),
+)

@@ -1,0 +1,244 @@
+"""The points of a LiDAR: against closed forms and Embree, and what recipes may say of it."""
+
+import numpy as np
+import pytest
+
+import viewsphere as vs
+from viewsphere.errors import RecipeError
+from viewsphere.labels._paint import color_of
+from viewsphere.preview.frame import draw_sample
+from viewsphere.preview.tiles import contact_sheet
+
+ROTATED = [5.0, 20.0, -3.0]
+
+
+def recipe(lidar=None, **changes):
+    sensor = {"rings": 12, "elevation": [-30, 6], "azimuth_step": 4, "range": [0.5, 50]} | (lidar or {})
+    said = {
+        "models": [{"source": "zoo:car", "category": "car", "scale": {"length": 1.8}}],
+        "viewpoints": {"azimuth": [30], "elevation": [10], "distance": 4},
+        "rig": {"sensors": {"front": {}, "top": {"position": [0.1, -0.3, 0], "rotation": ROTATED, "lidar": sensor}}},
+        "camera": {"size": [32, 24], "fov_deg": 50},
+        "channels": ["instances"],
+        "formats": [],
+        "splits": {"by": "frame", "train": 1},
+    }
+    return vs.Recipe.model_validate({**said, **changes})
+
+
+def points_of(said):
+    """The sample of the first scan, and its points."""
+    sample = next(s for s in vs.render(said) if s.sensor == "top")
+    return sample, sample.channels["lidar"]
+
+
+def in_world(sample, rows):
+    """Points from LiDAR axes (ahead, left, up) to the world."""
+    x, y, z = rows["xyz"].astype(np.float64).T
+    return (np.stack([-y, -z, x], axis=1) - sample.camera.t) @ sample.camera.R
+
+
+def test_a_lidar_keeps_its_points_and_a_camera_its_pictures():
+    front, top = vs.render(recipe())
+    assert tuple(front.channels) == ("instances",)
+    assert tuple(top.channels) == ("lidar",)
+    assert (top.height, top.width) == (12, 90)
+
+
+def test_points_of_the_ground_lie_on_it():
+    """A plane: range and incidence follow from the height above it and the ray."""
+    sample, rows = points_of(recipe())
+    ground = rows[rows["instance"] == 0]
+    world, eye = in_world(sample, ground), sample.camera.center
+    floor = world[:, 2].mean()
+    assert len(ground) > 200
+    np.testing.assert_allclose(world[:, 2], floor, atol=5e-6)
+    directions = (world - eye) / ground["range"][:, None]
+    np.testing.assert_allclose(np.cos(ground["incidence"]), -directions[:, 2], atol=1e-6)
+    np.testing.assert_allclose(ground["range"], (eye[2] - floor) / -directions[:, 2], rtol=2e-5)
+    np.testing.assert_allclose(ground["intensity"], -directions[:, 2] * (10 / ground["range"]) ** 2, rtol=1e-4)
+
+
+def test_points_of_an_object_are_its_own():
+    sample, rows = points_of(recipe({"azimuth_step": 1}))
+    (car,) = sample.objects
+    own = rows[rows["instance"] == car.id]
+    assert len(own) > 10
+    assert (own["category"] == car.category_id).all()
+    low, high = car.box3d_object.min(axis=0), car.box3d_object.max(axis=0)
+    inside = (in_world(sample, own) - car.world_from_object[:3, 3]) @ car.world_from_object[:3, :3]
+    assert ((inside >= low - 1e-4) & (inside <= high + 1e-4)).all()
+
+
+def test_nearer_and_farther_points_do_not_return():
+    _, everything = points_of(recipe())
+    _, some = points_of(recipe({"range": [4, 9]}))
+    expected = everything[(everything["range"] >= 4) & (everything["range"] <= 9)]
+    assert 0 < len(some) < len(everything)
+    np.testing.assert_array_equal(some, expected)
+
+
+def test_a_sensor_may_make_up_for_the_distance():
+    _, rows = points_of(recipe({"reference_range": None}))
+    np.testing.assert_allclose(rows["intensity"], np.cos(rows["incidence"]), atol=1e-6)
+
+
+def matched(rows, others):
+    """Rows of both whose rays are the same."""
+    keys, other_keys = (r["ring"].astype(int) * 10_000 + r["column"] for r in (rows, others))
+    return rows[np.isin(keys, other_keys)], others[np.isin(other_keys, keys)]
+
+
+def test_noise_moves_points_along_their_rays():
+    """By a normal distribution of the asked width; everything else stays exact."""
+    dense = {"rings": 40, "azimuth_step": 1, "range": [0, 1000]}
+    _, exact = points_of(recipe(dense))
+    _, noisy = points_of(recipe({**dense, "sigma": 0.05}))
+    exact, noisy = matched(exact, noisy)
+    error = (noisy["range"].astype(np.float64) - exact["range"]) / 0.05
+    assert len(error) > 5000
+    assert abs(error.mean()) < 5 / len(error) ** 0.5
+    assert abs(error.std() - 1) < 5 / (2 * len(error)) ** 0.5
+    assert abs((np.abs(error) < 1).mean() - 0.6827) < 0.03
+    np.testing.assert_allclose(noisy["xyz"] / noisy["range"][:, None], exact["xyz"] / exact["range"][:, None], atol=1e-5)
+    for same in ("incidence", "intensity", "instance", "category"):
+        np.testing.assert_array_equal(noisy[same], exact[same])
+
+
+def test_points_drop_out_as_often_as_was_asked():
+    """By themselves, by range, and by intensity; each cause by itself."""
+    dense = {"rings": 40, "azimuth_step": 1, "range": [0, 1000]}
+    _, exact = points_of(recipe(dense))
+    _, some = points_of(recipe({**dense, "dropout": 0.25}))
+    assert abs(len(some) / len(exact) - 0.75) < 0.03
+    assert len(matched(some, exact)[0]) == len(some)
+    _, near = points_of(recipe({**dense, "dropout_by_range": [[4, 0], [8, 1]]}))
+    assert near["range"].max() <= 8
+    assert (near["range"] < 4).sum() == (exact["range"] < 4).sum()
+    middle = (exact["range"] > 5) & (exact["range"] < 7)
+    kept = (near["range"] > 5) & (near["range"] < 7)
+    assert abs(kept.sum() / middle.sum() - 0.5) < 0.1
+    _, bright = points_of(recipe({**dense, "dropout_by_intensity": [[0.5, 1], [0.5001, 0]]}))
+    assert len(bright) == (exact["intensity"] > 0.5).sum() > 0
+
+
+def test_noise_follows_from_the_seed_and_the_pose():
+    """Not from which others are rendered; each instant has its own."""
+    noisy = {"sigma": 0.02, "dropout": 0.1}
+    one = {"azimuth": [30], "elevation": [10], "distance": 4}
+    two = {**one, "azimuth": [60, 30]}
+    _, first = points_of(recipe(noisy, viewpoints=one))
+    _, again = points_of(recipe(noisy, viewpoints=one))
+    _, other = points_of(recipe(noisy, viewpoints=one, seed=5))
+    np.testing.assert_array_equal(first, again)
+    assert not np.array_equal(first, other)
+    others = [s.channels["lidar"] for s in vs.render(recipe(noisy, viewpoints=two)) if s.sensor == "top"]
+    np.testing.assert_array_equal(others[1], first)
+
+
+def moving(sweep, **changes):
+    """A car that passes a sensor which goes around it."""
+    motion = {"kind": "constant", "velocity": [0, -8, 0]}
+    model = {"source": "zoo:car", "category": "car", "scale": {"length": 1.8}, "motion": motion}
+    said = {
+        "models": [model],
+        "viewpoints": {"kind": "orbit", "azimuth": [20, 60], "elevation": [15, 20], "distance": [8, 7]},
+        "time": {"frames": 3, "fps": 10},
+        "splits": {"by": "sequence", "train": 1},
+    }
+    return recipe({"sweep": sweep, "azimuth_step": 1}, **{**said, **changes})
+
+
+def test_a_sweep_does_not_depend_on_how_sequences_are_cut():
+    cut, whole = ([s.channels["lidar"] for s in vs.render(moving(0.1, shot_frames=n)) if s.sensor == "top"] for n in (1, 3))
+    still = [s.channels["lidar"] for s in vs.render(moving(0)) if s.sensor == "top"]
+    for one, other, at_once in zip(cut, whole, still, strict=True):
+        np.testing.assert_array_equal(one, other)
+        np.testing.assert_allclose(one["time"], (one["column"] + 0.5) / 360 * 0.1 - 0.05, atol=1e-8)
+        assert not at_once["time"].any()
+        then, now = matched(one, at_once)
+        assert np.abs(then["range"] - now["range"]).max() > 0.01
+        middle = np.abs(then["column"] - 180.0) < 1  # of the sweep: the instant itself
+        np.testing.assert_allclose(then["range"][middle], now["range"][middle], rtol=2e-3)
+
+
+def test_points_are_drawn_from_above():
+    """Ahead at the top; a preview shows them beside the camera's picture."""
+    said = recipe({"azimuth_step": 1, "elevation": [-40, -2]}, channels=["rgb"])
+    front, top = vs.render(said)
+    picture = draw_sample(top, width=200)
+    assert picture.shape == (200, 200, 3)
+    rows, columns = np.nonzero((picture == color_of(1)).all(axis=2))
+    own = top.channels["lidar"]["xyz"][top.channels["lidar"]["instance"] == 1]
+    assert len(rows) > 10
+    assert (rows < 100).mean() > 0.9
+    assert ((columns < 100).mean() > 0.5) == ((own[:, 1] > 0).mean() > 0.5)
+    assert contact_sheet([front, top], width=200).shape[0] > 200
+
+
+@pytest.mark.parametrize(
+    ("lidar", "problem"),
+    [
+        ({"rings": 10_000, "azimuth_step": 0.01}, "expected at most 10,000,000 rays and 65,535 columns; found 10,000 rings"),
+        ({"azimuth_step": 0.001}, "found 12 rings of 360,000 columns"),
+        ({"azimuth_step": 7}, "expected azimuth_step to divide azimuth; found 7 for 360 degrees"),
+        ({"azimuth_step": 0}, "azimuth_step"),
+        ({"azimuth_step": float("nan")}, "azimuth_step"),
+        ({"azimuth": [-300, 300]}, "expected at most a whole turn, 360 degrees; found 600"),
+        ({"azimuth": [20, -20]}, "azimuth: expected \\[low, high\\]"),
+        ({"elevations": [1, 2]}, "expected rings and elevation, or elevations; found both"),
+        ({"rings": None, "elevation": None}, "or elevations; found neither"),
+        ({"rings": None, "elevation": None, "elevations": [1, 1]}, "expected different ones; found one twice"),
+        ({"elevation": [-100, 0]}, "elevation"),
+        ({"range": [10, 5]}, "range: expected \\[low, high\\]"),
+        ({"range": [-1, 5]}, "range"),
+        ({"reference_range": 0}, "reference_range"),
+        ({"sigma": -0.1}, "sigma"),
+        ({"sweep": -1}, "sweep"),
+        ({"sigma": float("nan")}, "sigma"),
+        ({"dropout": 1.5}, "dropout"),
+        ({"dropout_by_range": [[5, 0.1], [1, 0.2]]}, "expected pairs whose first numbers ascend"),
+        ({"dropout_by_intensity": [[0, float("nan")]]}, "dropout_by_intensity"),
+    ],
+)
+def test_what_is_no_lidar_is_said(lidar, problem):
+    with pytest.raises(RecipeError, match=problem):
+        recipe(lidar)
+
+
+TOP = {"lidar": {"rings": 4, "elevation": [-10, 0]}}
+
+
+@pytest.mark.parametrize(
+    ("changes", "problem"),
+    [
+        ({"rig": {"sensors": {"top": TOP | {"fov_deg": 40}}}}, "expected none of size, fov_deg"),
+        (
+            {"rig": {"sensors": {"top": TOP | {"channels": ["rgb"]}}}, "channels": ["rgb"]},
+            "a LiDAR takes no pictures; found rgb",
+        ),
+        ({"rig": {"sensors": {"front": {"channels": ["lidar"]}, "top": TOP}}}, "expected what a camera sees; found lidar"),
+        ({"rig": {"sensors": {"top": {"lidar": TOP["lidar"] | {"sweep": 0.1}}}}}, "sweep: expected time beside it"),
+        (
+            {
+                "rig": {"sensors": {"top": {"lidar": TOP["lidar"] | {"sweep": 0.2}}}},
+                "time": {"frames": 2, "fps": 10},
+                "splits": {"by": "sequence", "train": 1},
+            },
+            "sweep: expected at most the 0.1 seconds between two instants; found 0.2",
+        ),
+        ({"rig": None, "channels": ["lidar"]}, "expected rig beside lidar, with a LiDAR among its sensors; found none"),
+        ({"rig": {"kind": "stereo", "baseline": 0.1}, "channels": ["lidar"]}, "with a LiDAR among its sensors; found none"),
+        (
+            {"rig": {"sensors": {"top": TOP, "front": {}}}, "camera": {"fov_deg": [30, 50]}},
+            "expected a camera as the first sensor, as the camera's lens is drawn or its file's; found the LiDAR top",
+        ),
+        (
+            {"formats": ["coco"], "channels": ["rgb", "instances"]},
+            "rig.sensors.top.channels: expected .*, which format coco needs; found lidar",
+        ),
+    ],
+)
+def test_what_a_rig_cannot_have_is_said(changes, problem, tmp_path):
+    with pytest.raises(RecipeError, match=problem):
+        vs.generate(recipe(**changes), tmp_path / "out", workers=0)
