@@ -136,6 +136,13 @@ def test_noise_follows_from_the_seed_and_the_pose():
     np.testing.assert_array_equal(others[1], first)
 
 
+def test_pictures_do_not_depend_on_a_lidar_beside_the_camera():
+    """However many columns it has: shadows are as fine as the pictures need."""
+    alone = next(iter(vs.render(recipe(rig=None, channels=["rgb"]))))
+    beside = next(iter(vs.render(recipe({"rings": 1, "elevation": [-1, 1], "azimuth_step": 0.1}, channels=["rgb"]))))
+    np.testing.assert_array_equal(beside.rgb, alone.rgb)
+
+
 def moving(sweep, **changes):
     """A car that passes a sensor which goes around it."""
     motion = {"kind": "constant", "velocity": [0, -8, 0]}
@@ -235,7 +242,7 @@ TOP = {"lidar": {"rings": 4, "elevation": [-10, 0]}}
         ),
         (
             {"formats": ["coco"], "channels": ["rgb", "instances"]},
-            "rig.sensors.top.channels: expected .*, which format coco needs; found lidar",
+            "rig.sensors.top.channels: expected .*, which format coco needs; found lidar: leave coco out",
         ),
     ],
 )
