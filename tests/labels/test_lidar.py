@@ -1,13 +1,20 @@
 """The points of a LiDAR: against closed forms and Embree, and what recipes may say of it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import viewsphere as vs
+from sealing import seal_again
+from viewsphere.check import check
+from viewsphere.codecs.npz import decode_npz, encode_npz
 from viewsphere.errors import RecipeError
 from viewsphere.labels._paint import color_of
+from viewsphere.labels.lidar import LABEL
 from viewsphere.preview.frame import draw_sample
 from viewsphere.preview.tiles import contact_sheet
+from viewsphere.store import Dataset
 
 ROTATED = [5.0, 20.0, -3.0]
 
@@ -136,6 +143,13 @@ def test_noise_follows_from_the_seed_and_the_pose():
     np.testing.assert_array_equal(others[1], first)
 
 
+def test_pictures_do_not_depend_on_a_lidar_beside_the_camera():
+    """However many columns it has: shadows are as fine as the pictures need."""
+    alone = next(iter(vs.render(recipe(rig=None, channels=["rgb"]))))
+    beside = next(iter(vs.render(recipe({"rings": 1, "elevation": [-1, 1], "azimuth_step": 0.1}, channels=["rgb"]))))
+    np.testing.assert_array_equal(beside.rgb, alone.rgb)
+
+
 def moving(sweep, **changes):
     """A car that passes a sensor which goes around it."""
     motion = {"kind": "constant", "velocity": [0, -8, 0]}
@@ -160,6 +174,46 @@ def test_a_sweep_does_not_depend_on_how_sequences_are_cut():
         assert np.abs(then["range"] - now["range"]).max() > 0.01
         middle = np.abs(then["column"] - 180.0) < 1  # of the sweep: the instant itself
         np.testing.assert_allclose(then["range"][middle], now["range"][middle], rtol=2e-3)
+
+
+TAMPERED = {
+    "xyz": (lambda rows: rows["xyz"] + np.float32([0, 0, 0.01]), "expected points on the rays of their rings and columns"),
+    "range": (lambda rows: rows["range"] * np.float32(1.001), "expected points on the rays of their rings and columns"),
+    "ring": (lambda rows: rows["ring"][::-1], "expected at most one point of each ray, ring by ring"),
+    "column": (lambda rows: rows["column"] + 5000, "expected rings below 12 and columns below 90"),
+    "instance": (lambda rows: np.full(len(rows), 7), "expected points on objects of the sample; found"),
+    "category": (lambda rows: np.full(len(rows), 9), "expected category 0 of object 0; found others"),
+    "incidence": (lambda rows: rows["incidence"] + 2, "expected incidences of 0 to pi/2"),
+    "intensity": (lambda rows: -rows["intensity"], "expected intensities of 0 or more"),
+}
+
+
+@pytest.fixture(scope="module")
+def scanned():
+    return points_of(recipe())[0]
+
+
+@pytest.mark.parametrize("field", TAMPERED)
+def test_what_was_changed_is_found(scanned, field):
+    change, problem = TAMPERED[field]
+    rows = scanned.channels["lidar"].copy()
+    assert not list(LABEL.prove(scanned, {}))
+    rows[field] = change(rows)
+    found = list(LABEL.prove(replace(scanned, channels={"lidar": rows}), {}))
+    assert any(one.startswith(problem) for one in found)
+
+
+def test_check_finds_times_that_are_not_those_of_the_sweep(tmp_path):
+    """Of which nothing else in a sample says anything: labels are computed again."""
+    out = tmp_path / "out"
+    vs.generate(moving(0.1, formats=["native"]), out, workers=0)
+    assert check(Dataset(out), rays=False).ok
+    file = next(out.glob("store/shots/**/lidar/*.npz"))
+    rows = decode_npz(file.read_bytes(), "lidar")
+    rows["time"] += 0.01
+    file.write_bytes(encode_npz(rows, "lidar"))
+    seal_again(out)
+    assert "lidar" in {finding.check for finding in check(Dataset(out), rays=False).findings}
 
 
 def test_points_are_drawn_from_above():
@@ -235,7 +289,7 @@ TOP = {"lidar": {"rings": 4, "elevation": [-10, 0]}}
         ),
         (
             {"formats": ["coco"], "channels": ["rgb", "instances"]},
-            "rig.sensors.top.channels: expected .*, which format coco needs; found lidar",
+            "rig.sensors.top.channels: expected .*, which format coco needs; found lidar: leave coco out",
         ),
     ],
 )

@@ -15,7 +15,8 @@ from pathlib import Path
 
 from viewsphere import plugins
 from viewsphere.errors import ModelError, RecipeError, UserError, ViewsphereError, WorkerDied, joined
-from viewsphere.model.channel import missing
+from viewsphere.model.channel import PASSES, missing
+from viewsphere.model.rig import Sensor
 from viewsphere.model.share import ALL
 from viewsphere.recipe.formats import FormatEntry, Formats, options_of, read_formats
 from viewsphere.recipe.recipe import Recipe
@@ -114,9 +115,7 @@ def generate(
     wanted += _others(wanted, store) if portion.number else ()
     with recipe.located():
         for entry, sensor in product(wanted, planned.rig.sensors):
-            _check_channels(
-                entry.name, sensor.kept(portion.record.channels), sensor.name if sensor.channels or sensor.lidar else ""
-            )
+            _check_channels(entry.name, portion.record.channels, sensor)
     with recipe.located(), _at_work(portion, store) as pulse:
         tell = heard(pulse, listener or unheard)
         notes: tuple[str, ...] = ()
@@ -241,17 +240,19 @@ def _said(lines: Mapping[str, list[str]]) -> dict[str, tuple[str, ...]]:
     return {key: tuple(dict.fromkeys(some)) for key, some in lines.items() if some}
 
 
-def _check_channels(name: str, channels: Sequence[str], sensor: str) -> None:
-    """Raises UserError for a format that is not known, does not work here, or needs a channel which is not kept; `sensor` names
-    the one that keeps but these.
+def _check_channels(name: str, channels: Sequence[str], sensor: Sensor) -> None:
+    """Raises UserError for a format that is not known, does not work here, or needs one of the channels which a sensor does not
+    keep.
     """
     needed: Sequence[str] = getattr(writable(name), "CHANNELS", ())
-    lacking = missing(needed, channels)
+    kept = sensor.kept(tuple(channels))
+    lacking = missing(needed, kept)
     if lacking:
-        where = f"rig.sensors.{sensor}.channels" if sensor else "channels"
+        where = f"rig.sensors.{sensor.name}.channels" if sensor.channels or sensor.lidar else "channels"
+        remedy = "" if sensor.lidar and lacking[0] in PASSES else "add it, or "
         raise RecipeError(
-            f"{where}: expected {lacking[0]}, which format {name} needs; found {', '.join(channels)}: "
-            f"add it, or leave {name} out of formats"
+            f"{where}: expected {lacking[0]}, which format {name} needs; found {', '.join(kept)}: "
+            f"{remedy}leave {name} out of formats"
         )
 
 

@@ -151,6 +151,6 @@ class RasterStage:
 def build_stage(shot: Shot, load: Load) -> RasterStage:
     """The stage of a shot, with all models loaded."""
     options = parse_options(shot.engine_options)
-    lenses = [sensor.intrinsics for sensor in shot.rig.sensors]
-    size = options.for_width(max(max(lens.width, lens.height) for lens in lenses))
+    lenses = [sensor.intrinsics for sensor in shot.rig.sensors if sensor.lidar is None]
+    size = options.for_width(max((max(lens.width, lens.height) for lens in lenses), default=1))
     return RasterStage(Arrangements.build(shot, load), replace(options, shadow_resolution=size))
