@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from viewsphere.geometry.rotation import transform
 from viewsphere.labels._label import Array, ChannelLabel, Drawing, Models, Picture, channel_of, rendered
-from viewsphere.labels._lifting import ROUNDING, misplaced
+from viewsphere.labels._lifting import ROUNDING, largest, misplaced
 from viewsphere.labels._sight import Sight
 from viewsphere.model.sample import ObjectAnnotation, Sample
 
@@ -58,12 +58,12 @@ def _of_object(sample: Sample, o: ObjectAnnotation, shares: Array, own: NDArray[
     slack = np.full(len(points), ROUNDING * (2 * diagonal + np.abs(middle).max()))
     coordinates = channel_of(sample, "coordinates")
     if coordinates is not None:
-        wrong = ~(np.abs(points - coordinates[own]).max(axis=1, initial=0.0) <= slack)
+        wrong = ~(largest(points - coordinates[own]) <= slack)
         if wrong.any():
             yield f"object {o.id}: expected shares of its coordinates, found others at {wrong.sum()} pixels"
     if sample.known_camera is not None:
         placed = transform(o.camera_from_object, points)
-        away = np.abs(o.camera_from_object[:3, 3]).max() + np.abs(placed).max(axis=1, initial=0.0)
+        away = np.abs(o.camera_from_object[:3, 3]).max() + largest(placed)
         wrong = misplaced(sample, placed, own, slack + 2 * ROUNDING * away)
         if wrong.any():
             yield f"object {o.id}: expected what its pixels show, at their depth; found other points at {wrong.sum()} pixels"

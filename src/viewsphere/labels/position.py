@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.geometry.rotation import inverse, product, transform
-from viewsphere.labels._label import ChannelLabel, Drawing, Models, Picture, channel_of, rendered
-from viewsphere.labels._lifting import ROUNDING, Float, exact_depth, misplaced
+from viewsphere.labels._label import Array, ChannelLabel, Drawing, Models, Picture, channel_of, rendered
+from viewsphere.labels._lifting import ROUNDING, Float, exact_depth, largest, misplaced
 from viewsphere.labels._sight import Sight
 from viewsphere.model.sample import Sample
 
@@ -50,29 +50,25 @@ def prove(sample: Sample, models: Models) -> Iterator[str]:
     off = misplaced(sample, transform(sample.camera.R, world) + sample.camera.t, seen, _slack(sample, world))
     if off.any():
         yield f"expected points that are seen in their pixels, and at their depth; found {off.sum()} others"
-    yield from _against_coordinates(sample, points)
+    yield from _against_coordinates(sample, points, seen)
 
 
-def _against_coordinates(sample: Sample, points: NDArray[np.float32]) -> Iterator[str]:
+def _against_coordinates(sample: Sample, points: Array, seen: NDArray[np.bool_]) -> Iterator[str]:
     coordinates, instances = channel_of(sample, "coordinates"), channel_of(sample, "instances")
     if coordinates is None or instances is None:
         return
     for o in rendered(sample):
-        own = np.logical_and(instances == o.id, np.isfinite(points).all(axis=-1))
+        own = np.logical_and(instances == o.id, seen)
         world = points[own].astype(np.float64)
         moved = transform(o.world_from_object, coordinates[own].astype(np.float64))
-        wrong = ~(
-            np.abs(moved - world).max(axis=1, initial=0.0)
-            <= _slack(sample, world) + ROUNDING * np.abs(moved).max(axis=1, initial=0.0)
-        )
+        wrong = ~(largest(moved - world) <= _slack(sample, world) + ROUNDING * largest(moved))
         if wrong.any():
             yield f"object {o.id}: expected its coordinates, moved by its pose; found other points at {wrong.sum()} pixels"
 
 
 def _slack(sample: Sample, world: Float) -> Float:
     """Metres by which rounding may move points (N, 3): a share of how far they are from the camera and from the origin."""
-    away = np.abs(world - sample.camera.center).max(axis=1, initial=0.0)
-    return ROUNDING * (2 * away + np.abs(world).max(axis=1, initial=0.0))
+    return ROUNDING * (2 * largest(world - sample.camera.center) + largest(world))
 
 
 def striped(points: NDArray[np.float32]) -> Picture:
