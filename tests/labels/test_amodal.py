@@ -251,3 +251,12 @@ def test_a_label_is_asked_for_once():
 def test_what_nobody_asks_for_changes_no_digest():
     assert vs.Recipe(**recipe()).digest == vs.Recipe(**{k: v for k, v in recipe().items() if k != "annotations"}).digest
     assert vs.Recipe(**recipe("amodal")).digest != vs.Recipe(**recipe()).digest
+
+
+def test_annotations_are_not_added_to_frames_that_are_there(tmp_path):
+    small = recipe() | {"camera": {"size": [32, 24]}, "channels": ["instances"], "formats": []}
+    vs.generate(vs.Recipe(**small), tmp_path, workers=0)
+    more = small | {"annotations": ["obb", "amodal"], "viewpoints": {"azimuth": [0, 90], "elevation": [20], "distance": 3}}
+    with pytest.raises(RecipeError, match=r"annotations: expected those of the frames that are there \(none\).*found obb"):
+        vs.generate(vs.Recipe(**more), tmp_path, workers=0, append=True)
+    assert len(vs.open(tmp_path)) == 1

@@ -280,6 +280,7 @@ def _supplies(planned: Plan, there: PlanRecord, wanted: Sequence[int]) -> Iterat
     for number, part in enumerate(there.parts):
         if not part.is_sampled or not part.frames:
             continue
+        _check_annotations(planned, part)
         lacking = tuple(c for c in planned.recipe.channels if c not in there.channels_of(number))
         if not lacking:
             continue
@@ -305,6 +306,17 @@ def _supplies(planned: Plan, there: PlanRecord, wanted: Sequence[int]) -> Iterat
                 f"found {problem}: list them, or leave {lacking[0]} out"
             )
         yield number, lacking
+
+
+def _check_annotations(planned: Plan, part: Part) -> None:
+    """Annotations are computed with their frames, and are not added to those that are there."""
+    known = part.recipe.get("annotations", ())
+    absent = next((name for name in planned.recipe.annotations if name not in known), None)
+    if absent:
+        raise RecipeError(
+            f"annotations: expected those of the frames that are there ({', '.join(known) or 'none'}), to which none are added; "
+            f"found {absent}: leave it out, or render to another folder"
+        )
 
 
 def _joined(old: Sequence[str], new: Iterable[str]) -> tuple[str, ...]:
