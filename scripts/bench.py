@@ -3,8 +3,9 @@
 Reference scene (bench_scene.py): a zoo car cut to about 75,000 triangles with 1,024 x 1,024 textures (base colour,
 occlusion-roughness-metallic, normals) on every material, the ground, an environment with a sun, 640x480; files: RGB PNG,
 instance PNG, float32 depth and normals, annotations. `--scaling` measures how cost grows instead and draws
-docs/images/scaling.svg. `--motion` measures sequences (bench_motion.py), `--training` how fast frames reach a training loop
-(bench_training.py, with PyTorch), `--cycles` and `--endurance` the Cycles engine (bench_cycles.py).
+docs/images/scaling.svg. `--labels` measures each label (bench_labels.py), `--motion` sequences (bench_motion.py), `--training`
+how fast frames reach a training loop (bench_training.py, with PyTorch), `--cycles` and `--endurance` the Cycles
+engine (bench_cycles.py).
 """
 
 from __future__ import annotations
@@ -253,12 +254,23 @@ def table(rows: dict[str, float], embree: float | None) -> list[str]:
     return lines
 
 
+def slow(args: argparse.Namespace) -> None:
+    """Measure the Cycles engine."""
+    from bench_cycles import cycles, endurance
+
+    if args.cycles:
+        cycles(args.cycles, args.threads)
+    if args.endurance:
+        endurance(args.endurance)
+
+
 def main() -> None:
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     options.add_argument("--frames", type=int, default=48)
     options.add_argument("--workers", action="store_true", help="measure frames a second with one and two workers, too")
     options.add_argument("--scaling", action="store_true", help="measure how cost grows, and draw it")
     options.add_argument("--motion", action="store_true", help="measure what flow, states, tracks and moving pictures cost")
+    options.add_argument("--labels", action="store_true", help="measure what each label costs, with 1 and 20 objects")
     options.add_argument("--training", action="store_true", help="measure reading and rendering for a training loop")
     options.add_argument("--cycles", type=int, metavar="FRAMES", help="measure the Cycles engine beside BlenderProc's way")
     options.add_argument("--threads", type=int, default=0, help="of BlenderProc's Blender, beside --cycles; 0: all cores")
@@ -271,6 +283,11 @@ def main() -> None:
         from bench_scaling import scaling
 
         scaling(ROOT / "docs" / "images")
+        return
+    if args.labels:
+        from bench_labels import report
+
+        report(max(1, args.frames // 12), embree)
         return
     if args.motion:
         from bench_motion import motion
@@ -287,12 +304,7 @@ def main() -> None:
             training(Path(name))
         return
     if args.cycles or args.endurance:
-        from bench_cycles import cycles, endurance
-
-        if args.cycles:
-            cycles(args.cycles, args.threads)
-        if args.endurance:
-            endurance(args.endurance)
+        slow(args)
         return
     figures: dict[str, Any] = {}
     with tempfile.TemporaryDirectory() as name:

@@ -7,6 +7,15 @@ from numpy.typing import NDArray
 
 Float = NDArray[np.float64]
 
+MANY = 64
+"""Points from which on those in the middle are left out first."""
+
+DIRECTIONS = (
+    *((1, 0), (3, 1), (2, 2), (1, 3), (0, 1), (-1, 3), (-2, 2), (-3, 1)),
+    *((-1, 0), (-3, -1), (-2, -2), (-1, -3), (0, -1), (1, -3), (2, -2), (3, -1)),
+)
+"""In the turn from x to y."""
+
 
 def convex_hull(points: Float) -> Float:
     """The corners (K, 2) of the convex hull of points (N, 2), in the turn from x to y, clockwise as seen where y points down.
@@ -15,11 +24,28 @@ def convex_hull(points: Float) -> Float:
 
     By A. M. Andrew, Another efficient algorithm for convex hulls in two dimensions, Information Processing Letters 9 (1979).
     """
-    found = np.unique(points, axis=0)
+    found = np.unique(_outer(points), axis=0)
     if len(found) < 3:
         return found
     lower, upper = _chain(found), _chain(found[::-1])
     return np.array(lower[:-1] + upper[:-1])
+
+
+def _outer(points: Float) -> Float:
+    """The points without most of those that cannot be corners: those within the polygon of the farthest ones in a few
+    directions (S. Akl and G. Toussaint, A fast convex hull algorithm, Information Processing Letters 7 (1978)).
+    """
+    if len(points) <= MANY:
+        return points
+    x, y = points.T
+    ends = points[[int(np.argmax(a * x + b * y)) for a, b in DIRECTIONS]]
+    if (ends == ends[0]).all():
+        return ends[:1]
+    inside = np.ones(len(points), np.bool_)
+    for (x0, y0), (x1, y1) in zip(ends.tolist(), np.roll(ends, -1, axis=0).tolist(), strict=True):
+        if (x0, y0) != (x1, y1):
+            inside &= (x1 - x0) * (y - y0) - (y1 - y0) * (x - x0) > 0
+    return points[~inside]
 
 
 def _chain(points: Float) -> list[tuple[float, float]]:

@@ -314,7 +314,7 @@ def _check_annotations(planned: Plan, part: Part) -> None:
     absent = next((name for name in planned.recipe.annotations if name not in known), None)
     if absent:
         raise RecipeError(
-            f"annotations: expected those of the frames that are there ({', '.join(known) or 'none'}), to which none are added; "
+            f"annotations: expected those of the frames that are there ({', '.join(known) or 'none'}), which get no others; "
             f"found {absent}: leave it out, or render to another folder"
         )
 

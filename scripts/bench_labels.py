@@ -1,0 +1,137 @@
+"""What each label costs: CPU milliseconds at 640x480 with 1 and with 20 objects, in the order in which frames compute them.
+
+Frames show zoo cars on a floor; each label is timed alone, on a view whose triangles are drawn already, and against one ray of
+Embree a pixel in the same run. The triangles themselves, and the channels depth, instances and normals, stand first: a label
+that shares work with these shows only what it adds.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from viewsphere import Recipe, plan
+from viewsphere.labels import ObjectLabel, annotated, channel_labels, on_request, sight_of
+from viewsphere.labels._label import later
+from viewsphere.labels._sight import Sight
+from viewsphere.run.stages import Stages
+from viewsphere.truth.shot_views import ShotViews
+from viewsphere.truth.visibility import Visibility, rasterize
+
+PLAIN = ("depth", "instances", "normals")
+RASTER = "truth: raster"
+TOGETHER = ("amodal", "nocs", "keypoints", "panoptic")
+"""Labels whose cost together is told beside that of the plain channels."""
+
+
+def recipe(objects: int) -> Recipe:
+    return Recipe.model_validate(
+        {
+            "models": [{"source": "zoo:car", "category": "car", "count": min(objects, 5), "scale": {"length": 1.8}}],
+            "scenes": {"count": 1, "objects": objects, "layout": "scatter", "repeat": True},
+            "viewpoints": {"azimuth": [20, 140, 260], "elevation": 30, "distance": 4 if objects == 1 else 12},
+            "camera": {"size": [640, 480], "fov_deg": 45},
+            "scene": {"ground": True},
+            "channels": ["depth", "instances"],
+            "annotations": list(asked()),
+            "formats": [],
+            "splits": {"by": "frame", "train": 1},
+        }
+    )
+
+
+def asked() -> list[str]:
+    """Annotations that still pictures of one camera have."""
+    return [name for name, label in on_request().items() if not (label.needs.poses or label.needs.rig)]
+
+
+def still_channels() -> list[str]:
+    """Channels that still pictures of one camera have."""
+    known = channel_labels().items()
+    return [n for n, label in known if not label.needs.is_some or (label.needs.points and not label.needs.lidar)]
+
+
+def measure(objects: int, rounds: int, embree: Callable[[Any], Any]) -> tuple[dict[str, float], int]:
+    """Median CPU milliseconds by label, and the number of triangles."""
+    stages, planned = Stages(), plan(recipe(objects))
+    shot = planned.shot(0, stages.box)
+    stage = stages.stage(shot)
+    views = ShotViews(shot, stage.at)
+    boxes = [stages.box(thing.model) for thing in shot.objects]
+    traits = [lambda thing=thing: stages.traits(thing.model) for thing in shot.objects]
+    found: dict[str, list[float]] = {}
+    rival = None
+    for round_ in range(rounds + 1):
+        for instant in range(len(shot.instants)):
+            view = views.view(instant, 0)
+            around = views.around(instant, 0)
+
+            def sight(view: Any = view, around: Any = around, instant: int = instant) -> Sight:
+                files = ["model.obj"] * len(boxes)
+                seen = sight_of(shot, instant, view.camera, view.geometry, view.visibility, boxes, files, None, around, traits)
+                for placement in seen.placements:
+                    if placement:
+                        _ = placement.facts.diameter, placement.facts.keypoints
+                return seen
+
+            rival = rival or embree(view.geometry)
+            times = frame(sight, view, rival)
+            if round_:
+                for name, ms in times.items():
+                    found.setdefault(name, []).append(ms)
+    return {name: float(np.median(times)) for name, times in found.items()}, len(stage.at(0).triangles)
+
+
+def frame(sight: Callable[[], Sight], view: Any, cast: Any) -> dict[str, float]:
+    """CPU milliseconds of one frame's labels by name."""
+    times = {"Embree": clocked(lambda: cast[1](view.camera))}
+    times[RASTER] = clocked(lambda: rasterize(view.geometry, view.camera))
+    for name in still_channels():
+        label, seen = channel_labels()[name], sight()
+        _ = seen.instances, seen.corners
+        times[name] = clocked(lambda label=label, seen=seen: label.compute(seen))
+    times["instances"] = clocked(lambda: fresh_instances(view))
+    objects = None
+    for name in asked():
+        label, seen = on_request()[name], sight()
+        _ = seen.instances, seen.projected
+        if isinstance(label, ObjectLabel):
+            objects = objects or annotated(sight())
+            times[name] = clocked(lambda label=label, seen=seen, objects=objects: of_objects(label, seen, objects))
+    return times
+
+
+def fresh_instances(view: Any) -> Any:
+    return Visibility(view.visibility.triangle, view.visibility.inverse_depth).instances(view.geometry)
+
+
+def of_objects(label: ObjectLabel, seen: Sight, objects: Any) -> None:
+    for o in objects:
+        if label.compute is later:
+            label.restore(None, seen.placement(o.id - 1), o)
+        else:
+            label.compute(seen, o.id - 1)
+
+
+def clocked(work: Callable[[], Any]) -> float:
+    begun = time.process_time()
+    work()
+    return 1e3 * (time.process_time() - begun)
+
+
+def report(rounds: int, embree: Callable[[Any], Any]) -> None:
+    """Print the table."""
+    (one, few), (many, triangles) = (measure(objects, rounds, embree) for objects in (1, 20))
+    print(f"CPU ms a frame, 640x480: 1 object ({few:,} triangles), 20 objects ({triangles:,} triangles); in units of Embree\n")
+    print(f"{'label':<22}{'1 object':>10}{'20 objects':>12}{'Embree 1':>10}{'Embree 20':>11}")
+    for name in one:
+        units = one[name] / one["Embree"], many[name] / many["Embree"]
+        print(f"{name:<22}{one[name]:>10.2f}{many[name]:>12.2f}{units[0]:>10.2f}{units[1]:>11.2f}")
+    plain = many[RASTER] + sum(many[name] for name in PLAIN)
+    together = sum(many[name] for name in TOGETHER)
+    print(
+        f"\n{' + '.join(TOGETHER)} of 20 objects: {together:.1f} ms, {together / plain:.2f} of {RASTER} + {' + '.join(PLAIN)}"
+    )
