@@ -159,15 +159,21 @@ def drawings() -> tuple[Drawing, ...]:
 
 
 def observe(
-    geometry: Geometry, camera: Camera, visibility: Visibility, names: Iterable[str], around: Around | None = None
+    geometry: Geometry,
+    camera: Camera,
+    visibility: Visibility,
+    names: Iterable[str],
+    around: Around | None = None,
+    options: Mapping[str, Mapping[str, Any]] | None = None,
 ) -> dict[str, NDArray[Any]]:
     """The named labels of pixels, each (H, W) or (H, W, components) as its file says.
 
-    `visibility` is `rasterize(geometry, camera)`; `around`: what labels of motion and of stereo pairs compare it with. The
-    array of `instances` is shared with the visibility and must not be written to. Raises ValueError for names that are no
-    labels of pixels.
+    `visibility` is `rasterize(geometry, camera)`; `around`: what labels of motion and of stereo pairs compare it with;
+    `options`: those of labels, by their names. The array of `instances` is shared with the visibility and must not be written
+    to. Raises ValueError for names that are no labels of pixels.
     """
-    known, sight, names = channel_labels(), Sight(geometry, camera, visibility, around=around), tuple(names)
+    known, names = channel_labels(), tuple(names)
+    sight = Sight(geometry, camera, visibility, around=around, options=options or {})
     unknown = [name for name in names if name not in known]
     if unknown:
         raise ValueError(f"channel {unknown[0]!r}: expected one of {', '.join(known)}")

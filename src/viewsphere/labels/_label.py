@@ -40,7 +40,7 @@ def trusted(sample: Sample, models: Models) -> Iterator[str]:
 class Needs:
     """The inputs of a label besides its own instant and sensor: offsets of instants (-1 is the one before), of those of which
     poses are enough, whether a sensor that is rectified with its own, whether any others, whether points that are followed,
-    whether points on objects, which are looked up in the picture, and whether how a LiDAR measures.
+    whether points on objects, which are looked up in the picture, whether how a LiDAR measures, and whether chance has a part.
     """
 
     instants: tuple[int, ...] = ()
@@ -50,11 +50,12 @@ class Needs:
     tracks: bool = False
     points: bool = False
     lidar: bool = False
+    chance: bool = False
 
     @property
     def is_some(self) -> bool:
         """Whether the label does not follow from what the picture's own camera sees at its instant."""
-        beside = self.rectified or self.rig or self.tracks or self.points or self.lidar
+        beside = self.rectified or self.rig or self.tracks or self.points or self.lidar or self.chance
         return bool(self.instants or self.poses or beside)
 
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
-from hashlib import blake2b
 
 import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.geometry.camera import pixel_rays
+from viewsphere.labels._chance import generator
 from viewsphere.labels._from_above import from_above
 from viewsphere.labels._label import ChannelLabel, Drawing, Models, Needs, channel_of
 from viewsphere.labels._sight import Around, Sight
@@ -69,9 +69,7 @@ def _drawn(
     seed: int, names: Sequence[str], size: tuple[int, ...], rays: Rays, purpose: str, method: Callable[..., Float]
 ) -> Float:
     """A number for each of some rays (ring, column) of a scan: every ray has its own, whether others are asked for or not."""
-    digest = blake2b("\0".join((*names, purpose)).encode(), digest_size=16).digest()
-    words = np.frombuffer(digest, "<u4").tolist()
-    return method(np.random.default_rng(np.random.SeedSequence(seed, spawn_key=words)), size)[rays]
+    return method(generator(seed, *names, purpose), size)[rays]
 
 
 def _returns(lidar: Lidar, distance: Float, intensity: Float, draw: Draw) -> NDArray[np.bool_]:

@@ -281,7 +281,7 @@ def render_sample(
     view, geometry = views.view(instant, sensor), stage.at(instant)
     now, camera, labelled, visibility = shot.instants[instant], view.camera, view.geometry, view.visibility
     around = views.around(instant, sensor)
-    observed = observe(labelled, camera, visibility, names, around)
+    observed = observe(labelled, camera, visibility, names, around, shot.labels)
     passes = [name for name in PASSES if name in kept]
     if passes:
         painted = visibility if labelled is geometry else with_ground(geometry, camera, visibility)

@@ -8,8 +8,11 @@ from functools import cached_property
 from itertools import chain
 from typing import Self
 
+from pydantic import JsonValue
+
 from viewsphere.assets.timeline import Timeline
 from viewsphere.errors import RecipeError
+from viewsphere.labels import labels
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.instant import Instant, Viewpoint
 from viewsphere.model.model_spec import ModelSpec
@@ -257,11 +260,18 @@ class Stock(Sendable):
             engine_options=engine_options(self.recipe),
             channels=self.recipe.channels,
             annotations=self.recipe.annotations,
-            labels=self.recipe.labels,
+            labels=_options(self.recipe),
             files=self.recipe.files,
             label_alpha=self.recipe.label_alpha,
             category_deg=self.recipe.viewpoints.bins,
         )
+
+
+def _options(recipe: Recipe) -> dict[str, dict[str, JsonValue]]:
+    """The options of the labels that a recipe names; those that leave something to chance have the recipe's seed."""
+    kinds = {name: labels()[name].options for name in (*recipe.channels, *recipe.annotations) if name in labels()}
+    drawn = {name: {"seed": recipe.seed} for name, kind in kinds.items() if kind and "seed" in kind.model_fields}
+    return {name: {**drawn.get(name, {}), **recipe.labels.get(name, {})} for name in {**recipe.labels, **drawn}}
 
 
 def _lens(recipe: Recipe, *names: str) -> Intrinsics:

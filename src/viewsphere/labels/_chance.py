@@ -1,0 +1,13 @@
+"""What labels leave to chance: the same numbers wherever, and in whichever order, samples are made."""
+
+from __future__ import annotations
+
+from hashlib import blake2b
+
+import numpy as np
+
+
+def generator(seed: int, *names: str) -> np.random.Generator:
+    """The generator that a seed and names stand for: those of the sample, and of the purpose."""
+    digest = blake2b("\0".join(names).encode(), digest_size=16).digest()
+    return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=np.frombuffer(digest, "<u4").tolist()))
