@@ -10,6 +10,7 @@ from sealing import seal_again
 from viewsphere.check import check
 from viewsphere.codecs.npz import decode_npz, encode_npz
 from viewsphere.errors import RecipeError
+from viewsphere.formats.blend import is_camera_view
 from viewsphere.labels._paint import color_of
 from viewsphere.labels.lidar import LABEL
 from viewsphere.preview.frame import draw_sample
@@ -148,6 +149,11 @@ def test_pictures_do_not_depend_on_a_lidar_beside_the_camera():
     alone = next(iter(vs.render(recipe(rig=None, channels=["rgb"]))))
     beside = next(iter(vs.render(recipe({"rings": 1, "elevation": [-1, 1], "azimuth_step": 0.1}, channels=["rgb"]))))
     np.testing.assert_array_equal(beside.rgb, alone.rgb)
+
+
+def test_a_lidar_is_no_camera_of_a_blend_file():
+    front, top = vs.render(recipe())
+    assert (is_camera_view(front), is_camera_view(top)) == (True, False)
 
 
 def moving(sweep, **changes):
