@@ -13,6 +13,7 @@ import viewsphere
 from small import small_recipe
 from viewsphere import Dataset, Recipe, generate
 from viewsphere.check import check
+from viewsphere.codecs.npz import encode_npz
 from viewsphere.codecs.palette import palette
 from viewsphere.errors import MissingExtraError, RecipeError, StoreError
 from viewsphere.labels import channels
@@ -292,3 +293,12 @@ def test_spoilt_files_are_arrays_or_store_errors(name, kinds, tmp_path):
         except StoreError:
             refused += 1
     assert refused or "qoi" in kinds.values()  # which has no checksum
+
+
+@pytest.mark.parametrize("name", ["tracks", "lidar"])
+def test_rows_of_other_fields_are_told(name, tmp_path):
+    """As another version may have written them."""
+    fields = np.dtype(channels()[name].dtype).descr[:-1]
+    (tmp_path / "x.npz").write_bytes(encode_npz(np.zeros(3, fields), name))
+    with pytest.raises(StoreError, match=r"expected \[.*, found \["):
+        decode(channels()[name], tmp_path / "x.npz")

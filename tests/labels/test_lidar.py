@@ -10,6 +10,7 @@ from sealing import seal_again
 from viewsphere.check import check
 from viewsphere.codecs.npz import decode_npz, encode_npz
 from viewsphere.errors import RecipeError
+from viewsphere.formats.blend import is_camera_view
 from viewsphere.labels._paint import color_of
 from viewsphere.labels.lidar import LABEL
 from viewsphere.preview.frame import draw_sample
@@ -22,7 +23,7 @@ ROTATED = [5.0, 20.0, -3.0]
 def recipe(lidar=None, **changes):
     sensor = {"rings": 12, "elevation": [-30, 6], "azimuth_step": 4, "range": [0.5, 50]} | (lidar or {})
     said = {
-        "models": [{"source": "zoo:car", "category": "car", "scale": {"length": 1.8}}],
+        "models": [{"source": "zoo:post_box", "category": "box"}],
         "viewpoints": {"azimuth": [30], "elevation": [10], "distance": 4},
         "rig": {"sensors": {"front": {}, "top": {"position": [0.1, -0.3, 0], "rotation": ROTATED, "lidar": sensor}}},
         "camera": {"size": [32, 24], "fov_deg": 50},
@@ -68,12 +69,12 @@ def test_points_of_the_ground_lie_on_it():
 
 def test_points_of_an_object_are_its_own():
     sample, rows = points_of(recipe({"azimuth_step": 1}))
-    (car,) = sample.objects
-    own = rows[rows["instance"] == car.id]
+    (box,) = sample.objects
+    own = rows[rows["instance"] == box.id]
     assert len(own) > 10
-    assert (own["category"] == car.category_id).all()
-    low, high = car.box3d_object.min(axis=0), car.box3d_object.max(axis=0)
-    inside = (in_world(sample, own) - car.world_from_object[:3, 3]) @ car.world_from_object[:3, :3]
+    assert (own["category"] == box.category_id).all()
+    low, high = box.box3d_object.min(axis=0), box.box3d_object.max(axis=0)
+    inside = (in_world(sample, own) - box.world_from_object[:3, 3]) @ box.world_from_object[:3, :3]
     assert ((inside >= low - 1e-4) & (inside <= high + 1e-4)).all()
 
 
@@ -150,10 +151,15 @@ def test_pictures_do_not_depend_on_a_lidar_beside_the_camera():
     np.testing.assert_array_equal(beside.rgb, alone.rgb)
 
 
+def test_a_lidar_is_no_camera_of_a_blend_file():
+    front, top = vs.render(recipe())
+    assert (is_camera_view(front), is_camera_view(top)) == (True, False)
+
+
 def moving(sweep, **changes):
-    """A car that passes a sensor which goes around it."""
+    """A post box that passes a sensor which goes around it."""
     motion = {"kind": "constant", "velocity": [0, -8, 0]}
-    model = {"source": "zoo:car", "category": "car", "scale": {"length": 1.8}, "motion": motion}
+    model = {"source": "zoo:post_box", "category": "box", "motion": motion}
     said = {
         "models": [model],
         "viewpoints": {"kind": "orbit", "azimuth": [20, 60], "elevation": [15, 20], "distance": [8, 7]},
@@ -218,7 +224,8 @@ def test_check_finds_times_that_are_not_those_of_the_sweep(tmp_path):
 
 def test_points_are_drawn_from_above():
     """Ahead at the top; a preview shows them beside the camera's picture."""
-    said = recipe({"azimuth_step": 1, "elevation": [-40, -2]}, channels=["rgb"])
+    car = {"source": "zoo:car", "category": "car", "scale": {"length": 1.8}}
+    said = recipe({"azimuth_step": 1, "elevation": [-40, -2]}, channels=["rgb"], models=[car])
     front, top = vs.render(said)
     picture = draw_sample(top, width=200)
     assert picture.shape == (200, 200, 3)

@@ -92,7 +92,8 @@ def decode(channel: Channel, file: Path, read: Callable[[], bytes] | None = None
     """
     try:
         array = _decoded(channel, (read or file.read_bytes)())
-        if np.issubdtype(channel.dtype, np.floating) != np.issubdtype(array.dtype, np.floating):
+        is_rows = channel.components == 0 and array.dtype != channel.dtype
+        if is_rows or np.issubdtype(channel.dtype, np.floating) != np.issubdtype(array.dtype, np.floating):
             raise UserError(f"expected {np.dtype(channel.dtype)}, found {array.dtype}")
     except MissingExtraError as error:
         raise MissingExtraError(f"{file}: {error}") from None

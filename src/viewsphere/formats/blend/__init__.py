@@ -28,6 +28,7 @@ from viewsphere.assets.mesh import Mesh
 from viewsphere.assets.normalise import normalise
 from viewsphere.errors import StoreError, UserError
 from viewsphere.geometry.rotation import rigid
+from viewsphere.model.camera import Scan
 from viewsphere.model.files import Files
 from viewsphere.model.instant import Instant
 from viewsphere.model.model_spec import ModelSpec
@@ -67,13 +68,20 @@ def writer(dataset: Dataset, folder: Path, note: Callable[[str], None]) -> Gener
 
     def add(sample: Sample) -> None:
         key, place = next(places)
-        if sample.known_camera and sample.known_pose and sample.objects and all(o.model for o in sample.objects):
+        if is_camera_view(sample):
             group = groups.setdefault(_scene(*stored(key), key, place, sample), _Group(sample.objects[0].key))
             group.places.setdefault(key, []).append(place)
 
     yield add
     for line in dict.fromkeys((*_left_out(dataset, groups.values()), *_save(dataset, folder, groups.values()))):
         note(f"format blend: {line}")
+
+
+def is_camera_view(sample: Sample) -> bool:
+    """Whether a frame can be written: it is a camera's, not a LiDAR's, and this, models and where they stand are known."""
+    if not (sample.known_camera and sample.known_pose and sample.objects):
+        return False
+    return not isinstance(sample.known_camera.distortion, Scan) and all(o.model for o in sample.objects)
 
 
 def _left_out(dataset: Dataset, groups: Collection[_Group]) -> Iterator[str]:
@@ -84,7 +92,7 @@ def _left_out(dataset: Dataset, groups: Collection[_Group]) -> Iterator[str]:
     if total and not written:
         raise UserError(f"{dataset.root}: expected frames for format blend, with known {needs}; found none")
     if written < total:
-        yield f"{total - written:,} of {total:,} frames are left out: their {needs} are not known"
+        yield f"{total - written:,} of {total:,} frames are left out: their {needs} are not known, or they are a LiDAR's"
     unlit = sum(len(group.places[key]) for group in groups for key in group.places if dataset.store.shot(key) is None)
     if unlit:
         yield f"nothing is known of the light of {unlit:,} frames: they have the default sun and sky"
