@@ -341,4 +341,4 @@ def test_what_users_hold_shows_itself_in_a_line(small_run):
     assert str(small_run) in repr(dataset)
     assert f"{frames.plan.frames} frames" in repr(frames)
     assert f"{dataset[0].width} x {dataset[0].height} pixels, {len(dataset[0].objects)} object" in repr(dataset[0])
-    assert all(len(repr(shown)) < 250 and " at 0x" not in repr(shown) for shown in (dataset, frames, dataset[0]))
+    assert all(len(repr(shown)) < 320 and " at 0x" not in repr(shown) for shown in (dataset, frames, dataset[0]))

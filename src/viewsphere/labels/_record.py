@@ -38,7 +38,8 @@ def computed(
     asked for, but that follow, too, are computed when they are first asked for.
     """
     made: ObjectAnnotation = annotation_of(object_id, values)
-    more = _More(made, placement, following)
+    more = _More(made.more)
+    more.follow(made, placement, following)
     object.__setattr__(made, "more", more)
     for label in labels:
         if label.compute is later:
@@ -49,11 +50,13 @@ def computed(
 class _More(dict[str, Any]):
     """Fields of an annotation, and those that follow from them and are computed when they are first asked for."""
 
-    def __init__(self, o: ObjectAnnotation, placement: Placement, following: Mapping[str, ObjectLabel]) -> None:
-        super().__init__(o.more)
+    def follow(self, o: ObjectAnnotation, placement: Placement, following: Mapping[str, ObjectLabel]) -> None:
+        """Say what the others follow from."""
         self._of, self._known = (o, placement, following), dict[str, Any]()
 
     def __missing__(self, name: str) -> Any:
+        if not hasattr(self, "_of"):
+            raise KeyError(name)
         o, placement, following = self._of
         if name not in self._known:
             self._known.update(following[name].restore(None, placement, o))
