@@ -133,3 +133,23 @@ def test_the_first_of_four_sides_shows_the_front(tmp_path):
 def test_a_preview_of_few_frames_shows_each_of_them_once():
     shown = [(s.objects[0].key, s.pose.index) for s in preview_samples(small_recipe(), 50, 48)]
     assert len(shown) == len(set(shown)) == 12
+
+
+def test_a_sequence_is_shown_whatever_channels_its_sensors_keep():
+    lidar = {"rings": 4, "elevation": [-20, 0], "azimuth_step": 6}
+    sensors = {
+        "front": {},
+        "top": {"lidar": lidar, "channels": ["lidar", "instances"]},
+        "labels": {"channels": ["depth"]},
+    }
+    recipe = small_recipe(
+        channels=["rgb", "depth", "instances", "lidar"],
+        viewpoints={"azimuth": [0], "elevation": [15], "distance": 1.0},
+        rig={"sensors": sensors},
+        time={"frames": 2, "fps": 5},
+        formats=[],
+    )
+    samples = list(preview_samples(recipe, count=2, width=48))
+    assert {sample.sensor for sample in samples} == set(sensors)
+    drawn = list(preview_samples(recipe, count=2, width=48, draw=["lidar"]))
+    assert any("lidar" in sample.channels for sample in drawn if sample.sensor == "top")

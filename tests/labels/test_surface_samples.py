@@ -174,6 +174,17 @@ def test_a_recipe_says_how_many_and_check_computes_them_again(made):
     assert report.ok and report.checked["surface_samples"] == len(made)
 
 
+def test_check_holds_of_frames_without_objects(tmp_path):
+    generate(
+        small_recipe(channels=["rgb", "depth", "instances", "surface_samples"], formats=[], empty=0.99999),
+        tmp_path / "out",
+        workers=0,
+    )
+    made = Dataset(tmp_path / "out")
+    assert all(len(sample.surface_samples) == 0 for sample in made)
+    assert check(made, rays=False).findings == ()
+
+
 @pytest.mark.parametrize("change", ["state", "fewer"])
 def test_check_notices_other_states_and_fewer_rows(made, change):
     sample = made[2]

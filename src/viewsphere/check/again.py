@@ -191,7 +191,7 @@ def _unequal(kept: NDArray[Any], again: NDArray[Any]) -> NDArray[np.bool_]:
 
 def _bytes(rows: NDArray[Any]) -> NDArray[np.uint8]:
     """The bytes of each row, (N, bytes)."""
-    return np.ascontiguousarray(rows).view(np.uint8).reshape(len(rows), -1)
+    return np.ascontiguousarray(rows).view(np.uint8).reshape(len(rows), rows.dtype.itemsize)
 
 
 def _beyond(kept: NDArray[Any], again: NDArray[Any], step: float) -> NDArray[np.bool_]:

@@ -21,6 +21,7 @@ from viewsphere.model.shot import Shot
 from viewsphere.model.tracks import Tracks
 from viewsphere.preview.frame import is_shown
 from viewsphere.recipe.recipe import Recipe
+from viewsphere.recipe.rig import SensorList
 from viewsphere.run.framing import Framing
 from viewsphere.run.opening import prepare
 from viewsphere.run.stages import Stages
@@ -96,7 +97,17 @@ def _drawable(recipe: Recipe, channels: Sequence[str], draw: Sequence[str]) -> R
     seen = tuple(dict.fromkeys((*channels, *(source for source in wanted if source in known()))))
     asked = tuple(source for source in wanted if source in on_request())
     options = {name: given for name, given in recipe.labels.items() if name in (*seen, *asked)}
-    return recipe.model_copy(update={"channels": seen, "annotations": asked, "labels": options})
+    changed = recipe.model_copy(update={"channels": seen, "annotations": asked, "labels": options})
+    return changed.model_copy(update={"rig": _keeping(recipe.rig, seen)}) if isinstance(recipe.rig, SensorList) else changed
+
+
+def _keeping(rig: SensorList, channels: Sequence[str]) -> SensorList:
+    """The rig, whose sensors keep what is left of their channels."""
+    sensors = {
+        name: entry.model_copy(update={"channels": tuple(c for c in entry.channels or () if c in channels) or None})
+        for name, entry in rig.sensors.items()
+    }
+    return rig.model_copy(update={"sensors": sensors})
 
 
 def dataset_samples(dataset: Dataset, count: int = 12, row: int = ROW, films: Sequence[Film] = ()) -> list[Sample]:
