@@ -221,8 +221,8 @@ def recipe(*annotations):
     ("entry", "message"),
     [
         ("amodl", r"annotations\[0\]: expected one of .*; found 'amodl'; did you mean 'amodal'"),
-        ("depth", r"annotations\[0\]: expected one of .*: depth is one of channels"),
-        ("pose", r"annotations\[0\]: expected one of .*: every data set has pose"),
+        ("depth", r"annotations\[0\]: expected a label of objects.*found depth, which is one of channels"),
+        ("pose", r"annotations\[0\]: expected a label on request; found pose, which every data set has"),
     ],
 )
 def test_a_label_that_cannot_be_asked_for_is_told_before_rendering(entry, message):

@@ -73,5 +73,5 @@ LABEL = ObjectLabel(
     ),
     restore=restore,
     prove=prove,
-    drawing=Drawing("contours", lines=draw),
+    drawing=Drawing("contour", lines=draw),
 )

@@ -169,5 +169,5 @@ LABEL = ChannelLabel(
     empty=np.inf,
     compute=compute,
     prove=prove,
-    drawing=Drawing("depth sensor", beside=beside, key=(("depth sensor: near is bright, holes are black", None),)),
+    drawing=Drawing("depth_sensor", beside=beside, key=(("depth_sensor: near is bright, holes are black", None),)),
 )

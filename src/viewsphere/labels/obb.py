@@ -125,5 +125,5 @@ LABEL = ObjectLabel(
     keep=keep,
     restore=restore,
     prove=prove,
-    drawing=Drawing("oriented boxes", lines=draw),
+    drawing=Drawing("obb", lines=draw),
 )

@@ -73,10 +73,12 @@ def check_names(recipe: Recipe) -> None:
 
 def _check_annotation(recipe: Recipe, where: str, name: str) -> None:
     """A label that can be asked for, with what it needs."""
+    if name in channels():
+        raise RecipeError(f"{where}: expected a label of objects or of pictures; found {name}, which is one of channels")
+    if name in labels() and name not in on_request():
+        raise RecipeError(f"{where}: expected a label on request; found {name}, which every data set has: leave it out")
     if name not in on_request():
-        always = f": every data set has {name}" if name in labels() else ""
-        told = f": {name} is one of channels" if name in channels() else always
-        raise RecipeError(f"{where}: {one_of(name, tuple(on_request()))}{told}")
+        raise RecipeError(f"{where}: {one_of(name, tuple(on_request()))}")
     _check_needs(recipe, where, name)
 
 
