@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 import pytest
-from truth_scenes import LENSES, cube, lens, mesh_of, orbit_camera, placed, silhouette
 
+from truth_scenes import LENSES, cube, lens, mesh_of, orbit_camera, placed, silhouette
 from viewsphere.geometry.camera import orbit_rotation
 from viewsphere.geometry.rotation import compose, rigid
 from viewsphere.truth.visibility import rasterize

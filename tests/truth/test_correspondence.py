@@ -6,9 +6,9 @@ import weakref
 
 import numpy as np
 import pytest
-from truth_scenes import LENSES, cube, lens, mesh_of, orbit_camera, random_soup, sphere
 from two_views import brute_points, brute_xy, centers, matched, pose, view
 
+from truth_scenes import LENSES, cube, lens, mesh_of, orbit_camera, random_soup, sphere
 from viewsphere.geometry.camera import pixel_rays, project
 from viewsphere.geometry.rotation import matrix_from_quaternion
 from viewsphere.model.camera import Camera

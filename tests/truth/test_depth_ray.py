@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from truth_scenes import LENSES, lens, orbit_camera, placed, random_soup, sphere
 
+from truth_scenes import LENSES, lens, orbit_camera, placed, random_soup, sphere
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.labels import observe
 from viewsphere.labels.depth_ray import LABEL

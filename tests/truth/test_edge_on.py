@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from truth_scenes import LENSES, cube, lens, orbit_camera, placed
 
 from small import small_recipe
+from truth_scenes import LENSES, cube, lens, orbit_camera, placed
 from viewsphere import Dataset, generate
 from viewsphere.check import check
 from viewsphere.check.rays import RayCaster

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from truth_scenes import LENSES, cube, least_weight, lens, mesh_of, orbit_camera, placed, sphere
 
+from truth_scenes import LENSES, cube, least_weight, lens, mesh_of, orbit_camera, placed, sphere
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.labels import observe
 from viewsphere.truth.cutouts import NEVER, SURFACE

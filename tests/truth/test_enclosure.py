@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from truth_scenes import cube, mesh_of, sphere
 
+from truth_scenes import cube, mesh_of, sphere
 from viewsphere.truth.enclosure import sky_hidden
 
 

@@ -2,8 +2,8 @@ import math
 
 import numpy as np
 import pytest
-from truth_scenes import LENSES, cube, lens, mesh_of, orbit_camera, placed
 
+from truth_scenes import LENSES, cube, lens, mesh_of, orbit_camera, placed
 from viewsphere.assets.mesh import Image, Material, Texture
 from viewsphere.labels import observe
 from viewsphere.truth.cutouts import NEVER, SURFACE

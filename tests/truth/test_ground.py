@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 import pytest
-from truth_scenes import LENSES, cube, lens, mesh_of, orbit_camera, placed
 
+from truth_scenes import LENSES, cube, lens, mesh_of, orbit_camera, placed
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.labels import observe
 from viewsphere.truth.geometry import without_ground

@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
-from truth_scenes import FISHEYE, cube, lens, mesh_of, orbit_camera, sphere
 from two_views import pose, view
 
+from truth_scenes import FISHEYE, cube, lens, mesh_of, orbit_camera, sphere
 from viewsphere.geometry.rotation import rigid
 from viewsphere.labels import Needs, Sight, channel_labels
 from viewsphere.labels._wheel import picture, wheel

@@ -4,9 +4,9 @@ import dataclasses
 
 import numpy as np
 import pytest
-from truth_scenes import cube, lens, mesh_of, orbit_camera, random_soup, sphere
 
 from shots import AHEAD, still_shot
+from truth_scenes import cube, lens, mesh_of, orbit_camera, random_soup, sphere
 from viewsphere.geometry.rotation import matrix_from_quaternion
 from viewsphere.labels import observe
 from viewsphere.model.model_spec import ModelSpec

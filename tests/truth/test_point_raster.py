@@ -5,9 +5,9 @@ import math
 
 import numpy as np
 import pytest
-from truth_scenes import LENSES, cube, lens, mesh_of, orbit_camera, random_soup, sphere
 from two_views import brute_hidden, brute_points, centers, matched, pose, thing, view
 
+from truth_scenes import LENSES, cube, lens, mesh_of, orbit_camera, random_soup, sphere
 from viewsphere.assets.mesh import Material
 from viewsphere.geometry.camera import project
 from viewsphere.geometry.rotation import matrix_from_quaternion

@@ -4,9 +4,9 @@ import dataclasses
 
 import numpy as np
 import pytest
-from truth_scenes import LENSES, cube, lens, mesh_of, orbit_camera, sphere
 from two_views import centers, matched, pose, view
 
+from truth_scenes import LENSES, cube, lens, mesh_of, orbit_camera, sphere
 from viewsphere.geometry.rotation import matrix_from_quaternion
 from viewsphere.truth.point_raster import BEHIND, INVALID, OUTSIDE, VISIBLE
 from viewsphere.truth.points import FREE, GROUND, NOWHERE, SKY, SurfacePoints, points_in_world, points_seen

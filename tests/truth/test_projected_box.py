@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from truth_scenes import LENSES, cube, lens, mesh_of, orbit_camera, placed, random_soup, silhouette, sphere
 
+from truth_scenes import LENSES, cube, lens, mesh_of, orbit_camera, placed, random_soup, silhouette, sphere
 from viewsphere.geometry.box import projected_bounds
 from viewsphere.model.camera import Distortion
 

@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 from test_embree import compare, embree, trace, turned
-from truth_scenes import LENSES, cube, lens, mesh_of, orbit_camera, placed, sphere
 
 from shots import still_shot
+from truth_scenes import LENSES, cube, lens, mesh_of, orbit_camera, placed, sphere
 from viewsphere.geometry.box import box_vertices
 from viewsphere.labels import annotated, observe, sight_of
 from viewsphere.model.camera import Camera

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from truth_scenes import LENSES, cast, cube, lens, mesh_of, orbit_camera, placed, random_soup, silhouette, sphere
 
+from truth_scenes import LENSES, cast, cube, lens, mesh_of, orbit_camera, placed, random_soup, silhouette, sphere
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.model.camera import Camera
 from viewsphere.truth.visibility import rasterize

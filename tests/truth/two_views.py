@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from truth_scenes import cast, least_weight
 
+from truth_scenes import cast, least_weight
 from viewsphere.geometry.camera import pixel_rays, project
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.scene import Floor
