@@ -234,7 +234,7 @@ def test_a_label_that_cannot_be_asked_for_is_told_before_rendering(entry, messag
     ("options", "message"),
     [
         ({"amodal": {"size": 3}}, r"labels\.amodal: expected no options, amodal has none; found size"),
-        ({"obb": {}}, r"labels: expected one of amodal; found 'obb'.*: name it in channels or annotations, too"),
+        ({"obb": {}}, r"labels: expected none, as no label .*; found 'obb': name it in channels or annotations, too"),
         ({"amodal": 3}, r"labels\.amodal: expected a mapping"),
     ],
 )

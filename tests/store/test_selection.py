@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from cube_dataset import make
-from viewsphere import Dataset
+from small import small_recipe
+from viewsphere import Dataset, generate
 from viewsphere.errors import UserError
 from viewsphere.store import dataset as reading
 
@@ -66,6 +67,49 @@ KINDS = {
     "view": (np.float64, (4,)),
     "mask": (np.bool_, (72, 96)),
 }
+
+
+ASKED = ("amodal", "occluders", "obb", "contour", "birds_eye")
+
+
+def test_labels_on_request_become_arrays_masks_or_lists(tmp_path):
+    dataset = make(tmp_path / "out", several=True, annotations=ASKED)
+    names = ("amodal", "box2d_amodal", "obb", "hull", "occluders", "birds_eye", "birds_eye_corners", "rle")
+    item, sample = dataset.select(*(f"objects.{name}" for name in names))[1], dataset[1]
+    assert item["objects.amodal"].shape == item["objects.rle"].shape == (3, 72, 96)
+    for mask, o in zip(item["objects.amodal"], sample.objects, strict=True):
+        assert (mask & ~o.mask).any() == (o.occluders != ())
+    assert item["objects.obb"].shape == (3, 4, 2) and item["objects.box2d_amodal"].shape == (3, 4)
+    assert np.isnan(item["objects.obb"][2]).all()  # out of sight
+    assert [len(hull) for hull in item["objects.hull"]] == [len(o.hull) for o in sample.objects]
+    assert item["objects.occluders"] == [o.occluders for o in sample.objects]
+    assert item["objects.birds_eye"] == [o.birds_eye for o in sample.objects]
+    assert item["objects.birds_eye_corners"].shape == (3, 4, 2)
+
+
+def test_what_nobody_asked_for_is_told(dataset):
+    with pytest.raises(AttributeError, match="add it to the recipe's annotations"):
+        _ = dataset.select("objects.amodal")[0]
+    with pytest.raises(AttributeError, match="camera_from_next"):
+        _ = dataset.select("camera_from_next")[0]
+
+
+def test_one_sensor_of_a_rig_is_selected(tmp_path):
+    eyes = small_recipe(
+        rig={"kind": "stereo", "baseline": 0.1}, channels=["instances"], annotations=["sensor_poses"], formats=[]
+    )
+    generate(eyes, tmp_path, workers=0)
+    dataset = Dataset(tmp_path)
+    names = sorted({sample.sensor for sample in dataset})
+    for name in names:
+        chosen = dataset.select("sensor", "index", "camera_from_sensors", sensor=name)
+        assert len(chosen) == len(dataset) / 2
+        assert {item["sensor"] for item in chosen} == {name}
+        assert len(chosen[0]["camera_from_sensors"]) == 2
+    both = [item["index"] for name in names for item in dataset.select("index", sensor=name)]
+    assert sorted(both) == [sample.index for sample in dataset]
+    with pytest.raises(UserError, match="select: sensor: expected one that took pictures; found 'third'"):
+        dataset.select("index", sensor="third")
 
 
 def test_frames_without_objects_have_arrays_of_no_rows(dataset, monkeypatch):

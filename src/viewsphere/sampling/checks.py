@@ -84,14 +84,14 @@ def _check_annotation(recipe: Recipe, where: str, name: str) -> None:
 
 def _check_options(recipe: Recipe, name: str, given: Mapping[str, JsonValue]) -> None:
     """Options of a label that the recipe names."""
-    asked = tuple(label for label in (*recipe.channels, *recipe.annotations) if label in labels())
-    if name not in asked:
-        raise RecipeError(f"labels: {one_of(name, asked)}: name it in channels or annotations, too")
+    named = tuple(label for label in (*recipe.channels, *recipe.annotations) if label in labels())
+    if name not in named:
+        some = tuple(label for label in named if labels()[label].options)
+        known = one_of(name, some) if some else f"expected none, as no label that the recipe names has options; found {name!r}"
+        raise RecipeError(f"labels: {known}: name it in channels or annotations, too")
     options = labels()[name].options
     if options is None:
-        raise RecipeError(
-            f"labels.{name}: expected no options, {name} has none; found {', '.join(given) or 'an empty mapping'}"
-        )
+        raise RecipeError(f"labels.{name}: expected no options, {name} has none; found {', '.join(given) or 'a mapping'}")
     read_options(options, given, f"labels.{name}")
 
 

@@ -147,22 +147,28 @@ class Dataset(Shown, Sequence[Sample]):
         for key, places in self._shots[0]:
             yield from self.samples_of(key, places)
 
-    def select(self, *fields: str, split: str | None = None) -> Selection:
-        """Some fields of the frames, of one split or of all: a map-style data set for PyTorch's DataLoader. Only what is named
-        is decoded.
+    def select(self, *fields: str, split: str | None = None, sensor: str | None = None) -> Selection:
+        """Some fields of the frames, of one split and of one sensor or of all: a map-style data set for PyTorch's DataLoader.
+        Only what is named is decoded.
 
         `fields`: names of channels (`rgb`), of values of samples (`index`, `split`, `sensor`, `time`, `camera.K`,
-        `pose.azimuth_deg`, ...), and of objects (`objects.box2d`, `objects.category_id`, `objects.mask`, ...), which become
-        arrays (N, ...), float64, int64 or bool, NaN where there is no value, or lists of texts; `objects.view` is (N, 4):
+        `pose.azimuth_deg`, `camera_from_next`, ...), and of objects (`objects.box2d`, `objects.category_id`, `objects.mask`,
+        `objects.keypoints`, ...). Those of objects become arrays (N, ...), float64, int64 or bool, NaN where there is no value,
+        of run-length codes masks (N, H, W); lists where they have no one shape, or are no numbers. `objects.view` is (N, 4):
         azimuth, elevation (degrees), distance (metres), tilt (degrees). Raises UserError for others.
         """
-        return Selection(self, fields, split)
+        return Selection(self, fields, split, sensor)
 
-    def of_split(self, split: str) -> Iterator[int]:
-        """Positions of the frames of a split in the data set; reads all records."""
+    def of(self, split: str | None = None, sensor: str | None = None) -> Iterator[int]:
+        """Positions of the frames of a split, and of a sensor, in the data set; reads all records."""
         for (key, places), first in zip(*self._shots, strict=False):
-            splits = self._read_records(key).splits
-            yield from (first + i for i, place in enumerate(places) if splits[place] == split)
+            records = self._read_records(key)
+            splits, sensors = records.splits, records.sensors
+            yield from (
+                first + i
+                for i, place in enumerate(places)
+                if split in (None, splits[place]) and sensor in (None, sensors[place])
+            )
 
     def shots(self) -> Iterator[tuple[str, Sequence[int]]]:
         """Key of every finished shot, in frame order, and which of its frames are chosen, counted from 0."""
@@ -418,6 +424,14 @@ class _Records:
             return [record.get("split", "") for record in self.records]
         shot = self.shot.shot
         return [shot.instants[instant].split for _, instant, _ in shot.samples]
+
+    @property
+    def sensors(self) -> list[str]:
+        """The name of each sample's sensor."""
+        if self.shot is None:
+            return [record.get("sensor", CAMERA) for record in self.records]
+        shot = self.shot.shot
+        return [shot.rig.sensors[sensor].name for _, _, sensor in shot.samples]
 
 
 class _ChannelFiles(Mapping[str, NDArray[Any]]):

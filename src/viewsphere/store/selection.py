@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.errors import UserError
-from viewsphere.labels import Field, object_labels
+from viewsphere.geometry.mask import decode_rle
+from viewsphere.labels import Field, object_labels, sample_labels
 from viewsphere.model.mistakes import one_of
-from viewsphere.model.sample import ObjectView, Sample
+from viewsphere.model.sample import ObjectView, Rle, Sample
 
 if TYPE_CHECKING:
     from viewsphere.store.dataset import Dataset
@@ -29,15 +30,18 @@ class Selection(Sequence[dict[str, Any]]):
     in memory that does not grow, and travels to workers as the data set's path.
     """
 
-    def __init__(self, dataset: Dataset, fields: Sequence[str], split: str | None = None) -> None:
-        known = (*dataset.plan.channels, *OF_SAMPLE, *OF_CAMERA, *OF_POSE, *(f"objects.{name}" for name in _of_objects()))
+    def __init__(self, dataset: Dataset, fields: Sequence[str], split: str | None = None, sensor: str | None = None) -> None:
+        of_labels = (*_of_pictures(), *(f"objects.{name}" for name in _of_objects()))
+        known = (*dataset.plan.channels, *OF_SAMPLE, *OF_CAMERA, *OF_POSE, *of_labels)
         for name in fields:
             if name not in known:
                 raise UserError(f"{dataset.root}: select: {one_of(name, known)}")
         if split is not None and split not in dataset.splits:
             raise UserError(f"{dataset.root}: select: split: {one_of(split, dataset.splits)}")
-        self.dataset, self.fields, self.split = dataset, tuple(fields), split
-        self._numbers = None if split is None else array("q", dataset.of_split(split))
+        self.dataset, self.fields, self.split, self.sensor = dataset, tuple(fields), split, sensor
+        self._numbers = None if split is None and sensor is None else array("q", dataset.of(split, sensor))
+        if sensor is not None and not self._numbers:
+            raise UserError(f"{dataset.root}: select: sensor: expected one that took pictures; found {sensor!r}")
 
     def __repr__(self) -> str:
         return f"<Selection of {self.dataset.name}: {len(self):,} frames; {', '.join(self.fields)}>"
@@ -61,23 +65,43 @@ def _value(sample: Sample, name: str) -> Any:
     whole, _, part = name.partition(".")
     if whole == "objects":
         return _stacked(sample, part)
-    return getattr(getattr(sample, whole), part) if part else getattr(sample, whole)
+    if part:
+        return getattr(getattr(sample, whole), part)
+    field = _of_pictures().get(name)
+    value = getattr(sample, name)
+    return _filled(value, field.shape) if field and field.is_regular else value
 
 
 def _of_objects() -> dict[str, Field]:
-    """The fields of objects that arrays or texts can hold."""
-    fields = (field for label in object_labels() for field in label.fields if field.is_regular)
-    plain = {field.name: field for field in fields if field.type in (float, int, bool, str, ObjectView)}
-    return {"id": Field("id", "", int), "mask": Field("mask", "", bool), **plain}
+    """The fields of objects."""
+    fields = {field.name: field for label in object_labels() for field in label.fields}
+    return {"id": Field("id", "", int), "mask": Field("mask", "", bool), **fields}
 
 
-def _stacked(sample: Sample, name: str) -> NDArray[Any] | list[str]:
-    """A field of all objects: an array (N, ...), NaN where an object has no such value, or a list of texts."""
+def _of_pictures() -> dict[str, Field]:
+    """The fields of labels of whole pictures."""
+    return {field.name: field for label in sample_labels().values() for field in label.fields}
+
+
+DTYPES: dict[Any, Any] = {float: np.float64, int: np.int64, bool: np.bool_}
+"""Of arrays, by the types of numbers."""
+
+
+def _stacked(sample: Sample, name: str) -> NDArray[Any] | list[Any]:
+    """A field of all objects: an array (N, ...), NaN where an object has no such value; of run-length codes the masks; a list
+    of what has no one shape, texts and arrays of other lengths among it.
+    """
     field, values = _of_objects()[name], [getattr(o, name) for o in sample.objects]
-    if field.type is str:
-        return values
+    size = sample.height, sample.width
+    if field.type is Rle:
+        return np.array([decode_rle(one.height, one.width, one.counts) for one in values], np.bool_).reshape(-1, *size)
     if field.type is ObjectView:
         return np.array([[*view.__dict__.values()] for view in values], np.float64).reshape(-1, 4)
-    shape = (sample.height, sample.width) if name == "mask" else field.shape
-    filled = [np.full(shape, np.nan) if value is None else value for value in values]
-    return np.array(filled, {float: np.float64, int: np.int64, bool: np.bool_}[field.type]).reshape(-1, *shape)
+    if not field.is_regular or field.type not in DTYPES:
+        return values
+    shape = size if name == "mask" else field.shape
+    return np.array([_filled(value, shape) for value in values], DTYPES[field.type]).reshape(-1, *shape)
+
+
+def _filled(value: Any, shape: tuple[int, ...]) -> Any:
+    return np.full(shape, np.nan) if value is None else value
