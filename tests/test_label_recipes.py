@@ -5,8 +5,9 @@ import pytest
 from small import ROOT
 from viewsphere import Recipe, generate
 from viewsphere.check import check
-from viewsphere.labels import labels, on_request
+from viewsphere.labels import drawable, labels, on_request
 from viewsphere.model.channel import DEFAULT_CHANNELS
+from viewsphere.preview.frame import draw_sample
 from viewsphere.store import Dataset
 
 RECIPES = sorted((ROOT / "recipes" / "labels").glob("*.yaml"))
@@ -27,6 +28,15 @@ def test_a_label_s_recipe_makes_a_data_set_that_passes(file, tmp_path):
     shown = {*recipe.annotations, *recipe.channels} - {*DEFAULT_CHANNELS}
     assert shown
     assert {report.checked[name] for name in (*(shown & labels().keys()), "surface")} <= seen
+    pictures = [sample for sample in dataset if "rgb" in sample.files]
+    for source in shown & drawable().keys() - {"lidar"}:
+        assert any(changes_the_picture(sample, source) for sample in pictures), source
+
+
+def changes_the_picture(sample, source):
+    """Whether a label's drawing shows anything, over the picture or beside it."""
+    plain, drawn = draw_sample(sample), draw_sample(sample, [drawable()[source].name])
+    return plain.shape != drawn.shape or (plain != drawn).any()
 
 
 def test_every_label_on_request_has_a_recipe():

@@ -5,10 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+Color = tuple[int, int, int]
+"""sRGB, 0 to 255."""
+
 PALETTE = ((230, 75, 60), (50, 130, 220), (45, 165, 95), (240, 170, 40), (150, 90, 200), (20, 170, 180))
 
 
-def color_of(object_id: int) -> tuple[int, int, int]:
+def color_of(object_id: int) -> Color:
     """An object's colour, sRGB."""
     return PALETTE[(object_id - 1) % len(PALETTE)]
 

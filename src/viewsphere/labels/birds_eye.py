@@ -5,15 +5,20 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from viewsphere.geometry.rotation import transform
 from viewsphere.labels._field import Field
-from viewsphere.labels._label import Models, ObjectLabel, rendered
+from viewsphere.labels._label import Drawing, Models, ObjectLabel, rendered
+from viewsphere.labels._lines import in_space
+from viewsphere.labels._paint import color_of
 from viewsphere.labels._placement import Placement
 from viewsphere.model.sample import Sample
+
+if TYPE_CHECKING:
+    from PIL.ImageDraw import ImageDraw
 
 TOLERANCE = 1e-9
 
@@ -75,6 +80,15 @@ def prove(sample: Sample, models: Models) -> Iterator[str]:
             yield f"object {o.id}: expected birds_eye_corners {np.array(expected).tolist()}, found {corners.tolist()}"
 
 
+def draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
+    """The rectangle on the height of the box's lowest corner, with a line to its front."""
+    for o in sample.objects:
+        low = float(o.box3d[:, 2].min())
+        corners = np.column_stack([o.birds_eye_corners, np.full(4, low)])
+        in_space(pen, sample, scale, corners[[0, 1, 2, 3, 0]], color_of(o.id))
+        in_space(pen, sample, scale, np.array([corners.mean(axis=0), corners[:2].mean(axis=0)]), color_of(o.id))
+
+
 LABEL = ObjectLabel.derived(
     of,
     name="birds_eye",
@@ -88,4 +102,5 @@ LABEL = ObjectLabel.derived(
         ),
     ),
     prove=prove,
+    drawing=Drawing("birds_eye", lines=draw, key=(("birds_eye: a line leads to the front", None),)),
 )

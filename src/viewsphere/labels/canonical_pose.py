@@ -4,18 +4,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.geometry.rotation import compose, product, rigid
+from viewsphere.geometry.rotation import compose, product, rigid, transform
 from viewsphere.labels._field import Field
-from viewsphere.labels._label import Models, ObjectLabel, rendered
+from viewsphere.labels._label import Drawing, Models, ObjectLabel, rendered
+from viewsphere.labels._lines import in_space
 from viewsphere.labels._placement import Placement
 from viewsphere.model.sample import Sample
 from viewsphere.model.scene import IDENTITY
 from viewsphere.model.symmetries import Continuous, Symmetries
+
+if TYPE_CHECKING:
+    from PIL.ImageDraw import ImageDraw
 
 Float = NDArray[np.float64]
 
@@ -101,6 +105,21 @@ def prove(sample: Sample, models: Models) -> Iterator[str]:
             yield f"object {o.id}: expected camera_from_object of a model without symmetries, found another canonical pose"
 
 
+def draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
+    """The axes of the canonical pose: x red, y green, z blue."""
+    camera = sample.camera
+    for o in sample.objects:
+        size = (o.diameter or 1.0) / 3
+        axes = transform(o.canonical_pose, np.vstack([np.zeros(3), size * np.eye(3)]))
+        in_world = transform(camera.R.T, axes - camera.t)
+        for axis, color in zip(in_world[1:], AXES, strict=True):
+            in_space(pen, sample, scale, np.array([in_world[0], axis]), color, 3)
+
+
+AXES = ((220, 50, 40), (40, 160, 60), (50, 90, 230))
+"""Colours of x, y and z."""
+
+
 LABEL = ObjectLabel.derived(
     of,
     name="canonical_pose",
@@ -117,4 +136,5 @@ LABEL = ObjectLabel.derived(
         Field("diameter", "the largest distance between two vertices of its model", float, (), "m", "object", optional=True),
     ),
     prove=prove,
+    drawing=Drawing("canonical_pose", lines=draw, key=(("canonical_pose: x red, y green, z blue", None),)),
 )

@@ -4,16 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from viewsphere.geometry.mask import decode_rle
 from viewsphere.labels._field import Field
-from viewsphere.labels._label import Models, ObjectLabel, rendered
+from viewsphere.labels._label import Drawing, Models, ObjectLabel, rendered
+from viewsphere.labels._lines import arrow, middle
+from viewsphere.labels._paint import color_of
 from viewsphere.labels._placement import Placement
 from viewsphere.labels._sight import Alone, Sight
 from viewsphere.model.sample import ObjectAnnotation, Sample
+
+if TYPE_CHECKING:
+    from PIL.ImageDraw import ImageDraw
 
 
 @dataclass(frozen=True)
@@ -88,6 +93,20 @@ def _mask(o: ObjectAnnotation) -> Any:
     return decode_rle(o.amodal.height, o.amodal.width, o.amodal.counts)
 
 
+def draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
+    """An arrow from each object to those that overlap with it and lie mostly behind it."""
+    by_id = {o.id: o for o in sample.objects}
+    for o in sample.objects:
+        for one in o.overlaps:
+            start, end = middle(o), middle(by_id[one.id]) if one.id in by_id else None
+            if start and end and one.nearer > MOSTLY:
+                arrow(pen, (start[0] * scale, start[1] * scale), (end[0] * scale, end[1] * scale), color_of(o.id))
+
+
+MOSTLY = 0.5
+"""Share of the common pixels from which on an object is drawn as the nearer one."""
+
+
 LABEL = ObjectLabel(
     name="depth_order",
     meaning="which objects overlap with it, and which of the two is nearer",
@@ -104,4 +123,5 @@ LABEL = ObjectLabel(
     keep=lambda o: [[one.id, one.pixels, one.nearer] for one in o.overlaps] or None,
     restore=restore,
     prove=prove,
+    drawing=Drawing("depth_order", lines=draw, key=(("depth_order: arrows lead from the nearer object", None),)),
 )

@@ -5,15 +5,20 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from viewsphere.labels._field import Field
-from viewsphere.labels._label import Models, ObjectLabel, rendered
+from viewsphere.labels._label import Drawing, Models, ObjectLabel, rendered
+from viewsphere.labels._lines import arrow, middle, note
+from viewsphere.labels._paint import color_of
 from viewsphere.labels._placement import Placement
 from viewsphere.labels._sight import Sight
 from viewsphere.model.sample import ObjectAnnotation, Sample
+
+if TYPE_CHECKING:
+    from PIL.ImageDraw import ImageDraw
 
 
 @dataclass(frozen=True)
@@ -59,6 +64,18 @@ def prove(sample: Sample, models: Models) -> Iterator[str]:
             yield f"object {o.id}: expected occluders of {hidden:.6f} of it, found {math.fsum(shares):.6f}"
 
 
+def draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
+    """An arrow from each object to what hides it, with the share in words."""
+    by_id = {o.id: o for o in sample.objects}
+    for o in sample.objects:
+        for one in o.occluders:
+            start, end = middle(o), middle(by_id[one.id]) if one.id in by_id else None
+            if start and end:
+                arrow(pen, (start[0] * scale, start[1] * scale), (end[0] * scale, end[1] * scale), color_of(o.id))
+        if o.occluders:
+            note(pen, o, scale, f"{sum(one.share for one in o.occluders):.0%}", color_of(o.id))
+
+
 LABEL = ObjectLabel(
     name="occluders",
     meaning="what hides it",
@@ -72,4 +89,5 @@ LABEL = ObjectLabel(
     keep=lambda o: [[one.id, one.share] for one in o.occluders] or None,
     restore=restore,
     prove=prove,
+    drawing=Drawing("occluders", lines=draw, key=(("occluders: arrows lead to what hides an object", None),)),
 )

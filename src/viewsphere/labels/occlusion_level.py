@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from viewsphere.labels._field import Field
-from viewsphere.labels._label import Models, ObjectLabel, rendered
+from viewsphere.labels._label import Drawing, Models, ObjectLabel, rendered
+from viewsphere.labels._lines import note
+from viewsphere.labels._paint import color_of
 from viewsphere.labels._placement import Placement
 from viewsphere.model.sample import ObjectAnnotation, Sample
+
+if TYPE_CHECKING:
+    from PIL.ImageDraw import ImageDraw
 
 PARTLY, LARGELY = 0.05, 0.5
 """Hidden shares of an object's pixels in the image, above which it is partly, and largely occluded. KITTI's people judged by
@@ -34,6 +39,12 @@ def prove(sample: Sample, models: Models) -> Iterator[str]:
             yield f"object {o.id}: expected a grade of 0 to 3 that fits {o.area} visible pixels, found {grade}"
 
 
+def draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
+    """The grade at each object's box."""
+    for o in sample.objects:
+        note(pen, o, scale, f"{o.occlusion_level}", color_of(o.id))
+
+
 LABEL = ObjectLabel(
     name="occlusion_level",
     meaning="how much others hide of it, in KITTI's grades",
@@ -47,4 +58,5 @@ LABEL = ObjectLabel(
     ),
     restore=restore,
     prove=prove,
+    drawing=Drawing("occlusion_level", lines=draw, key=(("occlusion_level: 1 partly, 2 largely occluded", None),)),
 )

@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from viewsphere.labels._field import Field
-from viewsphere.labels._label import Models, ObjectLabel, rendered
+from viewsphere.labels._label import Drawing, Models, ObjectLabel, rendered
+from viewsphere.labels._lines import note
+from viewsphere.labels._paint import color_of
 from viewsphere.labels._placement import Placement
 from viewsphere.model.sample import ObjectAnnotation, Sample
+
+if TYPE_CHECKING:
+    from PIL.ImageDraw import ImageDraw
 
 TRUNCATED, LARGELY = 0.15, 0.5
 """Shares outside of the image above which an object is truncated, and largely so: the most that the benchmark's easy and hard
@@ -30,6 +35,12 @@ def prove(sample: Sample, models: Models) -> Iterator[str]:
             yield f"object {o.id}: expected a grade of 0 to 2 that fits its box {inside}, found {grade}"
 
 
+def draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
+    """The grade at each object's box."""
+    for o in sample.objects:
+        note(pen, o, scale, f"{o.truncation_level}", color_of(o.id))
+
+
 LABEL = ObjectLabel(
     name="truncation_level",
     meaning="how much of it lies outside of the image, in KITTI's grades",
@@ -37,4 +48,5 @@ LABEL = ObjectLabel(
     fields=(Field("truncation_level", f"outside are: 0 at most {TRUNCATED:.0%}, 1 at most {LARGELY:.0%}, 2 more", int),),
     restore=restore,
     prove=prove,
+    drawing=Drawing("truncation_level", lines=draw, key=(("truncation_level: 0 inside, 1 truncated, 2 largely so", None),)),
 )

@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.geometry.rotation import product, rotation_vector, transform
 from viewsphere.labels._field import Field
-from viewsphere.labels._label import Models, Needs, ObjectLabel, rendered
+from viewsphere.labels._label import Drawing, Models, Needs, ObjectLabel, rendered
+from viewsphere.labels._lines import in_space
+from viewsphere.labels._paint import color_of
 from viewsphere.labels._placement import Placement
 from viewsphere.labels._sight import Sight
 from viewsphere.model.sample import ObjectAnnotation, Sample
+
+if TYPE_CHECKING:
+    from PIL.ImageDraw import ImageDraw
 
 Float = NDArray[np.float64]
 
@@ -60,6 +65,18 @@ def prove(sample: Sample, models: Models) -> Iterator[str]:
             yield f"object {o.id}: expected velocity and angular velocity together, found {o.velocity}, {o.angular_velocity}"
 
 
+def draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
+    """A line from the middle of each object's box to where that is half a second later."""
+    for o in sample.objects:
+        if o.velocity is not None:
+            center = (o.box3d[2] + o.box3d[4]) / 2
+            in_space(pen, sample, scale, np.array([center, center + AHEAD * o.velocity]), color_of(o.id), 3)
+
+
+AHEAD = 0.5
+"""Seconds of motion that are drawn."""
+
+
 LABEL = ObjectLabel(
     name="velocity",
     meaning="how it moves",
@@ -75,4 +92,5 @@ LABEL = ObjectLabel(
     keep=keep,
     restore=restore,
     prove=prove,
+    drawing=Drawing("velocity", lines=draw, key=(("velocity: half a second of motion", None),)),
 )

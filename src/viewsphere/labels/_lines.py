@@ -1,0 +1,53 @@
+"""Lines and words that labels are drawn with, over a picture."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.geometry.camera import project
+from viewsphere.geometry.rotation import transform
+from viewsphere.labels._paint import Color
+from viewsphere.model.sample import ObjectAnnotation, Sample
+
+if TYPE_CHECKING:
+    from PIL.ImageDraw import ImageDraw
+
+HEAD = 0.25
+"""Length of an arrow's head, as a share of the arrow."""
+
+
+def in_space(pen: ImageDraw, sample: Sample, scale: float, points: NDArray[np.float64], color: Color, width: int = 2) -> None:
+    """A line through points (N, 3) of the world; what the lens does not show is left out."""
+    camera = sample.camera
+    pixels = project(camera.intrinsics, transform(camera.R, points) + camera.t)[0] * scale
+    for a, b in zip(pixels[:-1].tolist(), pixels[1:].tolist(), strict=True):
+        if np.isfinite((*a, *b)).all():
+            pen.line((*a, *b), fill=color, width=width)
+
+
+def arrow(pen: ImageDraw, start: tuple[float, float], end: tuple[float, float], color: Color, width: int = 2) -> None:
+    """From one place of the picture to another."""
+    a, b = np.array(start), np.array(end)
+    along = (b - a) * HEAD
+    across = np.array([-along[1], along[0]]) / 2
+    pen.line((*start, *end), fill=color, width=width)
+    for side in (-1, 1):
+        pen.line((*end, *(b - along + side * across).tolist()), fill=color, width=width)
+
+
+def middle(o: ObjectAnnotation) -> tuple[float, float] | None:
+    """The middle of an object's box in the picture, of what is seen of it or else of the whole; None where it is not there."""
+    box = o.box2d or o.box2d_projected
+    return None if box is None else ((box[0] + box[2]) / 2, (box[1] + box[3]) / 2)
+
+
+def note(pen: ImageDraw, o: ObjectAnnotation, scale: float, words: str, color: Color) -> None:
+    """Words at the upper left corner of an object's box, on a ground of its colour."""
+    box = o.box2d or o.box2d_projected
+    if box is not None:
+        x, y = box[0] * scale, box[1] * scale
+        pen.rectangle(pen.textbbox((x + 2, y), words), fill=color)
+        pen.text((x + 2, y), words, fill=(255, 255, 255))
