@@ -13,9 +13,10 @@ from viewsphere.errors import RecipeError
 from viewsphere.formats.blend import is_camera_view
 from viewsphere.labels._paint import color_of
 from viewsphere.labels.lidar import LABEL
-from viewsphere.preview.frame import draw_sample
+from viewsphere.preview.frame import draw_sample, is_shown
 from viewsphere.preview.tiles import contact_sheet
 from viewsphere.store import Dataset
+from viewsphere.store.films import films_of
 
 ROTATED = [5.0, 20.0, -3.0]
 
@@ -303,3 +304,13 @@ TOP = {"lidar": {"rings": 4, "elevation": [-10, 0]}}
 def test_what_a_rig_cannot_have_is_said(changes, problem, tmp_path):
     with pytest.raises(RecipeError, match=problem):
         vs.generate(recipe(**changes), tmp_path / "out", workers=0)
+
+
+def test_a_lidar_of_a_sequence_is_shown_beside_its_camera(tmp_path):
+    moving = {"channels": ["rgb", "instances"], "time": {"frames": 2, "fps": 5}, "splits": {"by": "sequence", "train": 1}}
+    vs.generate(recipe(**moving), tmp_path, workers=0)
+    dataset = Dataset(tmp_path)
+    assert [film.sensors for film in films_of(dataset)] == [("front",)]
+    assert [film.sensors for film in films_of(dataset, is_shown)] == [("front", "top")]
+    sheet = contact_sheet(list(dataset), ["lidar"])
+    assert any((sheet == draw).all(axis=2).any() for draw in np.array([color_of(o.id) for o in dataset[0].objects]))

@@ -221,7 +221,7 @@ def preview(
     allow_scripts: AllowScripts = False,
 ) -> None:
     """Write a contact sheet (of sequences, filmstrips): a recipe's frames rendered small, or a data set's; or a video."""
-    from viewsphere.preview import Earlier, contact_sheet, dataset_samples, films_of, preview_samples, small_objects
+    from viewsphere.preview import Earlier, contact_sheet, dataset_samples, films_of, is_shown, preview_samples, small_objects
     from viewsphere.store import Dataset
 
     names = draw or []
@@ -233,7 +233,7 @@ def preview(
     recipe = None
     if source.is_dir():
         dataset = Dataset(source)
-        films = films_of(dataset)
+        films = films_of(dataset, is_shown)
         samples, before = dataset_samples(dataset, count, columns, films), Earlier(dataset, films)
     else:
         recipe = load_recipe(source, changes)

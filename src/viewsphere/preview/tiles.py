@@ -9,7 +9,18 @@ from PIL import Image, ImageDraw, ImageFont
 
 from viewsphere.labels import Color, drawings
 from viewsphere.model.sample import Sample
-from viewsphere.preview.frame import INK, PAPER, Before, Picture, check_drawn, draw_instant, draw_sample, extents, nothing
+from viewsphere.preview.frame import (
+    INK,
+    PAPER,
+    Before,
+    Picture,
+    check_drawn,
+    draw_instant,
+    draw_sample,
+    extents,
+    is_shown,
+    nothing,
+)
 from viewsphere.store.films import Film, films_of
 
 MARGIN = 8
@@ -29,7 +40,7 @@ def contact_sheet(
     `before` gives what a sample's sensor saw before it, for trails. Raises StoreError for what nobody can draw.
     """
     check_drawn(samples, draw)
-    films = films_of(samples)
+    films = films_of(samples, is_shown)
     strips = [_strip(samples, film, draw, width, before) for film in films]
     stills = [(draw_sample(s, draw, width), _caption(s)) for s in samples if not s.sequence]
     return with_key(tiled(*filter(None, (*strips, stills)), columns=columns), draw)

@@ -12,7 +12,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 from viewsphere.errors import StoreError, UserError
 from viewsphere.model.sample import Sample
-from viewsphere.preview.frame import INK, PAPER, Picture, check_drawn, draw_instant, extents
+from viewsphere.preview.frame import INK, PAPER, Picture, check_drawn, draw_instant, extents, is_shown
 from viewsphere.preview.mp4 import Shown, encoder, write_mp4
 from viewsphere.preview.tiles import CAPTION, MARGIN, film_caption, fitting, with_key
 from viewsphere.store.films import Earlier, Film, film_named, films_of
@@ -53,13 +53,13 @@ def write_video(
     for more pictures than a WebP may hold and where ffmpeg fails, MissingExtraError where ffmpeg is not installed.
     """
     write = _writer(file)
-    films = films_of(samples)
+    films = films_of(samples, is_shown)
     if not samples:
         raise StoreError("--video: expected finished frames, found none: render first")
     if not films:
         raise StoreError("--video: expected sequences, found still pictures: give the recipe a time, or leave out --video")
     films = films if sequence is None else [film_named(films, sequence)]
-    check_drawn([samples[film.places[0][0]] for film in films], draw)
+    check_drawn([samples[place] for film in films for place in film.places[0]], draw)
     size = _size([_first(samples, film, draw) for film in films])
     total = sum(len(film.instants) for film in films)
     with _Atomic(file) as aside:

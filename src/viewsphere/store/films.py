@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from bisect import bisect_left
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Container, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -22,7 +23,7 @@ ALONE = 1.0
 
 @dataclass(frozen=True)
 class Film:
-    """One sequence: the sensors with pictures, and, instant by instant, its number, its time in seconds and the place of each
+    """One sequence: the sensors that are shown, and, instant by instant, its number, its time in seconds and the place of each
     sensor's sample among all samples.
     """
 
@@ -52,38 +53,43 @@ Seen = tuple[str, int, str, int, float]
 """Sequence, instant, sensor, place among all samples, and time in seconds of a sample."""
 
 
-def films_of(samples: Sequence[Sample]) -> list[Film]:
-    """The sequences of samples, in their order; none of still pictures. Sensors and instants without pictures are left out.
+IsShown = Callable[[Container[str]], Any]
+"""Whether samples with these channels can be shown."""
+
+
+def films_of(samples: Sequence[Sample], is_shown: IsShown = picture_of) -> list[Film]:
+    """The sequences of samples, in their order; none of still pictures. Sensors and instants of which nothing is shown, by
+    default those without pictures, are left out.
 
     Of a data set no sample is read.
     """
-    return _films(_in_shots(samples) if isinstance(samples, Dataset) else _in_memory(samples))
+    return _films(_in_shots(samples, is_shown) if isinstance(samples, Dataset) else _in_memory(samples, is_shown))
 
 
-def _in_memory(samples: Iterable[Sample]) -> Iterator[Seen]:
+def _in_memory(samples: Iterable[Sample], is_shown: IsShown) -> Iterator[Seen]:
     for place, sample in enumerate(samples):
-        if sample.sequence and picture_of(sample.channels):
+        if sample.sequence and is_shown(sample.channels):
             yield sample.sequence, sample.instant, sample.sensor, place, sample.time
 
 
-def _in_shots(dataset: Dataset) -> Iterator[Seen]:
+def _in_shots(dataset: Dataset, is_shown: IsShown) -> Iterator[Seen]:
     """Parts of a data set without a time have no sequences; their shots are not read."""
     start = 0
     parts = dataset.plan.parts
     for key, places in dataset.shots():
         row = dataset.plan.find(key)
         if row is not None and row.part < len(parts) and parts[row.part].recipe.get("time"):
-            yield from _in_shot(dataset.labelled(key), places, start)
+            yield from _in_shot(dataset.labelled(key), places, start, is_shown)
         start += len(places)
 
 
-def _in_shot(shot: Shot | None, places: Sequence[int], start: int) -> Iterator[Seen]:
+def _in_shot(shot: Shot | None, places: Sequence[int], start: int, is_shown: IsShown) -> Iterator[Seen]:
     if shot is None or not shot.sequence:
         return
     own = list(shot.samples)
     for number, place in enumerate(places, start):
         _, instant, sensor = own[place]
-        if picture_of(shot.kept(sensor)):
+        if is_shown(shot.kept(sensor)):
             now = shot.instants[instant]
             yield shot.sequence, now.index, shot.rig.sensors[sensor].name, number, now.seconds
 
