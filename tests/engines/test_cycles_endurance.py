@@ -84,14 +84,14 @@ def test_a_run_whose_blender_is_killed_gives_the_same_files(blender, tmp_path, m
     start = time.perf_counter()
     generate(endured(), tmp_path / "calm", workers=0)
     killer = Killer(keeper_of(blender), seed=9, interval=(time.perf_counter() - start) / FRAMES)
-    color = CyclesStage.color
+    paint = CyclesStage.paint
 
     def counted(self, *given):
-        picture = color(self, *given)
+        pictures = paint(self, *given)
         killer.pictures += 1
-        return picture
+        return pictures
 
-    monkeypatch.setattr(CyclesStage, "color", counted)
+    monkeypatch.setattr(CyclesStage, "paint", counted)
     killer.start()
     generate(endured(), tmp_path / "killed", workers=0)
     killer.stop()

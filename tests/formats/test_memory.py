@@ -13,6 +13,7 @@ from viewsphere import Dataset, generate
 from viewsphere.recipe.formats import FormatEntry
 from viewsphere.run.exporting import write
 
+CHANNELS = ["rgb", "depth", "instances"]
 MOST_GROWTH = 400
 """Bytes a frame; its record alone has several thousand."""
 
@@ -24,7 +25,7 @@ def datasets(tmp_path_factory):
     for count in (60, 300):
         out = tmp_path_factory.mktemp("memory") / "out"
         views = {"azimuth": [i * 360 / count for i in range(count)], "elevation": 20, "distance": 1.0}
-        generate(small_recipe(viewpoints=views, formats=[], camera={"size": [32, 24]}, shot_frames=20), out)
+        generate(small_recipe(viewpoints=views, channels=CHANNELS, formats=[], camera={"size": [32, 24]}, shot_frames=20), out)
         found.append(out)
     return found
 
