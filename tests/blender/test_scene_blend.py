@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -33,16 +30,6 @@ ENGINE = {"name": "cycles", "samples": 1, "bounces": 1, "denoise": "off"}
 SHARP = {"pixel_filter_type": "GAUSSIAN", "filter_width": 0.01}
 INDEX = {"car": 11, "tree": 12, "aerial": 13}
 """Object index of each category in the files."""
-
-
-@pytest.fixture(scope="module")
-def made(blender, tmp_path_factory):
-    """The folder of the files that `make_scene` makes."""
-    folder = tmp_path_factory.mktemp("scenes")
-    script = Path(__file__).with_name("make_scene.py")
-    done = subprocess.run([blender, "-P", str(script), str(folder)], capture_output=True, text=True)
-    assert (folder / "made.json").exists(), done.stderr[-3000:]
-    return folder
 
 
 def recipe_of(file, engine=ENGINE, **changed):

@@ -11,6 +11,7 @@ from blurred_scenes import SCENES, load, meshes, sharp
 from light_stage import ball, cuboid, flat, quad
 from test_physics import camera, sky_file, stage_of, toward_sun
 
+from proven import close, told
 from shots import with_camera
 from viewsphere import Recipe, plan, zoo
 from viewsphere.assets.mesh import Image, Material, Texture
@@ -60,8 +61,9 @@ def test_a_matt_sphere_under_a_sun_is_lambert_s(tmp_path):
     cosine = np.maximum(normal @ toward_sun(SUN), 0)
     expected = cosine[..., None] * np.array(SUN.color) * SUN.strength / math.pi
     lit = sphere & (cosine > 0.1)
-    np.testing.assert_allclose(found["albedo"][sphere], np.tile(COLOR, (sphere.sum(), 1)), rtol=0.01)
     np.testing.assert_allclose(found["shading"][lit], expected[lit], rtol=0.01)
+    told("shading", "Lambert's sphere, a share of it", found["shading"][lit] / expected[lit] - 1)
+    close("albedo", "Lambert's sphere", found["albedo"][sphere], np.tile(COLOR, (sphere.sum(), 1)), rtol=0.01)
     assert found["shading"][sphere & (normal @ toward_sun(SUN) < -0.05)].max() == 0
     assert found["residual"][sphere].max() < 0.01 * expected.max()
     assert found["emission"].max() == 0
@@ -89,7 +91,7 @@ def test_a_plate_that_glows_sends_its_own_light(unlit):
     plate = flat(quad((-1, -1, 0), (2, 0, 0), (0, 2, 0)), Material(**look))
     found = passes(stage_of([plate], Scene(sun=SUN)), camera(16, 16, 40, 0, 60, 3))
     expected = COLOR / EXPOSURE if unlit else glow
-    np.testing.assert_allclose(found["emission"], np.broadcast_to(expected, (16, 16, 3)), rtol=1e-5)
+    close("emission", "a plate that glows", found["emission"], np.broadcast_to(expected, (16, 16, 3)), rtol=1e-5)
     assert (found["residual"] >= found["emission"] * (1 - 1e-5)).all()
     assert (found["albedo"].max() == 0) == unlit
 
@@ -158,6 +160,7 @@ def test_albedo_times_shading_and_the_rest_is_the_picture(where, catcher):
     )
     apart = np.abs(composed.astype(int) - found[name])
     assert apart.max() <= 1 and (apart > 0).mean() < 0.005
+    told("residual", "the picture, of albedo x shading + residual", apart, "of 255")
     assert (found["emission"] <= found["residual"] * (1 + 1e-5) + 1e-6).all()
     for each in ALL:
         assert np.isfinite(found[each]).all() and found[each].min() >= 0
@@ -212,8 +215,8 @@ def test_materials_are_those_at_the_pixels_centres():
     once = passes(stage_of([mesh], Scene(sun=SUN), antialias=1), view, MATERIAL_PASSES)
     middle = found["roughness"][4::8, 4::8], found["metallic"][4::8, 4::8]
     assert all(found[name].tobytes() == once[name].tobytes() for name in MATERIAL_PASSES)
-    np.testing.assert_allclose(middle[0], 0.8 * rough[..., 1] / 255, atol=2e-3)
-    np.testing.assert_allclose(middle[1], 0.5 * rough[..., 2] / 255, atol=2e-3)
+    close("roughness", "texels", middle[0], 0.8 * rough[..., 1] / 255, atol=2e-3)
+    close("metallic", "texels", middle[1], 0.5 * rough[..., 2] / 255, atol=2e-3)
 
 
 def test_passes_are_those_of_the_shutter_s_centre():

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from test_object_labels import LENS, UNIT, at, block, scene
 
 import viewsphere as vs
+from proven import close, equal, told
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.geometry.mask import decode_rle
@@ -47,6 +48,7 @@ def test_a_cube_behind_a_cube():
     np.testing.assert_array_equal(amodal(near), near.mask)
     np.testing.assert_array_equal(amodal(far) & ~far.mask, near.mask)
     assert (near.occluders, near.occlusion_level, near.truncation_level) == ((), 0, 0)
+    told("occlusion_level", "two cubes", (near.occlusion_level, far.occlusion_level - 1))
     ((front),) = far.occluders
     assert (front.id, front.share) == (1, near.area / amodal(far).sum())
     assert far.occlusion_level == 1
@@ -78,6 +80,7 @@ def test_the_grades_of_truncation():
     inside, cut, largely, outside = found[0]
     assert [o.truncation_level for o in (inside, cut, largely, outside)] == [0, *(_grade(o) for o in (cut, largely)), 2]
     assert {_grade(cut), _grade(largely)} <= {1, 2}
+    told("truncation_level", "four cubes", [o.truncation_level - _grade(o) for o in (inside, cut, largely, outside)])
     assert outside.occlusion_level == 3 and outside.occluders == () and amodal(outside).sum() == 0
     assert proofs(sample_of(found)) == []
 
@@ -100,6 +103,8 @@ def test_a_leaning_bar_has_an_oriented_box():
         near = 125 / 3.99  # pixels a metre at the bar's front
         assert abs(lengths.max() - 2 * near) < slack + 0.4 and abs(lengths.min() - 0.2 * near) < slack + 0.4
         assert abs(long[1] / long[0] + np.tan(angle)) < 0.02  # y points down
+        if corners is bar.obb_projected:
+            told("obb", "a bar's closed form", (lengths.max() - 2 * near, lengths.min() - 0.2 * near), "px")
     assert proofs(sample_of(found)) == []
 
 
@@ -108,10 +113,10 @@ def test_a_box_from_above(turn, yaw):
     """A model faces -Y: turned by an angle about Z its heading is that angle less 90 degrees."""
     found = scene([block((-1, -2, 0), (1, 2, 1))], [at(x=3.0, y=4.0, turn=np.radians(turn))], asked=ASKED)
     (o,) = found[0]
-    told = o.birds_eye
-    assert (told.x, told.y, told.length, told.width) == pytest.approx((3, 4, 4, 2))
-    assert told.yaw_deg == pytest.approx(yaw)
-    front = o.birds_eye_corners[:2].mean(axis=0) - (told.x, told.y)
+    box = o.birds_eye
+    close("birds_eye", "closed form", (box.x, box.y, box.length, box.width), (3, 4, 4, 2), "m", atol=1e-9)
+    assert box.yaw_deg == pytest.approx(yaw)
+    front = o.birds_eye_corners[:2].mean(axis=0) - (box.x, box.y)
     assert np.degrees(np.arctan2(*front[::-1])) == pytest.approx(yaw)
     assert proofs(sample_of(found)) == []
 
@@ -164,12 +169,33 @@ def test_embree_sees_the_same_hidden_parts(lens, seed):
     for o in objects:
         hit, distance = alone[o.id][0] >= 0, alone[o.id][1]
         assert (hit != amodal(o)).sum() <= hit.size / 2000
+        told("amodal", "Embree's rays, a share of all pixels", (hit != amodal(o)).mean())
         for one in o.occluders:
-            assert abs(one.share - (hit & (seen == one.id)).sum() / hit.sum()) <= 20 / hit.sum()
+            hidden = (hit & (seen == one.id)).sum()
+            assert abs(one.share - hidden / hit.sum()) <= 20 / hit.sum()
+            told("occluders", "Embree's rays, a share of the object", one.share - hidden / hit.sum())
         for one in o.overlaps:
             both = hit & (alone[one.id][0] >= 0)
             assert abs(one.pixels - both.sum()) <= hit.size / 1000
+            told("depth_order", "Embree's rays, a share of all pixels", (one.pixels - both.sum()) / hit.size)
             assert abs(one.nearer * one.pixels - (both & (distance < alone[one.id][1])).sum()) <= hit.size / 1000
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_contours_enclose_the_visible_pixels_and_no_others(seed):
+    """By the parity of edges to the right of each pixel's centre; every corner of them lies within the hull."""
+    objects, camera, *_ = random_scene(seed, "pinhole")
+    x, y = np.meshgrid(np.arange(camera.width) + 0.5, np.arange(camera.height) + 0.5)
+    for o in objects:
+        crossed = np.zeros(x.shape, int)
+        for ring in o.contour:
+            for (x0, y0), (x1, y1) in zip(ring, np.roll(ring, -1, axis=0), strict=True):
+                crossed += ((y0 > y) != (y1 > y)) & (x0 + (y - y0) * (x1 - x0) / (y1 - y0 if y1 != y0 else 1) > x)
+        equal("contour", "parity of edges", crossed % 2 == 1, o.mask)
+        for corners in o.contour:
+            side = np.roll(o.hull, -1, axis=0) - o.hull
+            away = corners[:, None] - o.hull
+            assert (side[:, 0] * away[..., 1] - side[:, 1] * away[..., 0] >= -1e-9).all()
 
 
 def embree(camera, geometry, chosen):

@@ -244,6 +244,7 @@ def test_points_are_drawn_from_above():
         ({"rings": 10_000, "azimuth_step": 0.01}, "expected at most 10,000,000 rays and 65,535 columns; found 10,000 rings"),
         ({"azimuth_step": 0.001}, "found 12 rings of 360,000 columns"),
         ({"azimuth_step": 7}, "expected azimuth_step to divide azimuth; found 7 for 360 degrees"),
+        ({"azimuth_step": 1e-300}, "found 12 rings of 3.6e\\+302 columns: take"),
         ({"azimuth_step": 0}, "azimuth_step"),
         ({"azimuth_step": float("nan")}, "azimuth_step"),
         ({"azimuth": [-300, 300]}, "expected at most a whole turn, 360 degrees; found 600"),

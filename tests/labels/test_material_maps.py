@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from label_scenes import changed, embree, pictured, proof, random_camera, random_things
+from proven import equal
 from sealing import seal_again
 from small import small_recipe
 from truth_scenes import LENSES, cube, lens, mesh_of, orbit_camera, placed
@@ -53,7 +54,7 @@ def test_embree_meets_triangles_of_these(name, seed):
     same = (triangle == visibility.triangle) & (sample.instances > 0)
     start = np.array((0, *geometry.triangle_start))[sample.instances[same]]
     assert same.sum() > 300
-    np.testing.assert_array_equal(sample.materials[same], (triangle[same] - start) % 6 + 1)
+    equal("materials", "Embree's rays", sample.materials[same], (triangle[same] - start) % 6 + 1)
     assert (sample.materials[sample.instances == 0] == 0).all()
 
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import viewsphere as vs
+from proven import close
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.rotation import rigid, rotation_about, rotation_vector
 
@@ -35,8 +36,8 @@ def samples():
 def test_a_constant_motion_has_its_velocity(samples):
     for sample in samples:
         (box,) = sample.objects
-        np.testing.assert_allclose(box.velocity, SPEED, atol=1e-9)
-        np.testing.assert_allclose(box.angular_velocity, np.radians(SPIN), atol=1e-9)
+        close("velocity", "closed form", box.velocity, SPEED, "m/s", atol=1e-9)
+        close("velocity", "closed form", box.angular_velocity, np.radians(SPIN), "rad/s", atol=1e-9)
         if 0 < sample.instant < 5:
             np.testing.assert_allclose(box.acceleration, 0, atol=1e-7)
         else:
@@ -74,7 +75,7 @@ def test_ego_motion_joins_the_cameras_of_neighbours(samples):
             assert (pose is None) == (other is None)
             if other is not None:
                 expected = rigid(sample.camera.R, sample.camera.t) @ np.linalg.inv(rigid(other.camera.R, other.camera.t))
-                np.testing.assert_allclose(pose, expected, atol=1e-9)
+                close("ego_motion", "both cameras", pose, expected, "m", atol=1e-9)
 
 
 def test_the_right_eye_stands_a_baseline_from_the_left(samples):
@@ -82,7 +83,8 @@ def test_the_right_eye_stands_a_baseline_from_the_left(samples):
         left, right = sample.camera_from_sensors
         own = 0 if sample.sensor == samples[0].sensor else 1
         np.testing.assert_allclose((left, right)[own], np.eye(4), atol=1e-9)
-        np.testing.assert_allclose((left, right)[1 - own][:3, 3], (0.1 if own == 0 else -0.1, 0, 0), atol=1e-9)
+        aside = (0.1 if own == 0 else -0.1, 0, 0)
+        close("sensor_poses", "the rig's baseline", (left, right)[1 - own][:3, 3], aside, "m", atol=1e-9)
 
 
 def test_they_are_kept_and_proved(tmp_path):

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from label_scenes import changed, embree, proof, random_sample
+from proven import close
 from truth_scenes import LENSES, cube, lens, mesh_of, orbit_camera, placed, sphere
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.geometry.rotation import transform
@@ -70,8 +71,8 @@ def test_through_the_pose_they_are_what_embree_meets_and_lifted_depth(name, seed
         own = (sample.instances == o.id) & (triangle == visibility.triangle)
         low, high = o.box3d_object.min(axis=0), o.box3d_object.max(axis=0)
         local = (low + high) / 2 + (sample.nocs[own].astype(float) - 0.5) * np.linalg.norm(high - low)
-        np.testing.assert_allclose(transform(o.world_from_object, local), points[own], atol=1e-4)
-        np.testing.assert_allclose(transform(o.camera_from_object, local), lifted[own], atol=5e-6)
+        close("nocs", "Embree's rays", transform(o.world_from_object, local), points[own], "m", atol=1e-4)
+        close("nocs", "lifted depth", transform(o.camera_from_object, local), lifted[own], "m", atol=5e-6)
         np.testing.assert_allclose(local, sample.coordinates[own], atol=3e-6)
         compared += own.sum()
     assert compared > 300

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import viewsphere as vs
+from proven import close, told
 from viewsphere.check import check
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.camera import project
@@ -47,7 +48,7 @@ def test_named_points_are_those_of_the_models_in_every_frame_of_reference(made):
             assert o.keypoint_names == tuple(known.points)
             assert len(o.keypoint_names) == len(o.keypoints) == len(o.keypoint_states) > 3
             own = np.column_stack([np.array([*known.points.values()]), np.ones(len(o.keypoints))])
-            np.testing.assert_allclose(o.keypoints3d, (own @ o.world_from_object.T)[:, :3], atol=1e-9)
+            close("keypoints", "poses", o.keypoints3d, (own @ o.world_from_object.T)[:, :3], "m", atol=1e-9)
             np.testing.assert_allclose(o.keypoints3d_camera, (own @ o.camera_from_object.T)[:, :3], atol=1e-9)
             np.testing.assert_allclose(o.keypoints, project(sample.camera.intrinsics, o.keypoints3d_camera)[0], atol=1e-9)
             seen.update(o.keypoint_states.tolist())
@@ -82,6 +83,7 @@ def test_rays_reach_what_is_visible_and_nothing_else(made):
             total += int(inside.sum())
     assert total > 30
     assert wrong <= total / 50
+    told("keypoints", "Embree's rays, a share of the states", wrong / total)
 
 
 def embree_distance(geometry, center, directions):
@@ -162,7 +164,8 @@ def test_all_poses_that_look_the_same_have_one_canonical_pose(kind):
         pose = rigid(random_rotation(rng), rng.normal(size=3))
         wanted = nearest(pose, symmetries)
         for motion in symmetries.motions(7):
-            np.testing.assert_allclose(nearest(compose(pose, motion), symmetries), wanted, atol=2e-6)
+            again = nearest(compose(pose, motion), symmetries)
+            close("canonical_pose", "that of every pose that looks the same", again, wanted, "m", atol=2e-6)
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -5,6 +5,7 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
+from proven import close, equal
 from shots import still_shot
 from viewsphere.assets.mesh import Mesh
 from viewsphere.geometry.box import FACES, box_vertices
@@ -64,17 +65,21 @@ def scene(meshes, motions, pose=None, intrinsics=LENS, ground=False, category_de
 def test_a_cube_seen_head_on():
     (cube,), *_ = scene([UNIT], [at()])
     half = 0.5 / 3.5 * 125  # 17.857 px about (80, 60)
-    assert cube.box2d_projected == pytest.approx((80 - half, 60 - half, 80 + half, 60 + half))
+    around = (80 - half, 60 - half, 80 + half, 60 + half)
+    close("box2d_projected", "closed form", cube.box2d_projected, around, "px", atol=1e-9)
     assert cube.box2d_unclipped == cube.box2d_projected
     assert cube.box2d == (62, 42, 98, 78)  # pixel centres within
     expected = np.zeros((120, 160), bool)
     expected[42:78, 62:98] = True
-    np.testing.assert_array_equal(cube.mask, expected)
+    equal("mask", "closed form", cube.mask, expected)
     assert cube.area == 36 * 36
     assert cube.polygons == [[62, 42, 98, 42, 98, 78, 62, 78]]
     assert (cube.visibility, cube.truncation) == (1.0, 0.0)
-    assert (cube.size, cube.real_size, cube.pose_category) == ((1, 1, 1), (1, 2, 3), "front")
-    assert (cube.id, cube.category, cube.key, cube.model) == (1, "cube", "m0", "MODELS/m0.glb")
+    close("size", "closed form", (*cube.size, *cube.real_size), (1, 1, 1, 1, 2, 3), "m")
+    equal("pose_category", "closed form", cube.pose_category, "front")
+    equal("category", "the recipe's entry", (cube.category, cube.supercategory, cube.category_id), ("cube", "", 1))
+    equal("model", "the model's file", (cube.key, cube.model, cube.track), ("m0", "MODELS/m0.glb", ""))
+    assert cube.id == 1
     np.testing.assert_allclose(cube.box3d_camera.mean(axis=0), (0, 0, 4), atol=1e-15)
     np.testing.assert_array_equal(cube.box3d, cube.box3d_object)
     np.testing.assert_allclose(cube.box3d_pixels[1], (80 + half, 60 + half))  # front, left of the object, bottom
@@ -97,16 +102,16 @@ def test_p_times_the_box_is_the_box_in_pixels(seed):
         np.testing.assert_array_equal(o.box3d_in_front, homogeneous[:, 2] > 0)
         front = o.box3d_in_front
         pixels = homogeneous[front, :2] / homogeneous[front, 2:]
-        np.testing.assert_allclose(o.box3d_pixels[front], pixels, rtol=1e-9, atol=1e-6)
+        close("box3d", "P x vertex", o.box3d_pixels[front], pixels, "px", rtol=1e-9, atol=1e-6)
         assert np.isnan(o.box3d_pixels[~front]).all()
-        np.testing.assert_allclose(o.camera_from_object, rigid(camera.R, camera.t) @ o.world_from_object, atol=1e-12)
+        close("pose", "camera x pose", o.camera_from_object, rigid(camera.R, camera.t) @ o.world_from_object, "m", atol=1e-12)
         np.testing.assert_allclose(matrix_from_quaternion(o.quaternion), o.camera_from_object[:3, :3], atol=1e-12)
         ids = np.where(visibility.triangle < 0, 0, geometry.triangle_object[visibility.triangle])
         np.testing.assert_array_equal(o.mask, ids == o.id)
         assert o.area == o.mask.sum()
         if o.area:
             rows, columns = np.nonzero(o.mask)
-            assert o.box2d == (columns.min(), rows.min(), columns.max() + 1, rows.max() + 1)
+            equal("box2d", "all pixels", o.box2d, (columns.min(), rows.min(), columns.max() + 1, rows.max() + 1))
         else:
             assert o.box2d is None
         large = rasterize(geometry, camera, object_id=o.id, window=(-160, -120, 320, 240)).triangle >= 0
@@ -130,7 +135,7 @@ def test_the_view_of_an_object_at_the_target_is_the_pose(azimuth, elevation, til
     (cube,), *_ = scene([UNIT], [at()], pose)
     view = cube.view
     assert view.distance == pytest.approx(4)
-    assert view.elevation_deg == pytest.approx(elevation)
+    close("view", "the camera's pose", view.elevation_deg, elevation, "deg", atol=1e-9)
     if abs(elevation) < 90:
         assert (view.azimuth_deg, view.tilt_deg) == pytest.approx((azimuth, tilt), abs=1e-9)
     else:  # azimuth and tilt are one and the same turn there
@@ -178,7 +183,7 @@ def test_one_cube_hides_another():
 def test_a_cube_half_outside():
     plate = block((-0.5, -0.001, -0.5), (0.5, 0.001, 0.5))
     (cut,), *_ = scene([plate], [at(x=80 / 125 * 3.999)])  # its middle projects to the image's right edge
-    assert (cut.truncation, cut.visibility) == (0.5, 0.5)
+    close("visibility", "a plate half outside", (cut.truncation, cut.visibility), (0.5, 0.5))
     assert cut.box2d_projected[2] == 160 < cut.box2d_unclipped[2]
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from label_scenes import changed, proof, random_sample
+from proven import equal
 from truth_scenes import LENSES
 from viewsphere.errors import StoreError
 from viewsphere.labels import Sight, channels
@@ -20,8 +21,8 @@ NAMES = ("depth", "instances", "semantic", "panoptic")
 @pytest.mark.parametrize("seed", range(3))
 def test_it_decodes_to_what_semantic_and_instances_are(name, seed):
     sample, *_ = random_sample(seed, name, NAMES)
-    np.testing.assert_array_equal(sample.panoptic >> 16, sample.semantic)
-    np.testing.assert_array_equal(sample.panoptic & 65535, sample.instances)
+    equal("panoptic", "semantic and instances", sample.panoptic >> 16, sample.semantic)
+    equal("panoptic", "semantic and instances", sample.panoptic & 65535, sample.instances)
     assert sample.panoptic.dtype == np.int32 and len(np.unique(object_of(sample.panoptic))) > 3
 
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from label_scenes import changed, embree, proof, random_sample
+from proven import told
 from truth_scenes import LENSES, lens, orbit_camera, placed, sphere
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.labels import observe
@@ -49,6 +50,7 @@ def test_embree_meets_the_same_points(name, seed):
     assert len(set(geometry.triangle_object[triangle[same]])) >= 3
     away = np.linalg.norm(points - sample.camera.center, axis=-1)
     assert (np.abs(sample.position - points).max(axis=-1) < 2e-5 * away)[same].all()
+    told("position", "Embree's rays", np.abs(sample.position - points)[same], "m")
 
 
 @pytest.mark.parametrize("name", LENSES)

@@ -3,6 +3,7 @@ import math
 import numpy as np
 import pytest
 
+from proven import close, equal, told
 from small import still_channels
 from truth_scenes import FISHEYE, LENSES, cube, lens, mesh_of, orbit_camera, placed, random_soup, sphere
 from viewsphere.geometry.camera import pixel_rays
@@ -50,7 +51,7 @@ def test_all_channels_tell_of_one_point(name):
     objects = geometry.triangle_object[triangle]
     assert {0, 1, 2, 3} == set(objects)
     assert np.array_equal(observed["instances"][seen], objects)
-    assert np.array_equal(observed["categories"][seen], np.array([0, 10, 11, 12])[objects])
+    equal("categories", "closed form", observed["categories"][seen], np.array([0, 10, 11, 12])[objects])
     assert np.array_equal(observed["parts"][seen], geometry.triangle_part[triangle])
     start = np.array((0, *geometry.triangle_start[:-1]))
     assert np.array_equal(observed["triangles"][seen], np.where(objects > 0, triangle - start[objects], -1))
@@ -65,16 +66,14 @@ def test_all_channels_tell_of_one_point(name):
     along = rays / visibility.inverse_depth[seen, None]
     off = np.abs(point @ camera.R.T + camera.t - along).max(axis=1)
     assert (off < 1e-6 * largest * np.abs(corners).max()).all()
+    told("barycentrics", "lifted rays", off[objects > 0], "m")
     np.testing.assert_allclose(observed["depth"][seen], along[:, 2], rtol=1e-6)
 
     solid = objects > 0
     local = observed["coordinates"][seen]
     assert np.isnan(local[~solid]).all()
-    np.testing.assert_allclose(
-        local[solid],
-        (weights[..., None] * geometry.coordinates[geometry.triangles[triangle]]).sum(axis=1)[solid],
-        atol=2e-6,
-    )
+    inside = (weights[..., None] * geometry.coordinates[geometry.triangles[triangle]]).sum(axis=1)
+    close("coordinates", "barycentrics of vertices", local[solid], inside[solid], "m", atol=2e-6)
 
 
 @pytest.mark.parametrize("name", LENSES)
@@ -86,12 +85,12 @@ def test_normals_are_unit_and_face_the_camera(name):
     expected = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     expected /= np.linalg.norm(expected, axis=1)[:, None]
     expected *= -np.sign((expected * rays).sum(axis=1))[:, None]
-    np.testing.assert_allclose(observed["normals_geometric"][seen], expected, atol=1e-5)
+    close("normals_geometric", "closed form", observed["normals_geometric"][seen], expected, atol=1e-5)
     normals = observed["normals"][seen].astype(float)
     np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1, atol=1e-6)
     assert (normals * rays).sum(axis=1).max() < 1e-6
     flat = np.isin(geometry.triangle_object[visibility.triangle[seen]], (0, 1))
-    np.testing.assert_allclose(normals[flat], expected[flat], atol=1e-6)
+    close("normals", "closed form", normals[flat], expected[flat], atol=1e-6)
 
 
 @pytest.mark.parametrize("name", LENSES)

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from proven import close
 from truth_scenes import LENSES, lens, orbit_camera, placed, random_soup, sphere
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.labels import observe
@@ -43,6 +44,8 @@ def test_the_ground_is_where_the_ray_meets_its_plane(name):
     rays /= np.linalg.norm(rays, axis=-1, keepdims=True)
     expected = (geometry.ground_z - camera.center[2]) / rays[:, 2]
     assert ground.sum() > 1000
+    near = expected < 10
+    close("depth_ray", "closed form, up to 10 m", observed["depth_ray"][ground][near], expected[near], "m", rtol=2e-6)
     np.testing.assert_allclose(observed["depth_ray"][ground], expected, rtol=2e-6)
 
 
@@ -66,7 +69,7 @@ def test_embree_measures_the_same(name):
     same = (np.asarray(hit["primID"]).reshape(72, 96) == visibility.triangle) & (visibility.triangle >= 0)
     assert same.sum() > 500
     far = np.asarray(hit["tfar"], np.float64).reshape(72, 96)
-    np.testing.assert_allclose(observed["depth_ray"][same], far[same], rtol=2e-5)
+    close("depth_ray", "Embree's rays", observed["depth_ray"][same], far[same], "m", rtol=2e-5)
     assert np.isinf(observed["depth_ray"][visibility.triangle < 0]).all()
 
 

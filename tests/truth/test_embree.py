@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from proven import equal, told
 from truth_scenes import LENSES, cube, least_weight, lens, mesh_of, orbit_camera, placed, sphere
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.labels import observe
@@ -94,9 +95,9 @@ def compare(geometry, cameras):
         objects = np.where(other >= 0, geometry.triangle_object[other], 0)
         parts = np.where(other >= 0, geometry.triangle_part[other], 0)
         start = np.array(geometry.triangle_start)[np.maximum(objects - 1, 0)]
-        assert np.array_equal(observed["instances"][agreed], objects[agreed])
-        assert np.array_equal(observed["parts"][agreed], parts[agreed])
-        assert np.array_equal(observed["triangles"][agreed], np.where(objects > 0, other - start, -1)[agreed])
+        equal("instances", "Embree's rays", observed["instances"][agreed], objects[agreed])
+        equal("parts", "Embree's rays", observed["parts"][agreed], parts[agreed])
+        equal("triangles", "Embree's rays", observed["triangles"][agreed], np.where(objects > 0, other - start, -1)[agreed])
     return toss_ups, overruled, np.concatenate(errors)
 
 
@@ -153,6 +154,7 @@ def test_ids_and_depth_on_procedural_scenes(name):
     assert toss_ups < 2e-4 * pixels
     assert overruled < 2e-5 * pixels
     assert np.quantile(errors, 0.999) <= 1e-4
+    told("depth", "Embree's rays, 999 of 1,000 pixels, at 10 m", np.quantile(errors, 0.999), "m")
 
 
 def real_models(count):

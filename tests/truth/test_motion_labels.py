@@ -6,8 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
-from two_views import pose, view
+from two_views import brute_points, expected_states, pose, view
 
+from proven import close, equal
 from truth_scenes import FISHEYE, cube, lens, mesh_of, orbit_camera, sphere
 from viewsphere.geometry.rotation import rigid
 from viewsphere.labels import Needs, Sight, channel_labels
@@ -135,16 +136,22 @@ def test_flow_is_that_of_depth_and_motion():
     owners = np.append(sight.neighbour().owners, -1)[sight.visibility.triangle]
     z, still = channels["depth"][..., None], (owners != 1) & (owners >= 0)
     expected = (centers - (48, 36)) * 0.2 / (z - 0.2)
-    close = still & (z[..., 0] < 100)
-    np.testing.assert_allclose(channels["flow"][close], expected[close], atol=1e-4)
-    np.testing.assert_allclose(channels["scene_flow"][still], np.broadcast_to((0, 0, -0.2), (still.sum(), 3)), atol=1e-6)
-    ball = owners == 1
-    np.testing.assert_allclose(channels["scene_flow"][ball], np.broadcast_to((0.1, 0, -0.2), (ball.sum(), 3)), atol=1e-6)
-    np.testing.assert_allclose(
-        channels["scene_flow_backward"][ball], np.broadcast_to((-0.1, 0, 0.2), (ball.sum(), 3)), atol=1e-6
+    near = still & (z[..., 0] < 100)
+    close("flow", "closed form", channels["flow"][near], expected[near], "px", atol=1e-4)
+    close(
+        "scene_flow",
+        "closed form",
+        channels["scene_flow"][still],
+        np.broadcast_to((0, 0, -0.2), (still.sum(), 3)),
+        "m",
+        atol=1e-6,
     )
-    back = (centers - (48, 36)) * -0.2 / (z + 0.2)
-    np.testing.assert_allclose(channels["flow_backward"][close], back[close], atol=1e-4)
+    ball = owners == 1
+    ahead, back = (np.broadcast_to(way, (ball.sum(), 3)) for way in ((0.1, 0, -0.2), (-0.1, 0, 0.2)))
+    close("scene_flow", "closed form", channels["scene_flow"][ball], ahead, "m", atol=1e-6)
+    close("scene_flow_backward", "closed form", channels["scene_flow_backward"][ball], back, "m", atol=1e-6)
+    expected = (centers - (48, 36)) * -0.2 / (z + 0.2)
+    close("flow_backward", "closed form", channels["flow_backward"][near], expected[near], "px", atol=1e-4)
     sky = owners == -1
     assert sky.any() and (channels["flow"][sky] == 0).all() and np.isnan(channels["scene_flow"][sky]).all()
 
@@ -153,10 +160,25 @@ def test_disparity_times_depth_is_focal_length_times_baseline():
     sight = whole()
     channels = observed(sight, "disparity", "depth", "disparity_state")
     seen = np.isfinite(channels["depth"])
-    product = channels["disparity"][seen].astype(np.float64) * channels["depth"][seen]
-    np.testing.assert_allclose(product, 0.1 * LENS.fx, rtol=2e-7)
+    expected = 0.1 * LENS.fx / channels["depth"][seen].astype(np.float64)
+    close("disparity", "focal length x baseline / depth", channels["disparity"][seen], expected, "px", rtol=2e-7)
     assert (channels["disparity"][~seen] == 0).all() and (channels["disparity_state"][~seen] != 4).all()
     assert {0, 1, 2} <= set(np.unique(channels["disparity_state"]))
+
+
+@pytest.mark.parametrize(
+    ("name", "where"),
+    [("flow_state", (1, None)), ("flow_backward_state", (-1, None)), ("disparity_state", (0, "right"))],
+)
+def test_states_are_those_of_brute_force(name, where):
+    sight = whole(sky=False)
+    own, there = sight.around.views[0, None], sight.around.views[where]
+    triangle, world, sure = brute_points(own, there)
+    seen = (triangle >= 0) & sure
+    first = np.minimum(triangle[seen], own.geometry.triangle_start[-1])
+    expected, known = expected_states(there, world[seen], first)
+    assert known.sum() > 3000 and len(set(expected[known].tolist())) >= 2
+    equal(name, "brute force in float64", observed(sight, name)[name][seen][known], expected[known])
 
 
 def test_left_and_right_agree():
@@ -178,7 +200,7 @@ def test_the_change_of_disparity_is_the_difference_of_the_points_disparities(zoo
     channels = observed(sight, "disparity", "disparity_change", "depth", "flow_state")
     z = channels["depth"].astype(np.float64)
     then = lens(96, 72, zoom).fx * 0.1 / (z - 0.2) - LENS.fx * 0.1 / z
-    np.testing.assert_allclose(channels["disparity_change"], then, atol=2e-6)
+    close("disparity_change", "closed form", channels["disparity_change"], then, "px", atol=2e-6)
     assert (channels["disparity_change"][np.isinf(z)] == 0).all()
 
 
@@ -248,7 +270,8 @@ def test_boundaries_are_where_things_move_apart():
     for axis in (0, 1):
         step = np.diff(thing, axis=axis) != 0
         outline |= np.pad(step, [(0, a == axis) for a in (0, 1)]) | np.pad(step, [(a == axis, 0) for a in (0, 1)])
-    assert np.array_equal(found > 0, outline) and outline.any()
+    assert outline.any()
+    equal("motion_boundaries", "outline of a card", found > 0, outline)
     assert not observed(sight_of(now, {(1, None): hardly}), "motion_boundaries")["motion_boundaries"].any()
 
 

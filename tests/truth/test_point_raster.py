@@ -5,21 +5,18 @@ import math
 
 import numpy as np
 import pytest
-from two_views import brute_hidden, brute_points, centers, matched, pose, thing, view
+from two_views import brute_hidden, brute_points, centers, expected_states, matched, pose, thing, view
 
 from truth_scenes import LENSES, cube, lens, mesh_of, orbit_camera, random_soup, sphere
 from viewsphere.assets.mesh import Material
-from viewsphere.geometry.camera import project
 from viewsphere.geometry.rotation import matrix_from_quaternion
 from viewsphere.model.camera import Camera
 from viewsphere.truth.geometry import build_geometry
-from viewsphere.truth.point_raster import BEHIND, INVALID, OCCLUDED, OUTSIDE, VISIBLE, states
+from viewsphere.truth.point_raster import INVALID, OCCLUDED, VISIBLE, states
 from viewsphere.truth.points import points_in_world, points_seen
 from viewsphere.truth.surface_draws import points_on
 from viewsphere.truth.view import View
 from viewsphere.truth.visibility import rasterize
-
-SURE = 1e-9
 
 
 def turned(rng):
@@ -34,19 +31,6 @@ def random_camera(rng, name, width=64, height=48):
         lens(width, height, fov, LENSES[name]), rng.uniform(0, 6), rng.uniform(-0.3, 1.2), rng.uniform(0.5, 6),
         rng.normal(size=3) * 0.3, tilt,
     )  # fmt: skip
-
-
-def expected_states(there, world, own):
-    """Of points (N, 3) by brute force, and which of them are no toss-up."""
-    camera = there.camera
-    xy, _ = project(camera.intrinsics, world @ camera.R.T + camera.t)
-    hidden, doubt = brute_hidden(there, world, own)
-    state = np.where(hidden, OCCLUDED, VISIBLE)
-    with np.errstate(invalid="ignore"):
-        edge = np.abs(np.concatenate([xy, xy - (camera.width, camera.height)], axis=1)).min(axis=1)
-        state[~((xy >= 0) & (xy < (camera.width, camera.height))).all(axis=1)] = OUTSIDE
-    state[np.isnan(xy[:, 0])] = BEHIND
-    return state, (doubt > SURE) & ~(edge < 1e-9)
 
 
 @pytest.mark.parametrize("name", LENSES)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from two_views import centers, matched, pose, view
 
+from proven import close
 from truth_scenes import LENSES, cube, lens, mesh_of, orbit_camera, sphere
 from viewsphere.geometry.rotation import matrix_from_quaternion
 from viewsphere.truth.point_raster import BEHIND, INVALID, OUTSIDE, VISIBLE
@@ -31,7 +32,7 @@ def test_points_move_rigidly_with_their_thing():
     points = points_on(here, 500, rng, things=[0])
     assert (points.thing == 0).all()
     own = np.column_stack((points.in_view(here).world, np.ones(500))) @ np.linalg.inv(np.array(first)).T
-    np.testing.assert_allclose(points.in_view(there).world, (own @ np.array(second).T)[:, :3], atol=1e-12)
+    close("tracks", "closed form", points.in_view(there).world, (own @ np.array(second).T)[:, :3], "m", atol=1e-12)
 
 
 @pytest.mark.parametrize("name", LENSES)

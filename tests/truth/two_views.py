@@ -11,7 +11,10 @@ from viewsphere.model.scene import Floor
 from viewsphere.model.thing import Motion, Thing, TimeStep
 from viewsphere.truth.correspondence import Match
 from viewsphere.truth.geometry import build_geometry, present
+from viewsphere.truth.point_raster import BEHIND, OCCLUDED, OUTSIDE, VISIBLE
 from viewsphere.truth.view import View
+
+SURE = 1e-9
 
 
 def pose(*position, turn=None):
@@ -68,6 +71,19 @@ def brute_points(here, there):
 
 def brute_xy(there, world):
     return project(there.camera.intrinsics, world @ there.camera.R.T + there.camera.t)[0]
+
+
+def expected_states(there, world, own):
+    """Of points (N, 3) by brute force, and which of them are no toss-up."""
+    camera = there.camera
+    xy, _ = project(camera.intrinsics, world @ camera.R.T + camera.t)
+    hidden, doubt = brute_hidden(there, world, own)
+    state = np.where(hidden, OCCLUDED, VISIBLE)
+    with np.errstate(invalid="ignore"):
+        edge = np.abs(np.concatenate([xy, xy - (camera.width, camera.height)], axis=1)).min(axis=1)
+        state[~((xy >= 0) & (xy < (camera.width, camera.height))).all(axis=1)] = OUTSIDE
+    state[np.isnan(xy[:, 0])] = BEHIND
+    return state, (doubt > SURE) & ~(edge < 1e-9)
 
 
 def brute_hidden(there, world, own, chunk=512):

@@ -42,8 +42,8 @@ def traits_of(spec: ModelSpec, mesh: Mesh, facts: FileFacts, step: TimeStep | No
         return Traits(across)
     if step is not None and step.frame != frame_of(spec, None):
         return Traits(across, keypoints=_own(mesh, across, facts))
-    path = sidecar_of(spec)
-    said = Sidecar() if path is None else _in_object_axes(_read(path), facts)
+    path, sidecar = said_of(spec)
+    said = _in_object_axes(sidecar, facts)
     if said.symmetries is not None and (problem := next(lacking(Surface.of(mesh), said.symmetries), None)):
         raise ModelError(f"{path}: {problem}")
     if said.keypoints is not None and (problem := next(far_points(mesh, across, said.keypoints), None)):
@@ -54,9 +54,14 @@ def traits_of(spec: ModelSpec, mesh: Mesh, facts: FileFacts, step: TimeStep | No
     return Traits(across, symmetries, said.keypoints or _own(mesh, across, facts) or _spread(spec, mesh))
 
 
-def _read(path: Path) -> Sidecar:
+def said_of(spec: ModelSpec) -> tuple[Path | None, Sidecar]:
+    """A model's sidecar and what it says; an empty one where there is none, and of a part of a file.
+
+    Raises ModelError for one that cannot be read.
+    """
+    path = None if spec.parts is not None else sidecar_of(spec)
     try:
-        return read_sidecar(path)
+        return path, Sidecar() if path is None else read_sidecar(path)
     except RecipeError as error:
         raise ModelError(str(error)) from None
 

@@ -161,14 +161,14 @@ def plan(
     json_: AsJson = False,
     allow_scripts: AllowScripts = False,
 ) -> None:
-    """Say what a recipe would make: models, poses, frames, splits. Without --estimate no model is read."""
-    from viewsphere.sampling.plan import check_engine, check_images
-    from viewsphere.sampling.plan import plan as make_plan
+    """Say what a recipe would make: models, poses, frames, splits. Without --estimate no model is read, but its sidecar is."""
+    from viewsphere.run.opening import check_formats, prepare
+    from viewsphere.sampling.plan import check_sidecars
 
     loaded = load_recipe(recipe, changes)
-    planned = make_plan(loaded)
-    check_engine(loaded)
-    check_images(planned)
+    planned = prepare(loaded)
+    check_formats(planned, loaded.formats, loaded.channels)
+    check_sidecars(planned)
     if not json_:
         print_plan(planned)
         for note in planned.notes:

@@ -16,6 +16,8 @@ from viewsphere.model.numbers import Count, Length, Metres, Number, Portion, Pos
 
 MOST_RAYS = 10_000_000
 MOST_COLUMNS = 65_535
+LONGEST = 1e12
+"""Columns that a message writes out in digits."""
 WHOLE = 1e-6
 """Share of a column by which the columns may miss a whole number."""
 
@@ -95,8 +97,9 @@ class LidarEntry(Frozen):
         columns = (high - low) / self.azimuth_step
         rings = len(self.elevations) if self.elevations is not None else self.rings or 0
         if rings * columns > MOST_RAYS or columns > MOST_COLUMNS + WHOLE:
+            found = f"{columns:,.0f}" if columns < LONGEST else f"{columns:.3g}"
             raise ValueError(
-                f"expected at most {MOST_RAYS:,} rays and {MOST_COLUMNS:,} columns; found {rings:,} rings of {columns:,.0f} "
+                f"expected at most {MOST_RAYS:,} rays and {MOST_COLUMNS:,} columns; found {rings:,} rings of {found} "
                 "columns: take fewer rings, or a larger azimuth_step"
             )
         if columns < 1 - WHOLE or abs(columns - round(columns)) > WHOLE:

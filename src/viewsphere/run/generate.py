@@ -9,21 +9,19 @@ from collections.abc import Container, Generator, Iterable, Iterator, Mapping, S
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import chain, product
+from itertools import chain
 from os import PathLike
 from pathlib import Path
 
 from viewsphere import plugins
 from viewsphere.errors import ModelError, RecipeError, UserError, ViewsphereError, WorkerDied, joined
-from viewsphere.model.channel import PASSES, missing
-from viewsphere.model.rig import Sensor
 from viewsphere.model.share import ALL
 from viewsphere.recipe.formats import FormatEntry, Formats, options_of, read_formats
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.run.executors import Crew, Job, Listed, Outcome, hired
-from viewsphere.run.exporting import export, is_out_of_date, is_written, writable
+from viewsphere.run.exporting import export, is_out_of_date, is_written
 from viewsphere.run.framing import MOST_TRIES, hidden_frames
-from viewsphere.run.opening import commit, prepare, to_append, to_render
+from viewsphere.run.opening import check_formats, commit, prepare, to_append, to_render
 from viewsphere.run.progress import Listener, Progress, unheard
 from viewsphere.run.pulse import heard, watched
 from viewsphere.run.share import share_of
@@ -113,9 +111,7 @@ def generate(
         )
     portion = replace(to_append(planned, store) if append else to_render(planned, store), share=share)
     wanted += _others(wanted, store) if portion.number else ()
-    with recipe.located():
-        for entry, sensor in product(wanted, planned.rig.sensors):
-            _check_channels(entry.name, portion.record.channels, sensor)
+    check_formats(planned, wanted, portion.record.channels)
     with recipe.located(), _at_work(portion, store) as pulse:
         tell = heard(pulse, listener or unheard)
         notes: tuple[str, ...] = ()
@@ -238,22 +234,6 @@ def _warnings(planned: Plan, dataset: Dataset, misses: Mapping[str, tuple[str, .
 
 def _said(lines: Mapping[str, list[str]]) -> dict[str, tuple[str, ...]]:
     return {key: tuple(dict.fromkeys(some)) for key, some in lines.items() if some}
-
-
-def _check_channels(name: str, channels: Sequence[str], sensor: Sensor) -> None:
-    """Raises UserError for a format that is not known, does not work here, or needs one of the channels which a sensor does not
-    keep.
-    """
-    needed: Sequence[str] = getattr(writable(name), "CHANNELS", ())
-    kept = sensor.kept(tuple(channels))
-    lacking = missing(needed, kept)
-    if lacking:
-        where = f"rig.sensors.{sensor.name}.channels" if sensor.channels or sensor.lidar else "channels"
-        remedy = "" if sensor.lidar and lacking[0] in PASSES else "add it, or "
-        raise RecipeError(
-            f"{where}: expected {lacking[0]}, which format {name} needs; found {', '.join(kept)}: "
-            f"{remedy}leave {name} out of formats"
-        )
 
 
 def _check_skies(work: Missing, tell: Listener) -> tuple[str, ...]:

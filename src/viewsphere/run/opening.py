@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from importlib.metadata import version
+from itertools import product
 
-from viewsphere.errors import StoreError
+from viewsphere.errors import RecipeError, StoreError
+from viewsphere.model.channel import PASSES, missing
+from viewsphere.model.rig import Sensor
+from viewsphere.recipe.formats import FormatEntry
 from viewsphere.recipe.recipe import Recipe
+from viewsphere.run.exporting import writable
 from viewsphere.sampling.engine_digest import engine_digest
 from viewsphere.sampling.extension import Portion, extend, resumed, whole
 from viewsphere.sampling.fitting import LOOK
@@ -25,6 +30,28 @@ def prepare(recipe: Recipe) -> Plan:
     check_images(planned)
     check_codecs(recipe.channels, recipe.files)
     return planned
+
+
+def check_formats(planned: Plan, wanted: Iterable[FormatEntry], channels: Sequence[str]) -> None:
+    """Raises UserError for a format that is not known, does not work here, or needs one of the channels which a sensor does not
+    keep.
+    """
+    with planned.recipe.located():
+        for entry, sensor in product(wanted, planned.rig.sensors):
+            _check_channels(entry.name, channels, sensor)
+
+
+def _check_channels(name: str, channels: Sequence[str], sensor: Sensor) -> None:
+    needed: Sequence[str] = getattr(writable(name), "CHANNELS", ())
+    kept = sensor.kept(tuple(channels))
+    lacking = missing(needed, kept)
+    if lacking:
+        where = f"rig.sensors.{sensor.name}.channels" if sensor.channels or sensor.lidar else "channels"
+        remedy = "" if sensor.lidar and lacking[0] in PASSES else "add it, or "
+        raise RecipeError(
+            f"{where}: expected {lacking[0]}, which format {name} needs; found {', '.join(kept)}: "
+            f"{remedy}leave {name} out of formats"
+        )
 
 
 def to_render(planned: Plan, store: Store) -> Portion:

@@ -15,6 +15,8 @@ from typing import Any, Self
 
 from viewsphere import plugins
 from viewsphere.assets.timeline import Timeline
+from viewsphere.assets.traits import said_of
+from viewsphere.errors import each
 from viewsphere.model.credit import Credit
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.notebook import Shown
@@ -352,6 +354,11 @@ def check_engine(recipe: Recipe) -> None:
     engine = plugins.load("engines", recipe.engine.name)
     with recipe.located():
         engine.check(engine_options(recipe))
+
+
+def check_sidecars(planned: Plan) -> None:
+    """See that what models' sidecars say can be read; raises ModelError, a line a mistake. No model is read."""
+    each(said_of, planned.kept_specs)
 
 
 def check_images(planned: Plan) -> None:

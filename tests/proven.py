@@ -1,0 +1,38 @@
+"""Comparisons of labels with what knows nothing of how they are made; `scripts/measure_labels` gathers their differences."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+
+import numpy as np
+
+VARIABLE = "VIEWSPHERE_PROVEN"
+"""Names the file to which differences are appended, a line of JSON each; without it nothing is written."""
+
+
+def close(label, against, found, expected, unit="", *, atol=0.0, rtol=0.0):
+    """A label's numbers are those expected by something else, which `against` names, but for a tolerance."""
+    np.testing.assert_allclose(found, expected, rtol=rtol, atol=atol)
+    with np.errstate(invalid="ignore"):  # of infinite ones
+        told(label, against, np.subtract(found, expected), unit)
+
+
+def equal(label, against, found, expected):
+    """A label is exactly what something else expects."""
+    np.testing.assert_array_equal(found, expected)
+    told(label, against, 0)
+
+
+def told(label, against, error, unit=""):
+    """Note the largest of a label's differences (those that are no number aside), which the caller has judged.
+
+    A difference without a unit is a share, or a number of things that differ.
+    """
+    file, errors = os.environ.get(VARIABLE), np.abs(np.asarray(error, float)).ravel()
+    if file and len(errors := errors[np.isfinite(errors)]):
+        test = os.environ["PYTEST_CURRENT_TEST"].partition("::")[0]
+        line = {"label": label, "against": against, "error": float(errors.max()), "unit": unit, "test": test}
+        with Path(file).open("a", encoding="utf-8") as out:
+            out.write(json.dumps(line) + "\n")
