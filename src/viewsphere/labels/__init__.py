@@ -259,6 +259,7 @@ class Rendered:
     track: str
     traits: Callable[[], Traits]
     materials: tuple[str, ...] = ()
+    body_parts: tuple[str, ...] = ()
 
     @property
     def diameter(self) -> float:

@@ -196,6 +196,10 @@ def _materials(sample: Sample, scale: Scale, within: Mapping[str, Extent]) -> La
     return Layer(webp(part_colors(_thinned(sample.channels["materials"], scale.layer_width)), 60))
 
 
+def _body_parts(sample: Sample, scale: Scale, within: Mapping[str, Extent]) -> Layer:
+    return Layer(webp(part_colors(_thinned(sample.channels["body_parts"], scale.layer_width)), 60))
+
+
 def _beside(name: str) -> Painter:
     """The painter of a channel that is shown as `preview` shows it, clear where it has no value."""
 
@@ -251,6 +255,7 @@ PAINTERS: dict[str, Painter] = {
     "panoptic": _beside("panoptic"),
     "parts": _parts,
     "materials": _materials,
+    "body_parts": _body_parts,
     "flow": _flow,
     "disparity": _disparity,
     "flow_state": _flow_state,

@@ -99,6 +99,7 @@ export function legend(frame) {
     coordinates: ["in the object's box: red to its left, green to its back, blue up"],
     parts: ["a colour for each named part"],
     materials: ["a colour for each material"],
+    body_parts: ["a colour for each part of the body"],
   }[layer] ?? [];
 }
 
