@@ -2,11 +2,13 @@
 
 import numpy as np
 import pytest
+from PIL import Image, ImageDraw
 
 import viewsphere as vs
 from proven import close
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.rotation import rigid, rotation_about, rotation_vector
+from viewsphere.labels import drawable
 
 SPEED, SPIN = (0.3, -0.2, 0.1), (0.0, 0.0, 40.0)
 
@@ -107,3 +109,30 @@ def test_what_they_need_is_told_before_rendering(name, lacking):
 @pytest.mark.parametrize("vector", [(0, 0, 0), (0.3, -0.2, 0.9), (0, np.pi, 0), (1e-9, 0, 0), (2.0, 1.0, -0.5)])
 def test_rotation_vectors_come_back(vector):
     np.testing.assert_allclose(rotation_vector(rotation_about(vector)), vector, atol=2e-12)
+
+
+def drawn(sample, name, zoom=8):
+    """A label's lines on black, (H, W, 3)."""
+    picture = Image.new("RGB", (sample.width * zoom, sample.height * zoom))
+    drawable()[name].lines(ImageDraw.Draw(picture, "RGBA"), sample, float(zoom))
+    return np.asarray(picture)
+
+
+@pytest.mark.parametrize(("name", "side"), [("ego_motion", "left"), ("sensor_poses", "right")])
+def test_small_maps_of_cameras_lie_in_their_corners(samples, name, side):
+    """Of two eyes neither sees the other, so nothing else is drawn."""
+    for sample in samples[:2]:
+        rows, columns = np.nonzero(drawn(sample, name).any(axis=2))
+        assert rows.min() >= 0.55 * sample.height * 8
+        assert (columns.max() < 0.45 * sample.width * 8) if side == "left" else (columns.min() > 0.55 * sample.width * 8)
+
+
+def test_the_axes_of_a_sensor_in_front_are_drawn():
+    """Its y, downwards, is as long as a tenth of a metre is at its distance of 0.8 m."""
+    rig = {"sensors": {"back": {}, "front": {"position": [0, 0, 0.8]}}}
+    sample = next(iter(vs.render(recipe(rig=rig, annotations=["sensor_poses"]))))
+    picture = drawn(sample, "sensor_poses")
+    green = (picture == (40, 160, 60)).all(axis=2)
+    rows, columns = np.nonzero(green)
+    assert abs(np.ptp(rows) - 0.1 / 0.8 * sample.camera.K[1, 1] * 8) < 4
+    assert abs(columns.mean() - sample.width * 4) < 2

@@ -1,5 +1,6 @@
 """Recipes at URLs: what they make is what their copies on a disk make."""
 
+from contextlib import contextmanager
 from pathlib import Path
 
 import fsspec
@@ -8,11 +9,12 @@ import pytest
 
 import viewsphere as vs
 from small import small_recipe, tree_hash
+from viewsphere.aside import aside
 from viewsphere.caches import cache_of
 from viewsphere.errors import RecipeError, RemoteError
 from viewsphere.recipe.fetched import PREFIX, fetched
 from viewsphere.recipe.recipe import Recipe
-from viewsphere.urls import located, remote_path
+from viewsphere.urls import download, files_below, located, remote_path
 
 TETRAHEDRON = "mtllib t.mtl\nusemtl red\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
 BASE = small_recipe(channels=["rgb", "instances"], formats=[]).to_yaml()
@@ -112,6 +114,41 @@ def test_a_folder_of_a_whole_store_is_refused(url, monkeypatch):
     monkeypatch.setenv("VIEWSPHERE_MAX_FETCHED_BYTES", "300")
     with pytest.raises(RecipeError, match=r"at most 300 bytes .*MAX_FETCHED_BYTES\), found more"):
         Recipe.load(url)
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_no_more_is_written_than_may_be(url, monkeypatch, known):
+    """Where the file system tells sizes, nothing is written; where it does not, no more than the limit."""
+    kind = fsspec.get_filesystem_class("memory")
+    found, written = kind.find, []
+
+    def find(self, path, **options):
+        return {name: {**info, "size": info["size"] if known else None} for name, info in found(self, path, **options).items()}
+
+    @contextmanager
+    def weighed(place, prefix):
+        with aside(place, prefix) as own:
+            try:
+                yield own
+            finally:
+                written.append(sum((own / "new" / name).stat().st_size for name in files_below(own / "new")))
+
+    monkeypatch.setattr(kind, "find", find)
+    monkeypatch.setattr("viewsphere.recipe.fetched.aside", weighed)
+    whole = sum(map(len, FILES.values()))
+    monkeypatch.setenv("VIEWSPHERE_MAX_FETCHED_BYTES", str(whole - 1))
+    with pytest.raises(RecipeError, match=rf"at most {whole - 1:,} bytes .*MAX_FETCHED_BYTES\), found more"):
+        fetched(url)
+    monkeypatch.setenv("VIEWSPHERE_MAX_FETCHED_BYTES", str(whole))
+    assert fetched(url).is_file()
+    assert written[0] == (0 if known else whole - 1)
+
+
+def test_a_download_stops_where_it_may_not_go_on(url, tmp_path):
+    file = located("memory://cars/base.yaml")
+    for most, whole in ((0, False), (len(BASE) - 1, False), (len(BASE), True)):
+        assert download(file, tmp_path / "copy", most) == whole
+        assert (tmp_path / "copy").read_text() == BASE[:most]
 
 
 @pytest.mark.parametrize("name", ["../../outside", "a/../../../outside"])

@@ -190,7 +190,7 @@ def test_what_is_not_known_is_null(small_dataset):
 def test_layers_are_those_whose_channels_are_there(small_dataset):
     sample = small_dataset[0]
     scale = Scale(48, 60, 32)
-    maps = {"coordinates", "nocs", "position", "semantic", "panoptic", "parts", "materials"}
+    maps = {"coordinates", "nocs", "position", "semantic", "panoptic", "parts", "materials", "body_parts"}
     assert set(layers(sample, scale)) == {"rgb", "depth", "depthRange", "normals"} | maps
     assert set(layers(replace(sample, channels={"rgb": sample.rgb}), scale)) == {"rgb"}
     assert layers(replace(sample, channels={}), scale) == {}

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.assets.folder import ModelFolder
+from viewsphere.assets.glb import BODY_PARTS
 from viewsphere.assets.gltf.document import Document
 from viewsphere.assets.gltf.field import Field
 from viewsphere.assets.gltf.material import read_materials
@@ -32,7 +33,8 @@ def read_exported(file: Path, parts: Sequence[str], node: str | None = None, *, 
     """
     document = Document.read(ModelFolder(file))
     step = None if node is None else _step(document, node)
-    primitives = list(_primitives(document, _meshes(document, step), parts))
+    meshes = _meshes(document, step)
+    primitives = list(_primitives(document, meshes, parts))
     vertices = [_accessor(document, p, "POSITION", 3) for _, p in primitives]
     triangles = [document.accessor(p.integer("indices"), (1,)).reshape(-1, 3).astype(np.int64) for _, p in primitives]
     firsts = np.cumsum([0, *(len(own) for own in vertices)])
@@ -43,6 +45,7 @@ def read_exported(file: Path, parts: Sequence[str], node: str | None = None, *, 
     if whole:
         _read_images(document)
     axes, signs = FROM_GLTF
+    body_parts, body_part = _body_parts(document, meshes, primitives)
     try:
         return Mesh(
             vertices=_joined(vertices, 3)[:, axes] * signs,
@@ -56,6 +59,8 @@ def read_exported(file: Path, parts: Sequence[str], node: str | None = None, *, 
             uv1=_optional(document, primitives, "TEXCOORD_1", 2),
             colors=_optional(document, primitives, "COLOR_0", 4),
             images=tuple(document.folder.images),
+            triangle_body_part=body_part,
+            body_parts=body_parts,
         )
     except ValueError as error:
         raise document.folder.error(f"expected an exported model, found {error}") from None
@@ -94,6 +99,17 @@ def _primitives(document: Document, meshes: Sequence[Field], parts: Sequence[str
         part = parts.index(name, part + 1)
         for primitive in mesh.items("primitives"):
             yield part, primitive
+
+
+def _body_parts(
+    document: Document, meshes: Sequence[Field], primitives: Sequence[Part]
+) -> tuple[tuple[str, ...], NDArray[np.int32] | None]:
+    """Names of the parts of the model's body, and the number of each triangle's; None where it has no bones."""
+    if not any(BODY_PARTS in mesh.get("extras") for mesh in meshes):
+        return (), None
+    names = tuple(str(item.value) for item in meshes[0].get("extras").items(BODY_PARTS))
+    own = [document.accessor(p.get("extras").integer(BODY_PARTS), (1,))[:, 0].astype(np.int32) for _, p in primitives]
+    return names, np.concatenate(own)
 
 
 def _accessor(document: Document, primitive: Field, name: str, width: int) -> NDArray[np.float32]:

@@ -24,6 +24,9 @@ NEAREST, LINEAR, LINEAR_MIPMAP_LINEAR = 9728, 9729, 9987
 FLOAT, UINT32 = 5126, 5125
 ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER = 34962, 34963
 
+BODY_PARTS = "body_parts"
+"""The member of `extras` that names the parts of a mesh's body, and of a primitive the accessor of each triangle's."""
+
 Object = dict[str, Any]
 
 
@@ -94,7 +97,8 @@ class _Writer:
         for run in runs(mesh):
             if run.part != part:
                 part = run.part
-                self.meshes.append({"name": mesh.parts[part], "primitives": []})
+                said: Object = {"extras": {BODY_PARTS: list(mesh.body_parts)}} if mesh.body_parts else {}
+                self.meshes.append({"name": mesh.parts[part], "primitives": [], **said})
             self.add_run(mesh, run)
         return [self.first_material, len(mesh.materials)]
 
@@ -115,7 +119,11 @@ class _Writer:
                 attributes[name] = self.accessor(array[at], kind)
         indices = self.accessor(run.triangles.astype(np.uint32).reshape(-1, 1), "SCALAR")
         material = self.first_material + run.material
-        self.meshes[-1]["primitives"].append({"attributes": attributes, "indices": indices, "material": material, "mode": 4})
+        entry: Object = {"attributes": attributes, "indices": indices, "material": material, "mode": 4}
+        if mesh.triangle_body_part is not None:
+            own = mesh.triangle_body_part[run.first : run.first + len(run.triangles)]
+            entry["extras"] = {BODY_PARTS: self.accessor(own.astype(np.uint32).reshape(-1, 1), "SCALAR", target=None)}
+        self.meshes[-1]["primitives"].append(entry)
 
     def animate(self, seconds: Sequence[float]) -> None:
         """Show the first nodes one after another, as many as there are seconds."""
@@ -145,14 +153,14 @@ class _Writer:
         return len(self.views) - 1
 
     def accessor(self, rows: NDArray[Any], kind: str, bounded: bool = False, target: int | None = ARRAY_BUFFER) -> int:
-        """Put an array into the file; `target` says what reads it, if it is no index."""
+        """Put an array into the file; `target` says what reads it, if it is no index; None: nothing of glTF."""
         is_float = rows.dtype == np.float32
         data = np.ascontiguousarray(rows, "<f4" if is_float else "<u4")
         content = kind, bounded, is_float, target, hashlib.sha256(data.tobytes()).digest()
         if self.known is not None and content in self.known:
             return self.known[content]
         entry: Object = {
-            "bufferView": self.view(data.tobytes(), target if is_float else ELEMENT_ARRAY_BUFFER),
+            "bufferView": self.view(data.tobytes(), target if is_float or target is None else ELEMENT_ARRAY_BUFFER),
             "componentType": FLOAT if is_float else UINT32,
             "count": len(rows),
             "type": kind,

@@ -92,7 +92,8 @@ class Mesh:
     vertices (V, 3) float32; triangles (T, 3) int32, counter-clockwise seen from outside; normals (V, 3)
     float32, unit length, for shading; uv0, uv1 (V, 2) float32 or None; colors (V, 4) float32 linear or None,
     multiplied with the base colour; triangle_material, triangle_part (T,) int32 index `materials` and `parts`
-    (never empty). `warnings` say what the file's reader had to mend or leave out.
+    (never empty). triangle_body_part (T,) int32: the number from 1 in `body_parts` of what a skin's bones move, 0 for none;
+    None for models without bones. `warnings` say what the file's reader had to mend or leave out.
     """
 
     vertices: NDArray[np.float32]
@@ -107,6 +108,8 @@ class Mesh:
     colors: NDArray[np.float32] | None = None
     images: tuple[Image, ...] = ()
     warnings: tuple[str, ...] = field(default=())
+    triangle_body_part: NDArray[np.int32] | None = None
+    body_parts: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         """Refuse arrays of the wrong shape or dtype, and indices out of range."""
@@ -120,6 +123,7 @@ class Mesh:
             "uv0": ((v, 2), np.float32),
             "uv1": ((v, 2), np.float32),
             "colors": ((v, 4), np.float32),
+            "triangle_body_part": ((t,), np.int32),
         }
         for name, (shape, dtype) in expected.items():
             array = getattr(self, name)
@@ -129,10 +133,11 @@ class Mesh:
             ("triangles", v),
             ("triangle_material", len(self.materials)),
             ("triangle_part", len(self.parts)),
+            ("triangle_body_part", len(self.body_parts) + 1),
         )
         for name, limit in limits:
             array = getattr(self, name)
-            if array.size and (array.min() < 0 or array.max() >= limit):
+            if array is not None and array.size and (array.min() < 0 or array.max() >= limit):
                 raise ValueError(f"Mesh.{name}: expected indices in [0, {limit}), got {array.min()}..{array.max()}")
 
     def emptied(self) -> Mesh:
@@ -142,6 +147,7 @@ class Mesh:
             triangles=self.triangles[:0],
             triangle_material=self.triangle_material[:0],
             triangle_part=self.triangle_part[:0],
+            triangle_body_part=None if self.triangle_body_part is None else self.triangle_body_part[:0],
         )
 
     @property

@@ -13,7 +13,17 @@ from viewsphere.assets.mesh import Image, Material, Mesh, Texture
 from viewsphere.assets.primitive import TEXTURE_FIELDS, FileFacts
 from viewsphere.model.keypoints import Keypoints
 
-ARRAYS = ("vertices", "triangles", "normals", "triangle_material", "triangle_part", "uv0", "uv1", "colors")
+ARRAYS = (
+    "vertices",
+    "triangles",
+    "normals",
+    "triangle_material",
+    "triangle_part",
+    "uv0",
+    "uv1",
+    "colors",
+    "triangle_body_part",
+)
 FACTS = ("format", "up", "forward", "unit", "origin", "size", "object_from_file")
 
 
@@ -24,6 +34,7 @@ def write_mesh(path: Path, mesh: Mesh, facts: FileFacts) -> None:
     header = {
         "materials": [asdict(material) for material in mesh.materials],
         "parts": mesh.parts,
+        "body_parts": mesh.body_parts,
         "images": [image.name for image in mesh.images],
         "warnings": mesh.warnings,
         "facts": {name: getattr(facts, name) for name in FACTS},
@@ -43,6 +54,7 @@ def read_mesh(path: Path, source: Path) -> tuple[Mesh, FileFacts]:
         **arrays,
         materials=tuple(_material(fields) for fields in header["materials"]),
         parts=tuple(header["parts"]),
+        body_parts=tuple(header["body_parts"]),
         images=tuple(Image(name, array) for name, array in zip(header["images"], pixels, strict=True)),
         warnings=tuple(header["warnings"]),
     )

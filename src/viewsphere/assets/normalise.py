@@ -45,6 +45,7 @@ def normalise(mesh: Mesh, facts: FileFacts, spec: ModelSpec, first: tuple[Mesh, 
         normals=unit_normals(stored, triangles, (mesh.normals.astype(np.float64) @ turn.T).astype(np.float32)),
         triangle_material=mesh.triangle_material[order],
         triangle_part=mesh.triangle_part[order],
+        triangle_body_part=None if mesh.triangle_body_part is None else mesh.triangle_body_part[order],
         warnings=mesh.warnings + warnings,
     )
 

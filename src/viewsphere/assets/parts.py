@@ -46,6 +46,7 @@ def taken(mesh: Mesh, spec: ModelSpec, step: TimeStep | None = None) -> Mesh:
         triangles=corners.reshape(-1, 3).astype(np.int32),
         triangle_part=part.astype(np.int32),
         triangle_material=material.astype(np.int32),
+        triangle_body_part=None if mesh.triangle_body_part is None else mesh.triangle_body_part[chosen],
         parts=tuple(mesh.parts[i] for i in parts),
         materials=kept,
         images=images,

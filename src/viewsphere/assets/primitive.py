@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from viewsphere.assets.folder import ModelFolder
 from viewsphere.assets.mesh import Image, Material, Mesh, Texture
+from viewsphere.assets.skin import joined
 from viewsphere.model.keypoints import Keypoints
 from viewsphere.model.model_spec import Axis
 from viewsphere.model.scene import IDENTITY, Matrix4
@@ -52,7 +53,9 @@ class FileFacts:
 
 @dataclass(frozen=True, eq=False)
 class Primitive:
-    """Some triangles of one part and material; arrays as in Mesh but float64, normals None if unknown."""
+    """Some triangles of one part and material; arrays as in Mesh but float64, normals None if unknown. `bone` (T,) is each
+    triangle's among `bones`, as `skin.strongest` gives it, None where no skin bends the piece.
+    """
 
     part: str
     material: int
@@ -62,6 +65,8 @@ class Primitive:
     uv0: Float | None = None
     uv1: Float | None = None
     colors: Float | None = None
+    bone: Int | None = None
+    bones: tuple[str, ...] = ()
 
 
 def compact(piece: Primitive) -> Primitive:
@@ -112,15 +117,14 @@ def assemble(
     sizes = [len(piece.triangles) for piece in pieces]
     part = np.repeat([part_of[piece.part] for piece in pieces], sizes)
     material = np.repeat([piece.material for piece in pieces], sizes)
+    body_parts, body_part = joined([(p.bones, p.bone, size) for p, size in zip(pieces, sizes, strict=True)])
 
-    finite = _finite_triangles(folder, positions, triangles)
-    triangles, part, material = triangles[finite], part[finite], material[finite]
-    positions, origin = _around_origin(positions, triangles)
-    solid = _solid_triangles(folder, positions, triangles)
-    triangles, part, material = triangles[solid], part[solid], material[solid]
-    _check_layers(folder, positions, triangles)
-    order = np.lexsort((material, part))
-    triangles, part, material = triangles[order], part[order], material[order]
+    taken = np.flatnonzero(_finite_triangles(folder, positions, triangles))
+    positions, origin = _around_origin(positions, triangles[taken])
+    taken = taken[_solid_triangles(folder, positions, triangles[taken])]
+    _check_layers(folder, positions, triangles[taken])
+    taken = taken[np.lexsort((material[taken], part[taken]))]
+    triangles, part, material = triangles[taken], part[taken], material[taken]
 
     used, corners = np.unique(triangles, return_inverse=True)
     triangles = corners.reshape(-1, 3).astype(np.int32)
@@ -141,6 +145,8 @@ def assemble(
         colors=_join(pieces, "colors", 4, 1.0, used),
         images=images,
         warnings=tuple(folder.warnings),
+        triangle_body_part=None if body_part is None else body_part[taken],
+        body_parts=body_parts,
     )
     return mesh, replace(facts, origin=(origin[0], origin[1], origin[2]), size=extents(mesh), files=tuple(folder.files))
 

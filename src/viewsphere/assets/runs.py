@@ -14,11 +14,12 @@ from viewsphere.assets.mesh import Mesh
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """Triangles of one part and material with vertices of their own.
+    """Triangles of one part and material, from the mesh's `first` one on, with vertices of their own.
 
     `vertices` (n,) int32 index the mesh's vertices; `triangles` (t, 3) int32 index `vertices`.
     """
 
+    first: int
     part: int
     material: int
     vertices: NDArray[np.int32]
@@ -32,6 +33,7 @@ def runs(mesh: Mesh) -> Iterator[Run]:
     for start, stop in pairwise(starts):
         used, local = np.unique(mesh.triangles[start:stop], return_inverse=True)
         yield Run(
+            first=start,
             part=int(mesh.triangle_part[start]),
             material=int(mesh.triangle_material[start]),
             vertices=used.astype(np.int32),

@@ -15,12 +15,14 @@ from viewsphere.assets.cache import ZOO, cache_folder, frame_of, keep, readers_d
 from viewsphere.assets.inside import split_source
 from viewsphere.assets.mesh import Mesh
 from viewsphere.assets.primitive import FileFacts
+from viewsphere.assets.skin import grouped
 from viewsphere.assets.spread_points import spread_points
 from viewsphere.assets.surface import Surface
 from viewsphere.assets.symmetries import find, lacking
 from viewsphere.errors import ModelError, RecipeError
 from viewsphere.geometry.diameter import diameter
 from viewsphere.model.keypoints import Keypoints, Place
+from viewsphere.model.mistakes import nearest, shown
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.symmetries import Symmetries
 from viewsphere.model.thing import TimeStep
@@ -54,6 +56,21 @@ def traits_of(spec: ModelSpec, mesh: Mesh, facts: FileFacts, step: TimeStep | No
     return Traits(across, symmetries, said.keypoints or _own(mesh, across, facts) or _spread(spec, mesh))
 
 
+def with_body_parts(mesh: Mesh, spec: ModelSpec) -> Mesh:
+    """The mesh with those parts of its body that its sidecar names. Raises ModelError for bones that its skin does not have."""
+    path, sidecar = said_of(spec)
+    parts = sidecar.body_parts
+    if parts is None:
+        return mesh
+    bones = mesh.body_parts
+    for name, own in parts.items():
+        for bone in own:
+            if bone not in bones:
+                found = f"{shown(bone)}{nearest(bone, bones)}" if bones else "a model that has none"
+                raise ModelError(f"{path}: body_parts.{name}: expected bones of the model's skin; found {found}")
+    return grouped(mesh, parts)
+
+
 def said_of(spec: ModelSpec) -> tuple[Path | None, Sidecar]:
     """A model's sidecar and what it says; an empty one where there is none, and of a part of a file.
 
@@ -67,7 +84,8 @@ def said_of(spec: ModelSpec) -> tuple[Path | None, Sidecar]:
 
 
 def sidecar_of(spec: ModelSpec) -> Path | None:
-    """The file that says symmetries and points of a model: that which the recipe names, else the one beside it; None without.
+    """The file that says symmetries, points and parts of a model: that which the recipe names, else the one beside it; None
+    without.
 
     Raises ModelError for one beside it that is a link out of the folder of a confined model.
     """

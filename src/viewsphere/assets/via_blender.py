@@ -25,6 +25,7 @@ from viewsphere.assets.mesh import Image, Material, Mesh
 from viewsphere.assets.named_points import NamedPoint, named_points
 from viewsphere.assets.nodes import Painter, Picture, images_of
 from viewsphere.assets.primitive import FileFacts, Float, Primitive, assemble
+from viewsphere.assets.skin import strongest
 from viewsphere.assets.transform import moved
 from viewsphere.blender.interpreter import find_blender
 from viewsphere.blender.process import BlenderProcess
@@ -246,15 +247,20 @@ def _piece(told: Mapping[str, Any], material: int) -> Primitive:
         uv = loaded(name)
         return None if uv is None else np.column_stack([uv[:, 0], 1 - uv[:, 1]])
 
+    triangles, skin = np.load(told["triangles"]).astype(np.int64), told["skin"] or ()
     return Primitive(
         part="",
         material=material,
         positions=np.load(told["positions"]).astype(np.float64),
-        triangles=np.load(told["triangles"]).astype(np.int64),
+        triangles=triangles,
         normals=loaded("normals"),
         uv0=downwards("uv0"),
         uv1=downwards("uv1"),
         colors=loaded("colors"),
+        bone=strongest(np.load(told["bones"]).astype(np.int64), np.load(told["weights"]).astype(np.float64), triangles)
+        if skin
+        else None,
+        bones=tuple(skin),
     )
 
 

@@ -81,6 +81,9 @@ def _facts(info: ModelInfo, mesh: Mesh) -> Iterator[str]:
     box, materials = box_vertices(*mesh.bounds), tuple(material.name for material in mesh.materials)
     if info.materials not in ((), materials):
         yield f"expected the materials {', '.join(materials)} of the GLB, found {', '.join(info.materials)}"
+    if info.body_parts != mesh.body_parts:
+        found = ", ".join(info.body_parts) or "none"
+        yield f"expected the parts of a body {', '.join(mesh.body_parts) or 'none'}, as the GLB has, found {found}"
     if info.triangles != len(mesh.triangles):
         yield f"expected {len(mesh.triangles)} triangles, as the GLB has, found {info.triangles}"
     if not np.array_equal(info.box3d_object, box):

@@ -221,7 +221,8 @@ def preview(
     allow_scripts: AllowScripts = False,
 ) -> None:
     """Write a contact sheet (of sequences, filmstrips): a recipe's frames rendered small, or a data set's; or a video."""
-    from viewsphere.preview import Earlier, contact_sheet, dataset_samples, films_of, is_shown, preview_samples, small_objects
+    from viewsphere.labels import is_shown
+    from viewsphere.preview import Earlier, contact_sheet, dataset_samples, films_of, preview_samples, small_objects
     from viewsphere.store import Dataset
 
     names = draw or []

@@ -27,6 +27,7 @@ from viewsphere.labels._label import (
     ModelFacts,
     Needs,
     ObjectLabel,
+    Picture,
     SampleLabel,
 )
 from viewsphere.labels._passes import DRAWINGS
@@ -34,7 +35,7 @@ from viewsphere.labels._placement import Placement
 from viewsphere.labels._record import Makers, computed, finite, from_short_record, from_whole_record, short_record, whole_record
 from viewsphere.labels._sight import Around, Sight
 from viewsphere.model.camera import Camera
-from viewsphere.model.channel import DEFAULT_CHANNELS, PASSES, Channel
+from viewsphere.model.channel import DEFAULT_CHANNELS, PASSES, Channel, picture_of
 from viewsphere.model.keypoints import Keypoints
 from viewsphere.model.model_spec import Size
 from viewsphere.model.sample import ObjectAnnotation, Sample
@@ -60,6 +61,7 @@ __all__ = [
     "Placement",
     "SampleLabel",
     "Sight",
+    "alone",
     "annotated",
     "channel_labels",
     "channels",
@@ -69,6 +71,7 @@ __all__ = [
     "from_short_record",
     "from_whole_record",
     "is_in",
+    "is_shown",
     "labels",
     "labels_of",
     "makers",
@@ -156,6 +159,19 @@ def is_in(source: str, sample: Sample) -> bool:
 def drawings() -> tuple[Drawing, ...]:
     """What `drawable` lists."""
     return tuple(drawable().values())
+
+
+def alone(channels: Container[str]) -> Callable[[Sample, int], Picture] | None:
+    """What stands for the picture of samples with these channels, at a size; None where they have one, or nothing does."""
+    if picture_of(channels) is not None:
+        return None
+    found = (label.drawing and label.drawing.alone for name, label in channel_labels().items() if name in channels)
+    return next(filter(None, found), None)
+
+
+def is_shown(channels: Container[str]) -> bool:
+    """Whether samples with these channels have a picture, or something that stands for it."""
+    return picture_of(channels) is not None or alone(channels) is not None
 
 
 def observe(
@@ -259,6 +275,7 @@ class Rendered:
     track: str
     traits: Callable[[], Traits]
     materials: tuple[str, ...] = ()
+    body_parts: tuple[str, ...] = ()
 
     @property
     def diameter(self) -> float:

@@ -32,7 +32,7 @@ def from_above(sample: Sample, size: int) -> Picture:
     scale = size / (2 * reach)
     picture = Image.new("RGB", (size, size), SKY)
     pen = ImageDraw.Draw(picture)
-    step = _round(reach / 2)
+    step = round_length(reach / 2)
     for i in range(1, math.ceil(reach * math.sqrt(2) / step) + 1):
         radius = i * step * scale
         pen.ellipse((size / 2 - radius, size / 2 - radius, size / 2 + radius, size / 2 + radius), outline=GRID)
@@ -61,7 +61,7 @@ def _colors(rows: NDArray[np.void], height: NDArray[np.float64]) -> Picture:
     return out
 
 
-def _round(length: float) -> float:
+def round_length(length: float) -> float:
     """1, 2 or 5 times a power of ten, at most this."""
     power = 10.0 ** math.floor(math.log10(length))
     return max(times * power for times in (1, 2, 5) if times * power <= length)

@@ -241,3 +241,10 @@ def channel_of(sample: Sample, name: str) -> Array | None:
         return None
     is_picture = array.shape[:2] == (sample.height, sample.width)
     return array if is_picture or array.dtype.names else None
+
+
+def mixed(triangles: Array, numbers: Array) -> int:
+    """How many of some triangles have several numbers, one being each pixel's."""
+    one = np.zeros(int(triangles.max()) + 1, numbers.dtype)
+    one[triangles] = numbers  # of each triangle one of its numbers
+    return len(np.unique(triangles[one[triangles] != numbers]))

@@ -15,6 +15,12 @@ from viewsphere.model.sample import ObjectAnnotation, Sample
 if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw
 
+AXES = ((220, 50, 40), (40, 160, 60), (50, 90, 230))
+"""Colours of x, y and z."""
+
+FAR = 1e5
+"""Pixels; a line that leads farther off, as of what is beside the lens, is left out."""
+
 HEAD = 0.25
 """Length of an arrow's head, as a share of the arrow."""
 
@@ -24,7 +30,7 @@ def in_space(pen: ImageDraw, sample: Sample, scale: float, points: NDArray[np.fl
     camera = sample.camera
     pixels = project(camera.intrinsics, transform(camera.R, points) + camera.t)[0] * scale
     for a, b in zip(pixels[:-1].tolist(), pixels[1:].tolist(), strict=True):
-        if np.isfinite((*a, *b)).all():
+        if np.abs((*a, *b)).max() < FAR:  # not NaN either
             pen.line((*a, *b), fill=color, width=width)
 
 

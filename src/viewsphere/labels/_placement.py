@@ -25,8 +25,9 @@ Float = NDArray[np.float64]
 
 class ModelFacts(Protocol):
     """Facts about a normalised model: its OBJ file (relative to the data set's root), its box (8, 3) in its own axes, its
-    true size if known (metres), its category, names of its materials, and of a time step the key of the animated model; and as
-    `Traits` has them, its diameter (None in data sets of older versions), symmetries and named points.
+    true size if known (metres), its category, names of its materials and of the parts of its body, and of a time step the key
+    of the animated model; and as `Traits` has them, its diameter (None in data sets of older versions), symmetries and named
+    points.
     """
 
     @property
@@ -41,6 +42,8 @@ class ModelFacts(Protocol):
     def category_id(self) -> int: ...
     @property
     def materials(self) -> tuple[str, ...]: ...
+    @property
+    def body_parts(self) -> tuple[str, ...]: ...
     @property
     def track(self) -> str: ...
     @property

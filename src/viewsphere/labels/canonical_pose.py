@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from viewsphere.geometry.rotation import compose, product, rigid, transform
 from viewsphere.labels._field import Field
 from viewsphere.labels._label import Drawing, Models, ObjectLabel, rendered
-from viewsphere.labels._lines import in_space
+from viewsphere.labels._lines import AXES, in_space
 from viewsphere.labels._placement import Placement
 from viewsphere.model.sample import Sample
 from viewsphere.model.scene import IDENTITY
@@ -114,10 +114,6 @@ def draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
         in_world = transform(camera.R.T, axes - camera.t)
         for axis, color in zip(in_world[1:], AXES, strict=True):
             in_space(pen, sample, scale, np.array([in_world[0], axis]), color, 3)
-
-
-AXES = ((220, 50, 40), (40, 160, 60), (50, 90, 230))
-"""Colours of x, y and z."""
 
 
 LABEL = ObjectLabel.derived(

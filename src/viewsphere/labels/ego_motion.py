@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from viewsphere.geometry.rotation import compose, rigid
+from viewsphere.geometry.rotation import compose, rigid, rotation_vector
 from viewsphere.labels._field import Field
-from viewsphere.labels._label import Models, Needs, SampleLabel
+from viewsphere.labels._inset import NEXT, OWN, PREVIOUS, inset
+from viewsphere.labels._label import Drawing, Models, Needs, SampleLabel
 from viewsphere.labels._sight import Sight
 from viewsphere.model.camera import Camera
 from viewsphere.model.sample import ObjectAnnotation, Sample
+
+if TYPE_CHECKING:
+    from PIL.ImageDraw import ImageDraw
 
 TOLERANCE = 1e-9
 
@@ -39,6 +44,20 @@ def prove(sample: Sample, models: Models) -> Iterator[str]:
             yield f"expected a rigid pose, found {pose.tolist()}"
 
 
+def draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
+    """A small map in the lower left corner: the camera now, before and after, and how far it moves and turns until then."""
+    before, after = sample.camera_from_previous, sample.camera_from_next
+    moved = after if after is not None else before
+    words = "" if moved is None else f"{np.linalg.norm(moved[:3, 3]):.3g} m {turned_deg(moved):.3g}\u00b0"
+    poses = [(pose, color) for pose, color in ((before, PREVIOUS), (np.eye(4), OWN), (after, NEXT)) if pose is not None]
+    inset(pen, sample, scale, poses, words, path=True)
+
+
+def turned_deg(pose: Any) -> float:
+    """The angle of a rigid matrix's rotation."""
+    return math.degrees(float(np.linalg.norm(rotation_vector(pose[:3, :3]))))
+
+
 LABEL = SampleLabel(
     name="ego_motion",
     meaning="how the camera moves",
@@ -54,4 +73,14 @@ LABEL = SampleLabel(
     ),
     compute=compute,
     prove=prove,
+    drawing=Drawing(
+        "ego_motion",
+        lines=draw,
+        key=(
+            ("ego_motion: the camera from above, and what lies between two instants", None),
+            ("before", PREVIOUS),
+            ("now", OWN),
+            ("after", NEXT),
+        ),
+    ),
 )

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from viewsphere.labels._label import Array, ChannelLabel, Drawing, Models, channel_of, rendered
+from viewsphere.labels._label import ChannelLabel, Drawing, Models, channel_of, mixed, rendered
 from viewsphere.labels._paint import by_number
 from viewsphere.model.sample import Sample
 
@@ -25,15 +25,8 @@ def prove(sample: Sample, models: Models) -> Iterator[str]:
         strange = (materials[own] > len(known)).sum() if known else 0
         if strange:
             yield f"object {o.id}: expected the materials 1 to {len(known)} of model {o.key}, found others at {strange} pixels"
-        if triangles is not None and own.any() and (mixed := _mixed(triangles[own], materials[own])):
-            yield f"object {o.id}: expected one material in each triangle, found several in {mixed}"
-
-
-def _mixed(triangles: Array, materials: Array) -> int:
-    """How many of the triangles have several materials."""
-    one = np.zeros(int(triangles.max()) + 1, materials.dtype)
-    one[triangles] = materials  # of each triangle one of its materials
-    return len(np.unique(triangles[one[triangles] != materials]))
+        if triangles is not None and own.any() and (several := mixed(triangles[own], materials[own])):
+            yield f"object {o.id}: expected one material in each triangle, found several in {several}"
 
 
 LABEL = ChannelLabel(

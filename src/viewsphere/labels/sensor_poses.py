@@ -3,15 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from viewsphere.geometry.rotation import compose, rigid
+from viewsphere.geometry.camera import project
+from viewsphere.geometry.rotation import compose, rigid, transform
 from viewsphere.labels._field import Field
-from viewsphere.labels._label import Models, Needs, SampleLabel
+from viewsphere.labels._inset import OWN, inset
+from viewsphere.labels._label import Drawing, Models, Needs, SampleLabel
+from viewsphere.labels._lines import AXES, in_space
+from viewsphere.labels._paint import color_of
 from viewsphere.labels._sight import Sight
 from viewsphere.model.sample import ObjectAnnotation, Sample
+
+if TYPE_CHECKING:
+    from PIL.ImageDraw import ImageDraw
 
 TOLERANCE = 1e-9
 
@@ -35,6 +42,24 @@ def prove(sample: Sample, models: Models) -> Iterator[str]:
         yield "expected the identity, the picture's own sensor, among the poses; found none"
 
 
+def draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
+    """A small map in the lower right corner, in which the own sensor is white; and the axes of those others that it sees."""
+    own = np.abs(sample.camera_from_sensors - np.eye(4)).max(axis=(1, 2)).argmin()
+    poses = [(pose, OWN if i == own else color_of(i + 1)) for i, pose in enumerate(sample.camera_from_sensors)]
+    inset(pen, sample, scale, poses, at_right=True)
+    camera, others = sample.camera, np.delete(sample.camera_from_sensors, own, axis=0)
+    pixels = project(camera.intrinsics, others[:, :3, 3])[0]
+    seen = ((pixels >= 0) & (pixels <= (sample.width, sample.height))).all(axis=1)
+    for pose in others[seen]:
+        start, *ends = transform(camera.R.T, transform(pose, np.vstack([np.zeros(3), AXIS * np.eye(3)])) - camera.t)
+        for end, color in zip(ends, AXES, strict=True):
+            in_space(pen, sample, scale, np.array([start, end]), color, 3)
+
+
+AXIS = 0.1
+"""Metres of a sensor's axes that are drawn."""
+
+
 LABEL = SampleLabel(
     name="sensor_poses",
     meaning="where the rig's sensors are",
@@ -50,4 +75,9 @@ LABEL = SampleLabel(
     ),
     compute=compute,
     prove=prove,
+    drawing=Drawing(
+        "sensor_poses",
+        lines=draw,
+        key=(("sensor_poses: the sensors from above, its own white; axes of those it sees: x red, y green, z blue", None),),
+    ),
 )

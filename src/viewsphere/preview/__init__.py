@@ -1,6 +1,6 @@
 """Pictures for people: a contact sheet of a recipe or a data set, films of sequences, a model from four sides."""
 
-from viewsphere.preview.frame import INK, PAPER, draw_sample, is_shown
+from viewsphere.preview.frame import INK, PAPER, draw_sample
 from viewsphere.preview.shown import dataset_samples, preview_samples
 from viewsphere.preview.sides import four_sides
 from viewsphere.preview.smallness import small_objects
@@ -19,7 +19,6 @@ __all__ = [
     "draw_sample",
     "films_of",
     "four_sides",
-    "is_shown",
     "preview_samples",
     "small_objects",
     "write_video",

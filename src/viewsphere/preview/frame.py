@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
 from viewsphere.errors import StoreError
-from viewsphere.labels import Drawing, Extent, channel_labels, channels, drawable, is_in
+from viewsphere.labels import Drawing, Extent, alone, channels, drawable, is_in
 from viewsphere.model.channel import picture_of
 from viewsphere.model.mistakes import one_of
 from viewsphere.model.sample import Sample
@@ -102,8 +102,8 @@ def _pictures(sample: Sample, draw: Sequence[str], width: int | None, before: Be
     """The picture, and what is drawn beside it, all of one size."""
     chosen = drawn(sample, draw)
     if picture_of(sample.channels) is None:
-        if (alone := _alone(sample.channels)) is not None:
-            return [alone(sample, width or SIZE)]
+        if (stand_in := alone(sample.channels)) is not None:
+            return [stand_in(sample, width or SIZE)]
         raise StoreError(
             "preview: expected pictures (rgb or rgba), found a data set that keeps neither: preview its recipe instead"
         )
@@ -122,17 +122,6 @@ def _pictures(sample: Sample, draw: Sequence[str], width: int | None, before: Be
     beside = (drawing.picture(sample, within.get(drawing.name)) for drawing in chosen)
     others = [Image.fromarray(other).resize(size, Image.Resampling.BILINEAR) for other in beside if other is not None]
     return [np.asarray(picture), *map(np.asarray, others)]
-
-
-def is_shown(channels: Container[str]) -> bool:
-    """Whether samples with these channels have a picture, or something that stands for it."""
-    return picture_of(channels) is not None or _alone(channels) is not None
-
-
-def _alone(channels: Container[str]) -> Callable[[Sample, int], Picture] | None:
-    """What stands for the picture of a sample that has none, None where nothing does."""
-    found = (label.drawing and label.drawing.alone for name, label in channel_labels().items() if name in channels)
-    return next(filter(None, found), None)
 
 
 def _on_paper(picture: Picture) -> Picture:

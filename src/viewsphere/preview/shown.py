@@ -11,7 +11,7 @@ import numpy as np
 
 from viewsphere.errors import each
 from viewsphere.labels import channels as known
-from viewsphere.labels import drawable, on_request
+from viewsphere.labels import drawable, is_shown, on_request
 from viewsphere.model.camera import Intrinsics
 from viewsphere.model.channel import picture_of
 from viewsphere.model.model_spec import ModelSpec
@@ -19,7 +19,6 @@ from viewsphere.model.rig import Rig
 from viewsphere.model.sample import Sample
 from viewsphere.model.shot import Shot
 from viewsphere.model.tracks import Tracks
-from viewsphere.preview.frame import is_shown
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.recipe.rig import SensorList
 from viewsphere.run.framing import Framing

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-from viewsphere.labels import Color, drawings
+from viewsphere.labels import Color, drawings, is_shown
 from viewsphere.model.sample import Sample
 from viewsphere.preview.frame import (
     INK,
@@ -18,7 +18,6 @@ from viewsphere.preview.frame import (
     draw_instant,
     draw_sample,
     extents,
-    is_shown,
     nothing,
 )
 from viewsphere.store.films import Film, films_of

@@ -49,19 +49,24 @@ def fetched(path: str | os.PathLike[str]) -> Path:
 
 
 def _download(folder: RemotePath, copy: Path) -> None:
-    """Copy all files of a folder and below, but for data sets."""
-    files = folder.files_below()
+    """Copy all files of a folder and below, but for data sets; not one where they are known to be too large together, and never
+    more than may be copied: not all file systems know sizes.
+    """
+    files = folder.sizes_below()
     made = tuple(file.removesuffix(PLAN) or "store/" for file in files if f"/{file}".endswith(f"/{PLAN}"))
-    size, most = 0, limits.MAX_FETCHED_BYTES
-    for file in files:
-        if not file.startswith(made):
-            download(folder / file, copy / file)
-            size += (copy / file).stat().st_size
-        if size > most:
-            raise RecipeError(
-                f"{folder}: expected at most {most:,} bytes in a recipe's folder (limit MAX_FETCHED_BYTES), found more: put "
-                "the recipe and its models into a folder of their own, or set VIEWSPHERE_MAX_FETCHED_BYTES higher"
-            )
+    wanted = {file: size for file, size in files.items() if not file.startswith(made)}
+    most = limits.MAX_FETCHED_BYTES
+    fits, left = sum(wanted.values()) <= most, most
+    for file in wanted if fits else ():
+        fits = download(folder / file, copy / file, left)
+        if not fits:
+            break
+        left -= (copy / file).stat().st_size
+    if not fits:
+        raise RecipeError(
+            f"{folder}: expected at most {most:,} bytes in a recipe's folder (limit MAX_FETCHED_BYTES), found more: put "
+            "the recipe and its models into a folder of their own, or set VIEWSPHERE_MAX_FETCHED_BYTES higher"
+        )
 
 
 def _replace(target: Path, own: Path) -> None:

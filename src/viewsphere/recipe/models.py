@@ -146,8 +146,8 @@ class ModelEntry(Brief):
     scale: Scale = Field(default="as_is", description="as_is, real_size, or {length: 1.8}: metres to scale the model to")
     sidecar: Annotated[str, Field(min_length=1)] | None = Field(
         default=None,
-        description="a file that says symmetries and keypoints of the models; by default, of each model the file beside it, "
-        "such as mug.glb.viewsphere.yaml",
+        description="a file that says symmetries, keypoints and body_parts of the models; by default, of each model the file "
+        "beside it, such as mug.glb.viewsphere.yaml",
     )
     symmetries: Literal["declared", "found"] | None = Field(
         default=None,

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from itertools import chain
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, Field, ValidationError
+from pydantic import AfterValidator, Field, ValidationError, model_validator
 
 from viewsphere.errors import RecipeError
 from viewsphere.model.frozen import Frozen
-from viewsphere.model.keypoints import Keypoints
-from viewsphere.model.mistakes import report
+from viewsphere.model.keypoints import Keypoints, PointName
+from viewsphere.model.mistakes import report, shown
 from viewsphere.model.symmetries import Symmetries
 from viewsphere.recipe.file import read
 
@@ -29,7 +30,7 @@ def _all_of_them(symmetries: Symmetries | None) -> Symmetries | None:
 
 
 class Sidecar(Frozen):
-    """Symmetries and named points of a model."""
+    """Symmetries, named points and parts of the body of a model."""
 
     axes: Literal["file", "object"] = Field(
         default="file",
@@ -40,11 +41,25 @@ class Sidecar(Frozen):
         default=None, description="rigid motions that leave the model as it is; {} says that there are none"
     )
     keypoints: Keypoints | None = Field(default=None, description="named points")
+    body_parts: dict[PointName, Annotated[tuple[PointName, ...], Field(min_length=1)]] | None = Field(
+        default=None,
+        min_length=1,
+        description="names of parts of its body, each with the bones of its skin that move it: `{head: [Head, Neck], ...}`; "
+        "bones that none of them names are no part. Without it each bone is one",
+    )
+
+    @model_validator(mode="after")
+    def _check(self) -> Sidecar:
+        bones = list(chain.from_iterable((self.body_parts or {}).values()))
+        again = next((bone for i, bone in enumerate(bones) if bone in bones[:i]), None)
+        if again is not None:
+            raise ValueError(f"expected every bone of body_parts once; found {shown(again)} again")
+        return self
 
 
 def read_sidecar(path: Path) -> Sidecar:
     """The sidecar in a file; raises RecipeError in a line a mistake, which names file, line and field."""
-    data, marks = read(path, "axes, symmetries, keypoints")
+    data, marks = read(path, "axes, symmetries, keypoints, body_parts")
     try:
         return Sidecar.model_validate(data)
     except ValidationError as error:

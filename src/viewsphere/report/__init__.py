@@ -9,7 +9,7 @@ from typing import Any
 
 from viewsphere.errors import StoreError, UserError, ViewsphereError
 from viewsphere.geometry.box import EDGES, FACES, VERTEX_SIGNS
-from viewsphere.labels import drawings
+from viewsphere.labels import drawings, is_shown
 from viewsphere.report.choice import chosen_frames
 from viewsphere.report.facts import facts, finished
 from viewsphere.report.frames import frame_data
@@ -72,7 +72,7 @@ def write_report(
     if not len(dataset):
         raise StoreError(f"{dataset.root}: expected finished frames, found none: render first")
     table = read_table(dataset, workers=workers, listener=lambda done, total: tell("records", done, total))
-    whole = {film.sequence: film for film in films_of(dataset)}
+    whole = {film.sequence: film for film in films_of(dataset, is_shown)}
     films = played(list(whole.values()), frames)
     positions = _positions(films, table, frames)
     data = report_data(dataset, table, positions, proof, tell)

@@ -7,21 +7,26 @@ from typing import Any
 import numpy as np
 
 from viewsphere.geometry.box import FACES
+from viewsphere.labels import alone
 from viewsphere.model.camera import Camera
 from viewsphere.model.instant import Viewpoint
 from viewsphere.model.sample import ObjectAnnotation, Sample
+from viewsphere.report.pictures import scan_size
 from viewsphere.report.sequences import moment_data
 from viewsphere.report.unknown import number, numbers
 
 
 def frame_data(sample: Sample) -> dict[str, Any]:
-    """Frame index, split, picture's path, pose, camera and objects, of a sequence also its moment; unknown values are null."""
-    pose, camera = sample.known_pose, sample.known_camera
+    """Frame index, split, picture's path and size, pose, camera and objects, of a sequence also its moment; unknown values are
+    null. Of a LiDAR, which has no picture, `scan` are its rings and columns, and the size is that of what stands for one.
+    """
+    pose, camera, stands_in = sample.known_pose, sample.known_camera, alone(sample.channels) is not None
     return {
         "index": sample.index,
         "split": sample.split,
         "file": sample.picture_file,
-        "size": [sample.width, sample.height],
+        "size": list(scan_size(sample) if stands_in else (sample.width, sample.height)),
+        "scan": [sample.height, sample.width] if stands_in else None,
         "pose": None if pose is None else _pose_data(pose),
         "camera": None if camera is None else _camera_data(camera),
         "objects": [_object_data(o) for o in sample.objects],

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from viewsphere.errors import UserError
-from viewsphere.labels import Extent, channel_labels
+from viewsphere.labels import Extent, alone, channel_labels
 from viewsphere.labels._passes import DRAWINGS
 from viewsphere.labels._passes import picture as pass_colors
 from viewsphere.labels._state import picture as state_colors
@@ -157,7 +157,9 @@ Painter = Callable[[Sample, Scale, Mapping[str, Extent]], Layer]
 
 
 def layer_names(sample: Sample) -> list[str]:
-    """Which layers can be drawn of a sample."""
+    """Which layers can be drawn of a sample; of one without a picture, for which another stands, that alone."""
+    if alone(sample.channels) is not None:
+        return ["rgb"]
     drawable = ({*PAINTERS} - {"rgb", "coordinates"}) & {*sample.channels}
     drawable |= {"rgb"} if picture_of(sample.channels) else set()
     drawable |= {"coordinates"} if {"coordinates", "instances"} <= {*sample.channels} else set()
@@ -170,8 +172,38 @@ def layer(sample: Sample, name: str, scale: Scale, within: Mapping[str, Extent] 
 
 
 def _rgb(sample: Sample, scale: Scale, within: Mapping[str, Extent]) -> Layer:
-    picture = _shrunk(np.asarray(sample.picture, np.uint8), scale)
+    picture = (
+        _shrunk(np.asarray(sample.picture, np.uint8), scale) if picture_of(sample.channels) else scan_picture(sample, scale)
+    )
     return Layer(webp(picture, scale.quality, method=1 if scale.quick else 4))
+
+
+SCAN = 640
+"""Width of what stands for the picture of a LiDAR; it is so high, too, below the range image."""
+
+LEAST_STRIP = 32
+"""Its range image's height at least."""
+
+NO_RETURN = (16, 18, 24)
+
+
+def scan_size(sample: Sample) -> tuple[int, int]:
+    """Width and height of what stands for a LiDAR's picture: its range image, and below it its points from above."""
+    return SCAN, SCAN + max(LEAST_STRIP, round(SCAN * sample.height / sample.width))
+
+
+def scan_picture(sample: Sample, scale: Scale) -> Picture:
+    """A LiDAR's range image, a row each ring, near light, above its points from above; (H, W, 3)."""
+    paint = alone(sample.channels)
+    assert paint is not None
+    width, height = (round(side * min(1.0, scale.width / SCAN)) for side in scan_size(sample))
+    rows = sample.channels["lidar"]
+    ranges = np.full((sample.height, sample.width), np.inf, np.float32)
+    ranges[rows["ring"], rows["column"]] = rows["range"]
+    _, _, colors = depth_colors(ranges)
+    strip = np.where(colors[..., 3:] > 0, colors[..., :3], np.array(NO_RETURN, np.uint8))
+    strip = np.asarray(Image.fromarray(strip).resize((width, height - width), Image.Resampling.NEAREST))
+    return np.vstack([strip, paint(sample, width)])
 
 
 def _depth(sample: Sample, scale: Scale, within: Mapping[str, Extent]) -> Layer:
@@ -194,6 +226,10 @@ def _parts(sample: Sample, scale: Scale, within: Mapping[str, Extent]) -> Layer:
 
 def _materials(sample: Sample, scale: Scale, within: Mapping[str, Extent]) -> Layer:
     return Layer(webp(part_colors(_thinned(sample.channels["materials"], scale.layer_width)), 60))
+
+
+def _body_parts(sample: Sample, scale: Scale, within: Mapping[str, Extent]) -> Layer:
+    return Layer(webp(part_colors(_thinned(sample.channels["body_parts"], scale.layer_width)), 60))
 
 
 def _beside(name: str) -> Painter:
@@ -251,6 +287,7 @@ PAINTERS: dict[str, Painter] = {
     "panoptic": _beside("panoptic"),
     "parts": _parts,
     "materials": _materials,
+    "body_parts": _body_parts,
     "flow": _flow,
     "disparity": _disparity,
     "flow_state": _flow_state,

@@ -144,6 +144,7 @@ class Models:
             diameter=traits.diameter,
             symmetries=traits.symmetries,
             keypoints=traits.keypoints,
+            body_parts=mesh.body_parts,
         )
 
     def _compare(self, spec: ModelSpec, known: ModelInfo, wanted: Steps) -> None:
@@ -205,6 +206,8 @@ def mesh_digest(mesh: Mesh) -> str:
     digest = hashlib.sha256()
     for name in (f.name for f in fields(Mesh) if f.name not in {"images", "warnings"}):
         value = getattr(mesh, name)
+        if "body_part" in name and not mesh.body_parts:
+            continue  # digests of models without bones are as they were before there were parts of bodies
         digest.update(name.encode())
         digest.update(value.tobytes() if hasattr(value, "tobytes") else repr(value).encode())
     for image in mesh.images:

@@ -17,7 +17,7 @@ from viewsphere.assets.opaque import Stamp
 from viewsphere.assets.parts import taken
 from viewsphere.assets.primitive import FileFacts
 from viewsphere.assets.repaint import repaint_stamps
-from viewsphere.assets.traits import traits_of
+from viewsphere.assets.traits import traits_of, with_body_parts
 from viewsphere.errors import ModelError, RecipeError
 from viewsphere.geometry.box import box_size, box_vertices
 from viewsphere.geometry.rotation import transform
@@ -103,7 +103,7 @@ class Stages:
         """Many may be parts of one model, which is loaded once."""
         if spec.parts is None:
             mesh, self._facts[_name(spec, step)] = load(spec, build_zoo_model, step=step)
-            return mesh
+            return with_body_parts(mesh, spec)
         frame = frame_of(spec, step)
         return taken(self.model(spec.whole, None if frame is None else TimeStep(frame=frame)), spec, step)
 

@@ -78,7 +78,7 @@ class ModelInfo:
     that it says of itself, or that were found (`Traits`). A model that deforms has the same of each of its `steps`, ascending,
     whose `track` is its key; its own fields are those of its file's first frame.
 
-    `parts` and `materials` are names: those of the numbers 1, 2, ... in maps of parts and of materials.
+    `parts`, `materials` and `body_parts` are names: those of the numbers 1, 2, ... in maps of these names.
     """
 
     __pydantic_config__ = _STRICTLY
@@ -104,6 +104,7 @@ class ModelInfo:
     diameter: float | None = None
     symmetries: Symmetries | None = None
     keypoints: Keypoints | None = None
+    body_parts: tuple[str, ...] = ()
 
     @property
     def node(self) -> str | None:
@@ -135,6 +136,8 @@ class ModelInfo:
             value["credit"] = self.credit.model_dump(exclude_none=True)
         if not self.materials:  # of models that were exported elsewhere, or before they had names here
             del value["materials"]
+        if not self.body_parts:
+            del value["body_parts"]
         for name in ("symmetries", "keypoints"):
             value[name] = value[name] and value[name].model_dump(mode="json")
         for name in ("credit", "diameter", "symmetries", "keypoints"):

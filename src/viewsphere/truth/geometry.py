@@ -33,6 +33,7 @@ OF_TRIANGLES = (
     "triangle_category",
     "triangle_class",
     "triangle_material",
+    "triangle_body_part",
 )
 STACKED = (*OF_VERTICES, *OF_TRIANGLES, "bounds")
 """Arrays of a geometry that are those of its parts, one after another."""
@@ -49,9 +50,9 @@ class Geometry:
 
     triangle_normals (T, 3) float32 world, unit, by winding (zero for a degenerate triangle); triangle_side (T,) int8: 1 where
     the mean of the vertex normals agrees with the winding, -1 where it opposes it, 2 or -2 likewise where all three equal the
-    triangle's own; triangle_object, triangle_part, triangle_category, triangle_material (T,) int32, 0 for scenery and ground;
-    triangle_class (T,) int32: of things and stuff, see `model.classes`; triangle_cutout (T,) int32: -1 all surface, -2 never
-    seen, -3 and -4 `cutouts.ENDLESS`, else a row of `cutouts.corners`.
+    triangle's own; triangle_object, triangle_part, triangle_category, triangle_material, triangle_body_part (T,) int32, 0 for
+    scenery and ground; triangle_class (T,) int32: of things and stuff, see `model.classes`; triangle_cutout (T,) int32: -1 all
+    surface, -2 never seen, -3 and -4 `cutouts.ENDLESS`, else a row of `cutouts.corners`.
 
     is_used (V,): whether a vertex is a triangle's corner; bounds (N, 2, 3) float64: of each thing, world metres, the lowest and
     the highest of its used vertices, infinite where it has none.
@@ -74,6 +75,7 @@ class Geometry:
     triangle_category: NDArray[np.int32]
     triangle_class: NDArray[np.int32]
     triangle_material: NDArray[np.int32]
+    triangle_body_part: NDArray[np.int32]
     triangle_cutout: NDArray[np.int32]
     cutouts: Cutouts
     is_used: NDArray[np.bool_]
@@ -169,7 +171,7 @@ def with_blended_colors(geometry: Geometry, meshes: Sequence[Mesh]) -> Geometry:
 def _placed(things: tuple[Thing, ...], meshes: tuple[Mesh, ...], label_alpha: float) -> Geometry:
     vertex_start = (0, *accumulate(len(m.vertices) for m in meshes))
     triangles = _joined([m.triangles + s for m, s in zip(meshes, vertex_start, strict=False)], np.int32)
-    labels = _joined([_labels(p, m) for p, m in zip(things, meshes, strict=True)], np.int32, 5)
+    labels = _joined([_labels(p, m) for p, m in zip(things, meshes, strict=True)], np.int32, 6)
     cutouts, rows = stack_cutouts([mesh_cutouts(m, label_alpha) for m in meshes])
     is_used = np.zeros(vertex_start[-1], np.bool_)
     is_used[triangles] = True
@@ -185,6 +187,7 @@ def _placed(things: tuple[Thing, ...], meshes: tuple[Mesh, ...], label_alpha: fl
         triangle_category=labels[:, 2],
         triangle_class=labels[:, 3],
         triangle_material=labels[:, 4],
+        triangle_body_part=labels[:, 5],
         triangle_cutout=rows,
         cutouts=cutouts,
         is_used=is_used,
@@ -220,11 +223,13 @@ def _stacked(parts: Sequence[Geometry]) -> Geometry:
 
 
 def _labels(thing: Thing, mesh: Mesh) -> NDArray[np.int32]:
-    """Object, part, category, class and material of each triangle, (T, 5)."""
-    labels = np.full((len(mesh.triangles), 5), BACKGROUND, np.int32)
+    """Object, part, category, class, material and part of a body of each triangle, (T, 6)."""
+    labels = np.full((len(mesh.triangles), 6), BACKGROUND, np.int32)
     if thing.id:
         labels[:, 0], labels[:, 1], labels[:, 2] = thing.id, mesh.triangle_part + 1, thing.model.category_id
         labels[:, 3], labels[:, 4] = thing_class(thing.model.category_id), mesh.triangle_material + 1
+        if mesh.triangle_body_part is not None:
+            labels[:, 5] = mesh.triangle_body_part
     else:
         stuff = [stuff_of(thing.model.category, part) for part in mesh.parts]
         labels[:, 3] = np.array(stuff, np.int32)[mesh.triangle_part]
@@ -247,6 +252,7 @@ def _ground(bounds: NDArray[np.float64], floor: Floor | None) -> Geometry:
         triangle_category=background,
         triangle_class=np.full(2, GROUND, np.int32),
         triangle_material=background,
+        triangle_body_part=background,
         triangle_cutout=np.array(ENDLESS, np.int32),
         cutouts=NO_CUTOUTS,
         is_used=np.ones(4, np.bool_),

@@ -22,7 +22,10 @@ ROOMS = 3
 MOVED = ("vertices", "normals", "coordinates", "triangle_normals", "triangle_side", "bounds")
 """Arrays of a geometry that change where something moves, or deforms."""
 
-KEPT = ("triangles", "triangle_material", "triangle_part", "uv0", "uv1", "colors", "materials", "images")
+KEPT = (
+    *("triangles", "triangle_material", "triangle_part", "triangle_body_part"),
+    *("uv0", "uv1", "colors", "materials", "images"),
+)
 """What a mesh and its deformed self have in common."""
 
 SLACK = 1e-6

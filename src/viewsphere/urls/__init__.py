@@ -14,11 +14,13 @@ from __future__ import annotations
 import os
 import re
 import shutil
+import sys
 from collections.abc import Generator, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from viewsphere.aside import temporary
+from viewsphere.urls.remote_path import BLOCK
 from viewsphere.urls.remote_path import RemotePath as RemotePath
 
 _URL = re.compile(r"[A-Za-z][A-Za-z0-9+.:-]+:/")
@@ -78,11 +80,16 @@ def here(path: Path) -> Generator[Path]:
         yield copy
 
 
-def download(file: Path, destination: Path) -> None:
-    """Copy a file from a URL to a disk, block by block."""
+def download(file: Path, destination: Path, most: int = sys.maxsize) -> bool:
+    """Copy a file from a URL to a disk, block by block, at most so many bytes of it; returns whether that is all of it."""
     destination.parent.mkdir(parents=True, exist_ok=True)
     with file.open("rb") as read, destination.open("wb") as write:
-        shutil.copyfileobj(read, write)
+        while block := read.read(min(BLOCK, most + 1)):
+            write.write(block[:most])
+            most -= len(block)
+            if most < 0:
+                return False
+    return True
 
 
 def link_file(source: Path, destination: Path) -> str:

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.errors import UserError, ViewsphereError
-from viewsphere.labels import channel_labels
-from viewsphere.model.channel import PASSES, PICTURES, picture_of
+from viewsphere.labels import channel_labels, is_shown
+from viewsphere.model.channel import PASSES, PICTURES
 from viewsphere.report import conventions, model_data
 from viewsphere.report.facts import facts
 from viewsphere.report.frames import frame_data
@@ -190,7 +190,7 @@ def _layer_names(channels: Sequence[str]) -> list[str]:
     """The layers that frames with these channels may have."""
     have = {*channels}
     drawn = [name for name in PASSES | channel_labels() if name in have and name not in PICTURES]
-    return [*(["rgb"] if picture_of(channels) else []), *drawn]
+    return [*(["rgb"] if is_shown(channels) else []), *drawn]
 
 
 def _as_json(value: object) -> Answer:

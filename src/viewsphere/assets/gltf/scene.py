@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -11,9 +11,11 @@ import numpy as np
 from viewsphere.assets.gltf.document import DRACO, Document, ForBlenderError
 from viewsphere.assets.gltf.field import Field
 from viewsphere.assets.primitive import Float, Int, Primitive, compact
+from viewsphere.assets.skin import strongest
 from viewsphere.assets.smoothing import flat
 from viewsphere.assets.transform import moved, unit
 from viewsphere.geometry.rotation import compose
+from viewsphere.model.keypoints import is_name
 
 TRIANGLES, STRIP, FAN = 4, 5, 6
 
@@ -36,7 +38,7 @@ def read_pieces(document: Document, worlds: Mapping[int, Float]) -> list[Primiti
         part = _unused(node.text("name") or entry.text("name") or f"node{index}", parts)
         weights = tuple(_weights(node) or _weights(entry))
         if "skin" in node or any(weights):
-            local = _primitives(document, entry, weights, _joints(document, node, worlds))
+            local = _primitives(document, entry, weights, _skin(document, node, worlds))
         else:
             local = meshes.setdefault(mesh, []) or _primitives(document, entry, (), None)
             meshes[mesh] = local
@@ -152,20 +154,28 @@ def _instances(document: Document, node: Field, world: Float) -> list[Float]:
     return [compose(world, local) for local in _compose(t, r, s)]
 
 
-def _primitives(document: Document, mesh: Field, weights: tuple[float, ...], joints: Float | None) -> list[Primitive]:
-    """A mesh's triangles in its own axes, or in the world's when `joints` (J, 4, 4) bend it."""
+@dataclass(frozen=True, eq=False)
+class _Skin:
+    """Matrices (J, 4, 4) of joints from the bind pose to the world, and the joints' names."""
+
+    matrices: Float
+    names: tuple[str, ...]
+
+
+def _primitives(document: Document, mesh: Field, weights: tuple[float, ...], skin: _Skin | None) -> list[Primitive]:
+    """A mesh's triangles in its own axes, or in the world's when a skin bends it."""
     pieces: list[Primitive] = []
     for entry in mesh.items("primitives"):
         piece = _primitive(document, entry)
         if piece is not None:
             piece = _morphed(document, entry, piece, weights)
-            pieces.append(compact(piece if joints is None else _skinned(document, entry, piece, joints)))
+            pieces.append(compact(piece if skin is None else _skinned(document, entry, piece, skin)))
             document.folder.check("MAX_TRIANGLES", sum(len(piece.triangles) for piece in pieces), "triangles")
     return pieces
 
 
-def _joints(document: Document, node: Field, worlds: Mapping[int, Float]) -> Float | None:
-    """Matrices (J, 4, 4) from the bind pose to the world of a node's skin, None if it has none."""
+def _skin(document: Document, node: Field, worlds: Mapping[int, Float]) -> _Skin | None:
+    """The skin of a node, None if it has none."""
     if "skin" not in node:
         return None
     skin = document.root.at("skins", node.integer("skin"))
@@ -173,20 +183,28 @@ def _joints(document: Document, node: Field, worlds: Mapping[int, Float]) -> Flo
     outside = [joint for joint in joints if joint not in worlds]
     if outside or not joints:
         raise skin.fail(f"joints that are nodes of the scene, not {outside[:3] or 'none at all'}")
-    matrices = np.array([worlds[joint] for joint in joints])
+    matrices, names = np.array([worlds[joint] for joint in joints]), _names(document, joints)
     if "inverseBindMatrices" not in skin:
-        return matrices
+        return _Skin(matrices, names)
     inverse = document.accessor(skin.integer("inverseBindMatrices"), (16,)).astype(np.float64)
     if len(inverse) < len(joints):
         raise skin.fail(f"{len(joints)} inverse bind matrices, not {len(inverse)}")
     local = inverse[: len(joints)].reshape(-1, 4, 4).transpose(0, 2, 1)
-    return np.array([compose(joint, bind) for joint, bind in zip(matrices, local, strict=True)])
+    return _Skin(np.array([compose(joint, bind) for joint, bind in zip(matrices, local, strict=True)]), names)
 
 
-def _skinned(document: Document, entry: Field, piece: Primitive, joints: Float) -> Primitive:
+def _names(document: Document, joints: Sequence[int]) -> tuple[str, ...]:
+    """Names of nodes, each another."""
+    taken = dict[str, int]()
+    said = ((joint, document.root.at("nodes", joint).text("name").strip()) for joint in joints)
+    return tuple(_unused(name if is_name(name) else f"node{joint}", taken) for joint, name in said)
+
+
+def _skinned(document: Document, entry: Field, piece: Primitive, skin: _Skin) -> Primitive:
     """The piece bent by its skin's joints (linear blend skinning)."""
-    attributes, count = entry.get("attributes"), len(piece.positions)
+    attributes, count, joints = entry.get("attributes"), len(piece.positions), skin.matrices
     blend = np.zeros((count, 4, 4))
+    bones, weights = list[Int](), list[Float]()
     for group in range(2):
         joint = _attribute(document, attributes, f"JOINTS_{group}", (4,), count)
         weight = _attribute(document, attributes, f"WEIGHTS_{group}", (4,), count)
@@ -194,6 +212,8 @@ def _skinned(document: Document, entry: Field, piece: Primitive, joints: Float) 
             break
         if joint.size and (joint.min() < 0 or joint.max() >= len(joints)):
             raise attributes.fail(f"JOINTS_{group} below {len(joints)}, not {joint.max():.0f}")
+        bones.append(joint.astype(np.int64))
+        weights.append(weight)
         for column in range(4):
             blend += weight[:, column, None, None] * joints[joint[:, column].astype(np.int64)]
     total = blend[:, 3, 3]
@@ -202,6 +222,8 @@ def _skinned(document: Document, entry: Field, piece: Primitive, joints: Float) 
         blend[total <= 0] = np.eye(4)
     blend /= blend[:, 3, 3, None, None]
     positions = np.einsum("nij,nj->ni", blend[:, :3, :3], piece.positions) + blend[:, :3, 3]
+    if bones:
+        piece = replace(piece, bone=strongest(np.hstack(bones), np.hstack(weights), piece.triangles), bones=skin.names)
     if piece.normals is None:
         return replace(piece, positions=positions)
     linear = blend[:, :3, :3]

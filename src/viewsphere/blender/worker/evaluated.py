@@ -8,6 +8,7 @@ import bpy
 import numpy as np
 
 from .nodes import Reader
+from .skins import skin_of
 
 SOLID = ("MESH", "META")
 """Objects whose triangles are taken; text, curves and surfaces come as meshes when they are evaluated."""
@@ -24,7 +25,8 @@ class Gathering:
     """Collects the triangles of all objects that a render would show.
 
     `pieces` are triangles of one material, with files of arrays: positions, triangles, normals, uv0, uv1 and colors, the last
-    three None where there are none; `uvs` names the two layers. `placed` lists where each piece stands (a matrix) and which
+    three None where there are none; `uvs` names the two layers. What an armature bends has `skin`, names of bones, and files of
+    each vertex's `bones` and `weights`. `placed` lists where each piece stands (a matrix) and which
     part it belongs to.
     """
 
@@ -91,7 +93,7 @@ class Gathering:
             triangles = len(mesh.loop_triangles)
             if self._count + triangles > self._most:
                 return [], triangles
-            found = self._cut(mesh, slots or list(mesh.materials)), triangles
+            found = self._cut(mesh, slots or list(mesh.materials), skin_of(item, mesh)), triangles
         finally:
             if item.type == "META":
                 item.to_mesh_clear()
@@ -99,7 +101,7 @@ class Gathering:
             self._meshes[key] = found
         return found
 
-    def _cut(self, mesh, slots):
+    def _cut(self, mesh, slots, skin):
         """The mesh's triangles, one piece a material."""
         count = len(mesh.loop_triangles)
         if count == 0:
@@ -112,9 +114,8 @@ class Gathering:
         slot_of = slot_of.clip(0, max(len(slots) - 1, 0))[polygons]
         arrays = self._arrays(mesh)
         numbers = [self._number(slots[k] if slots else None) for k in range(max(len(slots), 1))]
-        return [
-            self._piece(mesh, arrays, loops.reshape(-1, 3)[slot_of == k].reshape(-1), numbers[k]) for k in np.unique(slot_of)
-        ]
+        corners = loops.reshape(-1, 3)
+        return [self._piece(mesh, arrays, corners[slot_of == k].reshape(-1), numbers[k], skin) for k in np.unique(slot_of)]
 
     def _number(self, material):
         """The number of a material; None for none."""
@@ -130,7 +131,7 @@ class Gathering:
         mesh.corner_normals.foreach_get("vector", normals)
         return vertices.reshape(-1, 3), corners, normals.reshape(-1, 3)
 
-    def _piece(self, mesh, arrays, loops, number):
+    def _piece(self, mesh, arrays, loops, number, skin):
         """Write the triangles with these corners as a piece's files; equal corners share a vertex."""
         vertices, corners, normals = arrays
         material = self.materials[number] if number is not None else None
@@ -144,7 +145,11 @@ class Gathering:
         told = {name: self._saved(name, held[name][first]) for name in held if name != "corner"}
         told["positions"] = self._saved("positions", vertices[corners[loops[first]]])
         told["triangles"] = self._saved("triangles", triangles.reshape(-1, 3).astype(np.int32))
-        self.pieces.append({"uv0": None, "uv1": None, "colors": None, **told, "uvs": uvs, "material": number})
+        if skin is not None:
+            names, bones, weights = skin
+            own = corners[loops[first]]
+            told |= {"skin": names, "bones": self._saved("bones", bones[own]), "weights": self._saved("weights", weights[own])}
+        self.pieces.append({"uv0": None, "uv1": None, "colors": None, "skin": None, **told, "uvs": uvs, "material": number})
         return len(self.pieces) - 1
 
     def _saved(self, name, array):

@@ -93,12 +93,14 @@ export function legend(frame) {
     return [`${decimal(near)} px`, el("i", { class: "viridis" }), `${decimal(far)} px and less`];
   }
   if (layer === "flow" && frame.layers.flowRange) return [...key("flow"), `full colour: ${decimal(frame.layers.flowRange[1])} px to the next instant`];
+  if (frame.scan) return ["on top the range image, near is light;", ...key("lidar")];
   if (keys[layer]) return key(layer);
   return {
     normals: ["red: right, green: up, blue: towards the camera"],
     coordinates: ["in the object's box: red to its left, green to its back, blue up"],
     parts: ["a colour for each named part"],
     materials: ["a colour for each material"],
+    body_parts: ["a colour for each part of the body"],
   }[layer] ?? [];
 }
 
@@ -118,6 +120,11 @@ function numbers(frame) {
 
 function camera(frame) {
   if (!frame.camera) return [];
+  if (frame.scan) {
+    const [rings, columns] = frame.scan;
+    const place = frame.camera.center.map((v) => decimal(v, 3)).join(", ");
+    return [el("h3", {}, "LiDAR"), el("p", { class: "note" }, `${rings} rings × ${columns} columns; centre in the world ${place} m`)];
+  }
   const rows = frame.camera.K.map((row) => el("tr", {}, ...row.map((v) => el("td", {}, decimal(v, 2)))));
   return [
     el("h3", {}, "Camera matrix K, pixels"),

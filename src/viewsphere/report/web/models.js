@@ -96,7 +96,7 @@ function frustums(key, size) {
   const found = [];
   for (const frame of shown) {
     for (const object of frame.objects) {
-      if (object.model !== key || !object.cameraFromObject || !frame.camera) continue;
+      if (object.model !== key || !object.cameraFromObject || !frame.camera || frame.scan) continue;
       const m = object.cameraFromObject;
       const { K } = frame.camera;
       const { width, height } = frameSize(frame);

@@ -41,11 +41,12 @@ export async function draw(canvas, frame, large, base = false, trail = []) {
   if (image) pen.drawImage(image, 0, 0, canvas.width, canvas.height);
   const scale = canvas.width / size.width;
   const view = { pen, scale, ratio, large };
+  canvas.drawn = turn;
+  if (frame.scan) return; // labels of a LiDAR are in the pixels of its range image, and its points have the objects' colours
   if (layers.has("masks")) drawMasks(view, frame, canvas);
   if (layers.has("boxes3d")) for (const object of frame.objects) drawBox3d(view, object);
   if (layers.has("boxes")) for (const object of frame.objects) drawBox(view, object);
   if (layers.has("tracks") && frame.points) drawTracks(view, frame, trail);
-  canvas.drawn = turn;
 }
 
 /** The picture itself, pale where a layer covers it. */

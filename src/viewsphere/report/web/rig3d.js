@@ -13,13 +13,13 @@ function lines(points, tone, opacity = 1) {
 
 const center = (frame) => [3, 7, 11].map((i) => frame.worldFromCamera[i]);
 
-/** A pyramid from the sensor's centre to its picture, so far ahead. */
+/** A pyramid from the sensor's centre to its picture, so far ahead; a LiDAR's shows where ahead is. */
 function frustum(frame, size) {
   const m = frame.worldFromCamera;
   const { K } = frame.camera;
   const { width, height } = frameSize(frame);
   const place = (p) => [0, 4, 8].map((row) => m[row] * p[0] + m[row + 1] * p[1] + m[row + 2] * p[2] + m[row + 3]);
-  const corner = (u, v) => place([((u - K[0][2]) / K[0][0]) * size, ((v - K[1][2]) / K[1][1]) * size, size]);
+  const corner = frame.scan ? (u, v) => place([(u / width - 0.5) * 0.4 * size, (v / height - 0.5) * 0.4 * size, size]) : (u, v) => place([((u - K[0][2]) / K[0][0]) * size, ((v - K[1][2]) / K[1][1]) * size, size]);
   const ring = [corner(0, 0), corner(width, 0), corner(width, height), corner(0, height)];
   return ring.flatMap((p, i) => [...center(frame), ...p, ...p, ...ring[(i + 1) % 4]]);
 }

@@ -13,6 +13,7 @@ export const LAYERS = [
   { name: "panoptic", label: "Panoptic", key: "a", surface: true },
   { name: "parts", label: "Parts", key: "p", surface: true },
   { name: "materials", label: "Materials", key: "l", surface: true },
+  { name: "body_parts", label: "Body parts", key: "y", surface: true },
   { name: "flow", label: "Flow", key: "f", surface: true },
   { name: "flow_state", label: "Seen next", key: "s", surface: true },
   { name: "disparity", label: "Disparity", key: "i", surface: true },

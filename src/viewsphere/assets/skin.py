@@ -1,0 +1,60 @@
+"""Parts of bodies: which bone of its skin moves each triangle."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from viewsphere.assets.mesh import Mesh
+
+Int = NDArray[np.int64]
+
+NONE = -1
+"""The bone of a triangle that no bone moves."""
+
+
+def strongest(bones: Int, weights: NDArray[np.float64], triangles: Int) -> Int:
+    """The bone of each triangle (T,): that with the largest sum of weights at its corners, which is the largest at its middle;
+    of equal ones the first, and `NONE` where all weights are 0.
+
+    `bones` and `weights` (V, K) are those of each vertex; `triangles` (T, 3) index vertices.
+    """
+    found = np.full(len(triangles), NONE, np.int64)
+    if not bones.size or not triangles.size:
+        return found
+    count = int(bones.max()) + 1
+    corners = np.arange(len(triangles))[:, None] * count + bones[triangles].reshape(len(triangles), -1)
+    pairs, at = np.unique(corners, return_inverse=True)
+    sums = np.bincount(at.reshape(-1), np.nan_to_num(weights[triangles]).reshape(-1), len(pairs))
+    triangle, bone = np.divmod(pairs, count)
+    order = np.lexsort((bone, -sums, triangle))
+    best = order[np.unique(triangle[order], return_index=True)[1]]
+    return np.where(sums[best] > 0, bone[best], found)
+
+
+def joined(pieces: Sequence[tuple[tuple[str, ...], Int | None, int]]) -> tuple[tuple[str, ...], NDArray[np.int32] | None]:
+    """The names of all bones of some pieces, each once, and the number of each triangle's, from 1, 0 for none; None where no
+    piece has bones. Of each piece: names of its bones, the bone of each triangle (None: no bones), how many triangles it has.
+    """
+    names = tuple(dict.fromkeys(name for own, _, _ in pieces for name in own))
+    if not names:
+        return (), None
+    number = {name: i for i, name in enumerate(names, 1)}
+    parts = [
+        np.zeros(count, np.int32) if bone is None else np.array([*(number[name] for name in own), 0], np.int32)[bone]
+        for own, bone, count in pieces
+    ]
+    return names, np.concatenate(parts)
+
+
+def grouped(mesh: Mesh, parts: Mapping[str, Sequence[str]]) -> Mesh:
+    """The mesh whose bones are these named parts of its body; bones that none of them names are none. All are the mesh's."""
+    numbers = {bone: i for i, bones in enumerate(parts.values(), 1) for bone in bones}
+    table = np.array([0, *(numbers.get(name, 0) for name in mesh.body_parts)], np.int32)
+    assert mesh.triangle_body_part is not None
+    return replace(mesh, body_parts=tuple(parts), triangle_body_part=table[mesh.triangle_body_part])
