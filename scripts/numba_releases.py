@@ -26,7 +26,8 @@ from typing import Any
 from viewsphere.kernels.kernel_cache import NUMBA, QUICKER
 
 ROOT = Path(__file__).resolve().parents[1]
-DIGESTS = ROOT / "tests" / "truth" / "truth_digest.py"
+TESTS = ROOT / "tests"
+DIGESTS = TESTS / "truth" / "truth_digest.py"
 
 
 def installed(release: str) -> Path | None:
@@ -44,9 +45,9 @@ def installed(release: str) -> Path | None:
 def environment(cache: Path, release: str, stock: bool) -> dict[str, str]:
     """Environment variables for a process with this numba, which keeps compiled kernels in a separate folder."""
     folder = installed(release)
-    path = {} if folder is None else {"PYTHONPATH": str(folder)}
+    path = os.pathsep.join(map(str, [TESTS] if folder is None else [folder, TESTS]))
     place = cache / f"{release} {'stock' if stock else 'quicker'}"
-    return {**os.environ, **path, "VIEWSPHERE_STOCK_NUMBA": str(int(stock)), "VIEWSPHERE_CACHE": str(place)}
+    return {**os.environ, "PYTHONPATH": path, "VIEWSPHERE_STOCK_NUMBA": str(int(stock)), "VIEWSPHERE_CACHE": str(place)}
 
 
 def measured(cache: Path, build: tuple[str, bool]) -> dict[str, Any]:

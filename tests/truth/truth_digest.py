@@ -22,7 +22,8 @@ from viewsphere.truth.visibility import rasterize
 
 LABELS = [name for name, label in channel_labels().items() if not label.needs.is_some]
 """Those that still pictures of one sensor have."""
-ALL = [name for name in channel_labels() if name != "tracks"]  # which a recipe with tracks keeps anyway
+ALL = [name for name, label in channel_labels().items() if name != "tracks" and not label.needs.lidar]
+"""Those of cameras; a recipe with tracks keeps tracks anyway."""
 SEEDS = range(3)
 RECIPES = (
     {
