@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from viewsphere.geometry.rotation import compose, rigid
+from viewsphere.geometry.rotation import compose, rigid, rotation_vector
 from viewsphere.labels._field import Field
-from viewsphere.labels._label import Models, Needs, SampleLabel
+from viewsphere.labels._label import Drawing, Models, Needs, SampleLabel
+from viewsphere.labels._lines import arrow
 from viewsphere.labels._sight import Sight
 from viewsphere.model.camera import Camera
 from viewsphere.model.sample import ObjectAnnotation, Sample
+
+if TYPE_CHECKING:
+    from PIL.ImageDraw import ImageDraw
 
 TOLERANCE = 1e-9
 
@@ -39,6 +43,26 @@ def prove(sample: Sample, models: Models) -> Iterator[str]:
             yield f"expected a rigid pose, found {pose.tolist()}"
 
 
+COLOR = (20, 170, 180)
+
+
+def draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
+    """How the camera goes on, at a sequence's end how it came: an arrow from the picture's middle to the side that it moves to,
+    with its metres, those ahead, and its turn.
+    """
+    ahead, before = sample.camera_from_next, sample.camera_from_previous
+    way = np.zeros(3) if ahead is None and before is None else ahead[:3, 3] if ahead is not None else -before[:3, 3]
+    pose, far = before if ahead is None else ahead, float(np.linalg.norm(way))
+    x, y = scale * sample.width / 2, scale * sample.height / 2
+    aside = way[:2] / max(far, 1e-9) * 0.8 * min(x, y)
+    if far and np.linalg.norm(aside) > 1:
+        arrow(pen, (x, y), (x + float(aside[0]), y + float(aside[1])), COLOR, 3)
+    turn = 0.0 if pose is None else float(np.degrees(np.linalg.norm(rotation_vector(pose[:3, :3]))))
+    words = f"{far:.3g} m, ahead {way[2]:.2g} m, {turn:.3g} deg"
+    pen.rectangle(pen.textbbox((4, 2), words), fill=COLOR)
+    pen.text((4, 2), words, fill=(255, 255, 255))
+
+
 LABEL = SampleLabel(
     name="ego_motion",
     meaning="how the camera moves",
@@ -54,4 +78,5 @@ LABEL = SampleLabel(
     ),
     compute=compute,
     prove=prove,
+    drawing=Drawing("ego_motion", lines=draw, key=(("ego_motion: to where the camera moves, and how it turns", None),)),
 )
