@@ -14,7 +14,17 @@ from typing import Any
 import numpy as np
 
 from viewsphere import Recipe, plan
-from viewsphere.labels import ObjectLabel, annotated, channel_labels, on_request, sight_of
+from viewsphere.labels import (
+    ChannelLabel,
+    ObjectLabel,
+    annotated,
+    channel_labels,
+    labels,
+    object_labels,
+    on_request,
+    sample_labels,
+    sight_of,
+)
 from viewsphere.labels._label import later
 from viewsphere.labels._sight import Sight
 from viewsphere.run.stages import Stages
@@ -46,6 +56,75 @@ def recipe(objects: int) -> Recipe:
 def asked() -> list[str]:
     """Annotations that still pictures of one camera have."""
     return [name for name, label in on_request().items() if not (label.needs.poses or label.needs.rig)]
+
+
+def moving_recipe(objects: int) -> Recipe:
+    """The same in motion: a stereo pair and a LiDAR of 64 x 1,800 rays that pass by things which slide and turn."""
+    said = recipe(objects).model_dump(exclude_unset=True)
+    lidar = {"rings": 64, "elevation": [-25, 5], "azimuth_step": 0.2}
+    motion = {"kind": "constant", "velocity": [0.3, -0.5, 0], "spin_deg": [0, 0, 15]}
+    names = moving_labels()
+    return Recipe.model_validate(
+        said
+        | {
+            "models": [said["models"][0] | {"motion": motion}],
+            "viewpoints": {"kind": "orbit", "azimuth": [20, 30], "elevation": 30, "distance": said["viewpoints"]["distance"]},
+            "time": {"frames": 3, "fps": 10},
+            "tracks": {"grid": 16, "at": [0]},
+            "rig": {"sensors": {"left": {}, "right": {"position": [0.1, 0, 0]}, "top": {"lidar": lidar}}},
+            "channels": ["depth", "instances", *(name for name in names if name in channel_labels() and name != "tracks")],
+            "annotations": [name for name in names if name in on_request()],
+            "splits": {"by": "sequence", "train": 1},
+        }
+    )
+
+
+def moving_labels() -> list[str]:
+    """Labels that stills of one camera do not have."""
+    return [name for name in labels() if name not in (*still_channels(), *still_labels())]
+
+
+def still_labels() -> list[str]:
+    """Labels of objects and of whole pictures that stills of one camera have."""
+    known = (*object_labels(), *sample_labels().values())
+    return [label.name for label in known if not (label.needs.poses or label.needs.rig)]
+
+
+def measure_moving(objects: int, rounds: int) -> dict[str, float]:
+    """Median CPU milliseconds of the labels of motion, rigs and LiDARs, at the middle of three instants."""
+    stages, planned = Stages(), plan(moving_recipe(objects))
+    shot = planned.shot(0, stages.box)
+    stage = stages.stage(shot)
+    views = ShotViews(shot, stage.at)
+    boxes = [stages.box(thing.model) for thing in shot.objects]
+    found: dict[str, list[float]] = {}
+    for round_ in range(rounds + 1):
+        for name in moving_labels():
+            label = labels()[name]
+            sensor = 2 if label.needs.lidar else 0
+            views.followed(sensor)
+            view, around = views.view(1, sensor), views.around(1, sensor)
+            for instant in (0, 2):
+                _ = views.view(instant, sensor).visibility
+            seen = sight_of(
+                shot, 1, view.camera, view.geometry, view.visibility, boxes, ["model.obj"] * len(boxes), None, around
+            )
+            _ = seen.instances, seen.corners
+            ms = clocked(lambda label=label, seen=seen: of_any(label, seen))
+            if round_:
+                found.setdefault(name, []).append(ms)
+    return {name: float(np.median(times)) for name, times in found.items()}
+
+
+def of_any(label: Any, seen: Sight) -> None:
+    if isinstance(label, ChannelLabel):
+        label.compute(seen)
+    elif isinstance(label, ObjectLabel):
+        for i, placement in enumerate(seen.placements):
+            if placement:
+                label.compute(seen, i)
+    else:
+        label.compute(seen, ())
 
 
 def still_channels() -> list[str]:
@@ -95,8 +174,8 @@ def frame(sight: Callable[[], Sight], view: Any, cast: Any) -> dict[str, float]:
         times[name] = clocked(lambda label=label, seen=seen: label.compute(seen))
     times["instances"] = clocked(lambda: fresh_instances(view))
     objects = None
-    for name in asked():
-        label, seen = on_request()[name], sight()
+    for name in still_labels():
+        label, seen = labels()[name], sight()
         _ = seen.instances, seen.projected
         if isinstance(label, ObjectLabel):
             objects = objects or annotated(sight())
@@ -127,6 +206,8 @@ def report(rounds: int, embree: Callable[[Any], Any]) -> None:
     (one, few), (many, triangles) = (measure(objects, rounds, embree) for objects in (1, 20))
     print(f"CPU ms a frame, 640x480: 1 object ({few:,} triangles), 20 objects ({triangles:,} triangles); in units of Embree\n")
     print(f"{'label':<22}{'1 object':>10}{'20 objects':>12}{'Embree 1':>10}{'Embree 20':>11}")
+    few_moving, many_moving = (measure_moving(objects, rounds) for objects in (1, 20))
+    one, many = one | few_moving, many | many_moving
     for name in one:
         units = one[name] / one["Embree"], many[name] / many["Embree"]
         print(f"{name:<22}{one[name]:>10.2f}{many[name]:>12.2f}{units[0]:>10.2f}{units[1]:>11.2f}")

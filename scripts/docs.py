@@ -13,6 +13,7 @@ import json
 import re
 import subprocess
 import sys
+from collections.abc import Collection
 from enum import Enum
 from functools import partial
 from pathlib import Path
@@ -25,8 +26,19 @@ from typer.models import ArgumentInfo
 
 from viewsphere import plugins
 from viewsphere.cli.commands import app
-from viewsphere.labels import Field, ObjectLabel, SampleLabel, channels, object_labels, on_request
+from viewsphere.labels import (
+    ChannelLabel,
+    Field,
+    Label,
+    ObjectLabel,
+    SampleLabel,
+    channels,
+    labels,
+    object_labels,
+    on_request,
+)
 from viewsphere.limits import table
+from viewsphere.model.channel import PASSES, PICTURES
 from viewsphere.recipe.file import schema
 
 DOCS = Path(__file__).parent.parent / "docs"
@@ -126,6 +138,65 @@ def field_row(label: ObjectLabel | SampleLabel, field: Field) -> str:
     return f"`{field.name}` | {field_type(field)} | {field.unit} | {axes} | {field.meaning} |\n"
 
 
+def proofs_page() -> str:
+    """Each label and pass with what proves it; stops where figures or pictures are not those of the labels that there are."""
+    rows = {name: unit_of(label) for name, label in labels().items()}
+    rows |= {name: channel.unit for name, channel in PASSES.items() if name not in PICTURES}
+    proofs, costs = (json.loads((DOCS / "labels.json").read_text("utf-8"))[name] for name in ("proofs", "costs"))
+    pictures = {path.stem for path in (DOCS / LABEL_PICTURES).glob("*.jpg")}
+    tests = {proof["test"] for found in proofs.values() for proof in found}
+    agree("labels.json: proofs", proofs.keys(), rows.keys())
+    agree("labels.json: costs", costs.keys() - {"Embree", "truth: raster"}, labels().keys())
+    agree(LABEL_PICTURES, pictures, rows.keys())
+    agree("labels.json: tests", tests, {test for test in tests if (DOCS.parent / test).is_file()})
+    text = NOTE + PROOFS.format(costs["Embree"], costs["truth: raster"])
+    for name, unit in rows.items():
+        engines = "all" if name in labels() else ", ".join(e for e in plugins.names("engines") if name in painted(e))
+        found = "<br>".join(f"{error_of(proof)}: {proof['against']}" for proof in proofs[name])
+        files = "<br>".join(dict.fromkeys(f"`{proof['test'].removeprefix('tests/')}`" for proof in proofs[name]))
+        picture = f"![{name}]({LABEL_PICTURES}/{name}.jpg)"
+        cost = f"{costs[name]:g}" if name in costs else ""
+        text += f"| `{name}` | {picture} | {engines} | {unit} | {found} | {files} | {cost} |\n"
+    return text
+
+
+LABEL_PICTURES = "images/labels"
+PROOFS = """# Proofs of labels
+
+Each label is compared with something that knows nothing of how it is made. The table has the largest difference that the tests
+find (`scripts/measure_labels`); one without a unit is a share, or a number of things that differ. Besides, `viewsphere check`
+computes every label of a data set again from the exported models, and casts Embree's rays at them. Labels are the same, byte
+for byte, on all engines. Passes are what engines paint; their errors are raster's.
+
+Costs are CPU milliseconds at 640x480 with 20 objects. One of Embree's rays through each pixel takes {:g}; finding what all
+pixels show, which all labels share, takes {:g}. Meanings and axes are in [channels and annotations](channels.md).
+
+| label | picture | engines | unit | largest error | compared in | CPU ms |
+|---|---|---|---|---|---|---|
+"""
+
+
+def unit_of(label: Label) -> str:
+    """The unit of a label, or those of its fields, each once."""
+    units = [label.unit] if isinstance(label, ChannelLabel) else [field.unit for field in getattr(label, "fields", ())]
+    return ", ".join(dict.fromkeys(filter(None, units)))
+
+
+def painted(engine: str) -> tuple[str, ...]:
+    return getattr(plugins.load("engines", engine), "PAINTS", PICTURES)
+
+
+def error_of(proof: dict[str, Any]) -> str:
+    return f"{proof['error']:g} {proof['unit']}".rstrip()
+
+
+def agree(what: str, found: Collection[str], wanted: Collection[str]) -> None:
+    """Stop where something is missing, or is there and should not be."""
+    for problem, names in (("lacks", {*wanted} - {*found}), ("has no use for", {*found} - {*wanted})):
+        if names:
+            sys.exit(f"docs/{what} {problem} {', '.join(sorted(names))}: run scripts/measure_labels (and --pictures)")
+
+
 OPTIONS = re.compile(r"(<!-- options of (\w+), written by scripts/docs -->\n).*?(?=\n<!-- end -->)", re.DOTALL)
 
 
@@ -200,6 +271,7 @@ PAGES = {
     "limits.md": limits_page,
     "cli.md": cli_page,
     "channels.md": channels_page,
+    "proofs.md": proofs_page,
     "formats.md": partial(options_page, "formats", "formats.md"),
     "motion.md": partial(options_page, "motions", "motion.md"),
     "recipe.md": recipe_page,

@@ -5,7 +5,7 @@ import pytest
 from small import ROOT
 from viewsphere import Recipe, generate
 from viewsphere.check import check
-from viewsphere.labels import drawable, labels, on_request
+from viewsphere.labels import channels, drawable, labels, on_request
 from viewsphere.model.channel import DEFAULT_CHANNELS
 from viewsphere.preview.frame import draw_sample
 from viewsphere.store import Dataset
@@ -39,5 +39,9 @@ def changes_the_picture(sample, source):
     return plain.shape != drawn.shape or (plain != drawn).any()
 
 
-def test_every_label_on_request_has_a_recipe():
-    assert on_request().keys() <= {name for file in RECIPES for name in Recipe.load(file).annotations}
+def test_every_label_that_can_be_asked_for_has_a_recipe_and_every_label_a_drawing():
+    shown = [Recipe.load(file) for file in RECIPES]
+    assert on_request().keys() <= {name for recipe in shown for name in recipe.annotations}
+    followed = {"tracks"} if any(recipe.tracks for recipe in shown) else set()
+    assert channels().keys() - {"rgba"} <= {name for recipe in shown for name in recipe.channels} | followed
+    assert labels().keys() <= drawable().keys()

@@ -1,15 +1,19 @@
 """depth_sensor: the noise, steps and holes of depth cameras, against the statistics of the models that they are named for."""
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import viewsphere as vs
 from proven import close, told
+from truth_scenes import cube, lens, orbit_camera, placed
 from viewsphere.errors import RecipeError
-from viewsphere.labels.depth_sensor import STEPS, _shadow
+from viewsphere.labels import Sight
+from viewsphere.labels.depth_sensor import LABEL, STEPS, _seen, _shadow
 from viewsphere.store import Dataset
+from viewsphere.truth.visibility import rasterize
 
 FOV = 40.0
 WIDTH, HEIGHT = 160, 120
@@ -120,6 +124,19 @@ def test_depth_itself_stays_exact_and_the_seed_decides(tmp_path):
     np.testing.assert_array_equal(one.depth, other.depth)
     vs.generate(recipe(), tmp_path, workers=0)
     np.testing.assert_array_equal(Dataset(tmp_path)[0].depth_sensor, one.depth_sensor)
+
+
+def test_it_is_the_same_whether_other_labels_compare_pictures_or_not():
+    """These ask for inverse depth that is not rounded; near a step that would decide which one is measured."""
+    geometry, camera = placed(cube(0.7), ground=True), orbit_camera(lens(96, 72, 1.1), 0.4, 0.5, 5.0)
+    around = SimpleNamespace(drawn_as=("shot", "camera", "0.0"))
+    rounded, exact = (
+        Sight(geometry, camera, rasterize(geometry, camera, keeps_exact=keeps), around=around) for keeps in (False, True)
+    )
+    assert (rounded.inverse_depth != exact.inverse_depth).mean() > 0.5
+    for one, other in zip(_seen(rounded), _seen(exact), strict=True):
+        np.testing.assert_array_equal(one, other)
+    np.testing.assert_array_equal(LABEL.compute(rounded), LABEL.compute(exact))
 
 
 @pytest.mark.parametrize(

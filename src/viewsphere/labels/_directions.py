@@ -1,4 +1,4 @@
-"""The proof shared by both labels of normals: the values must be unit vectors."""
+"""What both labels of normals share: the proof that they are unit vectors, and the picture."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from viewsphere.labels._label import Models, channel_of
+from viewsphere.labels._label import Array, Drawing, Models, Picture, channel_of
 from viewsphere.model.sample import Sample
 
 TOLERANCE = 1e-5
@@ -25,3 +25,17 @@ def unit_proof(name: str) -> Callable[[Sample, Models], Iterator[str]]:
             yield f"expected directions of length 1, or 0 where there is none; found others at {wrong.sum()} pixels"
 
     return prove
+
+
+def picture(normals: Array) -> Picture:
+    """Normals as a picture (H, W, 3) uint8, as normal maps have them: red to the right, green up, blue towards the camera."""
+    right, down, away = np.moveaxis(normals.astype(np.float64), -1, 0)
+    shares = (np.stack([right, -down, -away], axis=-1) + 1) / 2
+    is_seen = (right != 0) | (down != 0) | (away != 0)
+    return np.where(is_seen[..., None], shares * 255, 0).round().astype(np.uint8)
+
+
+def drawing(name: str) -> Drawing:
+    """The drawing of a channel of directions."""
+    key = ((f"{name}: red to the right, green up, blue towards the camera", None),)
+    return Drawing(name, beside=lambda sample: picture(sample.channels[name]), key=key)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -9,14 +10,11 @@ from numpy.typing import NDArray
 
 from viewsphere.geometry.camera import project
 from viewsphere.geometry.rotation import transform
-from viewsphere.labels._paint import Color
+from viewsphere.labels._paint import Color, color_of
 from viewsphere.model.sample import ObjectAnnotation, Sample
 
 if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw
-
-AXES = ((220, 50, 40), (40, 160, 60), (50, 90, 230))
-"""Colours of x, y and z."""
 
 FAR = 1e5
 """Pixels; a line that leads farther off, as of what is beside the lens, is left out."""
@@ -32,6 +30,19 @@ def in_space(pen: ImageDraw, sample: Sample, scale: float, points: NDArray[np.fl
     for a, b in zip(pixels[:-1].tolist(), pixels[1:].tolist(), strict=True):
         if np.abs((*a, *b)).max() < FAR:  # not NaN either
             pen.line((*a, *b), fill=color, width=width)
+
+
+AXES = ((220, 50, 40), (40, 160, 60), (50, 90, 230))
+"""Colours of x, y and z."""
+
+
+def axes(pen: ImageDraw, sample: Sample, scale: float, camera_from_axes: NDArray[np.float64], size: float) -> None:
+    """Three axes that are so many metres long: x red, y green, z blue."""
+    camera = sample.camera
+    ends = transform(camera_from_axes, np.vstack([np.zeros(3), size * np.eye(3)]))
+    in_world = transform(camera.R.T, ends - camera.t)
+    for axis, color in zip(in_world[1:], AXES, strict=True):
+        in_space(pen, sample, scale, np.array([in_world[0], axis]), color, 3)
 
 
 def arrow(pen: ImageDraw, start: tuple[float, float], end: tuple[float, float], color: Color, width: int = 2) -> None:
@@ -57,3 +68,13 @@ def note(pen: ImageDraw, o: ObjectAnnotation, scale: float, words: str, color: C
         x, y = box[0] * scale, box[1] * scale
         pen.rectangle(pen.textbbox((x + 2, y), words), fill=color)
         pen.text((x + 2, y), words, fill=(255, 255, 255))
+
+
+def notes(words: Callable[[ObjectAnnotation], str]) -> Callable[[ImageDraw, Sample, float], None]:
+    """A drawing's lines: words on each object that is in the picture, in its colour."""
+
+    def draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
+        for o in sample.objects:
+            note(pen, o, scale, words(o), color_of(o.id))
+
+    return draw

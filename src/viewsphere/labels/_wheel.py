@@ -29,11 +29,17 @@ def wheel() -> NDArray[np.float64]:
     return np.concatenate(parts)
 
 
-def longest_of(flow: NDArray[np.floating]) -> float:
-    """The length of flow (H, W, 2) that 99 % of the pixels do not exceed; 1 where there is none."""
+MOST, NEAR = 99.0, 75.0
+"""Percentages of the pixels whose flow has full colours: of flow in the picture, and of scene flow, which has no bound towards
+the horizon.
+"""
+
+
+def longest_of(flow: NDArray[np.floating], most: float = MOST) -> float:
+    """The length of flow (H, W, 2) that so many per cent of the pixels do not exceed; 1 where there is none."""
     length = np.hypot(flow[..., 0], flow[..., 1], dtype=np.float64)
     known = length[np.isfinite(length)]
-    return float(np.percentile(known, 99)) if known.size else 1.0
+    return float(np.percentile(known, most)) if known.size else 1.0
 
 
 def picture(flow: NDArray[np.floating], longest: float | None = None) -> Picture:
@@ -54,14 +60,14 @@ def picture(flow: NDArray[np.floating], longest: float | None = None) -> Picture
     return np.where(known[..., None], np.floor(255 * color), 0).astype(np.uint8)
 
 
-def drawing(channel: str) -> Drawing:
-    """How a channel of flow, or the x and y of one of scene flow, is shown beside a picture."""
+def drawing(channel: str, most: float = MOST) -> Drawing:
+    """How a channel of flow, or the x and y of one of scene flow, is shown beside a picture; `most`: see `longest_of`."""
     ways = np.array([[[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]]])
     colors: list[list[int]] = picture(ways, 1.0)[0].tolist()
     names = (f"{channel}: right", "down", "left", "up")
     return Drawing(
         channel,
         within=lambda sample, extent: picture(sample.channels[channel][..., :2], extent[1]),
-        extent=lambda sample: (0.0, longest_of(sample.channels[channel][..., :2])),
+        extent=lambda sample: (0.0, longest_of(sample.channels[channel][..., :2], most)),
         key=tuple((name, (r, g, b)) for name, (r, g, b) in zip(names, colors, strict=True)),
     )

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.labels._label import ChannelLabel, Models, channel_of
+from viewsphere.labels._label import ChannelLabel, Drawing, Models, Picture, channel_of
 from viewsphere.labels._sight import Sight
 from viewsphere.model.sample import Sample
 
@@ -34,6 +34,11 @@ def prove(sample: Sample, models: Models) -> Iterator[str]:
         yield f"expected weights that add up to 1, found others at {wrong.sum()} pixels"
 
 
+def picture(weights: NDArray[np.float32]) -> Picture:
+    """Weights as a picture (H, W, 3) uint8: red at each triangle's first corner, green at the second, blue at the third."""
+    return (np.clip(weights, 0, 1) * 255).round().astype(np.uint8)
+
+
 LABEL = ChannelLabel(
     name="barycentrics",
     meaning="weights of the triangle's corners at the seen point",
@@ -41,4 +46,9 @@ LABEL = ChannelLabel(
     components=3,
     compute=compute,
     prove=prove,
+    drawing=Drawing(
+        "barycentrics",
+        beside=lambda sample: picture(sample.channels["barycentrics"]),
+        key=(("barycentrics: red, green and blue are the triangle's first, second and third corner", None),),
+    ),
 )

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from viewsphere.geometry.box import Bounds, clip_to_image
 from viewsphere.geometry.mask import mask_box
-from viewsphere.labels._label import Field, Models, ObjectLabel, rendered
+from viewsphere.labels._label import Drawing, Field, Models, ObjectLabel, rendered
+from viewsphere.labels._paint import color_of
 from viewsphere.labels._placement import Placement
 from viewsphere.labels._sight import Sight
 from viewsphere.model.camera import Camera
 from viewsphere.model.sample import ObjectAnnotation, Sample
+
+if TYPE_CHECKING:
+    from PIL.ImageDraw import ImageDraw
 
 
 def compute(sight: Sight, i: int) -> Mapping[str, Any]:
@@ -67,6 +71,13 @@ def _within(inner: tuple[float, ...], outer: tuple[float, ...], slack: float) ->
     )
 
 
+def draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
+    """Every object's box, seen or hidden, in its colour."""
+    for o in sample.objects:
+        if o.box2d_projected is not None:
+            pen.rectangle(tuple(v * scale for v in o.box2d_projected), outline=color_of(o.id), width=1)
+
+
 _CORNERS = "corners (x0, y0, x1, y1) of the projected model"
 
 LABEL = ObjectLabel(
@@ -81,4 +92,5 @@ LABEL = ObjectLabel(
     keep=keep,
     restore=restore,
     prove=prove,
+    drawing=Drawing("boxes_projected", lines=draw),
 )

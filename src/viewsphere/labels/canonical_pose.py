@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.geometry.rotation import compose, product, rigid, transform
+from viewsphere.geometry.rotation import compose, product, rigid
 from viewsphere.labels._field import Field
 from viewsphere.labels._label import Drawing, Models, ObjectLabel, rendered
-from viewsphere.labels._lines import AXES, in_space
+from viewsphere.labels._lines import axes
 from viewsphere.labels._placement import Placement
 from viewsphere.model.sample import Sample
 from viewsphere.model.scene import IDENTITY
@@ -106,14 +106,9 @@ def prove(sample: Sample, models: Models) -> Iterator[str]:
 
 
 def draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
-    """The axes of the canonical pose: x red, y green, z blue."""
-    camera = sample.camera
+    """The axes of the canonical pose."""
     for o in sample.objects:
-        size = (o.diameter or 1.0) / 3
-        axes = transform(o.canonical_pose, np.vstack([np.zeros(3), size * np.eye(3)]))
-        in_world = transform(camera.R.T, axes - camera.t)
-        for axis, color in zip(in_world[1:], AXES, strict=True):
-            in_space(pen, sample, scale, np.array([in_world[0], axis]), color, 3)
+        axes(pen, sample, scale, o.canonical_pose, (o.diameter or 1.0) / 3)
 
 
 LABEL = ObjectLabel.derived(

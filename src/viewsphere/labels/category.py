@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from viewsphere.labels._label import Field, Models, ObjectLabel, rendered
+from viewsphere.labels._label import Drawing, Field, Models, ObjectLabel, rendered
+from viewsphere.labels._lines import notes
 from viewsphere.labels._placement import Placement
 from viewsphere.model.sample import Sample
 
@@ -37,4 +38,5 @@ LABEL = ObjectLabel.derived(
         Field("category_id", "number of the category, from 1", int),
     ),
     prove=prove,
+    drawing=Drawing("category", lines=notes(lambda o: o.category)),
 )

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.labels._label import ChannelLabel, Models, channel_of, rendered
+from viewsphere.labels._label import ChannelLabel, Drawing, Models, Picture, channel_of, rendered
 from viewsphere.labels._sight import Sight
 from viewsphere.model.sample import Sample
 
@@ -41,6 +41,19 @@ def prove(sample: Sample, models: Models) -> Iterator[str]:
             yield f"object {o.id}: expected points in its box, found {outside} outside"
 
 
+def picture(sample: Sample) -> Picture:
+    """The points as a picture (H, W, 3) uint8: from one side of their object's box to the other, red goes with x, green with y,
+    blue with z; black where there are none.
+    """
+    points = sample.channels["coordinates"]
+    out = np.zeros(points.shape, np.uint8)
+    for o in rendered(sample):
+        own = sample.channels["instances"] == o.id
+        low, high = o.box3d_object.min(axis=0), o.box3d_object.max(axis=0)
+        out[own] = (255 * np.clip((points[own] - low) / np.maximum(high - low, 1e-9), 0, 1)).round()
+    return out
+
+
 LABEL = ChannelLabel(
     name="coordinates",
     meaning="the seen point in its object's own axes",
@@ -51,4 +64,9 @@ LABEL = ChannelLabel(
     empty=np.nan,
     compute=compute,
     prove=prove,
+    drawing=Drawing(
+        "coordinates",
+        beside=picture,
+        key=(("coordinates: across its box red goes with the object's x, green with y, blue with z", None),),
+    ),
 )

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.geometry.camera import pixel_rays
-from viewsphere.labels._label import ChannelLabel, Models, channel_of
+from viewsphere.labels._label import ChannelLabel, Drawing, Models, channel_of
+from viewsphere.labels._nearness import extent, picture
 from viewsphere.labels._sight import Sight
 from viewsphere.model.sample import Sample
 
@@ -45,4 +46,10 @@ LABEL = ChannelLabel(
     empty=np.inf,
     compute=compute,
     prove=prove,
+    drawing=Drawing(
+        "depth_ray",
+        within=lambda sample, within: picture(sample.channels["depth_ray"], within),
+        extent=lambda sample: extent(sample.channels["depth_ray"]),
+        key=(("depth_ray: light is near", None),),
+    ),
 )

@@ -91,7 +91,7 @@ def _seen(sight: Sight) -> tuple[Float, Float]:
     told = (sight.geometry.triangle_normals, sight.rays, sight.camera_from_ray, sight.camera.R)
     kernels.normals_geometric(sight.visibility.triangle, *told, normals)
     cosine = np.abs((normals * rays).sum(axis=-1)) / np.sqrt((rays * rays).sum(axis=-1))
-    near = sight.inverse_depth
+    near = sight.visibility.inverse_depth.astype(np.float64)  # as all frames have it, those that are compared with none, too
     with np.errstate(divide="ignore", invalid="ignore"):
         depth = np.where((near > 0) & (rays[..., 2] > 0), rays[..., 2] / near, np.inf)
     return depth, np.arccos(np.clip(np.nan_to_num(cosine), 0.0, 1.0))

@@ -6,7 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from viewsphere.labels._label import ChannelLabel, Models, channel_of
+from viewsphere.labels._label import ChannelLabel, Drawing, Models, channel_of
+from viewsphere.labels._paint import by_number
 from viewsphere.model.sample import Sample
 
 
@@ -29,4 +30,5 @@ LABEL = ChannelLabel(
     encoding="png16",
     compute=lambda sight: sight.instances.ids,
     prove=prove,
+    drawing=Drawing("instances", pixels=lambda picture, sample: by_number(picture, sample.channels["instances"])),
 )

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from viewsphere.labels._label import Field, Models, ObjectLabel, rendered
+from viewsphere.labels._label import Drawing, Field, Models, ObjectLabel, rendered
+from viewsphere.labels._lines import notes
 from viewsphere.labels._placement import Placement
 from viewsphere.model.sample import Sample
 
@@ -40,4 +41,5 @@ LABEL = ObjectLabel.derived(
         Field("track", "key of the animated model that stays itself over time, else empty", str),
     ),
     prove=prove,
+    drawing=Drawing("model", lines=notes(lambda o: o.key)),
 )

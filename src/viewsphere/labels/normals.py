@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.labels._directions import unit_proof
-from viewsphere.labels._label import ChannelLabel, Drawing, Picture
+from viewsphere.labels._directions import drawing, unit_proof
+from viewsphere.labels._label import ChannelLabel
 from viewsphere.labels._sight import Sight
-from viewsphere.model.sample import Sample
 
 
 def compute(sight: Sight) -> NDArray[np.float32]:
@@ -25,14 +24,6 @@ def compute(sight: Sight) -> NDArray[np.float32]:
     return out
 
 
-def picture(sample: Sample) -> Picture:
-    """Normals as a picture (H, W, 3) uint8, as normal maps have them: red to the right, green up, blue towards the camera."""
-    right, down, away = np.moveaxis(sample.channels["normals"].astype(np.float64), -1, 0)
-    shares = (np.stack([right, -down, -away], axis=-1) + 1) / 2
-    is_seen = (right != 0) | (down != 0) | (away != 0)
-    return np.where(is_seen[..., None], shares * 255, 0).round().astype(np.uint8)
-
-
 LABEL = ChannelLabel(
     name="normals",
     meaning="shading normal, camera axes, towards the camera",
@@ -41,5 +32,5 @@ LABEL = ChannelLabel(
     components=3,
     compute=compute,
     prove=unit_proof("normals"),
-    drawing=Drawing("normals", beside=picture, key=(("normals: red to the right, green up, blue towards the camera", None),)),
+    drawing=drawing("normals"),
 )

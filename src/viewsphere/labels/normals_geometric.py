@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.labels._directions import unit_proof
+from viewsphere.labels._directions import drawing, unit_proof
 from viewsphere.labels._label import ChannelLabel
 from viewsphere.labels._sight import Sight
 
@@ -27,4 +27,5 @@ LABEL = ChannelLabel(
     components=3,
     compute=compute,
     prove=unit_proof("normals_geometric"),
+    drawing=drawing("normals_geometric"),
 )

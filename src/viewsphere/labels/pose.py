@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from viewsphere.geometry.rotation import matrix_from_quaternion, quaternion_from_matrix, rigid
-from viewsphere.labels._label import Field, Models, ObjectLabel, rendered
+from viewsphere.labels._label import Drawing, Field, Models, ObjectLabel, rendered
+from viewsphere.labels._lines import axes
 from viewsphere.labels._placement import Placement
 from viewsphere.model.sample import Sample
+
+if TYPE_CHECKING:
+    from PIL.ImageDraw import ImageDraw
 
 TOLERANCE = 1e-9
 
@@ -39,6 +43,12 @@ def prove(sample: Sample, models: Models) -> Iterator[str]:
             yield f"object {o.id}: the quaternion is not camera_from_object's rotation"
 
 
+def draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
+    """Every object's own axes, as long as half of its longest side."""
+    for o in sample.objects:
+        axes(pen, sample, scale, o.camera_from_object, max(o.size) / 2)
+
+
 LABEL = ObjectLabel.derived(
     of,
     name="pose",
@@ -57,4 +67,5 @@ LABEL = ObjectLabel.derived(
         Field("quaternion", "rotation of camera_from_object: (w, x, y, z), w >= 0", float, (4,)),
     ),
     prove=prove,
+    drawing=Drawing("pose", lines=draw, key=(("pose: x red, y green, z blue", None),)),
 )

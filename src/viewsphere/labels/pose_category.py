@@ -6,7 +6,8 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from viewsphere.geometry.pose_category import pose_category
-from viewsphere.labels._label import Field, Models, ObjectLabel, rendered
+from viewsphere.labels._label import Drawing, Field, Models, ObjectLabel, rendered
+from viewsphere.labels._lines import notes
 from viewsphere.labels._placement import Placement
 from viewsphere.model.sample import Sample
 
@@ -36,4 +37,5 @@ LABEL = ObjectLabel.derived(
     axes="object",
     fields=(Field("pose_category", "named bin: front, front-left, ..., top", str),),
     prove=prove,
+    drawing=Drawing("pose_category", lines=notes(lambda o: o.pose_category)),
 )

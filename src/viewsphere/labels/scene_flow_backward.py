@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from viewsphere.labels import _flow
 from viewsphere.labels._label import ChannelLabel, Needs
 from viewsphere.labels._sight import Sight
-from viewsphere.labels._wheel import drawing
+from viewsphere.labels._wheel import NEAR, drawing
 
 
 def compute(sight: Sight) -> NDArray[np.float32]:
@@ -30,5 +30,5 @@ LABEL = ChannelLabel(
     empty=np.nan,
     compute=compute,
     prove=_flow.scene_flow_proof("scene_flow_backward", "flow_backward_state"),
-    drawing=drawing("scene_flow_backward"),
+    drawing=drawing("scene_flow_backward", NEAR),
 )

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from viewsphere.geometry.camera import project
-from viewsphere.geometry.rotation import compose, rigid, transform
+from viewsphere.geometry.rotation import compose, rigid
 from viewsphere.labels._field import Field
 from viewsphere.labels._inset import OWN, inset
 from viewsphere.labels._label import Drawing, Models, Needs, SampleLabel
-from viewsphere.labels._lines import AXES, in_space
+from viewsphere.labels._lines import axes
 from viewsphere.labels._paint import color_of
 from viewsphere.labels._sight import Sight
 from viewsphere.model.sample import ObjectAnnotation, Sample
@@ -51,9 +51,7 @@ def draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
     pixels = project(camera.intrinsics, others[:, :3, 3])[0]
     seen = ((pixels >= 0) & (pixels <= (sample.width, sample.height))).all(axis=1)
     for pose in others[seen]:
-        start, *ends = transform(camera.R.T, transform(pose, np.vstack([np.zeros(3), AXIS * np.eye(3)])) - camera.t)
-        for end, color in zip(ends, AXES, strict=True):
-            in_space(pen, sample, scale, np.array([start, end]), color, 3)
+        axes(pen, sample, scale, pose, AXIS)
 
 
 AXIS = 0.1

@@ -6,7 +6,8 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from viewsphere.geometry.box import box_size
-from viewsphere.labels._label import Field, Models, ObjectLabel, rendered
+from viewsphere.labels._label import Drawing, Field, Models, ObjectLabel, rendered
+from viewsphere.labels._lines import notes
 from viewsphere.labels._placement import Placement
 from viewsphere.model.sample import Sample
 
@@ -40,4 +41,9 @@ LABEL = ObjectLabel.derived(
         Field("real_size", "the true ones, None where nobody said", float, (3,), "m", optional=True),
     ),
     prove=prove,
+    drawing=Drawing(
+        "size",
+        lines=notes(lambda o: " x ".join(f"{side:.2f}" for side in o.size)),
+        key=(("size: width x height x length in metres", None),),
+    ),
 )

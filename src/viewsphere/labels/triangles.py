@@ -8,7 +8,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.labels._label import ChannelLabel, Models, channel_of
+from viewsphere.labels._label import ChannelLabel, Drawing, Models, channel_of
+from viewsphere.labels._paint import by_number
 from viewsphere.labels._sight import Sight
 from viewsphere.model.sample import Sample
 
@@ -38,4 +39,5 @@ LABEL = ChannelLabel(
     empty=-1,
     compute=compute,
     prove=prove,
+    drawing=Drawing("triangles", pixels=lambda picture, sample: by_number(picture, sample.channels["triangles"] + 1)),
 )

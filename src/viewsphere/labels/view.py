@@ -8,7 +8,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from viewsphere.geometry.camera import orbit_center
-from viewsphere.labels._label import Field, Models, ObjectLabel, rendered
+from viewsphere.labels._label import Drawing, Field, Models, ObjectLabel, rendered
+from viewsphere.labels._lines import notes
 from viewsphere.model.sample import ObjectView, Sample
 
 TOLERANCE = 1e-6
@@ -31,4 +32,9 @@ LABEL = ObjectLabel.derived(
     axes="object",
     fields=(Field("view", "azimuth, elevation and tilt (degrees) and distance (m)", ObjectView),),
     prove=prove,
+    drawing=Drawing(
+        "view",
+        lines=notes(lambda o: f"{o.view.azimuth_deg:.0f} {o.view.elevation_deg:.0f} {o.view.tilt_deg:.0f}"),
+        key=(("view: azimuth, elevation and tilt of the camera, degrees", None),),
+    ),
 )

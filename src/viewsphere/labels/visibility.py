@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from viewsphere.geometry.box import overlap
-from viewsphere.labels._label import Field, Models, ObjectLabel, rendered
+from viewsphere.labels._label import Drawing, Field, Models, ObjectLabel, rendered
+from viewsphere.labels._lines import notes
 from viewsphere.labels._sight import EVERYWHERE, Sight
 from viewsphere.model.sample import Sample
 
@@ -71,4 +72,5 @@ LABEL = ObjectLabel(
     keep=lambda o: [o.visibility, o.truncation],
     restore=lambda kept, placement, o: {"visibility": kept[0], "truncation": kept[1]},
     prove=prove,
+    drawing=Drawing("visibility", lines=notes(lambda o: f"{o.visibility:.0%}"), key=(("visibility: how much is seen", None),)),
 )

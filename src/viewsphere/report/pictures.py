@@ -16,13 +16,13 @@ from PIL import Image
 
 from viewsphere.errors import UserError
 from viewsphere.labels import Extent, alone, channel_labels
+from viewsphere.labels._nearness import extent as depth_extent
+from viewsphere.labels._nearness import nearness
 from viewsphere.labels._passes import DRAWINGS
 from viewsphere.labels._passes import picture as pass_colors
 from viewsphere.labels._state import picture as state_colors
 from viewsphere.labels._wheel import longest_of
 from viewsphere.labels._wheel import picture as flow_colors
-from viewsphere.labels.depth import extent as depth_extent
-from viewsphere.labels.depth import nearness
 from viewsphere.labels.disparity import extent as disparity_extent
 from viewsphere.labels.motion_boundaries import COLOR as BOUNDARY
 from viewsphere.model.channel import picture_of
