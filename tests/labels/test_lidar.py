@@ -4,9 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from PIL import Image
 
 import viewsphere as vs
 from sealing import seal_again
+from viewsphere.assets.srgb import linear
 from viewsphere.check import check
 from viewsphere.codecs.npz import decode_npz, encode_npz
 from viewsphere.errors import RecipeError
@@ -20,6 +22,9 @@ from viewsphere.store import Dataset
 from viewsphere.store.films import films_of
 
 ROTATED = [5.0, 20.0, -3.0]
+LUMINANCE = (0.2126, 0.7152, 0.0722)
+GRAY = float(linear((0.62, 0.61, 0.59)) @ LUMINANCE)
+"""Of the ground, where nobody says its colour."""
 
 
 def recipe(lidar=None, **changes):
@@ -66,7 +71,7 @@ def test_points_of_the_ground_lie_on_it():
     directions = (world - eye) / ground["range"][:, None]
     np.testing.assert_allclose(np.cos(ground["incidence"]), -directions[:, 2], atol=1e-6)
     np.testing.assert_allclose(ground["range"], (eye[2] - floor) / -directions[:, 2], rtol=2e-5)
-    np.testing.assert_allclose(ground["intensity"], -directions[:, 2] * (10 / ground["range"]) ** 2, rtol=1e-4)
+    np.testing.assert_allclose(ground["intensity"], GRAY * -directions[:, 2] * (10 / ground["range"]) ** 2, rtol=1e-4)
 
 
 def test_points_of_an_object_are_its_own():
@@ -90,7 +95,8 @@ def test_nearer_and_farther_points_do_not_return():
 
 def test_a_sensor_may_make_up_for_the_distance():
     _, rows = points_of(recipe({"reference_range": None}))
-    np.testing.assert_allclose(rows["intensity"], np.cos(rows["incidence"]), atol=1e-6)
+    ground = rows[rows["instance"] == 0]
+    np.testing.assert_allclose(ground["intensity"], GRAY * np.cos(ground["incidence"]), atol=1e-6)
 
 
 def matched(rows, others):
@@ -128,8 +134,9 @@ def test_points_drop_out_as_often_as_was_asked():
     middle = (exact["range"] > 5) & (exact["range"] < 7)
     kept = (near["range"] > 5) & (near["range"] < 7)
     assert abs(kept.sum() / middle.sum() - 0.5) < 0.1
-    _, bright = points_of(recipe({**dense, "dropout_by_intensity": [[0.5, 1], [0.5001, 0]]}))
-    assert len(bright) == (exact["intensity"] > 0.5).sum() > 0
+    level = float(np.median(exact["intensity"]))
+    _, bright = points_of(recipe({**dense, "dropout_by_intensity": [[level, 1], [level * 1.0001, 0]]}))
+    assert abs(len(bright) - (exact["intensity"] > level).sum()) <= 2
 
 
 def test_noise_follows_from_the_seed_and_the_pose():
@@ -316,3 +323,85 @@ def test_a_lidar_of_a_sequence_is_shown_beside_its_camera(tmp_path):
     assert [film.sensors for film in films_of(dataset, is_shown)] == [("front", "top")]
     sheet = contact_sheet(list(dataset), ["lidar"])
     assert any((sheet == draw).all(axis=2).any() for draw in np.array([color_of(o.id) for o in dataset[0].objects]))
+
+
+TILES = np.array([[[255, 0, 0], [0, 255, 0]], [[0, 0, 255], [128, 128, 128]]], np.uint8)
+WALL = """\
+mtllib wall.mtl
+usemtl tiles
+v -1 0 0
+v 1 0 0
+v 1 2 0
+v -1 2 0
+vt 0 0
+vt 1 0
+vt 1 1
+vt 0 1
+f 1/1 2/2 3/3 4/4
+"""
+
+
+@pytest.fixture
+def wall(tmp_path):
+    """What a recipe says of a wall of four tiles, 2 m wide and high."""
+    (tmp_path / "wall.obj").write_text(WALL)
+    (tmp_path / "wall.mtl").write_text("newmtl tiles\nKd 1 1 1\nmap_Kd tiles.png\n")
+    Image.fromarray(TILES).save(tmp_path / "tiles.png")
+    sensor = {"rings": 40, "elevation": [-20, 20], "azimuth": [-30, 30], "azimuth_step": 0.5, "range": [0.5, 50]}
+
+    def said(lidar=None, **changes):
+        rig = {"sensors": {"front": {}, "top": {"rotation": [0, 10, 0], "lidar": sensor | (lidar or {})}}}
+        models = [{"source": str(tmp_path / "wall.obj"), "category": "wall"}]
+        return recipe(models=models, rig=rig, **{"viewpoints": {"azimuth": [15], "elevation": [5], "distance": 4}} | changes)
+
+    return said
+
+
+def albedo_of(rows):
+    """What is left of the intensity without incidence and range, for a reference of 10 m."""
+    return rows["intensity"] / np.cos(rows["incidence"]) * (rows["range"] / 10.0) ** 2
+
+
+def test_a_picture_s_texels_send_back_their_luminance(wall):
+    sample, rows = points_of(wall())
+    (o,) = sample.objects
+    own = rows[rows["instance"] == o.id]
+    x, y, z = ((in_world(sample, own) - o.world_from_object[:3, 3]) @ o.world_from_object[:3, :3]).T
+    clear = (np.abs(x) > 1e-4) & (np.abs(z - o.box3d_object[:, 2].mean()) > 1e-4)
+    np.testing.assert_allclose(y, o.box3d_object[:, 1].mean(), atol=1e-4)
+    texels = TILES[(z < o.box3d_object[:, 2].mean()).astype(int), (x > 0).astype(int)]
+    expected = linear(texels / 255.0) @ LUMINANCE
+    assert len(np.unique(expected[clear])) == 4 and clear.sum() > 500
+    np.testing.assert_allclose(albedo_of(own)[clear], expected[clear], rtol=1e-4)
+
+
+def test_a_sweep_in_which_nothing_moves_has_the_same(wall):
+    """As far as points do not lie next to where tiles meet."""
+    still = {"viewpoints": {"kind": "orbit", "azimuth": [15, 15], "elevation": [5, 5], "distance": [4, 4]}}
+    still |= {"time": {"frames": 2, "fps": 5}, "splits": {"by": "sequence", "train": 1}}
+    _, rows = points_of(wall(**still))
+    _, swept = points_of(wall({"sweep": 0.1}, **still))
+    one, other = matched(rows, swept)
+    assert len(one) > 0.99 * len(rows)
+    assert (np.abs(one["intensity"] - other["intensity"]) > 1e-4 * one["intensity"]).mean() < 0.002
+
+
+def test_changes_to_materials_change_it_and_are_checked(wall, tmp_path):
+    """Tints, and pictures; labels computed again from exported models have the same, and so the same points drop out."""
+    _, rows = points_of(wall())
+    tinted = {"scene": {"materials": [{"tint": [0.5, 0.5, 0.5]}], "ground": {"color": [1, 1, 1]}}}
+    _, dark = points_of(wall(**tinted))
+    own = rows["instance"] > 0
+    np.testing.assert_allclose(dark["intensity"][own], rows["intensity"][own] / 2, rtol=1e-6)
+    np.testing.assert_allclose(albedo_of(dark)[~own], 1, rtol=1e-4)
+    Image.new("RGB", (2, 2), (128, 128, 128)).save(tmp_path / "gray.png")
+    painted = {"scene": {"materials": [{"image": str(tmp_path / "gray.png")}]}}
+    _, gray = points_of(wall(**painted))
+    np.testing.assert_allclose(albedo_of(gray)[own], linear(128 / 255), rtol=1e-4)
+    level = float(np.median(rows["intensity"]))
+    for said in ({}, tinted, painted):
+        out = tmp_path / f"out{len(str(said))}"
+        vs.generate(wall({"dropout_by_intensity": [[0, 1], [level, 0.5], [2 * level, 0]]}, **said), out, workers=0)
+        kept = next(s for s in Dataset(out) if s.sensor == "top").channels["lidar"]
+        assert 0 < len(kept) < len(rows)
+        assert check(Dataset(out), rays=False).ok

@@ -155,7 +155,8 @@ class Again:
 
     def _read(self, key: str) -> Mesh:
         info = self._models[key]
-        return read_exported(self._dataset.path(info.glb), info.parts, info.node)
+        whole = "lidar" in self._dataset.plan.channels  # its intensity follows from colours, too
+        return read_exported(self._dataset.path(info.glb), info.parts, info.node, whole=whole)
 
 
 def _spec(info: ModelInfo) -> ModelSpec:

@@ -21,7 +21,7 @@ from viewsphere.model.rig import Sensor
 from viewsphere.truth.correspondence import Match
 from viewsphere.truth.geometry import Geometry
 from viewsphere.truth.points import SurfacePoints
-from viewsphere.truth.shot_views import Followed, Moment
+from viewsphere.truth.shot_views import Followed, Moment, Painted
 from viewsphere.truth.sweeping import Turning
 from viewsphere.truth.view import View
 from viewsphere.truth.visibility import Instances, Visibility, homogeneous, lens_rays, rasterize
@@ -60,6 +60,11 @@ class Around(Protocol):
 
     def turning(self, seconds: float) -> Turning:
         """How all moves while the columns of the picture are measured one after another, within so many seconds."""
+        ...
+
+    @property
+    def painted(self) -> Painted:
+        """What surfaces look like at the picture's instant."""
         ...
 
     @property

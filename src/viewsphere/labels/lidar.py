@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.geometry.camera import pixel_rays
+from viewsphere.labels._albedo import albedo
 from viewsphere.labels._chance import generator
 from viewsphere.labels._from_above import from_above
 from viewsphere.labels._label import ChannelLabel, Drawing, Models, Needs, channel_of
@@ -34,7 +35,7 @@ def compute(sight: Sight) -> NDArray[np.void]:
         raise ValueError("lidar: expected a sample of a LiDAR, found a camera's")
     hits, width = _hits(sight, around, lidar), sight.camera.width
     ring, column, distance = hits.ring, hits.column, hits.distance
-    intensity = _intensity(lidar, distance, hits.cosine)
+    intensity = _intensity(lidar, distance, hits.cosine * albedo(sight.geometry, around.painted, hits))
     draw = partial(_drawn, lidar.seed, around.drawn_as, sight.visibility.triangle.shape, (ring, column))
     returns = _returns(lidar, distance, intensity, draw)
     distance = distance + lidar.sigma * draw("range", np.random.Generator.standard_normal) if lidar.sigma else distance
@@ -55,10 +56,12 @@ def _hits(sight: Sight, around: Around, lidar: Lidar) -> Hits:
     return still_hits(sight.geometry, sight.camera, sight.visibility)
 
 
-def _intensity(lidar: Lidar, distance: Float, cosine: Float) -> Float:
-    """Lambert's cosine, weakened by the square of the distance where the sensor does not make up for it."""
+def _intensity(lidar: Lidar, distance: Float, reflected: Float) -> Float:
+    """What a surface sends back, Lambert's cosine times its albedo, weakened by the square of the distance where the sensor
+    does not make up for it.
+    """
     near = lidar.reference_range
-    return cosine if near is None else cosine * (near / distance) ** 2
+    return reflected if near is None else reflected * (near / distance) ** 2
 
 
 Draw = Callable[[str, Callable[..., Float]], Float]

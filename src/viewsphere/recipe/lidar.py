@@ -61,7 +61,8 @@ class LidarEntry(Frozen):
     )
     reference_range: Positive | None = Field(
         default=10.0,
-        description="metres at which a surface seen straight on has intensity 1; null: intensity does not depend on the range",
+        description="metres at which a white surface seen straight on has intensity 1; null: intensity does not depend on the "
+        "range",
     )
     sigma: Annotated[Metres, Field(ge=0)] = Field(default=0.0, description="standard deviation of measured ranges, metres")
     dropout: Portion = Field(default=0.0, description="probability that a point does not return")

@@ -229,7 +229,7 @@ class Stages:
         """The shot's samples in order, channels in memory; raises RecipeError for a camera inside of scenery or a target."""
         stage = self.stage(shot)
         self._check_shot(shot)
-        views = ShotViews(shot, stage.at)
+        views = ShotViews(shot, stage.at, lambda thing: self.model(thing.model, thing.step))
         shown: tuple[TimeStep | None, ...] | None = None
         boxes, sizes, traits = list[Float](), list[Size | None](), list[Callable[[], Traits]]()
         for sample in shot.samples:

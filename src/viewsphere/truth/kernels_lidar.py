@@ -1,4 +1,4 @@
-"""Angles at which a LiDAR's rays meet surfaces."""
+"""Where, and at which angles, a LiDAR's rays meet surfaces."""
 
 from __future__ import annotations
 
@@ -23,3 +23,26 @@ def incidence(rays, normals, chosen, rotation, angle, cosine):
         length = math.sqrt(across * across + along * along)
         angle[i] = math.atan2(across, along)
         cosine[i] = along / length if length > 0.0 else 0.0
+
+
+@njit
+def weights(points, vertices, triangles, chosen, out):
+    """Fill (N, 3) with the weights, none negative, of the corners of the `chosen` triangles (N,) at points (N, 3) of their
+    planes.
+    """
+    for i in range(out.shape[0]):
+        t = triangles[chosen[i]]
+        a = vertices[t[0]]
+        bx, by, bz = vertices[t[1], 0] - a[0], vertices[t[1], 1] - a[1], vertices[t[1], 2] - a[2]
+        cx, cy, cz = vertices[t[2], 0] - a[0], vertices[t[2], 1] - a[1], vertices[t[2], 2] - a[2]
+        px, py, pz = points[i, 0] - a[0], points[i, 1] - a[1], points[i, 2] - a[2]
+        nx, ny, nz = by * cz - bz * cy, bz * cx - bx * cz, bx * cy - by * cx
+        second = (py * cz - pz * cy) * nx + (pz * cx - px * cz) * ny + (px * cy - py * cx) * nz
+        third = (by * pz - bz * py) * nx + (bz * px - bx * pz) * ny + (bx * py - by * px) * nz
+        first = nx * nx + ny * ny + nz * nz - second - third
+        first, second, third = max(first, 0.0), max(second, 0.0), max(third, 0.0)
+        total = first + second + third
+        if total > 0.0:
+            out[i, 0], out[i, 1], out[i, 2] = first / total, second / total, third / total
+        else:
+            out[i, 0], out[i, 1], out[i, 2] = 1.0, 0.0, 0.0

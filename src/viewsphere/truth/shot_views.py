@@ -11,12 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.assets.mesh import Mesh
+from viewsphere.assets.repaint import textured
 from viewsphere.geometry.rotation import compose, inverse, product, rigid, transform
 from viewsphere.model.camera import Camera
 from viewsphere.model.exposure import Sweep, beyond
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.rig import Sensor
-from viewsphere.model.scene import Matrix4
+from viewsphere.model.scene import Ground, Matrix4
 from viewsphere.model.shot import Shot
 from viewsphere.model.surface_samples import SurfaceSamples
 from viewsphere.model.thing import Motion, Thing, TimeStep
@@ -29,6 +30,19 @@ from viewsphere.truth.sweeping import Turning
 from viewsphere.truth.view import View
 
 Float = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Painted:
+    """What surfaces look like: the things at an instant with their meshes, which have those pictures that the shot gives them,
+    and the ground, if there is one.
+    """
+
+    things: Sequence[Thing]
+    meshes: Sequence[Mesh]
+    ground: Ground | None
+
+
 NO_POINTS: Drawn = np.zeros(0, np.int64), np.zeros((0, 3))
 
 
@@ -53,11 +67,13 @@ class Followed:
 @dataclass(frozen=True, eq=False)
 class ShotViews:
     """The views of a shot's sensors; instants count from 0 in the shot. `geometry_at` gives all triangles at an instant: those
-    of as many instants as `truth.moving.ROOMS` are there at once.
+    of as many instants as `truth.moving.ROOMS` are there at once; `mesh_of` a still thing's mesh, with all that it looks like,
+    which few labels need.
     """
 
     shot: Shot
     geometry_at: Callable[[int], Geometry]
+    mesh_of: Callable[[Thing], Mesh] | None = None
     _geometries: dict[int, tuple[Geometry, Geometry]] = field(default_factory=dict[int, "tuple[Geometry, Geometry]"])
     _views: dict[tuple[int, int], View] = field(default_factory=dict[tuple[int, int], View])
     _followed: dict[int, Followed] = field(default_factory=dict[int, Followed])
@@ -174,7 +190,7 @@ def views_of(shot: Shot, mesh_of: Callable[[Thing], Mesh]) -> ShotViews:
         return [mesh_of(thing) for thing in shot.things_at(instant)]
 
     floor = shot_floor(shot, meshes_at)
-    return ShotViews(shot, lambda instant: ring.at(shot.things_at(instant), meshes_at(instant), floor))
+    return ShotViews(shot, lambda instant: ring.at(shot.things_at(instant), meshes_at(instant), floor), mesh_of)
 
 
 def _drawn(view: View, count: int, on_objects: bool, rng: np.random.Generator) -> Float:
@@ -282,6 +298,16 @@ class SampleViews:
         (before, first), (after, last) = found[-1], found[1]
         path = Sweep(moments=(before, 0.0, after), motion=Motion(poses=(first, now, last)))
         return np.stack([np.array(path.pose(moment)) for moment in moments.tolist()])
+
+    @property
+    def painted(self) -> Painted:
+        """What surfaces look like at the instant. Raises RecipeError for a picture that cannot be read."""
+        shot, mesh_of = self.views.shot, self.views.mesh_of
+        if mesh_of is None:
+            raise ValueError(f"shot {shot.key}: expected its meshes, found none")
+        things = shot.things_at(self.instant)
+        meshes = [textured(mesh_of(thing), thing.repaints) for thing in things]
+        return Painted(things, meshes, shot.scene.ground)
 
     @property
     def drawn_as(self) -> tuple[str, ...]:

@@ -26,8 +26,9 @@ GLANCE = np.cos(np.radians(80.0))
 
 @dataclass(frozen=True, eq=False)
 class Hits:
-    """What rays meet: of each its ring, column and triangle (N,), the distance (N,) metres, and the angle (N,), 0 to pi/2,
-    between it and the triangle's normal, with its cosine.
+    """What rays meet: of each its ring, column and triangle (N,), the distance (N,) metres, the angle (N,), 0 to pi/2,
+    between it and the triangle's normal, with its cosine, and the place (N, 3): world metres at its own moment, and weights
+    of the triangle's corners.
     """
 
     ring: NDArray[np.intp]
@@ -36,6 +37,8 @@ class Hits:
     distance: Float
     incidence: Float
     cosine: Float
+    place: Float
+    weights: Float
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +58,10 @@ def still_hits(geometry: Geometry, camera: Camera, visibility: Visibility) -> Hi
     triangle = visibility.triangle[ring, column]
     distance = 1.0 / visibility.inverse_depth[ring, column].astype(np.float64)
     rays = _rays(camera)[ring, column]
-    return Hits(ring, column, triangle, distance, *_incidence(rays, geometry.triangle_normals, triangle, camera.R))
+    place = product(camera.R.T, (rays * distance[:, None] - camera.t)[..., None])[..., 0]
+    weights = _weights(place, geometry.vertices, geometry.triangles, triangle)
+    angle, cosine = _incidence(rays, geometry.triangle_normals, triangle, camera.R)
+    return Hits(ring, column, triangle, distance, angle, cosine, place, weights)
 
 
 def swept_hits(geometry: Geometry, camera: Camera, turning: Turning) -> Hits:
@@ -102,11 +108,26 @@ def _own_moment(geometry: Geometry, camera: Camera, turning: Turning, found: tup
     along = (normal * rays).sum(axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):
         again = (normal * a).sum(axis=1) / along
-    incidence, cosine = _incidence(rays, normal, np.arange(len(rays), dtype=np.int32), np.eye(3))
+    own = np.arange(len(rays), dtype=np.int32)
+    incidence, cosine = _incidence(rays, normal, own, np.eye(3))
     sides = np.stack([(np.cross(p, q) * rays).sum(axis=1) for p, q in ((b, c), (c, a), (a, b))])
     inside = (sides >= 0).all(axis=0) | (sides <= 0).all(axis=0) | (triangle >= geometry.triangle_start[-1])
     sure = np.isfinite(again) & (again > 0) & (inside | (cosine > GLANCE))
-    return Hits(ring, column, triangle, np.where(sure, again, distance), incidence, cosine)
+    distance = np.where(sure, again, distance)
+    seen = rays * distance[:, None]
+    back = turning.rotation[column].swapaxes(1, 2)
+    place = product(back, (seen - turning.shift[column])[..., None])[..., 0]
+    weights = _weights(seen, placed.reshape(-1, 3), np.arange(3 * len(own), dtype=np.int32).reshape(-1, 3), own)
+    return Hits(ring, column, triangle, distance, incidence, cosine, place, weights)
+
+
+def _weights(points: Float, vertices: Float, triangles: NDArray[np.int32], chosen: NDArray[np.int32]) -> Float:
+    """Weights (N, 3) of the corners of the chosen triangles at points (N, 3) of their planes."""
+    from viewsphere.truth import kernels_lidar as kernels
+
+    out = np.empty((len(points), 3))
+    kernels.weights(points, vertices, triangles, chosen, out)
+    return out
 
 
 def _transformed(motion: Float, points: Float) -> Float:
