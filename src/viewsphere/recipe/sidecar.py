@@ -10,6 +10,7 @@ from pydantic import Field, ValidationError
 from viewsphere.errors import RecipeError
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.keypoints import Keypoints
+from viewsphere.model.looks import Word
 from viewsphere.model.mistakes import report
 from viewsphere.model.symmetries import Symmetries
 from viewsphere.recipe.file import read
@@ -19,7 +20,7 @@ ENDING = ".viewsphere.yaml"
 
 
 class Sidecar(Frozen):
-    """Symmetries and named points of a model."""
+    """Symmetries and named points of a model, and words for what it looks like."""
 
     axes: Literal["file", "object"] = Field(
         default="file",
@@ -30,11 +31,13 @@ class Sidecar(Frozen):
         default=None, description="rigid motions that leave the model as it is; {} says that there are none"
     )
     keypoints: Keypoints | None = Field(default=None, description="named points")
+    color: Word | None = Field(default=None, description="what captions call its colour")
+    material: Word | None = Field(default=None, description="what captions call its material")
 
 
 def read_sidecar(path: Path) -> Sidecar:
     """The sidecar in a file; raises RecipeError in a line a mistake, which names file, line and field."""
-    data, marks = read(path, "axes, symmetries, keypoints")
+    data, marks = read(path, "axes, symmetries, keypoints, color, material")
     try:
         return Sidecar.model_validate(data)
     except ValidationError as error:
