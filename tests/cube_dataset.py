@@ -7,6 +7,7 @@ import numpy as np
 
 from small import still_channels
 from viewsphere.assets.export import export_glb, export_obj
+from viewsphere.assets.looks import looks_of
 from viewsphere.assets.mesh import Mesh
 from viewsphere.geometry.box import FACES, box_vertices
 from viewsphere.geometry.diameter import diameter
@@ -27,6 +28,7 @@ from viewsphere.sampling.camera import looking
 from viewsphere.store import Block, Category, Dataset, ModelInfo, Part, PlanRecord, Store
 from viewsphere.store.records import PRODUCT
 from viewsphere.truth.geometry import build_geometry
+from viewsphere.truth.shot_views import views_of
 from viewsphere.truth.visibility import rasterize
 
 HALVES = ((0, 1, 2), (0, 2, 3))
@@ -74,7 +76,8 @@ def render(shot: Shot):
     geometry = build_geometry(shot.things, meshes, shot.scene.ground is not None, shot.label_alpha)
     boxes = [box_vertices(*m.bounds) for m in meshes]
     files = [f"store/models/{p.model.key}/{p.model.key}.obj" for p in shot.things]
-    for number, instant, _ in shot.samples:
+    views = views_of(shot, lambda thing: MESHES[int(thing.model.key[-1])])
+    for number, instant, sensor in shot.samples:
         now, camera = shot.instants[instant], shot.camera(instant)
         visibility = rasterize(geometry, camera)
         channels = dict(observe(geometry, camera, visibility, {"instances", *shot.channels} - set(PASSES)))
@@ -82,8 +85,8 @@ def render(shot: Shot):
         alpha = np.where(channels["instances"] > 0, 255, 0).astype(np.uint8)
         channels |= {"rgb": colors, "rgba": np.dstack([colors, alpha])}
         channels = {name: channels[name] for name in shot.channels}
-        traits = [partial(Traits, diameter(mesh.vertices)) for mesh in meshes]
-        sight = sight_of(shot, instant, camera, geometry, visibility, boxes, files, traits=traits)
+        traits = [partial(Traits, diameter(mesh.vertices), looks=partial(looks_of, mesh)) for mesh in meshes]
+        sight = sight_of(shot, instant, camera, geometry, visibility, boxes, files, None, views.around(instant, sensor), traits)
         objects = annotated(sight)
         more = sample_values(sight, objects)
         told = {"instant": now.index, "asked": shot.annotations, "more": more}
@@ -152,6 +155,7 @@ def make(
                 s.key, s.category, s.supercategory, s.category_id, f"store/models/{s.key}/{s.key}.obj",
                 f"store/models/{s.key}/{s.key}.glb", box_vertices(low, high), (width, height, length), s.real_size,
                 mesh.parts, len(mesh.triangles), "d", diameter=diameter(mesh.vertices),
+                looks=looks_of(mesh) if annotations else None,
             )  # fmt: skip
             store.write_model_info(folder, info)
     for i, shot in enumerate(planned):

@@ -87,6 +87,46 @@ def test_check_looks_at_it(recipe, tmp_path):
         assert name in problem[1]
 
 
+def test_looks_are_kept_where_a_label_needs_them(recipe, tmp_path):
+    sidecar, asked = tmp_path / "box.stl.viewsphere.yaml", {"annotations": ("looks",)}
+    plain, out = tmp_path / "plain", tmp_path / "out"
+    generate(recipe(), plain)
+    assert Dataset(plain).models[0].looks is None
+    generate(recipe().model_copy(update=asked), out)
+    (info,) = Dataset(out).models
+    assert [patch.share for patch in info.looks.patches] == [1.0] and info.looks.color is None
+    assert not list(differing(Dataset(out), []))
+    before = {file: file.read_bytes() for file in out.glob("store/models/box/*")}
+    assert generate(recipe().model_copy(update=asked), out).rendered == 0
+    assert {file: file.read_bytes() for file in before} == before
+    file = out / "store" / "models" / "box" / "model.json"
+    known = json.loads(file.read_text())
+    known["looks"]["patches"][0]["color"] = [0.9, 0.0, 0.0]
+    file.write_text(json.dumps(known))
+    (problem,) = differing(Dataset(out), [])
+    assert "expected looks of the GLB" in problem[1]
+    file.write_bytes(before[file])
+    sidecar.write_text(SAID + "color: navy\n")
+    with pytest.raises(StoreError, match=r"expected looks .* of model 'box', as the data set has"):
+        generate(recipe().model_copy(update=asked), out)
+
+
+def test_what_is_said_of_looks(recipe, tmp_path):
+    sidecar = tmp_path / "box.stl.viewsphere.yaml"
+    sidecar.write_text(SAID + "color: navy\nmaterial: wooden\n")
+
+    def said(**settings):
+        (spec,) = model_specs(recipe(**settings))
+        looks = Stages().traits(spec).looks()
+        return looks.color, looks.material
+
+    assert said() == ("navy", "wooden") and said(color="dark blue") == ("dark blue", "wooden")
+    for wrong, told in (("color: ''", "color"), ("material: 'a  b'", "words with single spaces"), ("colour: red", "'color'")):
+        sidecar.write_text(wrong)
+        with pytest.raises(ModelError, match=told):
+            generate(recipe(), tmp_path / "out")
+
+
 def test_mistakes_are_told_before_anything_is_rendered(recipe, tmp_path):
     sidecar = tmp_path / "box.stl.viewsphere.yaml"
     sidecar.write_text("symmetries: {continuous: [{axis: [0, 0, 1], offset: [20, 0, 0]}]}")

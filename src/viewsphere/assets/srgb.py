@@ -15,7 +15,7 @@ def linear(srgb: ArrayLike) -> NDArray[np.float64]:
     """Linear light of sRGB values in [0, 1]."""
     srgb = np.asarray(srgb, np.float64)
     base = (np.maximum(srgb, 0.04045) + 0.055) / 1.055
-    fifth = _root(base, 5)
+    fifth = root(base, 5)
     return np.where(srgb <= 0.04045, srgb / 12.92, base * base * (fifth * fifth))
 
 
@@ -23,12 +23,14 @@ def encoded(light: ArrayLike) -> NDArray[np.float64]:
     """sRGB values of linear light in [0, 1]."""
     light = np.asarray(light, np.float64)
     base = np.maximum(light, 0.0031308)
-    power = np.sqrt(np.sqrt(base)) * np.sqrt(_root(base, 3))
+    power = np.sqrt(np.sqrt(base)) * np.sqrt(root(base, 3))
     return np.where(light <= 0.0031308, light * 12.92, 1.055 * power - 0.055)
 
 
-def _root(values: NDArray[np.float64], degree: Literal[3, 5]) -> NDArray[np.float64]:
-    """Third or fifth root of values about 1, by Newton's method: numpy's powers round differently on each processor."""
+def root(values: NDArray[np.float64], degree: Literal[3, 5]) -> NDArray[np.float64]:
+    """Third or fifth root of values about 1 (third ones from 1e-6 on), by Newton's method: numpy's powers round differently on
+    each processor.
+    """
     root = np.sqrt(np.sqrt(values))
     for _ in range(STEPS):
         square = root * root

@@ -40,12 +40,13 @@ def traits_of(spec: ModelSpec, mesh: Mesh, facts: FileFacts, step: TimeStep | No
     not have, and for points far outside of its box.
     """
     across = diameter(mesh.corners)
-    if spec.parts is not None:
-        return Traits(across)
-    if step is not None and step.frame != frame_of(spec, None):
-        return Traits(across, keypoints=_own(mesh, across, facts))
     path, sidecar = said_of(spec)
     said = _in_object_axes(sidecar, facts)
+    color, material = spec.color or said.color, spec.material or said.material
+    if spec.parts is not None:
+        return Traits(across, color=color, material=material)
+    if step is not None and step.frame != frame_of(spec, None):
+        return Traits(across, keypoints=_own(mesh, across, facts), color=color, material=material)
     if said.symmetries is not None and (problem := next(lacking(Surface.of(mesh), said.symmetries), None)):
         raise ModelError(f"{path}: {problem}")
     if said.keypoints is not None and (problem := next(far_points(mesh, across, said.keypoints), None)):
@@ -53,7 +54,9 @@ def traits_of(spec: ModelSpec, mesh: Mesh, facts: FileFacts, step: TimeStep | No
     symmetries = said.symmetries
     if symmetries is None and spec.symmetries == "found":
         symmetries = found_symmetries(mesh)
-    return Traits(across, symmetries, said.keypoints or _own(mesh, across, facts) or _spread(spec, mesh))
+    return Traits(
+        across, symmetries, said.keypoints or _own(mesh, across, facts) or _spread(spec, mesh), color=color, material=material
+    )
 
 
 def with_body_parts(mesh: Mesh, spec: ModelSpec) -> Mesh:

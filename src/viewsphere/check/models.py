@@ -13,6 +13,7 @@ import numpy as np
 from viewsphere.aside import temporary
 from viewsphere.assets.export import export_obj
 from viewsphere.assets.exported import read_exported
+from viewsphere.assets.looks import is_alike, looks_of
 from viewsphere.assets.mesh import Mesh
 from viewsphere.assets.surface import Surface
 from viewsphere.assets.symmetries import lacking
@@ -96,6 +97,8 @@ def _facts(info: ModelInfo, mesh: Mesh) -> Iterator[str]:
         yield f"expected a diameter of {across} m, as the GLB has, found {info.diameter}"
     if info.symmetries is not None:
         yield from lacking(Surface.of(mesh), info.symmetries)
+    if info.looks is not None and not is_alike(info.looks, looks_of(mesh)):
+        yield "expected looks of the GLB, found others"
     if info.keypoints is not None:
         yield from (f"keypoints.{problem}" for problem in far_points(mesh, across, info.keypoints))
 

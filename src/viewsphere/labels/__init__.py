@@ -37,6 +37,7 @@ from viewsphere.labels._sight import Around, Sight
 from viewsphere.model.camera import Camera
 from viewsphere.model.channel import DEFAULT_CHANNELS, PASSES, Channel, picture_of
 from viewsphere.model.keypoints import Keypoints
+from viewsphere.model.looks import Looks
 from viewsphere.model.model_spec import Size
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.model.shot import Shot
@@ -291,3 +292,8 @@ class Rendered:
     def keypoints(self) -> Keypoints | None:
         """Named points."""
         return self.traits().keypoints
+
+    @property
+    def looks(self) -> Looks | None:
+        """What it looks like."""
+        return self.traits().looks()

@@ -11,9 +11,9 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Field:
-    """One field of an object or of a picture: a number, a text or a plain dataclass of these (`shape` is empty), a tuple of
-    numbers, or an array, whose `shape` has -1 where any length will do. `many` is a tuple of any number of such values.
-    `optional`: None says that there is no such value.
+    """One field of an object or of a picture: a number, a text or a plain dataclass of these and of tuples of numbers (`shape`
+    is empty), a tuple of numbers, or an array, whose `shape` has -1 where any length will do. `many` is a tuple of any number
+    of such values. `optional`: None says that there is no such value.
     """
 
     name: str
@@ -39,7 +39,9 @@ class Field:
 
     def _plain(self, value: Any) -> Any:
         if hasattr(value, "__dataclass_fields__"):
-            return {name: _without_nan(part) for name, part in value.__dict__.items()}
+            return {
+                name: _without_nan(list(part) if isinstance(part, tuple) else part) for name, part in value.__dict__.items()
+            }
         if isinstance(value, np.ndarray):
             return _without_nan(value.tolist())
         return _without_nan(list(value) if isinstance(value, tuple) else value)
@@ -61,7 +63,7 @@ class Field:
         if self.shape:
             return tuple(map(_number, plain))
         if hasattr(self.type, "__dataclass_fields__"):
-            return self.type(**{name: _number(part) for name, part in plain.items()})
+            return self.type(**{n: tuple(part) if isinstance(part, list) else _number(part) for n, part in plain.items()})
         return plain
 
     def check(self, value: Any) -> None:
@@ -80,10 +82,7 @@ class Field:
         if isinstance(value, str):
             return self.type is str
         if hasattr(self.type, "__dataclass_fields__"):
-            types = {name: str(field.type) for name, field in self.type.__dataclass_fields__.items()}
-            return all(
-                isinstance(getattr(value, n), str) if t == "str" else _is_number(getattr(value, n)) for n, t in types.items()
-            )
+            return all(_is_part(getattr(value, name), str(one.type)) for name, one in self.type.__dataclass_fields__.items())
         return self.type in {int, float} and _is_number(value)
 
     def equals(self, one: Any, other: Any) -> bool:
@@ -96,6 +95,13 @@ class Field:
 
     def _equals(self, one: Any, other: Any) -> bool:
         return np.array_equal(one, other, equal_nan=True) if self.is_array and self.type is not bool else _plainly(one, other)
+
+
+def _is_part(value: Any, kind: str) -> bool:
+    """Whether a value is what a dataclass's field holds: a text, numbers or a number."""
+    if kind.startswith("tuple"):
+        return isinstance(value, tuple) and all(map(_is_number, value))
+    return isinstance(value, str) if kind == "str" else _is_number(value)
 
 
 def _is_shaped(found: tuple[int, ...], wanted: tuple[int, ...]) -> bool:

@@ -40,7 +40,8 @@ def trusted(sample: Sample, models: Models) -> Iterator[str]:
 class Needs:
     """The inputs of a label besides its own instant and sensor: offsets of instants (-1 is the one before), of those of which
     poses are enough, whether a sensor that is rectified with its own, whether any others, whether points that are followed,
-    whether points on objects, which are looked up in the picture, whether how a LiDAR measures, and whether chance has a part.
+    whether points on objects, which are looked up in the picture, whether how a LiDAR measures, whether chance has a part, and
+    whether what the shot's things look like.
     """
 
     instants: tuple[int, ...] = ()
@@ -51,11 +52,12 @@ class Needs:
     points: bool = False
     lidar: bool = False
     chance: bool = False
+    looks: bool = False
 
     @property
     def is_some(self) -> bool:
         """Whether the label does not follow from what the picture's own camera sees at its instant."""
-        beside = self.rectified or self.rig or self.tracks or self.points or self.lidar or self.chance
+        beside = self.rectified or self.rig or self.tracks or self.points or self.lidar or self.chance or self.looks
         return bool(self.instants or self.poses or beside)
 
 

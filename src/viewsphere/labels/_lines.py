@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Sequence
+from textwrap import wrap
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,6 +12,7 @@ from numpy.typing import NDArray
 
 from viewsphere.geometry.camera import project
 from viewsphere.geometry.rotation import transform
+from viewsphere.labels._label import Picture
 from viewsphere.labels._paint import Color, color_of
 from viewsphere.model.sample import ObjectAnnotation, Sample
 
@@ -18,6 +21,12 @@ if TYPE_CHECKING:
 
 FAR = 1e5
 """Pixels; a line that leads farther off, as of what is beside the lens, is left out."""
+INK, PAPER = (30, 32, 36), (250, 250, 248)
+MARGIN = 6
+"""Pixels between the edge of paper and what is written on it."""
+
+ALPHABET = "abcdefghijklmnopqrstuvwxyz"
+"""Letters whose mean width is that of a text's."""
 
 HEAD = 0.25
 """Length of an arrow's head, as a share of the arrow."""
@@ -59,6 +68,20 @@ def middle(o: ObjectAnnotation) -> tuple[float, float] | None:
     """The middle of an object's box in the picture, of what is seen of it or else of the whole; None where it is not there."""
     box = o.box2d or o.box2d_projected
     return None if box is None else ((box[0] + box[2]) / 2, (box[1] + box[3]) / 2)
+
+
+def written(sentences: Sequence[str], width: int, height: int) -> Picture:
+    """Sentences on paper of this size, (H, W, 3) uint8: each begins a line; as many as there is room for."""
+    from PIL import Image, ImageDraw
+
+    paper = Image.new("RGB", (width, height), PAPER)
+    pen = ImageDraw.Draw(paper)
+    letters = max(8, int((width - 2 * MARGIN) / (pen.textlength(ALPHABET) / len(ALPHABET))))
+    step = math.ceil(pen.textbbox((0, 0), ALPHABET)[3]) + 2
+    lines = [line for sentence in sentences for line in wrap(sentence, letters, subsequent_indent="  ")]
+    for i, line in enumerate(lines[: (height - MARGIN) // step]):
+        pen.text((MARGIN, MARGIN + i * step), line, fill=INK)
+    return np.asarray(paper)
 
 
 def note(pen: ImageDraw, o: ObjectAnnotation, scale: float, words: str, color: Color) -> None:

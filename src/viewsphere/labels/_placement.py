@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from viewsphere.geometry.rotation import compose, rigid
 from viewsphere.model.camera import Camera
 from viewsphere.model.keypoints import Keypoints
+from viewsphere.model.looks import Looks
 from viewsphere.model.model_spec import ModelSpec, Size
 from viewsphere.model.sample import ObjectView
 from viewsphere.model.scene import Matrix4
@@ -26,8 +27,8 @@ Float = NDArray[np.float64]
 class ModelFacts(Protocol):
     """Facts about a normalised model: its OBJ file (relative to the data set's root), its box (8, 3) in its own axes, its
     true size if known (metres), its category, names of its materials and of the parts of its body, and of a time step the key
-    of the animated model; and as `Traits` has them, its diameter (None in data sets of older versions), symmetries and named
-    points.
+    of the animated model; and as `Traits` has them, its diameter (None in data sets of older versions), symmetries, named
+    points and what it looks like (None where no label needs that).
     """
 
     @property
@@ -52,6 +53,8 @@ class ModelFacts(Protocol):
     def symmetries(self) -> Symmetries | None: ...
     @property
     def keypoints(self) -> Keypoints | None: ...
+    @property
+    def looks(self) -> Looks | None: ...
 
 
 @dataclass(frozen=True, eq=False)

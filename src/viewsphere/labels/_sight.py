@@ -18,6 +18,8 @@ from viewsphere.labels._placement import Placement
 from viewsphere.model.camera import Camera
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.rig import Sensor
+from viewsphere.model.scene import Finish
+from viewsphere.model.shot import Shot
 from viewsphere.truth.correspondence import Match
 from viewsphere.truth.geometry import Geometry
 from viewsphere.truth.points import SurfacePoints
@@ -51,6 +53,16 @@ class Around(Protocol):
     @property
     def surface(self) -> SurfacePoints:
         """The points that are drawn on the objects."""
+        ...
+
+    @property
+    def shot(self) -> Shot:
+        """The shot that the picture is of."""
+        ...
+
+    @property
+    def finish(self) -> Finish:
+        """How light becomes the picture."""
         ...
 
     @property

@@ -8,6 +8,7 @@ from pydantic import Field
 
 from viewsphere.model.brief import Brief
 from viewsphere.model.frozen import Frozen
+from viewsphere.model.looks import Word
 from viewsphere.model.scene import IDENTITY, Matrix4
 
 Axis = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
@@ -34,7 +35,7 @@ class ModelSpec(Brief):
     its file's first frame; which time step it shows, and when, its thing's motion says.
     """
 
-    UNSAID = ("fps", "sidecar", "symmetries", "keypoints")
+    UNSAID = ("fps", "sidecar", "symmetries", "keypoints", "color", "material")
 
     key: str  # unique and stable in the data set: also the name of its folder
     source: str
@@ -57,6 +58,8 @@ class ModelSpec(Brief):
     sidecar: str | None = None  # absolute path of the file that says symmetries and keypoints, where it is not beside its own
     symmetries: Literal["found"] | None = None  # whether they are looked for where none are declared
     keypoints: int | None = None  # how many are spread over its surface where none are named
+    color: Word | None = None  # what captions call its colour, where that is not what its sidecar or its surface says
+    material: Word | None = None  # the same of its material
 
     def key_at(self, frame: int | None) -> str:
         """The key of the model as it is at a frame of its file; None: its own."""

@@ -12,6 +12,7 @@ from viewsphere.model.brief import Brief
 from viewsphere.model.credit import Attribution, Credit, Licence, SourceUrl
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.keypoints import MOST_POINTS
+from viewsphere.model.looks import Word
 from viewsphere.model.mistakes import nearest, shown
 from viewsphere.model.model_spec import Axis
 from viewsphere.model.numbers import Count, Positive
@@ -90,7 +91,7 @@ Scale = Annotated[
 class ModelEntry(Brief):
     """Some models of one category, treated alike."""
 
-    UNSAID = ("motion", "fps", "sidecar", "symmetries", "keypoints")
+    UNSAID = ("motion", "fps", "sidecar", "symmetries", "keypoints", "color", "material")
 
     source: Annotated[
         tuple[Annotated[str, Field(min_length=1)], ...],
@@ -156,6 +157,10 @@ class ModelEntry(Brief):
     keypoints: Annotated[Count, Field(le=MOST_POINTS)] | None = Field(
         default=None, description="of models that name none, so many points that lie far apart on the surface"
     )
+    color: Word | None = Field(
+        default=None, description="what captions call the models' colour, instead of what their surfaces say"
+    )
+    material: Word | None = Field(default=None, description="what captions call the models' material: wooden")
     confined: bool = Field(
         default=True, strict=True, description="whether paths inside model files have to stay in the model's folder"
     )

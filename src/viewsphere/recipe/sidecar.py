@@ -11,6 +11,7 @@ from pydantic import AfterValidator, Field, ValidationError, model_validator
 from viewsphere.errors import RecipeError
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.keypoints import Keypoints, PointName
+from viewsphere.model.looks import Word
 from viewsphere.model.mistakes import report, shown
 from viewsphere.model.symmetries import Symmetries
 from viewsphere.recipe.file import read
@@ -30,7 +31,7 @@ def _all_of_them(symmetries: Symmetries | None) -> Symmetries | None:
 
 
 class Sidecar(Frozen):
-    """Symmetries, named points and parts of the body of a model."""
+    """Symmetries, named points and parts of the body of a model, and words for what it looks like."""
 
     axes: Literal["file", "object"] = Field(
         default="file",
@@ -47,6 +48,8 @@ class Sidecar(Frozen):
         description="names of parts of its body, each with the bones of its skin that move it: `{head: [Head, Neck], ...}`; "
         "bones that none of them names are no part. Without it each bone is one",
     )
+    color: Word | None = Field(default=None, description="what captions call its colour")
+    material: Word | None = Field(default=None, description="what captions call its material")
 
     @model_validator(mode="after")
     def _check(self) -> Sidecar:
@@ -59,7 +62,7 @@ class Sidecar(Frozen):
 
 def read_sidecar(path: Path) -> Sidecar:
     """The sidecar in a file; raises RecipeError in a line a mistake, which names file, line and field."""
-    data, marks = read(path, "axes, symmetries, keypoints, body_parts")
+    data, marks = read(path, "axes, symmetries, keypoints, body_parts, color, material")
     try:
         return Sidecar.model_validate(data)
     except ValidationError as error:

@@ -6,6 +6,7 @@ import hashlib
 from collections.abc import Callable, Iterable
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, fields, replace
+from functools import cached_property
 from itertools import chain
 from pathlib import Path
 from textwrap import shorten
@@ -16,6 +17,7 @@ from viewsphere.assets.export import export_deforming, export_glb, export_obj
 from viewsphere.assets.mesh import Mesh
 from viewsphere.errors import StoreError
 from viewsphere.geometry.box import box_size, box_vertices
+from viewsphere.labels import labels
 from viewsphere.model.credit import Credit
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.thing import TimeStep
@@ -36,6 +38,12 @@ class Models:
 
     store: Store
     stages: Stages
+
+    @cached_property
+    def _keeps_looks(self) -> bool:
+        """Whether a label of the data set needs what models look like."""
+        asked = {name for part in self.store.plan().parts for name in part.recipe.get("annotations", ())}
+        return any(label.needs.looks for name, label in labels().items() if name in asked)
 
     def make(self, spec: ModelSpec, steps: Iterable[TimeStep] = (), credit: Credit | None = None, trusted: bool = True) -> None:
         """Normalise a model, at these time steps if it deforms, and export it into the store, or see that the one there is the
@@ -145,6 +153,7 @@ class Models:
             symmetries=traits.symmetries,
             keypoints=traits.keypoints,
             body_parts=mesh.body_parts,
+            looks=traits.looks() if self._keeps_looks else None,
         )
 
     def _compare(self, spec: ModelSpec, known: ModelInfo, wanted: Steps) -> None:
@@ -156,7 +165,7 @@ class Models:
             info, step = known.at(frame), None if frame is None else wanted[frame]
             if info.digest != mesh_digest(self.stages.model(spec, step)):
                 raise _changed(self.store, spec)
-            now = {
+            now: dict[str, object] = {
                 "category": spec.category,
                 "supercategory": spec.supercategory,
                 "real_size": self.stages.real_size(spec, step),
@@ -164,6 +173,8 @@ class Models:
             if info.diameter is not None:
                 traits = self.stages.traits(spec, step)
                 now |= {"symmetries": traits.symmetries, "keypoints": traits.keypoints}
+                if info.looks is not None:
+                    now["looks"] = traits.looks()
             for name, value in now.items():
                 if getattr(info, name) != value:
                     raise StoreError(

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
-from functools import partial
+from dataclasses import dataclass, field, replace
+from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,6 +12,7 @@ import numpy as np
 
 from viewsphere import plugins
 from viewsphere.assets.cache import frame_of, load, read_ahead
+from viewsphere.assets.looks import looks_of
 from viewsphere.assets.mesh import Mesh
 from viewsphere.assets.opaque import Stamp
 from viewsphere.assets.parts import taken
@@ -120,7 +121,9 @@ class Stages:
         if name not in self._traits:
             mesh = self.model(spec, step)
             facts = self._facts.get(name) or FileFacts(Path(spec.source), "parts", "+z", "-y", 1.0)
-            self._traits[name] = traits_of(spec, mesh, facts, step)
+            said = traits_of(spec, mesh, facts, step)
+            looks = cache(lambda: looks_of(self.model(spec, step), said.color, said.material))
+            self._traits[name] = replace(said, looks=looks)
         return self._traits[name]
 
     def real_size(self, spec: ModelSpec, step: TimeStep | None = None) -> Size | None:

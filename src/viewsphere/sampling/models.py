@@ -103,6 +103,8 @@ def numbered_specs(recipe: Recipe) -> tuple[tuple[ModelSpec, int], ...]:
             sidecar=_sidecar(recipe, found.entry),
             symmetries="found" if entry.symmetries == "found" else None,
             keypoints=entry.keypoints,
+            color=entry.color,
+            material=entry.material,
         )
         return spec, found.entry
 

@@ -19,6 +19,7 @@ from pydantic import ConfigDict, PlainValidator, TypeAdapter, ValidationError
 from viewsphere.model.classes import SemanticClass, classes_of
 from viewsphere.model.credit import Credit
 from viewsphere.model.keypoints import Keypoints
+from viewsphere.model.looks import Looks
 from viewsphere.model.mistakes import first_of
 from viewsphere.model.model_spec import Size, step_key
 from viewsphere.model.symmetries import Symmetries
@@ -75,8 +76,9 @@ class ModelInfo:
 
     `box3d_object` (8, 3) metres in the object's axes; sizes are (width, height, length) in metres; `diameter` is the largest
     distance between two vertices, metres, None where older versions made the record; `symmetries` and `keypoints` are those
-    that it says of itself, or that were found (`Traits`). A model that deforms has the same of each of its `steps`, ascending,
-    whose `track` is its key; its own fields are those of its file's first frame.
+    that it says of itself, or that were found (`Traits`), and `looks`, None where no label needs them, what it looks like. A
+    model that deforms has the same of each of its `steps`, ascending, whose `track` is its key; its own fields are those of its
+    file's first frame.
 
     `parts`, `materials` and `body_parts` are names: those of the numbers 1, 2, ... in maps of these names.
     """
@@ -105,6 +107,7 @@ class ModelInfo:
     symmetries: Symmetries | None = None
     keypoints: Keypoints | None = None
     body_parts: tuple[str, ...] = ()
+    looks: Looks | None = None
 
     @property
     def node(self) -> str | None:
@@ -138,9 +141,9 @@ class ModelInfo:
             del value["materials"]
         if not self.body_parts:
             del value["body_parts"]
-        for name in ("symmetries", "keypoints"):
+        for name in ("symmetries", "keypoints", "looks"):
             value[name] = value[name] and value[name].model_dump(mode="json")
-        for name in ("credit", "diameter", "symmetries", "keypoints"):
+        for name in ("credit", "diameter", "symmetries", "keypoints", "looks"):
             if value[name] is None:
                 del value[name]
         return value

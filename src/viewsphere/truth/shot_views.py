@@ -17,7 +17,7 @@ from viewsphere.model.camera import Camera
 from viewsphere.model.exposure import Sweep, beyond
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.rig import Sensor
-from viewsphere.model.scene import Ground, Matrix4
+from viewsphere.model.scene import Finish, Ground, Matrix4
 from viewsphere.model.shot import Shot
 from viewsphere.model.surface_samples import SurfaceSamples
 from viewsphere.model.thing import Motion, Thing, TimeStep
@@ -258,6 +258,16 @@ class SampleViews:
         if instant is None or (sensor is not None and sensor not in names):
             return None
         return self.views.view(instant, self.sensor_number if sensor is None else names.index(sensor))
+
+    @property
+    def shot(self) -> Shot:
+        """The sample's shot."""
+        return self.views.shot
+
+    @property
+    def finish(self) -> Finish:
+        """How light becomes the sample's picture."""
+        return self.views.shot.finish(self.instant)
 
     @property
     def sensor(self) -> Sensor:

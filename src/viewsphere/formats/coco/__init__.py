@@ -1,6 +1,6 @@
 """COCO instances (https://cocodataset.org/#format-data) with the extra keys of Ruiz et al. 2019.
 
-    annotations/instances_<split>.json
+    annotations/instances_<split>.json; with the annotation captions, captions_<split>.json
     images/<split>/<image id>.png, images/<split>/MASK/<image id>.png     (_<object id> if frames hold several objects)
     MODELS/<key>/<key>.obj, .glb, ...
 

@@ -14,10 +14,14 @@ from viewsphere.formats._contents import Expected
 from viewsphere.formats._paper import faces, json_bytes, transformation_matrix
 from viewsphere.formats.coco.options import Options
 from viewsphere.geometry.mask import mask_polygons
+from viewsphere.labels.captions import MOST
 from viewsphere.model.sample import Box, ObjectAnnotation, Sample
 from viewsphere.store import Dataset
 
 FOLDER_SIZE = 10_000
+
+CAPTIONS = "captions"
+"""The label whose sentences are exported where a data set has it."""
 
 Masks = Mapping[int, NDArray[np.bool_]]
 """Masks (H, W) of the visible pixels of a sample's visible objects but imported ones, by the objects' ids."""
@@ -25,17 +29,25 @@ Masks = Mapping[int, NDArray[np.bool_]]
 
 @dataclass(frozen=True)
 class Entry:
-    """What the instances file of a split has of a sample: its image and its annotations, JSON."""
+    """What the files of a split have of a sample: its image, its annotations, and its captions, JSON."""
 
     split: str
     image: bytes
     annotations: tuple[bytes, ...]
+    captions: tuple[bytes, ...] = ()
 
 
 def entry(dataset: Dataset, sample: Sample, ids: Mapping[int, int], masks: Masks) -> Entry:
     """A sample's entry; `ids`: COCO's category ids by ours."""
     annotations = map(json_bytes, _annotations(dataset, sample, ids, masks))
-    return Entry(sample.split, json_bytes(_image(dataset, sample)), tuple(annotations))
+    captions = map(json_bytes, _captions(sample))
+    return Entry(sample.split, json_bytes(_image(dataset, sample)), tuple(annotations), tuple(captions))
+
+
+def _captions(sample: Sample) -> Iterator[dict[str, Any]]:
+    """COCO's captions of a picture, if it has any."""
+    for number, caption in enumerate(sample.captions if CAPTIONS in sample.asked else (), 1):
+        yield {"id": sample.index * MOST + number, "image_id": sample.index + 1, "caption": caption.text}
 
 
 def seen(sample: Sample) -> Masks:

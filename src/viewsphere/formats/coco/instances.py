@@ -1,4 +1,4 @@
-"""The files `annotations/instances_<split>.json`, written frame by frame."""
+"""The files `annotations/instances_<split>.json`, and `captions_<split>.json` beside them, written frame by frame."""
 
 from __future__ import annotations
 
@@ -11,15 +11,25 @@ from typing import Any
 
 from viewsphere.formats._paper import json_bytes, vehicles
 from viewsphere.formats.coco.categories import category_ids
-from viewsphere.formats.coco.entries import Entry
+from viewsphere.formats.coco.entries import CAPTIONS, Entry
 from viewsphere.formats.coco.options import Options
 from viewsphere.store import Dataset
 from viewsphere.store.credits import credited
 
 
-def file_name(split: str) -> str:
-    """File name of a split's instances."""
-    return f"instances_{split}.json"
+def file_name(split: str, kind: str = "instances") -> str:
+    """File name of a split's instances, or of its captions."""
+    return f"{kind}_{split}.json"
+
+
+def file_names(dataset: Dataset) -> list[str]:
+    """The names of all files: captions where some of the data set's pictures have them."""
+    return [file_name(split, kind) for split in dataset.splits for kind in ("instances", *_captions(dataset))]
+
+
+def _captions(dataset: Dataset) -> tuple[str, ...]:
+    """The kind of the files of captions, none where no picture has any."""
+    return (CAPTIONS,) if any(CAPTIONS in part.recipe.get("annotations", ()) for part in dataset.plan.parts) else ()
 
 
 @contextmanager
@@ -27,18 +37,25 @@ def instances(dataset: Dataset, folder: Path, options: Options) -> Generator[Cal
     """Write the files of all splits into this folder: gives a function that appends a frame to its split's file."""
     folder.mkdir(exist_ok=True)
     ids = category_ids(dataset, options)
-    head = json_bytes(_head(dataset, ids))[:-1]
+    head = _head(dataset, ids)
+    heads = {"instances": head, **{kind: {key: head[key] for key in ("info", "licenses")} for kind in _captions(dataset)}}
     with ExitStack() as stack:
-        files = {split: stack.enter_context(_instances(folder / file_name(split), head)) for split in dataset.splits}
+        files = {
+            (split, kind): stack.enter_context(_written(folder / file_name(split, kind), json_bytes(own)[:-1]))
+            for split in dataset.splits
+            for kind, own in heads.items()
+        }
 
         def add(entry: Entry) -> None:
-            files[entry.split](entry.image, entry.annotations)
+            files[entry.split, "instances"](entry.image, entry.annotations)
+            if (entry.split, CAPTIONS) in files:
+                files[entry.split, CAPTIONS](entry.image, entry.captions)
 
         yield add
 
 
 @contextmanager
-def _instances(file: Path, head: bytes) -> Generator[Callable[[bytes, Iterable[bytes]], None]]:
+def _written(file: Path, head: bytes) -> Generator[Callable[[bytes, Iterable[bytes]], None]]:
     """Write one file: annotations wait in a temporary file until the images, which come first, are complete."""
     with file.open("wb") as images, TemporaryFile(dir=file.parent) as waiting:
         images.write(head + b',"images":[')

@@ -13,7 +13,7 @@ from viewsphere.formats._json_proof import check_json
 from viewsphere.formats._json_rows import Where
 from viewsphere.formats.coco.categories import category_ids
 from viewsphere.formats.coco.entries import Entry, entry, files, seen
-from viewsphere.formats.coco.instances import file_name, instances
+from viewsphere.formats.coco.instances import file_name, file_names, instances
 from viewsphere.formats.coco.options import Options
 from viewsphere.formats.coco.witness import testify
 from viewsphere.store import Dataset
@@ -26,7 +26,7 @@ def verify(dataset: Dataset, folder: Path, sampled: Collection[int], options: Op
     """All that is not as it would be exported now. Of the `sampled` frames pycocotools' masks have to be those of the stored
     instance maps, and detections made from the latter have to score AP 1.
     """
-    names = [file_name(split) for split in dataset.splits]
+    names = file_names(dataset)
     with temporary("coco") as aside:
         with instances(dataset, aside, options) as append:
             expected, again = _expected(dataset, append, options), _expected(dataset, _nowhere, options)

@@ -1,0 +1,156 @@
+"""Sentences about pictures: what is kept of one, the user's templates, and what contradicts a sentence."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from string import Formatter
+from typing import Annotated
+
+from pydantic import AfterValidator, Field
+
+from viewsphere.labels._described import RELATIONS, SEEN, Company, Words, of_one, phrases
+from viewsphere.labels._words import capital, noun_of, number, with_article
+from viewsphere.model.mistakes import one_of, shown
+from viewsphere.model.sample import ObjectAnnotation, Sample
+
+LONGEST = 1000
+"""Characters of a template."""
+
+OF_PICTURE = ("count", "list", "categories", "weather", "surroundings")
+OF_OBJECT = ("object", "description", "category", "color", "material", "place", "size", "view", "relation")
+"""Fields of templates."""
+
+NOTHING = "No object can be seen."
+SKY = ("The sky is clear.", "The sky is partly cloudy.", "The sky is overcast.", "The sun is low.")
+
+
+@dataclass(frozen=True)
+class Caption:
+    """A sentence, its form, and the ids of the objects that it is of."""
+
+    text: str
+    form: str
+    objects: tuple[int, ...] = ()
+
+
+def fields_of(template: str) -> frozenset[str]:
+    """The fields of a template."""
+    return frozenset(name for _, name, _, _ in Formatter().parse(template) if name is not None)
+
+
+def _template(text: str) -> str:
+    try:
+        parts = [part for part in Formatter().parse(text) if part[1] is not None]
+    except ValueError:
+        raise ValueError(f"expected fields in pairs of braces; found {shown(text)}: a brace itself is {{{{ or }}}}") from None
+    for _, name, form, conversion in parts:
+        if name not in (*OF_PICTURE, *OF_OBJECT):
+            raise ValueError(f"field {{{name}}}: {one_of(name, (*OF_PICTURE, *OF_OBJECT))}")
+        if form or conversion:
+            raise ValueError(f"expected fields without a format, such as {{{name}}}; found {shown(text)}")
+    if not text.strip() or not text.isprintable():
+        raise ValueError(f"expected a line of printable text; found {shown(text)}")
+    return text
+
+
+AnyTemplate = Annotated[str, Field(max_length=LONGEST), AfterValidator(_template)]
+
+
+@dataclass(frozen=True)
+class Filled:
+    """Fields of a template, and the words for them, empty where there are none."""
+
+    fields: frozenset[str]
+    words: Mapping[str, str]
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether there are words for all fields."""
+        return all(self.words.get(name) for name in self.fields)
+
+    @property
+    def may_be_whole(self) -> bool:
+        """Whether there are words for all fields but those of objects."""
+        return all(self.words.get(name) for name in self.fields.intersection(OF_PICTURE))
+
+    def text(self, template: str) -> str:
+        """The template with its words."""
+        return template.format_map(self.words)
+
+
+def wrong(sample: Sample, caption: Caption, objects: Sequence[ObjectAnnotation], fronts: Sequence[bool]) -> str | None:
+    """What a caption should be by its sample's other labels, where it is something else; `objects` are those that it is of, and
+    `fronts` says of each whether it has a front.
+    """
+    text = caption.text
+    match caption.form:
+        case "count":
+            return _wrong_count(sample, text, objects)
+        case "relation" if len(objects) == 2:
+            return _wrong_relation(sample, text, *objects)
+        case "weather" | "surroundings" if not objects:
+            is_known = text in SKY if caption.form == "weather" else text.startswith("The picture also shows ")
+            return None if is_known else f"a sentence of {caption.form}"
+        case "template":
+            return None
+        case form if len(objects) == 1:
+            (o,) = objects
+            said = of_one(form, o, (sample.width, sample.height), fronts[0])
+            if not said:
+                return f"nothing of the form {form} of object {o.id}"
+            texts = [capital(f"{with_article(phrase)} {said}.") for phrase, _ in _phrases(sample, o)]
+            is_right = text in texts if texts else text.endswith(f"{noun_of(o.category)} {said}.")
+            return None if is_right else f"an object of its category that {said}, and has its colour and material"
+        case _:
+            return f"a known form with as many objects as it has, found {caption.form!r} of {len(objects)}"
+
+
+def _phrases(sample: Sample, o: ObjectAnnotation) -> list[tuple[str, Words]]:
+    """All noun phrases of an object, none where it is not known what it looks like."""
+    if "looks" not in sample.asked:
+        return []
+    return list(phrases(o, (o.color or "", o.material or "")))
+
+
+def _wrong_count(sample: Sample, text: str, objects: Sequence[ObjectAnnotation]) -> str | None:
+    if not objects:
+        return None if text == NOTHING else f"{NOTHING!r} where no object is told of"
+    told = {o.id for o in objects}
+    others = [o.visibility for o in sample.objects if o.id not in told and o.area >= SEEN]
+    if others and max(others) >= min(o.visibility for o in objects):
+        return "all objects to be told of that are as visible as those that are"
+    nouns = [noun_of(o.category) for o in objects]
+    for noun in nouns:
+        words = with_article(noun) if nouns.count(noun) == 1 else f"{number(nouns.count(noun))} "
+        if words not in text and not text.startswith(capital(words)):
+            return f"{words.strip()!r} among what is counted"
+    return None
+
+
+def _wrong_relation(sample: Sample, text: str, one: ObjectAnnotation, other: ObjectAnnotation) -> str | None:
+    relations = Company((one, other)).relations
+    for name in (name for name in RELATIONS if relations[name][0, 1]):
+        texts = set(_related(sample, one, name, other))
+        is_of_both = f"{noun_of(one.category)} is {name} a" in text and text.endswith(f"{noun_of(other.category)}.")
+        if text in texts or (not texts and is_of_both):
+            return None
+    return f"a relation of object {one.id} to object {other.id} that holds, of phrases for these"
+
+
+def _related(sample: Sample, one: ObjectAnnotation, relation: str, other: ObjectAnnotation) -> Iterator[str]:
+    """All sentences of a relation."""
+    for first in _phrases(sample, one):
+        for second in _phrases(sample, other):
+            yield related((one, *first), relation, (other, *second))
+
+
+Phrase = tuple[ObjectAnnotation, str, Words]
+"""An object with one of its noun phrases, and its words for looks."""
+
+
+def related(first: Phrase, relation: str, second: Phrase) -> str:
+    """The sentence that says of one object that it has a relation to another; `another` of what could be said of both."""
+    (one, phrase, own), (other, landmark, its) = first, second
+    is_alike = noun_of(one.category) == noun_of(other.category) and set(its) <= {*own, ""}
+    return capital(f"{with_article(phrase)} is {relation} {f'another {landmark}' if is_alike else with_article(landmark)}.")

@@ -1,0 +1,323 @@
+"""captions: sentences about a picture."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import Field as Limits
+
+from viewsphere.labels._chance import generator
+from viewsphere.labels._described import (
+    MIN_VISIBILITY,
+    ONE,
+    RELATIONS,
+    Company,
+    Words,
+    has_front,
+    is_told,
+    of_one,
+    phrases,
+    side_of,
+    size_of,
+    words_of,
+)
+from viewsphere.labels._field import Field
+from viewsphere.labels._label import Drawing, Models, Needs, Picture, SampleLabel
+from viewsphere.labels._lines import written
+from viewsphere.labels._sentences import NOTHING, AnyTemplate, Caption, Filled, fields_of, related, wrong
+from viewsphere.labels._sight import Around, Sight
+from viewsphere.labels._words import capital, listed, noun_of, number, plural, with_article
+from viewsphere.model.classes import SKY, STUFF_IDS
+from viewsphere.model.frozen import Frozen
+from viewsphere.model.numbers import Count, Natural, Portion
+from viewsphere.model.sample import ObjectAnnotation, Sample
+
+MOST = 100
+"""Sentences about one picture."""
+
+CLEAR, CLOUDY = 0.2, 0.6
+"""Clouds below which the sky is clear, and from which on it is overcast."""
+
+LOW_DEG = 20.0
+"""The sun's elevation below which it is low."""
+
+SEEN_STUFF = 0.05
+"""Share of the pixels from which on stuff is told of."""
+
+SURROUNDINGS = {
+    "road": "a road",
+    "pavement": "a pavement",
+    "grass": "grass",
+    "vegetation": "plants",
+    "building": "buildings",
+    "fence": "a fence",
+}
+
+Rng = np.random.Generator
+Sentences = Iterator[Caption]
+
+
+class Captions(Frozen):
+    """Options of the label."""
+
+    count: Annotated[Count, Limits(le=MOST)] = Limits(default=5, description="sentences about each picture, at most")
+    templates: tuple[AnyTemplate, ...] = Limits(
+        default=(), max_length=1000, description="sentences to fill in, instead of those of viewsphere: {list}, {color}, ..."
+    )
+    plurals: dict[str, str] = Limits(default={}, description="plurals of nouns that no rule gives")
+    min_visibility: Portion = Limits(
+        default=MIN_VISIBILITY, description="visibility from which on an object is told of, if at least 16 pixels are seen"
+    )
+    seed: Natural = Limits(default=0, description="what chance follows from; default: the recipe's seed")
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """What there is to tell of a picture: the objects that are told of, the words for what they look like, by their ids, and
+    those of them that have a front; the picture's size; and what is around them.
+    """
+
+    told: Sequence[ObjectAnnotation]
+    words: Mapping[int, Words]
+    fronts: frozenset[int]
+    size: tuple[int, int]
+    weather: str
+    sun_is_low: bool
+    surroundings: str
+    plurals: Mapping[str, str]
+
+    @cached_property
+    def company(self) -> Company:
+        """The objects together."""
+        return Company(self.told)
+
+    @cached_property
+    def groups(self) -> Sequence[tuple[str, int]]:
+        """Nouns and how many there are of each: most first, then by their categories' ids."""
+        ids: dict[str, list[int]] = {}
+        for o in self.told:
+            ids.setdefault(noun_of(o.category), []).append(o.category_id)
+        return [(noun, len(ids[noun])) for noun in sorted(ids, key=lambda noun: (-len(ids[noun]), min(ids[noun]), noun))]
+
+    @property
+    def list(self) -> str:
+        """What is seen, with numbers: three chairs and a car."""
+        return listed(
+            [with_article(noun) if n == 1 else f"{number(n)} {plural(noun, self.plurals)}" for noun, n in self.groups]
+        )
+
+
+def compute(sight: Sight, objects: Sequence[ObjectAnnotation]) -> Mapping[str, Any]:
+    """The sentences of a picture; of a LiDAR's none."""
+    options, around = sight.options_of("captions", Captions), sight.around
+    if around is None:
+        raise ValueError("captions: expected a sample of a shot, found none")
+    if around.sensor.lidar is not None:
+        return {"captions": ()}
+    seen, rng = _seen(sight, around, objects, options), generator(options.seed, "captions", *around.drawn_as)
+    found = _by_templates(seen, options, rng) if options.templates else _sentences(seen, options.count, rng)
+    return {"captions": tuple(found)}
+
+
+def _seen(sight: Sight, around: Around, objects: Sequence[ObjectAnnotation], options: Captions) -> Seen:
+    told = [o for o in objects if is_told(o, options.min_visibility)]
+    fronts = frozenset(o.id for o in told if has_front(sight.placement(o.id - 1).facts))
+    weather, sun_is_low = _weather(around)
+    size = sight.camera.width, sight.camera.height
+    return Seen(told, words_of(sight), fronts, size, weather, sun_is_low, _surroundings(sight), options.plurals)
+
+
+def _weather(around: Around) -> tuple[str, bool]:
+    """What the sky is like, empty where it is no daylight or not seen, and whether the sun is low."""
+    scene, behind = around.shot.scene, around.finish.background
+    is_sky = behind.color is None and behind.image is None and not behind.transparent
+    if scene.sky.kind != "daylight" or scene.blend is not None or not is_sky:
+        return "", False
+    clouds = scene.sky.clouds
+    weather = "clear" if clouds < CLEAR else "partly cloudy" if clouds < CLOUDY else "overcast"
+    return weather, clouds < CLOUDY and scene.sun is not None and scene.sun.elevation_deg < LOW_DEG
+
+
+def _surroundings(sight: Sight) -> str:
+    """A list of the stuff that is seen."""
+    classes = sight.per_triangle(sight.geometry.triangle_class, SKY)
+    pixels = np.bincount(classes.ravel(), minlength=len(STUFF_IDS) + 1)
+    return listed([words for name, words in SURROUNDINGS.items() if pixels[STUFF_IDS[name]] >= SEEN_STUFF * classes.size])
+
+
+def _sentences(seen: Seen, most: int, rng: Rng) -> list[Caption]:
+    """A sentence of counts, and others, whose forms take turns."""
+    ids = tuple(o.id for o in seen.told)
+    if not ids:
+        return [Caption(NOTHING, "count")]
+    found = [Caption(_counted(seen)[int(rng.integers(3))], "count", ids)]
+    waiting = [FORMS[i](seen, rng) for i in rng.permutation(len(FORMS)).tolist()]
+    while waiting and len(found) < most:
+        for form in tuple(waiting):
+            one = next(form, None)
+            if one is None:
+                waiting.remove(form)
+            elif len(found) < most and all(one.text != other.text for other in found):
+                found.append(one)
+    return found
+
+
+def _counted(seen: Seen) -> tuple[str, str, str]:
+    """The sentences of counts."""
+    told, verb = seen.list, "is" if seen.groups[0][1] == 1 else "are"
+    return f"There {verb} {told}.", f"The picture shows {told}.", capital(f"{told} can be seen.")
+
+
+def _of_one(form: str) -> Callable[[Seen, Rng], Sentences]:
+    """The sentences of a form that say something of one object."""
+
+    def sentences(seen: Seen, rng: Rng) -> Sentences:
+        for i in rng.permutation(len(seen.told)).tolist():
+            o = seen.told[i]
+            if said := of_one(form, o, seen.size, o.id in seen.fronts):
+                yield Caption(capital(f"{with_article(_phrase(seen, o, rng)[0])} {said}."), form, (o.id,))
+
+    return sentences
+
+
+def _phrase(seen: Seen, o: ObjectAnnotation, rng: Rng) -> tuple[str, Words]:
+    """One of an object's noun phrases, by chance, and its words for looks."""
+    known = list(phrases(o, seen.words[o.id]))
+    return known[int(rng.integers(len(known)))]
+
+
+def _relations(seen: Seen, rng: Rng) -> Sentences:
+    """For each two objects, in both orders, one of the relations that hold."""
+    count = len(seen.told)
+    for i, j in (divmod(pair, count) for pair in rng.permutation(count * count).tolist()):
+        known = [name for name in RELATIONS if seen.company.relations[name][i, j]]
+        if known:
+            one, other = seen.told[i], seen.told[j]
+            first, second = _phrase(seen, one, rng), _phrase(seen, other, rng)
+            text = related((one, *first), known[int(rng.integers(len(known)))], (other, *second))
+            yield Caption(text, "relation", (one.id, other.id))
+
+
+def _of_sky(seen: Seen, rng: Rng) -> Sentences:
+    if seen.weather:
+        yield Caption(f"The sky is {seen.weather}.", "weather")
+    if seen.sun_is_low:
+        yield Caption("The sun is low.", "weather")
+
+
+def _of_surroundings(seen: Seen, rng: Rng) -> Sentences:
+    if seen.surroundings:
+        yield Caption(f"The picture also shows {seen.surroundings}.", "surroundings")
+
+
+FORMS = (*map(_of_one, ONE), _relations, _of_sky, _of_surroundings)
+
+
+def _by_templates(seen: Seen, options: Captions, rng: Rng) -> list[Caption]:
+    """The user's sentences, filled in."""
+    found, waiting = list[Caption](), {template: _filled(template, seen, rng) for template in options.templates}
+    while waiting and len(found) < options.count:
+        template = [*waiting][int(rng.integers(len(waiting)))]
+        one = next(waiting[template], None)
+        if one is None:
+            del waiting[template]
+        elif all(one.text != other.text for other in found):
+            found.append(one)
+    return found
+
+
+def _filled(template: str, seen: Seen, rng: Rng) -> Sentences:
+    """A template filled in with each object for which all its fields have a word, in an order of chance; without fields of
+    objects, once.
+    """
+    fields = fields_of(template)
+    shared = Filled(fields, _of_picture(seen))
+    if shared.is_whole:
+        yield Caption(capital(shared.text(template)), "template")
+        return
+    for i in rng.permutation(len(seen.told)).tolist() if shared.may_be_whole else ():
+        words, ids = _of_object(seen, i, rng, "relation" in fields)
+        whole = Filled(fields, {**shared.words, **words})
+        if whole.is_whole:
+            yield Caption(capital(whole.text(template)), "template", ids)
+
+
+def _of_picture(seen: Seen) -> dict[str, str]:
+    nouns = [noun if n == 1 else plural(noun, seen.plurals) for noun, n in seen.groups]
+    return {
+        "count": number(len(seen.told)),
+        "list": seen.list,
+        "categories": listed(nouns),
+        "weather": seen.weather,
+        "surroundings": seen.surroundings,
+    }
+
+
+def _of_object(seen: Seen, i: int, rng: Rng, is_related: bool) -> tuple[dict[str, str], tuple[int, ...]]:
+    """The words of an object's fields, and the ids of what they are of."""
+    o = seen.told[i]
+    noun, (color, material) = noun_of(o.category), seen.words[o.id]
+    *_, (whole, _) = phrases(o, (color, material))
+    words = {
+        "object": with_article(noun),
+        "description": with_article(whole),
+        "category": noun,
+        "color": color,
+        "material": material,
+        "place": of_one("place", o, seen.size, True).removeprefix("is "),
+        "size": size_of(o.area, *seen.size),
+        "view": side_of(o) if o.id in seen.fronts else "",
+    }
+    if not is_related:
+        return words, (o.id,)
+    pairs = [(name, j) for name in RELATIONS for j in np.flatnonzero(seen.company.relations[name][i]).tolist()]
+    if not pairs:
+        return words, (o.id,)
+    name, j = pairs[int(rng.integers(len(pairs)))]
+    other = noun_of(seen.told[j].category)
+    relation = f"{name} {f'another {other}' if other == noun else with_article(other)}"
+    return {**words, "relation": relation}, (o.id, seen.told[j].id)
+
+
+def prove(sample: Sample, models: Models) -> Iterator[str]:
+    """Sentences are different and name visible objects; what they say of these holds by the sample's other labels, of colours
+    and materials where it has `looks`.
+    """
+    visible = {o.id: o for o in sample.objects if o.box2d is not None}
+    texts = [one.text for one in sample.captions]
+    if len(set(texts)) < len(texts):
+        yield "expected different sentences, found one twice"
+    for one in sample.captions:
+        objects = [visible[i] for i in one.objects if i in visible]
+        if len(objects) < len(set(one.objects)) or len(set(one.objects)) < len(one.objects):
+            yield f"{one.text!r:.80}: expected different objects that are visible, found {one.objects}"
+        elif problem := wrong(sample, one, objects, [has_front(models.get(o.key)) for o in objects]):
+            yield f"{one.text!r:.80}: expected {problem}"
+
+
+def beside(sample: Sample) -> Picture:
+    """The sentences, one below another."""
+    return written([one.text for one in sample.captions], sample.width, sample.height)
+
+
+LABEL = SampleLabel(
+    name="captions",
+    meaning="sentences about the picture",
+    needs=Needs(chance=True, looks=True),
+    options=Captions,
+    fields=(
+        Field(
+            "captions",
+            "text, form and ids of the objects that each is of: docs/captions.md has the grammar",
+            Caption,
+            many=True,
+        ),
+    ),
+    compute=compute,
+    prove=prove,
+    drawing=Drawing("captions", beside=beside),
+)

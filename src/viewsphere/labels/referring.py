@@ -1,0 +1,253 @@
+"""referring: expressions that single one object out of all that are visible."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from pydantic import Field as Limits
+
+from viewsphere.labels._described import (
+    MIN_VISIBILITY,
+    NEARER,
+    RELATIONS,
+    Company,
+    Truths,
+    Words,
+    is_told,
+    middle_of,
+    phrases,
+    place_of,
+    words_of,
+)
+from viewsphere.labels._field import Field
+from viewsphere.labels._label import Drawing, Models, Needs, SampleLabel
+from viewsphere.labels._lines import note
+from viewsphere.labels._paint import color_of
+from viewsphere.labels._sight import Sight
+from viewsphere.labels._words import noun_of, noun_phrase
+from viewsphere.model.frozen import Frozen
+from viewsphere.model.numbers import Portion
+from viewsphere.model.sample import ObjectAnnotation, Sample
+
+if TYPE_CHECKING:
+    from PIL.ImageDraw import ImageDraw
+
+APART = 0.02
+"""Share of the picture's width by which the leftmost and the rightmost are apart from the next."""
+
+EXTREMES = ("leftmost", "rightmost", "nearest", "farthest")
+
+
+class Referring(Frozen):
+    """Options of the label."""
+
+    min_visibility: Portion = Limits(
+        default=MIN_VISIBILITY, description="visibility from which on an object is named, if at least 16 pixels are seen"
+    )
+
+
+@dataclass(frozen=True)
+class Expression:
+    """An expression that holds of one object alone, and its parts: words, empty where they are not used, and the id of the
+    object that a relation is to, 0 without.
+    """
+
+    object: int
+    text: str
+    color: str = ""
+    material: str = ""
+    extreme: str = ""
+    place: str = ""
+    relation: str = ""
+    landmark: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """All visible objects of a picture of this size, and the words for what they look like, by their ids."""
+
+    objects: Sequence[ObjectAnnotation]
+    words: Mapping[int, Words]
+    size: tuple[int, int]
+
+    @cached_property
+    def relations(self) -> Mapping[str, Truths]:
+        """For each relation (N, N) whether it holds of the row's object to the column's."""
+        return Company(self.objects).relations
+
+    @cached_property
+    def places(self) -> Sequence[str]:
+        """Where each object is, in words."""
+        return [place_of(o.box2d, *self.size) if o.box2d else "" for o in self.objects]
+
+    @cached_property
+    def sorts(self) -> Mapping[tuple[str, Words], Truths]:
+        """For each noun with some words for looks (N,) whether its noun phrase holds of the objects."""
+        found: dict[tuple[str, Words], Truths] = {}
+        for i, o in enumerate(self.objects):
+            for _, own in phrases(o, self.words[o.id]):
+                found.setdefault((noun_of(o.category), own), np.zeros(len(self.objects), np.bool_))[i] = True
+        return found
+
+    def sort(self, i: int, own: Words) -> Truths:
+        """Of which objects the noun phrase of object i with these words holds, (N,)."""
+        return self.sorts[noun_of(self.objects[i].category), own]
+
+    def kinds(self, i: int) -> Iterator[tuple[str, Words]]:
+        """The noun phrases of object i."""
+        return phrases(self.objects[i], self.words[self.objects[i].id])
+
+    @cached_property
+    def landmarks(self) -> Mapping[int, tuple[str, int]]:
+        """For the number of each object that a noun phrase alone singles out: the shortest one, and how many words for looks it
+        has.
+        """
+        found: dict[int, tuple[str, int]] = {}
+        for i in range(len(self.objects)):
+            alone = [(_used(own), phrase) for phrase, own in self.kinds(i) if self.sort(i, own).sum() == 1]
+            if alone:
+                used, phrase = min(alone, key=lambda one: one[0])
+                found[i] = phrase, used
+        return found
+
+    def extreme(self, name: str, sort: Truths) -> int | None:
+        """The number of the object that is the leftmost, ... of those of a sort, None where none is clearly."""
+        at = np.flatnonzero(sort)
+        if name in ("leftmost", "rightmost"):
+            sign = 1.0 if name == "leftmost" else -1.0
+            values = sign * self._middles[at]
+            first, second = np.argsort(values, kind="stable")[:2].tolist()
+            is_clear = values[second] - values[first] >= APART * self.size[0]
+        else:
+            order = np.argsort(self._distances[at], kind="stable").tolist()
+            first, second = order[:2] if name == "nearest" else order[-1:-3:-1]
+            near, far = sorted((self._distances[at[first]], self._distances[at[second]]))
+            is_clear = near <= NEARER * far
+        return int(at[first]) if is_clear else None
+
+    @cached_property
+    def _middles(self) -> Any:
+        return np.array([middle_of(o.box2d)[0] if o.box2d else np.nan for o in self.objects])
+
+    @cached_property
+    def _distances(self) -> Any:
+        return np.array([o.view.distance for o in self.objects])
+
+    def expression(self, i: int) -> Expression | None:
+        """The shortest expression that holds of object i alone.
+
+        Full brevity of R. Dale and E. Reiter, https://arxiv.org/abs/cmp-lg/9504020, in the order of preference of their
+        incremental algorithm among expressions of one length.
+        """
+        found = min(self._candidates(i), key=lambda one: one[0], default=None)
+        return found and found[1]
+
+    def _candidates(self, i: int) -> Iterator[tuple[tuple[int, int], Expression]]:
+        """Expressions that hold of object i alone, with their lengths and how their kinds rank."""
+        o = self.objects[i]
+        for phrase, own in self.kinds(i):
+            sort, length, (color, material) = self.sort(i, own), _used(own), own
+            plain = Expression(o.id, f"the {phrase}", color, material)
+            if sort.sum() == 1:
+                yield (length, 0), plain
+                return  # the phrases that follow are no shorter
+            for more, rank, one in self._located(i, sort, phrase, plain):
+                yield (length + more, rank), one
+
+    def _located(self, i: int, sort: Truths, phrase: str, plain: Expression) -> Iterator[tuple[int, int, Expression]]:
+        """Expressions that single object i out of those of its sort by where it is, with how many words more they have, and the
+        ranks of their kinds.
+        """
+        own = np.arange(len(self.objects)) == i
+        place = self.places[i]
+        if [j for j in np.flatnonzero(sort).tolist() if self.places[j] == place] == [i]:
+            yield 1, 1, replace(plain, text=f"the {phrase} {place} of the picture", place=place)
+        for name in EXTREMES:
+            if self.extreme(name, sort) == i:
+                yield 1, 2, replace(plain, text=f"the {name} {phrase}", extreme=name)
+        for name in RELATIONS:
+            for j, (landmark, used) in self.landmarks.items():
+                related = self.relations[name][:, j] & sort
+                if j != i and related[i] and (related == own).all():
+                    text = f"the {phrase} that is {name} the {landmark}"
+                    yield 1 + used, 3, replace(plain, text=text, relation=name, landmark=self.objects[j].id)
+
+
+def _used(own: Words) -> int:
+    return sum(map(bool, own))
+
+
+def compute(sight: Sight, objects: Sequence[ObjectAnnotation]) -> Mapping[str, Any]:
+    """The expressions, in the order of the objects' ids; of a LiDAR's picture none."""
+    options, around = sight.options_of("referring", Referring), sight.around
+    if around is None:
+        raise ValueError("referring: expected a sample of a shot, found none")
+    if around.sensor.lidar is not None:
+        return {"referring": ()}
+    visible = [o for o in objects if o.box2d is not None]
+    scene = Scene(visible, words_of(sight), (sight.camera.width, sight.camera.height))
+    found = (scene.expression(i) for i, o in enumerate(visible) if is_told(o, options.min_visibility))
+    return {"referring": tuple(one for one in found if one)}
+
+
+def prove(sample: Sample, models: Models) -> Iterator[str]:
+    """At most one expression for each visible object, whose text has the parts that are told; where the words for all objects'
+    looks are known by the label `looks`, it is the one that singles the object out.
+    """
+    visible = [o for o in sample.objects if o.box2d is not None]
+    number, ids = {o.id: i for i, o in enumerate(visible)}, [one.object for one in sample.referring]
+    if ids != sorted(set(ids) & number.keys()):
+        yield f"expected visible objects in the order of their ids, each once; found {ids}"
+        return
+    for one in sample.referring:
+        text = _text(one, {o.id: o for o in visible})
+        if text != one.text:
+            yield f"object {one.object}: expected {text!r}, by the parts of the expression; found {one.text!r:.80}"
+    if "looks" in sample.asked:
+        words = {o.id: (o.color or "", o.material or "") for o in visible}
+        scene = Scene(visible, words, (sample.width, sample.height))
+        for one in sample.referring:
+            if one != (again := scene.expression(number[one.object])):
+                yield f"object {one.object}: expected {again and again.text!r}, found {one.text!r:.80}"
+
+
+def _text(one: Expression, by_id: Mapping[int, ObjectAnnotation]) -> str | None:
+    """The text that the parts of an expression make; as it is where there is a landmark, whose words are not kept."""
+    phrase = noun_phrase(noun_of(by_id[one.object].category), one.color, one.material)
+    if one.landmark:
+        begins = f"the {phrase} that is {one.relation} the "
+        other = by_id.get(one.landmark)
+        is_right = other is not None and one.text.startswith(begins) and one.text.endswith(noun_of(other.category))
+        return one.text if is_right else f"{begins}..."
+    words = ("the", one.extreme, phrase, f"{one.place} of the picture" if one.place else "")
+    return " ".join(filter(None, words))
+
+
+def draw(pen: ImageDraw, sample: Sample, scale: float) -> None:
+    """Each expression at its object."""
+    by_id = {o.id: o for o in sample.objects}
+    for one in sample.referring:
+        note(pen, by_id[one.object], scale, one.text, color_of(one.object))
+
+
+LABEL = SampleLabel(
+    name="referring",
+    meaning="expressions that single objects out",
+    needs=Needs(looks=True),
+    options=Referring,
+    fields=(
+        Field(
+            "referring",
+            "object (id), text, and its parts color, material, extreme, place, relation and landmark (id): docs/captions.md",
+            Expression,
+            many=True,
+        ),
+    ),
+    compute=compute,
+    prove=prove,
+    drawing=Drawing("referring", lines=draw),
+)

@@ -1,0 +1,46 @@
+"""What a model looks like, in numbers from which words are made."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import AfterValidator, Field
+
+from viewsphere.model.frozen import Frozen
+from viewsphere.model.mistakes import shown
+from viewsphere.model.numbers import Amount, Portion
+
+LONGEST = 40
+"""Characters of a word for a colour or a material."""
+
+
+def _word(text: str) -> str:
+    if text != " ".join(text.split()) or not text.isprintable():
+        raise ValueError(f"expected words with single spaces between them; found {shown(text)}")
+    return text
+
+
+Word = Annotated[str, Field(min_length=1, max_length=LONGEST), AfterValidator(_word)]
+
+
+class Patch(Frozen):
+    """What of one material has one basic colour and one word for its material: its share of what is seen of the model; means
+    over it, the colour (linear [r, g, b]), metallic, roughness, and the share of light that is let through; and whether a clear
+    coat makes it glossy.
+    """
+
+    material: str
+    share: Portion
+    color: tuple[Amount, Amount, Amount]
+    metallic: Portion
+    roughness: Portion
+    clear: Portion
+    coated: bool = False
+
+
+class Looks(Frozen):
+    """The surface of a model in patches, and the words for colour and material that somebody said of it, if anybody did."""
+
+    patches: tuple[Patch, ...] = ()
+    color: Word | None = None
+    material: Word | None = None
