@@ -20,6 +20,7 @@ from viewsphere.model.rig import CAMERA
 from viewsphere.model.shot import Shot
 
 if TYPE_CHECKING:
+    from viewsphere.model.point_cloud import Axes, PointCloud, Surface
     from viewsphere.model.voxels import VoxelGrid
 
 MERGED = "-merged-"
@@ -229,6 +230,18 @@ class Sample(Shown):
     def picture_file(self) -> str | None:
         """Path of the file of `picture`, relative to the data set's root; None without a picture."""
         return self.files.get(picture_of(self.files) or "")
+
+    def point_cloud(self, axes: Axes = "camera", surface: Surface = "visible") -> PointCloud:
+        """What the picture shows as points, with colours, objects, categories and normals as far as channels are kept, in the
+        axes of the camera or the world; of any lens.
+
+        surface: visible, a point for each pixel that shows something, row by row, by `depth_ray`, else by `depth`; complete,
+        the points of `surface_samples` on all objects, seen or not, without colours. Raises StoreError where these are not
+        kept, or the camera is not known.
+        """
+        from viewsphere.model.point_cloud import PointCloud
+
+        return PointCloud.of(self, axes, surface)
 
     @property
     def voxel_grid(self) -> VoxelGrid:

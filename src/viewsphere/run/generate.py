@@ -115,7 +115,7 @@ def generate(
     wanted += _others(wanted, store) if portion.number else ()
     with recipe.located():
         for entry, sensor in product(wanted, planned.rig.sensors):
-            _check_channels(entry.name, portion.record.channels, sensor)
+            _check_channels(entry, portion.record.channels, sensor)
     with recipe.located(), _at_work(portion, store) as pulse:
         tell = heard(pulse, listener or unheard)
         notes: tuple[str, ...] = ()
@@ -240,11 +240,14 @@ def _said(lines: Mapping[str, list[str]]) -> dict[str, tuple[str, ...]]:
     return {key: tuple(dict.fromkeys(some)) for key, some in lines.items() if some}
 
 
-def _check_channels(name: str, channels: Sequence[str], sensor: Sensor) -> None:
+def _check_channels(entry: FormatEntry, channels: Sequence[str], sensor: Sensor) -> None:
     """Raises UserError for a format that is not known, does not work here, or needs one of the channels which a sensor does not
     keep.
     """
-    needed: Sequence[str] = getattr(writable(name), "CHANNELS", ())
+    name, module = entry.name, writable(entry.name)
+    needed: Sequence[str] = getattr(module, "CHANNELS", ())
+    if hasattr(module, "needs"):
+        needed = (*needed, *module.needs(*entry.arguments()))
     kept = sensor.kept(tuple(channels))
     lacking = missing(needed, kept)
     if lacking:
