@@ -60,6 +60,14 @@ def test_cells_are_half_open():
     assert set(np.unique(np.nonzero(owner >= 0)[0])) == {2}
 
 
+@pytest.mark.parametrize("corner", [(0.6, 0.6, 0.6), (0.1, 0.7, 0.9), (0.9, 0.1, 0.2)])
+def test_the_last_cells_of_a_grid_are_like_all_others(corner):
+    small = np.array([[0, 0, 0], [0.05, 0, 0.02], [0.01, 0.06, 0]]) + corner
+    for cell in itertools.product(*((0, count - 1) for count in SIZE)):
+        owner = touched(small + cell, np.array([[0, 1, 2]]))
+        assert owner[cell] == 0 and (owner >= 0).sum() == 1
+
+
 def inside(mesh, size=SIZE, rows=None):
     owner, filled = np.full(size, -1, np.int32), np.zeros(size, np.uint8)
     rows = np.arange(len(mesh.faces)) if rows is None else rows

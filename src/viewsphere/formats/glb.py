@@ -17,16 +17,12 @@ from pathlib import Path
 
 import xxhash
 
-from viewsphere.assets.exported import read_exported
 from viewsphere.assets.glb import Placed, scene_glb_bytes
-from viewsphere.assets.mesh import Mesh
-from viewsphere.errors import StoreError
 from viewsphere.formats import Remark
 from viewsphere.formats._contents import check_files
 from viewsphere.model.classes import thing_class
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.store import Dataset
-from viewsphere.urls import here
 
 ANNOTATES = False  # what is hidden is part of a scene, too
 CHANNELS = ()
@@ -84,7 +80,7 @@ class _Scenes:
     _files: dict[object, str] = field(default_factory=dict[object, str])
 
     def __post_init__(self) -> None:
-        self._mesh = lru_cache(maxsize=MESHES)(self._read)
+        self._mesh = lru_cache(maxsize=MESHES)(self.dataset.mesh)
 
     def of(self, sample: Sample) -> tuple[str, bool]:
         """The file of a sample's scene, empty where it has none, and whether it is the first one there."""
@@ -115,18 +111,7 @@ class _Scenes:
             "class": thing_class(o.category_id),
             "model": o.key,
         }
-        return Placed(f"{o.id:03d} {o.category}", self._mesh(o.key, o.track), o.world_from_object, extras)
-
-    def _read(self, key: str, track: str) -> Mesh:
-        """A model as it is kept, or a time step of the model `track`."""
-        info = self.dataset.store.model_info(key)
-        if info is None and track:
-            moving = self.dataset.store.model_info(track)
-            info = moving and next((step for step in moving.steps if step.key == key), None)
-        if info is None:
-            raise StoreError(f"{self.dataset.root}: expected model {key!r} in the store, found none: render again")
-        with here(self.dataset.path(info.glb).absolute()) as file:
-            return read_exported(file, info.parts, info.node, whole=True)
+        return Placed(f"{o.id:03d} {o.category}", self._mesh(o.key), o.world_from_object, extras)
 
 
 def _known(sample: Sample) -> list[ObjectAnnotation]:

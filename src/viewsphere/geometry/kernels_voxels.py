@@ -33,10 +33,16 @@ def edges_apart(au, av, bu, bv, cu, cv):
 
 
 @inner
-def reach_of(points, triangles, t, axis, count):
-    """Where a triangle begins and ends in a grid of so many cells along an axis; beside the grid it ends before it begins."""
+def extent(points, triangles, t, axis):
+    """Where a triangle begins and ends along an axis."""
     p, q, r = points[triangles[t, 0], axis], points[triangles[t, 1], axis], points[triangles[t, 2], axis]
-    return max(min(p, q, r), 0.0), min(max(p, q, r), count - 0.5) if min(p, q, r) < count else -1.0
+    return min(p, q, r), max(p, q, r)
+
+
+@inner
+def cells(low, high, count):
+    """The cells of a grid of so many in which an extent lies."""
+    return range(math.floor(max(low, 0.0)), math.floor(min(high, count - 1.0)) + 1)
 
 
 @inner
@@ -53,17 +59,17 @@ def columns(points, triangles, t, w, owner, filled, value):
     """`touch` for one triangle, in columns along axis w."""
     u, v = (w + 1) % 3, (w + 2) % 3
     a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
-    low_u, high_u = reach_of(points, triangles, t, u, owner.shape[u])
-    low_v, high_v = reach_of(points, triangles, t, v, owner.shape[v])
-    low_w, high_w = reach_of(points, triangles, t, w, owner.shape[w])
-    if high_u < low_u or high_v < low_v or high_w < low_w:
+    low_u, high_u = extent(points, triangles, t, u)
+    low_v, high_v = extent(points, triangles, t, v)
+    low_w, high_w = extent(points, triangles, t, w)
+    if high_w < 0.0 or low_w >= owner.shape[w]:
         return
     nu, nv = normal_of(points, triangles, t, v, w), normal_of(points, triangles, t, w, u)
     nw = normal_of(points, triangles, t, u, v)
-    for i in range(math.floor(low_u), math.floor(high_u) + 1):
+    for i in cells(low_u, high_u, owner.shape[u]):
         x = i + 0.5
         au, bu, cu = points[a, u] - x, points[b, u] - x, points[c, u] - x
-        for j in range(math.floor(low_v), math.floor(high_v) + 1):
+        for j in cells(low_v, high_v, owner.shape[v]):
             y = j + 0.5
             av, bv, cv = points[a, v] - y, points[b, v] - y, points[c, v] - y
             if edges_apart(au, av, bu, bv, cu, cv):
@@ -73,7 +79,7 @@ def columns(points, triangles, t, w, owner, filled, value):
                 middle = points[a, w] + (au * nu + av * nv) / nw
                 reach = 0.5 * (abs(nu) + abs(nv)) / abs(nw) + SLACK * (1.0 + abs(middle))
                 first, last = max(first, middle - reach), min(last, middle + reach)
-            for k in range(math.floor(first), math.floor(last) + 1):
+            for k in cells(first, last, owner.shape[w]):
                 z = k + 0.5
                 aw, bw, cw = points[a, w] - z, points[b, w] - z, points[c, w] - z
                 if edges_apart(av, aw, bv, bw, cv, cw) or edges_apart(aw, au, bw, bu, cw, cu):

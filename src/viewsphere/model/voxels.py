@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, field_validator
 
+from viewsphere.geometry import voxels
 from viewsphere.limits import limits
 from viewsphere.model.camera import Camera
 from viewsphere.model.frozen import Frozen
@@ -40,6 +41,10 @@ that is seen, 3 occluded); and whether its centre is between scenery above and s
 
 LEVEL = 1e-6
 """The level part of a viewing direction below which a camera looks straight up or down."""
+
+
+ROOM = 1 + 1e-6
+"""How much larger than its longest side the cube around a model is, so that its farthest face is in a cell."""
 
 
 class Voxels(Frozen):
@@ -113,6 +118,36 @@ def _heading(camera: Camera) -> tuple[float, float]:
         x, y = sign * down[0], sign * down[1]
     length = math.sqrt(x * x + y * y)
     return x / length, y / length
+
+
+@dataclass(frozen=True, eq=False)
+class Occupancy:
+    """The cells of a cube around a model, `filled` (n, n, n) uint8 along the object's x, y and z: 0 nothing, 1 a triangle has a
+    part in the cell, 2 its centre is inside. `cell`: its side, metres; `corner` (3,): that of the first cell, object axes.
+    """
+
+    filled: NDArray[np.uint8]
+    cell: float
+    corner: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, vertices: NDArray[np.float32], triangles: NDArray[np.int32], cells: int) -> Occupancy:
+        """Of a mesh, whose longest side is so many cells; raises ValueError for more cells than are allowed, or less than 1."""
+        if not 1 <= cells**3 <= limits.MAX_VOXELS:
+            raise ValueError(f"occupancy: expected 1 to {limits.MAX_VOXELS:,} cells in all, found {cells} along each side")
+        used = vertices[np.unique(triangles)].astype(np.float64) if len(triangles) else np.zeros((1, 3))
+        low, high = used.min(axis=0), used.max(axis=0)
+        cell = ROOM * float((high - low).max() or 1.0) / cells
+        corner = (low + high) / 2 - cell * cells / 2
+        owner, filled = np.full((cells,) * 3, -1, np.int32), np.zeros((cells,) * 3, np.uint8)
+        points, rows = (vertices.astype(np.float64) - corner) / cell, np.arange(len(triangles))
+        voxels.touch(points, triangles, rows, owner, filled, TOUCHED)
+        voxels.fill(points, triangles, rows[voxels.closed(vertices, triangles)], owner, filled, INSIDE)
+        return cls(filled, cell, corner)
+
+    def centers(self, chosen: NDArray[np.bool_]) -> NDArray[np.float64]:
+        """Centres (N, 3) of the chosen cells in the object's axes, metres."""
+        return (np.argwhere(chosen) + 0.5) * self.cell + self.corner
 
 
 @dataclass(frozen=True, eq=False)

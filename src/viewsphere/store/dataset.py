@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache, partial
 from itertools import chain
 from pathlib import Path, PurePosixPath
-from typing import Any, Self, overload
+from typing import TYPE_CHECKING, Any, Self, overload
 
 from numpy.typing import NDArray
 from pydantic import TypeAdapter
@@ -36,7 +36,11 @@ from viewsphere.store.records import Category, ModelInfo, typed
 from viewsphere.store.sample_records import ShotRecords, from_whole_sample
 from viewsphere.store.selection import Selection
 from viewsphere.store.texts import parsed
-from viewsphere.urls import link_file, located
+from viewsphere.urls import here, link_file, located
+
+if TYPE_CHECKING:
+    from viewsphere.assets.mesh import Mesh
+    from viewsphere.model.voxels import Occupancy
 
 
 class Dataset(Shown, Sequence[Sample]):
@@ -383,6 +387,30 @@ class Dataset(Shown, Sequence[Sample]):
             destination.write_bytes(file.data)
         else:
             self.link_kinds.add(link_file(file.resolve() if file.is_symlink() else file, destination))
+
+    def mesh(self, key: str) -> Mesh:
+        """A finished model, or a time step of one, with its materials, in object axes: as its GLB has it. Raises StoreError for
+        one that is not there.
+        """
+        from viewsphere.assets.exported import read_exported
+
+        info = self._info(key)
+        if info is None:
+            moving = (self._info(model) for model in self.plan.models)
+            info = next((step for model in moving if model for step in model.steps if step.key == key), None)
+        if info is None:
+            raise StoreError(f"{self.root}: expected a finished model, found no {key!r}")
+        with here(self.path(info.glb).absolute()) as file:
+            return read_exported(file, info.parts, info.node, whole=True)
+
+    def occupancy(self, key: str, cells: int = 32) -> Occupancy:
+        """Which cells a model is in, of a cube of so many along each side around it: where its surface is, and the inside of
+        its pieces that are closed. Raises StoreError as `mesh` does, ValueError for too many cells.
+        """
+        from viewsphere.model.voxels import Occupancy
+
+        mesh = self.mesh(key)
+        return Occupancy.of(mesh.vertices, mesh.triangles, cells)
 
     def model_files(self) -> Iterator[tuple[str, str]]:
         """Every finished model's OBJ, GLB, materials and textures: `<key>/<name>`, and the path from the data set's root. A
