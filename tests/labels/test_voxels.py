@@ -238,6 +238,20 @@ def test_pictures_are_equal_with_any_number_of_workers_and_check_computes_them_a
     assert grid.grid.size == (30, 20, 30) and {0, 1} <= set(np.unique(grid.instances).tolist())
 
 
+def test_channels_that_are_added_later_have_their_options(tmp_path):
+    views = {"azimuth": [0, 120], "elevation": 15, "distance": 1.0}
+    first = small_recipe(channels=["rgb", "depth", "instances"], formats=[], viewpoints=views)
+    generate(first, tmp_path, workers=0)
+    labels = {"voxels": {"size": [12, 10, 14], "cell": 0.1, "distance": 1.0}, "surface_samples": {"count": 30}}
+    kept = ["rgb", "depth", "instances", "voxels", "surface_samples"]
+    generate(small_recipe(channels=kept, formats=[], viewpoints=views, labels=labels), tmp_path, workers=0, append=True)
+    made = Dataset(tmp_path)
+    assert made[0].voxel_grid.grid.size == (12, 10, 14) and len(made[0].surface_samples) == 30
+    report = check(made)
+    assert report.ok, report.findings
+    assert report.checked["voxels"] == report.checked["surface_samples"] == len(made)
+
+
 def test_ten_thousand_million_cells_are_refused_before_anything_is_rendered():
     expected = r"^labels\.voxels\.size: expected at most 100,000,000 cells, found 10,000,000,000: take fewer, larger cells"
     with pytest.raises(RecipeError, match=expected):

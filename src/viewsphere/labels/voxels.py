@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from functools import lru_cache
+from functools import cache
 
 import numpy as np
 import xxhash
@@ -29,6 +29,9 @@ Rows = NDArray[np.int64]
 
 BORDER = 1e-3
 """Cells by which rounding may move an object's box."""
+
+MESHES = 256
+"""Meshes of which it is kept which of their pieces are closed."""
 
 
 def compute(sight: Sight) -> NDArray[np.void]:
@@ -98,21 +101,18 @@ def _closed(sight: Sight, i: int) -> NDArray[np.bool_]:
     g = sight.geometry
     vertices = g.coordinates[g.vertex_start[i] : g.vertex_start[i + 1]]
     triangles = g.triangles[g.triangle_start[i] : g.triangle_start[i + 1]] - np.int32(g.vertex_start[i])
-    return _closed_again(vertices.tobytes(), triangles.tobytes())
+    key, known = xxhash.xxh3_128(vertices.tobytes() + triangles.tobytes()).digest(), _known()
+    if key not in known:
+        if len(known) >= MESHES:
+            known.clear()
+        known[key] = voxels.closed(vertices, triangles)
+    return known[key]
 
 
-class _Bytes(bytes):
-    """Bytes that are told apart by a digest of 128 bits."""
-
-    def __hash__(self) -> int:
-        return hash(xxhash.xxh3_128_digest(self))
-
-
-@lru_cache(maxsize=64)
-def _closed_again(vertices: bytes, triangles: bytes) -> NDArray[np.bool_]:
-    found = voxels.closed(np.frombuffer(vertices, np.float32).reshape(-1, 3), np.frombuffer(triangles, np.int32).reshape(-1, 3))
-    found.setflags(write=False)
-    return found
+@cache
+def _known() -> dict[bytes, NDArray[np.bool_]]:
+    """What `_closed` found of meshes, by their digests."""
+    return {}
 
 
 def _indoors(sight: Sight, points: Float, grid: Grid) -> NDArray[np.bool_]:

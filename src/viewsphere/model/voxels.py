@@ -95,7 +95,7 @@ class Grid:
         x, y, z = (points[:, i] - m[i, 3] for i in range(3))
         return np.column_stack([(m[0, i] * x + m[1, i] * y + m[2, i] * z) / self.cell for i in range(3)])
 
-    def points(self, cells: NDArray[np.float64]) -> NDArray[np.float64]:
+    def points(self, cells: NDArray[np.floating]) -> NDArray[np.float64]:
         """Where in the world these are, (N, 3) metres: the inverse of `cells`."""
         m, (a, b, c) = self.world_from_grid, cells.T * self.cell
         return np.column_stack([m[i, 0] * a + m[i, 1] * b + m[i, 2] * c + m[i, 3] for i in range(3)])
@@ -173,8 +173,8 @@ class VoxelGrid:
         def whole(name: str) -> NDArray[Any]:
             return np.repeat(runs[name], runs["length"]).reshape(grid.size)
 
-        names = ("class", "instance", "filled", "state")
-        return cls(grid, *(whole(name) for name in names), whole("indoors").astype(np.bool_))
+        indoors = whole("indoors").astype(np.bool_)
+        return cls(grid, whole("class"), whole("instance"), whole("filled"), whole("state"), indoors)
 
     def centers(self, chosen: NDArray[np.bool_]) -> NDArray[np.float64]:
         """Centres (N, 3) of the chosen cells in the world, metres: `centers(grid.classes > 0)`."""

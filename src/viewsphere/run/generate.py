@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import time
 from collections import Counter, defaultdict
-from collections.abc import Container, Generator, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Container, Generator, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -246,8 +246,9 @@ def _check_channels(entry: FormatEntry, channels: Sequence[str], sensor: Sensor)
     """
     name, module = entry.name, writable(entry.name)
     needed: Sequence[str] = getattr(module, "CHANNELS", ())
-    if hasattr(module, "needs"):
-        needed = (*needed, *module.needs(*entry.arguments()))
+    more: Callable[..., Sequence[str]] | None = getattr(module, "needs", None)
+    if more is not None:
+        needed = (*needed, *more(*entry.arguments()))
     kept = sensor.kept(tuple(channels))
     lacking = missing(needed, kept)
     if lacking:
