@@ -80,7 +80,8 @@ def render(shot: Shot):
     for number, instant, sensor in shot.samples:
         now, camera = shot.instants[instant], shot.camera(instant)
         visibility = rasterize(geometry, camera)
-        channels = dict(observe(geometry, camera, visibility, {"instances", *shot.channels} - set(PASSES)))
+        names = {"instances", *shot.channels} - set(PASSES)
+        channels = dict(observe(geometry, camera, visibility, names, options=shot.labels))
         colors = (channels["instances"][..., None] * np.array([90, 60, 30])).astype(np.uint8)
         alpha = np.where(channels["instances"] > 0, 255, 0).astype(np.uint8)
         channels |= {"rgb": colors, "rgba": np.dstack([colors, alpha])}
@@ -89,7 +90,7 @@ def render(shot: Shot):
         sight = sight_of(shot, instant, camera, geometry, visibility, boxes, files, None, views.around(instant, sensor), traits)
         objects = annotated(sight)
         more = sample_values(sight, objects)
-        told = {"instant": now.index, "asked": shot.annotations, "more": more}
+        told = {"instant": now.index, "asked": shot.annotations, "more": more, "options": shot.labels}
         yield Sample(number, now.split, camera, now.viewpoint, objects, channels, {}, **told)
 
 
@@ -125,9 +126,10 @@ def make(
     short=True,
     files=PLAIN,
     annotations=(),
+    labels=None,
 ) -> Dataset:
     """Write the data set; shots whose number is in `leave_out` stay unfinished. Records are `short`, or whole without shots."""
-    planned = shots(several, channels, intrinsics, ground, files, annotations=annotations)
+    planned = shots(several, channels, intrinsics, ground, files, annotations=annotations, labels=labels or {})
     recipe = {"annotations": annotations} if annotations else {}
     frames = sum(len(s.instants) for s in planned)
     store = Store(root)

@@ -13,7 +13,7 @@ def still_channels() -> tuple[str, ...]:
     from viewsphere.labels import Needs, channel_labels
     from viewsphere.model.channel import PICTURES
 
-    return (*PICTURES, *(name for name, label in channel_labels().items() if label.needs == Needs()))
+    return (*PICTURES, *(name for name, label in channel_labels().items() if label.needs == Needs() and label.components))
 
 
 def small_recipe(**changes):

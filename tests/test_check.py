@@ -88,8 +88,10 @@ def test_a_whole_data_set_passes(whole):
     assert json.loads(json.dumps(report.to_json()))["ok"] is True
 
 
-PLAIN = [name for name, label in labels().items() if label.needs == Needs() and name not in on_request()]
-STILL = [name for name, label in channel_labels().items() if label.needs == Needs()]
+STILL = [name for name, label in channel_labels().items() if label.needs == Needs() and label.components]
+ROWS = [name for name, label in channel_labels().items() if label.needs == Needs() and not label.components]
+"""Labels of a still picture that are pixels, or rows of a number of their own."""
+PLAIN = [name for name, label in labels().items() if label.needs == Needs() and name not in (*on_request(), *ROWS)]
 LIFTED = ["nocs", "position"]
 """Labels that are proved by depth, where that is exact, and by object coordinates."""
 
@@ -351,6 +353,31 @@ def nudged(array):
 def test_every_label_of_pixels_is_computed_again_to_the_last_bit(dataset, name):
     edit_channel(dataset, 5, name, nudged)
     assert (name, 5) in failures(dataset, rays=False)
+
+
+SMALL = {"voxels": {"size": [24, 20, 30], "cell": 0.11, "distance": 2.2, "bottom": -1}}
+"""Options of labels that would be large without."""
+
+
+@pytest.fixture(scope="module")
+def rows(tmp_path_factory):
+    kept = ("rgb", "depth", "instances", *ROWS)
+    return make(tmp_path_factory.mktemp("rows") / "set", channels=kept, labels=SMALL, ground=True)
+
+
+def test_labels_of_rows_are_proved(rows):
+    report = check(rows)
+    assert report.ok, report.findings
+    assert ROWS and all(report.checked[name] == len(rows) for name in ROWS)
+
+
+@pytest.mark.parametrize("name", ROWS)
+def test_every_field_of_labels_of_rows_is_computed_again(rows, tmp_path, name):
+    dataset = Dataset(shutil.copytree(rows.root, tmp_path / "out"))
+    for field in channels()[name].dtype.names:
+        edit_channel(dataset, 5, name, lambda a, field=field: a[field].__setitem__(7, a[field][7] + 1))
+        assert (name, 5) in failures(dataset, rays=False), field
+        shutil.copy(rows.path(rows[5].files[name]), dataset.path(dataset[5].files[name]))
 
 
 @pytest.mark.parametrize(("name", "told"), [("normals", ()), ("coordinates", LIFTED)])

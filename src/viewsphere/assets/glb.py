@@ -57,6 +57,41 @@ def deforming_glb_bytes(model: DeformingMesh, names: Mapping[int, str], seconds:
     return writer.packed(steps + parts, len(steps))
 
 
+@dataclass(frozen=True, eq=False)
+class Placed:
+    """A mesh in a scene: its name there, world_from_object (4, 4) of axes with z up, and what is said of it, as JSON."""
+
+    name: str
+    mesh: Mesh
+    world_from_object: NDArray[np.float64]
+    extras: Mapping[str, Any]
+
+
+def scene_glb_bytes(things: Sequence[Placed]) -> bytes:
+    """GLB of a scene, y up as glTF has it: a node for each thing, with its pose, its extras and a child for each part. Things
+    of one mesh share its arrays.
+    """
+    writer, meshes, nodes, parts = _Writer({}), dict[int, range](), list[Object](), list[Object]()
+    for thing in things:
+        first = len(writer.meshes)
+        if id(thing.mesh) not in meshes:
+            writer.add_mesh(thing.mesh)
+            meshes[id(thing.mesh)] = range(first, len(writer.meshes))
+        own = meshes[id(thing.mesh)]
+        begin = len(things) + len(parts)
+        parts += [{"name": writer.meshes[i]["name"], "mesh": i} for i in own]
+        children = {"children": list(range(begin, begin + len(own)))} if own else {}
+        matrix = _turned(thing.world_from_object).T.reshape(-1).tolist()  # column by column
+        nodes.append({"name": thing.name, "matrix": matrix, **children, "extras": dict(thing.extras)})
+    return writer.packed(nodes + parts, len(nodes))
+
+
+def _turned(pose: NDArray[np.float64]) -> NDArray[np.float64]:
+    """A pose of axes with z up as one of axes with y up."""
+    order, signs = [0, 2, 1, 3], np.array([1.0, 1.0, -1.0, 1.0])
+    return pose[order][:, order] * signs[:, None] * signs
+
+
 def material_names(file: Path) -> tuple[str, ...]:
     """Names of the materials in a GLB file that `glb_bytes` made, in its order; its arrays are not read."""
     with file.open("rb") as glb:

@@ -52,6 +52,7 @@ class Again:
         key = self._scenery.key_of(sample.index)
         shot = self._scenery.shot(key)
         assert shot is not None
+        shot = shot.model_copy(update={"labels": {**shot.labels, **sample.options}})  # those of channels added later, too
         geometry = self._built(sample, shot, key)
         if geometry is None:
             return

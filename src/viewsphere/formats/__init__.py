@@ -23,13 +23,13 @@ class Format(Protocol):
     A format may also have: `Options`, a pydantic class of what recipes and the command line may say of it (docs/formats.md has
     the fields' descriptions), of which `writer` and the other functions are then given one as their last argument; `CHANNELS`,
     names of all channels that it reads besides pictures that happen to be there: a run that does not keep them is refused
-    before it begins (without it, a format takes whatever is kept); `ANNOTATES = False`, if samples are to have all their
-    objects, those too that the recipe leaves out of annotations; `CREDITS = False`, if it does not name the models' credits, so
-    that it needs not be written again where only these change; `check()`, which raises a UserError where the format cannot be
-    written; `preparer` of `Prepared`, by which several processes share the work; `notes(categories, *options)`, with lines for
-    the user of what these options mean for a data set's categories; `verify(dataset, folder, sampled)` of `Verified`, with
-    which `viewsphere check` proves an export; `read(path, *, keep_going) -> ForeignDataset` (`viewsphere.store.foreign`), with
-    which data sets of the format are imported.
+    before it begins (without it, a format takes whatever is kept); `needs(*options)`, names of more that it reads then;
+    `ANNOTATES = False`, if samples are to have all their objects, those too that the recipe leaves out of annotations; `CREDITS
+    = False`, if it does not name the models' credits, so that it needs not be written again where only these change; `check()`,
+    which raises a UserError where the format cannot be written; `preparer` of `Prepared`, by which several processes share the
+    work; `notes(categories, *options)`, with lines for the user of what these options mean for a data set's categories;
+    `verify(dataset, folder, sampled)` of `Verified`, with which `viewsphere check` proves an export; `read(path, *, keep_going)
+    -> ForeignDataset` (`viewsphere.store.foreign`), with which data sets of the format are imported.
     """
 
     def writer(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,10 @@ from viewsphere.model.model_spec import Size
 from viewsphere.model.notebook import Shown
 from viewsphere.model.rig import CAMERA
 from viewsphere.model.shot import Shot
+
+if TYPE_CHECKING:
+    from viewsphere.model.point_cloud import Axes, PointCloud, Surface
+    from viewsphere.model.voxels import VoxelGrid
 
 MERGED = "-merged-"
 """Between the name of a sequence and its number, where merged data sets have several of one name."""
@@ -180,6 +184,7 @@ class Sample(Shown):
     taken: Taken | None = None  # None: nobody knows what was there
     asked: tuple[str, ...] = ()  # labels of objects and of pictures that were asked for
     more: Mapping[str, Any] = field(default_factory=dict[str, Any])  # fields of labels of pictures
+    options: Mapping[str, Mapping[str, Any]] = field(default_factory=dict[str, Mapping[str, Any]])  # those of labels
 
     def __repr__(self) -> str:
         size = f"{self.width} x {self.height} pixels"
@@ -225,6 +230,34 @@ class Sample(Shown):
     def picture_file(self) -> str | None:
         """Path of the file of `picture`, relative to the data set's root; None without a picture."""
         return self.files.get(picture_of(self.files) or "")
+
+    def point_cloud(self, axes: Axes = "camera", surface: Surface = "visible") -> PointCloud:
+        """What the picture shows as points, with colours, objects, categories and normals as far as channels are kept, in the
+        axes of the camera or the world; of any lens.
+
+        surface: visible, a point for each pixel that shows something, row by row, by `depth_ray`, else by `depth`; complete,
+        the points of `surface_samples` on all objects, seen or not, without colours. Raises StoreError where these are not
+        kept, or the camera is not known.
+        """
+        from viewsphere.model.point_cloud import PointCloud
+
+        return PointCloud.of(self, axes, surface)
+
+    @property
+    def voxel_grid(self) -> VoxelGrid:
+        """The cells of the channel `voxels` as arrays. Raises StoreError where it is not kept, or is not of the grid that the
+        recipe asks for.
+        """
+        from viewsphere.model.voxels import Grid, VoxelGrid, Voxels
+
+        if "voxels" not in self.channels:
+            raise StoreError(f"frame {self.index}: expected the channel voxels, found none: add it to the recipe's channels")
+        try:
+            return VoxelGrid.of(
+                self.channels["voxels"], Grid.of(Voxels.model_validate(self.options.get("voxels", {})), self.camera)
+            )
+        except ValueError as error:
+            raise StoreError(f"frame {self.index}: {error}") from None
 
     def __dir__(self) -> list[str]:
         """All attributes, the channels and the fields of labels among them."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from importlib.metadata import version
 from itertools import product
@@ -38,11 +38,15 @@ def check_formats(planned: Plan, wanted: Iterable[FormatEntry], channels: Sequen
     """
     with planned.recipe.located():
         for entry, sensor in product(wanted, planned.rig.sensors):
-            _check_channels(entry.name, channels, sensor)
+            _check_channels(entry, channels, sensor)
 
 
-def _check_channels(name: str, channels: Sequence[str], sensor: Sensor) -> None:
-    needed: Sequence[str] = getattr(writable(name), "CHANNELS", ())
+def _check_channels(entry: FormatEntry, channels: Sequence[str], sensor: Sensor) -> None:
+    name, module = entry.name, writable(entry.name)
+    needed: Sequence[str] = getattr(module, "CHANNELS", ())
+    more: Callable[..., Sequence[str]] | None = getattr(module, "needs", None)
+    if more is not None:
+        needed = (*needed, *more(*entry.arguments()))
     kept = sensor.kept(tuple(channels))
     lacking = missing(needed, kept)
     if lacking:

@@ -308,6 +308,7 @@ def render_sample(
         taken=Taken(instant, sensor, shot),
         asked=shot.annotations,
         more=sample_values(sight, objects),
+        options=shot.labels,
     )
 
 

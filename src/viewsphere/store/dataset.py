@@ -5,11 +5,11 @@ from __future__ import annotations
 import os
 from bisect import bisect_right
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache, partial
 from itertools import chain
 from pathlib import Path, PurePosixPath
-from typing import Any, Self, overload
+from typing import TYPE_CHECKING, Any, Self, overload
 
 from numpy.typing import NDArray
 from pydantic import TypeAdapter
@@ -36,7 +36,14 @@ from viewsphere.store.records import Category, ModelInfo, typed
 from viewsphere.store.sample_records import ShotRecords, from_whole_sample
 from viewsphere.store.selection import Selection
 from viewsphere.store.texts import parsed
-from viewsphere.urls import link_file, located
+from viewsphere.urls import here, link_file, located
+
+if TYPE_CHECKING:
+    from viewsphere.assets.mesh import Mesh
+    from viewsphere.model.voxels import Occupancy
+
+Options = Mapping[str, Mapping[str, Any]]
+"""Options of labels, by their names."""
 
 
 class Dataset(Shown, Sequence[Sample]):
@@ -55,6 +62,7 @@ class Dataset(Shown, Sequence[Sample]):
         self._records = lru_cache(maxsize=8)(self._read_records)
         self._manifests = lru_cache(maxsize=8)(partial(_manifest_of, self.root))
         self._info = lru_cache(maxsize=10_000)(self.store.model_info)
+        self._options = lru_cache(maxsize=8)(self._options_of)
         self._facts = lru_cache(maxsize=10_000)(self._model_facts)
 
     def __repr__(self) -> str:
@@ -303,14 +311,16 @@ class Dataset(Shown, Sequence[Sample]):
     def _sample(self, records: _Records, place: int) -> Sample:
         record = records.records[place]
         try:
+            supplied, options = self._supplied(record)
             if "camera" in record or records.shot is None:
-                files: dict[str, str] = record["files"] | self._supplied(record)
-                return self._named(from_whole_sample(record, _ChannelFiles(self.root, files, self._manifests), files))
+                files: dict[str, str] = record["files"] | supplied
+                whole = from_whole_sample(record, _ChannelFiles(self.root, files, self._manifests), files)
+                return self._named(_with_options(whole, options))
             kept, number = records.shot.kept(place), f"{record['index']:08d}"
             files = {name: head + number + tail for name, head, tail in records.files if name in kept}
-            supplied = self._supplied(record)
             files |= {name: file for name, file in supplied.items() if records.shot.keeps(place, name)}
-            return self._named(records.shot.sample(place, record, _ChannelFiles(self.root, files, self._manifests), files))
+            short = records.shot.sample(place, record, _ChannelFiles(self.root, files, self._manifests), files)
+            return self._named(_with_options(short, options))
         except (LookupError, TypeError, ValueError, AttributeError, ArithmeticError) as error:
             raise _damaged(records.file, error) from None
 
@@ -329,9 +339,9 @@ class Dataset(Shown, Sequence[Sample]):
     def _category_ids(self) -> frozenset[int]:
         return frozenset(category.id for category in self.categories)
 
-    def _supplied(self, record: dict[str, Any]) -> dict[str, str]:
-        """Files of channels that were added to a frame later."""
-        files: dict[str, str] = {}
+    def _supplied(self, record: dict[str, Any]) -> tuple[dict[str, str], Options]:
+        """Files of channels that were added to a frame later, and the options that these labels were given."""
+        files, options = dict[str, str](), dict[str, Mapping[str, Any]]()
         number = record["index"]
         for index, added in self.plan.supplements:
             if index.first <= number < index.first + index.samples:
@@ -339,7 +349,13 @@ class Dataset(Shown, Sequence[Sample]):
                 if self.store.has_shot(key):
                     kinds = self.kinds[index.part]
                     files |= {name: self.store.channel_file(key, name, number, kinds) for name in added}
-        return files
+                    options |= {name: given for name, given in self._options(key).items() if name in added}
+        return files, options
+
+    def _options_of(self, key: str) -> Options:
+        """The options of labels in a finished shot."""
+        shot = self.store.labelled(key)
+        return {} if shot is None else shot.labels
 
     @cached_property
     def kinds(self) -> tuple[Files, ...]:
@@ -384,6 +400,30 @@ class Dataset(Shown, Sequence[Sample]):
         else:
             self.link_kinds.add(link_file(file.resolve() if file.is_symlink() else file, destination))
 
+    def mesh(self, key: str) -> Mesh:
+        """A finished model, or a time step of one, with its materials, in object axes: as its GLB has it. Raises StoreError for
+        one that is not there.
+        """
+        from viewsphere.assets.exported import read_exported
+
+        info = self._info(key)
+        if info is None:
+            moving = (self._info(model) for model in self.plan.models)
+            info = next((step for model in moving if model for step in model.steps if step.key == key), None)
+        if info is None:
+            raise StoreError(f"{self.root}: expected a finished model, found no {key!r}")
+        with here(self.path(info.glb).absolute()) as file:
+            return read_exported(file, info.parts, info.node, whole=True)
+
+    def occupancy(self, key: str, cells: int = 32) -> Occupancy:
+        """Which cells a model is in, of a cube of so many along each side around it: where its surface is, and the inside of
+        its pieces that are closed. Raises StoreError as `mesh` does, ValueError for too many cells.
+        """
+        from viewsphere.model.voxels import Occupancy
+
+        mesh = self.mesh(key)
+        return Occupancy.of(mesh.vertices, mesh.triangles, cells)
+
     def model_files(self) -> Iterator[tuple[str, str]]:
         """Every finished model's OBJ, GLB, materials and textures: `<key>/<name>`, and the path from the data set's root. A
         model that deforms comes with all its time steps.
@@ -397,6 +437,11 @@ class Dataset(Shown, Sequence[Sample]):
         """Put the files of every finished model into `folder`/<key>, as `link` does."""
         for inside, stored in self.model_files():
             self.link(stored, folder / inside)
+
+
+def _with_options(sample: Sample, options: Options) -> Sample:
+    """The sample, of whose labels some have these options."""
+    return replace(sample, options={**sample.options, **options}) if options else sample
 
 
 @dataclass(frozen=True, eq=False)

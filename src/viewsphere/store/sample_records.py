@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import ConfigDict, PositiveInt, TypeAdapter
+from pydantic import ConfigDict, JsonValue, PositiveInt, TypeAdapter
 
 from viewsphere.labels import (
     Makers,
@@ -81,6 +81,7 @@ def whole_sample(sample: Sample) -> dict[str, Any]:
         "objects": [whole_record(o, labels) for o in sample.objects],
         "files": dict(sample.files),
         **({"asked": list(sample.asked)} if sample.asked else {}),
+        **({"options": {name: dict(of) for name, of in sample.options.items()}} if sample.options else {}),
         **_plain_more(sample),
     }
 
@@ -101,6 +102,7 @@ class _Picture:
     size: tuple[PositiveInt, PositiveInt] | None = None
     source: dict[str, Any] | None = None
     asked: tuple[str, ...] = ()
+    options: dict[str, dict[str, JsonValue]] = field(default_factory=dict[str, dict[str, JsonValue]])
     more: dict[str, Any] = field(default_factory=dict[str, Any])
 
 
@@ -132,6 +134,7 @@ def from_whole_sample(record: Mapping[str, Any], channels: Channels, files: Mapp
         time=picture.time,
         asked=picture.asked,
         more=_more(picture.asked, picture.more),
+        options=picture.options,
     )
 
 
@@ -189,6 +192,7 @@ class ShotRecords:
             taken=Taken(instant, sensor, None, self.root, self.shot.key),
             asked=self.shot.annotations,
             more=_more(self.shot.annotations, record.get("more", {})),
+            options=self.shot.labels,
         )
 
     def _objects(self, records: list[dict[str, Any]], instant: int, camera: Camera) -> Iterator[ObjectAnnotation]:

@@ -1,0 +1,107 @@
+"""Coloured point clouds: a PLY file for each picture, binary, which Open3D, MeshLab, CloudCompare and trimesh read.
+
+    <split>/<index>.ply
+
+Each point has x, y, z (metres), red, green, blue, and, where the data set keeps what they follow from, nx, ny, nz, object (0
+for none) and category. Comments in the head say the axes. Pictures of unknown cameras, which imported data sets have, are left
+out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Generator, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from pydantic import Field
+
+from viewsphere.codecs.ply import encode_ply
+from viewsphere.errors import UserError
+from viewsphere.formats import Remark
+from viewsphere.formats._contents import check_files
+from viewsphere.model.channel import missing
+from viewsphere.model.frozen import Frozen
+from viewsphere.model.point_cloud import PointCloud
+from viewsphere.model.sample import Sample
+from viewsphere.store import Dataset
+
+CHANNELS = ("depth", "instances")
+CREDITS = False
+FOLDER_SIZE = 10_000
+AXES = {
+    "camera": "camera axes: x right, y down, z ahead; metres",
+    "world": "world axes: z up; metres",
+}
+
+
+class Options(Frozen):
+    """Which points there are, and in which axes."""
+
+    axes: Literal["camera", "world"] = Field(
+        default="camera", description="`camera`: x right, y down, z ahead; `world`: those of all pictures of a scene, z up"
+    )
+    surface: Literal["visible", "complete"] = Field(
+        default="visible",
+        description="`visible`: a point for each pixel; `complete`: those of the channel `surface_samples`, which have "
+        "`visible` (1 or 0) instead of colours",
+    )
+
+
+def needs(options: Options) -> tuple[str, ...]:
+    """Channels that these options ask for."""
+    return ("surface_samples",) if options.surface == "complete" else ()
+
+
+def preparer(dataset: Dataset, folder: Path, options: Options) -> Callable[[Sample], None]:
+    """Writes a sample's cloud."""
+
+    def prepare(sample: Sample) -> None:
+        if sample.known_camera is not None:
+            file = folder / _name(dataset, sample)
+            file.parent.mkdir(parents=True, exist_ok=True)
+            file.write_bytes(_content(sample, options))
+
+    return prepare
+
+
+@contextmanager
+def writer(dataset: Dataset, folder: Path, note: Callable[[str], None], options: Options) -> Generator[Callable[[None], None]]:
+    """Nothing is left to write but clouds."""
+    for name in missing(needs(options), dataset.plan.channels):
+        raise UserError(f"ply: expected a data set with the channel {name}, of which complete clouds are made; found none")
+    yield lambda done: None
+
+
+def verify(dataset: Dataset, folder: Path, sampled: Collection[int], options: Options) -> Iterator[Remark]:
+    """Clouds that are not as they would be exported now."""
+    names = [_name(dataset, sample) for sample in dataset if sample.known_camera is not None]
+    yield from check_files(dataset, folder, (), (), names)
+    for sample in dataset:
+        file = folder / _name(dataset, sample)
+        if sample.known_camera is not None and file.is_file() and file.read_bytes() != _content(sample, options):
+            yield sample.index, f"{_name(dataset, sample)}: expected the points of its picture, found others: export again"
+
+
+def _name(dataset: Dataset, sample: Sample) -> str:
+    number = dataset.plan.folder_of(sample.index, FOLDER_SIZE)
+    parts = (sample.split or "all", *([] if number is None else [f"{number:04d}"]), f"{sample.index:08d}.ply")
+    return "/".join(parts)
+
+
+def _content(sample: Sample, options: Options) -> bytes:
+    cloud = PointCloud.of(sample, options.axes, options.surface)
+    columns = dict(zip("xyz", cloud.points.astype(np.float32).T, strict=True))
+    if cloud.colors is not None:
+        columns |= dict(zip(("red", "green", "blue"), cloud.colors.T, strict=True))
+    if cloud.normals is not None:
+        columns |= dict(zip(("nx", "ny", "nz"), cloud.normals.T, strict=True))
+    if cloud.instances is not None and cloud.categories is not None:
+        columns |= {"object": cloud.instances, "category": cloud.categories}
+    if options.surface == "complete":
+        columns["visible"] = cloud.visible.astype(np.uint8)
+    rows = np.empty(len(cloud), [(name, column.dtype) for name, column in columns.items()])
+    for name, column in columns.items():
+        rows[name] = column
+    return encode_ply(rows, (f"viewsphere, frame {sample.index}", AXES[options.axes], "object: 0 is none"))

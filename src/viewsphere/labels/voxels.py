@@ -1,0 +1,267 @@
+"""voxels: what is in each cell of a grid before the camera, seen or not."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from functools import cache
+
+import numpy as np
+import xxhash
+from numpy.typing import NDArray
+
+from viewsphere.geometry import voxels
+from viewsphere.geometry.camera import has_unit_rays, pixel_rays, project
+from viewsphere.geometry.rotation import transform
+from viewsphere.labels._cells import drawn
+from viewsphere.labels._classes import KEY
+from viewsphere.labels._label import Array, ChannelLabel, Drawing, Models, by_table, channel_of, rendered
+from viewsphere.labels._lifting import ROUNDING, exact_depth, largest
+from viewsphere.labels._sight import Sight
+from viewsphere.model.camera import Camera
+from viewsphere.model.classes import FIRST_THING, SKY, thing_class
+from viewsphere.model.sample import Sample
+from viewsphere.model.voxels import EMPTY, FREE, INSIDE, OCCLUDED, OUTSIDE, RUN, SURFACE, TOUCHED, Grid, VoxelGrid, Voxels
+from viewsphere.truth.cutouts import NEVER
+
+Float = NDArray[np.float64]
+Rows = NDArray[np.int64]
+
+BORDER = 1e-3
+"""Cells by which rounding may move an object's box."""
+
+MESHES = 256
+"""Meshes of which it is kept which of their pieces are closed."""
+
+
+def compute(sight: Sight) -> NDArray[np.void]:
+    """The cells of the grid, its first axis slowest, as runs of equal ones, (N,) of `viewsphere.model.voxels.RUN`.
+
+    A cell is an object's where a triangle has a part in it, or, for pieces of objects that are closed, where its centre is
+    inside; scenery's and the ground's where a triangle has a part in it. Of several things in a cell it is the first one's:
+    objects by their ids, then scenery, then the ground. Where only some of a triangle is surface, all of it counts.
+    """
+    from viewsphere.geometry import kernels_voxels as kernels
+
+    grid = Grid.of(sight.options_of("voxels", Voxels), sight.camera)
+    owner, filled = np.full(grid.size, -1, np.int32), np.zeros(grid.size, np.uint8)
+    points = grid.cells(sight.geometry.vertices)
+    _occupy(sight, points, owner, filled)
+    indoors = _indoors(sight, points, grid)
+    state = _state(sight, grid)
+    cells, pixels = _seen_cells(sight, grid)
+    triangles = sight.visibility.triangle[pixels]
+    state.reshape(-1)[cells] = SURFACE
+    missed = owner.reshape(-1)[cells] < 0  # a point of a triangle in a cell's border, by rounding in the next one
+    owner.reshape(-1)[cells[missed]], filled.reshape(-1)[cells[missed]] = triangles[missed], TOUCHED
+    table = np.column_stack((sight.geometry.triangle_class, sight.geometry.triangle_object))
+    flat = [array.reshape(-1) for array in (owner, filled, state, indoors)]
+    first = np.empty(1 << 18, np.int64)
+    while (count := int(kernels.starts(flat[0], table, *flat[1:], first))) > len(first):
+        first = np.empty(count, np.int64)
+    return _runs(first[:count], table, *flat)
+
+
+def _runs(first: Rows, table: Array, owner: Array, filled: Array, state: Array, indoors: Array) -> NDArray[np.void]:
+    out, owners = np.empty(len(first), RUN), owner[first]
+    out["length"] = np.diff(first, append=len(owner))
+    out["class"] = np.where(owners < 0, 0, table[owners, 0])
+    out["instance"] = np.where(owners < 0, 0, table[owners, 1])
+    out["filled"], out["state"], out["indoors"] = filled[first], state[first], indoors[first]
+    return out
+
+
+def _occupy(sight: Sight, points: Float, owner: NDArray[np.int32], filled: NDArray[np.uint8]) -> None:
+    g = sight.geometry
+    for i in range(g.object_count):
+        rows = np.arange(g.triangle_start[i], g.triangle_start[i + 1])
+        if len(rows):
+            voxels.touch(points, g.triangles, _shown(sight, rows), owner, filled, TOUCHED)
+            voxels.fill(points, g.triangles, rows[_closed(sight, i)], owner, filled, INSIDE)
+    voxels.touch(points, g.triangles, _scenery(sight), owner, filled, TOUCHED)
+    layer = -1 if g.ground_z is None else math.floor(points[g.vertex_start[-1], 1])
+    if 0 <= layer < owner.shape[1]:
+        free = owner[:, layer] < 0
+        owner[:, layer][free], filled[:, layer][free] = g.triangle_start[-1], TOUCHED
+
+
+def _shown(sight: Sight, rows: Rows) -> Rows:
+    """Those of triangles that may be seen."""
+    return rows[sight.geometry.triangle_cutout[rows] != NEVER]
+
+
+def _scenery(sight: Sight) -> Rows:
+    """The triangles of scenery, without the ground's."""
+    start = sight.geometry.triangle_start
+    return _shown(sight, np.arange(start[sight.geometry.object_count], start[-1]))
+
+
+def _closed(sight: Sight, i: int) -> NDArray[np.bool_]:
+    """Which triangles of thing i belong to closed pieces."""
+    g = sight.geometry
+    vertices = g.coordinates[g.vertex_start[i] : g.vertex_start[i + 1]]
+    triangles = g.triangles[g.triangle_start[i] : g.triangle_start[i + 1]] - np.int32(g.vertex_start[i])
+    key, known = xxhash.xxh3_128(vertices.tobytes() + triangles.tobytes()).digest(), _known()
+    if key not in known:
+        if len(known) >= MESHES:
+            known.clear()
+        known[key] = voxels.closed(vertices, triangles)
+    return known[key]
+
+
+@cache
+def _known() -> dict[bytes, NDArray[np.bool_]]:
+    """What `_closed` found of meshes, by their digests."""
+    return {}
+
+
+def _indoors(sight: Sight, points: Float, grid: Grid) -> NDArray[np.bool_]:
+    """Which cells have scenery above their centres, and scenery or ground below."""
+    g, (x, y, z) = sight.geometry, grid.size
+    if not g.has_scenery:
+        return np.zeros(grid.size, np.bool_)
+    low, high = voxels.heights(points, g.triangles, _scenery(sight), (x, z))
+    if g.ground_z is not None:
+        low = np.minimum(low, points[g.vertex_start[-1], 1])
+    height = np.arange(y)[:, None] + 0.5
+    return (low[:, None] < height) & (height < high[:, None])
+
+
+def _state(sight: Sight, grid: Grid) -> NDArray[np.uint8]:
+    """How each cell's centre is seen."""
+    from viewsphere.geometry import kernels_voxels as kernels
+
+    out, codes = np.empty(grid.size, np.uint8), np.array([OUTSIDE, FREE, OCCLUDED], np.uint8)
+    for i, plane in enumerate(_planes(sight.camera, grid)):
+        pixels, _ = project(sight.camera.intrinsics, plane)
+        kernels.seen(pixels, _along(sight.camera, plane), sight.visibility.inverse_depth, codes, out[i].reshape(-1))
+    return out
+
+
+def _planes(camera: Camera, grid: Grid) -> Iterator[Float]:
+    """The centres of the cells in the camera's axes, those of one step ahead after another, (N, 3)."""
+    cells = np.argwhere(np.ones((1, *grid.size[1:]), np.bool_)) + 0.5
+    first = transform(camera.R, grid.points(cells)) + camera.t
+    step = transform(camera.R, grid.world_from_grid[:3, 0] * grid.cell)
+    for i in range(grid.size[0]):
+        yield first + i * step
+
+
+def _along(camera: Camera, points: Float) -> Float:
+    """What 1/s of `truth.visibility` is the inverse of."""
+    x, y, z = points.T
+    return np.sqrt(x * x + y * y + z * z) if has_unit_rays(camera.distortion) else np.ascontiguousarray(z)
+
+
+def _seen_cells(sight: Sight, grid: Grid) -> tuple[Rows, tuple[Rows, Rows]]:
+    """The cells of the points that pixels show, as numbers of flat arrays, and these pixels; without those beyond the grid."""
+    where = np.nonzero(sight.visibility.inverse_depth > 0)
+    rays = pixel_rays(sight.camera.intrinsics)[where]
+    depth = 1.0 / sight.visibility.inverse_depth[where].astype(np.float64)
+    cells = np.floor(_lifted(sight.camera, grid, rays * depth[:, None]))
+    inside = ((cells >= 0) & (cells < grid.size)).all(axis=1)
+    i, j, k = cells[inside].astype(np.int64).T
+    return (i * grid.size[1] + j) * grid.size[2] + k, (where[0][inside], where[1][inside])
+
+
+def _lifted(camera: Camera, grid: Grid, points: Float) -> Float:
+    """Points (N, 3) of a camera's axes, counted in cells."""
+    return grid.cells(transform(camera.R.T, points - camera.t))
+
+
+def prove(sample: Sample, models: Models) -> Iterator[str]:
+    """Runs are whole, classes those of their objects, which lie in their boxes, and surface is seen where depth shows it."""
+    runs = channel_of(sample, "voxels")
+    if runs is None or sample.known_camera is None:
+        return
+    grid = Grid.of(Voxels.model_validate(sample.options.get("voxels", {})), sample.camera)
+    try:
+        cells = VoxelGrid.of(runs, grid)
+    except ValueError as error:
+        yield str(error).removeprefix("voxels: ")
+        return
+    rest = [name for name in RUN.names or () if name != "length"]
+    if (runs["length"] == 0).any() or (runs[rest][1:] == runs[rest][:-1]).any():
+        yield "expected runs that are as long as they can be; found shorter ones"
+    yield from _wrong_codes(sample, runs)
+    for o in rendered(sample):
+        own = np.argwhere(cells.instances == o.id)
+        if len(own) and o.is_placed:
+            box = grid.cells(o.box3d)
+            off = ((own + 1 < box.min(axis=0) - BORDER) | (own > box.max(axis=0) + BORDER)).any(axis=1).sum()
+            if off:
+                yield f"object {o.id}: expected cells in its box, found {off} outside"
+    yield from _wrong_surface(sample, cells)
+
+
+def _wrong_codes(sample: Sample, runs: Array) -> Iterator[str]:
+    filled, classes, instances = runs["filled"], runs["class"], runs["instance"]
+    if (filled > INSIDE).any() or (runs["state"] > OCCLUDED).any() or (runs["indoors"] > 1).any():
+        yield f"expected codes of 0 to {INSIDE} (filled), {OCCLUDED} (state) and 1 (indoors); found others"
+    if ((filled == EMPTY) != (classes == 0)).any():
+        yield "expected class 0 where a cell is empty, and nowhere else; found otherwise"
+    if ((filled == INSIDE) & (instances == 0)).any():
+        yield "expected insides of objects alone; found others"
+    if ((filled == EMPTY) & ((runs["state"] == SURFACE) | (instances != 0))).any():
+        yield "expected no object and no surface in empty cells; found some"
+    known = {o.id: thing_class(o.category_id) for o in sample.objects}
+    wrong = [i for i in np.unique(instances[instances != 0]).tolist() if i not in known]
+    wrong += [i for i in known if (classes[instances == i] != known[i]).any()]
+    if wrong:
+        yield f"object {wrong[0]}: expected an object of the sample and the class of its category; found others"
+    stuff = classes[(instances == 0) & (filled != EMPTY)]
+    if ((stuff <= SKY) | (stuff >= FIRST_THING)).any():
+        yield "expected stuff, but no sky, where a cell has something that is no object; found other classes"
+
+
+def _wrong_surface(sample: Sample, cells: VoxelGrid) -> Iterator[str]:
+    """Where surface is seen, and depth does not say so, and the other way round."""
+    depth, grid = exact_depth(sample), cells.grid
+    if depth is None:
+        return
+    rays = pixel_rays(sample.camera.intrinsics)
+    seen = np.logical_and(np.isfinite(depth), rays[..., 2] != 0)
+    lifted = rays[seen] * (depth[seen].astype(np.float64) / rays[seen][:, 2])[:, None]
+    points = _lifted(sample.camera, grid, lifted)
+    slack = (ROUNDING * (largest(lifted) + np.abs(sample.camera.center).max()) / grid.cell)[:, None]
+    sure = (np.abs(points - np.rint(points)) > slack).all(axis=1)
+    missing = (cells.state[_inside(grid, points[sure])] != SURFACE).sum()
+    if missing:
+        yield f"expected seen surface in the cells of what depth shows; found {missing} pixels in others"
+    extra = cells.state == SURFACE
+    for corner in np.argwhere(np.ones((2, 2, 2))) * 2 - 1:
+        extra[_inside(grid, points + corner * slack)] = False
+    if extra.any() and (seen == np.isfinite(depth)).all():
+        yield f"expected seen surface only where depth shows some; found {extra.sum()} other cells"
+
+
+def _inside(grid: Grid, points: Float) -> tuple[Rows, ...]:
+    """The cells of those of some points, counted in cells, that are in the grid."""
+    cells = np.floor(points)
+    i, j, k = cells[((cells >= 0) & (cells < grid.size)).all(axis=1)].astype(np.int64).T
+    return i, j, k
+
+
+def renumbered(runs: Array, ids: Mapping[int, int]) -> Array:
+    """The runs where categories have other ids."""
+    out = runs.copy()
+    out["class"] = by_table(runs["class"], {thing_class(old): thing_class(new) for old, new in ids.items()})
+    return out
+
+
+LABEL = ChannelLabel(
+    name="voxels",
+    meaning="cells of a grid before the camera, in runs, a row each: how many, class as in `semantic` (0: empty), object, "
+    "surface or inside, seen or not, indoors or not; `sample.voxel_grid` has them as arrays",
+    axes="ahead, up, right",
+    options=Voxels,
+    dtype=RUN,
+    components=0,
+    unit="cells",
+    empty=0,
+    encoding="npz",
+    compute=compute,
+    prove=prove,
+    renumbered=renumbered,
+    drawing=Drawing("voxels", beside=drawn, key=(("voxels from behind the camera; pale: not in its view", None), *KEY)),
+)
