@@ -121,6 +121,7 @@ MISTAKES = {
     "symmetries: {discrete: [[-1,0,0,0, 0,1,0,0, 0,0,1,0, 0,0,0,1]]}": "found a mirror image",
     "symmetries: {discrete: [[2,0,0,0, 0,1,0,0, 0,0,1,0, 0,0,0,1]]}": "expected rows of a rotation",
     "symmetries: {discrete: [[1,0,0,0, 0,1,0,0, 0,0,1,0, 0,0,1,1]]}": "expected [0, 0, 0, 1] as the last row",
+    "symmetries: {discrete: [[0,-1,0,0, 1,0,0,0, 0,0,1,0, 0,0,0,1]]}": "discrete[0] followed by discrete[0] is one, too",
     "keypoints: {points: {}}": "keypoints.points: expected at least 1",
     "keypoints: {points: {a: [0, 0]}}": "keypoints.points.a",
     "keypoints: {points: {a: [0, 0, .inf]}}": "keypoints.points.a[2]",

@@ -223,6 +223,7 @@ def recipe(*annotations):
         ("amodl", r"annotations\[0\]: expected one of .*; found 'amodl'; did you mean 'amodal'"),
         ("depth", r"annotations\[0\]: expected a label of objects.*found depth, which is one of channels"),
         ("pose", r"annotations\[0\]: expected a label on request; found pose, which every data set has"),
+        ("hull", r"annotations\[0\]: expected a label; found hull, a field of contour: name that"),
     ],
 )
 def test_a_label_that_cannot_be_asked_for_is_told_before_rendering(entry, message):
@@ -230,11 +231,21 @@ def test_a_label_that_cannot_be_asked_for_is_told_before_rendering(entry, messag
         vs.plan(vs.Recipe(**recipe(entry)))
 
 
+def test_a_label_of_objects_is_no_channel():
+    with pytest.raises(RecipeError, match=r"channels\[1\]: expected a channel; found amodal, which is one of annotations"):
+        vs.plan(vs.Recipe(**recipe(), channels=["rgb", "amodal"]))
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [
         ({"amodal": {"size": 3}}, r"labels\.amodal: expected no options, amodal has none; found size"),
-        ({"obb": {}}, r"labels: expected none, as no label .*; found 'obb': name it in channels or annotations, too"),
+        ({"obb": {}}, r"labels\.obb: expected no options, obb has none; found a mapping"),
+        (
+            {"keypoints": {}},
+            r"labels: expected .* recipe names; found 'keypoints': name it in channels or annotations",
+        ),
+        ({"keypoint": {}}, r"labels: expected one of .*; found 'keypoint'; did you mean 'keypoints'\?"),
         ({"amodal": 3}, r"labels\.amodal: expected a mapping"),
     ],
 )

@@ -14,13 +14,13 @@ FOV = 40.0
 WIDTH, HEIGHT = 160, 120
 
 
-def recipe(elevation=90, distance=2.0, model="zoo:post_box", scene=None, **options):
+def recipe(elevation=90, distance=2.0, model="zoo:post_box", scene=None, camera=None, **options):
     """By default straight down upon the floor, which is a plane at one depth around the post box."""
     return vs.Recipe.model_validate(
         {
             "models": [{"source": model, "category": "thing", "scale": {"length": 0.05}}],
             "viewpoints": {"azimuth": [0], "elevation": [elevation], "distance": distance},
-            "camera": {"size": [WIDTH, HEIGHT], "fov_deg": FOV},
+            "camera": camera or {"size": [WIDTH, HEIGHT], "fov_deg": FOV},
             "channels": ["depth", "depth_sensor", "normals_geometric", "instances"],
             "labels": {"depth_sensor": options},
             "scene": scene or {"ground": True},
@@ -98,6 +98,16 @@ def test_what_is_out_of_range_or_flat_is_a_hole():
     (sample,) = vs.render(recipe(elevation=6, distance=2.0, grazing_deg=60))
     ground = (sample.instances == 0) & np.isfinite(sample.depth)
     assert np.isinf(sample.depth_sensor[ground]).all()
+
+
+@pytest.mark.parametrize("kind", ["kinect", "stereo"])
+def test_a_fisheye_measures_nothing_where_its_lens_has_no_ray(kind):
+    """Straight down over the floor; the picture's corners are beyond 180 degrees from the axis."""
+    lens = {"size": [32, 32], "focal_px": 6, "distortion": {"model": "fisheye", "coefficients": [0, 0, 0, 0]}}
+    (sample,) = vs.render(recipe(kind=kind, camera=lens, noise=0, step=0))
+    away = np.hypot(*(np.mgrid[:32, :32] - 15.5)) / 6
+    assert np.isinf(sample.depth_sensor[away > math.pi / 2]).all() and (away > math.pi).any()
+    assert np.isfinite(sample.depth_sensor[away < 1]).mean() > 0.8
 
 
 def test_depth_itself_stays_exact_and_the_seed_decides(tmp_path):

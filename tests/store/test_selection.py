@@ -88,10 +88,10 @@ def test_labels_on_request_become_arrays_masks_or_lists(tmp_path):
 
 
 def test_what_nobody_asked_for_is_told(dataset):
-    with pytest.raises(AttributeError, match="add it to the recipe's annotations"):
-        _ = dataset.select("objects.amodal")[0]
-    with pytest.raises(AttributeError, match="camera_from_next"):
-        _ = dataset.select("camera_from_next")[0]
+    with pytest.raises(UserError, match=r"found objects\.amodal: add amodal to the recipe's annotations"):
+        dataset.select("objects.amodal")
+    with pytest.raises(UserError, match=r"found camera_from_next: add ego_motion to the recipe's annotations"):
+        dataset.select("camera_from_next")
 
 
 def test_one_sensor_of_a_rig_is_selected(tmp_path):

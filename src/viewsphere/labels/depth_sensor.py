@@ -81,7 +81,9 @@ def compute(sight: Sight) -> NDArray[np.float32]:
 
 
 def _seen(sight: Sight) -> tuple[Float, Float]:
-    """Depth (H, W), infinite where nothing is before the camera, and the angle (H, W) from the triangle's normal to the ray."""
+    """Depth (H, W), infinite where nothing is before the camera, and the angle (H, W) from the triangle's normal to the ray, a
+    right one where the lens has no ray.
+    """
     from viewsphere.truth import kernels_channels as kernels
 
     rays = pixel_rays(sight.camera.intrinsics)
@@ -92,7 +94,7 @@ def _seen(sight: Sight) -> tuple[Float, Float]:
     near = sight.inverse_depth
     with np.errstate(divide="ignore", invalid="ignore"):
         depth = np.where((near > 0) & (rays[..., 2] > 0), rays[..., 2] / near, np.inf)
-    return depth, np.arccos(np.clip(cosine, 0.0, 1.0))
+    return depth, np.arccos(np.clip(np.nan_to_num(cosine), 0.0, 1.0))
 
 
 def _shadow(depth: Float, reach: float) -> NDArray[np.bool_]:

@@ -52,7 +52,8 @@ LABEL = ObjectLabel(
     fields=(
         Field(
             "occlusion_level",
-            f"of its pixels in the image are hidden: 0 at most {PARTLY:.0%}, 1 at most {LARGELY:.0%}, 2 more; 3 none is there",
+            f"of its pixels in the image are hidden: 0 at most {PARTLY:.0%}, 1 at most {LARGELY:.0%}, 2 more, or it has none; "
+            "3 all are outside",
             int,
         ),
     ),

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import AfterValidator, BeforeValidator, Field
 
-from viewsphere.geometry.rotation import Float, compose, rigid, rotation_about, transform
+from viewsphere.geometry.rotation import Float, compose, product, rigid, rotation_about, transform
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.mistakes import shown
 from viewsphere.model.numbers import Number
@@ -55,6 +55,10 @@ def _unit(axis: Vector) -> Vector:
     return axis
 
 
+ALIKE = 0.01
+"""Radians by which two rotations may differ that are one symmetry's."""
+
+
 class Continuous(Frozen):
     """A model stays as it is, turned by any angle around the line through `offset` along the unit vector `axis`."""
 
@@ -84,6 +88,20 @@ class Symmetries(Frozen):
         for discrete in (IDENTITY, *self.discrete):
             yield np.array(discrete)
             yield from (compose(turn, discrete) for turn in turns)
+
+    def unlisted(self) -> tuple[int, int] | None:
+        """Places of two discrete symmetries that, one after the other, make one that is not listed; None if all are, and where
+        there are continuous ones, which join them. What is bounded has at most one symmetry of each rotation.
+        """
+        if self.continuous:
+            return None
+        turns = np.array([IDENTITY, *self.discrete])[:, :3, :3]
+        for j, after in enumerate(turns[1:]):
+            traces = product(after, turns[1:]).reshape(-1, 9) @ turns.reshape(-1, 9).T
+            lacking = np.flatnonzero(traces.max(axis=1) < 1 + 2 * math.cos(ALIKE))
+            if len(lacking):
+                return int(lacking[0]), j
+        return None
 
     def moved(self, similarity: ArrayLike) -> Symmetries:
         """The same symmetries in other axes: `similarity` (4, 4) takes points of these there, and may scale them."""

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
-from pydantic import Field, ValidationError
+from pydantic import AfterValidator, Field, ValidationError
 
 from viewsphere.errors import RecipeError
 from viewsphere.model.frozen import Frozen
@@ -19,6 +19,16 @@ ENDING = ".viewsphere.yaml"
 """Follows the whole name of the model's file."""
 
 
+def _all_of_them(symmetries: Symmetries | None) -> Symmetries | None:
+    if symmetries is not None and (pair := symmetries.unlisted()):
+        first, second = (f"discrete[{i}]" for i in pair)
+        raise ValueError(
+            f"expected every symmetry, as only then one pose stands for all; {first} followed by {second} is one, too, and was "
+            f"not found among them: add it, and whatever follows in the same way"
+        )
+    return symmetries
+
+
 class Sidecar(Frozen):
     """Symmetries and named points of a model, and words for what it looks like."""
 
@@ -27,7 +37,7 @@ class Sidecar(Frozen):
         description="what its numbers are in: the model file's own axes, origin and unit; or the object's: metres, +Z up, "
         "front -Y, the origin where `centring` puts it",
     )
-    symmetries: Symmetries | None = Field(
+    symmetries: Annotated[Symmetries | None, AfterValidator(_all_of_them)] = Field(
         default=None, description="rigid motions that leave the model as it is; {} says that there are none"
     )
     keypoints: Keypoints | None = Field(default=None, description="named points")

@@ -61,6 +61,8 @@ def check_names(recipe: Recipe) -> None:
     if isinstance(recipe.scenes, ScenesEntry) and recipe.scenes.placer not in (placers := plugins.names("placers")):
         raise RecipeError(f"scenes.layout: {one_of(recipe.scenes.placer, placers)}")
     for i, name in enumerate(recipe.channels):
+        if name in on_request():
+            raise RecipeError(f"channels[{i}]: expected a channel; found {name}, which is one of annotations")
         if name not in channels():
             raise RecipeError(f"channels[{i}]: {one_of(name, tuple(channels()))}")
         _check_needs(recipe, f"channels[{i}]", name)
@@ -78,20 +80,23 @@ def _check_annotation(recipe: Recipe, where: str, name: str) -> None:
     if name in labels() and name not in on_request():
         raise RecipeError(f"{where}: expected a label on request; found {name}, which every data set has: leave it out")
     if name not in on_request():
-        raise RecipeError(f"{where}: {one_of(name, tuple(on_request()))}")
+        of = [label.name for label in on_request().values() if name in {field.name for field in label.fields}]
+        known = f"expected a label; found {name}, a field of {of[0]}: name that" if of else one_of(name, tuple(on_request()))
+        raise RecipeError(f"{where}: {known}")
     _check_needs(recipe, where, name)
 
 
 def _check_options(recipe: Recipe, name: str, given: Mapping[str, JsonValue]) -> None:
     """Options of a label that the recipe names."""
-    named = tuple(label for label in (*recipe.channels, *recipe.annotations) if label in labels())
-    if name not in named:
-        some = tuple(label for label in named if labels()[label].options)
-        known = one_of(name, some) if some else f"expected none, as no label that the recipe names has options; found {name!r}"
-        raise RecipeError(f"labels: {known}: name it in channels or annotations, too")
+    if name not in labels():
+        raise RecipeError(f"labels: {one_of(name, tuple(name for name, label in labels().items() if label.options))}")
     options = labels()[name].options
     if options is None:
         raise RecipeError(f"labels.{name}: expected no options, {name} has none; found {', '.join(given) or 'a mapping'}")
+    if name not in (*recipe.channels, *recipe.annotations):
+        raise RecipeError(
+            f"labels: expected labels that the recipe names; found {name!r}: name it in channels or annotations, too"
+        )
     read_options(options, given, f"labels.{name}")
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from viewsphere.errors import UserError
 from viewsphere.geometry.mask import decode_rle
-from viewsphere.labels import Field, object_labels, sample_labels
+from viewsphere.labels import Field, object_labels, on_request, sample_labels
 from viewsphere.model.mistakes import one_of
 from viewsphere.model.sample import ObjectView, Rle, Sample
 
@@ -36,6 +36,7 @@ class Selection(Sequence[dict[str, Any]]):
         for name in fields:
             if name not in known:
                 raise UserError(f"{dataset.root}: select: {one_of(name, known)}")
+        _check_asked(dataset, fields)
         if split is not None and split not in dataset.splits:
             raise UserError(f"{dataset.root}: select: split: {one_of(split, dataset.splits)}")
         self.dataset, self.fields, self.split, self.sensor = dataset, tuple(fields), split, sensor
@@ -59,6 +60,16 @@ class Selection(Sequence[dict[str, Any]]):
             return [self[i] for i in range(*index.indices(len(self)))]
         sample = self.dataset[index if self._numbers is None else self._numbers[index]]
         return {name: _value(sample, name) for name in self.fields}
+
+
+def _check_asked(dataset: Dataset, fields: Sequence[str]) -> None:
+    """Raises UserError for fields of labels that nobody asked for, as the first frame shows."""
+    labels = {field.name: label for label in on_request().values() for field in label.fields}
+    for name in fields:
+        label = labels.get(name.removeprefix("objects."))
+        if label and len(dataset) and not label.is_in(dataset[0]):
+            problem = f"expected what the data set has; found {name}: add {label.name} to the recipe's annotations"
+            raise UserError(f"{dataset.root}: select: {problem}")
 
 
 def _value(sample: Sample, name: str) -> Any:
