@@ -10,6 +10,7 @@ from pycocotools.cocoeval import COCOeval
 
 from cube_dataset import MESHES, make
 from viewsphere.errors import UserError
+from viewsphere.formats.coco import verify
 from viewsphere.formats.coco.categories import CATEGORY_IDS, category_ids, official_ids
 from viewsphere.formats.coco.options import Options
 from viewsphere.geometry.mask import encode_rle
@@ -228,3 +229,25 @@ def test_the_papers_tree_has_the_same_files_a_folder_higher(exported, tmp_path):
             assert names == sorted(p.relative_to(other) for p in other.rglob("*") if p.is_file()) != []
         name = f"annotations/instances_{split}.json"
         assert (tmp_path / name).read_bytes() == (folder / name).read_bytes()
+
+
+def test_captions_are_coco_s(tmp_path):
+    """pycocotools reads them by the ids of the images; without them there is no such file, and a changed one is found."""
+    dataset, folder = make(tmp_path / "out", True, annotations=("captions",)), tmp_path / "coco"
+    folder.mkdir()
+    write(dataset, [(FormatEntry(name="coco"), folder)])
+    told = {sample.index + 1: [one.text for one in sample.captions] for sample in dataset}
+    for split in dataset.splits:
+        file = folder / "annotations" / f"captions_{split}.json"
+        with contextlib.redirect_stdout(io.StringIO()):
+            coco = COCO(file)
+        assert {i: [one["caption"] for one in coco.imgToAnns[i]] for i in coco.imgs} == {i: told.pop(i) for i in coco.imgs}
+        assert coco.dataset["images"] == load(folder, split).dataset["images"]
+    assert not told
+    assert not list(verify(dataset, folder, range(4), Options()))
+    file.write_text(file.read_text().replace("picture", "image", 1).replace("be seen", "be heard", 1))
+    assert list(verify(dataset, folder, range(4), Options()))
+
+
+def test_without_captions_there_is_no_file_of_them(exported):
+    assert not list(exported[1].glob("annotations/captions_*"))

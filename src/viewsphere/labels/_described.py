@@ -133,8 +133,8 @@ def side_of(o: ObjectAnnotation) -> str:
 
 def has_front(facts: ModelFacts | None) -> bool:
     """Whether a model is not known to look the same from several sides."""
-    known = facts and facts.symmetries
-    return not (known and (known.discrete or known.continuous))
+    known = None if facts is None else facts.symmetries
+    return known is None or not (known.discrete or known.continuous)
 
 
 ONE = ("place", "size", "hidden", "cut", "view")

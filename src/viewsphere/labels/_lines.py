@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from textwrap import wrap
 from typing import TYPE_CHECKING
@@ -61,7 +62,7 @@ def written(sentences: Sequence[str], width: int, height: int) -> Picture:
     paper = Image.new("RGB", (width, height), PAPER)
     pen = ImageDraw.Draw(paper)
     letters = max(8, int((width - 2 * MARGIN) / (pen.textlength(ALPHABET) / len(ALPHABET))))
-    step = pen.textbbox((0, 0), ALPHABET)[3] + 2
+    step = math.ceil(pen.textbbox((0, 0), ALPHABET)[3]) + 2
     lines = [line for sentence in sentences for line in wrap(sentence, letters, subsequent_indent="  ")]
     for i, line in enumerate(lines[: (height - MARGIN) // step]):
         pen.text((MARGIN, MARGIN + i * step), line, fill=INK)

@@ -164,7 +164,7 @@ class Scene:
         """
         own = np.arange(len(self.objects)) == i
         place = self.places[i]
-        if [j for j in np.flatnonzero(sort) if self.places[j] == place] == [i]:
+        if [j for j in np.flatnonzero(sort).tolist() if self.places[j] == place] == [i]:
             yield 1, 1, replace(plain, text=f"the {phrase} {place} of the picture", place=place)
         for name in EXTREMES:
             if self.extreme(name, sort) == i:

@@ -164,7 +164,7 @@ class Models:
             info, step = known.at(frame), None if frame is None else wanted[frame]
             if info.digest != mesh_digest(self.stages.model(spec, step)):
                 raise _changed(self.store, spec)
-            now = {
+            now: dict[str, object] = {
                 "category": spec.category,
                 "supercategory": spec.supercategory,
                 "real_size": self.stages.real_size(spec, step),
