@@ -8,6 +8,7 @@ import pytest
 import trimesh
 
 from label_scenes import changed, pictured, proof, random_camera, random_things, rows_of
+from proven import equal, told
 from small import small_recipe, tree_hash
 from truth_scenes import LENSES, cube, lens, mesh_of, orbit_camera, sphere
 from viewsphere import generate, plan
@@ -65,6 +66,7 @@ def test_seen_surface_is_where_lifted_depth_is(name, seed):
         possible[tuple(near[((near >= 0) & (near < grid.grid.size)).all(axis=1)].T)] = True
     found = grid.state == SURFACE
     assert expected.sum() > 300 and found[expected].all() and not (found & ~expected & ~possible).any()
+    told("voxels", "lifted depth", 0)
     assert (grid.classes[found] > 0).all()
     alone = inside & ~unsure
     seen = {tuple(cell): set() for cell in cells[alone]}
@@ -112,7 +114,8 @@ def test_objects_are_full_where_embree_is_inside_of_closed_meshes(seed):
         if mesh.is_watertight:
             wanted[mesh.contains(centers).reshape(grid.grid.size)] = i + 1
     own = grid.filled == INSIDE
-    assert own.sum() > 200 and (grid.instances[own] == wanted[own]).mean() == 1
+    assert own.sum() > 200
+    equal("voxels", "Embree's insides", grid.instances[own], wanted[own])
     empty = grid.filled == 0
     assert not wanted[empty].any()
     assert (grid.classes[own] == 31 + np.array([0, 3, 4, 5, 3])[grid.instances[own]]).all()
