@@ -147,7 +147,9 @@ class _Spots:
 def _patches(m: Material, spots: _Spots, weights: Float) -> Iterator[Patch]:
     """The patches of one material, by its points; shares are sums of their weights."""
     coated = m.clearcoat >= COATED and m.clearcoat_roughness <= GLOSSY
-    names, kinds = nearest_names(spots.color), _kinds(spots, coated)
+    first = nearest_names(spots.color[:1])
+    names = np.repeat(first, len(weights)) if _is_plain(spots) else nearest_names(spots.color)
+    kinds = _kinds(spots, coated)
     for name in range(len(NAMES)):
         for kind in range(len(MATERIALS) + 1):
             at = np.flatnonzero((names == name) & (kinds == kind) & spots.is_surface & (weights > 0))
@@ -163,6 +165,11 @@ def _patches(m: Material, spots: _Spots, weights: Float) -> Iterator[Patch]:
                     clear=clear,
                     coated=coated,
                 )
+
+
+def _is_plain(spots: _Spots) -> bool:
+    """Whether all points have one colour, whose name is looked up once."""
+    return bool((spots.color == spots.color[0]).all())
 
 
 def _spots(mesh: Mesh, number: int, corners: NDArray[np.int32], weights: Float) -> _Spots:
