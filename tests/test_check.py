@@ -248,10 +248,11 @@ def test_a_hole_that_is_cut_consistently(dataset):
     holes = []
     edit_record(dataset, 1, lambda r: holes.append(with_a_hole(r)))
     hole = (dataset[1].instances > 0) & ~holes[0]
-    for name in STILL:
+    shown = [name for name in STILL if name != "body_parts"]  # which these models do not have
+    for name in shown:
         edit_channel(dataset, 1, name, lambda a, empty=channels()[name].empty: a.__setitem__(hole, empty))
     found = failures(dataset)
-    assert {(name, 1) for name in (*STILL, "mask", "box2d")} == found
+    assert {(name, 1) for name in (*shown, "mask", "box2d")} == found
 
 
 @pytest.mark.parametrize("counts", ["?!", "", "o"])
@@ -343,9 +344,10 @@ def test_depth_that_is_not_the_models(dataset):
 
 
 def nudged(array):
-    """One pixel of the object is another number."""
+    """One pixel of the object is another number; of what these models do not have, parts of bodies, any pixel."""
     first = array if array.ndim == 2 else array[..., 0]
-    y, x = np.argwhere(np.isfinite(first) & (first != 0))[0]
+    shown = np.argwhere(np.isfinite(first) & (first != 0))
+    y, x = shown[0] if len(shown) else (0, 0)
     array[y, x] = np.nextafter(array[y, x], np.float32(9)) if array.dtype == np.float32 else array[y, x] + 1
 
 
