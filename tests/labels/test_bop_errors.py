@@ -192,7 +192,7 @@ def made(files, tmp_path_factory):
             "formats": [],
         }
     )
-    vs.generate(recipe, out, workers=1)
+    vs.generate(recipe, out, workers=0)
     return vs.open(out)
 
 
