@@ -92,5 +92,5 @@ LABEL = ObjectLabel(
     keep=keep,
     restore=restore,
     prove=prove,
-    drawing=Drawing("boxes_projected", lines=draw),
+    drawing=Drawing("box2d_projected", lines=draw),
 )
