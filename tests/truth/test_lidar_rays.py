@@ -13,15 +13,19 @@ from viewsphere.labels.lidar import LABEL
 from viewsphere.model.camera import Camera
 from viewsphere.model.rig import Sensor
 from viewsphere.recipe.lidar import LidarEntry
+from viewsphere.truth.shot_views import Painted
 from viewsphere.truth.visibility import rasterize
+
+WHITE = Painted((), (), None)
 
 
 @dataclass(frozen=True)
 class Alone:
-    """What is around a sample of one sensor."""
+    """What is around a sample of one sensor; all is white."""
 
     sensor: Sensor
     drawn_as: tuple[str, ...] = ("shot", "top", "0.0", "here")
+    painted: Painted = WHITE
 
 
 def turned(rng):
