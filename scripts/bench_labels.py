@@ -17,6 +17,7 @@ from viewsphere import Recipe, plan
 from viewsphere.labels import (
     ChannelLabel,
     ObjectLabel,
+    SampleLabel,
     annotated,
     channel_labels,
     labels,
@@ -95,7 +96,7 @@ def measure_moving(objects: int, rounds: int) -> dict[str, float]:
     stages, planned = Stages(), plan(moving_recipe(objects))
     shot = planned.shot(0, stages.box)
     stage = stages.stage(shot)
-    views = ShotViews(shot, stage.at)
+    views = ShotViews(shot, stage.at, lambda thing: stages.model(thing.model))
     boxes = [stages.box(thing.model) for thing in shot.objects]
     found: dict[str, list[float]] = {}
     for round_ in range(rounds + 1):
@@ -138,7 +139,7 @@ def measure(objects: int, rounds: int, embree: Callable[[Any], Any]) -> tuple[di
     stages, planned = Stages(), plan(recipe(objects))
     shot = planned.shot(0, stages.box)
     stage = stages.stage(shot)
-    views = ShotViews(shot, stage.at)
+    views = ShotViews(shot, stage.at, lambda thing: stages.model(thing.model))
     boxes = [stages.box(thing.model) for thing in shot.objects]
     traits = [lambda thing=thing: stages.traits(thing.model) for thing in shot.objects]
     found: dict[str, list[float]] = {}
@@ -173,13 +174,12 @@ def frame(sight: Callable[[], Sight], view: Any, cast: Any) -> dict[str, float]:
         _ = seen.instances, seen.corners
         times[name] = clocked(lambda label=label, seen=seen: label.compute(seen))
     times["instances"] = clocked(lambda: fresh_instances(view))
-    objects = None
+    objects = annotated(sight())
     for name in still_labels():
         label, seen = labels()[name], sight()
         _ = seen.instances, seen.projected
-        if isinstance(label, ObjectLabel):
-            objects = objects or annotated(sight())
-            times[name] = clocked(lambda label=label, seen=seen, objects=objects: of_objects(label, seen, objects))
+        of = of_objects if isinstance(label, ObjectLabel) else of_picture
+        times[name] = clocked(lambda of=of, label=label, seen=seen: of(label, seen, objects))
     return times
 
 
@@ -193,6 +193,10 @@ def of_objects(label: ObjectLabel, seen: Sight, objects: Any) -> None:
             label.restore(None, seen.placement(o.id - 1), o)
         else:
             label.compute(seen, o.id - 1)
+
+
+def of_picture(label: SampleLabel, seen: Sight, objects: Any) -> None:
+    label.compute(seen, objects)
 
 
 def clocked(work: Callable[[], Any]) -> float:

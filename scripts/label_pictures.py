@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from viewsphere import Recipe, render
-from viewsphere.labels import ObjectLabel, drawable, is_in, labels
+from viewsphere.labels import ObjectLabel, drawable, is_in, is_shown, labels
 from viewsphere.model.sample import Sample
-from viewsphere.preview import draw_sample, is_shown
+from viewsphere.preview import draw_sample
 
 ROOT = Path(__file__).parent.parent
 RECIPES = sorted((ROOT / "recipes" / "labels").glob("*.yaml"))
@@ -35,15 +35,7 @@ Picture = NDArray[np.uint8]
 @cache
 def recipes() -> dict[str, Recipe]:
     """By name; their pictures are as large as the page shows them."""
-    found = {file.stem: Recipe.load(file) for file in RECIPES}
-    return {
-        name: Recipe.model_validate(recipe.model_dump(exclude_unset=True) | {"camera": _camera(recipe)})
-        for name, recipe in found.items()
-    }
-
-
-def _camera(recipe: Recipe) -> dict[str, object]:
-    return recipe.camera.model_dump(exclude_unset=True) | {"size": SIZE}
+    return {file.stem: Recipe.load(file, {"camera.size": SIZE}) for file in RECIPES}
 
 
 def recipe_of(source: str) -> str:

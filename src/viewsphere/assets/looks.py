@@ -222,12 +222,12 @@ def _index(place: Float, wrap: str, size: int) -> NDArray[np.int64]:
     return np.floor(np.clip(place, 0.0, 1.0) * size).clip(0, size - 1).astype(np.int64)
 
 
-def _kinds(spots: _Spots, coated: bool) -> NDArray[np.int64]:
+def _kinds(spots: _Spots, coated: NDArray[np.bool_] | bool) -> NDArray[np.int64]:
     """For each point the number of its word in `MATERIALS`, as many as there are for none."""
     holds = [
         spots.clear >= GLASS,
         spots.metallic >= METAL,
-        np.full(len(spots.clear), coated) | (spots.roughness <= GLOSSY),
+        coated | (spots.roughness <= GLOSSY),
         spots.roughness >= MATTE,
     ]
     return np.select(holds, range(len(MATERIALS)), len(MATERIALS))
@@ -240,17 +240,16 @@ def words(looks: Looks, repaints: Sequence[Repaint] = ()) -> tuple[str | None, s
     What somebody said of the model counts first, but where it is repainted. A patch that is given a picture has no colour that
     is known; nor have glass and what else lets half of the light through, whose surface does not count for the colour.
     """
-    colors, materials, is_as_said = dict[str | None, float](), dict[str | None, float](), True
-    for patch in looks.patches:
-        found = next((r for r in reversed(repaints) if fnmatchcase(patch.material, r.material)), None)
-        is_as_said = is_as_said and found is None
-        now = patch if found is None else _repainted(patch, found)
-        kind = _kind(now)
-        materials[kind] = materials.get(kind, 0.0) + now.share
+    colors, materials = dict[str | None, float](), dict[str | None, float]()
+    found = [next((r for r in reversed(repaints) if fnmatchcase(p.material, r.material)), None) for p in looks.patches]
+    now = [patch if own is None else _repainted(patch, own) for patch, own in zip(looks.patches, found, strict=True)]
+    names = nearest_names([patch.color for patch in now]).tolist() if now else ()
+    for patch, own, kind, name in zip(now, found, _materials_of(now), names, strict=True):
+        materials[kind] = materials.get(kind, 0.0) + patch.share
         if kind != "glass":
-            name = None if found is not None and found.image is not None else NAMES[int(nearest_names([now.color])[0])]
-            colors[name] = colors.get(name, 0.0) + now.share
-    said = (looks.color, looks.material) if is_as_said else (None, None)
+            color = None if own is not None and own.image is not None else NAMES[name]
+            colors[color] = colors.get(color, 0.0) + patch.share
+    said = (None, None) if any(found) else (looks.color, looks.material)
     return said[0] or _most(colors), said[1] or _most(materials)
 
 
@@ -266,12 +265,12 @@ def _repainted(patch: Patch, repaint: Repaint) -> Patch:
     )
 
 
-def _kind(patch: Patch) -> str | None:
-    """The word for a patch's material."""
-    one = (np.array([value]) for value in (patch.metallic, patch.roughness, patch.clear))
-    spots = _Spots(np.zeros((1, 3)), *one, is_surface=np.ones(1, np.bool_))
-    number = int(_kinds(spots, patch.coated)[0])
-    return MATERIALS[number] if number < len(MATERIALS) else None
+def _materials_of(patches: Sequence[Patch]) -> list[str | None]:
+    """The words for patches' materials."""
+    values = np.array([(p.metallic, p.roughness, p.clear) for p in patches]).reshape(-1, 3)
+    spots = _Spots(np.zeros((len(patches), 3)), *values.T, is_surface=np.ones(len(patches), np.bool_))
+    named = (*MATERIALS, None)
+    return [named[number] for number in _kinds(spots, np.array([p.coated for p in patches], np.bool_)).tolist()]
 
 
 def _most(shares: dict[str | None, float]) -> str | None:
