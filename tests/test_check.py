@@ -617,7 +617,7 @@ def test_labels_on_request_are_proved_where_they_were_asked_for(annotated):
     assert {name: report.checked[name] for name in ASKED} == dict.fromkeys(ASKED, 4)
 
 
-@pytest.mark.parametrize("kind", ["short", "merged"])
+@pytest.mark.parametrize("kind", ["short", pytest.param("merged", marks=pytest.mark.slow)])
 def test_every_leaf_of_labels_on_request_is_proved(annotated, tmp_path, kind):
     """In a frame of objects that hide one another; records that say everything have their shots beside them."""
     dataset = Dataset(shutil.copytree(annotated.root, tmp_path / "out"))
