@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 
 import viewsphere as vs
+from viewsphere.check import check
 from viewsphere.errors import RecipeError
 from viewsphere.geometry.box import box_vertices
 from viewsphere.labels import labels
 from viewsphere.labels._described import Company, of_one, phrases, place_of, side_of
 from viewsphere.labels._words import listed, number, plural, with_article
 from viewsphere.labels.referring import Scene
+from viewsphere.run.merging import merge
 from viewsphere.store import Dataset
 
 SIZE = (300, 300)
@@ -214,6 +216,16 @@ def test_scenes_are_painted_and_have_weather():
         assert {one.object for one in sample.referring} <= whole
         assert "The sky is overcast." in texts and "place" in forms
         assert not {"navy", "yellow", "green"} & {word for text in texts for word in text.split()}
+
+
+def test_sentences_hold_in_a_merged_data_set_whose_categories_have_other_numbers(tmp_path):
+    models = [{"source": f"zoo:{name}", "category": name, "count": 1} for name in ("post_box", "wheelie_bin")]
+    scenes = {"count": 1, "objects": 2, "layout": "row"}
+    splits = {"by": "frame", "train": 1}
+    for name, own in (("a", models), ("b", models[::-1])):
+        vs.generate(recipe(models=own, scenes=scenes, splits=splits), tmp_path / name)
+    report = check(merge([tmp_path / "a", tmp_path / "b"], tmp_path / "c"))
+    assert report.ok and report.checked["captions"] == 2, report.findings
 
 
 def test_one_s_own_sentences():

@@ -181,8 +181,7 @@ class World:
     def tally(self):
         """The nouns of all that are told of with their numbers, in the order of lists."""
         counted = Counter(t.noun for t in self.told)
-        first = {noun: min(t.o.category_id for t in self.told if t.noun == noun) for noun in counted}
-        return sorted(counted.items(), key=lambda item: (-item[1], first[item[0]]))
+        return sorted(counted.items(), key=lambda item: (-item[1], item[0]))
 
     def weather(self):
         """The sentences that hold of sky and sun."""

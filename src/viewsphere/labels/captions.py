@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -97,11 +98,9 @@ class Seen:
 
     @cached_property
     def groups(self) -> Sequence[tuple[str, int]]:
-        """Nouns and how many there are of each: most first, then by their categories' ids."""
-        ids: dict[str, list[int]] = {}
-        for o in self.told:
-            ids.setdefault(noun_of(o.category), []).append(o.category_id)
-        return [(noun, len(ids[noun])) for noun in sorted(ids, key=lambda noun: (-len(ids[noun]), min(ids[noun]), noun))]
+        """Nouns and how many there are of each: most first, then by their letters, as a merge numbers categories anew."""
+        counts = Counter(noun_of(o.category) for o in self.told)
+        return sorted(counts.items(), key=lambda entry: (-entry[1], entry[0]))
 
     @property
     def list(self) -> str:
