@@ -188,6 +188,10 @@ def test_proofs_find_other_words(kept):
                 if one.form != "count" and old in one.text:
                     other = changed(sample, "captions", i, text=one.text.replace(old, new))
                     assert list(captions.prove(other, models)), other.captions[i]
+            if one.form == "count":
+                more, fewer = one.text.replace("bin", "bin and a dog"), one.objects[:-1]
+                for parts in ({"text": more}, {"objects": fewer}, {"text": "No object can be seen.", "objects": ()}):
+                    assert more != one.text and list(captions.prove(changed(sample, "captions", i, **parts), models)), parts
             if one.form in ("place", "view"):
                 assert list(captions.prove(changed(sample, "captions", i, objects=(99,)), models))
         for i, one in enumerate(sample.referring):
@@ -249,6 +253,8 @@ def test_one_s_own_sentences():
         ({"templates": ["{list:>9}"]}, r"templates\[0\]: expected fields without a format"),
         ({"templates": ["{object.id}"]}, r"templates\[0\]: field {object.id}"),
         ({"templates": ["{}"]}, r"templates\[0\]: field {}"),
+        ({"plurals": {"box": ""}}, r"plurals\.box: expected printable text; found ''"),
+        ({"plurals": {"box": "bo\nxes"}}, r"plurals\.box: expected printable text"),
         ({"templates": [" "]}, r"templates\[0\]: expected a line of printable text"),
         ({"count": 0}, r"count: expected a number greater than or equal to 1"),
         ({"min_visibility": float("nan")}, r"min_visibility: expected"),

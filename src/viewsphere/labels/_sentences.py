@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from string import Formatter
 from typing import Annotated
 
 from pydantic import AfterValidator, Field
 
-from viewsphere.labels._described import RELATIONS, SEEN, Company, Words, of_one, phrases
-from viewsphere.labels._words import capital, noun_of, number, with_article
+from viewsphere.labels._described import RELATIONS, Company, Words, of_one, phrases
+from viewsphere.labels._words import capital, listed, noun_of, number, plural, with_article
 from viewsphere.model.mistakes import one_of, shown
 from viewsphere.model.sample import ObjectAnnotation, Sample
 
@@ -57,6 +58,15 @@ def _template(text: str) -> str:
 AnyTemplate = Annotated[str, Field(max_length=LONGEST), AfterValidator(_template)]
 
 
+def _plural(text: str) -> str:
+    if not text.strip() or not text.isprintable():
+        raise ValueError(f"expected printable text; found {shown(text)}")
+    return text
+
+
+AnyPlural = Annotated[str, Field(max_length=LONGEST), AfterValidator(_plural)]
+
+
 @dataclass(frozen=True)
 class Filled:
     """Fields of a template, and the words for them, empty where there are none."""
@@ -85,8 +95,6 @@ def wrong(sample: Sample, caption: Caption, objects: Sequence[ObjectAnnotation],
     """
     text = caption.text
     match caption.form:
-        case "count":
-            return _wrong_count(sample, text, objects)
         case "relation" if len(objects) == 2:
             return _wrong_relation(sample, text, *objects)
         case "weather" | "surroundings" if not objects:
@@ -113,19 +121,30 @@ def _phrases(sample: Sample, o: ObjectAnnotation) -> list[tuple[str, Words]]:
     return list(phrases(o, (o.color or "", o.material or "")))
 
 
-def _wrong_count(sample: Sample, text: str, objects: Sequence[ObjectAnnotation]) -> str | None:
-    if not objects:
-        return None if text == NOTHING else f"{NOTHING!r} where no object is told of"
-    told = {o.id for o in objects}
-    others = [o.visibility for o in sample.objects if o.id not in told and o.area >= SEEN]
-    if others and max(others) >= min(o.visibility for o in objects):
-        return "all objects to be told of that are as visible as those that are"
-    nouns = [noun_of(o.category) for o in objects]
-    for noun in nouns:
-        words = with_article(noun) if nouns.count(noun) == 1 else f"{number(nouns.count(noun))} "
-        if words not in text and not text.startswith(capital(words)):
-            return f"{words.strip()!r} among what is counted"
-    return None
+def grouped(told: Iterable[ObjectAnnotation]) -> list[tuple[str, int]]:
+    """Nouns and how many there are of each: most first, then by their letters, as a merge numbers categories anew."""
+    counts = Counter(noun_of(o.category) for o in told)
+    return sorted(counts.items(), key=lambda entry: (-entry[1], entry[0]))
+
+
+def listing(groups: Iterable[tuple[str, int]], plurals: Mapping[str, str]) -> str:
+    """Nouns with their numbers: three chairs and a car."""
+    return listed([with_article(noun) if n == 1 else f"{number(n)} {plural(noun, plurals)}" for noun, n in groups])
+
+
+def counted(groups: Sequence[tuple[str, int]], plurals: Mapping[str, str]) -> tuple[str, ...]:
+    """The sentences of counts."""
+    if not groups:
+        return (NOTHING,)
+    told, verb = listing(groups, plurals), "is" if groups[0][1] == 1 else "are"
+    return f"There {verb} {told}.", f"The picture shows {told}.", capital(f"{told} can be seen.")
+
+
+def wrong_count(caption: Caption, told: Sequence[ObjectAnnotation], plurals: Mapping[str, str]) -> Iterator[str]:
+    """What is wrong with a sentence of counts where these objects are told of."""
+    texts, ids = counted(grouped(told), plurals), tuple(o.id for o in told)
+    if caption.text not in texts or caption.objects != ids:
+        yield f"{caption.text!r:.80}: expected {texts[0]!r:.200} or the like, of objects {ids}; found objects {caption.objects}"
 
 
 def _wrong_relation(sample: Sample, text: str, one: ObjectAnnotation, other: ObjectAnnotation) -> str | None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -29,7 +28,20 @@ from viewsphere.labels._described import (
 from viewsphere.labels._field import Field
 from viewsphere.labels._label import Drawing, Models, Needs, Picture, SampleLabel
 from viewsphere.labels._lines import written
-from viewsphere.labels._sentences import NOTHING, AnyTemplate, Caption, Filled, fields_of, related, wrong
+from viewsphere.labels._sentences import (
+    NOTHING,
+    AnyPlural,
+    AnyTemplate,
+    Caption,
+    Filled,
+    counted,
+    fields_of,
+    grouped,
+    listing,
+    related,
+    wrong,
+    wrong_count,
+)
 from viewsphere.labels._sight import Around, Sight
 from viewsphere.labels._words import capital, listed, noun_of, number, plural, with_article
 from viewsphere.model.classes import SKY, STUFF_IDS
@@ -69,7 +81,7 @@ class Captions(Frozen):
     templates: tuple[AnyTemplate, ...] = Limits(
         default=(), max_length=1000, description="sentences to fill in, instead of those of viewsphere: {list}, {color}, ..."
     )
-    plurals: dict[str, str] = Limits(default={}, description="plurals of nouns that no rule gives")
+    plurals: dict[str, AnyPlural] = Limits(default={}, description="plurals of nouns that no rule gives")
     min_visibility: Portion = Limits(
         default=MIN_VISIBILITY, description="visibility from which on an object is told of, if at least 16 pixels are seen"
     )
@@ -98,16 +110,13 @@ class Seen:
 
     @cached_property
     def groups(self) -> Sequence[tuple[str, int]]:
-        """Nouns and how many there are of each: most first, then by their letters, as a merge numbers categories anew."""
-        counts = Counter(noun_of(o.category) for o in self.told)
-        return sorted(counts.items(), key=lambda entry: (-entry[1], entry[0]))
+        """Nouns and how many there are of each, in the order of lists."""
+        return grouped(self.told)
 
     @property
     def list(self) -> str:
         """What is seen, with numbers: three chairs and a car."""
-        return listed(
-            [with_article(noun) if n == 1 else f"{number(n)} {plural(noun, self.plurals)}" for noun, n in self.groups]
-        )
+        return listing(self.groups, self.plurals)
 
 
 def compute(sight: Sight, objects: Sequence[ObjectAnnotation]) -> Mapping[str, Any]:
@@ -153,7 +162,7 @@ def _sentences(seen: Seen, most: int, rng: Rng) -> list[Caption]:
     ids = tuple(o.id for o in seen.told)
     if not ids:
         return [Caption(NOTHING, "count")]
-    found = [Caption(_counted(seen)[int(rng.integers(3))], "count", ids)]
+    found = [Caption(counted(seen.groups, seen.plurals)[int(rng.integers(3))], "count", ids)]
     waiting = [FORMS[i](seen, rng) for i in rng.permutation(len(FORMS)).tolist()]
     while waiting and len(found) < most:
         for form in tuple(waiting):
@@ -163,12 +172,6 @@ def _sentences(seen: Seen, most: int, rng: Rng) -> list[Caption]:
             elif len(found) < most and all(one.text != other.text for other in found):
                 found.append(one)
     return found
-
-
-def _counted(seen: Seen) -> tuple[str, str, str]:
-    """The sentences of counts."""
-    told, verb = seen.list, "is" if seen.groups[0][1] == 1 else "are"
-    return f"There {verb} {told}.", f"The picture shows {told}.", capital(f"{told} can be seen.")
 
 
 def _of_one(form: str) -> Callable[[Seen, Rng], Sentences]:
@@ -287,6 +290,8 @@ def prove(sample: Sample, models: Models) -> Iterator[str]:
     and materials where it has `looks`.
     """
     visible = {o.id: o for o in sample.objects if o.box2d is not None}
+    options = Captions.model_validate(sample.options.get("captions", {}))
+    told = [o for o in visible.values() if is_told(o, options.min_visibility)]
     texts = [one.text for one in sample.captions]
     if len(set(texts)) < len(texts):
         yield "expected different sentences, found one twice"
@@ -294,6 +299,8 @@ def prove(sample: Sample, models: Models) -> Iterator[str]:
         objects = [visible[i] for i in one.objects if i in visible]
         if len(objects) < len(set(one.objects)) or len(set(one.objects)) < len(one.objects):
             yield f"{one.text!r:.80}: expected different objects that are visible, found {one.objects}"
+        elif one.form == "count":
+            yield from wrong_count(one, told, options.plurals)
         elif problem := wrong(sample, one, objects, [has_front(models.get(o.key)) for o in objects]):
             yield f"{one.text!r:.80}: expected {problem}"
 
