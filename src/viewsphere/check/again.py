@@ -12,8 +12,18 @@ from numpy.typing import NDArray
 from viewsphere.assets.exported import read_exported
 from viewsphere.assets.mesh import Mesh
 from viewsphere.check.scenery import Scenery
-from viewsphere.errors import ViewsphereError
-from viewsphere.labels import Placement, Sight, annotated, channel_labels, labels, labels_of, sample_labels, sample_values
+from viewsphere.errors import RecipeError, ViewsphereError
+from viewsphere.labels import (
+    ChannelLabel,
+    Placement,
+    Sight,
+    annotated,
+    channel_labels,
+    labels,
+    labels_of,
+    sample_labels,
+    sample_values,
+)
 from viewsphere.model.model_spec import ModelSpec, step_key
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.model.scene import Matrix4
@@ -62,14 +72,26 @@ class Again:
         sight = Sight(geometry, camera, visibility, placed, self._compared(sample, shot, key), shot.annotations, shot.labels)
         for name, label in channel_labels().items():
             if name in sample.files:
-                yield from ((name, problem) for problem in self._pixels(sample, name, label.compute(sight)))
+                yield from ((name, problem) for problem in self._pixels(sample, name, self._computed(label, sight)))
         objects = annotated(sight)
         for o, again in zip(sample.objects, objects, strict=True):
             yield from _fields(o, again, shot.annotations)
         yield from _of_picture(sample.more, sample_values(sight, objects))
 
-    def _pixels(self, sample: Sample, name: str, again: NDArray[Any]) -> Iterator[str]:
+    def _computed(self, label: ChannelLabel, sight: Sight) -> NDArray[Any] | None:
+        """A channel, computed again; None where a picture of the scene is no longer there: it is no part of the data set."""
+        try:
+            return label.compute(sight)
+        except RecipeError as error:
+            note = f"{label.name} not checked: {error}"
+            if note not in self._scenery.notes:
+                self._scenery.notes.append(note)
+            return None
+
+    def _pixels(self, sample: Sample, name: str, again: NDArray[Any] | None) -> Iterator[str]:
         """Where a channel is not what it should be; what cannot be read, or has another size, is said elsewhere."""
+        if again is None:
+            return
         try:
             kept = sample.channels[name]
         except ViewsphereError:
