@@ -60,6 +60,10 @@ def test_what_is_not_kept_is_not_there():
         replace(sample, channels={}).point_cloud()
     with pytest.raises(StoreError, match="expected the channel surface_samples, found none"):
         sample.point_cloud(surface="complete")
+    with pytest.raises(UserError, match="point_cloud: axes: expected one of camera, world; found 'word'; did you mean 'world'"):
+        sample.point_cloud("word")
+    with pytest.raises(UserError, match="point_cloud: surface: expected one of visible, complete; found 'all'"):
+        sample.point_cloud(surface="all")
 
 
 FISHEYE = LENS.model_copy(update={"distortion": Distortion(model="fisheye", coefficients=(0.02, 0.05, 0.001, 0.0))})

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
-from viewsphere.errors import StoreError
+from viewsphere.errors import StoreError, UserError
 from viewsphere.geometry.camera import has_unit_rays, pixel_rays
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.channel import picture_of
+from viewsphere.model.mistakes import one_of
 from viewsphere.model.sample import Sample
 
 Float = NDArray[np.float64]
@@ -43,6 +44,9 @@ class PointCloud:
     @classmethod
     def of(cls, sample: Sample, axes: Axes = "camera", surface: Surface = "visible") -> PointCloud:
         """As `Sample.point_cloud` says."""
+        for name, value, known in (("axes", axes, get_args(Axes)), ("surface", surface, get_args(Surface))):
+            if value not in known:
+                raise UserError(f"point_cloud: {name}: {one_of(value, known)}")
         made = _complete(sample) if surface == "complete" else _visible(sample)
         return made.moved(sample) if axes == "world" else made
 

@@ -237,7 +237,7 @@ class Sample(Shown):
 
         surface: visible, a point for each pixel that shows something, row by row, by `depth_ray`, else by `depth`; complete,
         the points of `surface_samples` on all objects, seen or not, without colours. Raises StoreError where these are not
-        kept, or the camera is not known.
+        kept, or the camera is not known; UserError for other axes or surfaces.
         """
         from viewsphere.model.point_cloud import PointCloud
 
