@@ -99,6 +99,17 @@ def test_free_cells_are_before_what_is_seen_and_occluded_ones_behind(name):
     assert {OUTSIDE, FREE, OCCLUDED, SURFACE} == set(np.unique(grid.state).tolist())
 
 
+@pytest.mark.parametrize("slab", [1, 700, 4000])
+def test_cells_are_seen_alike_however_many_are_looked_at_together(slab, monkeypatch):
+    """Less than a step ahead has, more, and a number that no steps have; long and flat grids are as cheap as others."""
+    options = {**SMALL, "size": [9, 30, 50]}
+    whole, _ = voxelled(3, options=options)
+    monkeypatch.setattr("viewsphere.labels.voxels.SLAB", slab)
+    parted, _ = voxelled(3, options=options)
+    np.testing.assert_array_equal(parted.channels["voxels"], whole.channels["voxels"])
+    assert {OUTSIDE, FREE, OCCLUDED} <= set(np.unique(whole.voxel_grid.state).tolist())
+
+
 @pytest.mark.parametrize("seed", range(2))
 def test_objects_are_full_where_embree_is_inside_of_closed_meshes(seed):
     pytest.importorskip("embreex")

@@ -30,6 +30,9 @@ Rows = NDArray[np.int64]
 BORDER = 1e-3
 """Cells by which rounding may move an object's box."""
 
+SLAB = 1 << 16
+"""Cells whose centres are projected at once."""
+
 MESHES = 256
 """Meshes of which it is kept which of their pieces are closed."""
 
@@ -131,20 +134,30 @@ def _state(sight: Sight, grid: Grid) -> NDArray[np.uint8]:
     """How each cell's centre is seen."""
     from viewsphere.geometry import kernels_voxels as kernels
 
-    out, codes = np.empty(grid.size, np.uint8), np.array([OUTSIDE, FREE, OCCLUDED], np.uint8)
-    for i, plane in enumerate(_planes(sight.camera, grid)):
-        pixels, _ = project(sight.camera.intrinsics, plane)
-        kernels.seen(pixels, _along(sight.camera, plane), sight.visibility.inverse_depth, codes, out[i].reshape(-1))
-    return out
+    codes, (ahead, up, right) = np.array([OUTSIDE, FREE, OCCLUDED], np.uint8), grid.size
+    out = np.empty((ahead, up * right), np.uint8)
+    for part, centers in _slabs(sight.camera, grid):
+        pixels, _ = project(sight.camera.intrinsics, centers)
+        own = np.empty(len(centers), np.uint8)
+        kernels.seen(pixels, _along(sight.camera, centers), sight.visibility.inverse_depth, codes, own)
+        out[part] = own.reshape(out[part].shape)
+    return out.reshape(grid.size)
 
 
-def _planes(camera: Camera, grid: Grid) -> Iterator[Float]:
-    """The centres of the cells in the camera's axes, those of one step ahead after another, (N, 3)."""
-    cells = np.argwhere(np.ones((1, *grid.size[1:]), np.bool_)) + 0.5
-    first = transform(camera.R, grid.points(cells)) + camera.t
+def _slabs(camera: Camera, grid: Grid) -> Iterator[tuple[tuple[slice, slice], Float]]:
+    """Parts of the grid, `SLAB` cells at most: which steps ahead, and which cells of each; and where the cells' centres are in
+    the camera's axes, (N, 3).
+    """
+    ahead, up, right = grid.size
     step = transform(camera.R, grid.world_from_grid[:3, 0] * grid.cell)
-    for i in range(grid.size[0]):
-        yield first + i * step
+    for left in range(0, up * right, SLAB):
+        numbers = np.arange(left, min(left + SLAB, up * right))
+        cells = np.column_stack((np.zeros_like(numbers), *np.divmod(numbers, right))) + 0.5
+        first, count = transform(camera.R, grid.points(cells)) + camera.t, SLAB // len(cells)
+        for begin in range(0, ahead, count):
+            steps = np.arange(begin, min(begin + count, ahead))
+            part = slice(begin, begin + count), slice(left, left + SLAB)
+            yield part, (first + steps[:, None, None] * step).reshape(-1, 3)
 
 
 def _along(camera: Camera, points: Float) -> Float:
