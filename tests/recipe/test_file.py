@@ -66,6 +66,7 @@ POSITIONS = [
     (("  fov_deg: 40\n", "  K: null\n"), "recipe.yaml:12: camera: expected one of fov_deg, focal_px, focal_mm"),
     (("viewpoints:", "viewpoints:\n  kind: sphree"), "recipe.yaml:7: viewpoints.kind: expected one of grid, sphere"),
     (("name: cars", "nmae: cars"), "recipe.yaml:1: nmae: expected one of name, seed"),
+    (("category:", r'"a\n\e[31m":'), r"recipe.yaml:5: models[0].'a\n\x1b[31m': expected one of source, category"),
 ]
 
 

@@ -186,8 +186,8 @@ def _under(field: str, line: str) -> str:
 
 
 def dotted(path: Path) -> str:
-    """A path as text, `models[0].category`; `recipe` for the empty path."""
-    text = "".join(f"[{p}]" if isinstance(p, int) else f".{p}" for p in path)
+    """A path as text, `models[0].category`, in one line whatever its names are; `recipe` for the empty path."""
+    text = "".join(f"[{p}]" if isinstance(p, int) else f".{p if p.isprintable() else shown(p)}" for p in path)
     return text.removeprefix(".") or "recipe"
 
 
