@@ -1,5 +1,6 @@
 """captions and referring: what sentences say holds, in scenes and among objects that are made for it."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -197,12 +198,12 @@ def test_proofs_find_other_words(kept):
         for i, one in enumerate(sample.referring):
             assert list(referring.prove(changed(sample, "referring", i, text=one.text + "s"), models))
             assert list(referring.prove(changed(sample, "referring", i, extreme="middlemost"), models))
+        fewer = replace(sample, more={**sample.more, "referring": sample.referring[1:]})
+        assert sample.referring and list(referring.prove(fewer, models))
 
 
 def changed(sample, name, i, **parts):
     """The sample with other parts of one of its captions or expressions."""
-    from dataclasses import replace
-
     found = list(sample.more[name])
     found[i] = replace(found[i], **parts)
     return replace(sample, more={**sample.more, name: tuple(found)})
@@ -282,3 +283,4 @@ def test_a_lidar_s_picture_has_no_captions():
     found = [s for s in vs.render(recipe(rig=rig, channels=["instances", "lidar"]))]
     assert {bool(s.captions) for s in found if s.sensor == "camera"} == {True}
     assert {(s.captions, s.referring) for s in found if s.sensor == "top"} == {((), ())}
+    assert not [problem for s in found for problem in labels()["referring"].prove(s, {})]

@@ -29,6 +29,7 @@ from viewsphere.labels._lines import note
 from viewsphere.labels._paint import color_of
 from viewsphere.labels._sight import Sight
 from viewsphere.labels._words import noun_of, noun_phrase
+from viewsphere.model.camera import Scan
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.numbers import Portion
 from viewsphere.model.sample import ObjectAnnotation, Sample
@@ -196,23 +197,30 @@ def compute(sight: Sight, objects: Sequence[ObjectAnnotation]) -> Mapping[str, A
 
 def prove(sample: Sample, models: Models) -> Iterator[str]:
     """At most one expression for each visible object, whose text has the parts that are told; where the words for all objects'
-    looks are known by the label `looks`, it is the one that singles the object out.
+    looks are known by the label `looks`, it is the one that singles the object out, and there is none only where none does.
     """
     visible = [o for o in sample.objects if o.box2d is not None]
-    number, ids = {o.id: i for i, o in enumerate(visible)}, [one.object for one in sample.referring]
-    if ids != sorted(set(ids) & number.keys()):
+    ids = [one.object for one in sample.referring]
+    if ids != sorted(set(ids) & {o.id for o in visible}):
         yield f"expected visible objects in the order of their ids, each once; found {ids}"
         return
     for one in sample.referring:
         text = _text(one, {o.id: o for o in visible})
         if text != one.text:
             yield f"object {one.object}: expected {text!r}, by the parts of the expression; found {one.text!r:.80}"
-    if "looks" in sample.asked:
+    if "looks" in sample.asked and not isinstance(sample.camera.distortion, Scan):
+        options = Referring.model_validate(sample.options.get("referring", {}))
         words = {o.id: (o.color or "", o.material or "") for o in visible}
         scene = Scene(visible, words, (sample.width, sample.height))
-        for one in sample.referring:
-            if one != (again := scene.expression(number[one.object])):
-                yield f"object {one.object}: expected {again and again.text!r}, found {one.text!r:.80}"
+        kept = {one.object: one for one in sample.referring}
+        for i, o in enumerate(visible):
+            again = scene.expression(i) if is_told(o, options.min_visibility) else None
+            if again != (one := kept.get(o.id)):
+                yield f"object {o.id}: expected {_said(again)}, found {_said(one)}"
+
+
+def _said(one: Expression | None) -> str:
+    return f"{one.text!r:.80}" if one else "no expression"
 
 
 def _text(one: Expression, by_id: Mapping[int, ObjectAnnotation]) -> str | None:
