@@ -12,6 +12,7 @@ from proven import equal, told
 from small import small_recipe, tree_hash
 from truth_scenes import LENSES, cube, lens, mesh_of, orbit_camera, sphere
 from viewsphere import generate, plan
+from viewsphere.assets.mesh import Material
 from viewsphere.check import check
 from viewsphere.errors import RecipeError, StoreError
 from viewsphere.geometry.camera import pixel_rays, project
@@ -156,6 +157,17 @@ def test_an_open_mesh_is_surface_alone():
     assert (full.filled == INSIDE).sum() == 16**3  # the cells whose centres are within 0.83 but not those of its sides
     assert (hollow.filled == TOUCHED).sum() > 1000 and not (hollow.filled == INSIDE).any()
     assert (full.filled[hollow.filled == TOUCHED] == TOUCHED).all()
+
+
+def test_what_is_never_seen_is_neither_surface_nor_closes_a_piece():
+    closed = cube(0.83)
+    clear = Material(alpha_mode="BLEND", base_color=(1.0, 1.0, 1.0, 0.0))
+    assert not scene([replace(closed, materials=(clear,))]).filled.any()
+    materials = np.zeros(len(closed.triangles), np.int32)
+    materials[-1] = 1
+    window = scene([replace(closed, materials=(Material(), clear), triangle_material=materials)])
+    lid = scene([mesh_of(closed.vertices, closed.triangles[:-1])])
+    np.testing.assert_array_equal(window.filled, lid.filled)
 
 
 def test_scenery_is_surface_and_what_it_covers_is_indoors():

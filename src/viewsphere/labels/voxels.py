@@ -77,10 +77,10 @@ def _runs(first: Rows, table: Array, owner: Array, filled: Array, state: Array, 
 def _occupy(sight: Sight, points: Float, owner: NDArray[np.int32], filled: NDArray[np.uint8]) -> None:
     g = sight.geometry
     for i in range(g.object_count):
-        rows = np.arange(g.triangle_start[i], g.triangle_start[i + 1])
+        rows = _shown(sight, np.arange(g.triangle_start[i], g.triangle_start[i + 1]))
         if len(rows):
-            voxels.touch(points, g.triangles, _shown(sight, rows), owner, filled, TOUCHED)
-            voxels.fill(points, g.triangles, rows[_closed(sight, i)], owner, filled, INSIDE)
+            voxels.touch(points, g.triangles, rows, owner, filled, TOUCHED)
+            voxels.fill(points, g.triangles, rows[_closed(sight, i, rows)], owner, filled, INSIDE)
     voxels.touch(points, g.triangles, _scenery(sight), owner, filled, TOUCHED)
     layer = -1 if g.ground_z is None else math.floor(points[g.vertex_start[-1], 1])
     if 0 <= layer < owner.shape[1]:
@@ -99,11 +99,11 @@ def _scenery(sight: Sight) -> Rows:
     return _shown(sight, np.arange(start[sight.geometry.object_count], start[-1]))
 
 
-def _closed(sight: Sight, i: int) -> NDArray[np.bool_]:
-    """Which triangles of thing i belong to closed pieces."""
+def _closed(sight: Sight, i: int, rows: Rows) -> NDArray[np.bool_]:
+    """Which of these triangles of thing i belong to pieces that are closed without others."""
     g = sight.geometry
     vertices = g.coordinates[g.vertex_start[i] : g.vertex_start[i + 1]]
-    triangles = g.triangles[g.triangle_start[i] : g.triangle_start[i + 1]] - np.int32(g.vertex_start[i])
+    triangles = g.triangles[rows] - np.int32(g.vertex_start[i])
     key, known = xxhash.xxh3_128(vertices.tobytes() + triangles.tobytes()).digest(), _known()
     if key not in known:
         if len(known) >= MESHES:
