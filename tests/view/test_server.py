@@ -44,7 +44,10 @@ def parted(answer):
 
 @pytest.fixture
 def server(serve, small_run):
-    return serve(small_run)
+    """A server of the small run that has read all its frames."""
+    server = serve(small_run)
+    assert until(lambda: json.loads(get(server, "/state")[2])["read"] == 12)
+    return server
 
 
 def test_rows_pictures_and_counts(server):
