@@ -30,6 +30,7 @@ TESTED = {
     "MAX_REMOTE_TRIES": "test_places",
     "MAX_FETCHED_BYTES": "test_fetched",
     "MAX_MODELS": "test_models",
+    "MAX_VOXELS": "test_voxels",
     **dict.fromkeys(
         (
             "MAX_FILE_BYTES", "MAX_FILES", "MAX_TRIANGLES", "MAX_VERTICES", "MAX_PICTURE_PIXELS",
