@@ -22,7 +22,7 @@ from viewsphere.model.credit import Credit
 from viewsphere.model.model_spec import ModelSpec
 from viewsphere.model.thing import TimeStep
 from viewsphere.run.stages import Stages, model_files
-from viewsphere.store import ModelInfo, Store
+from viewsphere.store import ModelInfo, PlanRecord, Store
 from viewsphere.store.manifest import Manifest
 
 Steps = dict[int, TimeStep]
@@ -34,15 +34,16 @@ Export = Callable[[Path], None]
 
 @dataclass(frozen=True)
 class Models:
-    """Makes the models of a store."""
+    """Makes the models of a store, for the data set of this plan."""
 
     store: Store
     stages: Stages
+    record: PlanRecord
 
     @cached_property
     def _keeps_looks(self) -> bool:
         """Whether a label of the data set needs what models look like."""
-        asked = {name for part in self.store.plan().parts for name in part.recipe.get("annotations", ())}
+        asked = {name for part in self.record.parts for name in part.recipe.get("annotations", ())}
         return any(label.needs.looks for name, label in labels().items() if name in asked)
 
     def make(self, spec: ModelSpec, steps: Iterable[TimeStep] = (), credit: Credit | None = None, trusted: bool = True) -> None:

@@ -62,7 +62,7 @@ class Worker:
     def __init__(self, root: Path, portion: Portion) -> None:
         self.store = Store(root)
         self.stages = Stages()
-        self.models = Models(self.store, self.stages)
+        self.models = Models(self.store, self.stages, portion.record)
         self._portion = portion
         self._framing = Framing(portion.plan.recipe, self.stages)
         self._boxes = StoredBoxes(self.store)
