@@ -86,7 +86,7 @@ from viewsphere.run.executors import local
 class Gone:
     def recv(self):
         raise EOFError
-local._serve(Gone(), Path("nowhere"), SimpleNamespace(plan=SimpleNamespace(recipe=None)))
+local._serve(Gone(), Path("nowhere"), SimpleNamespace(plan=SimpleNamespace(recipe=None), record=None))
 """
 COMMAND = """
 from viewsphere import cli
