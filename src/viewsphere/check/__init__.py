@@ -19,7 +19,6 @@ from viewsphere.check.failure import failure
 from viewsphere.check.frames import FRAME_PROOFS
 from viewsphere.check.models import differing
 from viewsphere.check.rays import RayCaster
-from viewsphere.check.scenery import Scenery
 from viewsphere.check.shots import contradictions
 from viewsphere.errors import MissingExtraError, ViewsphereError
 from viewsphere.formats import Remark, Verified
@@ -29,6 +28,7 @@ from viewsphere.recipe.formats import FormatEntry
 from viewsphere.recipe.sequence import TimeEntry
 from viewsphere.run.in_order import in_order
 from viewsphere.run.preparing import Views
+from viewsphere.run.scenery import Scenery
 from viewsphere.store import Dataset, ModelInfo, PlanRecord, Row
 from viewsphere.store.checksums import damaged_files, written_least, written_options
 from viewsphere.store.credits import credits_problem
@@ -215,7 +215,7 @@ def _export_proof(views: Views, folder: Path, module: Verified, sampled: Collect
     try:
         entry = FormatEntry(name=folder.name, options=written_options(folder))
         with here(folder) as local:
-            yield from module.verify(views.of(module, written_least(folder)), local, sampled, *entry.arguments())
+            yield from module.verify(views.of(entry, written_least(folder)), local, sampled, *entry.arguments())
     except Exception as error:
         yield None, failure("an export that can be checked", error)
 

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from viewsphere import plugins
 from viewsphere.assets.deforming import Load
 from viewsphere.check.failure import failure
-from viewsphere.check.scenery import Scenery
 from viewsphere.formats.blend import StoredModels
 from viewsphere.model.sample import Sample
 from viewsphere.model.shot import Shot
 from viewsphere.recipe.scene import engine_entry
+from viewsphere.run.scenery import Scenery
 from viewsphere.store import Dataset
 
 

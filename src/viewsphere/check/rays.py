@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.assets.mesh import Mesh
-from viewsphere.check.scenery import Scenery
 from viewsphere.errors import MissingExtraError
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.sample import Sample
 from viewsphere.model.thing import Thing
+from viewsphere.run.scenery import Scenery
 from viewsphere.run.tasks import SceneryRecord
 from viewsphere.store import Dataset, depth_step
 from viewsphere.store.channel_files import MOST_STEPS

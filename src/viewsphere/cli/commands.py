@@ -30,6 +30,7 @@ for command in (
     making.preview,
     making.render,
     datasets.export,
+    datasets.formats,
     datasets.status,
     datasets.check,
     datasets.report,

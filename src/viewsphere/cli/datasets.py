@@ -21,7 +21,7 @@ from viewsphere.cli.arguments import (
     split,
     with_options,
 )
-from viewsphere.cli.terminal import ProgressBar, print_json, print_report, print_status
+from viewsphere.cli.terminal import ProgressBar, print_formats, print_json, print_report, print_status
 from viewsphere.errors import UserError
 
 if TYPE_CHECKING:
@@ -76,6 +76,17 @@ def export(
         typer.echo(note)
     for name in names:
         typer.echo(f"wrote {(output or folder) / name}")
+
+
+def formats(json_: AsJson = False) -> None:
+    """List all formats: what each needs, what it holds, and what reads it."""
+    from viewsphere.run.listing import listed
+
+    found = listed()
+    if json_:
+        print_json([one.__dict__ for one in found])
+    else:
+        print_formats(found)
 
 
 def status(folder: DataFolder, json_: AsJson = False) -> None:

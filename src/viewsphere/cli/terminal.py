@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from viewsphere.check import Report
     from viewsphere.run.estimate import Estimate
     from viewsphere.run.generate import Summary, Warnings
+    from viewsphere.run.listing import Listed
     from viewsphere.run.progress import Listener, Progress
     from viewsphere.run.status import Status
     from viewsphere.sampling.plan import Plan
@@ -146,6 +147,18 @@ def print_summary(summary: Summary, as_json: bool) -> None:
     rate = f", {_rate(summary.rendered, summary.seconds)}" if summary.rendered else ""
     formats = ", ".join(summary.formats) or "no format asked for"
     typer.echo(f"{summary.root}: {summary.frames:,} frames ({summary.rendered:,} new{rate}); {formats}")
+
+
+def print_formats(found: Sequence[Listed]) -> None:
+    """Print a paragraph for each format."""
+    for one in found:
+        does = " and ".join(word for word, can in (("written", one.writes), ("imported", one.reads)) if can)
+        typer.echo(f"{one.name} ({does}): {one.summary}")
+        options = tuple(f"{one.name}.{name}" for name in one.options)
+        parts = (("holds", one.holds), ("needs", one.needs), ("read by", one.read_by), ("options", options))
+        for what, names in parts:
+            if names:
+                typer.echo(f"    {what}: {', '.join(names)}")
 
 
 def print_status(found: Status) -> None:

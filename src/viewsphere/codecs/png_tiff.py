@@ -33,16 +33,17 @@ _SAMPLE_FORMATS = {np.dtype(np.int32): 2, np.dtype(np.float32): 3}
 
 
 def encode_png(array: NDArray[Any], *, palette: NDArray[np.uint8] | None = None, unit: float | None = None) -> bytes:
-    """A PNG file of a picture: (H, W) bool (1 bit), uint8 or uint16, or (H, W, 3 or 4) uint8, not empty.
+    """A PNG file of a picture: (H, W) bool (1 bit), uint8 or uint16, or (H, W, 3 or 4) uint8 or uint16, not empty.
 
     With a `palette` (n, 3), (H, W) uint8 are indices of its colours. `unit` is the length in metres of one step of (H, W)
     (pCAL).
     """
     components = 1 if array.ndim == 2 else array.shape[-1]
-    dtypes = (np.bool_, np.uint8, np.uint16) if array.ndim == 2 else (np.uint8,)
+    dtypes = (np.bool_, np.uint8, np.uint16) if array.ndim == 2 else (np.uint8, np.uint16)
     if array.ndim not in (2, 3) or array.size == 0 or components not in _COLOR_TYPES or array.dtype not in dtypes:
         raise ValueError(
-            f"encode_png: expected (H, W) bool, uint8 or uint16, or (H, W, 3 or 4) uint8, got {array.shape} {array.dtype}"
+            f"encode_png: expected (H, W) bool, uint8 or uint16, or (H, W, 3 or 4) uint8 or uint16, "
+            f"got {array.shape} {array.dtype}"
         )
     height, width = array.shape[:2]
     depth = 1 if array.dtype == np.bool_ else 8 * array.dtype.itemsize
@@ -149,7 +150,8 @@ def _png_pixels(header: bytes, body: bytes) -> NDArray[Any]:
     if depth == 1:
         return np.unpackbits(lines[:, 1:], axis=1, count=width).astype(np.bool_)
     if depth == 16:
-        return np.ascontiguousarray(lines[:, 1:]).view(">u2").astype(np.uint16)
+        deep = np.ascontiguousarray(lines[:, 1:]).view(">u2").astype(np.uint16)
+        return deep if components == 1 else deep.reshape(height, width, components)
     pixels = np.add.accumulate(lines[:, 1:].reshape(height, width, components), axis=1, dtype=np.uint8)
     return pixels[:, :, 0] if components == 1 else pixels
 

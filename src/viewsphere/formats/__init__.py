@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
 if TYPE_CHECKING:
@@ -10,26 +11,49 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from viewsphere.model.frozen import Frozen
+    from viewsphere.model.rig import Rig
     from viewsphere.model.sample import Sample
-    from viewsphere.store import Dataset
+    from viewsphere.store import Category, Dataset
 
 Remark = tuple[int | None, str]
 """A fault of an export: the number of its frame in the plan (None: of the whole export), and what is wrong."""
 
 
+@dataclass(frozen=True)
+class Scope:
+    """What is known of a data set before any of it is rendered. `rig`: that of its first part, None where nobody knows it, as
+    of imported pictures; `is_moving`: its pictures are of sequences; `most_objects`: of one picture; `channels` and
+    `annotations`: labels and passes that it keeps, and those that can be computed of its shots.
+    """
+
+    categories: tuple[Category, ...]
+    splits: tuple[str, ...]
+    rig: Rig | None
+    is_moving: bool
+    most_objects: int
+    channels: tuple[str, ...]
+    annotations: tuple[str, ...]
+
+
 class Format(Protocol):
     """A module that writes a data set in one format: `writer`.
 
-    A format may also have: `Options`, a pydantic class of what recipes and the command line may say of it (docs/formats.md has
-    the fields' descriptions), of which `writer` and the other functions are then given one as their last argument; `CHANNELS`,
-    names of all channels that it reads besides pictures that happen to be there: a run that does not keep them is refused
-    before it begins (without it, a format takes whatever is kept); `needs(*options)`, names of more that it reads then;
-    `ANNOTATES = False`, if samples are to have all their objects, those too that the recipe leaves out of annotations; `CREDITS
-    = False`, if it does not name the models' credits, so that it needs not be written again where only these change; `check()`,
-    which raises a UserError where the format cannot be written; `preparer` of `Prepared`, by which several processes share the
-    work; `notes(categories, *options)`, with lines for the user of what these options mean for a data set's categories;
-    `verify(dataset, folder, sampled)` of `Verified`, with which `viewsphere check` proves an export; `read(path, *, keep_going)
-    -> ForeignDataset` (`viewsphere.store.foreign`), with which data sets of the format are imported.
+    Most formats are trees of files (`viewsphere.formats._tree`), from which these functions follow. A format may also have:
+
+    - `HOLDS`, what it holds, and `READ_BY`, the programs that read it: a few words each.
+    - `Options`, a pydantic class of what recipes and the command line may say of it, of which `writer` and the other functions
+      are then given one as their last argument; the fields' descriptions are its documentation.
+    - `CHANNELS`, names of all labels and passes that it reads besides pictures that happen to be there (without it, a format
+      takes whatever is kept), and `needs(*options)`, names of more that it reads then. A run that does not keep them is
+      refused before it begins; an export computes those that are labels. `LIDAR = True`: a LiDAR's frames may lack them.
+    - `refuses(scope, *options)`, which yields what of a `Scope` it cannot hold: `expected ...; found ...`.
+    - `check()`, which raises a UserError where the format cannot be written on this machine.
+    - `ANNOTATES = False`, if samples are to have all their objects, those too that the recipe leaves out of annotations.
+    - `CREDITS = False`, if it does not name the models' credits: it needs not be written again where only these change.
+    - `preparer` of `Prepared`, by which several processes share the work.
+    - `notes(categories, *options)`, with lines for the user of what these options mean for a data set's categories.
+    - `verify(dataset, folder, sampled)` of `Verified`, with which `viewsphere check` proves an export.
+    - `read(path, *, keep_going) -> ForeignDataset` (`viewsphere.store.foreign`), with which data sets of it are imported.
     """
 
     def writer(

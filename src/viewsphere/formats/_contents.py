@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -16,11 +17,24 @@ from viewsphere.store import Dataset
 from viewsphere.store.checksums import CHECKSUMS
 from viewsphere.store.foreign import Loaded
 
-Content = str | NDArray[np.bool_]
-"""A stored file, by its path from the data set's root, or a mask (H, W), which becomes a PNG."""
+
+@dataclass(frozen=True)
+class Coded:
+    """What an encoding, by its name, makes of a frame; exports of one pass that share it make it once."""
+
+    frame: int
+    name: str
+    make: Callable[[], bytes]
+
+
+Content = str | bytes | Coded | NDArray[np.bool_]
+"""A stored file, by its path from the data set's root, bytes, what an encoding makes, or a mask (H, W), which becomes a PNG."""
 
 Expected = tuple[int | None, str, Content]
 """The frame that a file belongs to (None: to no single one), the file's path from the export's folder, and its content."""
+
+PNG = b"\x89PNG"
+"""How every PNG begins."""
 
 BLOCK = 1 << 20
 """Bytes of a file that are compared at once."""
@@ -30,10 +44,13 @@ def put(dataset: Dataset, content: Content, file: Path) -> None:
     """Make a file of this content."""
     if isinstance(content, str):
         dataset.link(content, file)
+        return
+    if not file.parent.is_dir():
+        file.parent.mkdir(parents=True, exist_ok=True)
+    if isinstance(content, Coded):
+        dataset.put(content.frame, content.name, content.make, file)
     else:
-        if not file.parent.is_dir():
-            file.parent.mkdir(parents=True, exist_ok=True)
-        file.write_bytes(encode_png(content))
+        file.write_bytes(content if isinstance(content, bytes) else encode_png(content))
 
 
 def models(dataset: Dataset) -> Iterator[Expected]:
@@ -44,19 +61,21 @@ def models(dataset: Dataset) -> Iterator[Expected]:
 def check_files(
     dataset: Dataset, folder: Path, expected: Iterable[Expected], again: Iterable[Expected], besides: Collection[str]
 ) -> Iterator[Remark]:
-    """Every expected file is there and holds what it should, and there is no other but those of the names `besides`.
+    """Every expected file is there and holds what it should, and there is no other but those of the names `besides`, which are
+    looked at when all expected ones were.
 
     `again`: the expected files once more; that is read only where there are more files than expected, so that their names need
     not be kept.
     """
-    lacking = [name for name in besides if not (folder / name).is_file()]
-    yield from ((None, f"{name}: expected a file, found none: export again") for name in lacking)
-    there = len(besides) - len(lacking)
+    there = 0
     for frame, name, content in expected:
         problem = _problem(dataset, content, folder / name)
         there += (folder / name).is_file()
         if problem:
             yield frame, f"{name}: {problem}: export again"
+    lacking = [name for name in besides if not (folder / name).is_file()]
+    yield from ((None, f"{name}: expected a file, found none: export again") for name in lacking)
+    there += len(besides) - len(lacking)
     listed = (folder / CHECKSUMS).is_file()
     if sum(len(names) for _, _, names in os.walk(folder)) > there + listed:
         known = {CHECKSUMS, *besides, *(name for _, name, _ in again)}
@@ -72,12 +91,27 @@ def _problem(dataset: Dataset, content: Content, file: Path) -> str | None:
         same = file.read_bytes() == stored.data if isinstance(stored, Loaded) else same_bytes(stored, file)
         return None if same else f"expected the bytes of {content}, found others"
     data = file.read_bytes()
+    if isinstance(content, bytes | Coded):
+        made = content if isinstance(content, bytes) else content.make()
+        return None if data == made else _different(made, data)
     if data == encode_png(content):
         return None
     try:  # another version of the encoder may have written the same mask in other bytes
         return None if np.array_equal(decode_png(data), content) else "expected the mask of its object, found another"
     except UserError as error:
         return f"expected the mask of its object, found: {error}"
+
+
+def _different(wanted: bytes, found: bytes) -> str | None:
+    """How two files' bytes differ; pictures of equal pixels do not: another version of the encoder may have written one."""
+    at = next((i for i, (a, b) in enumerate(zip(wanted, found, strict=False)) if a != b), min(len(wanted), len(found)))
+    problem = f"expected {len(wanted)} bytes that are exported, found {len(found)}, others from byte {at} on"
+    if not wanted.startswith(PNG):
+        return problem
+    try:
+        return None if np.array_equal(decode_png(found), decode_png(wanted)) else problem
+    except UserError as error:
+        return f"expected a picture, found: {error}"
 
 
 def same_bytes(one: Path, other: Path) -> bool:

@@ -22,6 +22,8 @@ from viewsphere.formats._contents import Expected, check_files, put
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.store import Dataset
 
+HOLDS = ("boxes", "poses", "views", "sizes")
+READ_BY = ("pandas", "any spreadsheet")
 CHANNELS = ()  # pictures are taken where there are any
 CREDITS = False
 TABLE = "objects.csv"

@@ -24,6 +24,8 @@ from viewsphere.model.classes import thing_class
 from viewsphere.model.sample import ObjectAnnotation, Sample
 from viewsphere.store import Dataset
 
+HOLDS = ("scenes as meshes", "poses")
+READ_BY = ("Blender", "trimesh", "any glTF viewer")
 ANNOTATES = False  # what is hidden is part of a scene, too
 CHANNELS = ()
 CREDITS = False

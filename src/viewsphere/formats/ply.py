@@ -27,6 +27,8 @@ from viewsphere.model.point_cloud import PointCloud
 from viewsphere.model.sample import Sample
 from viewsphere.store import Dataset
 
+HOLDS = ("coloured points", "normals", "objects")
+READ_BY = ("Open3D", "trimesh", "MeshLab", "CloudCompare")
 CHANNELS = ("depth", "instances")
 CREDITS = False
 FOLDER_SIZE = 10_000

@@ -30,6 +30,8 @@ from viewsphere.model.sample import Sample
 from viewsphere.store import Dataset
 from viewsphere.store.sample_records import whole_sample
 
+HOLDS = ("everything",)
+READ_BY = ("webdataset", "wids")
 CREDITS = False
 
 

@@ -13,8 +13,10 @@ from viewsphere.errors import UserError
 from viewsphere.formats import Format
 from viewsphere.model.mistakes import one_of
 from viewsphere.recipe.formats import FormatEntry, Formats, options_of, read_formats
+from viewsphere.run.completed import lacking
 from viewsphere.run.preparing import Entries, leaves_out, prepared, targets
 from viewsphere.run.progress import Listener, Progress, unheard
+from viewsphere.run.scope import check_held, scope_of
 from viewsphere.store import Choice, Dataset, located, new_folder
 from viewsphere.store.checksums import write_checksums, written_credits, written_frames, written_least, written_options
 from viewsphere.store.credits import credits_digest
@@ -46,9 +48,11 @@ def export(
     if place.resolve().is_relative_to(dataset.store.folder.resolve()):
         raise UserError(f"--output: expected a folder outside of the data set's store; found {place}")
     entries = tuple(entry.over(_known_options(dataset, entry.name)) for entry in read_formats(formats))
+    scope = scope_of(dataset)
     for entry in entries:  # before the first of them is written
-        writable(entry.name)
-        entry.arguments()
+        module = writable(entry.name)
+        check_held(module, entry, scope, str(dataset.root))
+        lacking(dataset, module, entry)
     if not entries:
         return ()
     with ExitStack() as whole:

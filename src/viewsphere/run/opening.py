@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from importlib.metadata import version
-from itertools import product
 
 from viewsphere.errors import RecipeError, StoreError
+from viewsphere.formats import Format, Scope
+from viewsphere.labels import on_request
 from viewsphere.model.channel import PASSES, missing
 from viewsphere.model.rig import Sensor
 from viewsphere.recipe.formats import FormatEntry
 from viewsphere.recipe.recipe import Recipe
 from viewsphere.run.exporting import writable
+from viewsphere.run.scope import check_held, needs_of, scope_of_plan
 from viewsphere.sampling.engine_digest import engine_digest
 from viewsphere.sampling.extension import Portion, extend, resumed, whole
 from viewsphere.sampling.fitting import LOOK
@@ -33,28 +35,40 @@ def prepare(recipe: Recipe) -> Plan:
 
 
 def check_formats(planned: Plan, wanted: Iterable[FormatEntry], channels: Sequence[str]) -> None:
-    """Raises UserError for a format that is not known, does not work here, or needs one of the channels which a sensor does not
-    keep.
+    """Raises UserError for a format that is not known, does not work here, cannot hold what is planned, or needs a label that
+    is not asked for: one of the channels which a sensor does not keep, or one on request.
     """
+    scope = scope_of_plan(planned, channels)
     with planned.recipe.located():
-        for entry, sensor in product(wanted, planned.rig.sensors):
-            _check_channels(entry, channels, sensor)
+        for entry in wanted:
+            module = writable(entry.name)
+            for sensor in planned.rig.sensors:
+                _check_channels(entry, module, channels, sensor)
+            _check_annotations(entry, module, scope)
+            check_held(module, entry, scope, "formats")
 
 
-def _check_channels(entry: FormatEntry, channels: Sequence[str], sensor: Sensor) -> None:
-    name, module = entry.name, writable(entry.name)
-    needed: Sequence[str] = getattr(module, "CHANNELS", ())
-    more: Callable[..., Sequence[str]] | None = getattr(module, "needs", None)
-    if more is not None:
-        needed = (*needed, *more(*entry.arguments()))
+def _check_annotations(entry: FormatEntry, module: Format, scope: Scope) -> None:
+    lacking = [name for name in needs_of(module, entry) if name in on_request() and name not in scope.annotations]
+    if lacking:
+        found = ", ".join(scope.annotations) or "none"
+        raise RecipeError(
+            f"annotations: expected {lacking[0]}, which format {entry.name} needs; found {found}: add it, or leave "
+            f"{entry.name} out of formats"
+        )
+
+
+def _check_channels(entry: FormatEntry, module: Format, channels: Sequence[str], sensor: Sensor) -> None:
+    if sensor.lidar is not None and getattr(module, "LIDAR", False):
+        return
     kept = sensor.kept(tuple(channels))
-    lacking = missing(needed, kept)
+    lacking = missing([name for name in needs_of(module, entry) if name not in on_request()], kept)
     if lacking:
         where = f"rig.sensors.{sensor.name}.channels" if sensor.channels or sensor.lidar else "channels"
         remedy = "" if sensor.lidar and lacking[0] in PASSES else "add it, or "
         raise RecipeError(
-            f"{where}: expected {lacking[0]}, which format {name} needs; found {', '.join(kept)}: "
-            f"{remedy}leave {name} out of formats"
+            f"{where}: expected {lacking[0]}, which format {entry.name} needs; found {', '.join(kept)}: "
+            f"{remedy}leave {entry.name} out of formats"
         )
 
 

@@ -14,10 +14,12 @@ from typing import Any
 from viewsphere import plugins
 from viewsphere.errors import UserError
 from viewsphere.formats import Format
+from viewsphere.model.camera import Scan
 from viewsphere.model.channel import missing
 from viewsphere.model.rig import CAMERA
 from viewsphere.model.sample import Sample
 from viewsphere.recipe.formats import FormatEntry
+from viewsphere.run.completed import Completed, lacking
 from viewsphere.run.in_order import in_order
 from viewsphere.store import Dataset, Exported
 
@@ -43,21 +45,26 @@ def leaves_out(module: object) -> bool:
 
 
 class Views:
-    """A data set as formats see it: read once for all that leave the same annotations out."""
+    """A data set as formats see it: one for all that leave the same annotations out, and lack the same labels."""
 
     def __init__(self, dataset: Dataset) -> None:
         self._dataset = dataset
-        self._above = cache(partial(_above, dataset))
+        self._seen = cache(self._made)
 
-    def of(self, module: object, least: float | None) -> Dataset:
-        """The data set without annotations of what is seen no more than `least`, but for a format that writes scenes."""
-        return self._dataset if least is None or not leaves_out(module) else self._above(least)
+    def of(self, entry: FormatEntry, least: float | None) -> Dataset:
+        """The data set with the labels that a format needs, and without annotations of what is seen no more than `least`, but
+        for a format that writes scenes. Raises UserError for needs that cannot be met.
+        """
+        module = plugins.load("formats", entry.name)
+        return self._seen(least if leaves_out(module) else None, lacking(self._dataset, module, entry))
 
-
-def _above(dataset: Dataset, least: float) -> Exported:
-    shown = Exported(dataset.root, dataset.choice, least)
-    shown.link_kinds = dataset.link_kinds
-    return shown
+    def _made(self, least: float | None, names: tuple[str, ...]) -> Dataset:
+        if least is None and not names:
+            return self._dataset
+        root, choice = self._dataset.root, self._dataset.choice
+        shown = Completed(root, choice, least, names) if names else Exported(root, choice, least or 0.0)
+        shown.link_kinds, shown.made = self._dataset.link_kinds, self._dataset.made
+        return shown
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,21 +95,23 @@ class Target:
         """The sample as the format sees it; raises UserError where a sensor keeps less than all channels, and lacks one that
         the format needs of every frame.
         """
-        lacking = missing(getattr(self.module, "CHANNELS", ()), sample.files)
-        if sample.sensor != CAMERA and lacking:
+        shown = self.view.shown(sample)
+        absent = missing(getattr(self.module, "CHANNELS", ()), shown.channels)
+        is_exempt = getattr(self.module, "LIDAR", False) and isinstance(sample.known_camera and sample.camera.distortion, Scan)
+        if sample.sensor != CAMERA and absent and not is_exempt:
             raise UserError(
-                f"{self.view.root}: format {self.entry.name}: expected channel {lacking[0]} of every frame, found none of "
+                f"{self.view.root}: format {self.entry.name}: expected channel {absent[0]} of every frame, found none of "
                 f"sensor {sample.sensor} (frame {sample.index}): leave {self.entry.name} out, or render that sensor with "
-                f"{lacking[0]}"
+                f"{absent[0]}"
             )
-        return self.view.shown(sample)
+        return shown
 
 
 def targets(dataset: Dataset, formats: Entries) -> tuple[Target, ...]:
     """The formats to be written of a data set."""
     views, least = Views(dataset), dataset.plan.keep_annotations_above
     modules = ((entry, folder, plugins.load("formats", entry.name)) for entry, folder in formats)
-    return tuple(Target(entry, folder, module, views.of(module, least)) for entry, folder, module in modules)
+    return tuple(Target(entry, folder, module, views.of(entry, least)) for entry, folder, module in modules)
 
 
 def prepared(dataset: Dataset, found: Sequence[Target], workers: int = 0) -> Generator[dict[str, Any]]:

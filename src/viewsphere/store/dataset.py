@@ -29,6 +29,7 @@ from viewsphere.store.choice import Choice
 from viewsphere.store.folder import Store
 from viewsphere.store.foreign import Loaded
 from viewsphere.store.index import Row
+from viewsphere.store.made import Made
 from viewsphere.store.manifest import MANIFEST, Manifest
 from viewsphere.store.paths import file_inside, files_inside, names
 from viewsphere.store.point_tracks import PointTracks, joined
@@ -59,6 +60,7 @@ class Dataset(Shown, Sequence[Sample]):
         self.store = Store(self.root)
         self.plan = self.store.plan()
         self.link_kinds: set[str] = set()
+        self.made = Made()
         self._records = lru_cache(maxsize=8)(self._read_records)
         self._manifests = lru_cache(maxsize=8)(partial(_manifest_of, self.root))
         self._info = lru_cache(maxsize=10_000)(self.store.model_info)
@@ -399,6 +401,14 @@ class Dataset(Shown, Sequence[Sample]):
             destination.write_bytes(file.data)
         else:
             self.link_kinds.add(link_file(file.resolve() if file.is_symlink() else file, destination))
+
+    def put(self, frame: int, name: str, make: Callable[[], bytes], destination: Path) -> None:
+        """Put what `make` gives at `destination`; where another export of this pass put the same of a frame, by the name of its
+        encoding, it is linked.
+        """
+        kind = self.made.put(frame, name, make, destination)
+        if kind:
+            self.link_kinds.add(kind)
 
     def mesh(self, key: str) -> Mesh:
         """A finished model, or a time step of one, with its materials, in object axes: as its GLB has it. Raises StoreError for

@@ -44,6 +44,8 @@ from viewsphere.zoo import build
 ENGINE = "cycles"
 """The engine that builds and saves the scenes."""
 
+HOLDS = ("the scene itself",)
+READ_BY = ("Blender",)
 ANNOTATES = False  # what is hidden is part of a scene, too
 CREDITS = False
 CHANNELS = ()

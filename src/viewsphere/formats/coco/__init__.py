@@ -28,6 +28,8 @@ from viewsphere.model.channel import missing
 from viewsphere.model.sample import Sample
 from viewsphere.store import Dataset
 
+HOLDS = ("boxes", "masks", "captions", "poses", "3D boxes")
+READ_BY = ("pycocotools", "torchvision", "datumaro", "supervision", "FiftyOne")
 CHANNELS = ("rgb",)
 
 

@@ -23,6 +23,9 @@ from viewsphere.formats.huggingface.shards import Shards, split_name
 from viewsphere.model.sample import Sample
 from viewsphere.store import Dataset
 
+HOLDS = ("everything but maps of points",)
+READ_BY = ("datasets",)
+
 
 def check() -> None:
     """Raise MissingExtraError where there is no pyarrow."""

@@ -25,6 +25,9 @@ from viewsphere.formats.native.reading import read as read
 from viewsphere.model.sample import Sample
 from viewsphere.store import Dataset
 
+HOLDS = ("poses", "3D boxes", "masks", "depth")
+READ_BY = ("any JSON reader",)
+
 
 def preparer(dataset: Dataset, folder: Path) -> Callable[[Sample], list[Entry]]:
     """Puts a sample's picture, masks and depth in place, and makes its entries of `dataset1.json`."""

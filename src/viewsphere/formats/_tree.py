@@ -1,0 +1,229 @@
+"""What most formats are: a tree of files, of which every sample gives some whole, and parts of others.
+
+A format's module has a class of its own, below `Tree`, and takes its functions from that:
+
+    preparer, writer, verify = functions(Yolo)
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Callable, Collection, Generator, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from itertools import zip_longest
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from viewsphere.aside import temporary
+from viewsphere.formats import Remark
+from viewsphere.formats._contents import Content, Expected, check_files, put, same_bytes
+from viewsphere.formats._paper import json_bytes
+from viewsphere.model.sample import Sample
+from viewsphere.store import Dataset
+
+FOLDER_SIZE = 10_000
+"""Most files of a folder, where a format does not say otherwise."""
+
+
+@dataclass(frozen=True)
+class File:
+    """A whole file, by its path from the export's folder."""
+
+    path: str
+    content: Content
+
+
+@dataclass(frozen=True)
+class Piece:
+    """The next bytes of a section of a file that many samples, or all, have parts in; `between` stands before all but the
+    first.
+    """
+
+    path: str
+    data: bytes
+    section: str = ""
+    between: bytes = b""
+
+
+def line(path: str, *values: object) -> Piece:
+    """A line of words and numbers with spaces between; floats in as many digits as they need to be read back equal."""
+    return Piece(path, (" ".join(map(str, values)) + "\n").encode())
+
+
+def item(path: str, value: Any, section: str = "") -> Piece:
+    """An item of a JSON list."""
+    return Piece(path, json_bytes(value), section, b",\n")
+
+
+def member(path: str, key: str, value: Any, section: str = "") -> Piece:
+    """A key of a JSON object, and its value."""
+    return Piece(path, json.dumps(key).encode() + b":" + json_bytes(value), section, b",\n")
+
+
+Layout = Iterable[bytes | str]
+"""What a file is put together of: bytes, and all pieces of the sections of these names."""
+
+LINES: Layout = ("",)
+LIST: Layout = (b"[\n", "", b"\n]\n")
+OBJECT: Layout = (b"{\n", "", b"\n}\n")
+
+
+class Tree:
+    """What a format makes of a data set; below it, a class for each format. Errors of the data set that only then are known are
+    raised as UserError, and leave nothing written.
+    """
+
+    def __init__(self, dataset: Dataset, *options: Any) -> None:
+        self.dataset = dataset
+
+    def stem(self, sample: Sample) -> str:
+        """A path for what is of one sample, `<split>/<index>`, without an ending; large data sets have numbered folders
+        between.
+        """
+        folder = self.dataset.plan.folder_of(sample.index, FOLDER_SIZE)
+        return "/".join((sample.split or "all", *([] if folder is None else [f"{folder:04d}"]), f"{sample.index:08d}"))
+
+    def of(self, sample: Sample) -> Iterator[File | Piece]:
+        """What a sample adds. Samples may come in any order, in several processes; their pieces are put together in the order
+        of frames.
+        """
+        raise NotImplementedError
+
+    def rest(self) -> Iterator[File]:
+        """Files that belong to no sample."""
+        yield from ()
+
+    def layout(self, path: str, counts: Mapping[str, int]) -> Layout:
+        """How a file is put together; `counts` are the numbers of its sections' pieces."""
+        return LIST if path.endswith(".json") else LINES
+
+    def notes(self) -> Iterator[str]:
+        """Lines for the user."""
+        yield from ()
+
+
+class Functions(NamedTuple):
+    """What a format's module has of a tree: see `viewsphere.formats.Format`."""
+
+    preparer: Callable[..., Callable[[Sample], list[Piece]]]
+    writer: Callable[..., Any]
+    verify: Callable[..., Iterator[Remark]]
+
+
+def functions(kind: type[Tree]) -> Functions:
+    """The functions of a format that is this tree."""
+
+    def preparer(dataset: Dataset, folder: Path, *options: Any) -> Callable[[Sample], list[Piece]]:
+        tree = kind(dataset, *options)
+
+        def prepare(sample: Sample) -> list[Piece]:
+            pieces: list[Piece] = []
+            for one in tree.of(sample):
+                if isinstance(one, Piece):
+                    pieces.append(one)
+                else:
+                    put(dataset, one.content, folder / one.path)
+            return pieces
+
+        return prepare
+
+    @contextmanager
+    def writer(
+        dataset: Dataset, folder: Path, note: Callable[[str], None], *options: Any
+    ) -> Generator[Callable[[list[Piece]], None]]:
+        tree = kind(dataset, *options)
+        with _collecting(tree, folder) as collected:
+            yield collected.add
+        for file in tree.rest():
+            put(dataset, file.content, folder / file.path)
+        for told in tree.notes():
+            note(f"note: {told}")
+
+    def verify(dataset: Dataset, folder: Path, sampled: Collection[int], *options: Any) -> Iterator[Remark]:
+        tree = kind(dataset, *options)
+        with temporary("proof") as aside:
+            with _collecting(tree, aside) as collected:
+                expected, again = _expected(tree, collected.add), _expected(tree, _nowhere)
+                yield from check_files(dataset, folder, expected, again, collected.files.keys())
+            for path in collected.files:
+                yield from _different(aside / path, folder / path)
+
+    return Functions(preparer, writer, verify)
+
+
+def _nowhere(pieces: list[Piece]) -> None:
+    """Where pieces go that nobody wants."""
+
+
+def _expected(tree: Tree, add: Callable[[list[Piece]], None]) -> Iterator[Expected]:
+    for sample in tree.dataset:
+        for one in tree.of(sample):
+            if isinstance(one, Piece):
+                add([one])
+            else:
+                yield sample.index, one.path, one.content
+    yield from ((None, file.path, file.content) for file in tree.rest())
+
+
+@contextmanager
+def _collecting(tree: Tree, folder: Path) -> Generator[_Collected]:
+    """Collects pieces, and puts their files together at the end."""
+    with temporary("pieces") as aside:
+        collected = _Collected(aside)
+        yield collected
+        for path, sections in collected.files.items():
+            _assemble(tree, path, sections, folder / path)
+
+
+def _assemble(tree: Tree, path: str, sections: Mapping[str, _Section], file: Path) -> None:
+    file.parent.mkdir(parents=True, exist_ok=True)
+    with file.open("wb") as out:
+        for part in tree.layout(path, {name: section.count for name, section in sections.items()}):
+            if isinstance(part, bytes):
+                out.write(part)
+            elif part in sections:
+                with sections[part].file.open("rb") as pieces:
+                    shutil.copyfileobj(pieces, out)
+
+
+@dataclass
+class _Section:
+    """The pieces of a section, one after another, and how many there are."""
+
+    file: Path
+    count: int = 0
+
+
+class _Collected:
+    """Pieces in the order in which they come, on the disk, by file and section."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self.files: dict[str, dict[str, _Section]] = {}
+
+    def add(self, pieces: Iterable[Piece]) -> None:
+        """Add pieces to the ends of their sections."""
+        for piece in pieces:
+            sections = self.files.setdefault(piece.path, {})
+            if piece.section not in sections:
+                sections[piece.section] = _Section(self._folder / f"{len(self.files)}-{len(sections)}")
+            section = sections[piece.section]
+            with section.file.open("ab") as file:
+                file.write(piece.between + piece.data if section.count else piece.data)
+            section.count += 1
+
+
+def _different(wanted: Path, found: Path) -> Iterator[Remark]:
+    """Where a file that is put together is not what it should be."""
+    if not found.is_file() or same_bytes(wanted, found):
+        return
+    with wanted.open("rb") as ours, found.open("rb") as theirs:
+        for number, (one, other) in enumerate(zip_longest(ours, theirs, fillvalue=b""), 1):
+            if one != other:
+                at = next((i for i, (a, b) in enumerate(zip(one, other, strict=False)) if a != b), min(len(one), len(other)))
+                begin = max(0, at - 40)
+                told = f"expected {one[begin : at + 40]!r}, found {other[begin : at + 40]!r}"
+                yield None, f"{found.name}: line {number}, byte {at}: {told}: export again"
+                return

@@ -1,0 +1,125 @@
+"""YOLO, as Ultralytics trains it: a text file beside each picture, a line an object, numbers as shares of the picture.
+
+    data.yaml                        path, train, val, test, names; for pose kpt_shape, flip_idx, kpt_names
+    images/<split>/<index>.png       the pictures
+    labels/<split>/<index>.txt       class, and by task: `detect` centre x, centre y, width, height of the visible pixels'
+                                     box; `segment` the mask's polygon; `pose` the box, then x, y, v of each point; `obb` four
+                                     corners
+
+Classes count from 0 in the data set's order of categories. `segment`: an object has one ring; several pieces are joined by
+lines of no width, as Ultralytics' own converter does. `pose`: v is 2 for a visible point, 1 for an occluded one, 0 for others,
+and the points of all models together are one list, of which each object has its own. Objects of which nothing is seen have no
+line. Source: Ultralytics' documentation, https://docs.ultralytics.com/datasets/.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, Literal
+
+import numpy as np
+import yaml
+from pydantic import Field
+
+from viewsphere.errors import UserError
+from viewsphere.formats._pictures import picture, suffix_of
+from viewsphere.formats._rings import one_ring
+from viewsphere.formats._tree import File, Piece, Tree, functions
+from viewsphere.model.frozen import Frozen
+from viewsphere.model.sample import ObjectAnnotation, Sample
+from viewsphere.store import Dataset
+
+CHANNELS = ("rgb",)
+CREDITS = False
+HOLDS = ("boxes", "masks", "keypoints", "oriented boxes")
+READ_BY = ("ultralytics", "supervision", "datumaro")
+KINDS = (".png", ".jpg", ".webp")
+STATES = {0: 2, 1: 1}  # of our keypoints; outside and behind the camera are not labelled
+
+
+class Options(Frozen):
+    """What is labelled."""
+
+    task: Literal["detect", "segment", "pose", "obb"] = Field(
+        default="detect",
+        description="`detect`: boxes; `segment`: polygons; `pose`: boxes with keypoints; `obb`: oriented boxes",
+    )
+
+
+def needs(options: Options) -> tuple[str, ...]:
+    """Labels on request."""
+    return {"pose": ("keypoints",), "obb": ("obb",)}.get(options.task, ())
+
+
+class Yolo(Tree):
+    """The tree of a task."""
+
+    def __init__(self, dataset: Dataset, options: Options) -> None:
+        super().__init__(dataset)
+        self._task = options.task
+        self._classes = {category.id: number for number, category in enumerate(dataset.categories)}
+        self._points = _points(dataset) if options.task == "pose" else {}
+        if options.task == "pose" and not self._points:
+            raise UserError("yolo: expected models with keypoints for task pose; found none: name some in the models' sidecars")
+
+    def of(self, sample: Sample) -> Iterator[File | Piece]:
+        """A picture and its labels."""
+        stem = self.stem(sample)
+        yield File(f"images/{stem}{suffix_of(sample, *KINDS)}", picture(sample, *KINDS))
+        rows = (self._row(sample, o) for o in sample.objects if o.box2d is not None)
+        yield File(f"labels/{stem}.txt", "".join(f"{row}\n" for row in rows if row).encode())
+
+    def rest(self) -> Iterator[File]:
+        """The description that training begins from."""
+        splits = {name: f"images/{name}" for name in self.dataset.splits}
+        data: dict[str, Any] = {"path": ".", **splits}
+        data |= {name: next(iter(splits.values())) for name in ("train", "val") if name not in splits}
+        if self._points:
+            swapped = _flipped(self.dataset)
+            data["kpt_shape"] = [len(self._points), 3]
+            data["flip_idx"] = [self._points[swapped.get(name, name)] for name in self._points]
+            names = list(self._points)
+            data["kpt_names"] = {number: names for number in self._classes.values()}
+        data["names"] = {self._classes[category.id]: category.name for category in self.dataset.categories}
+        yield File("data.yaml", yaml.safe_dump(data, sort_keys=False, allow_unicode=True).encode())
+
+    def _row(self, sample: Sample, o: ObjectAnnotation) -> str:
+        """A line of labels; empty for an object that the task has nothing for."""
+        assert o.box2d is not None
+        size = np.array([sample.width, sample.height])
+        low, high = np.array(o.box2d[:2]) / size, np.array(o.box2d[2:]) / size
+        numbers = [*((low + high) / 2), *(high - low)]
+        if self._task == "segment":
+            if not o.area:
+                return ""
+            numbers = (one_ring(o.polygons) / size).ravel()
+        elif self._task == "obb":
+            if o.obb is None:
+                return ""
+            numbers = np.clip(o.obb / size, 0, 1).ravel()
+        elif self._task == "pose":
+            numbers += self._marked(o, size).ravel().tolist()
+        return " ".join([str(self._classes[o.category_id]), *(f"{value:.8g}" for value in numbers)])
+
+    def _marked(self, o: ObjectAnnotation, size: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
+        """All points, (N, 3): x, y, v; 0 0 0 for those that the object does not have, or that are not in the picture."""
+        found = np.zeros((len(self._points), 3))
+        for name, place, state in zip(o.keypoint_names, o.keypoints, o.keypoint_states, strict=True):
+            if int(state) in STATES:
+                found[self._points[name]] = (*(place / size), STATES[int(state)])
+        return found
+
+
+def _points(dataset: Dataset) -> dict[str, int]:
+    """The names of all models' points, and their numbers."""
+    names = (name for model in dataset.models for name in (model.keypoints.points if model.keypoints else ()))
+    return {name: number for number, name in enumerate(dict.fromkeys(names))}
+
+
+def _flipped(dataset: Dataset) -> dict[str, str]:
+    """Which points change places in a mirror image."""
+    pairs = [pair for model in dataset.models if model.keypoints for pair in model.keypoints.flips]
+    return {one: other for pair in pairs for one, other in (pair, pair[::-1])}
+
+
+preparer, writer, verify = functions(Yolo)

@@ -1,0 +1,126 @@
+"""A data set with labels that it does not keep: they are computed of its shots and models when they are asked for."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
+from functools import cached_property, partial
+from typing import Any
+
+from numpy.typing import NDArray
+
+from viewsphere.errors import StoreError, UserError
+from viewsphere.formats import Format
+from viewsphere.labels import Sight, annotated, channel_labels, labels, on_request, sample_values
+from viewsphere.model.channel import PASSES, missing
+from viewsphere.model.sample import Sample
+from viewsphere.recipe.formats import FormatEntry
+from viewsphere.run.scenery import Scenery
+from viewsphere.run.scope import needs_of
+from viewsphere.run.sights import Sights
+from viewsphere.store import Choice, Dataset, Exported
+
+
+def lacking(dataset: Dataset, module: Format, entry: FormatEntry) -> tuple[str, ...]:
+    """The labels that a format needs and a data set does not keep, all of which can be computed of its shots; none of a data
+    set without shots, such as an imported one, of which formats take what there is.
+
+    Raises UserError for those that cannot: passes, which an engine has to paint, and points that a recipe has to name.
+    """
+    shot = next((dataset.labelled(row.key) for row in dataset.rows[:1]), None)
+    if shot is None:
+        return ()
+    asked = {name for part in dataset.plan.parts for name in part.recipe.get("annotations", ())}
+    wanted, names = needs_of(module, entry), dict[str, None]()
+    for sensor in shot.rig.sensors:
+        absent = missing(wanted, {*sensor.kept(dataset.plan.channels), *asked})
+        names |= dict.fromkeys(name for name in absent if sensor.lidar is None or name not in PASSES)
+    painted = [name for name in names if name in PASSES]
+    if painted:
+        raise UserError(
+            f"{dataset.root}: format {entry.name}: expected channel {', '.join(painted)}, found none: an engine has to paint "
+            "it: add it to the recipe's channels, and render with --append"
+        )
+    for name in names:
+        needs = labels()[name].needs
+        if needs.tracks or needs.lidar or needs.looks:
+            raise UserError(
+                f"{dataset.root}: format {entry.name}: expected label {name}, found none: add it to the recipe, and render"
+            )
+    return tuple(names)
+
+
+class Completed(Exported):
+    """A data set whose samples have labels of these names, too, and lack annotations of what is seen no more than `least`."""
+
+    def __init__(
+        self, root: str | os.PathLike[str], choice: Choice | None, least: float | None, names: tuple[str, ...]
+    ) -> None:
+        super().__init__(root, choice, -1.0 if least is None else least)
+        self._names = names
+
+    def __reduce__(self) -> tuple[Any, ...]:  # pyright: ignore[reportIncompatibleMethodOverride]
+        return type(self), (self.root, self.choice, self.least, self._names)
+
+    def shown(self, sample: Sample) -> Sample:
+        """A sample with the labels that are computed."""
+        wanted = [name for name in self._names if name not in sample.channels and name not in sample.asked]
+        return super().shown(self._with(sample, wanted) if wanted else sample)
+
+    @cached_property
+    def _scenery(self) -> Scenery:
+        return Scenery(self)
+
+    @cached_property
+    def _sights(self) -> Sights:
+        return Sights(self, self._scenery, {info.key: info for info in self.models})
+
+    def _with(self, sample: Sample, names: list[str]) -> Sample:
+        if not self._sights.is_possible(sample):
+            raise StoreError(
+                f"frame {sample.index}: expected a shot of which {names[0]} is computed; found an imported picture"
+            )
+        asked = tuple(name for name in names if name in on_request())
+        channels = _Computed(sample.channels, [n for n in names if n in channel_labels()], partial(self._sight, sample, names))
+        if not asked:
+            return replace(sample, channels=channels)
+        sight = self._sight(sample, names)
+        objects = annotated(sight)
+        more = {**sample.more, **sample_values(sight, objects)}
+        return replace(sample, channels=channels, objects=objects, more=more, asked=(*sample.asked, *asked))
+
+    def _sight(self, sample: Sample, names: list[str]) -> Sight:
+        asked = [name for name in names if name in on_request()]
+        sight = self._sights.of(sample, [*sample.files, *names], asked, continued=True)
+        if sight is None:
+            raise StoreError(f"frame {sample.index}: expected scenery as it was rendered: {'; '.join(self._scenery.notes)}")
+        return sight
+
+
+class _Computed(Mapping[str, NDArray[Any]]):
+    """A sample's channels, and others that are computed when they are first asked for."""
+
+    def __init__(self, kept: Mapping[str, NDArray[Any]], names: list[str], sight: Callable[[], Sight]) -> None:
+        self._kept, self._names, self._sight = kept, names, sight
+        self._made: dict[str, NDArray[Any]] = {}
+        self._seen: Sight | None = None
+
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        if name not in self._names:
+            return self._kept[name]
+        if name not in self._made:
+            self._seen = self._seen or self._sight()
+            self._made[name] = channel_labels()[name].compute(self._seen)
+        return self._made[name]
+
+    def __contains__(self, name: object) -> bool:
+        """Without reading or computing it."""
+        return name in self._kept or name in self._names
+
+    def __iter__(self) -> Iterator[str]:
+        yield from self._kept
+        yield from self._names
+
+    def __len__(self) -> int:
+        return len(self._kept) + len(self._names)

@@ -1,0 +1,215 @@
+"""What the cameras of a data set's frames see, made again: from the exported models, where shots say that they stand."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewsphere.assets.exported import read_exported
+from viewsphere.assets.mesh import Mesh
+from viewsphere.labels import Placement, Sight, labels
+from viewsphere.model.model_spec import ModelSpec, step_key
+from viewsphere.model.sample import ObjectAnnotation, Sample
+from viewsphere.model.scene import Matrix4
+from viewsphere.model.shot import Shot
+from viewsphere.model.thing import Motion, Thing, TimeStep
+from viewsphere.run.scenery import Scenery
+from viewsphere.run.tasks import SceneryRecord
+from viewsphere.store import Dataset, ModelInfo
+from viewsphere.truth.geometry import Geometry, build_geometry, present
+from viewsphere.truth.shot_views import SampleViews, ShotViews, views_of
+from viewsphere.truth.visibility import rasterize
+
+MODELS = 200
+"""Exported models that are kept in memory."""
+
+
+class Sights:
+    """Gives the sights of a data set's samples; the last geometry is kept, because samples of one follow one another."""
+
+    def __init__(self, dataset: Dataset, scenery: Scenery, models: Mapping[str, ModelInfo]) -> None:
+        self._dataset, self._scenery, self._models = dataset, scenery, models
+        self._mesh = lru_cache(maxsize=MODELS)(self._read)
+        self._geometry: tuple[object, Geometry | None] = None, None
+        self._views: tuple[str, ShotViews | None] = "", None
+        self._continued = lru_cache(maxsize=4)(self._joined)
+        self._keys: dict[int, str] = {}  # of the objects of the views' shot: merged data sets have names of their own
+
+    def is_possible(self, sample: Sample) -> bool:
+        """Whether it is known what was seen: the shot is kept, and the objects are placed."""
+        known = self._scenery.shot(self._scenery.key_of(sample.index)) is not None
+        return known and sample.known_camera is not None and all(o.source is None for o in sample.objects)
+
+    def of(self, sample: Sample, names: Iterable[str], asked: Iterable[str] = (), continued: bool = False) -> Sight | None:
+        """What a sample's sensor saw, for labels of these names, and with the labels on request that were or are `asked` for;
+        None where scenery is not what it was. `continued`: labels may compare it with instants of the shots before and after.
+        """
+        key = self._scenery.key_of(sample.index)
+        made = self._continued(key) if continued else self._made(key)
+        assert made is not None
+        around, shot = (
+            made.around,
+            made.shot.model_copy(update={"labels": {**made.shot.labels, **sample.options}}),
+        )  # those of channels added later, too
+        geometry = self._built(sample, shot, around)
+        if geometry is None:
+            return None
+        camera, by_id = sample.camera, {o.id: o for o in sample.objects}
+        placed = tuple(self._placement(by_id.get(i + 1), sample, shot) for i in range(geometry.object_count))
+        visibility = rasterize(geometry, camera, keeps_exact=True)
+        annotations = tuple(dict.fromkeys((*shot.annotations, *asked)))
+        views = self._compared(sample, shot, around, (*names, *annotations))
+        return Sight(geometry, camera, visibility, placed, views, annotations, shot.labels)
+
+    def _made(self, key: str) -> _Made | None:
+        shot = self._scenery.shot(key)
+        return shot and _Made(shot, self._scenery.around(key))
+
+    def _joined(self, key: str) -> _Made | None:
+        """A shot of a sequence with the last instant of the one before, and the first of the one after, where it lacks them."""
+        made, row = self._made(key), self._dataset.plan.find(key)
+        if made is None or row is None or not made.shot.sequence:
+            return made
+        for number, place in ((row.first - 1, -1), (row.first + row.count, 0)):
+            other = self._beside(number) if 0 <= number < self._dataset.plan.frames else None
+            if other is not None and other.shot.sequence == made.shot.sequence:
+                made = made.with_instant(other, place)
+        return made
+
+    def _beside(self, frame: int) -> _Made | None:
+        row = self._dataset.plan.row_at(frame)
+        return self._made(row.key) if self._dataset.store.has_shot(row.key) else None
+
+    def _placement(self, o: ObjectAnnotation | None, sample: Sample, shot: Shot) -> Placement | None:
+        if o is None:
+            return None
+        info = self._models[o.key]
+        pose = _matrix(o.world_from_object)
+        return Placement(_spec(info), pose, sample.camera, shot.category_deg, lambda: info, _step(info))
+
+    def _built(self, sample: Sample, shot: Shot, around: SceneryRecord) -> Geometry | None:
+        """The geometry that a sample shows; None where scenery is not what it was."""
+        there = {o.id: o for o in sample.objects}
+        objects = tuple(self._thing(there.get(thing.id), thing) for thing in shot.objects)
+        instant, _ = self._scenery.taken(sample, shot)
+        behind = tuple(thing.at(instant) for thing in around.things)
+        ground = shot.scene.ground is not None and shot.scene.ground.is_labelled
+        now = objects, behind, ground, shot.label_alpha, shot.scene.floor
+        if self._geometry[0] != now:
+            meshes = [self._mesh(thing.key) for thing in objects]
+            scenery = [self._scenery.mesh(around, thing) for thing in behind]
+            whole = [mesh for mesh in scenery if mesh is not None]
+            things = (*objects, *behind)
+            built = None
+            if len(whole) == len(scenery):
+                built = build_geometry(things, present(things, [*meshes, *whole]), ground, shot.label_alpha, shot.scene.floor)
+            self._geometry = now, built
+        return self._geometry[1]
+
+    def _compared(self, sample: Sample, shot: Shot, around: SceneryRecord, names: Iterable[str]) -> SampleViews | None:
+        """What labels of motion and stereo compare a sample with; None without one, and where scenery is not what it was.
+
+        Points are picked here, before any label asks for triangles, which would be written over.
+        """
+        known = labels()
+        needs = [known[name].needs for name in names if name in known]
+        if not any(need.is_some for need in needs):
+            return None
+        keys = {o.id: o.track or o.key for o in sample.objects}
+        if self._views[0] != shot.key:
+            self._keys = keys  # before the views are made, which ask for meshes
+            self._views = shot.key, self._shot_views(shot, around)
+        self._keys.update(keys)
+        views, (instant, sensor) = self._views[1], self._scenery.taken(sample, shot)
+        if views and any(need.tracks for need in needs):
+            views.followed(sensor)
+        return views and views.around(instant, sensor)
+
+    def _shot_views(self, shot: Shot, around: SceneryRecord) -> ShotViews | None:
+        """The views of a shot whose things stand where the shot says, in the exported models."""
+        if any(self._scenery.mesh(around, thing.at(i)) is None for thing in around.things for i in range(len(shot.instants))):
+            return None
+
+        def mesh(thing: Thing) -> Mesh:
+            if not thing.id:
+                return self._scenery.known(around, thing)
+            return self._mesh(step_key(self._keys.get(thing.id, thing.model.key), thing.step and thing.step.frame))
+
+        return views_of(shot.model_copy(update={"things": (*shot.things, *around.things)}), mesh)
+
+    def _thing(self, o: ObjectAnnotation | None, thing: Thing) -> Thing:
+        """An object as a sample says that it stands, or not there."""
+        if o is None:
+            return Thing(id=thing.id, model=thing.model, motion=Motion(poses=(None,)))
+        info = self._models[o.key]
+        return Thing(id=o.id, model=_spec(info), motion=Motion.still(_matrix(o.world_from_object), _step(info)))
+
+    def _read(self, key: str) -> Mesh:
+        info = self._models[key]
+        whole = "lidar" in self._dataset.plan.channels  # its intensity follows from colours, too
+        return read_exported(self._dataset.path(info.glb), info.parts, info.node, whole=whole)
+
+
+@dataclass(frozen=True)
+class _Made:
+    """A shot as it was rendered, and what stands around its objects."""
+
+    shot: Shot
+    around: SceneryRecord
+
+    def with_instant(self, other: _Made, place: int) -> _Made:
+        """The same with an instant of a neighbour in its sequence, the first one that is recorded (0), or the last (-1); as it
+        is where it has that already.
+        """
+        at = [i for i, instant in enumerate(other.shot.instants) if instant.recorded][place]
+        instant, own = other.shot.instants[at], self.shot.instants
+        if any(one.index == instant.index for one in own):
+            return self
+        where = 0 if place else len(own)
+
+        def inserted(values: Iterable[Any], one: Any) -> tuple[Any, ...]:
+            known = tuple(values)
+            return (*known[:where], one, *known[where:])
+
+        def moved(thing: Thing, then: Thing) -> Thing:
+            if thing.motion == then.motion and thing.motion.is_still:
+                return thing
+            poses = inserted(map(thing.motion.at, range(len(own))), then.motion.at(at))
+            steps = inserted(map(thing.motion.step_at, range(len(own))), then.motion.step_at(at))
+            return thing.model_copy(update={"motion": Motion(poses=poses, steps=steps, moves=True)})
+
+        shot = self.shot.model_copy(
+            update={
+                "instants": inserted(own, instant.model_copy(update={"recorded": False})),
+                "things": tuple(map(moved, self.shot.things, other.shot.things)),
+                "exposures": inserted(self.shot.exposures, None) if self.shot.shutter else (),
+            }
+        )
+        behind = tuple(map(moved, self.around.things, other.around.things))
+        return _Made(shot, self.around.model_copy(update={"things": behind}))
+
+
+def _spec(info: ModelInfo) -> ModelSpec:
+    """The model as labels know it: what the data set says of it."""
+    return ModelSpec(
+        key=info.track or info.key,
+        source="",
+        category=info.category,
+        supercategory=info.supercategory,
+        category_id=info.category_id,
+    )
+
+
+def _step(info: ModelInfo) -> TimeStep | None:
+    """The time step that the key of a model names."""
+    return info.step if info.track else None
+
+
+def _matrix(values: NDArray[np.float64]) -> Matrix4:
+    a, b, c, d = ((w, x, y, z) for w, x, y, z in values.tolist())
+    return a, b, c, d

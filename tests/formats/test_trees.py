@@ -1,0 +1,114 @@
+"""What holds of every format, on each data set of tests/worlds.py that it does not refuse: it is the same however it is
+written, and its proof finds whatever is changed.
+"""
+
+from __future__ import annotations
+
+import shutil
+
+import pytest
+
+from small import tree_hash
+from viewsphere import Dataset, plugins
+from viewsphere.errors import UserError
+from viewsphere.recipe.formats import FormatEntry
+from viewsphere.run.exporting import export, writable_formats
+from viewsphere.run.preparing import Views
+from viewsphere.run.scope import refusals, scope_of
+from viewsphere.store.checksums import CHECKSUMS
+from worlds import WORLDS
+
+HEAVY = {"blend", "huggingface"}  # a program of its own; another library's files
+FORMATS = [name for name in writable_formats() if name not in HEAVY]
+
+
+@pytest.fixture(scope="module")
+def exported(request, tmp_path_factory):
+    """A function that gives a format's export of a world, written once; None where the format refuses it."""
+    made = {}
+
+    def get(name, world):
+        if (name, world) not in made:
+            dataset = request.getfixturevalue(world)
+            made[name, world] = None
+            if accepts(dataset, name):
+                export(dataset.root, name, output=tmp_path_factory.mktemp(f"{name}-{world}"))
+                made[name, world] = tmp_path_factory.getbasetemp() / f"{name}-{world}0" / name
+        return made[name, world]
+
+    return get
+
+
+def accepts(dataset, name):
+    return not list(refusals(plugins.load("formats", name), FormatEntry(name=name), scope_of(dataset)))
+
+
+def remarks(dataset, name, folder):
+    entry = FormatEntry(name=name)
+    view = Views(dataset).of(entry, None)
+    return list(plugins.load("formats", name).verify(view, folder, range(len(dataset)), *entry.arguments()))
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_every_format_holds_some_data_set_and_refuses_others_in_words(name, request):
+    refused = []
+    for world in WORLDS:
+        dataset = request.getfixturevalue(world)
+        problems = list(refusals(plugins.load("formats", name), FormatEntry(name=name), scope_of(dataset)))
+        refused += [world] if problems else []
+        assert all("; found " in problem and "\n" not in problem for problem in problems)
+        if problems:
+            with pytest.raises(UserError, match=f"format {name}: "):
+                export(dataset.root, name, output=dataset.root.parent / "refused")
+            assert not (dataset.root.parent / "refused").exists()
+    assert len(refused) < len(WORLDS)
+
+
+@pytest.mark.parametrize("world", WORLDS)
+@pytest.mark.parametrize("name", FORMATS)
+def test_an_export_is_proved(exported, name, world, request):
+    folder = exported(name, world)
+    if folder is not None:
+        assert remarks(request.getfixturevalue(world), name, folder) == []
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_what_is_changed_is_found(exported, name, request, tmp_path):
+    """A file of each kind, which is cut, changed in one byte, missing, or too many."""
+    world = next(world for world in WORLDS if exported(name, world))
+    dataset, folder = request.getfixturevalue(world), tmp_path / name
+    shutil.copytree(exported(name, world), folder)
+    (folder / CHECKSUMS).unlink()
+    kinds = {}
+    for file in sorted(path for path in folder.rglob("*") if path.is_file() and path.stat().st_size):
+        kinds.setdefault((file.suffix, file.parent.name), file)
+    for file in kinds.values():
+        data = file.read_bytes()
+        for other in (
+            data[:-1],
+            bytes([*data[:-1], data[-1] ^ 1]),
+            data[: len(data) // 2] + b"x" + data[len(data) // 2 :],
+            None,
+        ):
+            file.unlink()
+            if other is not None:
+                file.write_bytes(other)
+            found = remarks(dataset, name, folder)
+            assert found, (file, other is None)
+            assert all("\n" not in message for _, message in found)
+            file.write_bytes(data)
+    (folder / "strange").write_text("")
+    assert any("strange" in message for _, message in remarks(dataset, name, folder))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", FORMATS)
+def test_an_export_is_the_same_by_several_processes(exported, name, request, tmp_path, monkeypatch):
+    from viewsphere.run import preparing
+
+    monkeypatch.setattr(preparing, "PATIENCE_S", 0.0)
+    monkeypatch.setattr(preparing, "WORTH_S", 0.0)
+    world = next(world for world in WORLDS if exported(name, world))
+    dataset: Dataset = request.getfixturevalue(world)
+    export(dataset.root, name, output=tmp_path, workers=2)
+    assert tree_hash(tmp_path / name) == tree_hash(exported(name, world))

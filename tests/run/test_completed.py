@@ -1,0 +1,55 @@
+"""Labels that a data set does not keep are computed for exports: they are those that it would have kept."""
+
+import numpy as np
+import pytest
+
+from viewsphere import Dataset, generate
+from viewsphere.errors import UserError
+from viewsphere.recipe.formats import FormatEntry
+from viewsphere.run.completed import Completed, lacking
+from viewsphere.run.exporting import export
+from worlds import rendered, shared_place, stills, videos
+
+FEW = {"channels": ["rgb", "tracks"], "annotations": []}
+
+
+@pytest.mark.parametrize("world", ["stills", "videos"])
+def test_what_is_computed_is_what_would_have_been_kept(world, tmp_path, tmp_path_factory):
+    whole = Dataset(rendered(world, shared_place(tmp_path_factory)))
+    recipe = stills(**{**FEW, "channels": ["rgb"]}) if world == "stills" else videos(**FEW, shot_frames=4)
+    generate(recipe, tmp_path / "few")
+    wanted = [name for name in whole.plan.channels if name not in ("rgb", "tracks")]
+    asked = [name for name in whole.recipe["annotations"] if name not in ("captions",)]
+    completed = Completed(tmp_path / "few", None, None, (*wanted, *asked))
+    assert len(list(completed.shots())) > len(list(whole.shots())) or world == "stills"
+    for ours, theirs in zip(completed, whole, strict=True):
+        for name in wanted:
+            np.testing.assert_array_equal(ours.channels[name], theirs.channels[name], err_msg=name)
+        for one, other in zip(ours.objects, theirs.objects, strict=True):
+            assert one.id == other.id and one.rle == other.rle
+            for name in ("amodal", "occluders", "obb", "keypoints", "keypoint_states"):
+                np.testing.assert_equal(getattr(one, name), getattr(other, name))
+        if world == "videos":
+            np.testing.assert_equal(ours.more["camera_from_next"], theirs.more["camera_from_next"])
+
+
+def test_what_cannot_be_computed_is_told(tmp_path):
+    generate(stills(channels=["depth"], annotations=[]), tmp_path / "out")
+    with pytest.raises(UserError, match="format yolo: expected channel rgb, found none: an engine has to paint it"):
+        export(tmp_path / "out", "yolo")
+    assert not (tmp_path / "out" / "yolo").exists()
+    dataset = Dataset(tmp_path / "out")
+    module = type("module", (), {"CHANNELS": ("tracks",)})
+    with pytest.raises(UserError, match="expected label tracks, found none: add it to the recipe, and render"):
+        lacking(dataset, module, FormatEntry(name="yolo"))
+
+
+def test_exports_of_few_channels_are_those_of_many(tmp_path, tmp_path_factory):
+    whole = Dataset(rendered("stills", shared_place(tmp_path_factory)))
+    generate(stills(channels=["rgb"], annotations=[]), tmp_path / "few")
+    for root, place in ((whole.root, "whole"), (tmp_path / "few", "computed")):
+        export(root, [{"yolo": {"task": "pose"}}, "ply"], output=tmp_path / place)
+    pairs = [(file, tmp_path / "computed" / file.relative_to(tmp_path / "whole"))
+             for file in (tmp_path / "whole").rglob("*.txt")]  # fmt: skip
+    assert len(pairs) == len(whole)
+    assert all(one.read_bytes() == other.read_bytes() for one, other in pairs)
