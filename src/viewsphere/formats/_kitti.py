@@ -98,6 +98,12 @@ def printed(values: Float) -> str:
     return " ".join(f"{value:.12e}" for value in (np.asarray(values) + 0.0).ravel())
 
 
+def calibration_text(calibrated: Mapping[str, Float], *others: tuple[str, Float]) -> bytes:
+    """Lines of the four projections, and of other matrices, each with the word that its line begins with."""
+    projections = ((f"{name}:", calibrated[name]) for name in ("P0", "P1", "P2", "P3"))
+    return "".join(f"{name} {printed(matrix)}\n" for name, matrix in (*projections, *others)).encode()
+
+
 def velodyne(sample: Sample) -> bytes:
     """The points of a LiDAR, four float32 each: x ahead, y left, z up (metres), and intensity."""
     points = sample.channels["lidar"]

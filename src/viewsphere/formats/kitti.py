@@ -39,12 +39,21 @@ from collections.abc import Iterator, Mapping
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from viewsphere.errors import UserError
 from viewsphere.formats import Scope
-from viewsphere.formats._kitti import Car, calibration, car_in, inclusive, other_cars, printed, upright, velodyne
+from viewsphere.formats._kitti import (
+    Car,
+    Float,
+    calibration,
+    calibration_text,
+    car_in,
+    inclusive,
+    other_cars,
+    upright,
+    velodyne,
+)
 from viewsphere.formats._pictures import picture
 from viewsphere.formats._refusals import pinhole, plain_names, sequences
 from viewsphere.formats._timeline import Timeline
@@ -163,11 +172,10 @@ class Kitti(Tree):
         return " ".join([start, *(f"{number + 0.0:.9g}" for number in numbers)])
 
 
-def _text(calibrated: Mapping[str, NDArray[np.float64]], task: str) -> bytes:
+def _text(calibrated: Mapping[str, Float], task: str) -> bytes:
     """The text of a calibration, in a task's words."""
-    projections = [(f"{name}:", calibrated[name]) for name in ("P0", "P1", "P2", "P3")]
-    others = zip(CALIBRATED[task], (np.eye(3), calibrated["velo"], np.eye(3, 4)), strict=True)
-    return "".join(f"{name} {printed(matrix)}\n" for name, matrix in (*projections, *others)).encode()
+    others = (np.eye(3), calibrated["velo"], np.eye(3, 4))
+    return calibration_text(calibrated, *zip(CALIBRATED[task], others, strict=True))
 
 
 preparer, writer, verify = functions(Kitti)
