@@ -8,7 +8,9 @@ import pytest
 
 from cube_dataset import LENS, make
 from proven import close, equal
+from small import small_recipe
 from truth_scenes import LENSES
+from viewsphere import Dataset, generate
 from viewsphere.errors import UserError
 from viewsphere.geometry.camera import project
 from viewsphere.run.exporting import export
@@ -154,6 +156,17 @@ def test_a_part_of_an_instant(videos, tmp_path):
     for number, image in model.images.items():
         camera = videos[number - 1].camera
         close("colmap", "a part", image.cam_from_world().matrix(), np.column_stack((camera.R, camera.t)), "m", atol=1e-12)
+
+
+def test_pictures_of_other_lenses_have_cameras_of_their_own(tmp_path):
+    camera = {"size": [96, 72], "fov_deg": {"uniform": [30, 50]}}
+    generate(small_recipe(camera=camera, channels=["rgb", "depth"], formats=[]), tmp_path / "out", workers=0)
+    dataset = Dataset(tmp_path / "out")
+    found = images(dataset, written(dataset, tmp_path / "made", "binary"))
+    for sample, model, image in found:
+        close("colmap", "drawn lenses", model.cameras[image.camera_id].calibration_matrix(), sample.camera.K, "px", atol=1e-12)
+        close("colmap", "points of drawn lenses", *reprojected(model), "px", atol=1e-3)
+    assert len({image.camera_id for _, _, image in found}) == len(dataset) == 12
 
 
 def test_what_it_refuses(tmp_path):
