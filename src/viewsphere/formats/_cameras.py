@@ -10,7 +10,9 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from viewsphere.codecs.png_tiff import encode_png
 from viewsphere.formats import Scope
+from viewsphere.formats._contents import Coded
 from viewsphere.geometry.camera import pixel_rays
 from viewsphere.geometry.rotation import transform
 from viewsphere.model.camera import Camera, Intrinsics
@@ -19,6 +21,9 @@ from viewsphere.model.sample import Sample
 from viewsphere.store import Dataset
 
 Float = NDArray[np.float64]
+MOST = 65535
+"""Steps of depth that 16 bits hold."""
+
 POINTS = 500
 """Points that are taken of a picture, about."""
 
@@ -112,6 +117,19 @@ class Rigs:
             first,
             shot.camera(taken.instant),
         )
+
+
+def measured_png(sample: Sample, metres: float) -> Coded:
+    """Depth along z in steps of so many metres, 16 bits, as RGB-D cameras measure it: 0 where nothing is, or it is too far."""
+
+    def make() -> bytes:
+        depth = sample.channels["depth"].astype(np.float64)
+        with np.errstate(invalid="ignore"):
+            steps = np.rint(depth / metres)
+        held = (depth > 0) & (steps <= MOST)
+        return encode_png(np.where(held, np.maximum(steps, 1), 0).astype(np.uint16))
+
+    return Coded(sample.index, f"measured {metres!r}.png", make)
 
 
 @dataclass(frozen=True, eq=False)
