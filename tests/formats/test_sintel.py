@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from changed_samples import empty, files, with_channels
 from flow_readers import of, read_cam, read_picture, read_tagged
 from torchvision_readers import torchvision_datasets
 
@@ -142,6 +143,38 @@ def test_ptlflow_reads_flow_and_occlusions(videos, written):
 def test_without_stereo_one_eye_is_enough(videos, tmp_path):
     export(videos.root, "sintel", output=tmp_path)
     assert not (tmp_path / "sintel" / "stereo").exists()
+
+
+def test_albedo_where_it_is_kept(videos, tmp_path):
+    tree, light = sintel.Sintel(videos, sintel.Options()), np.random.default_rng(0).random((120, 160, 3), np.float32)
+    made = files(tree, with_channels(videos[0], albedo=light))
+    (tmp_path / "a.png").write_bytes(made[f"training/albedo/{videos[0].sequence}/frame_0001.png"])
+    curve = np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
+    close("sintel", "IEC 61966-2-1: albedo", read_picture(tmp_path / "a.png") / 255, curve, atol=0.51 / 255)
+
+
+def test_a_picture_of_nothing(videos, tmp_path):
+    made = files(sintel.Sintel(videos, sintel.Options(stereo=True)), empty(videos[0]))
+    name = f"{videos[0].sequence}/frame_0001"
+    (tmp_path / "a").write_bytes(made[f"training/flow/{name}.flo"])
+    assert (read_tagged(tmp_path / "a", 2) == np.float32(1e10)).all()
+    (tmp_path / "a").write_bytes(made[f"training/depth/{name}.dpt"])
+    assert np.isposinf(read_tagged(tmp_path / "a", 1)).all()
+    for kind, value in {"training/segmentation": 0, "training/occlusions": 0, "training/invalid": 255,
+                        "stereo/training/disparities": 0, "stereo/training/occlusions": 255,
+                        "stereo/training/outofframe": 0}.items():  # fmt: skip
+        (tmp_path / "a.png").write_bytes(made[f"{kind}/{name}.png"])
+        assert (read_picture(tmp_path / "a.png") == value).all(), kind
+
+
+def test_disparity_has_a_limit(videos, tmp_path):
+    tree = sintel.Sintel(videos, sintel.Options(stereo=True))
+    near = with_channels(videos[0], disparity=np.full((120, 160), 1023.9, np.float32))
+    (tmp_path / "a.png").write_bytes(files(tree, near)[f"stereo/training/disparities/{videos[0].sequence}/frame_0001.png"])
+    red, green, blue = np.moveaxis(read_picture(tmp_path / "a.png").astype(float), -1, 0)
+    assert np.abs(4 * red + green / 64 + blue / 16384 - np.float32(1023.9)).max() < 2**-14
+    with pytest.raises(UserError, match=r"frame 0: sintel: expected disparity below 1024 pixels; found 1024\.0"):
+        files(tree, with_channels(videos[0], disparity=np.full((120, 160), 1024, np.float32)))
 
 
 def scope(videos, **changes):

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
+from functools import lru_cache
 
 from viewsphere.errors import StoreError, UserError
 from viewsphere.formats import Scope
-from viewsphere.model.rig import Pair
+from viewsphere.model.camera import Intrinsics
+from viewsphere.model.rig import Pair, Rig
 from viewsphere.model.sample import Sample
 from viewsphere.recipe.sequence import TimeEntry
 from viewsphere.store import Dataset
@@ -22,31 +24,39 @@ def two_eyes(scope: Scope) -> Iterator[str]:
 
 
 class Eyes:
-    """The sensors of a data set that a format calls left and right; a lone camera is the left one."""
+    """Which sensors a format calls left and right: the first that are rectified with one another; a lone camera is left."""
 
     def __init__(self, dataset: Dataset) -> None:
         self._dataset = dataset
-        shots = (dataset.labelled(row.key) for row in dataset.rows[:1])
-        rig = next((shot.rig for shot in shots if shot is not None), None)
-        pair = rig.rectified[0] if rig and rig.rectified else Pair(0, 0, 0.0)
-        sensors = rig.sensors if rig else ()
-        self._sides: Mapping[str, str] = {}
-        if sensors:
-            self._sides = {sensors[pair.right].name: "right", sensors[pair.left].name: "left"}
+        self._rig_of = lru_cache(maxsize=8)(self._read)
 
     def side(self, sample: Sample) -> str:
-        """`left` or `right`; raises UserError for a sensor that the first sequence does not have."""
-        if sample.sensor not in self._sides:
-            known = ", ".join(self._sides) or "none"
-            raise UserError(
-                f"frame {sample.index}: expected a picture of a sensor of the first part ({known}); found {sample.sensor}"
-            )
-        return self._sides[sample.sensor]
+        """`left` or `right`; raises UserError for a sensor that is neither."""
+        rig, pair = self._rig(sample), self.pair(sample)
+        sides = {rig.sensors[pair.right].name: "right", rig.sensors[pair.left].name: "left"}
+        if sample.sensor not in sides:
+            raise UserError(f"frame {sample.index}: expected sensors {', '.join(sides)}; found {sample.sensor}")
+        return sides[sample.sensor]
 
-    def baseline(self, sample: Sample) -> float:
-        """Metres between the two eyes of a sample's shot; 0 without a pair."""
-        shot = self._dataset.labelled(sample.taken.key) if sample.taken else None
-        return shot.rig.rectified[0].baseline if shot and shot.rig.rectified else 0.0
+    def pair(self, sample: Sample) -> Pair:
+        """The two eyes of a sample's shot, and the metres between them; of a lone camera twice this, 0 apart."""
+        rig = self._rig(sample)
+        return rig.rectified[0] if rig.rectified else Pair(0, 0, 0.0)
+
+    def lens(self, sample: Sample) -> Intrinsics:
+        """The lens of the left eye in a sample's shot, before it zooms."""
+        return self._rig(sample).sensors[self.pair(sample).left].intrinsics
+
+    def _rig(self, sample: Sample) -> Rig:
+        if sample.taken is None:
+            raise StoreError(f"frame {sample.index}: expected the rig that took it; found an imported picture")
+        return self._rig_of(sample.taken.key)
+
+    def _read(self, key: str) -> Rig:
+        shot = self._dataset.labelled(key)
+        if shot is None:
+            raise StoreError(f"{self._dataset.root}: expected a shot {key}, found none")
+        return shot.rig
 
 
 def check_whole(dataset: Dataset, name: str) -> None:
