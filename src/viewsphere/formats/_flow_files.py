@@ -68,19 +68,17 @@ def flow_png(flow: NDArray[np.float32], valid: NDArray[np.bool_]) -> bytes:
 
     Flow beyond 512 pixels, which has no number, is not valid; what is not is 0, 0, 0.
     """
-    steps = np.rint(np.nan_to_num(flow.astype(np.float64)) * STEPS) + ZERO
-    has = valid & np.isfinite(flow).all(axis=-1) & ((steps >= 0) & (steps <= 65535)).all(axis=-1)
+    steps = np.rint(np.where(valid[..., None], flow.astype(np.float64), 0) * STEPS) + ZERO
+    has = valid & ((steps >= 0) & (steps <= 65535)).all(axis=-1)
     return encode_png(np.where(has[..., None], np.dstack((steps, np.ones(has.shape))), 0).astype(np.uint16))
 
 
-def disparity_png(disparity: NDArray[Any], valid: NDArray[np.bool_]) -> bytes:
-    """KITTI's disparity (H, W) as 16 bits: steps of 1/256 pixel, 0 where it is not valid, or too large for 16 bits.
-
-    What is valid and less than half a step counts as one step.
+def steps_png(numbers: NDArray[Any], valid: NDArray[np.bool_]) -> bytes:
+    """KITTI's disparity (pixels) or depth (metres), (H, W), as 16 bits in steps of 1/256; 0 where it is not valid, or too large
+    for 16 bits. What is valid and less than half a step counts as one step.
     """
-    steps = np.maximum(np.rint(np.nan_to_num(disparity.astype(np.float64)) * 256), 1)
-    has = valid & np.isfinite(disparity) & (steps <= 65535)
-    return encode_png(np.where(has, steps, 0).astype(np.uint16))
+    steps = np.maximum(np.rint(np.where(valid, numbers.astype(np.float64), 0) * 256), 1)
+    return encode_png(np.where(valid & (steps <= 65535), steps, 0).astype(np.uint16))
 
 
 def states_png(sample: Sample, channel: str, *states: int) -> Coded:
