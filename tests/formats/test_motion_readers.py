@@ -8,14 +8,11 @@ from __future__ import annotations
 import ast
 import os
 import pickle
-import warnings
 from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 import pytest
-from PIL import Image
-from torchvision_readers import torchvision_datasets
 
 import viewsphere as vs
 from sequence_recipe import eventful_recipe
@@ -23,9 +20,6 @@ from viewsphere.run.stages import Stages
 
 pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("ignore")]
 FRAMES = 12
-UNKNOWN = np.float32(1e10)
-"""Flow that is not known, as files of Middlebury say."""
-
 TAPNET = "VIEWSPHERE_TAPNET"
 """Names a checkout of https://github.com/google-deepmind/tapnet, whose evaluation is in no package."""
 
@@ -41,91 +35,6 @@ def of(dataset, sensor):
     """The samples of a sensor in the first sequence."""
     first = dataset[0].sequence
     return [sample for sample in dataset if (sample.sequence, sample.sensor) == (first, sensor)]
-
-
-def flow_of(sample):
-    return np.where(np.isnan(sample.flow), UNKNOWN, sample.flow)
-
-
-def write_flo(path, flow):
-    """https://vision.middlebury.edu/flow/code/flow-code/README.txt"""
-    height, width = flow.shape[:2]
-    path.write_bytes(b"PIEH" + np.array([width, height], "<i4").tobytes() + flow.astype("<f4").tobytes())
-
-
-def write_mask(path, mask):
-    Image.fromarray(np.where(mask, 255, 0).astype(np.uint8)).save(path)
-
-
-def write_disparity(path, disparity):
-    """Of Sintel's stereo pairs: 4 R + G / 2^6 + B / 2^14 pixels."""
-    whole = np.rint(disparity.astype(np.float64) * 2**14).astype(np.int64)
-    Image.fromarray(np.stack([whole >> 16, whole >> 8 & 255, whole & 255], axis=-1).astype(np.uint8)).save(path)
-
-
-@pytest.fixture(scope="module")
-def sintel(dataset, tmp_path_factory):
-    """The sequence as Sintel's files (http://sintel.is.tue.mpg.de): what is not visible counts as occluded."""
-    root = tmp_path_factory.mktemp("sintel")
-    folder = root / "Sintel" / "training"
-    names = ("clean", "final", "clean_left", "clean_right", "final_left", "final_right", "flow", "occlusions", "invalid")
-    for name in (*names, "disparities", "outofframe", "flow_occlusions"):
-        (folder / name / "post_box").mkdir(parents=True)
-    for left, right in zip(of(dataset, "left"), of(dataset, "right"), strict=True):
-        png = f"post_box/frame_{left.instant + 1:04d}.png"
-        for name, sample in ((n, right if n.endswith("right") else left) for n in names[:6]):
-            Image.fromarray(sample.rgb).save(folder / name / png)
-        write_disparity(folder / "disparities" / png, left.disparity)
-        write_mask(folder / "occlusions" / png, left.disparity_state == 1)
-        write_mask(folder / "outofframe" / png, left.disparity_state == 2)
-        if left.instant < FRAMES - 1:
-            write_flo((folder / "flow" / png).with_suffix(".flo"), flow_of(left))
-            write_mask(folder / "flow_occlusions" / png, (left.flow_state > 0) & (left.flow_state < 4))
-            write_mask(folder / "invalid" / png, left.flow_state == 4)
-    return root
-
-
-def test_torchvision_reads_the_flow(dataset, sintel):
-    found = torchvision_datasets().Sintel(sintel, split="train", pass_name="clean")
-    left = of(dataset, "left")
-    assert len(found) == FRAMES - 1
-    for a, b, item in zip(left[:-1], left[1:], found, strict=True):
-        first, second, flow = item
-        assert np.array_equal(np.asarray(first), a.rgb) and np.array_equal(np.asarray(second), b.rgb)
-        assert np.array_equal(flow.transpose(1, 2, 0), flow_of(a)) and (np.abs(flow) < 1e9).mean() > 0.9
-
-
-def test_torchvision_reads_disparity_and_its_occlusions(dataset, sintel):
-    found = torchvision_datasets().SintelStereo(sintel, pass_name="both")
-    pairs = list(zip(of(dataset, "left"), of(dataset, "right"), strict=True))
-    assert len(found) == 2 * FRAMES
-    hidden = 0
-    for (left, right), (seen_left, seen_right, disparity, valid) in zip(2 * pairs, found, strict=True):
-        assert np.array_equal(np.asarray(seen_left), left.rgb) and np.array_equal(np.asarray(seen_right), right.rgb)
-        assert np.abs(disparity[0] - left.disparity).max() <= 2**-15
-        assert np.array_equal(valid, left.disparity_state == 0)
-        hidden += (left.disparity_state == 1).sum()
-    assert hidden > 100
-
-
-def test_ptlflow_reads_flow_and_occlusions(dataset, sintel, tmp_path):
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        torchvision_datasets()
-        datasets = pytest.importorskip("ptlflow.data.datasets")
-    root = tmp_path / "MPI-Sintel"
-    (root / "training").mkdir(parents=True)
-    for name in ("clean", "final", "flow", "invalid"):
-        (root / "training" / name).symlink_to(sintel / "Sintel" / "training" / name)
-    (root / "training" / "occlusions").symlink_to(sintel / "Sintel" / "training" / "flow_occlusions")
-    found = datasets.SintelDataset(root, split="trainval", pass_names="clean", get_occlusion_mask=True)
-    left = of(dataset, "left")
-    assert len(found) == FRAMES - 1
-    for a, item in zip(left[:-1], (found[i] for i in range(len(found))), strict=True):
-        flow, known = np.asarray(item["flows"][0]), a.flow_state < 4
-        assert np.array_equal(flow[known], a.flow[known])
-        occluded = np.asarray(item["occs"][0])[..., 0] > 0
-        assert np.array_equal(occluded, (a.flow_state > 0) & known)
 
 
 def tapvid():

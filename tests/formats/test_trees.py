@@ -72,6 +72,7 @@ def test_an_export_is_proved(exported, name, world, request):
         assert remarks(request.getfixturevalue(world), name, folder) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", FORMATS)
 def test_what_is_changed_is_found(exported, name, request, tmp_path):
     """A file of each kind, which is cut, changed in one byte, missing, or too many."""

@@ -51,3 +51,10 @@ def plain_names(scope: Scope, allowed: str = r"[^\s]+") -> Iterator[str]:
     for category in scope.categories:
         if not re.fullmatch(allowed, category.name):
             yield f"expected names of categories that match {allowed}; found {category.name!r}"
+
+
+def no_skew(scope: Scope) -> Iterator[str]:
+    """Of a format whose camera matrices are two focal lengths and a principal point."""
+    for sensor in () if scope.rig is None else scope.rig.sensors:
+        if sensor.lidar is None and sensor.intrinsics.skew != 0:
+            yield f"expected cameras without skew; found {sensor.intrinsics.skew:g} of {sensor.name}"

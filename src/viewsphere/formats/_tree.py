@@ -38,13 +38,14 @@ class File:
 @dataclass(frozen=True)
 class Piece:
     """The next bytes of a section of a file that many samples, or all, have parts in; `between` stands before all but the
-    first.
+    first. `count`: how many of what the section holds they are.
     """
 
     path: str
     data: bytes
     section: str = ""
     between: bytes = b""
+    count: int = 1
 
 
 def line(path: str, *values: object) -> Piece:
@@ -96,7 +97,7 @@ class Tree:
         yield from ()
 
     def layout(self, path: str, counts: Mapping[str, int]) -> Layout:
-        """How a file is put together; `counts` are the numbers of its sections' pieces."""
+        """How a file is put together; `counts` are the numbers of what its sections hold."""
         return LIST if path.endswith(".json") else LINES
 
     def notes(self) -> Iterator[str]:
@@ -190,7 +191,7 @@ def _assemble(tree: Tree, path: str, sections: Mapping[str, _Section], file: Pat
 
 @dataclass
 class _Section:
-    """The pieces of a section, one after another, and how many there are."""
+    """The pieces of a section, one after another, and how many things they are."""
 
     file: Path
     count: int = 0
@@ -212,7 +213,7 @@ class _Collected:
             section = sections[piece.section]
             with section.file.open("ab") as file:
                 file.write(piece.between + piece.data if section.count else piece.data)
-            section.count += 1
+            section.count += piece.count
 
 
 def _different(wanted: Path, found: Path) -> Iterator[Remark]:
