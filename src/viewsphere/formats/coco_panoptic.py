@@ -1,4 +1,4 @@
-"""COCO panoptic segmentation: every pixel is of one segment, a thing or stuff; read by panopticapi, datumaro and Detectron2.
+"""COCO panoptic segmentation: every pixel is of one segment, a thing or stuff; read by panopticapi, datumaro and trainers.
 
     annotations/panoptic_<split>.json            images, annotations with `segments_info`, categories
     annotations/panoptic_<split>/<image id>.png  segments' ids as colours: id = R + 256 G + 65536 B
@@ -36,7 +36,7 @@ from viewsphere.store import Dataset
 CHANNELS = ("rgb", "panoptic")
 CREDITS = False
 HOLDS = ("panoptic masks", "boxes")
-READ_BY = ("panopticapi", "datumaro", "Detectron2")
+READ_BY = ("panopticapi", "datumaro")
 
 KINDS = (".png", ".jpg")
 
