@@ -75,8 +75,8 @@ class Nocs(Tree):
         stem = f"real/{split}/{scene}/{number:04d}"
         yield File(f"{stem}_color.png", picture(sample, ".png"))
         yield File(f"{stem}_depth.png", depth_png(sample, MILLIMETRE))
-        yield File(f"{stem}_mask.png", Coded(sample.index, f"ids {BACKGROUND}.png", lambda: encode_png(_mask(sample))))
-        yield File(f"{stem}_coord.png", Coded(sample.index, "nocs.png", lambda: encode_png(_coord(sample))))
+        yield File(f"{stem}_mask.png", Coded(sample.index, "nocs mask.png", lambda: encode_png(_mask(sample))))
+        yield File(f"{stem}_coord.png", Coded(sample.index, "nocs coord.png", lambda: encode_png(_coord(sample))))
         yield File(f"{stem}_meta.txt", _meta(sample).encode())
         yield File(f"gts/real_{split}/results_real_{split}_{scene}_{number:04d}.pkl", _portable(_poses(sample)))
 
