@@ -103,7 +103,7 @@ class Mot(Tree):
 def _columns(sample: Sample, o: ObjectAnnotation, x0: float, y0: float, x1: float, y1: float) -> tuple[int | str, ...]:
     """A line's values; of a box (half-open corners) with origin 0."""
     box = (f"{value:.10g}" for value in (x0 + 1, y0 + 1, x1 - x0, y1 - y0))
-    return (sample.instant + 1, o.id, *box, 1, o.category_id, f"{o.visibility:.6g}")
+    return (sample.instant + 1, o.id, *box, 1, o.category_id, f"{o.visibility:.10g}")
 
 
 preparer, writer, verify = functions(Mot)
