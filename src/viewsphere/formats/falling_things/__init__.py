@@ -52,6 +52,7 @@ from viewsphere.formats._pictures import depth_png, picture, png
 from viewsphere.formats._refusals import pinhole
 from viewsphere.formats._tree import File, Layout, Piece, Tree, functions
 from viewsphere.formats.falling_things.entries import annotation, box_of, camera_data, class_of, lens_settings, model_settings
+from viewsphere.model.channel import missing
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.rig import Rig
 from viewsphere.model.sample import Sample
@@ -107,7 +108,9 @@ class FallingThings(Tree):
         self._lenses = [(side, lenses[name]) for name, side in self._sides.items()]
 
     def of(self, sample: Sample) -> Iterator[File | Piece]:
-        """A camera's picture, depth, classes and objects."""
+        """A camera's picture, depth, classes and objects; raises UserError where an imported picture lacks a channel."""
+        for name in missing(CHANNELS, sample.channels):
+            raise UserError(f"frame {sample.index}: expected channel {name}; found none")
         number = sample.instant if sample.sequence else sample.index - (sample.taken.sensor if sample.taken else 0)
         folder = self._folder(sample, number)
         side = self._sides.get(sample.sensor, "left")
