@@ -31,6 +31,9 @@ canvas of three times the picture's width and height, and boxes in scene_gt_info
 are exact. bbox_obj of an object that reaches out of the picture may be a pixel off; where it reaches behind the camera, it is
 the box of what lies in the picture. bop_toolkit's readers of masks fail at pictures without objects.
 
+Trees of scenes are imported, others' too, with what of this they have; models are not, and an import that is exported again has
+its objects' numbers, and an empty models_info.json.
+
 Lost: looks and parts of models (PLY files have no colours), categories but for dataset_info.json, names of sensors and
 sequences, times. Models that deform are refused. There is no models_eval: the toolkit's remesh script makes it.
 Source: Hodan et al., BOP: Benchmark for 6D Object Pose Estimation (ECCV 2018), https://bop.felk.cvut.cz, and
@@ -63,6 +66,7 @@ from viewsphere.formats.bop.entries import (
 )
 from viewsphere.formats.bop.models import facts, ply
 from viewsphere.formats.bop.options import Options as Options
+from viewsphere.formats.bop.reading import read as read
 from viewsphere.model.sample import Sample
 from viewsphere.store import Dataset
 

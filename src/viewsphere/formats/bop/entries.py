@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -9,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewsphere.codecs.png_tiff import encode_png
+from viewsphere.errors import UserError
 from viewsphere.formats._contents import Coded
 from viewsphere.formats._pictures import depth_steps
 from viewsphere.geometry.mask import decode_rle, rle_area, rle_box, rle_runs
@@ -62,20 +65,34 @@ def depth_file(sample: Sample, scale: float) -> Coded:
     return Coded(sample.index, f"bop depth {scale!r}.png", lambda: encode_png(depth(sample, scale)))
 
 
-def entries(sample: Sample, numbers: dict[str, int], scale: float) -> list[Entry]:
-    """All objects that have pixels in the picture, seen or hidden."""
+def entries(sample: Sample, numbers: Mapping[str, int], scale: float) -> list[Entry]:
+    """All objects that have pixels in the picture, seen or hidden; raises UserError where an imported picture lacks depth, or
+    an object its whole mask.
+    """
+    if "depth" not in sample.channels:
+        raise UserError(f"frame {sample.index}: expected channel depth; found none")
     valid = depth(sample, scale) > 0
-    shown = ((o, rle_area(sample.height, sample.width, o.amodal.counts)) for o in sample.objects)
+    listed = ((o, inside) for o in sample.objects if (inside := _inside(sample, o)))
     return [
-        Entry(pose(o, numbers[o.key]), _info(o, inside, valid, sample.width, sample.height), o.amodal, o.rle)
-        for o, inside in shown
-        if inside
+        Entry(pose(o, numbers), _info(o, inside, valid, sample.width, sample.height), o.amodal, o.rle) for o, inside in listed
     ]
 
 
-def pose(o: ObjectAnnotation, number: int) -> dict[str, Any]:
-    """An object's pose in the camera, in mm."""
+def _inside(sample: Sample, o: ObjectAnnotation) -> int:
+    """Number of an object's pixels in the picture, hidden ones too; raises UserError where nobody knows."""
+    whole: Rle | None = getattr(o, "amodal", None)
+    inside = 0 if whole is None else rle_area(whole.height, whole.width, whole.counts)
+    if whole is None or (inside and math.isnan(o.visibility + o.truncation)):
+        raise UserError(
+            f"bop: expected whole masks and visibility of all objects; found none of {o.id} in frame {sample.index}"
+        )
+    return inside
+
+
+def pose(o: ObjectAnnotation, numbers: Mapping[str, int]) -> dict[str, Any]:
+    """An object's pose in the camera, in mm; an imported one keeps its number."""
     m = o.camera_from_object
+    number = numbers[o.key] if o.key in numbers else (o.source or {})["obj_id"]
     return {"cam_R_m2c": m[:3, :3].ravel().tolist(), "cam_t_m2c": (m[:3, 3] * MM).tolist(), "obj_id": number}
 
 
