@@ -7,19 +7,14 @@ from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from viewsphere.errors import UserError
 from viewsphere.formats import Scope
-from viewsphere.geometry.rotation import compose, product, rigid, transform
+from viewsphere.formats._mounting import CAMERA_FROM_LIDAR, Float, centred, measured, mounted, pointless, unmoved
+from viewsphere.geometry.rotation import compose, product, transform
 from viewsphere.model.rig import Rig
 from viewsphere.model.sample import Box, ObjectAnnotation, Sample
 from viewsphere.model.shot import Shot
-
-Float = NDArray[np.float64]
-
-CAMERA_FROM_LIDAR = np.array([[0.0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0], [0, 0, 0, 1]])
-"""From a LiDAR's axes (x ahead, y left, z up) to those of a camera that stands and looks as it does."""
 
 
 class Car(NamedTuple):
@@ -42,7 +37,8 @@ def car_of(rig: Rig) -> Car | None:
 
 
 def other_cars(scope: Scope) -> Iterator[str]:
-    """Why a data set's rig is no car of KITTI's."""
+    """Why a data set's rig is no car of KITTI's, or has none of its points."""
+    yield from pointless(scope)
     if scope.rig is not None and car_of(scope.rig) is None:
         found = ", ".join(sensor.name for sensor in scope.rig.sensors)
         yield f"expected a camera or a rectified pair, and one LiDAR at most; found {found}"
@@ -70,27 +66,9 @@ def calibration(shot: Shot, instant: int, car: Car) -> Mapping[str, Float]:
     return {"P0": two, "P1": three, "P2": two, "P3": three, "velo": velo[:3]}
 
 
-def mounted(rig: Rig, sensor: int) -> Float:
-    """The rigid matrix (4, 4) from the axes of a sensor, by its place in the rig, to those of the first; OpenCV axes."""
-    return np.array(rig.sensors[sensor].rig_from_sensor, np.float64)
-
-
-def unmoved(matrix: Float) -> Float:
-    """The inverse of a rigid matrix (4, 4)."""
-    turn = np.ascontiguousarray(matrix[:3, :3].T)
-    return rigid(turn, -transform(turn, matrix[:3, 3]))
-
-
 def _along(left: Float, right: Float) -> float:
     """How far the right camera stands along the left one's x axis."""
     return float(transform(left[:3, :3].T, right[:3, 3] - left[:3, 3])[0])
-
-
-def centred(matrix: Float) -> Float:
-    """A camera matrix K (3, 3) whose origin is the centre of the first pixel, of one whose origin is the picture's corner."""
-    moved = np.array(matrix)
-    moved[:2, 2] -= 0.5
-    return moved
 
 
 def printed(values: Float) -> str:
@@ -106,7 +84,7 @@ def calibration_text(calibrated: Mapping[str, Float], *others: tuple[str, Float]
 
 def velodyne(sample: Sample) -> bytes:
     """The points of a LiDAR, four float32 each: x ahead, y left, z up (metres), and intensity."""
-    points = sample.channels["lidar"]
+    points = measured(sample)
     return np.column_stack([points["xyz"], points["intensity"]]).astype("<f4").tobytes()
 
 

@@ -202,6 +202,7 @@ class _Collected:
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
+        self._count = 0
         self.files: dict[str, dict[str, _Section]] = {}
 
     def add(self, pieces: Iterable[Piece]) -> None:
@@ -209,7 +210,8 @@ class _Collected:
         for piece in pieces:
             sections = self.files.setdefault(piece.path, {})
             if piece.section not in sections:
-                sections[piece.section] = _Section(self._folder / f"{len(self.files)}-{len(sections)}")
+                self._count += 1
+                sections[piece.section] = _Section(self._folder / str(self._count))
             section = sections[piece.section]
             with section.file.open("ab") as file:
                 file.write(piece.between + piece.data if section.count else piece.data)

@@ -45,7 +45,6 @@ from viewsphere.errors import UserError
 from viewsphere.formats import Scope
 from viewsphere.formats._kitti import (
     Car,
-    Float,
     calibration,
     calibration_text,
     car_in,
@@ -54,6 +53,7 @@ from viewsphere.formats._kitti import (
     upright,
     velodyne,
 )
+from viewsphere.formats._mounting import Float
 from viewsphere.formats._pictures import picture
 from viewsphere.formats._refusals import pinhole, plain_names, sequences
 from viewsphere.formats._timeline import Timeline

@@ -1,5 +1,5 @@
-"""KITTI's odometry benchmark: sequences of one camera or a rectified pair, their poses and a LiDAR's points; pykitti and code for
-odometry and SLAM read it.
+"""KITTI's odometry benchmark: sequences of one camera or a rectified pair, their poses and a LiDAR's points; pykitti and code
+for odometry and SLAM read it.
 
     sequences/<NN>/image_2/<frame>.png     the pictures of the left or only camera; image_3: those of the right one
     sequences/<NN>/velodyne/<frame>.bin    where there is a LiDAR: its points, float32 x (ahead) y (left) z (up) intensity
@@ -28,16 +28,14 @@ from viewsphere.errors import UserError
 from viewsphere.formats import Scope
 from viewsphere.formats._kitti import (
     Car,
-    Float,
     calibration,
     calibration_text,
     car_in,
-    mounted,
     other_cars,
     printed,
-    unmoved,
     velodyne,
 )
+from viewsphere.formats._mounting import Float, mounted, unmoved
 from viewsphere.formats._pictures import picture
 from viewsphere.formats._refusals import pinhole, sequences
 from viewsphere.formats._timeline import Timeline
