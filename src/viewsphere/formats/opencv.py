@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from viewsphere.errors import UserError
 from viewsphere.formats import Scope
-from viewsphere.formats._cameras import Rigs, known_cameras, unskewed
+from viewsphere.formats._cameras import Rigs, unskewed
 from viewsphere.formats._tree import File, Tree, functions
 from viewsphere.geometry.rotation import product, rotation_vector, transform
 from viewsphere.model.camera import Distortion, Intrinsics
@@ -43,8 +43,7 @@ Value = int | NDArray[np.float64]
 
 
 def refuses(scope: Scope) -> Iterator[str]:
-    """Unknown cameras and skew."""
-    yield from known_cameras(scope)
+    """Skew."""
     yield from unskewed(scope)
 
 

@@ -32,7 +32,7 @@ from pydantic import Field
 
 from viewsphere.errors import UserError
 from viewsphere.formats import Scope
-from viewsphere.formats._cameras import Rigs, known_cameras, measured_png, unskewed, world_from_camera, world_of
+from viewsphere.formats._cameras import Rigs, measured_png, unskewed, world_from_camera, world_of
 from viewsphere.formats._pictures import picture
 from viewsphere.formats._refusals import pinhole
 from viewsphere.formats._tree import File, Layout, Piece, Tree, functions, line
@@ -68,8 +68,7 @@ class Options(Frozen):
 
 
 def refuses(scope: Scope, options: Options) -> Iterator[str]:
-    """Unknown cameras and lenses that a line of numbers does not hold."""
-    yield from known_cameras(scope)
+    """Lenses that a line of numbers does not hold."""
     yield from unskewed(scope)
     if options.kind == "icl-nuim":
         yield from pinhole(scope)
@@ -91,7 +90,7 @@ class Tum(Tree):
         lens, now, world = sample.camera.intrinsics, self._rigs.at(sample), world_of(self.dataset, sample)
         if lens.skew or not _is_held(lens):
             raise UserError(f"tum: frame {sample.index}: expected a lens of k1 k2 p1 p2 k3; found another")
-        folder = f"{world}/{now.names[now.sensor]}" if len(now.names) > 1 else world
+        folder = f"{world}/{now.folder}" if now.folder else world
         number = sample.instant if sample.sequence else sample.index
         stamp = str(number) if self._mirrored else f"{sample.time if sample.sequence else number:.6f}"
         between = self.stem(sample).partition("/")[2].rpartition("/")[0]
