@@ -17,9 +17,10 @@ from proven import close, equal
 from small import small_recipe
 from truth_scenes import LENSES
 from viewsphere import Dataset, generate
-from viewsphere.errors import UserError
+from viewsphere.errors import StoreError, UserError
 from viewsphere.geometry.camera import project
 from viewsphere.run.exporting import export
+from viewsphere.run.importing import import_dataset
 
 
 def written(dataset, place, **options):
@@ -192,3 +193,73 @@ def test_what_it_refuses(lens, options, message, tmp_path):
     with pytest.raises(UserError, match=f"format nerfstudio: .*{message}"):
         written(dataset, tmp_path / "made", **options)
     assert not (tmp_path / "made").exists()
+
+
+@pytest.mark.parametrize("kind", ["nerfstudio", "instant-ngp", "nerf-synthetic"])
+def test_a_world_comes_in_as_it_went_out(stills, poses, kind, tmp_path):
+    for dataset, world in ((stills, "scene-000001"), (poses, "car_000")):
+        folder = written(dataset, tmp_path / world, kind=kind) / world
+        found = import_dataset("nerfstudio", folder, tmp_path / f"{world}-in")
+        imported = Dataset(tmp_path / f"{world}-in")
+        own = [sample for sample in dataset if dataset.plan.row_at(sample.index).subject == world]
+        assert len(imported) == len(own) > 1 and found.left_out == ()
+        for sample, was in zip(imported, own, strict=True):
+            close("nerfstudio", "import: poses", sample.camera.R, was.camera.R, atol=1e-12)
+            close("nerfstudio", "import: positions", sample.camera.center, was.camera.center, "m", atol=1e-12)
+            close("nerfstudio", "import: lenses", sample.camera.K, was.camera.K, "px", atol=1e-9)
+            equal("nerfstudio", "import: pictures", sample.rgb, was.rgb)
+            assert sample.split == (was.split if kind == "nerf-synthetic" else "train")  # a world of one split has it thrice
+            if kind != "nerf-synthetic":
+                near = was.depth < 65.5
+                close("nerfstudio", "import: depth", sample.depth[near], was.depth[near], "m", atol=0.000501)
+                assert np.isinf(sample.depth[~near]).all()
+    again = written(imported, tmp_path / "again", kind=kind)
+    first = [json.loads(min(place.rglob("transforms*.json")).read_text())["frames"] for place in (folder, again)]
+    before, after = ([frame["transform_matrix"] for frame in frames] for frames in first)
+    close("nerfstudio", "import: out again", after, before, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", ["barrel", "fisheye"])
+@pytest.mark.parametrize("kind", ["nerfstudio", "instant-ngp"])
+def test_lenses_come_in(name, kind, tmp_path):
+    bent = LENSES[name]
+    if name == "barrel" and kind == "instant-ngp":
+        bent = bent.model_copy(update={"coefficients": bent.coefficients[:4]})
+    dataset = make(tmp_path / "out", several=True, intrinsics=LENS.model_copy(update={"distortion": bent}))
+    import_dataset("nerfstudio", written(dataset, tmp_path / "made", kind=kind) / "several", tmp_path / "in")
+    for sample in Dataset(tmp_path / "in"):
+        assert sample.camera.distortion == bent
+
+
+def test_what_is_broken_is_told(poses, tmp_path):
+    folder = written(poses, tmp_path / "made") / "car_000"
+    file = folder / "transforms.json"
+    whole = json.loads(file.read_text())
+
+    def told(change):
+        data = json.loads(json.dumps(whole))
+        change(data)
+        file.unlink()
+        file.write_text(json.dumps(data))
+        with pytest.raises(StoreError) as caught:
+            import_dataset("nerfstudio", folder, tmp_path / "in")
+        assert not (tmp_path / "in").exists()
+        return str(caught.value)
+
+    def of_frame(**fields):
+        return told(lambda data: data["frames"][1].update(fields))
+
+    assert "frame number 1: expected a picture; found no images/none.png" in of_frame(file_path="images/none.png")
+    assert "frame number 1: " in of_frame(file_path="../../../etc/passwd")
+    assert "expected a picture of 161 x 120 pixels; found 160 x 120" in of_frame(w=161)
+    assert "expected a rigid pose; found another" in of_frame(transform_matrix=np.diag([2.0, 1, 1, 1]).tolist())
+    assert "expected a transform_matrix of 4 x 4; found (2, 2)" in of_frame(transform_matrix=[[1, 0], [0, 1]])
+    assert "frame number 1: found no 'file_path'" in told(lambda data: data["frames"][1].pop("file_path"))
+    assert "expected lenses without k4; found 0.5" in of_frame(k4=0.5)
+    assert "expected a camera_model of OPENCV, " in told(lambda data: data.update(camera_model="EQUIRECTANGULAR"))
+    assert "expected a mapping with a list of frames" in told(lambda data: data.pop("frames"))
+    file.write_text(json.dumps({**whole, "frames": [7, *whole["frames"]]}))
+    found = import_dataset("nerfstudio", file, tmp_path / "in", keep_going=True)
+    assert found.count == 4 and len(found.left_out) == 1
+    with pytest.raises(StoreError, match=r"expected transforms\.json, or transforms_train\.json; found neither"):
+        import_dataset("nerfstudio", tmp_path, tmp_path / "none")

@@ -48,7 +48,7 @@ def test_exports_of_few_channels_are_those_of_many(tmp_path, tmp_path_factory):
     whole = Dataset(rendered("stills", shared_place(tmp_path_factory)))
     generate(stills(channels=["rgb"], annotations=[]), tmp_path / "few")
     for root, place in ((whole.root, "whole"), (tmp_path / "few", "computed")):
-        export(root, [{"yolo": {"task": "pose"}}, "ply"], output=tmp_path / place)
+        export(root, [{"yolo": {"task": "pose"}}, "pointcloud"], output=tmp_path / place)
     pairs = [(file, tmp_path / "computed" / file.relative_to(tmp_path / "whole"))
              for file in (tmp_path / "whole").rglob("*.txt")]  # fmt: skip
     assert len(pairs) == len(whole)

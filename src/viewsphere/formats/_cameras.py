@@ -28,12 +28,6 @@ POINTS = 500
 """Points that are taken of a picture, about."""
 
 
-def known_cameras(scope: Scope) -> Iterator[str]:
-    """Of a format of cameras."""
-    if scope.rig is None:
-        yield "expected pictures whose cameras are known; found imported ones"
-
-
 def unskewed(scope: Scope) -> Iterator[str]:
     """Of a format whose pixels have right angles."""
     for sensor in () if scope.rig is None else scope.rig.sensors:
@@ -64,7 +58,8 @@ def opengl_pose(camera: Camera) -> Float:
 @dataclass(frozen=True, eq=False)
 class Moment:
     """A rig when it takes a sample: names, lenses and `rig_from_sensor`, (4, 4), of its sensors, which of these the sample is
-    of, those of which there are samples, the number of the first of all, and the rig's own pose, as that of a camera.
+    of, those of which there are samples, the number of the first of all, and the rig's own pose, as that of a camera. `folder`
+    is where files of several sensors are told apart, empty where there is one.
     """
 
     names: tuple[str, ...]
@@ -74,6 +69,7 @@ class Moment:
     there: tuple[int, ...]
     first: int
     pose: Camera
+    folder: str
 
     @property
     def is_first(self) -> bool:
@@ -106,7 +102,8 @@ class Rigs:
         shot = taken.shot or self._shot(taken.key) if taken else None
         if taken is None or shot is None:
             camera = sample.camera
-            return Moment((CAMERA,), (camera.intrinsics,), (np.eye(4),), 0, (0,), sample.index, camera)
+            folder = "" if sample.sensor == CAMERA else sample.sensor
+            return Moment((sample.sensor,), (camera.intrinsics,), (np.eye(4),), 0, (0,), sample.index, camera, folder)
         sensors, first = shot.rig.sensors, sample.index - taken.sensor
         return Moment(
             tuple(sensor.name for sensor in sensors),
@@ -116,6 +113,7 @@ class Rigs:
             tuple(self._dataset.choice.places(first, len(sensors))),
             first,
             shot.camera(taken.instant),
+            sensors[taken.sensor].name if len(sensors) > 1 else "",
         )
 
 

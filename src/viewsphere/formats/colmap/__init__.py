@@ -30,7 +30,7 @@ import numpy as np
 from pydantic import Field
 
 from viewsphere.formats import Scope
-from viewsphere.formats._cameras import Moment, Rigs, known_cameras, unskewed, world_of
+from viewsphere.formats._cameras import Moment, Rigs, unskewed, world_of
 from viewsphere.formats._pictures import picture, suffix_of
 from viewsphere.formats._tree import File, Layout, Piece, Tree, functions
 from viewsphere.formats.colmap.points import Sights
@@ -55,8 +55,7 @@ class Options(Frozen):
 
 
 def refuses(scope: Scope, options: Options) -> Iterator[str]:
-    """Unknown cameras, skew, and splits that are called like a model's files."""
-    yield from known_cameras(scope)
+    """Skew, and splits that are called like a model's files."""
     yield from unskewed(scope)
     for name in (name for name in scope.splits if name in KINDS):
         yield f"expected splits of other names than {', '.join(KINDS)}; found {name}"
@@ -75,8 +74,7 @@ class Colmap(Tree):
         now, world, own = self._rigs.at(sample), world_of(self.dataset, sample), sample.index + 1
         part = self.dataset.plan.part_of(sample.index)
         name = self.stem(sample).partition("/")[2] + suffix_of(sample, ".png", ".jpg")
-        if len(now.names) > 1:
-            name = f"{now.names[now.sensor]}/{name}"
+        name = f"{now.folder}/{name}" if now.folder else name
         yield File(f"{world}/images/{name}", picture(sample, ".png", ".jpg"))
         sparse = f"{world}/sparse/0"
         yield Piece(f"{sparse}/{sample.split or 'all'}.txt", f"{name}\n".encode())

@@ -39,11 +39,12 @@ from viewsphere.codecs.ply import ply_head
 from viewsphere.codecs.png_tiff import encode_png
 from viewsphere.errors import UserError
 from viewsphere.formats import Scope
-from viewsphere.formats._cameras import Rigs, known_cameras, measured_png, opengl_pose, points_of, world_of
+from viewsphere.formats._cameras import Rigs, measured_png, opengl_pose, points_of, world_of
 from viewsphere.formats._contents import Coded
 from viewsphere.formats._pictures import picture, suffix_of
 from viewsphere.formats._tree import File, Layout, Piece, Tree, functions, item
 from viewsphere.formats.nerfstudio.lenses import SYNTHETIC, lens_problem, model_of, said_of
+from viewsphere.formats.nerfstudio.reading import read as read
 from viewsphere.formats.nerfstudio.synthetic import SPLITS, synthetic_files, synthetic_layout
 from viewsphere.model.frozen import Frozen
 from viewsphere.model.sample import Sample
@@ -73,8 +74,7 @@ def needs(options: Options) -> tuple[str, ...]:
 
 
 def refuses(scope: Scope, options: Options) -> Iterator[str]:
-    """Unknown cameras and lenses that are not in the files' words."""
-    yield from known_cameras(scope)
+    """Lenses that are not in the files' words."""
     if options.masks and options.kind != "nerfstudio":
         yield f"expected masks with kind nerfstudio; found {options.kind}"
     cameras = [sensor for sensor in scope.rig.sensors if sensor.lidar is None] if scope.rig else []
@@ -99,7 +99,7 @@ class Nerfstudio(Tree):
         if problem:
             raise UserError(f"nerfstudio: frame {sample.index}: {problem}")
         stem = self.stem(sample).partition("/")[2]
-        stem = f"{now.names[now.sensor]}/{stem}" if len(now.names) > 1 else stem
+        stem = f"{now.folder}/{stem}" if now.folder else stem
         if self._kind == SYNTHETIC:
             yield from synthetic_files(sample, world, stem)
             return
