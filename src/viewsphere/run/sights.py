@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
@@ -170,7 +171,7 @@ class _Made:
         instant, own = other.shot.instants[at], self.shot.instants
         if any(one.index == instant.index for one in own):
             return self
-        where = 0 if place else len(own)
+        where = bisect_left(own, instant.index, key=lambda one: one.index)
 
         def inserted(values: Iterable[Any], one: Any) -> tuple[Any, ...]:
             known = tuple(values)
