@@ -43,6 +43,12 @@ class Eyes:
         rig = self._rig(sample)
         return rig.rectified[0] if rig.rectified else Pair(0, 0, 0.0)
 
+    def numbers(self, sample: Sample) -> tuple[int, int]:
+        """The number of the first sample of a sample's instant in the data set, and that of the instant before."""
+        assert sample.taken is not None
+        first = sample.index - sample.taken.sensor
+        return first, first - len(self._rig(sample).sensors)
+
     def lens(self, sample: Sample) -> Intrinsics:
         """The lens of the left eye in a sample's shot, before it zooms."""
         return self._rig(sample).sensors[self.pair(sample).left].intrinsics
