@@ -13,27 +13,33 @@ from viewsphere.model.classes import STUFF_IDS, SemanticClass
 
 @dataclass(frozen=True, eq=False)
 class Numbered:
-    """`table` (N,): numbers by the ids of classes; `own`: the names of categories that the list lacks, by their numbers."""
+    """`table` (N,): numbers by the ids of classes; `own`: names of categories that the list lacks, by numbers."""
 
     table: NDArray[np.uint8]
     own: Mapping[int, str]
 
     @classmethod
     def of(
-        cls, classes: Iterable[SemanticClass], stuff: Mapping[str, int], things: Mapping[str, int], rest: int, first: int | None
+        cls,
+        classes: Iterable[SemanticClass],
+        stuff: Mapping[str, int],
+        things: Mapping[str, int],
+        other: int,
+        *,
+        counted: bool = True,
     ) -> Numbered:
-        """Of a data set's classes. `stuff`, `things`: numbers by names, whatever their case and whether words are joined; other
-        stuff is `rest`, and so are other things where `first` is None; else they are counted from there.
+        """Of a data set's classes. `stuff`, `things`: numbers by names, those of things as `plain` has them; other stuff is 0.
+        Other things are `other`, or, `counted`, are numbered from there on.
         """
-        numbers = {0: rest} | {i: stuff.get(name, rest) for name, i in STUFF_IDS.items()}
+        numbers = {0: 0} | {i: stuff.get(name, 0) for name, i in STUFF_IDS.items()}
         own = dict[int, str]()
         for one in classes:
             if one.is_thing:
                 known = things.get(plain(one.name))
-                if known is None and first is not None:
-                    known = first + len(own)
+                if known is None:
+                    known = other + len(own) * counted
                     own[known] = one.name
-                numbers[one.id] = rest if known is None else known
+                numbers[one.id] = known
         table = np.zeros(max(numbers) + 1, np.uint8)
         table[list(numbers)] = list(numbers.values())
         return cls(table, own)

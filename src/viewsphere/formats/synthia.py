@@ -151,7 +151,7 @@ class Synthia(Tree):
         self._rand = options.layout == "rand"
         light = LIGHTS[options.layout]
         things = {**THINGS, "trafficlight": light}
-        self._numbered = Numbered.of(dataset.classes, STUFF, things, 0, light + 1)
+        self._numbered = Numbered.of(dataset.classes, STUFF, things, light + 1)
         self._names, self._colors = _named(self._numbered, dataset.classes, light)
         self._eyes = None if self._rand else Eyes(dataset)
 
